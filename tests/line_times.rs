@@ -174,10 +174,29 @@ fn tables_that_are_none_are_refused() {
     );
     let nowhere = refused(20, &[piece(0, 0.0, 0.01), piece(10, f64::NAN, 0.01)]);
     assert!(matches!(nowhere, LineTimesError::Overlap { piece: 2, .. }));
-    // ET is rounded: what begins within a microsecond follows at once.
-    let times =
-        LineTimes::of_pieces(20, &[piece(0, 0.0, 0.01), piece(10, 0.099_999_9, 0.01)]).unwrap();
-    assert!((times.seconds(10.0) - 0.1).abs() < 1e-12); // seconds, rounding
+}
+
+/// ET is rounded: what begins within a microsecond of the end of the piece before follows at once, however many do.
+#[test]
+fn pieces_that_overlap_by_rounding_follow_each_other() {
+    let early_s = [0.0, 4e-7, -4e-7];
+    for early_s in early_s {
+        let pieces = (0..300_u32).map(|index| {
+            let after_s = f64::from(index) * (0.1 - early_s);
+            piece(10 * index, after_s, 0.01)
+        });
+        let pieces: Vec<LinePiece> = pieces.collect();
+        let times = LineTimes::of_pieces(3000, &pieces).unwrap();
+        for piece in pieces {
+            let first = f64::from(piece.first_line);
+            let expected_s = piece.start.since(start());
+            // Seconds: the rounding of ET, which does not add up.
+            assert!((times.seconds(first) - expected_s).abs() < 2e-8);
+            assert!((times.seconds(first - 1e-6) - expected_s).abs() < 2e-8);
+        }
+    }
+    let overlap = [piece(0, 0.0, 0.01), piece(10, 0.1 - 2e-6, 0.01)];
+    assert!(LineTimes::of_pieces(20, &overlap).is_err());
 }
 
 /// An image of the scene as a camera would have taken it that changes its exposure: fine lines first, coarse ones

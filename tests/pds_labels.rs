@@ -2,7 +2,7 @@
 
 mod common;
 
-use areograph::{config::built_in_instruments, image::ImageFields, pds::moc::read_label};
+use areograph::{config::built_in_instruments, image::ImageFields, pds::read_label};
 use common::real_data;
 
 /// All three images were exposed for 0.4821 ms a line.

@@ -220,7 +220,7 @@ fn image_starts_are_the_published_times_to_the_clock_tick() {
     let session = MISSION.session("nav.tm");
     for image in MISSION.truth["images"].as_array().unwrap() {
         let id = image["id"].as_str().unwrap();
-        let label = areograph::pds::moc::read_label(
+        let label = areograph::pds::read_label(
             &MISSION.path(&format!("labels/{id}.lbl")),
             built_in_instruments(),
         )
@@ -261,7 +261,7 @@ fn the_images_are_flown_as_table_2_prints_them() {
         // Degrees: two of the nadir images are printed to a tenth, and one mounting serves all.
         assert!((flown_deg - emission_deg).abs() < 0.06, "{id}: {flown_deg}");
         let path = MISSION.path(&format!("labels/{id}.lbl"));
-        let label = areograph::pds::moc::read_label(&path, built_in_instruments()).unwrap();
+        let label = areograph::pds::read_label(&path, built_in_instruments()).unwrap();
         let fields = &label.fields;
         assert_eq!(fields.downtrack_summing, Some(sum), "{id}");
         assert_eq!(fields.lines_header, Some(header_lines), "{id}");

@@ -40,13 +40,15 @@ pub(super) const IMAGES: Many = Many {
 declare_table! {
     /// Images, none to many: a label, the keys below, or both; keys written here win over the label. Or support data.
     pub struct ImageConfig: Deserialize {
-        /// Identifier, unique in the site; also the name of a folder. One that begins with a MOC product, such
-        /// as `E02-02855` or `m0402852_part`, is for the label of that product only.
+        /// Identifier, unique in the site; also the name of a folder. One that begins with a product, such as `E02-02855`,
+        /// `m0402852_part` or `h5270_0000_ir2`, is for the label of that product only.
         id: String = key(identifier())
             .required()
             .example(r#""E02-02855""#)
             .example_in(1, r#""M04-02852""#),
-        /// PDS3 or ISIS label, attached or detached.
+        /// PDS3 or ISIS label, attached or detached. Of HRSC on Mars Express the file of the archive at level 2 (`h….img`), whose
+        /// rows hold the times of their lines, with `instrument`; a label alone needs `exposures` beside it. Where such a file
+        /// has fewer samples than the detector has pixels, it needs `first_detector`: ISIS and ALE take pixel 0.
         #[serde(skip)]
         label: Option<PathBuf> = key(FILE).example(r#""../labels/e0202855.lbl""#),
         /// The image itself (.imq, .img, .cub, TIFF, PNG), which may be the label's file. The report shows footprints and tie
@@ -63,9 +65,9 @@ declare_table! {
         /// shots that were fired while the image was exposed are measured from them. With support data alone.
         has_laser: bool = key(Switch).or(false).unused("true"),
         /// The camera: `moc_na`, `moc_wa_red`, `moc_wa_blue`; a line of HRSC on Mars Express: `hrsc_nd`, `hrsc_s1`, `hrsc_s2`,
-        /// `hrsc_p1`, `hrsc_p2`, `hrsc_ir`, `hrsc_gr`, `hrsc_bl`, `hrsc_re`, whose images have the keys below and no label; or
-        /// the path of an instrument file like those in `config/instruments`. Without it, the camera that the label names,
-        /// and without a label `moc_na`. Clock, orbit and attitude are those of the spacecraft that carries it.
+        /// `hrsc_p1`, `hrsc_p2`, `hrsc_ir`, `hrsc_gr`, `hrsc_bl`, `hrsc_re`, which no label can do without; or the path of an
+        /// instrument file like those in `config/instruments`. Without it, the camera of MOC that the label names, and without
+        /// a label `moc_na`. Clock, orbit and attitude are those of the spacecraft that carries it.
         instrument: Option<Instrument> = key(CAMERA).example(r#""moc_na""#),
         /// Its name in tie point files and in what is written for ISIS, when that is not the identifier: for a
         /// control network the ISIS serial number, in which the clock must be that of the image. Without it, the
@@ -204,7 +206,7 @@ fn is_complete(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
     }
 }
 
-/// Clock and label are those of the spacecraft that carries the camera; labels are read of one alone.
+/// The clock is that of the spacecraft that carries the camera.
 fn of_spacecraft(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
     let named = image.instrument.as_ref().map(|camera| camera.spacecraft);
     let spacecraft = named.unwrap_or(&SPACECRAFT);
@@ -214,10 +216,6 @@ fn of_spacecraft(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
             "utc_start or exposures instead: the clock in labels of {of} lies seconds from its clock kernels"
         );
         keys.refuse("sclk_start", expected);
-    }
-    if !spacecraft.has_laser() {
-        let expected = format!("the keys of the image instead: labels of {of} are not read");
-        keys.refuse("label", expected);
     }
 }
 

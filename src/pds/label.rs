@@ -83,6 +83,14 @@ pub enum LabelError {
         /// What it should be.
         expected: &'static str,
     },
+    /// Two values that are those of two images.
+    #[error("{} is {:?}, but {} is {:?}; expected those of one image", .keys[0], .values[0], .keys[1], .values[1])]
+    Contradiction {
+        /// Their keywords.
+        keys: [String; 2],
+        /// The values.
+        values: [String; 2],
+    },
     /// Another instrument's image.
     #[error("instrument is {found:?}; expected {}", listed(known))]
     Instrument {
@@ -106,13 +114,17 @@ impl Cause for LabelError {
                 "find out which of the two holds, and leave only that in the label"
             }
             Self::OtherImage { .. } => {
-                "give the label of an image that MGS took of Mars, as its camera took it"
+                "give the label of an image that the camera's spacecraft took of Mars, as the camera took it"
             }
             Self::Value { .. } => {
                 "correct the label, or write the key in the image's table of the configuration"
             }
             Self::Instrument { .. } => {
-                "name the camera's instrument file with `instrument` in the image's table"
+                "name the camera that took it with `instrument` in the image's table: one of those that areograph knows, or an \
+                 instrument file"
+            }
+            Self::Contradiction { .. } => {
+                "check that files and labels are not exchanged or renamed; one of the two is of another image"
             }
         }
         .to_owned()

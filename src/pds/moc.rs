@@ -1,48 +1,18 @@
 //! Labels of MOC images, as archived by PDS and as ISIS writes them.
 
-use std::{fs::File, io::Read, path::Path};
-
-use super::label::{Entry, LABEL_BYTES_MAX, Label, LabelError, parse};
+use super::{
+    image_label::{
+        ImageLabel, as_taken, camera, count, either, known, of_mars, optional_count, text,
+        value_error,
+    },
+    label::{Entry, Label, LabelError},
+};
 use crate::{
-    constants::{MARS_NAME, SPACECRAFT},
-    error::{IoError, Locate, Result},
+    constants::SPACECRAFT,
     image::{CLOCK_STRING, ImageFields, is_clock_string},
-    instruments::{Instrument, LabelNames},
+    instruments::Instrument,
     units::SECONDS_PER_MS,
 };
-
-/// What the label of a MOC image says.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ImageLabel {
-    /// Product, for example `M04/02852`.
-    pub product_id: Option<String>,
-    /// The camera that took it.
-    pub instrument: Instrument,
-    /// Times, exposure, summing and size.
-    pub fields: ImageFields,
-    /// UTC of the end of the last line.
-    pub utc_stop: Option<String>,
-}
-
-/// Reads a PDS3 label (attached or detached) or an ISIS label of an image by one of `cameras`.
-///
-/// # Errors
-/// The system's refusal to read; no label, or a cut one; those of [`image_label`].
-pub fn read_label(path: &Path, cameras: &[Instrument]) -> Result<ImageLabel> {
-    let mut bytes = Vec::new();
-    File::open(path)
-        .map_err(IoError::on("open"))
-        .in_file(path)?
-        .take(LABEL_BYTES_MAX as u64)
-        .read_to_end(&mut bytes)
-        .map_err(IoError::on("read"))
-        .in_file(path)?;
-    let label = parse(&bytes).in_file(path)?;
-    if !label.ended {
-        return Err(LabelError::NoEnd).in_file(path);
-    }
-    image_label(&label, cameras).in_file(path)
-}
 
 /// The fields of a parsed label; what it does not say stays `None`.
 ///
@@ -51,12 +21,10 @@ pub fn read_label(path: &Path, cameras: &[Instrument]) -> Result<ImageLabel> {
 /// # Errors
 /// An instrument that is not among `cameras`, or none; an image of another spacecraft or target, or one that is
 /// map-projected; a value that is not of its kind, or two values under one keyword.
-pub fn image_label(
-    label: &Label,
-    cameras: &[Instrument],
-) -> std::result::Result<ImageLabel, LabelError> {
-    let instrument = camera(label, cameras)?;
-    of_mars_by_mgs(label)?;
+pub fn image_label(label: &Label, cameras: &[Instrument]) -> Result<ImageLabel, LabelError> {
+    let instrument = camera(label, cameras, ["FILTER_NAME", "FILTERNAME"])?;
+    let spacecraft = ["SPACECRAFT_NAME", "SPACECRAFTNAME"];
+    of_mars(label, spacecraft, &SPACECRAFT.label_name)?;
     as_taken(label)?;
     let size = |pds, isis| match label.only_in("IMAGE", pds)? {
         None => label.only_in("DIMENSIONS", isis),
@@ -90,6 +58,7 @@ pub fn image_label(
             first_detector,
         },
         utc_stop: text(either(label, "STOP_TIME", "STOPTIME")?),
+        lines: None,
     })
 }
 
@@ -120,146 +89,15 @@ pub fn product_named(name: &str) -> Option<String> {
 /// Mission phases that product identifiers do not count by months (as `M04`, `E02`).
 const PHASES: [&str; 5] = ["AB1", "SP1", "SP2", "FHA", "CAL"];
 
-/// Positions, attitudes and the shape of the target are those of MGS and Mars.
-fn of_mars_by_mgs(label: &Label) -> std::result::Result<(), LabelError> {
-    let required = [
-        (
-            ["SPACECRAFT_NAME", "SPACECRAFTNAME"],
-            &*SPACECRAFT.label_name,
-        ),
-        (["TARGET_NAME", "TARGETNAME"], MARS_NAME),
-    ];
-    for ([pds, isis], expected) in required {
-        if let Some(entry) = either(label, pds, isis)?
-            && !entry.value.replace('_', " ").eq_ignore_ascii_case(expected)
-        {
-            return Err(other_image(&entry.key, &entry.value, expected));
-        }
-    }
-    Ok(())
-}
-
-/// Lines and samples of a map are no places on a detector.
-fn as_taken(label: &Label) -> std::result::Result<(), LabelError> {
-    match projection(label) {
-        Some(entry) => Err(other_image(
-            "OBJECT",
-            &entry.group,
-            "the image as its camera took it, which no map projection describes",
-        )),
-        None => Ok(()),
-    }
-}
-
-/// Something of the map projection of an image that has one.
-pub(super) fn projection(label: &Label) -> Option<&Entry> {
-    let mut entries = label.entries.iter();
-    entries.find(|entry| ["IMAGE_MAP_PROJECTION", "MAPPING"].contains(&&*entry.group))
-}
-
-fn other_image(key: &str, value: &str, expected: &'static str) -> LabelError {
-    LabelError::OtherImage {
-        key: key.to_owned(),
-        value: value.to_owned(),
-        expected,
-    }
-}
-
-/// The first of `cameras` whose names the label has; a camera that is known without a filter takes any.
-fn camera<'a>(
-    label: &Label,
-    cameras: &'a [Instrument],
-) -> std::result::Result<&'a Instrument, LabelError> {
-    let value = |pds, isis| {
-        let entry = either(label, pds, isis)?;
-        Ok(entry.map_or("", |entry| entry.value.as_str()))
-    };
-    let instrument = value("INSTRUMENT_ID", "INSTRUMENTID")?;
-    let filter = value("FILTER_NAME", "FILTERNAME")?;
-    let fits = |names: &LabelNames| {
-        let own_filter = names.filter.as_deref().unwrap_or(filter);
-        names.instrument.eq_ignore_ascii_case(instrument) && own_filter.eq_ignore_ascii_case(filter)
-    };
-    let found = cameras.iter().find(|camera| fits(&camera.label));
-    found.ok_or_else(|| LabelError::Instrument {
-        found: format!("{instrument} {filter}").trim().to_owned(),
-        known: cameras
-            .iter()
-            .map(|camera| camera.label.to_string())
-            .collect(),
-    })
-}
-
-/// The entry under its PDS3 keyword or its ISIS keyword, unless it says that the value is not known.
-fn either<'a>(
-    label: &'a Label,
-    pds: &str,
-    isis: &str,
-) -> std::result::Result<Option<&'a Entry>, LabelError> {
-    let entry = match label.only(pds)? {
-        None => label.only(isis)?,
-        found => found,
-    };
-    Ok(entry.filter(|entry| known(entry)))
-}
-
-/// Whether the entry has a value and not one of the words for "none".
-fn known(entry: &Entry) -> bool {
-    !matches!(
-        entry.value.to_ascii_uppercase().as_str(),
-        "" | "UNK" | "N/A" | "NULL"
-    )
-}
-
-fn text(entry: Option<&Entry>) -> Option<String> {
-    entry.map(|entry| entry.value.clone())
-}
-
-fn error(entry: &Entry, expected: &'static str) -> LabelError {
-    LabelError::Value {
-        key: entry.key.clone(),
-        value: entry.written(),
-        expected,
-    }
-}
-
-fn count(entry: &Entry, least: u32) -> std::result::Result<u32, LabelError> {
-    entry
-        .value
-        .parse()
-        .ok()
-        .filter(|count| (least..=1_000_000).contains(count))
-        .ok_or_else(|| {
-            error(
-                entry,
-                if least == 0 {
-                    "a count from 0"
-                } else {
-                    "a count from 1"
-                },
-            )
-        })
-}
-
-fn optional_count(
-    entry: Option<&Entry>,
-    least: u32,
-) -> std::result::Result<Option<u32>, LabelError> {
-    entry
-        .filter(|entry| known(entry))
-        .map(|entry| count(entry, least))
-        .transpose()
-}
-
-fn clock(entry: &Entry) -> std::result::Result<String, LabelError> {
+fn clock(entry: &Entry) -> Result<String, LabelError> {
     let value = entry.value.clone();
     is_clock_string(&value)
         .then_some(value)
-        .ok_or_else(|| error(entry, CLOCK_STRING))
+        .ok_or_else(|| value_error(entry, CLOCK_STRING))
 }
 
 /// The exposure in seconds; the archive writes milliseconds, with or without the unit.
-fn exposure_s(entry: &Entry) -> std::result::Result<f64, LabelError> {
+fn exposure_s(entry: &Entry) -> Result<f64, LabelError> {
     const EXPECTED: &str = "milliseconds above 0, below 1000";
     let milliseconds = match entry.unit.as_deref() {
         None | Some("ms" | "msec" | "millisecond" | "milliseconds") => entry.value.parse().ok(),
@@ -268,15 +106,15 @@ fn exposure_s(entry: &Entry) -> std::result::Result<f64, LabelError> {
     milliseconds
         .filter(|ms: &f64| 0.0 < *ms && *ms < 1_000.0)
         .map(|ms| ms * SECONDS_PER_MS)
-        .ok_or_else(|| error(entry, EXPECTED))
+        .ok_or_else(|| value_error(entry, EXPECTED))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::built_in_instruments;
+    use crate::{config::built_in_instruments, pds::label::parse};
 
-    fn read(text: &str) -> std::result::Result<ImageLabel, LabelError> {
+    fn read(text: &str) -> Result<ImageLabel, LabelError> {
         image_label(&parse(text.as_bytes()).unwrap(), built_in_instruments())
     }
 

@@ -1,17 +1,15 @@
-//! Files of pixels: images as the archive has them, and what stands in for them: ISIS cubes, TIFF and PNG of one band of grey.
+//! Files of pixels: images as the archive has them, MOC's and HRSC's, and what stands in for them: ISIS cubes, TIFF and PNG of
+//! one band of grey.
 //!
 //! All of them are read strip by strip, in 8 bits. Numbers of other kinds are shown between the least and the largest one.
 
 mod cube;
 mod pictures;
+mod prefixed;
 mod pyramid;
 mod rows;
 
-use std::{
-    fs::File,
-    io::Read as _,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 pub use self::pyramid::Pyramid;
 use self::{
@@ -20,9 +18,12 @@ use self::{
     rows::{Rows, Scale},
 };
 use super::{
+    hrsc::{Raster, is_hrsc},
     image_file::{Complaint, ImageFile, LineState, Strip, Strips},
-    label::{LABEL_BYTES_MAX, Label, parse},
-    moc::{ImageLabel, image_label, projection},
+    image_label::{ImageLabel, projection},
+    label::{Label, LabelError, parse},
+    moc::image_label,
+    read_label::Labelled,
 };
 use crate::{
     error::{Cause, IoError, Kind, Locate as _, Result},
@@ -38,7 +39,7 @@ pub enum PixelFile {
     Other(Box<OtherFile>),
 }
 
-/// A cube or a picture.
+/// A cube, a picture, or an image whose rows are samples as they are.
 #[derive(Debug)]
 pub struct OtherFile {
     path: PathBuf,
@@ -53,6 +54,7 @@ pub struct OtherFile {
 enum OtherKind {
     Cube(Cube),
     Picture(Picture),
+    Prefixed(Raster),
 }
 
 /// A file whose pixels cannot be read.
@@ -110,15 +112,11 @@ impl PixelFile {
     /// Opens a file by what stands in it: a cube, a TIFF, a PNG, or an image of the archive by one of `cameras`.
     ///
     /// # Errors
-    /// The system's refusal to read; those of [`ImageFile::open`]; [`PixelFileError`].
+    /// The system's refusal to read; those of [`ImageFile::open`] and of [`read_label`](super::read_label()); [`PixelFileError`].
     pub fn open(path: &Path, cameras: &[Instrument]) -> Result<Self> {
-        let mut start = Vec::new();
-        let file = File::open(path)
-            .map_err(IoError::on("open"))
-            .in_file(path)?;
-        let read = file.take(LABEL_BYTES_MAX as u64).read_to_end(&mut start);
-        read.map_err(IoError::on("read")).in_file(path)?;
-        if let Some(picture) = Picture::recognise(&start) {
+        let labelled = Labelled::open(path)?;
+        let start = &labelled.start;
+        if let Some(picture) = Picture::recognise(start) {
             let size = picture.rows(path).in_file(path)?.size();
             return Ok(Self::Other(Box::new(OtherFile {
                 path: path.to_owned(),
@@ -128,7 +126,10 @@ impl PixelFile {
                 is_projected: false,
             })));
         }
-        let label = parse(&start).in_file(path)?;
+        let label = parse(start).in_file(path)?;
+        if is_hrsc(&label) && !is_cube(&label) {
+            return Self::prefixed(&labelled, &label, cameras);
+        }
         if !is_cube(&label) {
             return Ok(Self::Archive(Box::new(ImageFile::open(path, cameras)?)));
         }
@@ -140,6 +141,23 @@ impl PixelFile {
             is_projected: projection(&label).is_some(),
             // A cube need not be of a camera that is known.
             label: image_label(&label, cameras).ok(),
+        })))
+    }
+
+    /// An image whose rows have prefixes.
+    fn prefixed(labelled: &Labelled, label: &Label, cameras: &[Instrument]) -> Result<Self> {
+        let path = &labelled.path;
+        if !label.ended {
+            return Err(LabelError::NoEnd).in_file(path);
+        }
+        let image = labelled.hrsc(label, cameras)?;
+        let raster = image.rows().in_file(path)?;
+        Ok(Self::Other(Box::new(OtherFile {
+            path: path.clone(),
+            kind: OtherKind::Prefixed(raster),
+            size: [raster.lines, raster.samples],
+            label: Some(image.label),
+            is_projected: false,
         })))
     }
 
@@ -205,6 +223,7 @@ impl PixelFile {
             Self::Other(other) => Some(match &other.kind {
                 OtherKind::Cube(cube) => cube.to_string(),
                 OtherKind::Picture(picture) => picture.to_string(),
+                OtherKind::Prefixed(raster) => prefixed::description(raster),
             }),
         }
     }
@@ -250,6 +269,7 @@ impl OtherFile {
         match &self.kind {
             OtherKind::Cube(cube) => cube.rows(&self.path),
             OtherKind::Picture(picture) => picture.rows(&self.path),
+            OtherKind::Prefixed(raster) => prefixed::rows(raster, &self.path),
         }
         .in_file(&self.path)
     }

@@ -26,7 +26,7 @@ use crate::{
     config::{built_in_instruments, usual_altimeter, usual_instrument},
     error::{IoError, Locate, Result},
     geom::ellipsoid::Spherical,
-    pds::moc::read_label,
+    pds::read_label,
     spice::{KernelSet, Session},
     time::{Et, Interval},
     units::RADIANS_PER_DEGREE,

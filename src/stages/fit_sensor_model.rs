@@ -284,6 +284,10 @@ fn rotation_vector_model(orientation: &Orientation) -> Result<RotationVectorMode
     })
 }
 
+/// Longer images break the usual limit by the curvature of the orbit alone, seconds: its error grows with the third power of
+/// the time, to 5 m in 74 s.
+const LONG_S: f64 = 60.0;
+
 /// A limit as it was written, without the rounding of its conversion; limits of any size keep their digits.
 fn four_digits(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
@@ -300,8 +304,21 @@ fn broken_limits(
     let position_rmse_m = model.position_rmse_m();
     // Written so that NaN breaks a limit.
     if !(position_rmse_m <= limits.position_rmse_max_m) {
+        let ends = [orientation.samples.first(), orientation.samples.last()];
+        let exposed_s = match ends {
+            [Some(first), Some(last)] => last.et.since(first.et),
+            _ => 0.0,
+        };
+        let advice = if exposed_s > LONG_S {
+            format!(
+                "; in {exposed_s:.0} s an orbit leaves any polynomial of second order: set registration.model = \"samples\", which \
+                 follows it, and orientation.position_rmse_max_m above this"
+            )
+        } else {
+            String::new()
+        };
         broken.push(format!(
-            "second-order position RMSE {position_rmse_m:.4} m; limit {} m",
+            "second-order position RMSE {position_rmse_m:.4} m; limit {} m{advice}",
             limits.position_rmse_max_m
         ));
     }

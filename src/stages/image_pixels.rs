@@ -6,12 +6,12 @@ use rayon::prelude::*;
 
 use super::{site_image::SiteImage, tag_times::ImageTimes};
 use crate::{
-    config::built_in_instruments,
+    config::all_instruments,
     error::{Cause, Kind, Locate as _, Result},
     files::HashedFile,
     instruments::Instrument,
     pds::{
-        ImageLabel,
+        ImageLabel, RowTimes,
         image_file::ImageFile,
         pixel_file::{PixelFile, Pyramid},
         product_named,
@@ -115,6 +115,23 @@ enum PixelsError {
         expected: String,
     },
     #[error(
+        "image {image}: its pixels are those of camera {found}; expected {expected}, as the image itself is"
+    )]
+    Camera {
+        image: String,
+        found: String,
+        expected: String,
+    },
+    #[error(
+        "image {image}: the rows of its pixels were exposed from ET {found_s:.3} s on; expected {expected_s:.3} s, as the image \
+         itself is"
+    )]
+    Start {
+        image: String,
+        found_s: f64,
+        expected_s: f64,
+    },
+    #[error(
         "image {image}: its pixels are those of a map; expected the image as its camera took it"
     )]
     Map { image: String },
@@ -161,6 +178,9 @@ impl Cause for PixelsError {
                 "give the file of the archive (.imq, .img) or the cube of ISIS for one of the images: exchanged pictures could not be \
                  told from orientations that err"
             }
+            Self::Camera { .. } | Self::Start { .. } => {
+                "check that images.pixels are not exchanged, and the label or the exposures of the image"
+            }
             Self::Clock { .. } => {
                 "check that images.pixels are not exchanged, and the clock of the image's label or keys"
             }
@@ -172,7 +192,7 @@ impl Cause for PixelsError {
 fn open_pixels(path: &Path, times: &ImageTimes) -> Result<PixelFile> {
     // The image's own camera before others that labels name alike.
     let cameras: Vec<Instrument> = std::iter::once(&times.instrument)
-        .chain(built_in_instruments())
+        .chain(all_instruments())
         .cloned()
         .collect();
     let file = PixelFile::open(path, &cameras)?;
@@ -215,6 +235,10 @@ fn belongs(file: &PixelFile, times: &ImageTimes) -> std::result::Result<(), Pixe
             times.samples.to_string(),
         ));
     }
+    let has_rows = file.label().is_some_and(|label| label.lines.is_some());
+    if has_rows && lines != header {
+        return Err(size("lines", lines, header.to_string()));
+    }
     if lines > header {
         return Err(size("lines", lines, format!("at most {header}")));
     }
@@ -255,6 +279,9 @@ fn of_the_image(label: &ImageLabel, times: &ImageTimes) -> std::result::Result<(
             expected,
         });
     }
+    if let Some(rows) = &label.lines {
+        of_its_rows(label, rows, times)?;
+    }
     let clocks = [&label.fields.sclk_start, &times.sclk_start];
     if let [Some(clock), Some(expected)] = clocks
         && let [Some(found), Some(known)] = [clock, expected].map(|clock| whole_seconds(clock))
@@ -264,6 +291,38 @@ fn of_the_image(label: &ImageLabel, times: &ImageTimes) -> std::result::Result<(
             image: image(),
             clock: clock.clone(),
             expected: expected.clone(),
+        });
+    }
+    Ok(())
+}
+
+/// Whether rows with times of their own are those of the image: of its camera, and from the same instant on.
+fn of_its_rows(
+    label: &ImageLabel,
+    rows: &RowTimes,
+    times: &ImageTimes,
+) -> std::result::Result<(), PixelsError> {
+    let names = [&label.instrument, &times.instrument].map(|camera| camera.label.to_string());
+    if let [found, expected] = names
+        && found != expected
+    {
+        return Err(PixelsError::Camera {
+            image: times.id.clone(),
+            found,
+            expected,
+        });
+    }
+    let starts = [
+        rows.pieces.first().map(|piece| piece.start),
+        Some(times.line_times.start()),
+    ];
+    if let [Some(found), Some(expected)] = starts
+        && !(found.since(expected).abs() <= f64::from(CLOCKS_APART_MAX_S))
+    {
+        return Err(PixelsError::Start {
+            image: times.id.clone(),
+            found_s: found.seconds(),
+            expected_s: expected.seconds(),
         });
     }
     Ok(())

@@ -13,9 +13,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use agreement::{mounting_agrees, of_one_clock, of_one_product, start_agrees, stop_agrees};
-use detector::fits_detector;
+use detector::{PartOfLine, fits_detector};
 use error::ImageError;
-use pieces::Pieces;
+use pieces::{Pieces, rows_of};
 pub use support::SupportFile;
 use support::supported;
 
@@ -84,6 +84,8 @@ pub enum StartFrom {
     Support,
     /// Ephemeris time of the configuration.
     Exposures,
+    /// Ephemeris time that the file holds beside every line.
+    Lines,
 }
 
 impl ImageTimes {
@@ -171,7 +173,7 @@ stage_inputs! {
 
 impl Stage for TagTimes<'_> {
     const NAME: &'static str = "tag_times";
-    const METHOD: u32 = 6;
+    const METHOD: u32 = 7;
     const CHECKED: bool = true;
     type Output = ImageTimes;
     stage_inputs!(fingerprint);
@@ -229,7 +231,9 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
     let (instrument, label) = labelled(image)?;
     let session = &session.of(instrument.spacecraft);
     let utc_stop = label.as_ref().and_then(|label| label.utc_stop.clone());
-    let of_label = label.map_or_else(ImageFields::default, |label| label.fields);
+    let tells_lines = label.is_some() && !instrument.spacecraft.labels_tell_clock;
+    let (of_label, label_lines) =
+        label.map_or_else(Default::default, |label| (label.fields, label.lines));
     let fields = merged(&image.fields, of_label, &mut notes);
     let missing = |key| ImageError::Missing {
         image: image.id.clone(),
@@ -249,13 +253,15 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
         [downtrack_summing, crosstrack_summing],
         [first_detector, samples],
     )?;
+    let of_file = rows_of(image, label_lines.as_ref(), &mut notes);
     if fields.first_detector.is_none() && samples * crosstrack_summing < instrument.detector.pixels
     {
-        remarks.push(format!(
-            "nothing says where on the {} pixels its {samples} samples begin (EDIT_MODE_ID, first_detector); pixel 0 is \
-             taken",
-            instrument.detector.pixels
-        ));
+        let part = PartOfLine {
+            instrument: &instrument,
+            samples,
+            crosstrack: crosstrack_summing,
+        };
+        remarks.push(part.on_first_pixel(&image.id, of_file.is_some())?);
     }
     of_one_clock(image, instrument.spacecraft, fields.sclk_start.as_deref())?;
     let told = start_time(image, &fields, session, &mut notes, &mut remarks)?;
@@ -265,14 +271,8 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
         lines: lines_header,
         downtrack_summing,
     };
-    let (line_times, exposure_s, start_from) = if let Some(exposures) = &image.exposures {
-        let (times, exposure_s) = pieces.listed(exposures, told, &mut remarks)?;
-        (times, exposure_s, StartFrom::Exposures)
-    } else {
-        let (start, start_from) = told.ok_or_else(|| missing("sclk_start"))?;
-        let (times, exposure_s) = pieces.even(start)?;
-        (times, exposure_s, start_from)
-    };
+    let (line_times, exposure_s, start_from) =
+        pieces.line_times(of_file, tells_lines, told, &mut remarks)?;
     let start = line_times.start();
     // Without the camera's frame its orientation says what is missing.
     if let Ok(mounting) = session.mounting(&instrument, start) {

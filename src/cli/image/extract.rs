@@ -6,7 +6,7 @@ use clap::Args;
 
 use crate::{
     cli::output,
-    config::built_in_instruments,
+    config::all_instruments,
     error::{Cause, Kind, Locate as _, Result},
     files::require_apart,
     pds::{
@@ -103,7 +103,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let mask_format = arguments.mask.as_deref().map(self::format).transpose()?;
     let outputs = std::iter::once(&arguments.out).chain(&arguments.mask);
     require_apart(outputs.map(PathBuf::as_path), [arguments.file.as_path()])?;
-    let image = PixelFile::open(&arguments.file, built_in_instruments())?;
+    let image = PixelFile::open(&arguments.file, all_instruments())?;
     let (mut lines, mut odd_even, mut complaints) = (
         0,
         OddEven::default(),

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::{
     cli::output,
-    config::built_in_instruments,
+    config::all_instruments,
     error::Error,
     pds::{
         image_file::{Coding, Complaint, Complaints, ImageFile, Statistics},
@@ -23,11 +23,12 @@ use crate::{
 ///
 /// Statistics and the hash are those of the decoded 8-bit pixels in the order of the file; lines that are missing do not
 /// count. A line is suspect when it comes from damaged data, or when its place in the image is not known. A damaged
-/// file is no failure as long as some of it can be read.
+/// file is no failure as long as some of it can be read. `exposures` are the times of lines that a file of HRSC holds, as
+/// `images.exposures` has them: first line, its start in ET seconds, line period in milliseconds.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: areograph image info e0202855.imq --json")]
 pub(super) struct Arguments {
-    /// Image files of the archive (.imq, .img), ISIS cubes, TIFF or PNG of one band of grey.
+    /// Image files of the archive (.imq, .img; of HRSC level 2), ISIS cubes, TIFF or PNG of one band of grey.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Print JSON.
@@ -57,7 +58,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
 }
 
 fn info(path: &Path) -> Result<Value, Error> {
-    let image = PixelFile::open(path, built_in_instruments())?;
+    let image = PixelFile::open(path, all_instruments())?;
     let mut strips = image.strips()?;
     let (mut statistics, mut lines) = (Statistics::default(), 0);
     while let Some(strip) = strips.next_strip()? {
@@ -72,6 +73,13 @@ fn info(path: &Path) -> Result<Value, Error> {
     let opened = archive.map(ImageFile::complaints);
     let (decoded, decoded_count) = strips.complaints();
     let texts = opened.into_iter().flat_map(Complaints::kept).chain(decoded);
+    let rows = label.and_then(|label| label.lines.as_ref());
+    let of_rows = rows.map_or_else(Vec::new, |rows| rows.remarks.clone());
+    let pieces = rows.into_iter().flat_map(|rows| &rows.pieces).map(|piece| {
+        let period_ms = piece.period_s / SECONDS_PER_MS;
+        json!([piece.first_line, piece.start.seconds(), period_ms])
+    });
+    let pieces: Vec<Value> = pieces.collect();
     let milliseconds = |seconds: Option<f64>| seconds.map(|seconds| seconds / SECONDS_PER_MS);
     Ok(json!({
         "file": path,
@@ -80,6 +88,7 @@ fn info(path: &Path) -> Result<Value, Error> {
         "sclk_start": fields.sclk_start,
         "utc_start": fields.utc_start,
         "exposure_ms": milliseconds(fields.exposure_s),
+        "exposures": rows.map(|_| pieces),
         "downtrack_summing": fields.downtrack_summing,
         "crosstrack_summing": fields.crosstrack_summing,
         "first_detector": fields.first_detector,
@@ -105,8 +114,8 @@ fn info(path: &Path) -> Result<Value, Error> {
         "distinct_values": pixels.distinct,
         "zeros": pixels.zeros,
         "pixels_blake3": pixels.blake3,
-        "complaint_count": opened.map_or(0, Complaints::count) + decoded_count,
-        "complaints": texts.map(Complaint::to_string).collect::<Vec<_>>(),
+        "complaint_count": opened.map_or(0, Complaints::count) + decoded_count + of_rows.len() as u64,
+        "complaints": texts.map(Complaint::to_string).chain(of_rows).collect::<Vec<_>>(),
     }))
 }
 

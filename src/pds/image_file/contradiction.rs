@@ -5,7 +5,7 @@ use super::{
     fragment::Fragments,
     header::Header,
 };
-use crate::pds::moc::{ImageLabel, product_named};
+use crate::pds::{image_label::ImageLabel, moc::product_named};
 
 /// The camera whose line clock has a unit that is known, as labels name it.
 const NARROW_ANGLE: &str = "MOC-NA";

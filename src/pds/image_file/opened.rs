@@ -17,8 +17,9 @@ use crate::{
     error::{Cause, IoError, Kind, Locate as _, Result},
     instruments::Instrument,
     pds::{
+        image_label::ImageLabel,
         label::{LABEL_BYTES_MAX, Label, LabelError, parse},
-        moc::{ImageLabel, image_label},
+        moc::image_label,
     },
 };
 

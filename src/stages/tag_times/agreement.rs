@@ -19,7 +19,7 @@ use crate::{
 ///
 /// UTC in MOC labels is cut to 10 ms: in five labels it lies 1 to 5 ms from the clock, and in three the time from
 /// start to stop is 4 to 6 ms less than that of the lines. It is 60 m on the ground.
-const CLOSE_S: f64 = 0.02;
+pub(super) const CLOSE_S: f64 = 0.02;
 /// Farther apart than this they are those of two images, seconds.
 const TOLERANCE_S: f64 = 1.0;
 /// Speed of the spacecraft's shadow on the ground, metres per second: what a time is worth there.
@@ -184,12 +184,12 @@ pub(super) fn start_agrees(
     }))
 }
 
-/// A remark on exposures that do not begin when clock or UTC say.
+/// A remark on exposures that do not begin within `close_s` of when clock or UTC say.
 pub(super) fn pieces_agree(
     image: &str,
     first: Et,
-    told: Et,
-    from: StartFrom,
+    (told, from): (Et, StartFrom),
+    close_s: f64,
 ) -> Result<Option<String>, Contradiction> {
     let apart_s = first.since(told).abs();
     let told = match from {
@@ -204,7 +204,7 @@ pub(super) fn pieces_agree(
             apart_s,
         });
     }
-    Ok((apart_s > CLOSE_S).then(|| {
+    Ok((apart_s > close_s).then(|| {
         format!(
             "the first of its exposures begins {apart_s:.3} s away from {told}, {} on the ground; the exposures are used",
             ground(apart_s * GROUND_SPEED_M_S)

@@ -38,6 +38,17 @@ enum DetectorError {
         instrument: String,
         pixels: u32,
     },
+    #[error(
+        "image {image}: its {samples} samples of {crosstrack} pixels are a part of the {pixels} pixels of {instrument}, and \
+         nothing says where it begins; expected first_detector"
+    )]
+    FirstPixel {
+        image: String,
+        samples: u32,
+        crosstrack: u32,
+        instrument: String,
+        pixels: u32,
+    },
 }
 
 impl Cause for DetectorError {
@@ -49,6 +60,11 @@ impl Cause for DetectorError {
         match self {
             Self::Summing { .. } | Self::Detector { .. } => {
                 "check summing, samples and first detector, and that the image is of this camera"
+                    .to_owned()
+            }
+            Self::FirstPixel { .. } => {
+                "add `first_detector` to the image's table; ISIS and ALE put such files on the first pixel, first_detector = 0, and a \
+                 file from which columns were cut begins as many pixels later"
                     .to_owned()
             }
             Self::VariableSumming { .. } => {
@@ -108,4 +124,35 @@ pub(super) fn fits_detector(
         .into());
     }
     Ok(())
+}
+
+/// An image with fewer samples than its detector has, of which nothing says where on the line they lie.
+pub(super) struct PartOfLine<'a> {
+    pub(super) instrument: &'a Instrument,
+    pub(super) samples: u32,
+    pub(super) crosstrack: u32,
+}
+
+impl PartOfLine<'_> {
+    /// A remark that the image is put on the first pixel.
+    ///
+    /// # Errors
+    /// An image whose file tells everything else (`of_file`), so that nobody was asked yet.
+    pub(super) fn on_first_pixel(&self, image: &str, of_file: bool) -> Result<String> {
+        let (samples, pixels) = (self.samples, self.instrument.detector.pixels);
+        if of_file {
+            return Err(DetectorError::FirstPixel {
+                image: image.to_owned(),
+                samples,
+                crosstrack: self.crosstrack,
+                instrument: self.instrument.name.clone(),
+                pixels,
+            }
+            .into());
+        }
+        Ok(format!(
+            "nothing says where on the {pixels} pixels its {samples} samples begin (EDIT_MODE_ID, first_detector); pixel 0 is \
+             taken"
+        ))
+    }
 }

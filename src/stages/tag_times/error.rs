@@ -11,6 +11,18 @@ pub(super) enum ImageError {
     #[error("image {image}: no {key}, neither in the label nor in the configuration")]
     Missing { image: String, key: &'static str },
     #[error(
+        "image {0}: its label tells no times of lines, which its file has beside each of them; expected these"
+    )]
+    NoLineTimes(String),
+    #[error(
+        "image {image}: lines_header is {stated}, but the file of its label has {found} lines; expected them to agree"
+    )]
+    LinesOfFile {
+        image: String,
+        stated: u32,
+        found: u32,
+    },
+    #[error(
         "image {image}: line period {stated_ms} ms is stated, but exposure {exposure_ms} ms × summing \
          {summing} makes {computed_ms} ms; expected them to agree within the rounding of 0.0001 ms"
     )]
@@ -51,6 +63,14 @@ impl Cause for ImageError {
     fn advice(&self) -> String {
         match self {
             Self::Missing { key, .. } => format!("add `{key}` to the image's table, or name its label"),
+            Self::NoLineTimes(_) => {
+                "give the file of the archive, label and rows in one, as images.label; or the pieces of its line times as \
+                 images.exposures"
+                    .to_owned()
+            }
+            Self::LinesOfFile { .. } => {
+                "leave out lines_header, or give the label without rows and images.exposures of the lines".to_owned()
+            }
             Self::Period { .. } => {
                 "give the exposure of one detector line, or the period of summed lines, not a mixture".to_owned()
             }

@@ -2,7 +2,7 @@
 
 use super::{
     StartFrom,
-    agreement::{piece_follows, pieces_agree},
+    agreement::{CLOSE_S, piece_follows, pieces_agree},
     error::ImageError,
 };
 use crate::{
@@ -10,9 +10,14 @@ use crate::{
     error::{Error, Result},
     image::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageFields, line_period_agrees},
     line_times::LineTimes,
+    pds::RowTimes,
     time::Et,
     units::SECONDS_PER_MS,
 };
+
+/// Times of rows and UTC of the start that lie farther apart are remarked on, seconds: labels round the latter to a
+/// millisecond, and in three it is 0.5 ms from the first row.
+const ROWS_CLOSE_S: f64 = 0.002;
 
 /// What is known of the lines of an image.
 pub(super) struct Pieces<'a> {
@@ -23,8 +28,38 @@ pub(super) struct Pieces<'a> {
 }
 
 impl Pieces<'_> {
+    /// When the lines were exposed, by what tells it first: the pieces of the configuration, the `rows` of a file, a start with
+    /// a line period. And the exposure of a detector line in seconds, and where the start comes from.
+    ///
+    /// Of an image whose rows tell their times (`in_rows`), and its label no clock, a label without rows says too little.
+    pub(super) fn line_times(
+        &self,
+        rows: Option<&RowTimes>,
+        in_rows: bool,
+        told: Option<(Et, StartFrom)>,
+        remarks: &mut Vec<String>,
+    ) -> Result<(LineTimes, f64, StartFrom)> {
+        let (times, exposure_s, from) = if let Some(exposures) = &self.image.exposures {
+            let (times, exposure_s) = self.listed(exposures, told, remarks)?;
+            (times, exposure_s, StartFrom::Exposures)
+        } else if let Some(rows) = rows {
+            let (times, exposure_s) = self.of_rows(rows, told, remarks)?;
+            (times, exposure_s, StartFrom::Lines)
+        } else if in_rows && !is_even(self.fields) {
+            return Err(ImageError::NoLineTimes(self.image.id.clone()).into());
+        } else {
+            let (start, from) = told.ok_or_else(|| ImageError::Missing {
+                image: self.image.id.clone(),
+                key: if in_rows { "utc_start" } else { "sclk_start" },
+            })?;
+            let (times, exposure_s) = self.even(start)?;
+            (times, exposure_s, from)
+        };
+        Ok((times, exposure_s, from))
+    }
+
     /// Lines of one period, and the exposure of a detector line in seconds.
-    pub(super) fn even(&self, start: Et) -> Result<(LineTimes, f64)> {
+    fn even(&self, start: Et) -> Result<(LineTimes, f64)> {
         let (line_period_s, exposure_s) =
             line_period(self.image, self.fields, self.downtrack_summing)?.ok_or_else(|| {
                 ImageError::Missing {
@@ -40,7 +75,7 @@ impl Pieces<'_> {
     /// Lines in the pieces that the configuration lists, and the exposure of a detector line of the first one in seconds.
     ///
     /// A start that is told beside them must agree with theirs.
-    pub(super) fn listed(
+    fn listed(
         &self,
         exposures: &[ExposurePiece],
         told: Option<(Et, StartFrom)>,
@@ -48,15 +83,51 @@ impl Pieces<'_> {
     ) -> Result<(LineTimes, f64)> {
         let times = line_times_of(exposures, self.lines)?;
         self.require_duration(times.duration_s(), times.mean_period_s())?;
-        if let Some((start, from)) = told {
-            remarks.extend(pieces_agree(&self.image.id, times.start(), start, from)?);
+        if let Some(told) = told {
+            remarks.extend(pieces_agree(&self.image.id, times.start(), told, CLOSE_S)?);
         }
         let pieces: Vec<_> = times.pieces().collect();
         for [piece, next] in pieces.array_windows() {
             remarks.extend(piece_follows(piece, next));
         }
-        let period_s = pieces.first().map_or(0.0, |piece| piece.period_s);
-        Ok((times, period_s / f64::from(self.downtrack_summing)))
+        let exposure_s = self.first_exposure_s(&times);
+        Ok((times, exposure_s))
+    }
+
+    /// Lines as the rows of the label's file have them, and the exposure of a detector line of the first one in seconds.
+    ///
+    /// A start that is told beside them must agree with theirs.
+    fn of_rows(
+        &self,
+        rows: &RowTimes,
+        told: Option<(Et, StartFrom)>,
+        remarks: &mut Vec<String>,
+    ) -> Result<(LineTimes, f64)> {
+        if rows.lines != self.lines {
+            return Err(Error::from(ImageError::LinesOfFile {
+                image: self.image.id.clone(),
+                stated: self.lines,
+                found: rows.lines,
+            }));
+        }
+        let times = LineTimes::of_pieces(rows.lines, &rows.pieces)?;
+        self.require_duration(times.duration_s(), times.mean_period_s())?;
+        remarks.extend_from_slice(&rows.remarks);
+        if let Some(told) = told {
+            remarks.extend(pieces_agree(
+                &self.image.id,
+                times.start(),
+                told,
+                ROWS_CLOSE_S,
+            )?);
+        }
+        let exposure_s = self.first_exposure_s(&times);
+        Ok((times, exposure_s))
+    }
+
+    fn first_exposure_s(&self, times: &LineTimes) -> f64 {
+        let first = times.pieces().next();
+        first.map_or(0.0, |piece| piece.period_s) / f64::from(self.downtrack_summing)
     }
 
     fn require_duration(&self, duration_s: f64, line_period_s: f64) -> Result<()> {
@@ -71,6 +142,30 @@ impl Pieces<'_> {
             line_period_s,
         }))
     }
+}
+
+/// Whether one line period holds for all lines.
+const fn is_even(fields: &ImageFields) -> bool {
+    fields.line_period_s.is_some() || fields.exposure_s.is_some()
+}
+
+/// Times of the lines that the file of the label has, unless the configuration tells others, which win.
+pub(super) fn rows_of<'a>(
+    image: &ImageConfig,
+    rows: Option<&'a RowTimes>,
+    notes: &mut Vec<String>,
+) -> Option<&'a RowTimes> {
+    let key = match &image.exposures {
+        Some(_) => Some("exposures"),
+        None if is_even(&image.fields) => Some("exposure_ms or line_period_ms"),
+        None => None,
+    };
+    if let (Some(key), Some(_)) = (key, rows) {
+        notes.push(format!(
+            "{key} of the configuration replaces the times that the file has of its lines"
+        ));
+    }
+    rows.filter(|_| key.is_none())
 }
 
 /// Line period and exposure in seconds; `None` when neither is given.

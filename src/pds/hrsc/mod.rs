@@ -1,0 +1,75 @@
+//! Images of the High Resolution Stereo Camera on Mars Express as the archive has them at level 2: a PDS3 label, mostly a
+//! VICAR label behind it, and rows of samples, each with a prefix that holds the time of its line.
+//!
+//! # Source
+//! Labels and files of data set MEX-M-HRSC-3-RDR; `hrsc2isis` of ISIS for the prefixes.
+
+mod error;
+mod label;
+mod prefixes;
+mod product;
+mod raster;
+mod times;
+mod vicar;
+
+use std::{fs::File, path::Path};
+
+use self::error::HrscError;
+pub(super) use self::{
+    label::is_hrsc,
+    product::product_named,
+    raster::{Number, Raster},
+};
+use super::{image_label::ImageLabel, label::Label};
+use crate::{
+    error::{IoError, Result},
+    files::file_name,
+    instruments::Instrument,
+};
+
+/// A file with the label of an image.
+#[derive(Debug)]
+pub(super) struct HrscFile {
+    /// What the label says, and the times of the rows behind it.
+    pub(super) label: ImageLabel,
+    /// The rows; none behind a label that stands alone.
+    pub(super) raster: Option<Raster>,
+}
+
+impl HrscFile {
+    /// The image whose `label` stands at the `start` of a file.
+    ///
+    /// # Errors
+    /// The system's refusal to read; a label of another image or camera; rows that are not those of the label; line times
+    /// that contradict each other.
+    pub(super) fn of(
+        path: &Path,
+        file: &File,
+        start: &[u8],
+        label: &Label,
+        cameras: &[Instrument],
+    ) -> Result<Self> {
+        let mut image = label::image_label(label, cameras)?;
+        product::of_one_product(label, &file_name(path))?;
+        let bytes = file.metadata().map_err(IoError::on("read"))?.len();
+        let raster = Raster::of(label, bytes)?;
+        if let Some(raster) = &raster {
+            vicar::agrees(label, start, raster)?;
+            raster.confirm_byte_order(label, file)?;
+            let prefixes = prefixes::read(raster, file).map_err(IoError::on("read"))?;
+            image.lines = Some(times::row_times(&prefixes)?);
+        }
+        Ok(Self {
+            label: image,
+            raster,
+        })
+    }
+
+    /// The rows.
+    ///
+    /// # Errors
+    /// A label that stands alone.
+    pub(super) fn rows(&self) -> Result<Raster> {
+        Ok(self.raster.ok_or(HrscError::NoRows)?)
+    }
+}
