@@ -22,7 +22,7 @@ const TOP: f64 = 6.0;
 const SIZE: [f64; 2] = [LEFT + EDGE + 9.0, TOP + EDGE + 18.0];
 /// Width and height of the bar of colours with its words, units of its own drawing.
 const BAR: [u32; 2] = [600, 130];
-/// Colours, each for a fiftieth of similarity or less: more would show nothing, and make pages larger.
+/// Colours: more would show nothing, and make pages larger.
 const COLOURS: u8 = 51;
 /// Marks, which stand out from any colour: white on black.
 const MARKS: &str = "<g id=\"similarity-none\"><path d=\"M-6 0H6M0-6V6\" stroke=\"#000\" stroke-width=\"4\"/>\
@@ -152,9 +152,9 @@ fn bar() -> Result<String> {
             top: 46,
             words: "similarity, 0 and below to 1",
             numbers: [0.0, 1.0],
-            colour: relief::colour,
+            colour: |similarity| relief::colour(SimilaritySurface::share_of(similarity)),
         };
-        bar.draw(&[0.0, 0.5, 1.0], area)
+        bar.draw(&[0.0, 0.2, 0.4, 0.6, 0.8, 1.0], area)
     })?;
     let (_, drawing) = svg.split_once('>').unwrap_or_default();
     let keys = [("none", "no shift"), ("best", "the best shift")].map(|(mark, words)| {
@@ -199,7 +199,7 @@ fn png(surface: &SimilaritySurface) -> std::result::Result<Vec<u8>, EncodingErro
     encoder.set_palette(palette.flatten().collect::<Vec<u8>>());
     encoder.set_trns(vec![0]);
     let pixels = surface.levels.iter().map(|level| {
-        let share = SimilaritySurface::similarity(*level);
+        let share = SimilaritySurface::share(*level);
         share.map_or(0, |share| 1 + (share * last).round() as u8)
     });
     let pixels: Vec<u8> = pixels.collect();

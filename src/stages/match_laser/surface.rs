@@ -14,8 +14,8 @@ pub struct SimilaritySurface {
     pub step_cells: u32,
     /// Values from that one to each side.
     pub reach: u32,
-    /// Row by row from the north-west, as many columns as rows: 1 for similarity 0 and below, 255 for 1, evenly between; 0 where the
-    /// model covers too few shots, or is flat.
+    /// Row by row from the north-west, as many columns as rows: 1 for similarity 0 and below, 255 for 1, between them evenly by
+    /// `1 − √(1 − similarity)`, as a good match and a chance one both lie near 1; 0 where the model covers too few shots, or is flat.
     pub levels: Vec<u8>,
 }
 
@@ -42,11 +42,17 @@ impl SimilaritySurface {
         }
     }
 
-    /// The similarity that a level stands for, 0 for what lies below.
+    /// Place of a level between similarity 0 and 1; none where nothing is known.
     #[must_use]
-    pub fn similarity(level: u8) -> Option<f64> {
+    pub fn share(level: u8) -> Option<f64> {
         let above = level.checked_sub(1)?;
         Some(f64::from(above) / STEPS)
+    }
+
+    /// Place of a similarity between 0 and 1: `1 − √(1 − similarity)`.
+    #[must_use]
+    pub fn share_of(similarity: f64) -> f64 {
+        1.0 - (1.0 - similarity.clamp(0.0, 1.0)).sqrt()
     }
 
     /// Values from side to side.
@@ -66,7 +72,7 @@ fn natural(of: i64) -> u32 {
     reason = "between 0 and 254"
 )]
 fn level(similarity: Option<f64>) -> u8 {
-    let of = |similarity: f64| 1 + (STEPS * similarity.clamp(0.0, 1.0)).round() as u8;
+    let of = |similarity: f64| 1 + (STEPS * SimilaritySurface::share_of(similarity)).round() as u8;
     similarity.map_or(0, of)
 }
 
@@ -97,12 +103,12 @@ mod tests {
         assert_eq!(brightest(&of), [3, -5]);
         let mut levels = of.levels.iter().zip(0..);
         assert!(levels.all(|(level, at)| (*level == 0) == (at % 141 - 70 == 7)));
-        // 0.9 of 254 levels above the first; similarities below 0 are that.
-        assert_eq!(of.levels.iter().max(), Some(&230));
-        let told = SimilaritySurface::similarity(230).unwrap();
-        assert!((told - 0.9).abs() <= 0.5 / STEPS); // half a level
-        assert_eq!(SimilaritySurface::similarity(of.levels[0]), Some(0.0));
-        assert_eq!(SimilaritySurface::similarity(0), None);
+        // 1 − √0.1 of 254 levels above the first; similarities below 0 are that.
+        assert_eq!(of.levels.iter().max(), Some(&175));
+        let told = SimilaritySurface::share(175).unwrap();
+        assert!((told - (1.0 - 0.1_f64.sqrt())).abs() <= 0.5 / STEPS); // half a level
+        assert_eq!(SimilaritySurface::share(of.levels[0]), Some(0.0));
+        assert_eq!(SimilaritySurface::share(0), None);
     }
 
     #[test]
@@ -114,7 +120,7 @@ mod tests {
             // All shifts are in it, and no row is of shifts beyond the search alone.
             let edge = i64::from(of.reach) * step;
             assert!(edge + step / 2 >= reach && edge - step / 2 <= reach);
-            assert_eq!(of.levels.iter().max(), Some(&230));
+            assert_eq!(of.levels.iter().max(), Some(&175));
             let nearest = [3, -5].map(|of: i64| (of + step / 2).div_euclid(step));
             assert_eq!(brightest(&of), nearest);
         }
