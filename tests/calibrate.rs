@@ -337,6 +337,31 @@ fn errors_in_the_plane_do_not_hide_behind_those_in_height() {
     }
 }
 
+/// A table's standard deviations of matching are added to the laser's own, which the calibration file says.
+#[test]
+fn what_matching_leaves_open_is_added_to_the_laser() {
+    let plane = |horizontal_m: f64| {
+        let folder = scene(&[]);
+        let path = folder.path().join("lines/i864_control.csv");
+        let text = fs::read_to_string(&path).unwrap();
+        let (header, rows) = text.split_once('\n').unwrap();
+        let rows = rows
+            .lines()
+            .map(|row| format!("{row},{horizontal_m},0.001\n"));
+        let header = format!("{header},sigma_matching_horizontal_m,sigma_matching_vertical_m\n");
+        fs::write(&path, header + &rows.collect::<String>()).unwrap();
+        both(calibrated(folder.path()).unwrap().used)[0]
+    };
+    let (little, much) = (plane(0.001), plane(300.0));
+    // 100 m of the laser and 28 m of a pixel against these and 300 m.
+    let expected = 104_f64.hypot(300.0) / 104.0;
+    println!("{little:.2} and {much:.2}");
+    assert!(
+        (little / much / expected - 1.0).abs() < 0.1,
+        "{little} {much}"
+    );
+}
+
 #[test]
 fn all_angles_by_ties_alone_are_asked_for_by_name_and_lead_astray() {
     let folder = scene(&AS_PUBLISHED);

@@ -301,7 +301,11 @@ fn images_show_the_models_place_where_the_table_says() {
         let off_m = (place_m - position_m).cross(&ray).norm();
         // A hundredth of a line of 27 m.
         assert!(off_m < 0.3, "{}: {off_m} m", row.image.point);
-        assert!((row.radius_m - point.laser[2]).abs() < 1e-3); // digits of the table, metres
+        // Digits of the table, metres. What the laser errs by is for the calibration to say.
+        assert!((row.radius_m - point.laser[2]).abs() < 1e-3);
+        let [horizontal_m, vertical_m] = row.matching_m.map(Option::unwrap);
+        assert!((horizontal_m - point.sigma_horizontal_m()).abs() < 1e-3);
+        assert!((vertical_m - point.sigma_m[2]).abs() < 1e-3 && row.sigma_m == [None; 2]);
     }
     // The same again is kept; products are those of one thread.
     assert!(run_match(&request, &out, false).unwrap().unchanged);

@@ -248,15 +248,17 @@ declare_table! {
     pub struct CalibrationControlConfig {
         /// Paths or globs of tables (.csv), one row an image of a point: `point`, `camera`, `line`, `sample`, `longitude_deg`
         /// (east), `latitude_deg` (areocentric), `radius_m` (from the centre of the body: heights have a datum), and where
-        /// known `sigma_line`, `sigma_sample`, `sigma_horizontal_m`, `sigma_vertical_m`.
+        /// known `sigma_line`, `sigma_sample`, `sigma_horizontal_m`, `sigma_vertical_m`, and what matching the point adds to
+        /// these, `sigma_matching_horizontal_m`, `sigma_matching_vertical_m`.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs).or(Vec::new()).example(r#"["control.csv"]"#),
         /// Standard deviation of lines and samples, where the table has none.
         sigma_px: f64 = key(from_to(SIGMA_MIN, 100.0)).or(1.0),
-        /// Standard deviation of a horizontal coordinate of a laser point, where the table has none: the profiles of MOLA. Beyond
-        /// the range the ground bends away from the plane in which errors are taken.
+        /// Standard deviation of a horizontal coordinate of a laser point, where the table has none: the profiles of MOLA. With
+        /// `ties.match` what matching leaves open is added to it. Beyond the range the ground bends away from the plane in which
+        /// errors are taken.
         sigma_horizontal_m: f64 = key(from_to(SIGMA_MIN, CONTROL_SIGMA_MAX_M)).or(100.0),
-        /// Standard deviation of its radius, where the table has none.
+        /// Standard deviation of its radius, likewise.
         sigma_vertical_m: f64 = key(from_to(SIGMA_MIN, CONTROL_SIGMA_MAX_M)).or(10.0),
         /// Every so manieth control point along the flight judges the result and is never used for it; with ties.match
         /// every so manieth rectangle of 5 by 10 km of the ground, with all of its shots.

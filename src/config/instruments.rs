@@ -67,7 +67,7 @@ fn of_the_program<T>(read: Result<T, Problems>) -> T {
     read.unwrap_or_else(|problems| panic!("built with a bad file: {problems}"))
 }
 
-/// The cameras whose labels, files and archive the program reads: those on the spacecraft of the laser.
+/// The cameras on the spacecraft of the laser, whose archive the program searches.
 #[must_use]
 pub fn built_in_instruments() -> &'static [Instrument] {
     let own = CAMERAS.partition_point(|camera| camera.spacecraft.has_laser());

@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// Raised when the products of a calibration are laid out anew.
-const METHOD: u32 = 1;
+const METHOD: u32 = 2;
 
 /// Calibrates the lines of a camera and publishes the products in `<out>/<calibration>`, when something has changed since the
 /// last time.

@@ -56,6 +56,7 @@ pub(super) struct CalibrationLoop<'a> {
 
 impl Stage for CalibrationLoop<'_> {
     const NAME: &'static str = "calibration_loop";
+    const METHOD: u32 = 2;
     type Output = Calibration;
 
     fn inputs(&self) -> Inputs {

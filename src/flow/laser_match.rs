@@ -17,7 +17,7 @@ use crate::{
 };
 
 /// Raised when the products of a match are laid out anew.
-const METHOD: u32 = 1;
+const METHOD: u32 = 2;
 /// What stands for the name of a site in messages and in the manifest.
 const NAME: &str = "pedr_match";
 

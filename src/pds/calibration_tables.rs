@@ -45,6 +45,8 @@ pub struct ControlRow {
     pub radius_m: f64,
     /// Standard deviations of a horizontal coordinate and of the radius, where the table has them, metres.
     pub sigma_m: [Option<f64>; 2],
+    /// What finding the point in the image adds to these, where the table has that, metres.
+    pub matching_m: [Option<f64>; 2],
 }
 
 /// Reads a table of tie points.
@@ -72,6 +74,8 @@ pub fn read_control(path: &Path) -> Result<Rows<ControlRow>> {
             COLUMNS,
         )?;
         let sigma = ["sigma_horizontal_m", "sigma_vertical_m"].map(|name| optional(header, name));
+        let matching = ["sigma_matching_horizontal_m", "sigma_matching_vertical_m"];
+        let matching = matching.map(|name| optional(header, name));
         Ok(move |row: &csv::StringRecord| {
             let of = numbers(row, &place)?;
             if !(of[0] >= -180.0 && of[0] <= 360.0 && of[1].abs() <= 90.0) {
@@ -92,6 +96,7 @@ pub fn read_control(path: &Path) -> Result<Rows<ControlRow>> {
                 latitude_deg: of[1],
                 radius_m: of[2],
                 sigma_m: deviations(row, sigma, CONTROL_SIGMA_MAX_M)?,
+                matching_m: deviations(row, matching, CONTROL_SIGMA_MAX_M)?,
             })
         })
     })

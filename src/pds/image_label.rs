@@ -28,7 +28,7 @@ pub struct ImageLabel {
 pub struct RowTimes {
     /// Number of lines.
     pub lines: u32,
-    /// Pieces of one line period each, in order; between two of them may be a gap.
+    /// Pieces of one line period each, in order; between two of them may be a gap. None where the rows tell no times.
     pub pieces: Vec<LinePiece>,
     /// What is wrong with some of them, one sentence each.
     pub remarks: Vec<String>,

@@ -71,7 +71,11 @@ pub fn read_label(path: &Path, cameras: &[Instrument]) -> Result<ImageLabel> {
         return Err(LabelError::NoEnd).in_file(path);
     }
     if hrsc::is_hrsc(&label) {
-        Ok(labelled.hrsc(&label, cameras)?.label)
+        let file = labelled.hrsc(&label, cameras)?;
+        match file.timeless {
+            Some(why) => Err(why).in_file(path),
+            None => Ok(file.label),
+        }
     } else {
         moc::image_label(&label, cameras).in_file(path)
     }

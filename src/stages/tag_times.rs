@@ -261,7 +261,7 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
             samples,
             crosstrack: crosstrack_summing,
         };
-        remarks.push(part.on_first_pixel(&image.id, of_file.is_some())?);
+        remarks.push(part.on_first_pixel(&image.id, tells_lines)?);
     }
     of_one_clock(image, instrument.spacecraft, fields.sclk_start.as_deref())?;
     let told = start_time(image, &fields, session, &mut notes, &mut remarks)?;

@@ -16,6 +16,8 @@ pub struct Missed {
     /// What that is on average when standard deviations are true: the number of coordinates, more by the parameters' own errors for a point
     /// that was not used to find them, less for one that was.
     pub expected: f64,
+    /// How many coordinates are free to differ: all of a point that was not used, and as many as are expected of one that was.
+    pub free: f64,
 }
 
 /// What a point of known place misses.
@@ -84,12 +86,14 @@ impl GroundPoint {
         let drawn_m2 = &drawn * covariance * drawn.transpose();
         let missed = |at: usize| {
             let share = drawn_m2[(at, at)] / noise_m2[(at, at)];
+            let (expected, free) = match took_part {
+                TookPart::Yes => ((1.0 - share).max(0.0), (1.0 - share).max(0.0)),
+                TookPart::No => (1.0 + share, 1.0),
+            };
             Missed {
                 square: off_m[at].powi(2) / noise_m2[(at, at)],
-                expected: match took_part {
-                    TookPart::Yes => (1.0 - share).max(0.0),
-                    TookPart::No => 1.0 + share,
-                },
+                expected,
+                free,
             }
         };
         Ok(Some(Misfit {
@@ -106,6 +110,7 @@ impl Missed {
         Self {
             square: self.square + other.square,
             expected: self.expected + other.expected,
+            free: self.free + other.free,
         }
     }
 }

@@ -14,13 +14,16 @@ mod vicar;
 
 use std::{fs::File, path::Path};
 
-use self::error::HrscError;
 pub(super) use self::{
+    error::HrscError,
     label::is_hrsc,
     product::product_named,
     raster::{Number, Raster},
 };
-use super::{image_label::ImageLabel, label::Label};
+use super::{
+    image_label::{ImageLabel, RowTimes},
+    label::Label,
+};
 use crate::{
     error::{IoError, Result},
     files::file_name,
@@ -34,14 +37,15 @@ pub(super) struct HrscFile {
     pub(super) label: ImageLabel,
     /// The rows; none behind a label that stands alone.
     pub(super) raster: Option<Raster>,
+    /// Why the rows tell no times, if they do not: their samples can be used all the same.
+    pub(super) timeless: Option<HrscError>,
 }
 
 impl HrscFile {
     /// The image whose `label` stands at the `start` of a file.
     ///
     /// # Errors
-    /// The system's refusal to read; a label of another image or camera; rows that are not those of the label; line times
-    /// that contradict each other.
+    /// The system's refusal to read; a label of another image or camera; rows that are not those of the label.
     pub(super) fn of(
         path: &Path,
         file: &File,
@@ -52,16 +56,26 @@ impl HrscFile {
         let mut image = label::image_label(label, cameras)?;
         product::of_one_product(label, &file_name(path))?;
         let bytes = file.metadata().map_err(IoError::on("read"))?.len();
-        let raster = Raster::of(label, bytes)?;
+        let (raster, mut timeless) = (Raster::of(label, bytes)?, None);
         if let Some(raster) = &raster {
             vicar::agrees(label, start, raster)?;
             raster.confirm_byte_order(label, file)?;
             let prefixes = prefixes::read(raster, file).map_err(IoError::on("read"))?;
-            image.lines = Some(times::row_times(&prefixes)?);
+            let times = times::row_times(&prefixes).unwrap_or_else(|why| {
+                let remarks = vec![why.to_string()];
+                timeless = Some(why);
+                RowTimes {
+                    lines: raster.lines,
+                    pieces: Vec::new(),
+                    remarks,
+                }
+            });
+            image.lines = Some(times);
         }
         Ok(Self {
             label: image,
             raster,
+            timeless,
         })
     }
 

@@ -66,7 +66,11 @@ impl Raster {
         let Some(pointer) = label.find("^IMAGE") else {
             return Ok(None);
         };
-        if pointer.value.contains(',') {
+        // Of another file.
+        if !pointer
+            .value
+            .starts_with(|first: char| first.is_ascii_digit())
+        {
             return Ok(None);
         }
         let record_bytes = whole(label, "RECORD_BYTES", [1, 1 << 20], "a number of bytes")?;
@@ -83,7 +87,7 @@ impl Raster {
         }
         let (number, is_lsb) = number(label)?;
         for (key, right) in [("LINE_SUFFIX_BYTES", "0"), ("BANDS", "1")] {
-            if let Some(entry) = label.find(key).filter(|entry| entry.value != right) {
+            if let Some(entry) = of_rows(label, key).filter(|entry| entry.value != right) {
                 return Err(refused(key, entry, right));
             }
         }
@@ -265,7 +269,7 @@ fn start(pointer: &Entry, record_bytes: u64, bytes: u64) -> std::result::Result<
 /// How samples are stored, and whether their least significant byte stands first.
 fn number(label: &Label) -> std::result::Result<(Number, bool), HrscError> {
     let bits = whole(label, "SAMPLE_BITS", [8, 16], "8 or 16")?;
-    let entry = label.find("SAMPLE_TYPE").ok_or(HrscError::Lacking {
+    let entry = of_rows(label, "SAMPLE_TYPE").ok_or(HrscError::Lacking {
         key: "SAMPLE_TYPE",
         expected: "that of samples with 8 or 16 bits",
     })?;
@@ -293,6 +297,12 @@ fn refused(key: &'static str, entry: &Entry, expected: &str) -> HrscError {
     }
 }
 
+/// What a label says of the rows: in the object of the image, or outside of all.
+fn of_rows<'a>(label: &'a Label, key: &str) -> Option<&'a Entry> {
+    let mut entries = label.entries.iter();
+    entries.find(|entry| matches!(&*entry.group, "" | "IMAGE") && entry.key == key)
+}
+
 /// A whole number within both ends.
 fn whole(
     label: &Label,
@@ -300,10 +310,7 @@ fn whole(
     [least, largest]: [u64; 2],
     expected: &'static str,
 ) -> std::result::Result<u64, HrscError> {
-    let mut entries = label.entries.iter();
-    let of_rows = |entry: &&Entry| matches!(&*entry.group, "" | "IMAGE") && entry.key == key;
-    let entry = entries
-        .find(of_rows)
+    let entry = of_rows(label, key)
         .filter(|entry| known(entry))
         .ok_or(HrscError::Lacking { key, expected })?;
     let number = entry.value.parse::<u64>().ok();

@@ -14,6 +14,8 @@ use crate::{line_times::LinePiece, pds::image_label::RowTimes, time::Et};
 const REGULAR_S: f64 = 5e-5;
 /// Share of rows whose prefixes must have a time and an exposure.
 const KNOWN_SHARE_MIN: f64 = 0.9;
+/// Rows without a time at either end of an image that are continued by their exposures: a change of these would be told by no time.
+const CONTINUED_MAX: usize = 10;
 /// Remarks of one kind that are told one by one.
 const REMARKS_MAX: usize = 5;
 
@@ -104,6 +106,11 @@ impl Rows {
                 row += 1;
                 continue;
             }
+            let is_at_an_end = first == 0 || row == lines;
+            if is_at_an_end && row - first > CONTINUED_MAX {
+                let last = row - 1;
+                return Err(HrscError::TimeGap { first, last });
+            }
             if first == 0 && row < lines {
                 for filled in (0..row).rev() {
                     self.start_s[filled] = self.start_s[filled + 1] - self.period_s[filled];
@@ -114,10 +121,17 @@ impl Rows {
                 }
                 let ends_s = self.start_s[row - 1] + self.period_s[row - 1];
                 let limit_s = REGULAR_S * (row - first) as f64;
-                let next_s = self.start_s.get(row);
-                if next_s.is_some_and(|next_s| (next_s - ends_s).abs() > limit_s) {
-                    let last = row - 1;
-                    return Err(HrscError::TimeGap { first, last });
+                if let Some(next_s) = self.start_s.get(row) {
+                    let apart_s = next_s - ends_s;
+                    if apart_s.abs() > limit_s {
+                        let last = row - 1;
+                        return Err(HrscError::TimeGap { first, last });
+                    }
+                    // Exposures add up to a little more or less than the times between.
+                    for filled in first..row {
+                        let share = (filled - before) as f64 / (row - before) as f64;
+                        self.start_s[filled] += share * apart_s;
+                    }
                 }
             }
             self.damaged.push(format!(
@@ -399,6 +413,17 @@ mod tests {
             HrscError::TimeGap {
                 first: 55,
                 last: 63
+            }
+        ));
+        // More rows than are continued without a time behind them.
+        let mut damaged = prefixes();
+        damaged[129..].fill(nothing);
+        let failure = row_times(&damaged).unwrap_err();
+        assert!(matches!(
+            failure,
+            HrscError::TimeGap {
+                first: 129,
+                last: 139
             }
         ));
         assert!(row_times(&vec![nothing; 10]).is_err());

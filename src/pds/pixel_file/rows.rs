@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 
-/// Largest size of a line that is believed, samples: the largest file of any camera here has 4096.
+/// Largest size of a line that is believed, samples: the largest line of any camera here has 5184.
 pub(super) const SAMPLES_MAX: u32 = 65_536;
 /// The same of an image, lines.
 pub(super) const LINES_MAX: u32 = 10_000_000;

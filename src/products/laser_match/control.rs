@@ -80,13 +80,13 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
             |row: &Row| row.point.laser[2],
         ),
         column(
-            "sigma_horizontal_m",
+            "sigma_matching_horizontal_m",
             Unit::Metre,
-            "standard deviation of a horizontal coordinate, of the matching, metres: errors of the laser's own are not in it",
+            "standard deviation of a horizontal coordinate by the matching, metres; calibrations add it to the laser's own",
             |row: &Row| row.point.sigma_horizontal_m(),
         ),
         column(
-            "sigma_vertical_m",
+            "sigma_matching_vertical_m",
             Unit::Metre,
             "likewise of the radius",
             |row: &Row| row.point.sigma_m[2],

@@ -135,7 +135,7 @@ impl Judged {
 fn scatters(of: &Evidence<'_>) -> Vec<Judged> {
     let judged = |kind, what, found: Option<Scattered>| {
         let found = found?;
-        // Few coordinates scatter more by chance; less than one says nothing. Hundredths are what is printed.
+        // Few coordinates scatter more by chance. Hundredths are what is printed.
         let [_, by_chance] = unit_weight_limits(found.coordinates)?;
         Some(Judged {
             kind,

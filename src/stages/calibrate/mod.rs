@@ -78,7 +78,7 @@ impl Input for CalibrationFiles<'_> {
 
 impl Stage for Calibrate<'_> {
     const NAME: &'static str = "calibrate";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     type Output = Calibration;
     stage_inputs!(fingerprint);
 

@@ -23,8 +23,8 @@ use crate::{
 
 /// Places at which look directions are compared, `s′`.
 const COMPARED_AT: [f64; 3] = [-1.0, 0.0, 1.0];
-/// Fewer coordinates than this are left over by rounding alone.
-const EXPECTED_MIN: f64 = 0.01;
+/// Fewer coordinates that are free to differ say nothing.
+const FREE_MIN: f64 = 1.0;
 
 /// A calibration that is done.
 pub(super) struct Outcome<'a> {
@@ -56,11 +56,11 @@ pub(super) fn drift(
     })
 }
 
-/// None where what is expected is rounding: the calibration follows every point.
+/// None where the calibration follows the points.
 fn scattered(of: Missed) -> Option<Scattered> {
-    (of.expected >= EXPECTED_MIN).then(|| Scattered {
+    (of.free >= FREE_MIN).then(|| Scattered {
         sigmas: (of.square / of.expected).sqrt(),
-        coordinates: of.expected,
+        coordinates: of.free,
     })
 }
 

@@ -184,7 +184,7 @@ pub struct HeldBack {
 /// true. In the plane and in height apart, as errors of the one hide behind too large standard deviations of the other.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Scatter {
-    /// East and north; none where the calibration follows every point.
+    /// East and north; none where the calibration follows the points.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plane: Option<Scattered>,
     /// Up, of points in two cameras or more; none without such a point.
@@ -195,10 +195,10 @@ pub struct Scatter {
 /// A root mean square over what is expected.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Scattered {
-    /// It.
+    /// Root mean square of what is missed over what is expected.
     #[schemars(range(min = 0.0))]
     pub sigmas: f64,
-    /// Of how many coordinates; of points that were used less, as the calibration follows them.
+    /// How many coordinates are free to differ; of points that were used fewer, as the calibration follows them.
     #[schemars(range(min = 0.0))]
     pub coordinates: f64,
 }

@@ -257,9 +257,12 @@ fn known(row: &ControlRow, sigma: ControlSigma) -> KnownPlace {
         row.latitude_deg * RADIANS_PER_DEGREE,
         row.radius_m,
     );
-    let horizontal_m = row.sigma_m[0].unwrap_or(sigma.horizontal_m);
-    let vertical_m = row.sigma_m[1].unwrap_or(sigma.vertical_m);
-    known_place(place_m, [horizontal_m, vertical_m])
+    let laser_m = [sigma.horizontal_m, sigma.vertical_m];
+    let sigma_m = [0, 1].map(|axis| {
+        let laser_m = row.sigma_m[axis].unwrap_or(laser_m[axis]);
+        laser_m.hypot(row.matching_m[axis].unwrap_or_default())
+    });
+    known_place(place_m, sigma_m)
 }
 
 /// A place with its standard deviations in the plane and in height, metres.

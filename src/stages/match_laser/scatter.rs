@@ -61,7 +61,7 @@ impl Plane {
                 .zip(seen)
                 .map(|(off, of)| off / of.sigmas[at])
                 .collect();
-            let scale = spread(&normalised).max(f64::MIN_POSITIVE);
+            let scale = spread(&normalised, 1.0).max(f64::MIN_POSITIVE);
             let (mut normals, mut right) = (Matrix3::zeros(), Vector3::zeros());
             for (of, z) in seen.iter().zip(normalised) {
                 let weight = robust.factor(z / scale) / of.sigmas[at].powi(2);
@@ -79,10 +79,10 @@ impl Plane {
     }
 }
 
-/// Robust standard deviation of residuals of a plane about it.
-fn spread(normalised: &[f64]) -> f64 {
+/// Robust standard deviation of residuals of so many planes about these.
+fn spread(normalised: &[f64], planes: f64) -> f64 {
     let count = normalised.len() as f64;
-    Summary::of(normalised).nmad * (count / (count - UNKNOWNS)).sqrt()
+    Summary::of(normalised).nmad * (count / (count - planes * UNKNOWNS)).sqrt()
 }
 
 fn seen(units: &[UnitResult], cell_m: [f64; 2]) -> Vec<Seen> {
@@ -128,8 +128,8 @@ pub(super) fn widen(units: &mut [UnitResult], cell_m: [f64; 2]) -> Option<Widene
         .flat_map(|of| of.normalised.iter().copied())
         .collect();
     let widened = Widened {
-        shift: (spread(&both)).max(1.0),
-        bias: spread(&bias.normalised).max(1.0),
+        shift: spread(&both, 2.0).max(1.0),
+        bias: spread(&bias.normalised, 1.0).max(1.0),
     };
     for (index, of) in seen.iter().enumerate() {
         let off_cells = east.off[index].hypot(north.off[index]);

@@ -126,7 +126,8 @@ pub(super) fn settled(
             let [sigma_bias_m, south, east] = Linear::at(grid, shots, shift).sigmas()?;
             return Ok(Settled {
                 shift,
-                sigma_cells: [south, east],
+                // A step that was shortened to its end may leave the way open that it asks for.
+                sigma_cells: [south.hypot(step[0]), east.hypot(step[1])],
                 sigma_bias_m,
             });
         }

@@ -137,10 +137,10 @@ impl PartOfLine<'_> {
     /// A remark that the image is put on the first pixel.
     ///
     /// # Errors
-    /// An image whose file tells everything else (`of_file`), so that nobody was asked yet.
-    pub(super) fn on_first_pixel(&self, image: &str, of_file: bool) -> Result<String> {
+    /// An image by a label that never says so (`is_open`), where the first pixel is nobody's choice.
+    pub(super) fn on_first_pixel(&self, image: &str, is_open: bool) -> Result<String> {
         let (samples, pixels) = (self.samples, self.instrument.detector.pixels);
-        if of_file {
+        if is_open {
             return Err(DetectorError::FirstPixel {
                 image: image.to_owned(),
                 samples,

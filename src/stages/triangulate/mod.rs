@@ -64,7 +64,7 @@ impl Input for NetFiles<'_> {
 
 impl Stage for Triangulate<'_> {
     const NAME: &'static str = "triangulate";
-    const METHOD: u32 = 4;
+    const METHOD: u32 = 5;
     type Output = Triangulation;
     stage_inputs!(fingerprint);
 
