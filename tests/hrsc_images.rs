@@ -26,11 +26,13 @@ use serde_json::Value;
 
 const FOLDER: &str = "ale_mex/h5270_0000_ir2";
 const LABEL: &str = "h5270_0000_ir2_pds3.lbl";
-const KERNELS: [&str; 6] = [
+const KERNELS: [&str; 7] = [
     "naif0012.tls",
     "pck00009.tpc",
     "MEX_190911_STEP.TSC",
     "MEX_V14.TF",
+    // Light that reaches the image left the Sun in the pass before.
+    "h5270_0000_ir2_0.bsp",
     "h5270_0000_ir2_1.bsp",
     "ATNM_MEASURED_080101_090101_V03_1_sliced_-41001.bc",
 ];
@@ -590,8 +592,8 @@ fn damaged_and_exchanged_files_are_told() {
         // Rows that do not begin where the label has them.
         (
             &|bytes: &mut Vec<u8>| {
-                bytes.remove(row(0));
-                bytes.push(0);
+                bytes.drain(row(0)..row(0) + 2);
+                bytes.extend([0; 2]);
             },
             "0 of 400 rows have a time and an exposure",
         ),
