@@ -354,7 +354,7 @@ fn a_site_of_one_file_runs_and_a_long_image_says_what_it_needs() {
     );
     succeed(&mut case.run());
     let orientation = json(&case.path("out/hrsc/images/h5270_0000_ir2/orientation.json"));
-    assert_eq!(orientation["start_from"], "lines");
+    assert_eq!(orientation["times"]["start_from"], "lines");
     let image = info(&case.path("h5270_0000_ir2.img")).unwrap();
     for (key, expected) in [
         ("product_id", Value::from("H5270_0000_IR2.IMG")),
@@ -454,7 +454,7 @@ fn a_part_of_the_image_is_valid_by_label_and_pixels() {
 }
 
 #[test]
-fn labels_and_keys_that_contradict_the_file_are_refused() {
+fn labels_that_contradict_the_file_are_refused() {
     let Some(folder) = real_data(FOLDER, "contradicting labels of HRSC") else {
         return;
     };
@@ -524,6 +524,13 @@ fn labels_and_keys_that_contradict_the_file_are_refused() {
         let told = told_of(&folder, |case| edit_label(case, from, to));
         assert!(told.contains(expected), "{to}: {told}");
     }
+}
+
+#[test]
+fn keys_that_contradict_the_file_are_refused() {
+    let Some(folder) = real_data(FOLDER, "contradicting keys of HRSC") else {
+        return;
+    };
     for (from, to, expected) in [
         (
             "'hrsc_ir'",
