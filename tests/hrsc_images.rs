@@ -26,11 +26,13 @@ use serde_json::Value;
 
 const FOLDER: &str = "ale_mex/h5270_0000_ir2";
 const LABEL: &str = "h5270_0000_ir2_pds3.lbl";
-const KERNELS: [&str; 6] = [
+const KERNELS: [&str; 7] = [
     "naif0012.tls",
     "pck00009.tpc",
     "MEX_190911_STEP.TSC",
     "MEX_V14.TF",
+    // Light that reaches the image left the Sun in the pass before.
+    "h5270_0000_ir2_0.bsp",
     "h5270_0000_ir2_1.bsp",
     "ATNM_MEASURED_080101_090101_V03_1_sliced_-41001.bc",
 ];
@@ -352,7 +354,7 @@ fn a_site_of_one_file_runs_and_a_long_image_says_what_it_needs() {
     );
     succeed(&mut case.run());
     let orientation = json(&case.path("out/hrsc/images/h5270_0000_ir2/orientation.json"));
-    assert_eq!(orientation["start_from"], "lines");
+    assert_eq!(orientation["times"]["start_from"], "lines");
     let image = info(&case.path("h5270_0000_ir2.img")).unwrap();
     for (key, expected) in [
         ("product_id", Value::from("H5270_0000_IR2.IMG")),
@@ -452,7 +454,7 @@ fn a_part_of_the_image_is_valid_by_label_and_pixels() {
 }
 
 #[test]
-fn labels_and_keys_that_contradict_the_file_are_refused() {
+fn labels_that_contradict_the_file_are_refused() {
     let Some(folder) = real_data(FOLDER, "contradicting labels of HRSC") else {
         return;
     };
@@ -522,6 +524,13 @@ fn labels_and_keys_that_contradict_the_file_are_refused() {
         let told = told_of(&folder, |case| edit_label(case, from, to));
         assert!(told.contains(expected), "{to}: {told}");
     }
+}
+
+#[test]
+fn keys_that_contradict_the_file_are_refused() {
+    let Some(folder) = real_data(FOLDER, "contradicting keys of HRSC") else {
+        return;
+    };
     for (from, to, expected) in [
         (
             "'hrsc_ir'",
@@ -590,8 +599,8 @@ fn damaged_and_exchanged_files_are_told() {
         // Rows that do not begin where the label has them.
         (
             &|bytes: &mut Vec<u8>| {
-                bytes.remove(row(0));
-                bytes.push(0);
+                bytes.drain(row(0)..row(0) + 2);
+                bytes.extend([0; 2]);
             },
             "0 of 400 rows have a time and an exposure",
         ),

@@ -199,7 +199,9 @@ impl Rows {
         let [before_s, next_s] =
             [row.saturating_sub(1), row + 1].map(|beside| self.period_s[beside]);
         let (least_s, largest_s) = (before_s.min(next_s), before_s.max(next_s));
-        least_s < largest_s
+        // Of the first line nothing says what the exposure was before.
+        row > 0
+            && least_s < largest_s
             && (least_s..=largest_s).contains(&self.period_s[row])
             && (least_s - REGULAR_S..=largest_s + REGULAR_S).contains(&step_s)
     }
