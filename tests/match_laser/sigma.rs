@@ -29,8 +29,11 @@ fn normalised(of: &LaserMatch, [east, north]: [f64; 2], bias_m: f64) -> [f64; 3]
     })
 }
 
-/// The model of the scene with something added to every height by its row and column.
-fn with_noise(name: &str, added_m: impl Fn(usize, usize, f64) -> f64) -> LaserMatch {
+/// What is added to a height, metres, by its row, its column and itself.
+type Added<'a> = &'a dyn Fn(usize, usize, f64) -> f64;
+
+/// The model of the scene with something added to every height.
+fn with_noise(name: &str, added_m: Added<'_>) -> LaserMatch {
     let path = SCENE.path().join(format!("{name}.tif"));
     model::edited(&scene().join("model.tif"), &path, |model| {
         let columns = model.columns;
@@ -90,7 +93,7 @@ fn a_model_that_errs_in_common_over_units_has_wider_standard_deviations() {
             .sum();
         sum / std::f64::consts::SQRT_2
     };
-    let cases: [(&str, &dyn Fn(usize, usize, f64) -> f64); 4] = [
+    let cases: [(&str, Added<'_>); 4] = [
         ("white noise of 20 m", &|row, column, _| {
             20.0 * white(row, column)
         }),
