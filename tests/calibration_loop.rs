@@ -137,45 +137,43 @@ fn rounds_converge_and_their_numbers_are_kept() {
 
 #[test]
 fn places_are_as_near_as_stated_to_where_they_truly_are() {
-    holds_what_it_states(SCENE.path(), &RUN);
     let other = scene(2);
-    holds_what_it_states(other.path(), &run_in(other.path(), "other", &[]).unwrap());
-}
-
-fn holds_what_it_states(folder: &Path, run: &SingleOutcome) {
-    let verdict = &run.manifest.verdict;
-    assert!(verdict.valid, "{:?}", verdict.reasons);
-    let given = errors_m(folder, |line| folder.join(format!("lines/isd/{line}.json")));
-    let errors_m = errors_m(folder, |line| {
-        run.folder.join(format!("cameras/{line}/isd.json"))
-    });
-    let [plane_m, height_m] = plane_and_height_m(&errors_m);
-    let before_m = plane_and_height_m(&given);
-    println!(
-        "before {before_m:.1?}; plane {plane_m:.2} m, height {height_m:.2} m of {}",
-        errors_m.len()
-    );
-    assert!(errors_m.len() >= 100);
-    assert!(before_m[0] > 500.0 && before_m[1] > 300.0, "{before_m:?}");
-    // The bounds: half a pixel of the stereo lines, and 20 m.
-    assert!(plane_m < 0.5 * PIXEL_M, "{plane_m}");
-    assert!(height_m < 20.0, "{height_m}");
-    let document = json(&run.folder.join("calibration.json"));
-    let held_back = &document["held_back"];
-    let stated_m = ["accuracy_plane_m", "accuracy_height_m"].map(|key| number(&held_back[key]));
-    let scatter = [&held_back["scatter"], &document["control_scatter"]]
-        .map(|of| ["plane", "height"].map(|axis| number(&of[axis]["sigmas"])));
-    println!("stated {stated_m:.2?}, control off {scatter:.2?} times as far as expected");
-    // The checked places are measured without error, so that only that of the calibration is left, which all of them share: two
-    // standard deviations of it are rarely exceeded.
-    for (found_m, stated_m) in [plane_m, height_m].iter().zip(stated_m) {
-        assert!(*found_m < 2.0 * stated_m, "{found_m} of {stated_m}");
-    }
-    // Nor are standard deviations so large that they always hold. In the plane: the range within which the verdict has no word to
-    // say; heights of units are as good as the worst of their ground, which few have.
-    for [plane, height] in scatter {
-        assert!((0.6..1.5).contains(&plane), "{scatter:?}");
-        assert!((0.3..1.5).contains(&height), "{scatter:?}");
+    let other_run = run_in(other.path(), "other", &[]).unwrap();
+    for (folder, run) in [(SCENE.path(), &*RUN), (other.path(), &other_run)] {
+        let verdict = &run.manifest.verdict;
+        assert!(verdict.valid, "{:?}", verdict.reasons);
+        let given = errors_m(folder, |line| folder.join(format!("lines/isd/{line}.json")));
+        let errors_m = errors_m(folder, |line| {
+            run.folder.join(format!("cameras/{line}/isd.json"))
+        });
+        let [plane_m, height_m] = plane_and_height_m(&errors_m);
+        let before_m = plane_and_height_m(&given);
+        println!(
+            "before {before_m:.1?}; plane {plane_m:.2} m, height {height_m:.2} m of {}",
+            errors_m.len()
+        );
+        assert!(errors_m.len() >= 100);
+        assert!(before_m[0] > 500.0 && before_m[1] > 300.0, "{before_m:?}");
+        // The bounds: half a pixel of the stereo lines, and 20 m.
+        assert!(plane_m < 0.5 * PIXEL_M, "{plane_m}");
+        assert!(height_m < 20.0, "{height_m}");
+        let document = json(&run.folder.join("calibration.json"));
+        let held_back = &document["held_back"];
+        let stated_m = ["accuracy_plane_m", "accuracy_height_m"].map(|key| number(&held_back[key]));
+        let scatter = [&held_back["scatter"], &document["control_scatter"]]
+            .map(|of| ["plane", "height"].map(|axis| number(&of[axis]["sigmas"])));
+        println!("stated {stated_m:.2?}, control off {scatter:.2?} times as far as expected");
+        // The checked places are measured without error, so that only that of the calibration is left, which all of them share: two
+        // standard deviations of it are rarely exceeded.
+        for (found_m, stated_m) in [plane_m, height_m].iter().zip(stated_m) {
+            assert!(*found_m < 2.0 * stated_m, "{found_m} of {stated_m}");
+        }
+        // Nor are standard deviations so large that they always hold. In the plane: the range within which the verdict has no word to
+        // say; heights of units are as good as the worst of their ground, which few have.
+        for [plane, height] in scatter {
+            assert!((0.6..1.5).contains(&plane), "{scatter:?}");
+            assert!((0.3..1.5).contains(&height), "{scatter:?}");
+        }
     }
 }
 
