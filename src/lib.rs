@@ -1,39 +1,27 @@
 //! areograph: Mars Global Surveyor data preparation, from SPICE kernels, MOLA shots and MOC images
 //! to validated, photogrammetry-ready products.
 //!
-//! [`flow::run_site`] runs a site; `flow/site.rs` tells how, read top to bottom; `ARCHITECTURE.md` is the map.
+//! [`flow::run_site`] runs a site; `flow/site.rs` shows how, read top to bottom; `ARCHITECTURE.md` is the map. What
+//! lies below the stages are crates of their own, under their names here.
 
-pub mod altimetry;
-pub mod body;
 pub mod cli;
-pub mod config;
-pub mod constants;
 pub mod difference;
-pub mod error;
-pub mod files;
 pub mod flow;
-pub mod footprints;
-pub mod frames;
-pub mod geom;
-pub mod image;
-pub mod imaging;
-pub mod instruments;
-pub mod kernel_source;
-pub mod line_times;
-pub mod pds;
 pub mod products;
 pub mod report;
-pub mod scene;
-pub mod schema;
-pub mod service;
-pub mod spice;
 #[cfg(feature = "sql")]
 pub mod sql;
-pub mod stage;
 pub mod stages;
-pub mod store;
-pub mod ties;
-pub mod time;
-pub mod units;
-pub mod watch;
-pub mod wording;
+pub mod worker;
+
+pub use areograph_base::{
+    altimetry, body, constants, error, footprints, frames, image, instruments, kernel_source,
+    line_times, schema, ties, time, units, verdict, watch, wording,
+};
+pub use areograph_config as config;
+pub use areograph_geom::{self as geom, imaging};
+pub use areograph_pds as pds;
+pub use areograph_scene as scene;
+pub use areograph_service as service;
+pub use areograph_spice as spice;
+pub use areograph_store::{self as store, files, stage, stage_inputs};

@@ -20,10 +20,8 @@ use areograph::{
     },
     stages::register::{ImageRegistration, Method, register},
 };
-use arrow::{
-    array::{AsArray, RecordBatch},
-    datatypes::{Float64Type, UInt32Type},
-};
+use arrow_array::types::{Float64Type, UInt32Type};
+use arrow_array::{AsArray, RecordBatch};
 use common::case::Case;
 use fixture::{SHOTS, Site, line_offset, move_under_the_camera};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;

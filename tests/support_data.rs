@@ -25,10 +25,8 @@ use areograph::{
     geom::{attitude::matrix_of_spice_quaternion, pushbroom::Detector},
     pds::isd::read_isd,
 };
-use arrow::{
-    array::{AsArray as _, RecordBatch},
-    datatypes::{Float64Type, UInt32Type},
-};
+use arrow_array::types::{Float64Type, UInt32Type};
+use arrow_array::{AsArray as _, RecordBatch};
 use common::{
     case::Case,
     json,

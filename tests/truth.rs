@@ -35,10 +35,8 @@ use std::{
     process::Command,
 };
 
-use arrow::{
-    array::{Array as _, AsArray, RecordBatch},
-    datatypes::Float64Type,
-};
+use arrow_array::types::Float64Type;
+use arrow_array::{Array as _, AsArray, RecordBatch};
 use common::{
     json,
     mission::{areograph, mission, succeed},

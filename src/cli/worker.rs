@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use crate::service::worker::child;
+use crate::worker;
 
 /// Does one task of the service, which talks to it over standard input and output.
 #[derive(Debug, Args)]
@@ -15,5 +15,5 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> ExitCode {
-    child::main(arguments.parent)
+    worker::main(arguments.parent)
 }

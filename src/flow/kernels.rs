@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::RivalSet;
 use crate::{
-    config::SiteConfig,
+    config::{SiteConfig, built_in_instruments},
     constants::SPACECRAFT,
     error::Result,
     files::InputFiles,
@@ -24,7 +24,9 @@ pub(super) fn load_kernels(
 ) -> Result<KernelSet> {
     match &config.kernels.source {
         KernelSource::Listed(list) => load_list(list, files),
-        KernelSource::Root(selection) => KernelSet::select_of(files, selection, required),
+        KernelSource::Root(selection) => {
+            KernelSet::select_of(files, selection, built_in_instruments(), required)
+        }
         KernelSource::Sets(sets) => sets.get(chosen).map_or_else(
             || Ok(KernelSet::default()),
             |set| load_list(&set.list, files),

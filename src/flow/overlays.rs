@@ -4,10 +4,11 @@ use super::{
     driver::{Driver, Flow},
     outputs::Site,
 };
+use crate::stages::site_image::SiteImages;
 use crate::{
     config::{ImageConfig, SiteConfig},
     files::HashedFile,
-    stage::{InOrder, Output, Stage as _},
+    stage::{Output, Stage as _},
     stages::{
         image_pixels::PixelFiles,
         lay_overlays::{LayOverlays, MeasuredTies, Overlays},
@@ -37,8 +38,8 @@ pub(super) fn overlays<D: Driver>(
     let adjustment = site.adjustment.as_ref();
     let measured = site.ties.as_ref().zip(site.intersection.as_ref());
     let overlays = flow.stage(&LayOverlays {
-        images: InOrder(&site.images),
-        adjusted_images: InOrder(adjustment.map_or(&[], |of| &of.images)),
+        images: SiteImages(&site.images),
+        adjusted_images: SiteImages(adjustment.map_or(&[], |of| &of.images)),
         model: &config.registration.model,
         pixels: PixelFiles(&pixels),
         converted: &site.converted,

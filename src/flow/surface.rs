@@ -5,9 +5,10 @@ use super::{
     outputs::Site,
     overlays::pixel_files,
 };
+use crate::stages::site_image::SiteImages;
 use crate::{
     config::SiteConfig,
-    stage::{InOrder, Output, Stage as _},
+    stage::{Output, Stage as _},
     stages::{
         image_pixels::PixelFiles,
         map_surface::{AdjustmentOfImages, MapSurface, Surface},
@@ -28,7 +29,7 @@ pub(super) fn surface<D: Driver>(
     let limits = &config.limits;
     let pixels = pixel_files(flow, MapSurface::NAME, config)?;
     let surface = flow.stage(&MapSurface {
-        images: InOrder(adjustment.map_or(&site.images, |of| &of.images)),
+        images: SiteImages(adjustment.map_or(&site.images, |of| &of.images)),
         model: &config.registration.model,
         pixels: PixelFiles(&pixels),
         converted: &site.converted,

@@ -21,7 +21,7 @@ use crate::{
         match_ties::{Margin, MatchTies, TiesOfFiles},
         read_ties::{ImageNames, ReadTies, TieFiles, Ties},
         reorient::Reorient,
-        site_image::SiteImage,
+        site_image::{SiteImage, SiteImages},
         tabulate_kernels::TabulateKernels,
     },
 };
@@ -105,7 +105,7 @@ pub(super) fn match_ties<D: Driver>(
     let pixels = pixel_files(flow, MatchTies::NAME, config)?;
     flow.stage(&MatchTies {
         round,
-        images: InOrder(images),
+        images: SiteImages(images),
         model: &config.registration.model,
         pixels: PixelFiles(&pixels),
         converted,
@@ -168,7 +168,7 @@ fn corrected<D: Driver>(
     let (converted, profiles) = shots;
     let adjusted = flow.stage(&Adjust {
         round,
-        images: InOrder(images),
+        images: SiteImages(images),
         model: &config.registration.model,
         converted,
         profiles,
@@ -252,7 +252,7 @@ fn ground<D: Driver>(
     ties: &Output<Ties>,
     (converted, profiles): Shots,
 ) -> Flow<(Output<IntersectedTies>, Output<Vec<PairComparison>>)> {
-    let (images, model) = (InOrder(images), &config.registration.model);
+    let (images, model) = (SiteImages(images), &config.registration.model);
     let intersected = flow.stage(&Intersect {
         round,
         images,

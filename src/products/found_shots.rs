@@ -9,11 +9,8 @@ use std::{
 };
 
 use ::parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
-use arrow::{
-    array::{ArrayRef, Float64Array, StructArray},
-    datatypes::{DataType, Field, Fields, Schema, SchemaRef},
-    record_batch::RecordBatch,
-};
+use arrow_array::{ArrayRef, Float64Array, RecordBatch, StructArray};
+use arrow_schema::{DataType, Field, Fields, Schema, SchemaRef};
 use serde_json::{Value, json};
 
 use super::{

@@ -3,13 +3,11 @@
 use std::{collections::HashMap, fs::File, io::Write, ops::Range, path::Path, sync::Arc};
 
 use ::parquet::{arrow::arrow_reader::ParquetRecordBatchReaderBuilder, errors::ParquetError};
-use arrow::{
-    array::{
-        ArrayRef, BinaryArray, BooleanArray, Float64Array, Int32Array, StringArray, UInt32Array,
-    },
-    datatypes::{DataType, Field, Schema, SchemaRef},
-    record_batch::RecordBatch,
+use arrow_array::{
+    ArrayRef, BinaryArray, BooleanArray, Float64Array, Int32Array, RecordBatch, StringArray,
+    UInt32Array,
 };
+use arrow_schema::{DataType, Field, Schema, SchemaRef};
 use rayon::prelude::*;
 
 use super::{

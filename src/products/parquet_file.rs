@@ -19,10 +19,8 @@ use ::parquet::{
     },
     schema::types::ColumnPath,
 };
-use arrow::{
-    datatypes::{DataType, Field, SchemaRef},
-    record_batch::RecordBatch,
-};
+use arrow_array::RecordBatch;
+use arrow_schema::{DataType, Field, SchemaRef};
 use rayon::prelude::*;
 
 /// Rows of a group, whose encoded columns stand in memory until it is whole; readers pass over groups.
@@ -151,11 +149,9 @@ mod tests {
     use ::parquet::{
         arrow::arrow_reader::ParquetRecordBatchReaderBuilder, file::metadata::RowGroupMetaData,
     };
-    use arrow::{
-        array::{Float64Array, StringArray, UInt32Array},
-        compute::concat_batches,
-        datatypes::Schema,
-    };
+    use arrow_array::{Float64Array, StringArray, UInt32Array};
+    use arrow_schema::Schema;
+    use arrow_select::concat::concat_batches;
 
     use super::*;
 

@@ -1,10 +1,8 @@
 //! Shots of an archive as columns of a table that is queried: those of `footprints.parquet` that need neither windows
 //! nor kernels.
 
-use arrow::{
-    datatypes::SchemaRef,
-    record_batch::{RecordBatch, RecordBatchOptions},
-};
+use arrow_array::{RecordBatch, RecordBatchOptions};
+use arrow_schema::SchemaRef;
 
 use super::{
     error::ProductError,

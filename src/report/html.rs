@@ -5,7 +5,7 @@ use std::{borrow::Cow, fmt::Write as _};
 use super::numbers::whole;
 
 /// Style of all pages. Reports have no scripts; plots take their colours from here, so that they follow light and dark.
-pub const STYLE: &str = include_str!("style.css");
+pub use areograph_base::style::STYLE;
 
 /// Letters up to which a cell stays on one line.
 const SHORT: usize = 28;

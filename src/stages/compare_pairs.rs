@@ -13,7 +13,7 @@ use super::{
     intersect::{IntersectedPoint, IntersectedTies, MeasureResidual},
     read_ties::Ties,
     register::ImageRegistration,
-    site_image::SiteImage,
+    site_image::SiteImages,
 };
 use crate::{
     error::Result,
@@ -27,7 +27,7 @@ use crate::{
         statistics::Summary,
         uncertainty::{BudgetInput, ResidualMoments, UncertaintyBudget, uncertainty_budget},
     },
-    stage::{InOrder, Output, Round, Stage},
+    stage::{Output, Round, Stage},
     stage_inputs,
     ties::TiePoint,
 };
@@ -119,7 +119,7 @@ stage_inputs! {
         /// Which orientation.
         pub round: Round,
         /// The images.
-        pub images: InOrder<'a, SiteImage>,
+        pub images: SiteImages<'a>,
         /// The form of the orientation.
         pub model: &'a CameraModel,
         /// Tie points.
@@ -144,7 +144,7 @@ impl Stage for ComparePairs<'_> {
     }
 
     fn run(&self, _stop: &AtomicBool) -> Result<Vec<PairComparison>> {
-        let oriented = SiteImage::oriented(self.images.0)?;
+        let oriented = self.images.oriented()?;
         let images: Vec<_> = oriented
             .iter()
             .map(|image| image.oriented_camera(*self.model))

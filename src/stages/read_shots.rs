@@ -9,7 +9,7 @@ use std::{
 use super::{outline_windows::Windows, search_footprints::SearchResult};
 use crate::{
     body::{Body, Datum},
-    config::{ShotTableConfig, WindowConfig},
+    config::{ShotColumns, ShotTableConfig, WindowConfig},
     error::{Cause, Kind, Result, Stopped},
     files::{HashedFile, file_name},
     footprints::{Footprint, Footprints, SourceFile},
@@ -20,7 +20,7 @@ use crate::{
     },
     pds::{
         pedr::{Complaint, Reason},
-        shot_table::{RowComplaint, ShotRow, read_shot_table},
+        shot_table::{self, RowComplaint, ShotRow, read_shot_table},
     },
     spice::KernelView,
     stage::{InOrder, Input, Inputs, Stage},
@@ -146,7 +146,7 @@ pub fn read_shots(
             datum,
             blake3: file.blake3.clone(),
         });
-        let (path, columns) = (&file.path, table.columns());
+        let (path, columns) = (&file.path, columns_of(table.columns()));
         read_shot_table(path, &columns, body, utc, |row| {
             Stopped::check(stop)?;
             gathered.take(index, datum, path, row);
@@ -154,6 +154,26 @@ pub fn read_shots(
         })?;
     }
     Ok(gathered.finish(tables.len()))
+}
+
+/// The columns of the configuration, as the reader of tables takes them.
+fn columns_of(columns: ShotColumns) -> shot_table::ShotColumns {
+    shot_table::ShotColumns {
+        utc: columns.utc,
+        et_s: columns.et_s,
+        longitude_deg: columns.longitude_deg,
+        latitude_deg: columns.latitude_deg,
+        radius_km: columns.radius_km,
+        radius_m: columns.radius_m,
+        height_m: columns.height_m,
+        range_km: columns.range_km,
+        range_m: columns.range_m,
+        spacecraft_longitude_deg: columns.spacecraft_longitude_deg,
+        spacecraft_latitude_deg: columns.spacecraft_latitude_deg,
+        spacecraft_radius_km: columns.spacecraft_radius_km,
+        spacecraft_radius_m: columns.spacecraft_radius_m,
+        orbit: columns.orbit,
+    }
 }
 
 fn empty(body: Body) -> SearchResult {

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    stage::{InOrder, Input, Inputs, Output},
+    stage::{Input, Inputs, Output},
 };
 
 /// What the stages made of one image, with the orientation of the kernels or the adjusted one.
@@ -22,7 +22,11 @@ pub struct SiteImage {
     pub registration: Output<ImageRegistration>,
 }
 
-impl Input for InOrder<'_, SiteImage> {
+/// The images of a site in its order.
+#[derive(Debug, Clone, Copy)]
+pub struct SiteImages<'a>(pub &'a [SiteImage]);
+
+impl Input for SiteImages<'_> {
     fn add_to(&self, field: &str, inputs: &mut Inputs) {
         let labels: Vec<&str> = self.0.iter().map(|image| image.times.label()).collect();
         inputs.setting(&format!("{field} (order)"), &labels);
@@ -35,13 +39,13 @@ impl Input for InOrder<'_, SiteImage> {
     }
 }
 
-impl SiteImage {
+impl<'a> SiteImages<'a> {
     /// The images with their orientation in every form.
     ///
     /// # Errors
     /// Samples that are no orientation.
-    pub fn oriented(images: &[Self]) -> Result<Vec<OrientedImage<'_>>> {
-        let oriented = images.iter().map(|image| {
+    pub fn oriented(self) -> Result<Vec<OrientedImage<'a>>> {
+        let oriented = self.0.iter().map(|image| {
             let (times, orientation) = (image.times.value()?, image.orientation.value()?);
             OrientedImage::of(times, orientation, image.model.value()?)
         });

@@ -3,10 +3,7 @@
 use std::path::Path;
 
 use ::parquet::arrow::{ProjectionMask, arrow_reader::ParquetRecordBatchReaderBuilder};
-use arrow::{
-    array::{Array as _, Float64Array, StringArray, UInt32Array},
-    record_batch::RecordBatch,
-};
+use arrow_array::{Array as _, Float64Array, RecordBatch, StringArray, UInt32Array};
 
 use super::ReadError;
 use crate::{
@@ -134,7 +131,7 @@ impl Batch {
 mod tests {
     use std::sync::Arc;
 
-    use arrow::array::ArrayRef;
+    use arrow_array::ArrayRef;
 
     use super::*;
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use arrow::array::Array as _;
+use arrow_array::Array as _;
 
 use super::{ReadError, columns};
 use crate::{

@@ -11,12 +11,12 @@ use crate::{
     footprints::AdjustmentModel,
     geom::{pushbroom::CameraModel, surface::SurfaceOptions},
     instruments::Altimeter,
-    stage::{InOrder, Output, Round, Stage},
+    stage::{Output, Round, Stage},
     stage_inputs,
     stages::{
         check_ranges::RangeCheck, compare_pairs::PairComparison, convert_datum::Converted,
         group_profiles::Profile, intersect::IntersectedTies, mola_surface::MolaShots,
-        read_ties::Ties, site_image::SiteImage,
+        read_ties::Ties, site_image::SiteImages,
     },
     watch::Watch,
 };
@@ -27,7 +27,7 @@ stage_inputs! {
         /// What the adjustment is for.
         pub round: Round,
         /// The images with the orientation of the kernels.
-        pub images: InOrder<'a, SiteImage>,
+        pub images: SiteImages<'a>,
         /// The form of the orientation.
         pub model: &'a CameraModel,
         /// Footprints in IAU 2000.
@@ -66,7 +66,7 @@ impl Stage for Adjust<'_> {
     }
 
     fn run_watched(&self, watch: Watch<'_>) -> Result<Adjusted> {
-        let oriented = SiteImage::oriented(self.images.0)?;
+        let oriented = self.images.oriented()?;
         let orbits_m = self.pedr_orbits_m()?;
         let candidates = self.images.0.iter().zip(&oriented).enumerate();
         let candidates = candidates.map(|(index, (image, oriented))| {

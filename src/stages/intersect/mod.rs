@@ -12,7 +12,7 @@ use nalgebra::{Matrix3, Vector2};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{read_ties::Ties, site_image::SiteImage};
+use super::{read_ties::Ties, site_image::SiteImages};
 use crate::{
     body::Body,
     config::IntersectionConfig,
@@ -25,7 +25,7 @@ use crate::{
         oriented_camera::OrientedCamera,
         pushbroom::{CameraModel, ExteriorOrientation, Projector, Unseen},
     },
-    stage::{InOrder, Output, Round, Stage},
+    stage::{Output, Round, Stage},
     stage_inputs,
     ties::{TiePoint, require_images},
 };
@@ -180,7 +180,7 @@ stage_inputs! {
         /// Which orientation.
         pub round: Round,
         /// The images.
-        pub images: InOrder<'a, SiteImage>,
+        pub images: SiteImages<'a>,
         /// The form of the orientation.
         pub model: &'a CameraModel,
         /// Tie points.
@@ -200,7 +200,7 @@ impl Stage for Intersect<'_> {
     }
 
     fn run(&self, _stop: &AtomicBool) -> Result<IntersectedTies> {
-        let oriented = SiteImage::oriented(self.images.0)?;
+        let oriented = self.images.oriented()?;
         let images: Vec<_> = oriented
             .iter()
             .map(|image| image.oriented_camera(*self.model))

@@ -1,15 +1,11 @@
 //! Every limit of a site with what uses most of it: what the verdict rests on, as a table.
 
 use super::{
-    AdjustmentEvidence, Evidence, JudgedImage,
+    AdjustmentEvidence, Check, CheckKind,
+    CheckOutcome::{self, Fail, Pass, Warning},
+    Evidence, JudgedImage,
     adjustment::{HEIGHT_LOOSE_M, HEIGHT_OUTLIERS_FEW},
-    check::{
-        Check,
-        CheckOutcome::{self, Fail, Pass, Warning},
-    },
-    clock_limit_s,
-    kind::CheckKind,
-    surface,
+    clock_limit_s, surface,
 };
 use crate::{
     config::LimitsConfig,

@@ -1,11 +1,9 @@
 //! What is judged of a terrain model: how much of the ground it has, and what the altimeter says of it.
 
 use super::{
-    CheckKind, Evidence,
-    check::{
-        Check,
-        CheckOutcome::{Fail, Warning},
-    },
+    Check, CheckKind,
+    CheckOutcome::{Fail, Warning},
+    Evidence,
 };
 use crate::{stages::map_surface::SurfaceAccount, wording::signed};
 

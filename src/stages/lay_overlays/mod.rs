@@ -15,12 +15,12 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     adjust::Adjusted, convert_datum::Converted, group_profiles::Profile, image_pixels::PixelFiles,
-    intersect::IntersectedTies, read_ties::Ties, site_image::SiteImage, tag_times::ImageTimes,
+    intersect::IntersectedTies, read_ties::Ties, site_image::SiteImages, tag_times::ImageTimes,
 };
 use crate::{
     error::Result,
     geom::pushbroom::CameraModel,
-    stage::{InOrder, Input, Inputs, Output, Stage},
+    stage::{Input, Inputs, Output, Stage},
     stage_inputs,
 };
 
@@ -108,9 +108,9 @@ stage_inputs! {
     /// Images with pixels, and what is shown in them.
     pub struct LayOverlays<'a> {
         /// Images with the orientation of the kernels.
-        pub images: InOrder<'a, SiteImage>,
+        pub images: SiteImages<'a>,
         /// The same with the adjusted one; none where there is no adjustment.
-        pub adjusted_images: InOrder<'a, SiteImage>,
+        pub adjusted_images: SiteImages<'a>,
         /// The form of the orientation.
         pub model: &'a CameraModel,
         /// Files of pixels.
@@ -135,12 +135,11 @@ pub struct MeasuredTies<'a> {
     pub adjusted: Option<(&'a Output<Adjusted>, &'a Output<IntersectedTies>)>,
 }
 
-impl Input for Option<MeasuredTies<'_>> {
+impl Input for MeasuredTies<'_> {
     fn add_to(&self, field: &str, inputs: &mut Inputs) {
-        let Some(measured) = self else { return };
-        measured.ties.add_to(field, inputs);
-        measured.intersected.add_to(field, inputs);
-        if let Some((adjusted, intersected)) = measured.adjusted {
+        self.ties.add_to(field, inputs);
+        self.intersected.add_to(field, inputs);
+        if let Some((adjusted, intersected)) = self.adjusted {
             adjusted.add_to(field, inputs);
             intersected.add_to(field, inputs);
         }

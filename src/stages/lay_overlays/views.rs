@@ -11,7 +11,11 @@ use super::{
 use crate::{
     error::Result,
     geom::pushbroom::CameraModel,
-    stages::{oriented::OrientedImage, site_image::SiteImage, tag_times::ImageTimes},
+    stages::{
+        oriented::OrientedImage,
+        site_image::{SiteImage, SiteImages},
+        tag_times::ImageTimes,
+    },
 };
 
 /// Length on the ground over which lines and samples are counted, metres.
@@ -34,7 +38,7 @@ pub(super) struct Camera<'a> {
 /// # Errors
 /// Samples that are no orientation.
 pub(super) fn cameras(images: &[SiteImage], model: CameraModel) -> Result<Vec<Camera<'_>>> {
-    let oriented = SiteImage::oriented(images)?.into_iter();
+    let oriented = SiteImages(images).oriented()?.into_iter();
     Ok(oriented
         .map(|oriented| Camera { oriented, model })
         .collect())

@@ -27,14 +27,14 @@ use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 use self::{common::Common, compare::compare, levels::all_levels};
 use super::{
     adjust::Adjusted, convert_datum::Converted, group_profiles::Profile, image_pixels::PixelFiles,
-    image_view::View, shot_heights::Heights, site_image::SiteImage, tag_times::ImageTimes,
+    image_view::View, shot_heights::Heights, site_image::SiteImages, tag_times::ImageTimes,
 };
 use crate::{
     body::Body,
     config::{MolaSurfaceConfig, SurfaceConfig},
     error::{Cause, Kind, Result},
     geom::pushbroom::{CameraModel, Unseen},
-    stage::{InOrder, Input, Inputs, Output, Stage},
+    stage::{Input, Inputs, Output, Stage},
     stage_inputs,
     ties::Unmatched,
     watch::Watch,
@@ -56,7 +56,7 @@ stage_inputs! {
     /// Images with their best orientation and their pixels, what is known of heights, and what is asked for.
     pub struct MapSurface<'a> {
         /// The images.
-        pub images: InOrder<'a, SiteImage>,
+        pub images: SiteImages<'a>,
         /// The form of the orientation.
         pub model: &'a CameraModel,
         /// Their pixels.
@@ -136,7 +136,7 @@ impl Stage for MapSurface<'_> {
     }
 
     fn run_watched(&self, watch: Watch<'_>) -> Result<Surface> {
-        let oriented = SiteImage::oriented(self.images.0)?;
+        let oriented = self.images.oriented()?;
         let times = self.images.0.iter().map(|image| image.times.value());
         let times: Vec<&ImageTimes> = times.collect::<Result<_>>()?;
         let pixels = self.pixels.decoded(&times)?;

@@ -20,13 +20,13 @@ use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 use self::pair::{Matched, match_pair};
 use super::{
     convert_datum::Converted, group_profiles::Profile, image_pixels::PixelFiles, image_view::View,
-    oriented::OrientedImage, read_ties::Ties, shot_heights::Heights, site_image::SiteImage,
+    oriented::OrientedImage, read_ties::Ties, shot_heights::Heights, site_image::SiteImages,
     tag_times::ImageTimes,
 };
 use crate::{
     error::{Cause, Kind, Result},
     geom::pushbroom::{CameraModel, Unseen},
-    stage::{InOrder, Input, Inputs, Output, Round, Stage},
+    stage::{Input, Inputs, Output, Round, Stage},
     stage_inputs,
     ties::{MatchedPair, TieMeasure, TiePoint},
     watch::Watch,
@@ -46,7 +46,7 @@ stage_inputs! {
         /// Which orientation.
         pub round: Round,
         /// The images.
-        pub images: InOrder<'a, SiteImage>,
+        pub images: SiteImages<'a>,
         /// The form of the orientation.
         pub model: &'a CameraModel,
         /// Their pixels.
@@ -119,7 +119,7 @@ impl Stage for MatchTies<'_> {
     }
 
     fn run_watched(&self, watch: Watch<'_>) -> Result<Ties> {
-        let oriented = SiteImage::oriented(self.images.0)?;
+        let oriented = self.images.oriented()?;
         let times = self.images.0.iter().map(|image| image.times.value());
         let times: Vec<&ImageTimes> = times.collect::<Result<_>>()?;
         let pixels = self.pixels.decoded(&times)?;

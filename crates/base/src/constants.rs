@@ -1,0 +1,101 @@
+//! Constants of the mission, each with its source and sign; those of the spacecraft stand in `config/spacecraft`, those
+//! of bodies in [`crate::body`].
+
+use std::sync::LazyLock;
+
+/// Smallest standard deviation of a point, pixels or metres: no measurement is better, and squares stay numbers.
+pub const SIGMA_MIN: f64 = 1e-3;
+
+/// Largest standard deviation of a laser point, metres: so far away the ground lies 3 m below a plane (of the Moon), which laser
+/// heights do not notice; three times as far 23 m.
+pub const CONTROL_SIGMA_MAX_M: f64 = 3_000.0;
+
+use serde::Deserialize;
+
+/// NAIF id of the centre of Mars.
+pub const NAIF_MARS: i32 = 499;
+/// Name of Mars in labels.
+pub const MARS_NAME: &str = "MARS";
+/// NAIF id of the Sun.
+pub const NAIF_SUN: i32 = 10;
+
+/// NAIF id of the barycentre of the solar system.
+pub const NAIF_SOLAR_SYSTEM_BARYCENTRE: i32 = 0;
+/// Speed of light, metres per second.
+pub const SPEED_OF_LIGHT_M_S: f64 = 299_792_458.0;
+
+/// All that the program knows; the first is that of the laser.
+static ALL: LazyLock<[Spacecraft; 2]> = LazyLock::new(|| {
+    [
+        of_the_program(include_str!("../../../config/spacecraft/mgs.toml")),
+        of_the_program(include_str!("../../../config/spacecraft/mex.toml")),
+    ]
+});
+
+/// The spacecraft of the laser, and of cameras that name no other one.
+pub static SPACECRAFT: LazyLock<&Spacecraft> = LazyLock::new(|| &ALL[0]);
+
+/// A spacecraft, as its file under `config/spacecraft` says.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spacecraft {
+    /// Identifier, the name of its file; kernels of its archive have names that begin with it and an underscore.
+    pub id: String,
+    /// Its name in messages and in serial numbers of ISIS.
+    pub name: String,
+    /// Its name in full.
+    pub full_name: String,
+    /// Its name in labels, where underscores may stand for blanks.
+    pub label_name: String,
+    /// NAIF id of the spacecraft and of its clock.
+    pub naif: i32,
+    /// NAIF id of the frame of its bus, the object of attitude kernels.
+    pub bus: i32,
+    /// Name of that frame.
+    pub bus_frame: String,
+    /// Whether its labels hold the clock of the clock kernels.
+    pub labels_tell_clock: bool,
+    /// A file of the archive that defines the clock.
+    pub clock_kernel: String,
+    /// A file of the archive that defines the frame of the bus.
+    pub frame_kernel: String,
+    /// Largest time correction of its attitude kernels that is taken, seconds; 0 where they need none.
+    pub ck_bias_max_s: f64,
+    /// Where these come from.
+    pub source: String,
+}
+
+impl Spacecraft {
+    /// All that the program knows; the first is that of the laser.
+    #[must_use]
+    pub fn all() -> &'static [Self] {
+        &*ALL
+    }
+
+    /// The one with this identifier.
+    #[must_use]
+    pub fn of_id(id: &str) -> Option<&'static Self> {
+        ALL.iter().find(|spacecraft| spacecraft.id == id)
+    }
+
+    /// Its place among [`Self::all`].
+    #[must_use]
+    pub fn place(&self) -> usize {
+        let place = ALL.iter().position(|one| one.naif == self.naif);
+        place.unwrap_or_default()
+    }
+
+    /// Whether it carries the laser.
+    #[must_use]
+    pub fn has_laser(&self) -> bool {
+        self.naif == SPACECRAFT.naif
+    }
+}
+
+#[expect(
+    clippy::panic,
+    reason = "a program built with a bad file of its own; every test with kernels reads it"
+)]
+fn of_the_program<T: serde::de::DeserializeOwned>(text: &str) -> T {
+    toml::from_str(text).unwrap_or_else(|error| panic!("built with a bad file: {error}"))
+}

@@ -1,0 +1,276 @@
+//! `[adjustment]`.
+
+use serde::Deserialize;
+
+use areograph_base::{
+    footprints::{AdjustmentModel, FootprintImageCoordinates},
+    units::{RADIANS_PER_ARCSECOND, SECONDS_PER_MS},
+};
+use areograph_geom::{robust::RobustWeight, statistics::BAARDA_LIMIT};
+
+use super::{
+    declare::{Declare as _, Keys, Many, declare_table, group, key, tables},
+    forms::{
+        Number, Several, above_to, from_to, identifier, several, words, words_of, yes_or_no,
+        zero_or,
+    },
+    unknowns::{PositionUnknowns, RotationUnknowns},
+};
+
+/// Standard deviations of observations: none is better than a micrometre or a millionth of a pixel, and smaller
+/// ones would drown all others in rounding.
+pub(super) const SIGMA: Number = from_to(1e-6, 1e6);
+/// Standard deviations of unknowns that 0 takes out.
+const SIGMA_OR_NONE: Number = zero_or(1e-6, 1e6);
+/// Standard deviations of orientation unknowns: 0 holds fixed, infinity leaves free.
+const SIGMA_OR_FREE: Number = zero_or(1e-6, f64::INFINITY);
+/// Standard deviations along and across the track.
+const SIGMAS: Several<Number, 2> = several(SIGMA, "2 numbers");
+/// Standard deviations of three quantities, each with three powers of time.
+const SIGMAS_OF_POWERS: Several<Number, 9> = several(SIGMA_OR_FREE, "9 numbers");
+
+/// Standard deviations of the three powers of time.
+const SIGMAS_OF_TIME: Several<Number, 3> = several(SIGMA_OR_FREE, "3 numbers");
+
+declare_table! {
+    /// Combined adjustment of images, laser shots and tie points. Standard deviations are those of Yoon & Shan 2004 where
+    /// the paper gives one.
+    pub struct AdjustmentConfig: Deserialize {
+        /// What controls it. In the published model the image coordinates of footprints come from the orientations
+        /// that are adjusted and hold them where they were; it is there for comparison.
+        model: AdjustmentModel = key(words_of(
+            AdjustmentModel::WORDS,
+            [
+                "heights of tie points by the MOLA surface, orientations by what is known of orbit and attitude",
+                "image coordinates of footprints as observations, one standard deviation an image (Yoon & Shan 2004)",
+            ],
+        )).or(AdjustmentModel::MolaSurface),
+        /// Standard deviations of tie points, along and across the track, in the focal plane (the paper); measurements
+        /// that have their own in their file keep them.
+        tie_sigma_px: [f64; 2] = key(SIGMAS).or([1.0, 1.0]),
+        /// Standard deviations of X, Y and Z of every image for the powers 0, 1, 2 of t, which is 0 in the middle of the
+        /// image and 1 at its end; inf leaves free, 0 holds fixed. Orbits of three families lie up to 50 m apart
+        /// (Shan et al. 2005), and errors go with the revolution.
+        position_sigma_m: [f64; 3] = key(SIGMAS_OF_TIME).or([25.0, 0.2, 0.0]),
+        /// Standard deviations of the rotations about the camera's axes, likewise: 0.4 mrad, 150 m on the ground, as the
+        /// distances between images of a pair ask for, with drifts of the size of the attitude's own residuals.
+        rotation_sigma_rad as "rotation_sigma_arcsec": [f64; 3] = key(SIGMAS_OF_TIME)
+            .or([82.5, 2.0, 2.0])
+            .map(|sigmas| sigmas.map(|sigma| sigma * RADIANS_PER_ARCSECOND)),
+        /// How many powers of t are unknown of every image's position, as jigsaw's spsolve says: levels above have no
+        /// unknown, whatever their standard deviation.
+        position_unknowns: PositionUnknowns = key(words_of(
+            PositionUnknowns::WORDS,
+            ["", "a constant", "and what is linear in t", "and what is quadratic"],
+        )).or(PositionUnknowns::Acceleration),
+        /// The same of rotations, as jigsaw's camsolve says.
+        rotation_unknowns: RotationUnknowns = key(words_of(
+            RotationUnknowns::WORDS,
+            ["", "constants", "and what is linear in t", "and what is quadratic"],
+        )).or(RotationUnknowns::Acceleration),
+        /// Whether what the images of a pair disagree by along the flight is put down to one offset of the time at which
+        /// attitudes were read, the same for all images: it turns those that follow nadir, and those that are held towards
+        /// a star not. Otherwise all images are as likely to be wrong. Tie points do not tell, so this is a decision and no
+        /// estimate; where a pair disagrees by more than 100 m the report and adjustment.json have both.
+        attitude_clock: bool = key(yes_or_no(
+            "all images are as likely to be wrong",
+            "the images that follow nadir are wrong, by one offset",
+        )).or(false),
+        /// Standard deviation of that offset.
+        attitude_clock_sigma_s: f64 = key(SIGMA).or(1.0),
+        /// What the constant rotations of every image have at most as standard deviation beside it: 0.1 mrad. An offset of
+        /// the clock explains nothing where the attitude may err as much without it.
+        attitude_clock_rotation_sigma_rad as "attitude_clock_rotation_sigma_arcsec": f64 = key(SIGMA)
+            .or(20.6)
+            .map(|sigma| sigma * RADIANS_PER_ARCSECOND),
+        /// Whether an image that was exposed during a profile is expected where the PEDR file has the spacecraft, and not where
+        /// the kernels have it: camera and altimeter are then on one orbit. The range check tells the distance between the two.
+        orbit_of_pedr: bool = key(yes_or_no(
+            "the orbit of the kernels",
+            "the orbit of the kernels, moved by the mean distance over the profile",
+        )).or(false),
+        /// Whether heights of tie points on slopes of the MOLA surface also tell where the images lie in plan. Of use where the
+        /// report states that relief knows the place to less than half of what is known beforehand: ground rougher than 25 m
+        /// at 300 m for measurements of a pixel, 7 m for 0.3 pixels.
+        relief_for_plan: bool = key(yes_or_no(
+            "a slope makes heights less certain and nothing else",
+            "each profile may lie elsewhere, and tie points move to where their heights fit",
+        )).or(false),
+        /// Whether the laser's place in an image that was exposed meanwhile is an observation: camera and laser are on one bus, so
+        /// that the mounting tells it, whatever the attitude was. It needs profiles that were flown with the images, whose
+        /// place is known to `mola_surface.profile_plan_sigma_m`; each profile then may lie elsewhere, and the laser may point
+        /// elsewhere than its file and the frame kernels say.
+        common_bus: bool = key(yes_or_no(
+            "footprints say nothing of the attitude",
+            "a footprint is in the simultaneous image where the mounting has the laser",
+        )).or(false),
+        /// Standard deviation of the two angles by which the laser points elsewhere, the same for all images: 0.1 mrad. No alignment
+        /// with its standard deviation is published; the narrow-angle camera was aligned in flight with the altimeter
+        /// (Kirk et al. 2001).
+        boresight_sigma_rad as "boresight_sigma_arcsec": f64 = key(SIGMA_OR_NONE)
+            .or(20.6)
+            .map(|sigma| sigma * RADIANS_PER_ARCSECOND),
+        /// Standard deviation of what the line times of each image are late by against the shots. Along the track they hide
+        /// where the laser points: without this key nothing is taken from there, since `rotation_sigma_arcsec` already allows
+        /// for line times and pitch together; 0 is for line times that are right.
+        boresight_line_time_sigma_s as "boresight_line_time_sigma_ms": Option<f64> = key(SIGMA_OR_NONE)
+            .unused("0.0")
+            .map(|milliseconds| milliseconds.map(|milliseconds| milliseconds * SECONDS_PER_MS)),
+        /// What image coordinates of footprints are: "off" unless the model is the published one, where they are
+        /// "weighted". They come from the orientation that is being adjusted and are no measurements of their own.
+        footprint_image_coordinates: Option<FootprintImageCoordinates> = key(words_of(
+            FootprintImageCoordinates::WORDS,
+            [
+                "observations",
+                "nothing",
+                "projections with the adjusted orientation, without weight, freedom or covariance",
+            ],
+        )).unused(r#""off""#).was("mola_image"),
+        /// Their standard deviations, along and across the track, in the focal plane: one MOLA spacing (325 m
+        /// at 4.4 m a pixel), and 4; the paper gives none.
+        footprint_sigma_px: [f64; 2] = key(SIGMAS).or([74.0, 4.0]).was("mola_sigma_px"),
+        /// How far outside an image a footprint still counts as seen by it.
+        footprint_margin_px: f64 = key(from_to(0.0, 1e4)).or(200.0).was("mola_margin_px"),
+        /// Standard deviation of footprint coordinates (the paper).
+        ground_sigma_m: f64 = key(SIGMA).or(10.0),
+        /// Standard deviation of ranges (the paper; the instrument: 7 m at 400 km).
+        range_sigma_m: f64 = key(SIGMA).or(10.0),
+        /// Range bias of each profile as an unknown with this standard deviation; 0 for no such unknown. Biases
+        /// up to 25 m occur off nadir (Table 3 of Shan et al. 2005). 30 unless the model is the published one, where
+        /// there is none.
+        range_bias_sigma_m: Option<f64> = key(SIGMA_OR_NONE).unused("30.0"),
+        /// Time bias of each image as an unknown with this standard deviation; 0 for no such unknown.
+        time_bias_sigma_s as "time_bias_sigma_ms": f64 =
+            key(SIGMA_OR_NONE).or(0.0).map(|milliseconds| milliseconds * SECONDS_PER_MS),
+        /// Published model: standard deviation of the position unknowns of images that look to nadir (within 5
+        /// degrees); inf leaves free, 0 holds fixed. Rotations get what moves the ground as far (the paper).
+        position_sigma_nadir_m: Option<f64> = key(SIGMA_OR_FREE).unused("100.0").was("nadir_sigma_m"),
+        /// The same for all other images (the paper).
+        position_sigma_off_nadir_m: Option<f64> =
+            key(SIGMA_OR_FREE).unused("200.0").was("off_nadir_sigma_m"),
+        /// Weights of image coordinates that fall with their residual.
+        robust: Option<RobustWeight> = group::<RobustKeys>().map(RobustKeys::weight),
+        /// Standardised residual above which a tie point is a blunder and rejected; 0 keeps all. Beyond the
+        /// default is one good observation in a thousand.
+        blunder_limit: Option<f64> = key(from_to(0.0, 1000.0))
+            .or(BAARDA_LIMIT)
+            .map(|limit| (limit > 0.0).then_some(limit)),
+        /// Height against the MOLA surface, in standard deviations, above which a tie point is a blunder and rejected
+        /// unless a neighbour lies off to the same side; 0 keeps all. Not used in the published model.
+        height_blunder_limit: Option<f64> = key(from_to(0.0, 1000.0))
+            .or(5.0)
+            .map(|limit| (limit > 0.0).then_some(limit)),
+        /// Images whose unknowns have their own standard deviations.
+        images: Vec<OrientationPrior> = tables(Many::ANY),
+    }
+    check keys_of_the_model
+}
+
+/// Keys of one model are not used by the other.
+fn keys_of_the_model(checked: &AdjustmentConfig, keys: &mut Keys<'_, '_>) {
+    let others: &[&str] = match checked.model {
+        AdjustmentModel::MolaSurface => &["position_sigma_nadir_m", "position_sigma_off_nadir_m"],
+        AdjustmentModel::Published => &[
+            "position_sigma_m",
+            "rotation_sigma_arcsec",
+            "orbit_of_pedr",
+            "relief_for_plan",
+            "attitude_clock",
+            "attitude_clock_sigma_s",
+            "attitude_clock_rotation_sigma_arcsec",
+            "common_bus",
+            "boresight_sigma_arcsec",
+            "boresight_line_time_sigma_ms",
+            "height_blunder_limit",
+        ],
+    };
+    let reason = format!("adjustment.model is {:?}", checked.model.word());
+    for key in others {
+        keys.unused(key, &reason);
+    }
+}
+
+impl AdjustmentConfig {
+    /// What image coordinates of footprints are.
+    #[must_use]
+    pub fn footprints_in_images(&self) -> FootprintImageCoordinates {
+        self.footprint_image_coordinates
+            .unwrap_or(match self.model {
+                AdjustmentModel::MolaSurface => FootprintImageCoordinates::Off,
+                AdjustmentModel::Published => FootprintImageCoordinates::Weighted,
+            })
+    }
+
+    /// Standard deviation of the range bias of a profile, metres; 0 for no such unknown.
+    #[must_use]
+    pub fn range_bias_m(&self) -> f64 {
+        self.range_bias_sigma_m.unwrap_or(match self.model {
+            AdjustmentModel::MolaSurface => 30.0,
+            AdjustmentModel::Published => 0.0,
+        })
+    }
+
+    /// Standard deviations of position unknowns of nadir images and of others in the published model, metres.
+    #[must_use]
+    pub fn published_sigmas_m(&self) -> [f64; 2] {
+        [
+            self.position_sigma_nadir_m.unwrap_or(100.0),
+            self.position_sigma_off_nadir_m.unwrap_or(200.0),
+        ]
+    }
+}
+
+declare_table! {
+    /// Robust estimation.
+    struct RobustKeys {
+        /// Weights of image coordinates that fall with their residual.
+        robust: Option<RobustWeight> = key(words([
+            ("none", None, ""),
+            ("huber", Some(RobustWeight::Huber { limit: RobustWeight::HUBER_LIMIT }), ""),
+            ("cauchy", Some(RobustWeight::Cauchy { limit: RobustWeight::CAUCHY_LIMIT }), ""),
+        ])).or(None),
+        /// Normalised residual from which (huber, default 1.345) or at which half (cauchy, default 2.385) the
+        /// weight falls.
+        robust_limit: Option<f64> = key(above_to(0.0, 1000.0)).unused("1.345"),
+    }
+    check limit_is_used
+}
+
+fn limit_is_used(written: &RobustKeys, keys: &mut Keys<'_, '_>) {
+    if written.robust.is_none() {
+        keys.unused("robust_limit", "adjustment.robust is \"none\"");
+    }
+}
+
+impl RobustKeys {
+    fn weight(self) -> Option<RobustWeight> {
+        match (self.robust?, self.robust_limit) {
+            (usual, None) => Some(usual),
+            (RobustWeight::Huber { .. }, Some(limit)) => Some(RobustWeight::Huber { limit }),
+            (RobustWeight::Cauchy { .. }, Some(limit)) => Some(RobustWeight::Cauchy { limit }),
+        }
+    }
+}
+
+declare_table! {
+    /// Images whose unknowns have their own standard deviations; of each image X, Y, Z, or rotations about the
+    /// camera's x, y, z, each with the powers 0, 1, 2 of t, which is 0 in the middle of the image and 1 at its
+    /// end.
+    pub struct OrientationPrior: Deserialize {
+        /// Identifier of the image.
+        id: String = key(identifier()).required().unused(r#""E02-02855""#),
+        /// X, Y, Z; inf leaves free, 0 holds fixed.
+        position_m: Option<[f64; 9]> = key(SIGMAS_OF_POWERS)
+            .unused("[100.0, 100.0, 100.0, 100.0, 100.0, 100.0, 100.0, 100.0, 100.0]"),
+        /// Rotations, likewise.
+        rotation_rad as "rotation_arcsec": Option<[f64; 9]> = key(SIGMAS_OF_POWERS)
+            .unused("[54.0, 54.0, 54.0, 54.0, 54.0, 54.0, 54.0, 54.0, 54.0]")
+            .map(|sigmas| sigmas.map(|sigmas| sigmas.map(|sigma| sigma * RADIANS_PER_ARCSECOND))),
+        /// Unknown powers of t of its position; those of `[adjustment]` where it is left out.
+        position_unknowns: Option<PositionUnknowns> =
+            key(words_of(PositionUnknowns::WORDS, [""; 4])).unused(r#""acceleration""#),
+        /// And of its rotation.
+        rotation_unknowns: Option<RotationUnknowns> =
+            key(words_of(RotationUnknowns::WORDS, [""; 4])).unused(r#""acceleration""#),
+    }
+}

@@ -1,0 +1,196 @@
+//! A key is declared once, where its table is: documentation, form, unit, range, default and example.
+//!
+//! ```text
+//! declare_table! {
+//!     /// Limits that make a profile valid or invalid.
+//!     pub struct RangeCheckConfig {
+//!         /// Fewest shots. The default is one PEDR frame.
+//!         shots_min: u32 = key(whole_from_to(2, 1_000_000)).or(20),
+//!     }
+//! }
+//! ```
+//!
+//! From the declaration follow the field of the valid configuration, the reading of a file with its
+//! messages, `config/sites/example.toml`, `config/schema/site.schema.json` and [`keys`](super::keys).
+//! Reading and describing are the same text: [`Table::read`] declares key after key to [`Keys`], which
+//! takes each from the file, or where there is no file notes what was declared.
+
+mod described;
+mod example;
+mod key;
+mod reader;
+mod schema;
+
+use toml::{Spanned, Value, de::DeValue};
+
+use super::problems::Review;
+
+pub(super) use described::Many;
+pub use described::{Accept, DeclaredKey, ValueKind, Word};
+pub(super) use example::example;
+pub(super) use key::{group, key, of_the_file, table, tables};
+pub(super) use reader::{Keys, described, no_repeats, suggestion};
+pub(super) use schema::schema;
+
+/// What is read from one table of the configuration.
+pub(super) trait Table: Sized {
+    /// Documentation of the table, line by line.
+    const ABOUT: &'static [&'static str];
+
+    /// Declares the keys of the table one by one and makes the valid form of them.
+    ///
+    /// Returns a value even after a problem, so that all problems are found in one pass; it is used only
+    /// when there was none.
+    fn read(keys: &mut Keys<'_, '_>) -> Self;
+}
+
+/// A value of the file and the name of its key for messages.
+pub(super) struct Found<'a> {
+    pub(super) key: String,
+    pub(super) value: &'a Spanned<DeValue<'a>>,
+}
+
+impl Found<'_> {
+    /// Tells that the value is not what the key takes.
+    pub(super) fn refuse(&self, review: &mut Review<'_>, expected: impl std::fmt::Display) {
+        review.refuse(self.value.span(), &self.key, expected);
+    }
+}
+
+/// What values a key takes, and what they become.
+pub(super) trait Form {
+    /// The valid form of a value.
+    type Value;
+
+    /// The values in words that example, schema and tests understand.
+    fn kind(&self) -> ValueKind;
+
+    /// The valid form of what was written, or nothing after a problem was told.
+    fn read(&self, found: &Found<'_>, review: &mut Review<'_>) -> Option<Self::Value>;
+
+    /// How `value` is written in a file; for defaults.
+    fn written(&self, value: &Self::Value) -> Value;
+}
+
+/// Something that takes one or several keys from a table.
+pub(super) trait Declare: Sized {
+    /// What becomes of them.
+    type Value;
+
+    /// Declares the keys to `keys`; `name` and `about` are those of the field in the valid form.
+    fn declare(
+        self,
+        name: &'static str,
+        about: &'static [&'static str],
+        keys: &mut Keys<'_, '_>,
+    ) -> Self::Value;
+
+    /// The same with its value changed, for example from degrees to radians.
+    fn map<V>(self, change: fn(Self::Value) -> V) -> impl Declare<Value = V> {
+        self.then(move |value, _: &mut Keys<'_, '_>| change(value))
+    }
+
+    /// The same with its value changed by something that may find more problems.
+    fn then<V, F>(self, change: F) -> impl Declare<Value = V>
+    where
+        F: FnOnce(Self::Value, &mut Keys<'_, '_>) -> V,
+    {
+        Then {
+            declared: self,
+            change,
+        }
+    }
+}
+
+struct Then<D, F> {
+    declared: D,
+    change: F,
+}
+
+impl<D, F, V> Declare for Then<D, F>
+where
+    D: Declare,
+    F: FnOnce(D::Value, &mut Keys<'_, '_>) -> V,
+{
+    type Value = V;
+
+    fn declare(
+        self,
+        name: &'static str,
+        about: &'static [&'static str],
+        keys: &mut Keys<'_, '_>,
+    ) -> V {
+        let value = self.declared.declare(name, about, keys);
+        (self.change)(value, keys)
+    }
+}
+
+/// Declares a table: a struct of the valid form (`struct Name`) or the fields of one that is defined
+/// elsewhere (`fill Name`).
+///
+/// Each entry is `field: Type = declaration`; a key that is named differently from its field, for its
+/// unit, is given by `field as "key"`. The documentation of an entry is that of the field and of the key.
+/// `#[serde(skip)]` keeps a path out of what stages are distinguished by: files enter by their content.
+/// `struct Name: Trait` derives `Trait`. `settle function` completes defaults that follow from other keys:
+/// `fn(Name, &Keys) -> Name`; `check function` names what must hold between keys: `fn(&Name, &mut Keys)`.
+macro_rules! declare_table {
+    (
+        $(#[doc = $about:literal])+
+        $vis:vis struct $name:ident $(: $($derive:ident),+)? {
+            $(
+                $(#[doc = $doc:literal])+
+                $(#[serde($skip:ident)])?
+                $field:ident $(as $key:literal)? : $type:ty = $declared:expr,
+            )+
+        }
+        $(settle $settle:ident)?
+        $(check $check:path)?
+    ) => {
+        $(#[doc = $about])+
+        #[derive(Debug, Clone, PartialEq, serde::Serialize $(, $($derive),+)?)]
+        $vis struct $name { $($(#[doc = $doc])+ $(#[serde($skip)])? $vis $field: $type,)+ }
+
+        impl Default for $name {
+            /// Every key as where the file leaves it out; what has no default is empty.
+            fn default() -> Self {
+                $crate::declare::Keys::default_of()
+            }
+        }
+
+        $crate::declare::declare_table! {
+            $(#[doc = $about])+
+            fill $name { $($(#[doc = $doc])+ $field $(as $key)? = $declared,)+ }
+            $(settle $settle)?
+            $(check $check)?
+        }
+    };
+    (
+        $(#[doc = $about:literal])+
+        fill $name:ident {
+            $($(#[doc = $doc:literal])+ $field:ident $(as $key:literal)? = $declared:expr,)+
+        }
+        $(settle $settle:ident)?
+        $(check $check:path)?
+    ) => {
+        impl $crate::declare::Table for $name {
+            const ABOUT: &'static [&'static str] = &[$($about),+];
+
+            fn read(keys: &mut $crate::declare::Keys<'_, '_>) -> Self {
+                let read = Self {
+                    $($field: $crate::declare::Declare::declare(
+                        $declared,
+                        $crate::declare::declare_table!(@name $field $($key)?),
+                        &[$($doc),+],
+                        keys,
+                    ),)+
+                };
+                $(let read = $settle(read, keys);)?
+                $($check(&read, keys);)?
+                read
+            }
+        }
+    };
+    (@name $field:ident) => { stringify!($field) };
+    (@name $field:ident $key:literal) => { $key };
+}
+pub(super) use declare_table;

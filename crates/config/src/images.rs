@@ -1,0 +1,373 @@
+//! `[[images]]`: labels, or the keys that stand in for them.
+
+use std::path::PathBuf;
+
+use serde::Deserialize;
+use serde_json::json;
+
+use areograph_base::{
+    constants::SPACECRAFT,
+    image::{
+        CLOCK_STRING, IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageFields, is_clock_string,
+        line_period_agrees,
+    },
+    instruments::Instrument,
+    units::SECONDS_PER_MS,
+};
+
+use super::{
+    declare::{Declare, Keys, Many, declare_table, group, key},
+    exposures::{ExposurePiece, ExposureRows, LINES_MAX, MILLISECONDS_MAX, line_times_of},
+    forms::{Switch, Whole, above_to, identifier, matching, text, whole_from_to},
+    instruments::CAMERA,
+    paths::FILE,
+};
+
+/// Largest summing of the wide-angle cameras; the narrow-angle camera sums up to 8.
+const SUMMING: Whole<u32> = whole_from_to(1, 127);
+/// Beyond the detectors of all cameras.
+const DETECTORS_MAX: u32 = 8_192;
+
+/// Images of a site.
+pub(super) const IMAGES: Many = Many {
+    further: &[&[
+        " Without a label or support data these are required: `sclk_start` or `utc_start`, `exposure_ms` or",
+        " `line_period_ms` (or for both of these `exposures`), `downtrack_summing`, `lines_header`, `samples`.",
+    ]],
+    ..Many::ANY
+};
+
+declare_table! {
+    /// Images, none to many: a label, the keys below, or both; keys written here win over the label. Or support data.
+    pub struct ImageConfig: Deserialize {
+        /// Identifier, unique in the site; also the name of a folder. One that begins with a product, such as `E02-02855`,
+        /// `m0402852_part` or `h5270_0000_ir2`, is for the label of that product only.
+        id: String = key(identifier())
+            .required()
+            .example(r#""E02-02855""#)
+            .example_in(1, r#""M04-02852""#),
+        /// PDS3 or ISIS label, attached or detached. Of HRSC on Mars Express the file of the archive at level 2 (`h….img`), whose
+        /// rows hold the times of their lines, with `instrument`; a label alone needs `exposures` beside it. Where such a file
+        /// has fewer samples than the detector has pixels, it needs `first_detector`: ISIS and ALE take pixel 0.
+        #[serde(skip)]
+        label: Option<PathBuf> = key(FILE).example(r#""../labels/e0202855.lbl""#),
+        /// The image itself (.imq, .img, .cub, TIFF, PNG), which may be the label's file. The report shows footprints and tie
+        /// points on it, and tie points are matched in it where `ties.match` says so. A file without a label must have all
+        /// lines, and of two such files that are matched each must have a size of its own: nothing else tells them apart.
+        #[serde(skip)]
+        pixels: Option<PathBuf> = key(FILE).unused(r#""../images/e0202855.imq""#),
+        /// Or image support data (ISD) of the Community Sensor Model, as ALE writes them: camera, line times and
+        /// orientation of a line scanner, and then neither label nor the keys below. The orientation is taken as it
+        /// stands there: pointing bias, `light_time` and the kernels of orbit and attitude are not for such an image.
+        #[serde(skip)]
+        isd: Option<PathBuf> = key(FILE).unused(r#""../isd/m0402852.json""#),
+        /// Whether the laser flew on the spacecraft of these support data, and their positions are geometric: then ranges of
+        /// shots that were fired while the image was exposed are measured from them. With support data alone.
+        has_laser: bool = key(Switch).or(false).unused("true"),
+        /// The camera: `moc_na`, `moc_wa_red`, `moc_wa_blue`; a line of HRSC on Mars Express: `hrsc_nd`, `hrsc_s1`, `hrsc_s2`,
+        /// `hrsc_p1`, `hrsc_p2`, `hrsc_ir`, `hrsc_gr`, `hrsc_bl`, `hrsc_re`, which no label can do without; or the path of an
+        /// instrument file like those in `config/instruments`. Without it, the camera of MOC that the label names, and without
+        /// a label `moc_na`. Clock, orbit and attitude are those of the spacecraft that carries it.
+        instrument: Option<Instrument> = key(CAMERA).example(r#""moc_na""#),
+        /// Its name in tie point files and in what is written for ISIS, when that is not the identifier: for a
+        /// control network the ISIS serial number, in which the clock must be that of the image. Without it, the
+        /// identifier.
+        serial_number: Option<String> =
+            key(text()).example(r#""MGS/651158134:116/MOC-NA""#),
+        /// When its lines were exposed, where their exposure changes inside the image, as HRSC's does: for every piece its
+        /// first line, counted from 0, the start of that line in ephemeris time (TDB seconds past J2000), and the time
+        /// between two lines in milliseconds. ISIS has them in the table `LineScanTimes` (there lines count from 1), ALE in
+        /// `line_scan_rate` (seconds from `center_ephemeris_time`). With `lines_header`; then neither `exposure_ms` nor
+        /// `line_period_ms`. A start beside it must agree, and more than half a line between two pieces is remarked on.
+        exposures: Option<Vec<ExposurePiece>> = key(ExposureRows)
+            .unused("[[0, 255744599.027482, 12.800791], [6665, 255744684.345045, 13.227428]]"),
+        /// Keys written in the configuration.
+        fields: ImageFields = group(),
+    }
+    check is_complete
+}
+
+impl ImageConfig {
+    /// The file that says when and how its lines were exposed: support data, or a label.
+    #[must_use]
+    pub fn source(&self) -> Option<&PathBuf> {
+        self.isd.as_ref().or(self.label.as_ref())
+    }
+
+    /// The name that tie points give the image.
+    #[must_use]
+    pub fn name_in_ties(&self) -> &str {
+        self.serial_number.as_deref().unwrap_or(&self.id)
+    }
+}
+
+declare_table! {
+    /// What the configuration says of an image.
+    fill ImageFields {
+        /// Spacecraft clock at the start of the first line, seconds:ticks with 256 ticks a second (":28" and
+        /// ":028" are both 28/256 s). Preferred: label UTC is rounded, 1.0 to 4.8 ms off in five labels. Farther
+        /// apart than 20 ms they are remarked on, farther than 1 s refused. Not for Mars Express, whose labels hold
+        /// counts that lie seconds from its clock kernels.
+        sclk_start = key(matching(
+            CLOCK_STRING,
+            "^(1/)?[0-9]+[:.][0-9]+$",
+            is_clock_string,
+        )).example_in(1, r#""619971158:028""#),
+        /// UTC at the start of the first line, used when there is no clock string.
+        utc_start = key(matching(
+            "UTC such as 1999-08-24T14:12:13.64 or 1999-236T14:12:13.64",
+            "^[0-9]{4}-([0-9]{2}-[0-9]{2}|[0-9]{3})T[0-9]{2}:[0-9]{2}:[0-9]{2}([.][0-9]{1,9})?Z?$",
+            is_utc_string,
+        )).unused_in(1, r#""1999-08-24T14:12:13.64""#),
+        /// Exposure of one detector line (`LINE_EXPOSURE_DURATION`).
+        exposure_s as "exposure_ms" = milliseconds("0.4821"),
+        /// Time between two image lines: `exposure_ms` × `downtrack_summing`. One of the two is enough; both,
+        /// or one here and one in the label, must agree within the rounding of 0.0001 ms. The "Exposure Time"
+        /// of Shan et al. 2005, Table 2, is this.
+        line_period_s as "line_period_ms" = milliseconds("3.8568"),
+        /// Detector lines summed along the track (narrow angle: to 8).
+        downtrack_summing = key(SUMMING).example_in(1, "8"),
+        /// Detector pixels summed across the track.
+        crosstrack_summing = key(SUMMING).example_in(1, "8"),
+        /// Lines that were exposed, as the image header says; the time model counts these, less than 600 s in
+        /// all.
+        lines_header = key(whole_from_to(IMAGE_LINES_MIN, LINES_MAX)).example_in(1, "1536"),
+        /// Lines in the delivered file, when fewer.
+        lines_delivered = key(whole_from_to(1, LINES_MAX)).example_in(1, "1536"),
+        /// Samples per line.
+        samples = key(whole_from_to(1, DETECTORS_MAX)).example_in(1, "256"),
+        /// First detector pixel, counted from 0 (`EDIT_MODE_ID`).
+        first_detector = key(whole_from_to(0, DETECTORS_MAX - 1)).example_in(1, "0"),
+    }
+    check agree
+}
+
+fn milliseconds(example: &'static str) -> impl Declare<Value = Option<f64>> {
+    key(above_to(0.0, MILLISECONDS_MAX))
+        .example_in(1, example)
+        .map(|value_ms| value_ms.map(|value_ms| value_ms * SECONDS_PER_MS))
+}
+
+/// Keys that stand in for a label.
+const OF_FIELDS: [&str; 11] = [
+    "exposures",
+    "sclk_start",
+    "utc_start",
+    "exposure_ms",
+    "line_period_ms",
+    "downtrack_summing",
+    "crosstrack_summing",
+    "lines_header",
+    "lines_delivered",
+    "samples",
+    "first_detector",
+];
+
+/// Without a label the keys must give what times and sensor model need: start, line period, summing, size.
+fn is_complete(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
+    const NEEDS: [&[&str]; 5] = [
+        &["sclk_start", "utc_start", "exposures"],
+        &["exposure_ms", "line_period_ms", "exposures"],
+        &["downtrack_summing"],
+        &["lines_header"],
+        &["samples"],
+    ];
+    keys.rule(|| {
+        let needs = NEEDS.map(|ways| {
+            let ways: Vec<_> = ways.iter().map(|way| json!({"required": [way]})).collect();
+            json!({"anyOf": ways})
+        });
+        json!({"anyOf": [{"required": ["label"]}, {"required": ["isd"]}, {"allOf": needs}]})
+    });
+    if keys.span_of("isd").is_some() {
+        let of_label = ["label", "instrument"].into_iter();
+        for key in of_label.chain(OF_FIELDS) {
+            keys.unused(key, "the support data of images.isd say it all");
+        }
+        return;
+    }
+    keys.unused(
+        "has_laser",
+        "positions of kernels are those of the spacecraft with the laser",
+    );
+    of_spacecraft(image, keys);
+    of_pieces(image, keys);
+    let lacking: Vec<String> = NEEDS
+        .into_iter()
+        .filter(|ways| !ways.iter().any(|way| keys.span_of(way).is_some()))
+        .map(|ways| ways.join(" or "))
+        .collect();
+    if keys.span_of("label").is_none() && !lacking.is_empty() {
+        let expected = format!(
+            "a label, support data (isd), or also {}",
+            lacking.join(", ")
+        );
+        keys.missing("label", &expected);
+    }
+}
+
+/// The clock is that of the spacecraft that carries the camera.
+fn of_spacecraft(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
+    let named = image.instrument.as_ref().map(|camera| camera.spacecraft);
+    let spacecraft = named.unwrap_or(&SPACECRAFT);
+    let of = &spacecraft.full_name;
+    if !spacecraft.labels_tell_clock {
+        let expected = format!(
+            "utc_start or exposures instead: the clock in labels of {of} lies seconds from its clock kernels"
+        );
+        keys.refuse("sclk_start", expected);
+    }
+}
+
+/// Pieces of line times follow each other, and nothing says otherwise beside them.
+fn of_pieces(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
+    let Some(pieces) = &image.exposures else {
+        return;
+    };
+    for key in ["exposure_ms", "line_period_ms"] {
+        keys.refuse(
+            key,
+            "no such key beside images.exposures, which say it for every piece",
+        );
+    }
+    // Those of a label are held against them when it is read.
+    let Some(lines) = image.fields.lines_header else {
+        return;
+    };
+    match line_times_of(pieces, lines) {
+        Err(wrong) => {
+            let span = keys.span_of("exposures");
+            keys.review()
+                .problem(span, format!("images.exposures: {wrong}"));
+        }
+        Ok(times) if !(times.duration_s() < IMAGE_DURATION_END_S) => {
+            let expected = format!(
+                "less than {IMAGE_DURATION_END_S} s in all; these pieces take {:.1} s",
+                times.duration_s()
+            );
+            keys.refuse("exposures", expected);
+        }
+        Ok(_) => {}
+    }
+}
+
+/// Keys that are all written must agree.
+fn agree(fields: &ImageFields, keys: &mut Keys<'_, '_>) {
+    line_period(fields, keys);
+    duration(fields, keys);
+    if let (Some(header), Some(delivered)) = (fields.lines_header, fields.lines_delivered)
+        && delivered > header
+    {
+        keys.refuse(
+            "lines_delivered",
+            format!("at most lines_header = {header}"),
+        );
+    }
+    if keys.span_of("sclk_start").is_some() {
+        keys.unused("utc_start", "sclk_start comes first");
+    }
+}
+
+/// A period, an exposure and a summing that are all written must agree.
+fn line_period(fields: &ImageFields, keys: &mut Keys<'_, '_>) {
+    let (Some(period_s), Some(exposure_s), Some(summing)) = (
+        fields.line_period_s,
+        fields.exposure_s,
+        fields.downtrack_summing,
+    ) else {
+        return;
+    };
+    if !line_period_agrees(period_s, exposure_s, summing) {
+        let expected_ms = exposure_s * f64::from(summing) / SECONDS_PER_MS;
+        keys.refuse(
+            "line_period_ms",
+            format!("exposure_ms × downtrack_summing = {expected_ms:.4}, or only one of them"),
+        );
+    }
+}
+
+/// Lines and line period that are both written must not make an endless image.
+fn duration(fields: &ImageFields, keys: &mut Keys<'_, '_>) {
+    let summed_s = || Some(fields.exposure_s? * f64::from(fields.downtrack_summing?));
+    let period_s = fields.line_period_s.or_else(summed_s);
+    let (Some(lines), Some(period_s)) = (fields.lines_header, period_s) else {
+        return;
+    };
+    let duration_s = f64::from(lines) * period_s;
+    if !(duration_s < IMAGE_DURATION_END_S) {
+        let expected = format!(
+            "less than {IMAGE_DURATION_END_S} s in all; {lines} lines of {:.4} ms take {duration_s:.1} s",
+            period_s / SECONDS_PER_MS
+        );
+        keys.refuse("lines_header", expected);
+    }
+}
+
+/// `YYYY-MM-DDThh:mm:ss[.fff][Z]`, or with the day of the year `YYYY-DDD`.
+///
+/// Only the form; leap seconds and month lengths are for the leap-second kernel.
+fn is_utc_string(text: &str) -> bool {
+    let text = text.strip_suffix('Z').unwrap_or(text);
+    let Some((date, time)) = text.split_once('T') else {
+        return false;
+    };
+    let date: Vec<&str> = date.split('-').collect();
+    let time: Vec<&str> = time.split(':').collect();
+    let date_fits = match date[..] {
+        [year, month, day] => {
+            whole(year, 4, 1990..=2050) && whole(month, 2, 1..=12) && whole(day, 2, 1..=31)
+        }
+        [year, day] => whole(year, 4, 1990..=2050) && whole(day, 3, 1..=366),
+        _ => false,
+    };
+    let time_fits = match time[..] {
+        [hour, minute, second] => {
+            let (second, fraction) = second.split_once('.').unwrap_or((second, "0"));
+            whole(hour, 2, 0..=23)
+                && whole(minute, 2, 0..=59)
+                && whole(second, 2, 0..=60)
+                && (1..=9).contains(&fraction.len())
+                && fraction.bytes().all(|byte| byte.is_ascii_digit())
+        }
+        _ => false,
+    };
+    date_fits && time_fits
+}
+
+/// Whether `text` is a number of `width` digits within `range`.
+fn whole(text: &str, width: usize, range: std::ops::RangeInclusive<u32>) -> bool {
+    text.len() == width
+        && text.bytes().all(|byte| byte.is_ascii_digit())
+        && text.parse().is_ok_and(|value| range.contains(&value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn utc_strings_have_the_forms_of_labels() {
+        for good in [
+            "1999-08-24T14:12:13.64",
+            "1999-236T14:12:13",
+            "1998-12-31T23:59:60.5Z",
+        ] {
+            assert!(is_utc_string(good), "{good}");
+        }
+        for bad in [
+            "",
+            "1999-08-24",
+            "1999-13-24T14:12:13",
+            "1999-08-24T24:12:13",
+            "1999-08-24T14:12:61",
+            "1999-8-24T14:12:13",
+            "1999-08-24T14:12:13.",
+            "1999-000T14:12:13",
+            "99-08-24T14:12:13",
+            "1999-08-24 14:12:13",
+            "1999-08-24T1é:12:13",
+        ] {
+            assert!(!is_utc_string(bad), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! `[kernels]`: one source of kernels and how coverage is judged.
+
+use std::path::PathBuf;
+
+use serde::Deserialize;
+use serde_json::json;
+
+use areograph_base::kernel_source::{
+    CkQuality, KernelList, KernelSelection, KernelSource, RivalKernels,
+};
+
+use super::{
+    declare::{Declare as _, Keys, Many, declare_table, group, key, tables},
+    forms::{from_to, list, list_or_none, lower_case_identifier, matching, words},
+    paths::{FILE, FOLDER},
+};
+
+/// The ways to name kernels; exactly one of them.
+const SOURCES: [&str; 4] = ["metakernel", "files", "root", "sets"];
+/// Keys that only a folder needs.
+const OF_ROOT: [&str; 3] = ["spk_family", "ck_quality", "pinned"];
+
+/// Sets are loaded one after the other and compared; more than this is a slip.
+const SETS: Many = Many {
+    count: Some((2, 16)),
+    purpose: " sets to choose from",
+    ..Many::ANY
+};
+
+declare_table! {
+    /// Where kernels come from, and how coverage is judged: exactly one of `metakernel`, `files`, `root`,
+    /// `sets`.
+    pub struct KernelsConfig: Deserialize {
+        /// The source of the kernel list.
+        #[serde(skip)]
+        source: KernelSource = group::<SourceKeys>().map(SourceKeys::source),
+        /// How far from an attitude sample the C-kernel may be asked; 0 only inside its intervals, so that gaps
+        /// are reported. (The ISIS addendum for MOC uses 1 s.) Beyond the intervals the nearest attitude is
+        /// held though the bus turns: noted, and invalid beyond 4 s.
+        ck_tolerance_s: f64 = key(from_to(0.0, 60.0)).or(0.0),
+        /// Margin that kernel coverage must have beyond the first and last instant used. The default is more
+        /// than the rounding of label times (10 ms) and clock ticks (4 ms), well below the 4 s between attitude
+        /// samples, so that no image is refused which the kernels can orient.
+        padding_s: f64 = key(from_to(0.0, 3600.0)).or(1.0),
+    }
+}
+
+declare_table! {
+    /// The source of the kernel list.
+    struct SourceKeys {
+        /// A SPICE metakernel; relative paths in it count from its own folder.
+        metakernel: Option<PathBuf> = key(FILE).example(r#""../kernels/scene.tm""#),
+        /// Or kernels in load order, plain paths without wildcards; later ones win.
+        files: Option<Vec<PathBuf>> = key(list(FILE).each_once("each kernel once"))
+            .unused(r#"["../kernels/naif0012.tls", "../kernels/mgs_ext1.bsp"]"#),
+        /// Or a folder, searched with its subfolders; then also the three keys that follow.
+        root: Option<PathBuf> = key(FOLDER).unused(r#""../kernels""#),
+        /// Or rival sets, each complete with the same clocks.
+        sets: Option<Vec<RivalKernels>> = tables(SETS).then(|sets, keys: &mut Keys<'_, '_>| {
+            keys.span_of("sets").is_some().then_some(sets)
+        }),
+        /// Orbit solution: "nav" (MGS navigation team, recommended by NAIF and used by Shan et al. 2005),
+        /// "gsfc", "ipng"; they differ by 0 to 50 m, mostly across the track. With `root`.
+        spk_family: String = key(lower_case_identifier()).or("nav".to_owned()).unused(r#""nav""#),
+        /// Attitude that may be used, best first: "reconstructed" is telemetry, "nominal" the commanded attitude
+        /// that fills its gaps. With `root`.
+        ck_quality: Vec<CkQuality> = key(list(words([
+            ("reconstructed", CkQuality::Reconstructed, ""),
+            ("nominal", CkQuality::Nominal, ""),
+        ])).each_once("each quality once"))
+            .or(vec![CkQuality::Reconstructed, CkQuality::Nominal])
+            .unused(r#"["reconstructed", "nominal"]"#),
+        /// Kernels fixed by file name; of others the latest version is taken. With `root`.
+        pinned: Vec<String> = key(list_or_none(matching(
+            "file names without folders",
+            r"^[^/\\]+$",
+            |name| !name.is_empty() && !name.contains(['/', '\\']),
+        ))).or(Vec::new()).unused(r#"["pck00010.tpc"]"#),
+    }
+    check one_source
+}
+
+fn one_source(_: &SourceKeys, keys: &mut Keys<'_, '_>) {
+    keys.rule(|| json!({"oneOf": SOURCES.map(|source| json!({"required": [source]}))}));
+    let given = SOURCES.map(|source| keys.span_of(source));
+    let expected = format!(
+        "exactly one of {}",
+        SOURCES.map(|key| format!("kernels.{key}")).join(", ")
+    );
+    match given.iter().flatten().count() {
+        0 if keys.is_no_table() || keys.misspelt(&SOURCES) => {}
+        0 => keys.problem(format!("kernels has no source; expected {expected}")),
+        1 => {}
+        sources => {
+            let second = given.into_iter().flatten().max_by_key(|span| span.start);
+            let text = format!("kernels has {sources} sources; expected {expected}");
+            keys.review().problem(second, text);
+        }
+    }
+    if keys.span_of("root").is_none() {
+        for key in OF_ROOT {
+            keys.unused(key, "it belongs to kernels.root");
+        }
+    }
+}
+
+impl SourceKeys {
+    /// The folder before the sets before the list, when several are given.
+    fn source(self) -> KernelSource {
+        match (self.root, self.sets) {
+            (Some(root), _) => KernelSource::Root(KernelSelection {
+                root,
+                spk_family: self.spk_family,
+                ck_quality: self.ck_quality,
+                pinned: self.pinned,
+            }),
+            (None, Some(sets)) => KernelSource::Sets(sets),
+            (None, None) => KernelSource::Listed(listed(self.metakernel, self.files)),
+        }
+    }
+}
+
+/// Of both the metakernel, of none an empty list.
+fn listed(metakernel: Option<PathBuf>, files: Option<Vec<PathBuf>>) -> KernelList {
+    metakernel.map_or_else(
+        || KernelList::Files(files.unwrap_or_default()),
+        KernelList::Metakernel,
+    )
+}
+
+declare_table! {
+    /// Or 2 to 16 rival sets instead of the source above, each complete with the same clocks: the one whose
+    /// trajectory is closest to the mean of all (root mean square distance over the positions that the site
+    /// needs) is used, the rule by which Shan et al. 2005 chose; the manifest tells the distances. Of two sets
+    /// both are equally far from their mean: the first is used. Each has either `metakernel` or `files`.
+    fill RivalKernels {
+        /// Identifier, unique in the site.
+        id = key(lower_case_identifier()).required().unused(r#""nav""#).unused_in(1, r#""ipng""#),
+        /// Its kernels.
+        list = group::<ListKeys>().map(|keys| listed(keys.metakernel, keys.files)),
+    }
+}
+
+declare_table! {
+    /// Kernels of a set.
+    struct ListKeys {
+        /// A SPICE metakernel, as above.
+        metakernel: Option<PathBuf> = key(FILE).unused(r#""../kernels/nav.tm""#),
+        /// Or kernels in load order, as above.
+        files: Option<Vec<PathBuf>> = key(list(FILE).each_once("each kernel once"))
+            .unused_in(1, r#"["../kernels/naif0012.tls", "../kernels/mgs_ipng.bsp"]"#),
+    }
+    check one_list
+}
+
+fn one_list(_: &ListKeys, keys: &mut Keys<'_, '_>) {
+    const LISTS: [&str; 2] = ["metakernel", "files"];
+    keys.rule(|| json!({"oneOf": LISTS.map(|list| json!({"required": [list]}))}));
+    let given = LISTS.map(|list| keys.span_of(list).is_some());
+    if given[0] == given[1] && !keys.is_no_table() && !keys.misspelt(&LISTS) {
+        keys.problem(
+            "kernels.sets has no clear source; expected either metakernel or files".to_owned(),
+        );
+    }
+}

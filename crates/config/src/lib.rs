@@ -1,0 +1,291 @@
+//! Site configuration: a TOML file, checked whole, turned into [`SiteConfig`].
+//!
+//! The file speaks of degrees and milliseconds, the valid form of radians and seconds. All
+//! problems of a file are reported together, each as `file:line:column: key is value; expected …`.
+//! Each table has a file here, in which its keys are declared; `config/sites/example.toml`, which
+//! documents every key, and `config/schema/site.schema.json` are made from the declarations.
+
+mod adjustment;
+mod calibration;
+mod data_file;
+mod declare;
+mod exposures;
+mod forms;
+mod geojson;
+mod images;
+mod instruments;
+mod kernels;
+mod limits;
+mod mola_surface;
+mod net;
+mod new_site;
+mod orientation;
+mod paths;
+mod pedr;
+mod pointing;
+mod problems;
+mod range_check;
+mod service;
+mod shots;
+mod site;
+mod surface;
+mod ties;
+mod unknowns;
+mod window_list;
+mod windows;
+mod written;
+
+use std::{
+    collections::BTreeMap,
+    fs::File,
+    io::Read as _,
+    path::{Path, PathBuf},
+};
+
+use serde::Serialize;
+use toml::de::DeTable;
+
+pub use adjustment::{AdjustmentConfig, OrientationPrior};
+pub use calibration::{
+    APrioriConfig, CalibrationConfig, CalibrationMode, CameraConfig, LoadedCalibration,
+    SolutionConfig, ValidationConfig, calibration_example, calibration_schema, load_calibration,
+    parse_calibration,
+};
+pub use declare::{Accept, DeclaredKey, ValueKind, Word};
+pub use exposures::{ExposurePiece, line_times_of};
+pub use images::ImageConfig;
+pub use instruments::{
+    all_instruments, altimeter, built_in_altimeters, built_in_instruments, instrument,
+    usual_altimeter, usual_instrument,
+};
+pub use kernels::KernelsConfig;
+pub use limits::LimitsConfig;
+pub use mola_surface::MolaSurfaceConfig;
+pub use net::{
+    Blunders, LoadedNet, Method, NetConfig, TriangulationConfig, YAxis, load_net, net_example,
+    net_schema, parse_net,
+};
+pub use new_site::NewSite;
+pub use orientation::{OrientationConfig, RegistrationConfig};
+pub use pedr::PedrConfig;
+pub use pointing::{PointingConfig, UsedBias};
+pub use problems::Problems;
+pub use range_check::{RangeCheckConfig, SCAN_STEPS_MAX};
+pub use service::{
+    AlertKind, ChangesConfig, FreshnessConfig, HookConfig, HttpConfig, LoadedService, MovedConfig,
+    RetentionConfig, ScheduleConfig, ServiceConfig, ServiceInputs, ServiceOutputs, WorkersConfig,
+    load_service, parse_service, service_example, service_schema,
+};
+pub use shots::{ShotColumns, ShotLayout, ShotTableConfig};
+pub use site::SiteConfig;
+pub use surface::SurfaceConfig;
+pub use ties::{IntersectionConfig, TiesConfig};
+pub use unknowns::{PositionUnknowns, RotationUnknowns};
+pub use window_list::{load_windows, require_outlines, window_of_box, window_of_polygon};
+pub use windows::WindowConfig;
+
+use areograph_base::error::{Cause, Error, IoError, Kind, Locate as _};
+use declare::{Keys, Table, described};
+use problems::Review;
+use written::Written;
+
+/// How the example of a site begins.
+const HEADER: &str = "\
+# Site configuration of areograph, every key with its unit, range and default.
+#
+# Only `site`, one source of kernels, and either [pedr] (or [[shots]]) with [[windows]] or [[images]] are required;
+# a key that is left out has the default written here. Relative paths count from this file's folder.
+# Angles are degrees, exposures milliseconds, times seconds; longitudes are east, latitudes
+# areocentric, both in the frame of the body: IAU 2000 of Mars. Schema: ../schema/site.schema.json
+
+";
+
+/// Longest configuration file, bytes.
+const BYTES_MAX: u64 = 1 << 20;
+
+/// A configuration that passed every check.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Loaded {
+    /// The valid form.
+    pub site: SiteConfig,
+    /// What was accepted but is worth a word, each with its place: entries that are never used.
+    pub warnings: Vec<String>,
+    /// Files, and folders of kernels, that its keys lead to.
+    pub files: Vec<PathBuf>,
+}
+
+/// Reads and checks the configuration `path`; relative paths in it count from its own folder.
+///
+/// # Errors
+/// [`Problems`] with everything that is wrong, or [`IoError`] when the file cannot be read.
+pub fn load(path: &Path) -> Result<Loaded, Error> {
+    load_within(path, &[])
+}
+
+/// As [`load`], of a configuration that may lead only to what lies below `roots`, links followed.
+///
+/// # Errors
+/// Those of [`load`].
+pub fn load_within(path: &Path, roots: &[PathBuf]) -> Result<Loaded, Error> {
+    let text = read(path)?;
+    Ok(parse_within(&text, path, roots)?)
+}
+
+/// The text of the file, of bounded length.
+fn read(path: &Path) -> Result<String, Error> {
+    let size = path.metadata().map_err(IoError::on("read")).in_file(path)?;
+    // Devices and pipes could be read for ever.
+    if !size.is_file() {
+        return Err(Problems::of_file(path, "is no regular file; expected a TOML file").into());
+    }
+    let mut bytes = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(BYTES_MAX + 1).read_to_end(&mut bytes))
+        .map_err(IoError::on("read"))
+        .in_file(path)?;
+    if bytes.len() as u64 > BYTES_MAX {
+        let text = format!("is longer than {BYTES_MAX} bytes; expected the TOML file of one site");
+        return Err(Problems::of_file(path, &text).into());
+    }
+    String::from_utf8(bytes).map_err(|error| {
+        let byte = error.utf8_error().valid_up_to() + 1;
+        Problems::of_file(
+            path,
+            &format!("is not UTF-8 from byte {byte}; expected text"),
+        )
+        .into()
+    })
+}
+
+/// Checks the configuration `text` of `file`.
+///
+/// Beyond the text it looks only at what the text names: whether files are there, which files globs
+/// match, and the polygons of windows.
+///
+/// # Errors
+/// [`Problems`] with everything that is wrong.
+pub fn parse(text: &str, file: &Path) -> Result<Loaded, Problems> {
+    parse_within(text, file, &[])
+}
+
+fn parse_within(text: &str, file: &Path, roots: &[PathBuf]) -> Result<Loaded, Problems> {
+    let mut review = Review::new(file, text).within(roots);
+    let read = read_table::<SiteConfig>(text, &mut review);
+    let files = review.take_files();
+    let ((site, Written { blake3, keys }), warnings) = review.finish(read)?;
+    let site = SiteConfig {
+        file: file.to_owned(),
+        blake3,
+        keys,
+        ..site
+    };
+    Ok(Loaded {
+        site,
+        warnings,
+        files,
+    })
+}
+
+/// What was read, with the keys as written, and warnings.
+type Parsed<T> = ((T, Written), Vec<String>);
+
+/// Checks the `text` of `file`, whose keys are those of `T` and are documented in `documentation`.
+fn parse_file<T: Table>(
+    text: &str,
+    file: &Path,
+    documentation: &'static str,
+) -> Result<Parsed<T>, Problems> {
+    let mut review = Review::new(file, text).documented_in(documentation);
+    let read = read_table(text, &mut review);
+    review.finish(read)
+}
+
+/// What `text` says, to be used only when `review` has found no problem.
+fn read_table<T: Table>(text: &str, review: &mut Review<'_>) -> Option<(T, Written)> {
+    let (document, syntax_errors) = DeTable::parse_recoverable(text);
+    if !syntax_errors.is_empty() {
+        for error in syntax_errors {
+            let text = format!("this is not TOML: {}", error.message());
+            review.problem(error.span(), text);
+        }
+        return None;
+    }
+    let mut keys = Keys::of_file(document.get_ref(), review);
+    let read = T::read(&mut keys);
+    keys.finish();
+    match toml::from_str(text) {
+        Ok(table) => Some((read, Written::of(table, review.renames()))),
+        // A value that TOML cannot hold, which its key has refused already.
+        Err(error) => {
+            if !review.has_problems() {
+                review.problem(error.span(), error.message().to_owned());
+            }
+            None
+        }
+    }
+}
+
+/// Every key that a site file can have, in the order of the example file.
+#[must_use]
+pub fn keys() -> Vec<DeclaredKey> {
+    let mut keys = Vec::new();
+    described::<SiteConfig>().walk(&mut keys);
+    keys
+}
+
+/// The example file, `config/sites/example.toml`.
+#[must_use]
+pub fn example() -> String {
+    declare::example(HEADER, &described::<SiteConfig>())
+}
+
+/// The JSON Schema of a site file, `config/schema/site.schema.json`.
+#[must_use]
+pub fn schema() -> impl Serialize {
+    declare::schema(
+        "Site configuration of areograph",
+        "The TOML file of one site as JSON. areograph checks more than a schema can: files that are there, order \
+         within windows, agreement between keys.",
+        &described::<SiteConfig>(),
+    )
+}
+
+/// Two configurations name the same site, so their products would overwrite each other.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("site is \"{site}\" in {first} and in {second}; expected one file per site")]
+pub struct DuplicateSite {
+    /// The identifier they share.
+    pub site: String,
+    /// The file that came first.
+    pub first: String,
+    /// The file that came later.
+    pub second: String,
+}
+
+impl Cause for DuplicateSite {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        "give each site its own identifier: it is also the folder of its products".to_owned()
+    }
+}
+
+/// Sites of one run must have different identifiers.
+///
+/// # Errors
+/// [`DuplicateSite`] for the first identifier that comes twice.
+pub fn check_sites(sites: &[SiteConfig]) -> Result<(), DuplicateSite> {
+    let mut seen: BTreeMap<&str, &Path> = BTreeMap::new();
+    for site in sites {
+        if let Some(first) = seen.insert(&site.site, &site.file) {
+            return Err(DuplicateSite {
+                site: site.site.clone(),
+                first: first.display().to_string(),
+                second: site.file.display().to_string(),
+            });
+        }
+    }
+    Ok(())
+}

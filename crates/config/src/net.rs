@@ -1,0 +1,300 @@
+//! The configuration of a net of rectified pictures: `areograph triangulate`.
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
+
+use serde::Serialize;
+
+use areograph_base::{body::MARS_IAU2000, error::Error, units::RADIANS_PER_DEGREE};
+use areograph_geom::conformal_map::{ConformalMap, Projection};
+
+use super::{
+    declare::{Declare as _, Keys, declare_table, example, group, key, of_the_file, schema, table},
+    described,
+    forms::{above_to, any_text, from_to, lower_case_identifier, whole_from_to, words, yes_or_no},
+    parse_file,
+    paths::Globs,
+    problems::Problems,
+    read,
+};
+
+/// Where every key is documented.
+pub(super) const NET_EXAMPLE: &str = "config/nets/example.toml";
+
+const HEADER: &str = "\
+# A net of rectified pictures for `areograph triangulate`, every key with its unit, range and default.
+#
+# Only `net`, [measurements] and [controls] are required; a key that is left out has the default written
+# here. Relative paths count from this file's folder. Schema: ../schema/net.schema.json
+
+";
+
+declare_table! {
+    /// Everything that `areograph triangulate` needs to know about a net: every value checked, metres and radians inside.
+    pub struct NetConfig {
+        /// Identifier, and the name of the folder of its products.
+        net: String = key(lower_case_identifier()).required().example(r#""tertiary""#),
+        /// Free text for the report.
+        description: String = key(any_text()).or(String::new())
+            .example(r#""Viking pictures of Arthur & McMacken 1977, tertiary net""#),
+        /// The file it was read from.
+        file: PathBuf = of_the_file(),
+        /// BLAKE3, hexadecimal, of the keys and values as written.
+        blake3: String = of_the_file(),
+        /// The same keys and values one by one.
+        keys: BTreeMap<String, String> = of_the_file(),
+        /// Points in pictures.
+        measurements: MeasurementsConfig = table(),
+        /// Points on the map.
+        controls: ControlsConfig = table(),
+        /// Pictures; none when nothing is said of them.
+        pictures: PicturesConfig = table(),
+        /// Corrections of the film.
+        film: FilmConfig = table(),
+        /// The map.
+        map: MapConfig = table(),
+        /// How the net is solved.
+        triangulation: TriangulationConfig = table(),
+    }
+    check across_tables
+}
+
+/// What must be there, and what is never used.
+fn across_tables(net: &NetConfig, keys: &mut Keys<'_, '_>) {
+    keys.rule(|| serde_json::json!({"required": ["measurements", "controls"]}));
+    for (name, files) in [
+        ("measurements", &net.measurements.files),
+        ("controls", &net.controls.files),
+    ] {
+        if files.is_empty() && keys.span_of(name).is_none() {
+            keys.missing(name, &format!("a table {name} with files"));
+        }
+    }
+}
+
+declare_table! {
+    /// Points in pictures.
+    pub struct MeasurementsConfig {
+        /// Paths or globs of tables (.csv), one row a measurement: `picture`, `point`, `x`, `y`, y upwards as in a map (turned over
+        /// where it counts lines downwards). A crater boxed by two settings of a cross has `x_upper_right`, `y_upper_right`,
+        /// `x_lower_left`, `y_lower_left` instead of `x`, `y`. Units are the picture's own.
+        #[serde(skip)]
+        files: Vec<PathBuf> = key(Globs)
+            .required_as("paths or globs of tables of measurements")
+            .example(r#"["measurements.csv"]"#),
+        /// Which way y counts in all pictures.
+        y_axis: YAxis = key(words([
+            ("up", YAxis::Up, "as on a map"),
+            ("down", YAxis::Down, "as lines of an image"),
+        ])).or(YAxis::Up),
+    }
+}
+
+/// Which way y counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum YAxis {
+    /// As on a map.
+    Up,
+    /// As lines of an image.
+    Down,
+}
+
+declare_table! {
+    /// Points whose place is known.
+    pub struct ControlsConfig {
+        /// Paths or globs of tables (.csv), one row a control: `point` and `x_m`, `y_m` or `x_km`, `y_km` on the map, or
+        /// `longitude_deg` (east), `latitude_deg` (areocentric); `sigma_m` or `sigma_km` where the control has a standard
+        /// deviation of its own.
+        #[serde(skip)]
+        files: Vec<PathBuf> = key(Globs)
+            .required_as("paths or globs of tables of controls")
+            .example(r#"["controls.csv"]"#),
+        /// Standard deviation of a coordinate of a control, its measurement included, where the table has none. Without it, what
+        /// SCALE leaves at the controls.
+        sigma_m: Option<f64> = key(above_to(0.0, 1e7)).unused("2000.0"),
+        /// Residual, in standard deviations of SCALE, beyond which a control is left out. Two gross errors that hide each other are
+        /// found too, by least median of squares; fewer than five controls cannot be judged.
+        limit: f64 = key(from_to(2.5, 1e6)).or(4.0),
+    }
+}
+
+declare_table! {
+    /// What is known of the pictures. Without this table they are those of the measurements.
+    pub struct PicturesConfig {
+        /// Paths or globs of tables (.csv), one row a picture: `picture`, and where known `brick`, the name of its brick, and
+        /// `metres_per_unit`, the size of a unit of its coordinates on the ground, from which the adjusted one may differ by a
+        /// factor of 2.
+        #[serde(skip)]
+        files: Vec<PathBuf> = key(Globs).or(Vec::new()).unused(r#"["pictures.csv"]"#),
+    }
+}
+
+declare_table! {
+    /// Corrections of the film, before anything else.
+    pub struct FilmConfig {
+        /// Paths or globs of tables (.csv) of ticks, one row a tick: `picture`, `tick`, measured `x`, `y`, known `known_x`,
+        /// `known_y`. The ticks `upper_left`, `upper_right`, `lower_left` and `lower_right` give linear double interpolation
+        /// (drum scanners); with `upper`, `lower`, `left` and `right`, the middles of the edges, a quadratic that is 0 at the
+        /// corners is added (cathode-ray recorders).
+        #[serde(skip)]
+        files: Vec<PathBuf> = key(Globs).or(Vec::new()).unused(r#"["ticks.csv"]"#),
+    }
+}
+
+declare_table! {
+    /// The map: a conformal projection of a sphere, in which pictures fit by similarities.
+    pub struct MapConfig {
+        /// The projection.
+        map: ConformalMap = group::<MapKeys>().map(MapKeys::map),
+    }
+}
+
+declare_table! {
+    /// The map: a conformal projection of a sphere, in which pictures fit by similarities.
+    struct MapKeys {
+        /// The projection.
+        projection: Projection = key(words([
+            ("mercator", Projection::Mercator, "the paper's; away from poles"),
+            ("stereographic", Projection::Stereographic, "about any place"),
+        ])).or(Projection::Mercator),
+        /// East longitude of the central meridian, or of the centre.
+        longitude_rad as "longitude_deg": f64 =
+            key(from_to(-180.0, 360.0)).or(0.0).map(|degrees| degrees * RADIANS_PER_DEGREE),
+        /// Areocentric latitude at which Mercator's scale is true, or of the centre.
+        latitude_rad as "latitude_deg": f64 =
+            key(from_to(-90.0, 90.0)).or(0.0).map(|degrees| degrees * RADIANS_PER_DEGREE),
+        /// Radius of the sphere. The default is the equatorial radius of the IAU 2000 ellipsoid.
+        radius_m: f64 = key(above_to(0.0, 1e9)).or(MARS_IAU2000.equatorial_radius_m),
+    }
+    check mercator_has_an_equator
+}
+
+impl MapKeys {
+    fn map(self) -> ConformalMap {
+        ConformalMap {
+            projection: self.projection,
+            longitude_rad: self.longitude_rad,
+            latitude_rad: self.latitude_rad,
+            radius_m: self.radius_m,
+        }
+    }
+}
+
+fn mercator_has_an_equator(map: &MapKeys, keys: &mut Keys<'_, '_>) {
+    if map.projection == Projection::Mercator && map.latitude_rad.cos() < 1e-3 {
+        keys.refuse(
+            "latitude_deg",
+            "a latitude away from the poles, or the stereographic projection",
+        );
+    }
+}
+
+declare_table! {
+    /// How the net is solved. The programs are those of Arthur & McMacken 1977.
+    pub struct TriangulationConfig {
+        /// What puts the pictures on the map.
+        method: Method = key(words([
+            ("scale", Method::Scale, "BRICK, EXTEND, SCALE: the figure keeps its shape"),
+            ("mortar", Method::Mortar, "BRICK, EXTEND, MORTAR, SCALE: bricks give way to the controls by their weights"),
+            ("one_shot", Method::OneShot, "all pictures and controls at once, by their weights"),
+        ])).or(Method::Scale),
+        /// LOCAL: evens out the seams between bricks afterwards.
+        local: bool = key(yes_or_no("seams stay as they are", "pictures of a brick give way to its neighbours")).or(false),
+        /// Pictures of a brick, where the table of pictures names no bricks.
+        brick_pictures: u32 = key(whole_from_to(2, 100)).or(8),
+        /// Blunders in bricks: measurements flagged beyond 3.5 robust standard deviations without which a brick's root mean square falls by 30 %.
+        blunders: Blunders = key(words([
+            ("remove", Blunders::Remove, "leave them out, and say so"),
+            ("report", Blunders::Report, "flag them and use them"),
+        ])).or(Blunders::Remove),
+        /// Standard deviation of a coordinate of a measurement on the map. Without it, what the bricks' deviations say.
+        tie_sigma_m: Option<f64> = key(above_to(0.0, 1e7)).unused("50.0"),
+    }
+    check seams_need_bricks
+}
+
+fn seams_need_bricks(written: &TriangulationConfig, keys: &mut Keys<'_, '_>) {
+    if written.method == Method::OneShot && written.local {
+        keys.refuse(
+            "local",
+            "no: one_shot has no bricks whose seams could be evened out",
+        );
+    }
+}
+
+/// What puts the pictures on the map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// BRICK, EXTEND, SCALE.
+    Scale,
+    /// BRICK, EXTEND, MORTAR, SCALE.
+    Mortar,
+    /// All pictures and controls at once.
+    OneShot,
+}
+
+/// What becomes of blunders.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Blunders {
+    /// Left out.
+    Remove,
+    /// Flagged and used.
+    Report,
+}
+
+/// A net that passed every check, and what was accepted but is worth a word.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoadedNet {
+    /// The valid form.
+    pub net: NetConfig,
+    /// Entries that are never used, each with its place.
+    pub warnings: Vec<String>,
+}
+
+/// Reads and checks the net `path`; relative paths in it count from its own folder.
+///
+/// # Errors
+/// [`Problems`] with everything that is wrong, or [`IoError`](areograph_base::error::IoError) when the file cannot be read.
+pub fn load_net(path: &Path) -> Result<LoadedNet, Error> {
+    let text = read(path)?;
+    Ok(parse_net(&text, path)?)
+}
+
+/// Checks the net `text` of `file`.
+///
+/// # Errors
+/// [`Problems`] with everything that is wrong.
+pub fn parse_net(text: &str, file: &Path) -> Result<LoadedNet, Problems> {
+    let ((net, written), warnings) = parse_file::<NetConfig>(text, file, NET_EXAMPLE)?;
+    Ok(LoadedNet {
+        net: NetConfig {
+            file: file.to_owned(),
+            blake3: written.blake3,
+            keys: written.keys,
+            ..net
+        },
+        warnings,
+    })
+}
+
+/// The example of a net, `config/nets/example.toml`.
+#[must_use]
+pub fn net_example() -> String {
+    example(HEADER, &described::<NetConfig>())
+}
+
+/// The JSON Schema of a net, `config/schema/net.schema.json`.
+#[must_use]
+pub fn net_schema() -> impl Serialize {
+    schema(
+        "Net of rectified pictures of areograph",
+        "The TOML file of one net as JSON. areograph checks more than a schema can: files that are there, agreement \
+         between keys.",
+        &described::<NetConfig>(),
+    )
+}

@@ -1,0 +1,54 @@
+//! `[orientation]` and `[registration]`: the sensor model and its use.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use areograph_base::units::RADIANS_PER_ARCSECOND;
+use areograph_geom::{light_time::LightTime, pushbroom::CameraModel};
+
+use super::{
+    declare::{Declare as _, declare_table, key},
+    forms::{above_to, from_to, whole_from_to, words_of},
+};
+
+declare_table! {
+    /// Sampling of exterior orientation and limits of the sensor model.
+    pub struct OrientationConfig: Deserialize {
+        /// Equal intervals over the image; one epoch more than intervals. The default is that of Shan et
+        /// al. 2005; a second-order polynomial through four epochs is the least that leaves residuals.
+        intervals: u32 = key(whole_from_to(3, 10_000)).or(30),
+        /// From where straight rays to the ground start: one convention for all positions of the camera in all
+        /// products. How far the others are from it is told for every image. Ranges are geometric always.
+        light_time: LightTime = key(words_of(LightTime::WORDS, [
+            "where the camera was when the light left the ground: light time to the surface and aberration",
+            "where it was at the exposure, as papers without a word on it are read",
+            "where it seems to be from the centre of Mars (LT+S): to match ISIS and ALE",
+        ])).or(LightTime::Surface),
+        /// Largest second-order position RMSE, norm of x, y, z. The default is about twice the largest in Table 4
+        /// of Shan et al. 2005 (2.3 m).
+        position_rmse_max_m: f64 = key(above_to(0.0, 1e6)).or(5.0),
+        /// Largest second-order pointing RMSE of each angle. The default is twice the largest there (5.0″).
+        pointing_rmse_max_rad as "pointing_rmse_max_arcsec": f64 =
+            key(above_to(0.0, 3600.0)).or(10.0).map(|arcsec| arcsec * RADIANS_PER_ARCSECOND),
+    }
+}
+
+declare_table! {
+    /// Projection of the footprints into the images.
+    pub struct RegistrationConfig: Deserialize, JsonSchema {
+        /// The orientation that points are projected with. How far the others are from the one chosen is
+        /// told in `registration.json` and in the report.
+        model: CameraModel = key(words_of(CameraModel::WORDS, [
+            "positions and angles as polynomials of first order (Shan, Lee & Yoon 2002)",
+            "of second order (Shan et al. 2005); angles lose their meaning near the equator",
+            "second order with a rotation vector, which means the same at every latitude",
+            "interpolation between the samples, no polynomial over the whole image",
+        ])).or(CameraModel::RotationVector),
+        /// A step of the two published iterations below this is the last. The default is that of the papers.
+        /// They run beside Newton's method, which makes the product.
+        // Below, steps drown in the rounding of coordinates: 1e-9 m of 4e6 m, lines of metres.
+        tolerance_lines: f64 = key(from_to(1e-6, 100.0)).or(0.1),
+        /// Steps after which they are given up. The default is our choice.
+        steps_max: u32 = key(whole_from_to(1, 10_000)).or(100),
+    }
+}

@@ -1,0 +1,65 @@
+//! `[pedr]`: files, datum, filter.
+
+use std::path::PathBuf;
+
+use serde::Deserialize;
+
+use areograph_base::{
+    altimetry::{DatumChoice, ShotFilter},
+    body::Datum,
+    units::RADIANS_PER_DEGREE,
+};
+
+use super::{
+    declare::{Declare as _, declare_table, key, table},
+    forms::{above_to, list, whole_from_to, words},
+    paths::Globs,
+};
+
+declare_table! {
+    /// PEDR files. Without this table images are oriented, but there are no footprints and no range check.
+    pub struct PedrConfig: Deserialize {
+        /// PEDR files: paths or globs with `*`, `?`, `[..]`, in at most three parts of the path, `**` not
+        /// taken; letter case counts. A glob that matches no file is a problem. Every shot counts once: a copy
+        /// of a file is read once, two versions of one orbit are refused.
+        #[serde(skip)]
+        files: Vec<PathBuf> = key(Globs)
+            .required_as("paths or globs of PEDR files (or no table pedr at all)")
+            .example(r#"["../pedr/*.b"]"#),
+        /// Datum of their coordinates; a stated one must not contradict version letter or label. IAU 1991 and
+        /// 1994 differ by 0.033 degrees of longitude, 1.96 km at the equator; pck00006, which Shan et al. 2005
+        /// calls IAU 1991, holds the 1994 constants.
+        datum: DatumChoice = key(words([
+            ("auto", DatumChoice::Auto, "by version letter and label: L is IAU 2000, older versions IAU 1991"),
+            ("iau1991", DatumChoice::Stated(Datum::Iau1991), ""),
+            ("iau1994", DatumChoice::Stated(Datum::Iau1994), ""),
+            ("iau2000", DatumChoice::Stated(Datum::Iau2000), ""),
+        ])).or(DatumChoice::Auto),
+        /// Shots to keep.
+        filter: ShotFilter = table(),
+    }
+}
+
+declare_table! {
+    /// Shots to keep; a shot must pass every test.
+    fill ShotFilter {
+        /// Classification codes: 1 ground, 0 cloud or noise. The default is that of pedr2tab.
+        classes = key(list(whole_from_to(i16::MIN, i16::MAX))).or(vec![1]).map(sorted),
+        /// Trigger channels. (The MOLA team's grids leave out channel 4.)
+        channels = key(list(whole_from_to(ShotFilter::CHANNELS[0], ShotFilter::CHANNELS[1]))).or(vec![1, 2, 3, 4]).map(sorted),
+        /// Attitude flags. With 2 (attitude missing for part of the frame) and 3 (for all of it) the footprint
+        /// assumes nadir pointing, which off nadir can be 100 km wrong. 1 has no published meaning; in files
+        /// before 1998-10 the field is undefined: there, list the values found.
+        attitude_flags = key(list(whole_from_to(u16::MIN, u16::MAX))).or(vec![0, 1]).map(sorted),
+        /// Largest off-nadir angle of the laser. The default keeps all, because images are taken off nadir too: Shan
+        /// et al. 2005, Table 2, has emission angles of up to 22.1 degrees. (The MOLA team's grids stop at 1.0 or 1.2.)
+        off_nadir_max_rad as "off_nadir_max_deg" =
+            key(above_to(0.0, ShotFilter::OFF_NADIR_LIMIT_DEG)).or(90.0).map(|degrees| degrees * RADIANS_PER_DEGREE),
+    }
+}
+
+fn sorted<T: Ord>(mut values: Vec<T>) -> Vec<T> {
+    values.sort_unstable();
+    values.dedup();
+    values
+}

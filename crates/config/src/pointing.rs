@@ -1,0 +1,166 @@
+//! `[pointing]` and `[mola_clock]`: the two time biases.
+
+use serde::Deserialize;
+
+use areograph_base::{
+    altimetry::{BiasScope, MolaClock, TagSign},
+    instruments::Instrument,
+    time::PointingBias,
+};
+
+use super::{
+    declare::{Declare as _, Keys, declare_table, key},
+    forms::{from_to, text, words},
+    instruments::{usual_altimeter, usual_instrument},
+};
+
+/// A bias this close to the known one with its sign turned is that one, seconds: NAIF measured 1.140 ± 0.010 s.
+const TURNED_SIGN_S: f64 = 0.05;
+/// A bias this close to the known one is the known one, seconds: 0.2 m on the ground.
+const KNOWN_S: f64 = 0.0005;
+/// What a second of attitude time is on the ground when the bus keeps nadir, metres: it turns by 0.0501° meanwhile.
+const NADIR_TURN_M_S: f64 = 330.0;
+
+declare_table! {
+    /// Pointing bias, where it is not to be that of the cameras. Every instrument file holds the bias of its camera and
+    /// where that is known from; what is written here holds for all images of the site instead.
+    pub struct PointingConfig: Deserialize {
+        /// Time correction of attitude kernels: the attitude of an exposure at t is read at t + `ck_bias_s`.
+        /// Position, Mars rotation and mounting stay at t. Without it, that of the instrument file.
+        /// Known: value and sign for MOC, from ISIS and ALE (`INS-94031_CK_TIME_BIAS`) and Shan et al. 2005.
+        /// The known value with its sign turned is refused; any other one is remarked on.
+        /// Unknown: whether the same value holds for kernels before the mapping phase (before April 1999).
+        ck_bias as "ck_bias_s": Option<PointingBias> = key(from_to(-10.0, 10.0))
+            .unused("-1.15")
+            .map(|bias_s| bias_s.map(PointingBias::from_seconds)),
+        /// Citation that products repeat; change it together with the value. Without it, that of the instrument file,
+        /// or for another bias this key's name.
+        source: Option<String> = key(text()).unused(r#""mocAddendum004.ti; Shan et al. 2005, p. 98""#),
+    }
+}
+
+/// Whether a bias is the known one but for its sign.
+pub(super) fn has_turned_sign(bias_s: f64, known_s: f64) -> bool {
+    known_s.abs() > TURNED_SIGN_S && (bias_s + known_s).abs() < TURNED_SIGN_S
+}
+
+/// A pointing bias as used.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UsedBias<'a> {
+    /// The bias.
+    pub bias: PointingBias,
+    /// Where it comes from.
+    pub source: &'a str,
+    /// Name of the first camera that it holds for.
+    pub camera: &'a str,
+}
+
+impl UsedBias<'_> {
+    fn is_same(&self, other: &Self) -> bool {
+        self.bias == other.bias && self.source == other.source
+    }
+}
+
+impl PointingConfig {
+    /// The bias that holds for `camera`: the site's, else that of its instrument file.
+    #[must_use]
+    pub fn bias_of(&self, camera: &Instrument) -> PointingBias {
+        self.ck_bias.unwrap_or(camera.pointing_bias())
+    }
+
+    /// Where the bias that holds for `camera` comes from.
+    #[must_use]
+    pub fn source_of<'a>(&'a self, camera: &'a Instrument) -> &'a str {
+        let own = &camera.pointing;
+        match (&self.source, self.departure_s(camera) > KNOWN_S) {
+            (Some(source), _) => source,
+            (None, false) => &own.source,
+            (None, true) => "pointing.ck_bias_s of the site",
+        }
+    }
+
+    /// The biases that hold for `cameras`, each once; for none, that of the usual camera.
+    #[must_use]
+    pub fn used<'a>(
+        &'a self,
+        cameras: impl IntoIterator<Item = &'a Instrument>,
+    ) -> Vec<UsedBias<'a>> {
+        let used = |camera: &'a Instrument| UsedBias {
+            bias: self.bias_of(camera),
+            source: self.source_of(camera),
+            camera: &camera.name,
+        };
+        let mut all: Vec<UsedBias<'a>> = Vec::new();
+        for bias in cameras.into_iter().map(used) {
+            if !all.iter().any(|known| known.is_same(&bias)) {
+                all.push(bias);
+            }
+        }
+        if all.is_empty() {
+            all.push(used(usual_instrument()));
+        }
+        all
+    }
+
+    fn departure_s(&self, camera: &Instrument) -> f64 {
+        (self.bias_of(camera).seconds() - camera.pointing.ck_bias_s).abs()
+    }
+
+    /// How far the bias is from the known one of `camera`, in a sentence; `None` for the known one.
+    #[must_use]
+    pub fn departure(&self, camera: &Instrument) -> Option<String> {
+        let (bias_s, known_s) = (self.bias_of(camera).seconds(), camera.pointing.ck_bias_s);
+        let apart_s = self.departure_s(camera);
+        (apart_s > KNOWN_S).then(|| {
+            format!(
+                "pointing.ck_bias_s is {bias_s} s, the known bias of {} {known_s} s: {apart_s:.3} s more or less are up \
+                 to {:.0} m on the ground",
+                camera.name,
+                apart_s * NADIR_TURN_M_S
+            )
+        })
+    }
+}
+
+declare_table! {
+    /// Clock bias of MOLA.
+    /// Known: Shan et al. 2005 (data preparation, citing NAIF 2001) corrected it. Unknown: its sign, and whether PEDR
+    /// time tags, of which versions, already include it. The defaults below are therefore a choice; the
+    /// bias scan of the range check tells which one a profile supports. Size: about one shot spacing
+    /// (353 to 398 m) along the track, 28 m of Mars rotation at the equator, at most 3.2 m of height.
+    fill MolaClock {
+        /// Size of the bias. Without it, that of the altimeter file.
+        bias_s = key(from_to(0.0, 10.0)).or(usual_altimeter().clock_bias_s),
+        /// On which side of the true time a tag lies.
+        sign = key(words([
+            ("late", TagSign::Late, "true time = tag - bias"),
+            ("early", TagSign::Early, "true time = tag + bias"),
+        ])).or(TagSign::Late),
+        /// What the corrected time is used for. Shan et al. 2005 correct the bias in the datum conversion, and look the
+        /// spacecraft up at the corrected time; they give no formula. Three readings: one corrected time serves both
+        /// rotations and the look-up, then footprints stay (0.3 mm) and only the look-up counts ("spk_lookup", our
+        /// choice); the rotation into IAU 2000 has it and the one out of the file's datum has not ("both", 28 m);
+        /// that rotation alone ("rotation") contradicts their look-up.
+        scope = key(words([
+            ("spk_lookup", BiasScope::SpkLookup, "the spacecraft's position in the range check"),
+            (
+                "rotation",
+                BiasScope::Rotation,
+                "the rotation into IAU 2000 (the one out of the file's datum stays at the tag)",
+            ),
+            ("both", BiasScope::Both, "both"),
+            ("none", BiasScope::None, "nothing: tags are taken as they are"),
+        ])).or(BiasScope::SpkLookup),
+        /// Citation that products repeat; change it together with the values.
+        source = key(text()).or(usual_altimeter().clock_source.clone()),
+    }
+    check bias_is_used
+}
+
+fn bias_is_used(clock: &MolaClock, keys: &mut Keys<'_, '_>) {
+    if clock.scope == BiasScope::None {
+        for key in ["bias_s", "sign"] {
+            keys.unused(key, "mola_clock.scope is \"none\"");
+        }
+    }
+}

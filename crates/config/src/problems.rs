@@ -1,0 +1,283 @@
+//! All problems of one configuration file, each with its place.
+
+use std::{
+    collections::BTreeSet,
+    fmt,
+    ops::Range,
+    path::{Path, PathBuf},
+};
+
+use areograph_base::error::{Cause, Kind};
+use areograph_store::files::outside;
+
+/// Problems reported one by one; a file with more is told how many were left out.
+const LISTED_MAX: usize = 100;
+/// Characters of a value that a message repeats.
+const EXCERPT_MAX: usize = 60;
+
+/// Documents every key of a site.
+pub(super) const SITE_EXAMPLE: &str = "config/sites/example.toml";
+
+/// Everything that is wrong with one configuration file, in order of place.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Problems {
+    lines: Vec<String>,
+    unlisted: usize,
+    /// The file that documents every key.
+    documentation: &'static str,
+}
+
+impl Problems {
+    /// One problem that concerns the file as a whole.
+    pub(super) fn of_file(file: &Path, text: &str) -> Self {
+        Self {
+            lines: vec![format!("{}: {text}", file.display())],
+            unlisted: 0,
+            documentation: SITE_EXAMPLE,
+        }
+    }
+}
+
+impl fmt::Display for Problems {
+    /// One problem per line: `file:line:column: key is value; expected …`.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(&self.lines.join("\n"))?;
+        match self.unlisted {
+            0 => Ok(()),
+            more => write!(formatter, "\n… and {more} problems more"),
+        }
+    }
+}
+
+impl std::error::Error for Problems {}
+
+impl Cause for Problems {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        format!(
+            "correct these entries; {} documents every key with its unit and default",
+            self.documentation
+        )
+    }
+}
+
+/// Where something stands: a byte range of the text, or the file as a whole.
+type TextSpan = Option<Range<usize>>;
+
+/// A key that stands in the file under its former name.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Rename {
+    /// Its tables, with dots between them.
+    pub(super) table: String,
+    /// Its former name.
+    pub(super) was: &'static str,
+    /// Its name.
+    pub(super) name: &'static str,
+}
+
+/// The text under review, and what has been found in it so far.
+pub(super) struct Review<'a> {
+    file: &'a Path,
+    text: &'a str,
+    problems: Vec<(TextSpan, String)>,
+    unlisted: usize,
+    warnings: Vec<(TextSpan, String)>,
+    renames: BTreeSet<Rename>,
+    documentation: &'static str,
+    /// Folders below which files must lie; none for no such rule.
+    roots: &'a [PathBuf],
+    /// Files that the text leads to.
+    files: Vec<PathBuf>,
+}
+
+impl<'a> Review<'a> {
+    pub(super) const fn new(file: &'a Path, text: &'a str) -> Self {
+        Self {
+            file,
+            text,
+            problems: Vec::new(),
+            unlisted: 0,
+            warnings: Vec::new(),
+            renames: BTreeSet::new(),
+            documentation: SITE_EXAMPLE,
+            roots: &[],
+            files: Vec::new(),
+        }
+    }
+
+    /// The same of a file that may lead only below these folders.
+    pub(super) fn within(self, roots: &'a [PathBuf]) -> Self {
+        Self { roots, ..self }
+    }
+
+    /// Notes a file to which the value of `key` at `span` leads. Where it must not lead is a problem, and such a file is not
+    /// to be read.
+    pub(super) fn admit(&mut self, path: &Path, span: Range<usize>, key: &str) -> bool {
+        match outside(path, self.roots) {
+            None => {
+                self.files.push(path.to_owned());
+                true
+            }
+            Some(outside) => {
+                self.refuse(span, key, outside);
+                false
+            }
+        }
+    }
+
+    /// Files to which the text leads.
+    pub(super) fn take_files(&mut self) -> Vec<PathBuf> {
+        std::mem::take(&mut self.files)
+    }
+
+    /// The same of a file whose keys another example documents.
+    pub(super) fn documented_in(self, documentation: &'static str) -> Self {
+        Self {
+            documentation,
+            ..self
+        }
+    }
+
+    /// `path` as written in the file, counted from the file's folder unless absolute.
+    pub(super) fn resolve(&self, path: &str) -> PathBuf {
+        self.file
+            .parent()
+            .map_or_else(|| PathBuf::from(path), |folder| folder.join(path))
+    }
+
+    /// A problem in words of its own.
+    pub(super) fn problem(&mut self, place: TextSpan, text: String) {
+        if self.problems.len() < LISTED_MAX {
+            self.problems.push((place, text));
+        } else {
+            self.unlisted += 1;
+        }
+    }
+
+    /// The value at `span` is not what `key` takes.
+    pub(super) fn refuse(&mut self, span: Range<usize>, key: &str, expected: impl fmt::Display) {
+        let value = self.excerpt(&span);
+        self.problem(Some(span), format!("{key} is {value}; expected {expected}"));
+    }
+
+    /// `key` is absent from the table at `place`.
+    pub(super) fn missing(&mut self, place: TextSpan, key: &str, expected: impl fmt::Display) {
+        self.problem(place, format!("{key} is missing; expected {expected}"));
+    }
+
+    /// The entry at `span` is accepted but worth a word.
+    pub(super) fn warn(&mut self, span: Range<usize>, text: String) {
+        if self.warnings.len() < LISTED_MAX {
+            self.warnings.push((Some(span), text));
+        }
+    }
+
+    /// The key at `span` stands under its former name.
+    pub(super) fn renamed(&mut self, span: Range<usize>, rename: Rename) {
+        let Rename { table, was, name } = &rename;
+        let dot = if table.is_empty() { "" } else { "." };
+        self.warn(
+            span,
+            format!("{table}{dot}{was} is now called {table}{dot}{name}"),
+        );
+        self.renames.insert(rename);
+    }
+
+    pub(super) const fn has_problems(&self) -> bool {
+        !self.problems.is_empty()
+    }
+
+    /// Keys that stand under former names.
+    pub(super) const fn renames(&self) -> &BTreeSet<Rename> {
+        &self.renames
+    }
+
+    /// The value and the warnings, or the problems when there are any.
+    pub(super) fn finish<T>(mut self, value: Option<T>) -> Result<(T, Vec<String>), Problems> {
+        let problems = std::mem::take(&mut self.problems);
+        let warnings = std::mem::take(&mut self.warnings);
+        match value {
+            Some(value) if problems.is_empty() => Ok((value, self.placed(warnings))),
+            _ => Err(Problems {
+                lines: self.placed(problems),
+                unlisted: self.unlisted,
+                documentation: self.documentation,
+            }),
+        }
+    }
+
+    /// `file:line:column: text` for each entry, in order of place.
+    fn placed(&self, mut entries: Vec<(TextSpan, String)>) -> Vec<String> {
+        entries.sort_by_key(|(place, _)| place.as_ref().map(|span| span.start));
+        let file = self.file.display();
+        entries
+            .into_iter()
+            .map(|(place, text)| match place {
+                None => format!("{file}: {text}"),
+                Some(span) => {
+                    let (line, column) = line_and_column(self.text, span.start);
+                    format!("{file}:{line}:{column}: {text}")
+                }
+            })
+            .collect()
+    }
+
+    /// The value as written, on one line and of bounded length.
+    fn excerpt(&self, span: &Range<usize>) -> String {
+        let written = self.text.get(span.clone()).unwrap_or_default();
+        let mut excerpt = String::new();
+        for (count, character) in written.chars().enumerate() {
+            if count == EXCERPT_MAX {
+                excerpt.push('…');
+                break;
+            }
+            if character.is_control() {
+                excerpt.extend(character.escape_default());
+            } else {
+                excerpt.push(character);
+            }
+        }
+        excerpt
+    }
+}
+
+/// Line and column of a byte, both counted from 1, the column in characters.
+fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
+    let before = &text[..text.floor_char_boundary(offset)];
+    let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+    let line = 1 + before.bytes().filter(|byte| *byte == b'\n').count();
+    (line, 1 + before[line_start..].chars().count())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn problems_come_in_order_of_place_and_long_lists_are_cut() {
+        let text = "a = 1\nbé = 'x'\n";
+        let file = Path::new("s.toml");
+        let mut review = Review::new(file, text);
+        review.refuse(12..15, "bé", "a number");
+        review.refuse(4..5, "a", "a string");
+        review.missing(None, "site", "an identifier");
+        let found = review.finish(Some(())).unwrap_err();
+        assert_eq!(
+            found.to_string(),
+            "s.toml: site is missing; expected an identifier\n\
+             s.toml:1:5: a is 1; expected a string\n\
+             s.toml:2:6: bé is 'x'; expected a number"
+        );
+
+        let mut review = Review::new(file, text);
+        for _ in 0..LISTED_MAX + 7 {
+            review.refuse(4..5, "a", "a string");
+        }
+        let found = review.finish(Some(())).unwrap_err().to_string();
+        assert_eq!(found.lines().count(), LISTED_MAX + 1);
+        assert!(found.ends_with("… and 7 problems more"));
+    }
+}

@@ -1,0 +1,410 @@
+//! The configuration of the service: `areograph serve` and `areograph nightly`.
+
+use std::{
+    collections::BTreeMap,
+    net::{IpAddr, SocketAddr},
+    path::{Path, PathBuf},
+};
+
+use serde::Serialize;
+
+use areograph_base::error::Error;
+
+use super::{
+    declare::{
+        Declare as _, Keys, Many, declare_table, described, example, key, of_the_file, schema,
+        table, tables,
+    },
+    forms::{any_text, from_to, list, list_or_none, matching, text, whole_from_to, words},
+    parse_file,
+    paths::MIRROR,
+    problems::Problems,
+    read,
+};
+
+/// Where every key is documented.
+pub(super) const SERVICE_EXAMPLE: &str = "config/areograph.toml";
+
+const HEADER: &str = "\
+# The service of areograph, `areograph serve` and `areograph nightly`: every key with its unit, range and default.
+#
+# Only the folders of [inputs] are required; a key that is left out has the default written here. Relative paths
+# count from this file's folder. Schema: schema/service.schema.json
+
+";
+
+/// A person reads what hooks tell; more programs than this are a slip.
+const HOOKS: Many = Many {
+    count: Some((1, 16)),
+    purpose: " programs that are told",
+    ..Many::ANY
+};
+
+declare_table! {
+    /// Everything that the service needs to know: every value checked.
+    pub struct ServiceConfig {
+        /// Name of the service in pages and alerts.
+        name: String = key(text()).or("areograph".to_owned()),
+        /// The file it was read from.
+        file: PathBuf = of_the_file(),
+        /// BLAKE3, hexadecimal, of the keys and values as written.
+        blake3: String = of_the_file(),
+        /// The same keys and values one by one.
+        keys: BTreeMap<String, String> = of_the_file(),
+        /// Folders that are read.
+        inputs: ServiceInputs = table(),
+        /// Folders that are written.
+        outputs: ServiceOutputs = table(),
+        /// When every site is looked at.
+        schedule: ScheduleConfig = table(),
+        /// How changes are found.
+        changes: ChangesConfig = table(),
+        /// The processes that run sites.
+        workers: WorkersConfig = table(),
+        /// What is kept.
+        retention: RetentionConfig = table(),
+        /// When a site counts as stale.
+        freshness: FreshnessConfig = table(),
+        /// How far a site may move between two runs before people are told.
+        moved: MovedConfig = table(),
+        /// The HTTP service.
+        http: HttpConfig = table(),
+        /// Programs that are told of events.
+        hooks: Vec<HookConfig> = tables(HOOKS),
+    }
+    check across_tables
+}
+
+declare_table! {
+    /// Folders that are read. Site files may name files below these folders only. A folder must be there when the service
+    /// first sees it; later it may be away for a while, and its sites are held.
+    pub struct ServiceInputs {
+        /// Folders of site files (`*.toml`, without subfolders). A file that appears or changes is seen by the next sweep.
+        sites: Vec<PathBuf> = key(list(MIRROR).each_once("each folder once")).required().example(r#"["sites"]"#),
+        /// Folders of kernels, with their subfolders.
+        kernels: Vec<PathBuf> = key(list(MIRROR).each_once("each folder once")).required().example(r#"["kernels"]"#),
+        /// Folders of PEDR files, labels and tie points, with their subfolders.
+        data: Vec<PathBuf> = key(list(MIRROR).each_once("each folder once"))
+            .required()
+            .example(r#"["pedr", "labels", "ties"]"#),
+    }
+}
+
+declare_table! {
+    /// Folders that are written; they are made where they are not there.
+    pub struct ServiceOutputs {
+        /// Products: `<products>/<site>/current` leads to those of the newest valid run.
+        products: PathBuf = key(text()).or("products".to_owned()).then(|path, keys: &mut Keys<'_, '_>| keys.review().resolve(&path)),
+        /// Database, logs and copies of the database; on a local disk, for one service alone.
+        state: PathBuf = key(text()).or("state".to_owned()).then(|path, keys: &mut Keys<'_, '_>| keys.review().resolve(&path)),
+    }
+}
+
+declare_table! {
+    /// When every site is looked at, whether something was seen to change or not.
+    pub struct ScheduleConfig {
+        /// Five fields: minute, hour, day of the month, month, day of the week.
+        cron: String = key(matching(
+            "five fields as in `30 2 * * *`",
+            r"^\S+( +\S+){4}$",
+            |text| text.split_ascii_whitespace().count() == 5,
+        )).or("30 2 * * *".to_owned()),
+        /// IANA time zone of these fields. An hour that daylight saving leaves out is made up for at its end; of one that comes
+        /// twice the first counts.
+        zone: String = key(matching(
+            "a time zone as in Europe/Berlin or UTC",
+            r"^[A-Za-z0-9_+/-]+$",
+            |text| text.parse::<chrono_tz::Tz>().is_ok(),
+        )).or("UTC".to_owned()),
+        /// A night that was missed, since the service did not run, is caught up with if it is not older than this; of several
+        /// the newest alone.
+        catch_up_h: f64 = key(from_to(0.0, 8784.0)).or(36.0),
+    }
+}
+
+declare_table! {
+    /// How changes are found: files are listed, not watched, since network file systems tell nothing.
+    pub struct ChangesConfig {
+        /// Time between two sweeps of all folders.
+        scan_interval_s: f64 = key(from_to(0.05, 86_400.0)).or(60.0),
+        /// A folder is used when nothing below it has changed for so long: mirrors copy slowly.
+        quiet_period_s: f64 = key(from_to(0.0, 86_400.0)).or(600.0),
+        /// A folder that has lost a larger share of its files is taken for unavailable, and its sites are held.
+        max_loss: f64 = key(from_to(0.0, 1.0)).or(0.2),
+        /// Longest time that listing a folder may take; a dead mount does not answer.
+        sweep_limit_s: f64 = key(from_to(0.1, 3600.0)).or(30.0),
+        /// How often all files are read again, whatever the file system says of them, days; 0 never.
+        scrub_days: f64 = key(from_to(0.0, 3660.0)).or(7.0),
+    }
+}
+
+declare_table! {
+    /// The processes that run sites, one site each.
+    pub struct WorkersConfig {
+        /// How many run at the same time.
+        count: u16 = key(whole_from_to(1, 256)).or(2),
+        /// Threads of each.
+        threads: u16 = key(whole_from_to(1, 1024)).or(2),
+        /// Memory that each may take, mebibytes.
+        memory_mib: u32 = key(whole_from_to(64, 1 << 24)).or(8192),
+        /// Longest time for a site.
+        deadline_s: f64 = key(from_to(1.0, 2_592_000.0)).or(21_600.0),
+        /// A worker that gives no sign of life for so long is ended.
+        silence_s: f64 = key(from_to(1.0, 86_400.0)).or(30.0),
+        /// Longest log of an attempt, kibibytes; its middle is left out.
+        log_max_kib: u32 = key(whole_from_to(16, 1 << 20)).or(4096),
+        /// No site is started while the disk of products or state has less space, mebibytes.
+        min_free_mib: u32 = key(whole_from_to(0, 1 << 24)).or(1024),
+        /// Delay of the first attempt after a failure of input or output; each further one doubles it, up to 15 minutes.
+        retry_s: f64 = key(from_to(0.0, 900.0)).or(30.0),
+    }
+}
+
+declare_table! {
+    /// What is kept. The current run, its predecessor and pinned runs always are.
+    pub struct RetentionConfig {
+        /// Newest runs of each site.
+        runs: u32 = key(whole_from_to(1, 100_000)).or(14),
+        /// One run a week for so many weeks.
+        weeks: u32 = key(whole_from_to(0, 1040)).or(52),
+        /// Newest events.
+        events: u32 = key(whole_from_to(1000, 100_000_000)).or(100_000),
+        /// Logs of attempts whose runs are gone, days.
+        logs_days: f64 = key(from_to(0.0, 36_600.0)).or(90.0),
+        /// Figures of runs that are gone, which a site's trends show, days.
+        history_days: f64 = key(from_to(0.0, 36_600.0)).or(1830.0),
+        /// Nightly copies of the database.
+        copies: u32 = key(whole_from_to(0, 1000)).or(7),
+    }
+}
+
+declare_table! {
+    /// When a site counts as stale. A site whose inputs did not change is fresh, however old its run.
+    pub struct FreshnessConfig {
+        /// Longest time from a change of its inputs to a run with them.
+        stale_after_h: f64 = key(from_to(0.0, 87_840.0)).or(48.0),
+        /// Longest time without a complete comparison of its inputs.
+        unchecked_after_h: f64 = key(from_to(0.0, 87_840.0)).or(26.0),
+    }
+}
+
+declare_table! {
+    /// How far a site may move between two runs before people are told, as for `areograph report diff`.
+    pub struct MovedConfig {
+        /// How far a footprint, a camera or a boresight on the ground may move.
+        limit_m: f64 = key(from_to(0.0, 1e7)).or(50.0),
+        /// How far a camera may turn.
+        limit_arcsec: f64 = key(from_to(0.0, 1_296_000.0)).or(60.0),
+    }
+}
+
+declare_table! {
+    /// The HTTP service: pages, and an interface for programs.
+    pub struct HttpConfig {
+        /// Address and port. One that is not of this machine alone needs `behind_tls_proxy`.
+        listen: SocketAddr = key(matching(
+            "an address with its port, as in 127.0.0.1:8470",
+            r"^[0-9a-fA-F.:\[\]]+:[0-9]{1,5}$",
+            |text| text.parse::<SocketAddr>().is_ok(),
+        )).or("127.0.0.1:8470".to_owned()).then(|text, _: &mut Keys<'_, '_>| socket_address(&text)),
+        /// The address under which a proxy shows the service, as in `https://mars.example.org`; requests for another host are
+        /// refused.
+        public_url: String = key(matching(
+            "a host with https:// before it, without a path",
+            r"^(https://[A-Za-z0-9.-]+(:[0-9]{1,5})?)?$",
+            |text| text.is_empty() || is_public_url(text),
+        )).or(String::new()).unused(r#""https://mars.example.org""#),
+        /// A proxy in front of the service encrypts the connections.
+        behind_tls_proxy: bool = key(words([("no", false, ""), ("yes", true, "")])).or(false),
+        /// Addresses of proxies whose `X-Forwarded-For` is believed.
+        trusted_proxies: Vec<IpAddr> = key(list_or_none(matching(
+            "addresses as in 10.0.0.1",
+            r"^[0-9a-fA-F.:]+$",
+            |text| text.parse::<IpAddr>().is_ok(),
+        ))).or(Vec::new()).unused(r#"["127.0.0.1"]"#).then(|texts, _: &mut Keys<'_, '_>| addresses(&texts)),
+        /// Who may read on a loopback address: everybody on this machine, or those with a token. Elsewhere a token is always
+        /// needed; to change anything, too.
+        open_reading: bool = key(words([
+            ("yes", true, "reading from this machine needs no token"),
+            ("no", false, "reading needs a token"),
+        ])).or(true),
+    }
+}
+
+/// The text has been checked; an address that cannot be had is the one that the system chooses.
+fn socket_address(text: &str) -> SocketAddr {
+    text.parse()
+        .unwrap_or_else(|_| SocketAddr::from(([127, 0, 0, 1], 0)))
+}
+
+fn addresses(texts: &[String]) -> Vec<IpAddr> {
+    texts.iter().filter_map(|text| text.parse().ok()).collect()
+}
+
+fn is_public_url(text: &str) -> bool {
+    text.strip_prefix("https://")
+        .is_some_and(|host| !host.is_empty() && !host.contains(['/', '?', '#', '@', ' ']))
+}
+
+declare_table! {
+    /// Programs that are told of events, as JSON on their standard input: run without a shell, ended after 30 s, told again
+    /// when they fail.
+    pub struct HookConfig {
+        /// Program and arguments; a relative path of the program counts from this file's folder.
+        command: Vec<String> = key(list(any_text()))
+            .required()
+            .unused(r#"["/usr/local/bin/tell-us", "--mars"]"#)
+            .then(program_below_the_file),
+        /// What it is told of; everything when empty.
+        events: Vec<AlertKind> = key(list_or_none(words(AlertKind::WORDS))).or(Vec::new()).unused(r#"["failed", "night_complete"]"#),
+    }
+}
+
+/// A program without a folder is looked for in the search path.
+fn program_below_the_file(mut command: Vec<String>, keys: &mut Keys<'_, '_>) -> Vec<String> {
+    if let Some(program) = command.first_mut().filter(|program| program.contains('/')) {
+        *program = keys
+            .review()
+            .resolve(program)
+            .to_string_lossy()
+            .into_owned();
+    }
+    command
+}
+
+/// What people are told of.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, serde::Deserialize,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum AlertKind {
+    /// First failure of a site after a success.
+    Failed,
+    /// First success after a failure.
+    Recovered,
+    /// A run made products that are not valid.
+    Invalid,
+    /// A site moved beyond a limit.
+    Moved,
+    /// A site is stale, or was not looked at for too long.
+    Stale,
+    /// A folder of inputs is not available.
+    RootUnavailable,
+    /// A folder of inputs is back.
+    RootBack,
+    /// The disk is nearly full.
+    DiskLow,
+    /// A night is over.
+    NightComplete,
+}
+
+impl AlertKind {
+    const WORDS: [(&'static str, Self, &'static str); 9] = [
+        (
+            "failed",
+            Self::Failed,
+            "first failure of a site after a success",
+        ),
+        (
+            "recovered",
+            Self::Recovered,
+            "first success after a failure",
+        ),
+        ("invalid", Self::Invalid, "products that are not valid"),
+        ("moved", Self::Moved, "a site moved beyond a limit"),
+        (
+            "stale",
+            Self::Stale,
+            "a site is stale, or was not looked at for too long",
+        ),
+        (
+            "root_unavailable",
+            Self::RootUnavailable,
+            "a folder of inputs is not available",
+        ),
+        ("root_back", Self::RootBack, "a folder of inputs is back"),
+        ("disk_low", Self::DiskLow, "the disk is nearly full"),
+        (
+            "night_complete",
+            Self::NightComplete,
+            "once a night: its summary",
+        ),
+    ];
+}
+
+fn across_tables(service: &ServiceConfig, keys: &mut Keys<'_, '_>) {
+    keys.rule(|| serde_json::json!({"required": ["inputs"]}));
+    if keys.span_of("inputs").is_none() {
+        keys.missing(
+            "inputs",
+            "a table inputs with the folders sites, kernels and data",
+        );
+    }
+    let http = &service.http;
+    if !http.listen.ip().is_loopback() && !http.behind_tls_proxy {
+        keys.refuse_below(
+            "http",
+            "listen",
+            "a loopback address as in 127.0.0.1:8470, or behind_tls_proxy = \"yes\" for a service behind a proxy that encrypts",
+        );
+    }
+    let (products, state) = (&service.outputs.products, &service.outputs.state);
+    if products == state {
+        keys.refuse_below(
+            "outputs",
+            "state",
+            "another folder than that of the products",
+        );
+    }
+}
+
+/// A configuration of the service that passed every check, and what was accepted but is worth a word.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoadedService {
+    /// The valid form.
+    pub service: ServiceConfig,
+    /// Entries that are never used, each with its place.
+    pub warnings: Vec<String>,
+}
+
+/// Reads and checks the configuration `path` of the service; relative paths in it count from its own folder.
+///
+/// # Errors
+/// [`Problems`] with everything that is wrong, or [`IoError`](areograph_base::error::IoError) when the file cannot be read.
+pub fn load_service(path: &Path) -> Result<LoadedService, Error> {
+    let text = read(path)?;
+    Ok(parse_service(&text, path)?)
+}
+
+/// Checks the configuration `text` of `file`.
+///
+/// # Errors
+/// [`Problems`] with everything that is wrong.
+pub fn parse_service(text: &str, file: &Path) -> Result<LoadedService, Problems> {
+    let ((service, written), warnings) = parse_file::<ServiceConfig>(text, file, SERVICE_EXAMPLE)?;
+    Ok(LoadedService {
+        service: ServiceConfig {
+            file: file.to_owned(),
+            blake3: written.blake3,
+            keys: written.keys,
+            ..service
+        },
+        warnings,
+    })
+}
+
+/// The example of the service, `config/areograph.toml`.
+#[must_use]
+pub fn service_example() -> String {
+    example(HEADER, &described::<ServiceConfig>())
+}
+
+/// The JSON Schema of the service's configuration, `config/schema/service.schema.json`.
+#[must_use]
+pub fn service_schema() -> impl Serialize {
+    schema(
+        "Service configuration of areograph",
+        "The TOML file of the service as JSON. areograph checks more than a schema can: agreement between keys, and folders that are there.",
+        &described::<ServiceConfig>(),
+    )
+}

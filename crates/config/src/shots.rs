@@ -1,0 +1,197 @@
+//! `[[shots]]`: tables of laser shots, of any altimeter.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use areograph_base::body::Datum;
+
+use super::{
+    declare::{Keys, Many, declare_table, key, table},
+    forms::{text, words},
+    paths::Globs,
+};
+
+/// Tables of shots of a site.
+pub(super) const SHOTS: Many = Many::ANY;
+
+/// A table whose columns are known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ShotLayout {
+    /// LOLA's reduced data records, a row a shot.
+    LolaRdr,
+    /// `footprints.csv` of a site.
+    Areograph,
+}
+
+declare_table! {
+    /// Tables of laser shots (CSV), in place of `[pedr]`: those of other altimeters, or of MOLA from elsewhere. A row is a
+    /// shot; rows that lie in no window are left out, rows that are none are told with file and line. Rows that say the same
+    /// of the same instant count once.
+    pub struct ShotTableConfig: Deserialize {
+        /// Tables: paths or globs as in `[pedr]`.
+        #[serde(skip)]
+        files: Vec<PathBuf> = key(Globs)
+            .required_as("paths or globs of tables of shots")
+            .unused(r#"["../lola/*.csv"]"#),
+        /// Columns that are known: then no table `columns`.
+        layout: Option<ShotLayout> = key(words([
+            ("lola_rdr", ShotLayout::LolaRdr, "LOLA's reduced data records as the Orbital Data Explorer gives them, 29 columns"),
+            ("areograph", ShotLayout::Areograph, "footprints.csv of another site"),
+        ])).unused(r#""lola_rdr""#),
+        /// Datum of longitudes and latitudes; without it, that of the products.
+        datum: Option<Datum> = key(words([
+            ("iau1991", Datum::Iau1991, ""),
+            ("iau1994", Datum::Iau1994, ""),
+            ("iau2000", Datum::Iau2000, "that of the products at Mars"),
+            ("moon_me", Datum::MoonMe, "the Moon's mean Earth/polar axis, that of the products there"),
+        ])).unused(r#""moon_me""#),
+        /// Which column holds what.
+        columns: ShotColumns = table(),
+    }
+    check has_columns
+}
+
+declare_table! {
+    /// Which column holds what: its name in the first row, or its number, from 1. Units are those of the keys.
+    pub struct ShotColumns: Deserialize {
+        /// Time of the shot, UTC such as 2010-01-27T06:19:47.013. Or `et_s`.
+        utc: Option<String> = key(text()).unused(r#""1""#),
+        /// Time of the shot, TDB seconds past J2000.
+        et_s: Option<String> = key(text()).unused(r#""16""#),
+        /// East longitude of the footprint.
+        longitude_deg: Option<String> = key(text()).unused(r#""2""#),
+        /// Latitude of the direction from the centre of the body.
+        latitude_deg: Option<String> = key(text()).unused(r#""3""#),
+        /// Distance of the footprint from the centre of the body. Or `radius_m`, or `height_m`.
+        radius_km: Option<String> = key(text()).unused(r#""4""#),
+        /// The same in metres.
+        radius_m: Option<String> = key(text()).unused(r#""planet_rad""#),
+        /// Or its height above the ellipsoid of the products, along the radius: at the Moon above 1737.4 km.
+        height_m: Option<String> = key(text()).unused(r#""height""#),
+        /// One-way range from the spacecraft. Or `range_m`.
+        range_km: Option<String> = key(text()).unused(r#""5""#),
+        /// The same in metres.
+        range_m: Option<String> = key(text()).unused(r#""range""#),
+        /// East longitude of the spacecraft in the table's own orbit solution.
+        spacecraft_longitude_deg: Option<String> = key(text()).unused(r#""19""#),
+        /// Its latitude.
+        spacecraft_latitude_deg: Option<String> = key(text()).unused(r#""20""#),
+        /// Its distance from the centre of the body. Or `spacecraft_radius_m`.
+        spacecraft_radius_km: Option<String> = key(text()).unused(r#""21""#),
+        /// The same in metres.
+        spacecraft_radius_m: Option<String> = key(text()).unused(r#""sc_rad""#),
+        /// Number of the orbit; without it 0, and pauses alone part profiles.
+        orbit: Option<String> = key(text()).unused(r#""orbit""#),
+    }
+}
+
+impl ShotLayout {
+    /// Which of its columns holds what.
+    ///
+    /// # Source
+    /// LOLA RDR software interface specification; the header of the Orbital Data Explorer's tables
+    /// (`Coordinated_Universal_Time, Pt_Longitude, Pt_Latitude, Pt_Radius, Pt_Range, …, Terrestrial_Dyn_Time, …,
+    /// SC_Longitude, SC_Latitude, SC_Radius, …`).
+    fn columns(self) -> ShotColumns {
+        let column = |number: u32| Some(number.to_string());
+        let named = |name: &str| Some(name.to_owned());
+        match self {
+            Self::LolaRdr => ShotColumns {
+                et_s: column(16),
+                longitude_deg: column(2),
+                latitude_deg: column(3),
+                radius_km: column(4),
+                range_km: column(5),
+                spacecraft_longitude_deg: column(19),
+                spacecraft_latitude_deg: column(20),
+                spacecraft_radius_km: column(21),
+                ..ShotColumns::default()
+            },
+            Self::Areograph => ShotColumns {
+                et_s: named("et_tag_s"),
+                longitude_deg: named("longitude_deg"),
+                latitude_deg: named("latitude_deg"),
+                radius_m: named("radius_m"),
+                range_m: named("range_m"),
+                spacecraft_longitude_deg: named("spacecraft_longitude_deg"),
+                spacecraft_latitude_deg: named("spacecraft_latitude_deg"),
+                spacecraft_radius_m: named("spacecraft_radius_m"),
+                orbit: named("orbit"),
+                ..ShotColumns::default()
+            },
+        }
+    }
+}
+
+impl ShotTableConfig {
+    /// Which column holds what, by the layout or as written.
+    #[must_use]
+    pub fn columns(&self) -> ShotColumns {
+        self.layout
+            .map_or_else(|| self.columns.clone(), ShotLayout::columns)
+    }
+}
+
+/// Ways to write what a table must hold: of each exactly one.
+const NEEDS: [&[&str]; 8] = [
+    &["utc", "et_s"],
+    &["longitude_deg"],
+    &["latitude_deg"],
+    &["radius_km", "radius_m", "height_m"],
+    &["range_km", "range_m"],
+    &["spacecraft_longitude_deg"],
+    &["spacecraft_latitude_deg"],
+    &["spacecraft_radius_km", "spacecraft_radius_m"],
+];
+
+fn has_columns(_: &ShotTableConfig, keys: &mut Keys<'_, '_>) {
+    keys.rule(|| {
+        let needs = NEEDS.map(|ways| {
+            let ways: Vec<_> = ways.iter().map(|way| json!({"required": [way]})).collect();
+            json!({"oneOf": ways})
+        });
+        json!({"oneOf": [
+            {"required": ["layout"], "not": {"required": ["columns"]}},
+            {"required": ["columns"], "properties": {"columns": {"allOf": needs}}},
+        ]})
+    });
+    let (layout, columns) = (keys.span_of("layout"), keys.span_of("columns"));
+    match (layout, columns) {
+        (Some(_), Some(_)) => {
+            keys.refuse("layout", "a layout, or a table columns, not both");
+            return;
+        }
+        (Some(_), None) => return,
+        (None, None) => {
+            keys.missing(
+                "layout",
+                "a layout, or a table columns that says which column holds what",
+            );
+            return;
+        }
+        (None, Some(_)) => {}
+    }
+    for ways in NEEDS {
+        let written: Vec<&&str> = ways
+            .iter()
+            .filter(|way| keys.writes("columns", way))
+            .collect();
+        match written[..] {
+            [_] => {}
+            [] => keys.problem(format!(
+                "shots.columns.{} is missing; expected the name or the number of the column",
+                ways.join(" or ")
+            )),
+            [_, second, ..] => {
+                keys.refuse_below(
+                    "columns",
+                    second,
+                    format!("only one of {}", ways.join(", ")),
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,375 @@
+//! The configuration of one site: its tables, and what must hold between them.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::PathBuf,
+};
+
+use serde::Deserialize;
+use serde_json::json;
+
+use areograph_base::{
+    altimetry::MolaClock,
+    body::Body,
+    instruments::{Altimeter, Instrument},
+    kernel_source::KernelSource,
+    time::PointingBias,
+    wording::Wording,
+};
+
+use super::{
+    adjustment::AdjustmentConfig,
+    declare::{Keys, declare_table, key, no_repeats, of_the_file, table, tables},
+    forms::{any_text, lower_case_identifier, words},
+    images::{IMAGES, ImageConfig},
+    instruments::{ALTIMETER, usual_altimeter, usual_instrument},
+    kernels::KernelsConfig,
+    limits::LimitsConfig,
+    mola_surface::MolaSurfaceConfig,
+    orientation::{OrientationConfig, RegistrationConfig},
+    pedr::PedrConfig,
+    pointing::{PointingConfig, has_turned_sign},
+    range_check::RangeCheckConfig,
+    shots::{SHOTS, ShotTableConfig},
+    surface::SurfaceConfig,
+    ties::{IntersectionConfig, TiesConfig},
+    windows::{WINDOWS, WINDOWS_MAX, WindowConfig},
+};
+
+declare_table! {
+    /// Everything that `areograph run` needs to know about a site: every value checked, metres, radians and
+    /// seconds inside.
+    pub struct SiteConfig: Deserialize {
+        /// Identifier, and the name of the folder of its products.
+        site: String = key(lower_case_identifier()).required().example(r#""eos_chasma""#),
+        /// Free text for the report.
+        description: String = key(any_text())
+            .or(String::new())
+            .example(r#""Eos Chasma, one of the three study sites of Shan et al. 2005""#),
+        /// The body: its rotation and shape are those of `config/bodies`, and so are frame, heights and maps of all products.
+        /// At another body than Mars, images come with support data and shots from tables.
+        body: Body = key(words([
+            ("mars", Body::Mars, "in IAU 2000"),
+            ("moon", Body::Moon, "in the mean Earth/polar axis frame, radius 1737.4 km"),
+        ])).or(Body::Mars),
+        /// The altimeter of the PEDR files, or of the tables of shots: `mola`, `lola`, or the path of an altimeter file like
+        /// those in `config/altimeters`.
+        altimeter: Altimeter = key(ALTIMETER).or(usual_altimeter().clone()),
+        /// The file it was read from.
+        file: PathBuf = of_the_file(),
+        /// BLAKE3, hexadecimal, of the keys and values as written: comments, spacing, order of keys and the
+        /// place of the file do not change it.
+        blake3: String = of_the_file(),
+        /// The same keys and values one by one: dots between tables, elements of lists by their `id`, else
+        /// their place from 1.
+        keys: BTreeMap<String, String> = of_the_file(),
+        /// Where kernels come from.
+        kernels: KernelsConfig = table(),
+        /// Pointing (CK) bias.
+        pointing: PointingConfig = table(),
+        /// MOLA clock bias.
+        mola_clock: MolaClock = table(),
+        /// PEDR files and filters; no files when only images are oriented.
+        pedr: PedrConfig = table(),
+        /// Tables of laser shots, in place of PEDR files.
+        shots: Vec<ShotTableConfig> = tables(SHOTS),
+        /// Windows on the ground, 1 to 64, or none when there are no PEDR files; bit `i` of
+        /// `Footprints::windows` is entry `i`.
+        windows: Vec<WindowConfig> = tables(WINDOWS),
+        /// Images, possibly none.
+        images: Vec<ImageConfig> = tables(IMAGES),
+        /// Limits of the range check.
+        range_check: RangeCheckConfig = table(),
+        /// Sampling of exterior orientation.
+        orientation: OrientationConfig = table(),
+        /// Projection of footprints into the images.
+        registration: RegistrationConfig = table(),
+        /// Tie points between the images.
+        ties: TiesConfig = table(),
+        /// Intersection of tie points.
+        intersection: IntersectionConfig = table(),
+        /// The MOLA surface.
+        mola_surface: MolaSurfaceConfig = table(),
+        /// Combined adjustment.
+        adjustment: AdjustmentConfig = table(),
+        /// Terrain model of a pair of images.
+        surface: SurfaceConfig = table(),
+        /// Limits on tie points, their adjustment and the terrain model.
+        limits: LimitsConfig = table(),
+    }
+    settle clock_of_altimeter
+    check across_tables
+}
+
+impl SiteConfig {
+    /// The words of its texts.
+    #[must_use]
+    pub fn wording(&self) -> Wording<'_> {
+        Wording {
+            body: self.body,
+            altimeter: &self.altimeter.name,
+            has_tables: !self.shots.is_empty(),
+        }
+    }
+
+    /// Whether the site has laser shots, of PEDR files or of tables.
+    #[must_use]
+    pub fn has_shots(&self) -> bool {
+        !(self.pedr.files.is_empty() && self.shots.is_empty())
+    }
+}
+
+/// The clock bias is that of the altimeter where the site gives no other.
+fn clock_of_altimeter(mut site: SiteConfig, keys: &Keys<'_, '_>) -> SiteConfig {
+    let (clock, altimeter) = (&mut site.mola_clock, &site.altimeter);
+    if !keys.writes("mola_clock", "bias_s") {
+        clock.bias_s = altimeter.clock_bias_s;
+    }
+    if !keys.writes("mola_clock", "source") {
+        clock.source.clone_from(&altimeter.clock_source);
+    }
+    site
+}
+
+fn across_tables(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
+    keys.rule(|| json!({"required": ["kernels"]}));
+    keys.rule(|| {
+        json!({"anyOf": [
+            {"required": ["pedr", "windows"], "not": {"required": ["shots"]}},
+            {"required": ["shots", "windows"], "not": {"required": ["pedr"]}},
+            {"required": ["images"], "not": {"anyOf": [{"required": ["pedr"]}, {"required": ["shots"]}]}},
+        ]})
+    });
+    something_to_do(site, keys);
+    other_bodies(site, keys);
+    serial_numbers(keys);
+    pointing_of_instruments(site, keys);
+    kernels_of_spacecraft(site, keys);
+    if site.images.len() < 2 {
+        keys.refuse("ties", "at least two images that tie points can join");
+    }
+    matched_images(site, keys);
+    images_of_surface(site, keys);
+    priors_of_images(site, keys);
+    images_of_windows(site, keys);
+}
+
+/// Matching needs two images at least whose pixels are there.
+fn matched_images(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
+    let with_pixels = site.images.iter().filter(|image| image.pixels.is_some());
+    if site.ties.matched && site.images.len() > 1 && with_pixels.count() < 2 {
+        keys.refuse_below(
+            "ties",
+            "match",
+            "at least two images with images.pixels, or false",
+        );
+    }
+}
+
+/// A terrain model needs two images whose pixels are there, and their names where there are more.
+fn images_of_surface(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
+    if !site.surface.is_asked_for() {
+        return;
+    }
+    let with_pixels = site.images.iter().filter(|image| image.pixels.is_some());
+    let known: Vec<&str> = with_pixels.map(|image| &*image.id).collect();
+    match &site.surface.images {
+        None if known.len() == 2 => {}
+        None if known.len() < 2 => {
+            let expected = "no cell, or at least two images with images.pixels";
+            keys.refuse_below("surface", "cell_m", expected);
+        }
+        None => keys.refuse_below(
+            "surface",
+            "cell_m",
+            format!(
+                "surface.images beside it: two of {}, which have pixels",
+                known.join(", ")
+            ),
+        ),
+        Some([one, other]) => {
+            let is_known = |id: &String| known.contains(&&**id);
+            if one == other || !is_known(one) || !is_known(other) {
+                let expected = format!(
+                    "two different images with images.pixels, of which the site has {}",
+                    if known.is_empty() {
+                        "none".to_owned()
+                    } else {
+                        known.join(", ")
+                    }
+                );
+                keys.refuse_below("surface", "images", expected);
+            }
+        }
+    }
+}
+
+/// Footprints need windows; a site needs footprints or images.
+fn something_to_do(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
+    let windows = keys.span_of("windows");
+    if keys.span_of("shots").is_some() {
+        keys.refuse("pedr", "PEDR files or tables [[shots]], not both");
+    }
+    if keys.span_of("pedr").is_some() || keys.span_of("shots").is_some() {
+        if windows.is_none() {
+            keys.missing("windows", &format!("1 to {WINDOWS_MAX} tables [[windows]]"));
+        }
+        return;
+    }
+    if let Some(windows) = windows {
+        let text = "windows are never used: there is no table pedr";
+        keys.review().warn(windows, text.to_owned());
+    }
+    match keys.span_of("images") {
+        Some(images) if !site.images.is_empty() => keys.review().warn(
+            images,
+            "images without a table pedr: orientation only, no footprints and no range check"
+                .to_owned(),
+        ),
+        _ => keys.missing(
+            "pedr",
+            "a table pedr (or tables [[shots]]), tables [[images]], or both: a site without either has nothing to do",
+        ),
+    }
+}
+
+/// What kernels, labels and PEDR files are of is at Mars; a datum is of one body.
+fn other_bodies(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
+    let body = site.body;
+    for table in keys.entries(&["shots"]) {
+        let Some(datum) = table.get("datum") else {
+            continue;
+        };
+        let of_body = site.shots.iter().filter_map(|of| of.datum);
+        if of_body.clone().any(|of| of.body() != body) {
+            let expected = format!("a datum of {body}, the body of the site");
+            keys.review().refuse(datum.span(), "shots.datum", expected);
+        }
+    }
+    if body == Body::Mars {
+        return;
+    }
+    let only_at_mars = format!("none on {body}: it belongs to Mars Global Surveyor");
+    for table in ["pedr", "mola_clock", "pointing"] {
+        keys.refuse(table, &only_at_mars);
+    }
+    if site.images.iter().any(|image| image.isd.is_none()) {
+        let text = format!(
+            "images on {body} need support data (images.isd): labels and kernels are read of spacecraft at Mars alone"
+        );
+        let span = keys.span_of("images");
+        keys.review().problem(span, text);
+    }
+    if !site.shots.is_empty() && keys.span_of("altimeter").is_none() {
+        keys.missing("altimeter", "the altimeter of the tables, such as lola");
+    }
+}
+
+/// A pointing bias of the site has the sign of what is known of its cameras, and takes the place of it.
+fn pointing_of_instruments(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
+    let Some(used_s) = site.pointing.ck_bias.map(PointingBias::seconds) else {
+        return;
+    };
+    let mut told = BTreeSet::new();
+    for camera in cameras(&site.images) {
+        if !told.insert(&*camera.id) {
+            continue;
+        }
+        let spacecraft = camera.spacecraft;
+        if used_s.abs() > spacecraft.ck_bias_max_s {
+            let expected = format!(
+                "no such key: it holds for all images of the site, and attitude kernels of {}, which carries {}, need no \
+                 time correction; that of another camera belongs in an instrument file of its own",
+                spacecraft.full_name, camera.name
+            );
+            keys.refuse_below("pointing", "ck_bias_s", expected);
+            continue;
+        }
+        let known_s = camera.pointing.ck_bias_s;
+        if has_turned_sign(used_s, known_s) {
+            keys.refuse_below(
+                "pointing",
+                "ck_bias_s",
+                format!(
+                    "{known_s}, the known bias of {} with its sign: the attitude of an exposure at t is read at t + \
+                     ck_bias_s",
+                    camera.name
+                ),
+            );
+        }
+    }
+}
+
+/// A folder of kernels is searched, and rival sets are weighed, for one spacecraft alone.
+fn kernels_of_spacecraft(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
+    let key = match &site.kernels.source {
+        KernelSource::Listed(_) => return,
+        KernelSource::Root(_) => "root",
+        KernelSource::Sets(_) => "sets",
+    };
+    let mut cameras = cameras(&site.images).into_iter();
+    if let Some(camera) = cameras.find(|camera| !camera.spacecraft.has_laser()) {
+        let expected = format!(
+            "kernels.files or kernels.metakernel: kernels of {}, which carries {}, are not chosen by the program",
+            camera.spacecraft.full_name, camera.name
+        );
+        keys.refuse_below("kernels", key, expected);
+    }
+}
+
+/// The cameras that images of kernels name; the usual one where such an image, or no image, names none.
+fn cameras(images: &[ImageConfig]) -> Vec<&Instrument> {
+    let named = images
+        .iter()
+        .filter(|image| image.isd.is_none())
+        .map(|image| image.instrument.as_ref().unwrap_or(usual_instrument()));
+    let usual = images.is_empty().then(usual_instrument);
+    named.chain(usual).collect()
+}
+
+/// Names in tie point files are as unique as identifiers; an image without one has its identifier.
+fn serial_numbers(keys: &mut Keys<'_, '_>) {
+    let images = keys.entries(&["images"]);
+    if images
+        .iter()
+        .any(|image| image.contains_key("serial_number"))
+    {
+        let names = images
+            .iter()
+            .filter_map(|image| image.get("serial_number").or_else(|| image.get("id")));
+        no_repeats("images.serial_number", names, keys.review());
+    }
+}
+
+/// Windows are what images of the site see.
+fn images_of_windows(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
+    let known: BTreeSet<&str> = site.images.iter().map(|image| &*image.id).collect();
+    for window in keys.entries(&["windows"]) {
+        let Some(id) = window.get("image") else {
+            continue;
+        };
+        if id.get_ref().as_str().is_some_and(|id| !known.contains(id)) {
+            let images: Vec<&str> = known.iter().copied().collect();
+            let expected = if images.is_empty() {
+                "an image of the site, which has none".to_owned()
+            } else {
+                format!("one of the site's images: {}", images.join(", "))
+            };
+            keys.review().refuse(id.span(), "windows.image", expected);
+        }
+    }
+}
+
+/// Standard deviations of their own are for images of the site.
+fn priors_of_images(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
+    let known: BTreeSet<&str> = site.images.iter().map(|image| &*image.id).collect();
+    for prior in keys.entries(&["adjustment", "images"]) {
+        let Some(id) = prior.get("id") else { continue };
+        if id.get_ref().as_str().is_some_and(|id| !known.contains(id)) {
+            let images: Vec<&str> = site.images.iter().map(|image| &*image.id).collect();
+            let expected = format!("one of the site's images: {}", images.join(", "));
+            keys.review()
+                .refuse(id.span(), "adjustment.images.id", expected);
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! `[ties]` and `[intersection]`.
+
+use std::path::PathBuf;
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde_json::json;
+
+use areograph_base::units::RADIANS_PER_DEGREE;
+use areograph_geom::intersection::Weighting;
+
+use super::{
+    adjustment::SIGMA,
+    declare::{Declare as _, Keys, declare_table, group, key},
+    forms::{Switch, above_to, words},
+    paths::Globs,
+};
+
+declare_table! {
+    /// Tie points between the images. Without this table nothing is intersected or adjusted.
+    pub struct TiesConfig: Deserialize {
+        /// Paths or globs as in `[pedr]`: tables (.csv) with the columns `point_id`, `serial_number`, `sample`,
+        /// `line`, one row a measurement, and where known `line_sigma_px` and `sample_sigma_px`, its standard deviations;
+        /// or ISIS control networks in PVL (a binary one: cnetbin2pvl), of which points that are fixed or constrained
+        /// bring their coordinates, IAU 2000. Lines and samples count as in ISIS, the middle of the first pixel is 1. `serial_number` is an image's
+        /// `serial_number` above, or its `id`; measurements in other images are counted and left out.
+        #[serde(skip)]
+        files: Vec<PathBuf> = key(Globs)
+            .or(Vec::new())
+            .example(r#"["../ties/*.csv"]"#),
+        /// Whether areograph measures tie points itself, beside those of files: every pair of images that have `pixels` is
+        /// matched where both show the same ground with enough texture, and once more with the orientation that these tie
+        /// points adjust. Each measurement has the standard deviations of its own match.
+        matched as "match": bool = key(Switch).or(false),
+    }
+    check something_measures
+}
+
+/// Without files and without matching there is no tie point.
+fn something_measures(ties: &TiesConfig, keys: &mut Keys<'_, '_>) {
+    keys.rule(|| {
+        json!({"anyOf": [
+            {"required": ["files"]},
+            {"required": ["match"], "properties": {"match": {"const": true}}},
+        ]})
+    });
+    if !ties.matched && keys.span_of("files").is_none() {
+        keys.missing(
+            "files",
+            "paths or globs of tie point files, or match = true (or no table ties at all)",
+        );
+    }
+}
+
+impl TiesConfig {
+    /// Whether the site has tie points, of files or matched.
+    #[must_use]
+    pub fn are_there(&self) -> bool {
+        self.matched || !self.files.is_empty()
+    }
+}
+
+declare_table! {
+    /// Ground points of the tie points, with the orientation held fixed.
+    pub struct IntersectionConfig: Copy, Deserialize, JsonSchema {
+        /// Weights of the measurements.
+        weighting: Weighting = group::<WeightingKeys>().map(WeightingKeys::weighting),
+        /// Smallest angle between the two rays of a point that differ most.
+        convergence_min_rad as "convergence_min_deg": f64 =
+            key(above_to(0.0, 90.0)).or(0.5).map(|degrees| degrees * RADIANS_PER_DEGREE),
+    }
+}
+
+declare_table! {
+    /// Weights of the measurements.
+    struct WeightingKeys {
+        /// The unit in which measuring errors are alike in all images.
+        weighting: ErrorUnit = key(words([
+            ("focal", ErrorUnit::Focal, "pixels of the focal plane, along and across the track"),
+            (
+                "line",
+                ErrorUnit::Line,
+                "lines along the track, pixels across it; it changes how images share a disagreement",
+            ),
+        ])).or(ErrorUnit::Focal),
+        /// Standard deviation of measurements; with "line" only across the track.
+        sigma_px: f64 = key(SIGMA).or(1.0),
+        /// Standard deviation along the track with "line".
+        sigma_lines: f64 = key(SIGMA).or(1.0).unused("1.0"),
+    }
+    check lines_are_used
+}
+
+/// What a measuring error is given in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+enum ErrorUnit {
+    Focal,
+    Line,
+}
+
+fn lines_are_used(written: &WeightingKeys, keys: &mut Keys<'_, '_>) {
+    if written.weighting == ErrorUnit::Focal {
+        keys.unused("sigma_lines", "intersection.weighting is not \"line\"");
+    }
+}
+
+impl WeightingKeys {
+    fn weighting(self) -> Weighting {
+        let sigma_px = self.sigma_px;
+        match self.weighting {
+            ErrorUnit::Focal => Weighting::Focal { sigma_px },
+            ErrorUnit::Line => Weighting::Line {
+                along_lines: self.sigma_lines,
+                across_px: sigma_px,
+            },
+        }
+    }
+}

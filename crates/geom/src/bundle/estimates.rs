@@ -1,0 +1,61 @@
+//! Single unknowns of the settled adjustment: their values, cofactors, and what was expected of them.
+
+use super::{AdjustedBus, Estimate, Residual, layout::Layout, unknowns::State};
+use crate::block_equations::BlockMatrix;
+
+/// Correction and square root of the cofactor of a column.
+pub(super) fn estimate(state: &State, cofactors: &BlockMatrix, column: usize) -> (f64, f64) {
+    (
+        state.corrections[column],
+        variance(cofactors, column).sqrt(),
+    )
+}
+
+fn variance(cofactors: &BlockMatrix, column: usize) -> f64 {
+    cofactors.element(column, column).unwrap_or_default()
+}
+
+/// Residual of what an unknown was expected to be, where that has a weight.
+pub(super) fn prior<M>(
+    layout: &Layout<'_, M>,
+    state: &State,
+    cofactors: &BlockMatrix,
+    column: usize,
+) -> Option<Residual> {
+    let sigma = layout.columns.sigmas[column];
+    let share = variance(cofactors, column) / sigma.powi(2);
+    sigma.is_finite().then(|| Residual {
+        value: -(state.corrections[column] - layout.columns.expected[column]),
+        sigma,
+        redundancy: (1.0 - share).clamp(0.0, 1.0),
+        weight_factor: 1.0,
+    })
+}
+
+/// What is found of laser and profiles; residuals of spots are still to come.
+pub(super) fn of_bus<M>(
+    layout: &Layout<'_, M>,
+    state: &State,
+    cofactors: &BlockMatrix,
+) -> Option<AdjustedBus> {
+    let bus = layout.network.common_bus.as_ref()?;
+    let columns = &layout.columns;
+    let found = |column: usize| {
+        let (value, root_cofactor) = estimate(state, cofactors, column);
+        let prior = prior(layout, state, cofactors, column);
+        Estimate {
+            value,
+            root_cofactor,
+            prior,
+        }
+    };
+    let or_held = |column: Option<usize>| column.map(found).unwrap_or_default();
+    let times = columns.line_time_of_image.iter();
+    let shifts = columns.shift_of_profile.iter();
+    Some(AdjustedBus {
+        boresight_rad: columns.boresight.map(or_held),
+        line_times_s: times.map(|column| column.map(found)).collect(),
+        profile_shifts_m: shifts.map(|shift| shift.map(or_held)).collect(),
+        spots: vec![None; bus.spots.len()],
+    })
+}

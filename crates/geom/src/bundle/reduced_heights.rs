@@ -1,0 +1,158 @@
+//! Heights of points above a surface, observed to be 0 with a full covariance.
+//!
+//! Points are still eliminated one by one. With the triangle `R` that their own rows leave, the change of a height by
+//! the point is `u = R⁻ᵀ ∂h/∂P`; what the rays alone leave open of it has the variance `u·u`, and the shared unknowns
+//! see it through `G = −uᵀC`, `C` what the transformed rows hold of them. Given these the heights are observations of
+//! the shared unknowns with the covariance `Σ` = that of the surface + diag(u·u), and then of the points.
+//!
+//! # Source
+//! The partitioned inverse (Woodbury 1950) of normal equations with additional observations of the points.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
+
+use super::{
+    HeightResidual,
+    heights::Heights,
+    layout::{Layout, Linearised},
+    point_rows::PointRows,
+};
+use crate::pushbroom::{ExteriorOrientation, Unseen};
+
+/// Heights in terms of the shared unknowns.
+#[derive(Clone)]
+pub(super) struct ReducedHeights {
+    /// What the rays leave of each height, metres, and its change by the shared unknowns.
+    pub(super) misclosures_m: DVector<f64>,
+    pub(super) by_shared: DMatrix<f64>,
+    /// Variance that the rays of each point leave to its height when orientations are known, m².
+    pub(super) ray_variances_m2: DVector<f64>,
+    /// Heights as they are, metres.
+    differences_m: DVector<f64>,
+    /// `u` of each point, and how the point moves with its height.
+    pub(super) turned: Vec<Vector3<f64>>,
+    moves: Vec<Vector3<f64>>,
+    /// Covariance of surface and rays together, `Σ`, m².
+    pub(super) covariance_m2: DMatrix<f64>,
+    factor: Cholesky<f64, Dyn>,
+    /// Covariance of the surface alone.
+    of_surface: Cholesky<f64, Dyn>,
+}
+
+impl ReducedHeights {
+    pub(super) fn of<M: ExteriorOrientation>(
+        layout: &Layout<'_, M>,
+        heights: &Heights,
+        at: &Linearised,
+    ) -> Result<Self, Unseen> {
+        let (count, columns) = (heights.points.len(), layout.columns.len());
+        let mut misclosures_m = DVector::zeros(count);
+        let mut by_shared = DMatrix::zeros(count, columns);
+        let mut differences_m = DVector::zeros(count);
+        let (mut turned, mut moves) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        let mut rows = PointRows::default();
+        for (index, point) in heights.points.iter().enumerate() {
+            layout.fill(&mut rows, at, *point)?;
+            let triangle = rows.eliminate();
+            let (difference_m, by_point) = heights.difference_m(&at.state, index);
+            let u = triangle
+                .tr_solve_upper_triangular(&by_point)
+                .ok_or(Unseen::BehindCamera)?;
+            let step = triangle
+                .solve_upper_triangular(&u)
+                .ok_or(Unseen::BehindCamera)?;
+            differences_m[index] = difference_m;
+            misclosures_m[index] = difference_m;
+            for (axis, share) in u.iter().enumerate() {
+                let row = rows.row(axis);
+                misclosures_m[index] += share * row[rows.width - 1];
+                for (column, partial) in rows.columns().zip(row) {
+                    by_shared[(index, column)] -= share * partial;
+                }
+            }
+            for (column, by_shift) in heights.by_shared(index) {
+                by_shared[(index, column)] -= by_shift;
+            }
+            turned.push(u);
+            moves.push(step);
+        }
+        let covariance_m2 = heights.covariance_m2();
+        let ray_variances_m2 =
+            DVector::from_iterator(count, turned.iter().map(Vector3::norm_squared));
+        let with_rays_m2 = &covariance_m2 + DMatrix::from_diagonal(&ray_variances_m2);
+        // A covariance that is none comes from points that are nowhere.
+        let factor = Cholesky::new(with_rays_m2.clone()).ok_or(Unseen::BehindCamera)?;
+        let of_surface = Cholesky::new(covariance_m2).ok_or(Unseen::BehindCamera)?;
+        Ok(Self {
+            misclosures_m,
+            by_shared,
+            ray_variances_m2,
+            differences_m,
+            turned,
+            moves,
+            covariance_m2: with_rays_m2,
+            factor,
+            of_surface,
+        })
+    }
+
+    /// What the heights add to the right-hand side of the shared unknowns' normal equations.
+    pub(super) fn right(&self) -> DVector<f64> {
+        -self
+            .by_shared
+            .tr_mul(&self.factor.solve(&self.misclosures_m))
+    }
+
+    /// `Σ⁻¹G`.
+    pub(super) fn weighted(&self) -> DMatrix<f64> {
+        self.factor.solve(&self.by_shared)
+    }
+
+    /// `Σ⁻¹`.
+    pub(super) fn weights(&self) -> DMatrix<f64> {
+        self.factor.inverse()
+    }
+
+    /// How far each point moves for its height, beyond what its rays say, with a step of the shared unknowns.
+    pub(super) fn moves_m(&self, shared: &DVector<f64>) -> Vec<Vector3<f64>> {
+        let pull = self
+            .factor
+            .solve(&(&self.misclosures_m + &self.by_shared * shared));
+        let moves = self.moves.iter().zip(&pull);
+        moves.map(|(step, pull)| -step * *pull).collect()
+    }
+
+    /// Residuals of the heights, `left` being `Σ⁻¹ − Σ⁻¹ G Q Gᵀ Σ⁻¹`, `Q` the cofactors of the shared unknowns.
+    ///
+    /// Redundancy numbers are the diagonal of the covariance of the surface times `left`. Of correlated observations one
+    /// may lie outside `0..=1`; their sum is what counts.
+    pub(super) fn residuals(&self, heights: &Heights, left: &DMatrix<f64>) -> Vec<HeightResidual> {
+        let redundancies = (heights.covariance_m2() * left).diagonal();
+        (0..heights.points.len())
+            .map(|index| {
+                let variance_m2 = heights.surface.covariance_m2[(index, index)];
+                let ray_m2 = self.ray_variances_m2[index];
+                HeightResidual {
+                    point: heights.points[index],
+                    above_m: self.differences_m[index],
+                    surface_sigma_m: variance_m2.sqrt(),
+                    ray_sigma_m: ray_m2.sqrt(),
+                    nearest_shot_m: heights.surface.nearest_m[index],
+                    weight_factor: (variance_m2 + ray_m2)
+                        / (variance_m2 + ray_m2 + heights.inflation_m2[index]),
+                    redundancy: redundancies[index],
+                }
+            })
+            .collect()
+    }
+
+    /// Residuals of the heights, each times what it weighs beside the others: `C⁻¹ d`.
+    pub(super) fn weighted_differences(&self) -> DVector<f64> {
+        self.of_surface.solve(&self.differences_m)
+    }
+
+    /// Weighted sum of squared residuals of the heights.
+    pub(super) fn weighted_squares(&self) -> f64 {
+        self.differences_m
+            .dot(&self.of_surface.solve(&self.differences_m))
+    }
+}

@@ -1,0 +1,311 @@
+//! Which unknown of images and profiles stands in which column of the reduced equations.
+
+use std::{fmt, ops::Range};
+
+use nalgebra::{DVector, Vector3};
+
+use super::{CommonBus, Network, ORIENTATION_UNKNOWNS, Part};
+use crate::pushbroom::OrientationCorrection;
+use areograph_base::units::METRES_PER_KM;
+
+/// An unknown that is shared by many observations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Unknown {
+    /// Coefficient of the correction to an image's orientation at `3·quantity + power`, quantities X, Y, Z and
+    /// the rotations about the camera's x, y and z axis.
+    Orientation {
+        /// Index of the image.
+        image: usize,
+        /// `3·quantity + power`.
+        coefficient: usize,
+    },
+    /// Bias of the line times of an image.
+    TimeBias {
+        /// Index of the image.
+        image: usize,
+    },
+    /// Bias of the ranges of a profile.
+    RangeBias {
+        /// Index of the profile.
+        profile: usize,
+    },
+    /// Offset of the attitude's clock of all images.
+    AttitudeClock,
+    /// How far a profile is recorded from where it lies, towards east, north or up.
+    ProfileShift {
+        /// Index of the profile.
+        profile: usize,
+        /// 0 east, 1 north, 2 up.
+        axis: usize,
+    },
+    /// What the line times of an image are late by against the laser's shots.
+    LineTime {
+        /// Index of the image.
+        image: usize,
+    },
+    /// An angle by which the laser points elsewhere than its mounting says.
+    Boresight {
+        /// 0 or 1.
+        axis: usize,
+    },
+}
+
+/// Names of the quantities that an orientation is corrected by.
+const QUANTITIES: [&str; 6] = [
+    "X position",
+    "Y position",
+    "Z position",
+    "rotation about the camera's x axis",
+    "rotation about the camera's y axis",
+    "rotation about the camera's z axis",
+];
+/// Names of the powers of `t`.
+const POWERS: [&str; 3] = ["constant", "linear", "quadratic"];
+
+impl Unknown {
+    /// What the unknown is of its image or profile.
+    #[must_use]
+    pub fn quantity(self) -> String {
+        match self {
+            Self::Orientation { coefficient, .. } => {
+                let quantity = QUANTITIES[coefficient / 3 % QUANTITIES.len()];
+                format!("{} {quantity}", POWERS[coefficient % 3])
+            }
+            Self::TimeBias { .. } => "time bias".to_owned(),
+            Self::RangeBias { .. } => "range bias".to_owned(),
+            Self::AttitudeClock => "offset of the attitude's clock".to_owned(),
+            Self::ProfileShift { axis, .. } => {
+                format!("shift {}", ["east", "north", "up"][axis % 3])
+            }
+            Self::LineTime { .. } => "line times against the laser".to_owned(),
+            Self::Boresight { axis } => {
+                format!(
+                    "{} angle of the laser's boresight",
+                    ["first", "second"][axis % 2]
+                )
+            }
+        }
+    }
+
+    /// The image or profile that it belongs to.
+    #[must_use]
+    pub const fn part(self) -> Part {
+        match self {
+            Self::Orientation { image, .. }
+            | Self::TimeBias { image }
+            | Self::LineTime { image } => Part::Image(image),
+            Self::RangeBias { profile } | Self::ProfileShift { profile, .. } => {
+                Part::Profile(profile)
+            }
+            Self::AttitudeClock | Self::Boresight { .. } => Part::Images,
+        }
+    }
+}
+
+impl fmt::Display for Unknown {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{} of {}", self.quantity(), self.part())
+    }
+}
+
+pub(super) fn names(unknowns: &[Unknown]) -> String {
+    let names: Vec<String> = unknowns.iter().map(Unknown::to_string).collect();
+    names.join(", ")
+}
+
+impl Unknown {
+    /// Size of a change that matters as much as a kilometre, a radian or a second.
+    pub(super) fn step_unit(self) -> f64 {
+        match self {
+            Self::Orientation { coefficient, .. } if coefficient < 9 => METRES_PER_KM,
+            Self::RangeBias { .. } | Self::ProfileShift { .. } => METRES_PER_KM,
+            Self::Orientation { .. }
+            | Self::TimeBias { .. }
+            | Self::LineTime { .. }
+            | Self::AttitudeClock
+            | Self::Boresight { .. } => 1.0,
+        }
+    }
+}
+
+/// The unknowns that are solved for, in column order, and their standard deviations.
+pub(super) struct Columns {
+    pub(super) unknowns: Vec<Unknown>,
+    pub(super) sigmas: Vec<f64>,
+    /// What they are expected to be.
+    pub(super) expected: Vec<f64>,
+    /// Column of each image's 18 coefficients and its time bias.
+    pub(super) of_image: Vec<[Option<usize>; ORIENTATION_UNKNOWNS + 1]>,
+    /// All columns of each image: they stand side by side.
+    pub(super) images: Vec<Range<usize>>,
+    /// Columns that stand side by side because they belong to one image or profile.
+    pub(super) blocks: Vec<Range<usize>>,
+    /// Column of what the line times of each image are late by.
+    pub(super) line_time_of_image: Vec<Option<usize>>,
+    /// Column of each profile's bias.
+    pub(super) of_profile: Vec<Option<usize>>,
+    /// Columns of each profile's shift.
+    pub(super) shift_of_profile: Vec<[Option<usize>; 3]>,
+    /// All columns of each profile.
+    pub(super) profiles: Vec<Range<usize>>,
+    /// Column of the offset of the attitude's clock.
+    pub(super) attitude_clock: Option<usize>,
+    /// Columns of the angles of the laser's boresight.
+    pub(super) boresight: [Option<usize>; 2],
+}
+
+impl Columns {
+    pub(super) fn of<M>(network: &Network<M>) -> Self {
+        let mut columns = Self {
+            unknowns: Vec::new(),
+            sigmas: Vec::new(),
+            expected: Vec::new(),
+            of_image: Vec::new(),
+            images: Vec::new(),
+            blocks: Vec::new(),
+            line_time_of_image: Vec::new(),
+            of_profile: Vec::new(),
+            shift_of_profile: Vec::new(),
+            profiles: Vec::new(),
+            attitude_clock: None,
+            boresight: [None; 2],
+        };
+        let bus = network.common_bus.as_ref();
+        for (image, entry) in network.images.iter().enumerate() {
+            let first = columns.len();
+            let mut of_image = [None; ORIENTATION_UNKNOWNS + 1];
+            for (coefficient, sigma) in entry.sigmas.iter().enumerate() {
+                of_image[coefficient] =
+                    columns.add(Unknown::Orientation { image, coefficient }, *sigma);
+            }
+            let expected_m = network.expected_m.get(image).into_iter().flatten();
+            for (constant, expected_m) in of_image.iter().step_by(3).zip(expected_m) {
+                if let Some(column) = constant {
+                    columns.expected[*column] = *expected_m;
+                }
+            }
+            of_image[ORIENTATION_UNKNOWNS] =
+                columns.add(Unknown::TimeBias { image }, entry.time_bias_sigma_s);
+            columns.of_image.push(of_image);
+            let with_spots = bus.filter(|bus| bus.spots.iter().any(|of| of.view.image == image));
+            let line_time_s = with_spots.map_or(0.0, |bus| bus.line_time_sigma_s);
+            let line_time = columns.add(Unknown::LineTime { image }, line_time_s);
+            columns.line_time_of_image.push(line_time);
+            columns.images.push(first..columns.len());
+        }
+        for (profile, sigma_m) in network.range_bias_sigmas_m.iter().enumerate() {
+            let first = columns.len();
+            let column = columns.add(Unknown::RangeBias { profile }, *sigma_m);
+            columns.of_profile.push(column);
+            let sigma_m = bus.map_or_else(Vector3::zeros, |bus| bus.profiles[profile].sigma_m);
+            let shift = |axis| Unknown::ProfileShift { profile, axis };
+            let shift = [0, 1, 2].map(|axis| columns.add(shift(axis), sigma_m[axis]));
+            columns.shift_of_profile.push(shift);
+            columns.profiles.push(first..columns.len());
+        }
+        let clock = network.attitude_clock.as_ref();
+        columns.attitude_clock =
+            clock.and_then(|clock| columns.add(Unknown::AttitudeClock, clock.sigma_s));
+        let first = columns.len();
+        let boresight_rad = bus.map_or(0.0, |bus| bus.boresight_sigma_rad);
+        columns.boresight =
+            [0, 1].map(|axis| columns.add(Unknown::Boresight { axis }, boresight_rad));
+        let clock = columns.attitude_clock.map(|column| column..column + 1);
+        let blocks = columns.images.iter().chain(&columns.profiles).cloned();
+        let blocks = blocks
+            .chain(clock)
+            .chain(std::iter::once(first..columns.len()));
+        columns.blocks = blocks.filter(|block| !block.is_empty()).collect();
+        columns
+    }
+
+    fn add(&mut self, unknown: Unknown, sigma: f64) -> Option<usize> {
+        // A standard deviation of 0 holds the unknown fixed: it has no column at all.
+        (sigma > 0.0).then(|| {
+            self.unknowns.push(unknown);
+            self.sigmas.push(sigma);
+            self.expected.push(0.0);
+            self.unknowns.len() - 1
+        })
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.unknowns.len()
+    }
+
+    /// The shifts of profiles that `bus` makes unknowns: indices on the surface, and columns.
+    pub(super) fn shifts_on_surface(&self, bus: &CommonBus) -> Vec<(usize, [Option<usize>; 3])> {
+        let profiles = bus.profiles.iter().zip(&self.shift_of_profile);
+        profiles
+            .map(|(profile, columns)| (profile.surface_profile, *columns))
+            .collect()
+    }
+
+    /// The block of a column.
+    pub(super) fn block_of(&self, column: usize) -> usize {
+        self.blocks.partition_point(|block| block.end <= column)
+    }
+}
+
+/// Values of all unknowns.
+#[derive(Clone)]
+pub(super) struct State {
+    /// Shared unknowns minus their initial values, by column.
+    pub(super) corrections: DVector<f64>,
+    pub(super) orientations: Vec<OrientationCorrection>,
+    pub(super) range_biases_m: Vec<f64>,
+    /// How far each profile is recorded from where it lies, Mars-fixed.
+    pub(super) profile_shifts_m: Vec<Vector3<f64>>,
+    pub(super) line_times_s: Vec<f64>,
+    pub(super) boresight_rad: [f64; 2],
+    pub(super) points_m: Vec<Vector3<f64>>,
+}
+
+impl State {
+    /// The state with these corrections of shared unknowns and these points.
+    pub(super) fn new<M>(
+        network: &Network<M>,
+        columns: &Columns,
+        corrections: DVector<f64>,
+        points_m: Vec<Vector3<f64>>,
+    ) -> Self {
+        let value = |column: Option<usize>| column.map_or(0.0, |column| corrections[column]);
+        let images = network.images.iter().zip(&columns.of_image).enumerate();
+        let orientations = images.map(|(index, (image, of_image))| {
+            let coefficients = std::array::from_fn(|coefficient| value(of_image[coefficient]));
+            let time_bias_s = value(of_image[ORIENTATION_UNKNOWNS]);
+            let mut correction = OrientationCorrection::of(
+                &coefficients,
+                image.half_lines,
+                time_bias_s / image.line_period_s,
+            );
+            if let Some(clock) = &network.attitude_clock {
+                correction.rotation_rad[0] +=
+                    clock.turns_rad_s[index] * value(columns.attitude_clock);
+            }
+            correction
+        });
+        Self {
+            orientations: orientations.collect(),
+            profile_shifts_m: network
+                .common_bus
+                .iter()
+                .flat_map(|bus| bus.profiles.iter().zip(&columns.shift_of_profile))
+                .map(|(profile, shift)| profile.axes.tr_mul(&Vector3::from(shift.map(value))))
+                .collect(),
+            line_times_s: columns
+                .line_time_of_image
+                .iter()
+                .map(|column| value(*column))
+                .collect(),
+            boresight_rad: columns.boresight.map(value),
+            range_biases_m: columns
+                .of_profile
+                .iter()
+                .map(|column| value(*column))
+                .collect(),
+            corrections,
+            points_m,
+        }
+    }
+}

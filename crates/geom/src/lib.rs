@@ -1,0 +1,33 @@
+//! Pure geometry: no files, no clocks, no SPICE.
+
+pub mod attitude;
+pub mod block_equations;
+pub mod body_rotation;
+pub mod bundle;
+pub mod calibration;
+pub mod chebyshev;
+pub mod collinearity;
+pub mod conformal_map;
+pub mod convex;
+pub mod ellipsoid;
+pub mod height_grid;
+pub mod image_outline;
+pub mod imaging;
+pub mod intersection;
+pub mod lagrange;
+pub mod light_time;
+pub mod longitude_ring;
+pub mod map_projection;
+pub mod misregistration;
+pub mod orbit_axes;
+pub mod oriented_camera;
+pub mod plane;
+pub mod polynomial;
+pub mod pushbroom;
+pub mod random;
+pub mod range_residuals;
+pub mod robust;
+pub mod statistics;
+pub mod surface;
+pub mod uncertainty;
+pub mod window;

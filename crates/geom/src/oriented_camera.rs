@@ -1,0 +1,85 @@
+//! An image as intersection and adjustment use it: orientation and detector together.
+
+use nalgebra::{Vector2, Vector3};
+
+use super::{
+    intersection::Ray,
+    pushbroom::{Detector, ExteriorOrientation, missed_m},
+};
+use areograph_base::line_times::LineTimes;
+
+/// An image that takes part in intersection or adjustment.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OrientedCamera<M> {
+    /// Identifier that measurements name.
+    pub id: String,
+    /// Exterior orientation as a function of [`LineTimes::offset`].
+    pub orientation: M,
+    /// Detector line.
+    pub detector: Detector,
+    /// Times of the lines of the whole image.
+    pub line_times: LineTimes,
+}
+
+impl<M> OrientedCamera<M> {
+    /// Lines of the whole image.
+    #[must_use]
+    pub fn lines(&self) -> f64 {
+        f64::from(self.line_times.lines())
+    }
+}
+
+impl<M: ExteriorOrientation> OrientedCamera<M> {
+    /// Time as the orientation takes it, and focal coordinates along and across the track in pixels, of a place in the image.
+    ///
+    /// Lines and samples are 0 at the outer edge of the first one.
+    #[must_use]
+    pub fn focal_plane_coordinates(&self, line: f64, sample: f64) -> (f64, Vector2<f64>) {
+        (
+            self.line_times.offset_of_line(line),
+            self.detector.place_px(sample),
+        )
+    }
+
+    /// The ray of a place, with a standard deviation of a pixel along the track and of a sample across it.
+    #[must_use]
+    pub fn ray(&self, line: f64, sample: f64) -> Ray {
+        let (x_lines, focal_px) = self.focal_plane_coordinates(line, sample);
+        let pose = self.orientation.pose(x_lines);
+        Ray {
+            position_m: pose.position_m,
+            mars_to_camera: pose.mars_to_camera,
+            focal_length_px: self.detector.focal_length_px,
+            focal_px,
+            along_sigma_px: 1.0,
+            across_sigma_px: self.detector.focal_px_per_sample(focal_px.y),
+        }
+    }
+
+    /// Whether a place lies in the image, its edges included.
+    #[must_use]
+    pub fn shows(&self, line: f64, sample: f64) -> bool {
+        (0.0..=self.lines()).contains(&line) && (0.0..=self.detector.samples).contains(&sample)
+    }
+
+    /// How far a ground point moves along the focal plane during a mean line period at `x_lines`, pixels.
+    #[must_use]
+    pub fn focal_px_per_line(&self, x_lines: f64, ground_m: &Vector3<f64>) -> f64 {
+        let (pose, motion) = self.orientation.pose_and_rate(x_lines);
+        let camera_m = pose.camera_vector_m(ground_m);
+        let rate_m = motion.camera_vector_rate_m(&pose, &camera_m);
+        let [_, missed_rate_m] = missed_m(&self.detector.distortion, &camera_m, &rate_m);
+        // The point lies in the plane of its line, so that the change of its depth does not count.
+        self.detector.focal_length_px * missed_rate_m.abs() / camera_m.z
+    }
+
+    /// How far apart the line exposed at `x_lines` and the next lie on the ground at a point of it, metres, across the
+    /// ray.
+    #[must_use]
+    pub fn line_spacing_m(&self, x_lines: f64, ground_m: &Vector3<f64>) -> f64 {
+        let depth_m = self.orientation.pose(x_lines).camera_vector_m(ground_m).z;
+        let spacing_m =
+            self.focal_px_per_line(x_lines, ground_m) * depth_m / self.detector.focal_length_px;
+        spacing_m * self.line_times.offsets_per_line(x_lines)
+    }
+}

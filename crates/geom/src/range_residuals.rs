@@ -1,0 +1,100 @@
+//! Ranges, the file's own orbit and the kernels' orbit against each other, shot by shot.
+//!
+//! Geometric states only: the range is to the spacecraft's centre of mass.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{
+    body_rotation::body_rotation, ellipsoid::spherical_to_xyz_m, orbit_axes::radial_along_cross,
+};
+use areograph_base::{
+    body::Body,
+    footprints::Footprint,
+    frames::{BodyFixed, Frame, J2000, Position},
+    time::Et,
+};
+
+/// Where the kernels have the spacecraft at one instant, and the axes of its orbit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpacecraftState {
+    /// Position.
+    pub position: Position<BodyFixed>,
+    /// Radial, along-track and cross-track unit vectors as columns, in IAU 2000.
+    pub axes: Matrix3<f64>,
+}
+
+impl SpacecraftState {
+    /// The state of position and velocity (metres per second) in J2000 at `at`.
+    #[must_use]
+    pub fn of(at: Et, position: &Position<J2000>, velocity_m_s: &Vector3<f64>) -> Self {
+        let to_mars = body_rotation(Body::Mars, at);
+        Self {
+            position: to_mars.apply(position),
+            axes: to_mars.matrix() * radial_along_cross(&position.xyz_m, velocity_m_s),
+        }
+    }
+}
+
+/// Residuals of one shot, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RangeResiduals {
+    /// Range − |SPK spacecraft − raw footprint|.
+    pub range_minus_distance_m: f64,
+    /// Range − |SPK spacecraft − crossover-corrected footprint|.
+    pub range_minus_distance_crossover_m: f64,
+    /// Range − |PEDR spacecraft − raw footprint|.
+    pub decoding_m: f64,
+    /// PEDR spacecraft − SPK spacecraft along radial, along-track and cross-track axes.
+    pub spacecraft_m: Vector3<f64>,
+}
+
+impl RangeResiduals {
+    /// Those of a shot in IAU 2000.
+    #[must_use]
+    pub fn of(shot: &Footprint, spacecraft: &SpacecraftState) -> Self {
+        let direction = spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, 1.0);
+        let raw = Position::new(shot.radius_m * direction);
+        let crossover = Position::new(shot.radius_crossover_m * direction);
+        let own = own_spacecraft(shot);
+        let craft = &spacecraft.position;
+        let difference_m = own.xyz_m - craft.xyz_m;
+        Self {
+            range_minus_distance_m: range_residual_m(shot.range_m, craft, &raw),
+            range_minus_distance_crossover_m: range_residual_m(shot.range_m, craft, &crossover),
+            decoding_m: range_residual_m(shot.range_m, &own, &raw),
+            spacecraft_m: spacecraft.axes.tr_mul(&difference_m),
+        }
+    }
+}
+
+/// Measured range minus the geometric distance of spacecraft and footprint, metres.
+///
+/// Any frame will do that both positions share; the sign is that of Shan et al. 2005, Table 3.
+#[must_use]
+pub fn range_residual_m<F: Frame>(
+    range_m: f64,
+    spacecraft: &Position<F>,
+    footprint: &Position<F>,
+) -> f64 {
+    range_m - spacecraft.distance_m(footprint)
+}
+
+/// The footprint with this radius, metres.
+#[must_use]
+pub fn footprint(shot: &Footprint, radius_m: f64) -> Position<BodyFixed> {
+    Position::new(spherical_to_xyz_m(
+        shot.longitude_rad,
+        shot.latitude_rad,
+        radius_m,
+    ))
+}
+
+/// The spacecraft where the PEDR file has it.
+#[must_use]
+pub fn own_spacecraft(shot: &Footprint) -> Position<BodyFixed> {
+    Position::new(spherical_to_xyz_m(
+        shot.spacecraft_longitude_rad,
+        shot.spacecraft_latitude_rad,
+        shot.spacecraft_radius_m,
+    ))
+}

@@ -1,0 +1,383 @@
+//! The ground between laser shots: its height by ordinary kriging, with the covariance of its errors.
+//!
+//! Profiles of a laser altimeter sample the ground every 300 m along the track and every few kilometres across it.
+//! How far the ground strays from what lies between is learnt from the profiles themselves ([`Variogram`]);
+//! errors at neighbouring places are alike, so their covariance is full ([`SurfaceHeights::covariance_m2`]).
+//!
+//! # Source
+//! Ordinary kriging: Cressie 1993, Statistics for spatial data, section 3.2.
+//!
+//! ```
+//! use areograph::{
+//!     body::Body,
+//!     geom::{
+//!         ellipsoid::on_ellipsoid_m,
+//!         surface::{LaserSurface, SurfaceOptions, SurfaceShot},
+//!     },
+//! };
+//! use nalgebra::Vector3;
+//!
+//! // A profile along a meridian, 300 m from shot to shot, 50 m above the ellipsoid.
+//! let shots: Vec<SurfaceShot> = (0..40)
+//!     .map(|shot| {
+//!         let north_rad = f64::from(shot) * 300.0 / 3_396_190.0;
+//!         let up = Vector3::new(north_rad.cos(), 0.0, north_rad.sin());
+//!         let ground_m = on_ellipsoid_m(Body::Mars.model(), &up) + 50.0 * up;
+//!         SurfaceShot { ground_m, profile: 0 }
+//!     })
+//!     .collect();
+//! let surface = LaserSurface::new(&shots, &[], &SurfaceOptions::default())?;
+//! let beside = surface.predict(&[shots[20].ground_m + Vector3::new(0.0, 300.0, 0.0)]);
+//! assert!((beside.heights_m[0] - 50.0).abs() < 1e-6); // metres; a constant comes back
+//! // Beside the profile the ground may be anything like what it is along it.
+//! assert!((4.0..4.5).contains(&beside.sigma_m(0)));
+//! # Ok::<(), areograph::geom::surface::SurfaceError>(())
+//! ```
+
+mod kriging;
+mod plan;
+mod variogram;
+
+use nalgebra::{DMatrix, Matrix3xX, Vector2, Vector3};
+
+use self::{kriging::Kriging, plan::Plan};
+use crate::ellipsoid::height_m;
+use areograph_base::body::{Body, BodyModel};
+
+pub use variogram::Variogram;
+
+/// More shots than this are not kriged with: the equations grow with their cube.
+const SHOTS_MAX: usize = 1500;
+/// Of more shots those within this of a place that is asked for are taken, metres.
+const NEAR_M: f64 = 3_000.0;
+/// Fewer shots than this make no surface.
+const SHOTS_MIN: usize = 10;
+/// Gradients are differences over this to both sides, metres: less than a spot of the laser.
+const GRADIENT_STEP_M: f64 = 30.0;
+
+/// A laser shot on the ground. Shots of a profile stand in their order along it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfaceShot {
+    /// Where it met the ground, Mars-fixed, metres.
+    pub ground_m: Vector3<f64>,
+    /// Index of its profile.
+    pub profile: usize,
+}
+
+/// What is uncertain about a surface of laser shots.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfaceOptions {
+    /// Noise of the height of a shot, metres.
+    pub shot_sigma_m: f64,
+    /// Radial error that all shots of a profile share, metres.
+    pub profile_sigma_m: f64,
+    /// Error in plan between the places that are asked for and the shots on each axis, common to all of them, metres; on
+    /// a slope it becomes one of height.
+    pub plan_sigma_m: f64,
+    /// Roughness that is assumed at least, metres at 300 m, see [`Variogram`].
+    pub roughness_min_m: f64,
+    /// Where relief is to tell the place: standard deviation on each axis of where a profile lies in plan, metres. The
+    /// error in plan between images and shots is then what heights are asked for, and no part of their own errors.
+    pub relief_sigma_m: Option<f64>,
+    /// The body, above whose ellipsoid heights are.
+    pub body: Body,
+}
+
+impl Default for SurfaceOptions {
+    /// Shots of MOLA to 1 m and their profiles to 1 m radially after crossovers (Neumann et al. 2001); 130 m in
+    /// plan: 110 m of the images and 70 m of MOLA on an axis.
+    fn default() -> Self {
+        Self {
+            shot_sigma_m: 1.0,
+            profile_sigma_m: 1.0,
+            plan_sigma_m: 130.0,
+            roughness_min_m: 4.0,
+            relief_sigma_m: None,
+            body: Body::Mars,
+        }
+    }
+}
+
+/// A surface that cannot be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SurfaceError {
+    /// Too few shots.
+    #[error("{shots} laser shots make no surface, expected at least {SHOTS_MIN}")]
+    TooFew {
+        /// Shots.
+        shots: usize,
+    },
+    /// Shots or options that give no positive definite covariance.
+    #[error("laser shots determine no surface: a coordinate or a standard deviation is no number")]
+    NotANumber,
+}
+
+/// The ground by laser shots.
+#[derive(Debug, Clone)]
+pub struct LaserSurface {
+    plan: Plan,
+    kriging: Kriging,
+    options: SurfaceOptions,
+}
+
+/// Heights of the surface at some places, above the ellipsoid along the radius.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SurfaceHeights {
+    /// Heights, metres.
+    pub heights_m: Vec<f64>,
+    /// Slopes towards east and north, metres per metre.
+    pub slopes: Vec<Vector2<f64>>,
+    /// Distance of the nearest shot in plan, metres.
+    pub nearest_m: Vec<f64>,
+    /// Covariance of the errors of the heights, m².
+    pub covariance_m2: DMatrix<f64>,
+    /// The same without what comes from errors in plan on a slope.
+    pub without_plan_m2: DMatrix<f64>,
+    /// The body, above whose ellipsoid they are.
+    pub body: Body,
+    /// Where relief is to tell the place.
+    pub relief: Option<Relief>,
+}
+
+/// What heights over relief say of the place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Relief {
+    /// How each height changes with its place, metres per metre, Mars-fixed.
+    pub by_place: Vec<Vector3<f64>>,
+    /// Where each profile may lie: one entry a profile of the surface.
+    pub profiles: Vec<ProfileOnRelief>,
+}
+
+/// What heights of the surface have to do with where one of its profiles lies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ProfileOnRelief {
+    /// Index of the profile.
+    pub profile: usize,
+    /// How measured minus predicted heights change when the profile is recorded farther to the east, to the north and
+    /// higher than it lies: one row a place.
+    pub by_shift: Matrix3xX<f64>,
+    /// Standard deviations of these shifts, metres.
+    pub sigma_m: Vector3<f64>,
+}
+
+impl SurfaceHeights {
+    /// Standard deviation of the height at `index`, metres.
+    #[must_use]
+    pub fn sigma_m(&self, index: usize) -> f64 {
+        self.covariance_m2[(index, index)].sqrt()
+    }
+}
+
+impl LaserSurface {
+    /// The surface of `shots` for heights near the places `around`, Mars-fixed, metres: of very many shots those near
+    /// them are taken.
+    ///
+    /// # Errors
+    /// Too few shots, a coordinate or standard deviation that is no number.
+    pub fn new(
+        shots: &[SurfaceShot],
+        around: &[Vector3<f64>],
+        options: &SurfaceOptions,
+    ) -> Result<Self, SurfaceError> {
+        if shots.len() < SHOTS_MIN {
+            return Err(SurfaceError::TooFew { shots: shots.len() });
+        }
+        let model = options.body.model();
+        let plan = Plan::around(model, shots.iter().map(|shot| shot.ground_m));
+        let placed: Vec<Placed> = shots
+            .iter()
+            .map(|shot| Placed::new(model, &plan, shot))
+            .collect();
+        let variogram = Variogram::learn(&placed, options);
+        let around: Vec<Vector2<f64>> = around.iter().map(|place| plan.of(place)).collect();
+        let taken = thinned(near(placed, &around));
+        if taken.len() < SHOTS_MIN {
+            return Err(SurfaceError::TooFew { shots: taken.len() });
+        }
+        let kriging =
+            Kriging::new(taken, variogram, options.shot_sigma_m).ok_or(SurfaceError::NotANumber)?;
+        Ok(Self {
+            plan,
+            kriging,
+            options: *options,
+        })
+    }
+
+    /// How rough the ground is.
+    #[must_use]
+    pub const fn variogram(&self) -> Variogram {
+        self.kriging.variogram
+    }
+
+    /// Profiles that shots of the surface belong to, by their indices, ascending.
+    #[must_use]
+    pub fn profiles(&self) -> Vec<usize> {
+        let mut profiles: Vec<usize> = self.kriging.shots.iter().map(|shot| shot.profile).collect();
+        profiles.sort_unstable();
+        profiles.dedup();
+        profiles
+    }
+
+    /// Whether heights above it are to tell the place.
+    #[must_use]
+    pub const fn uses_relief(&self) -> bool {
+        self.options.relief_sigma_m.is_some()
+    }
+
+    /// Shots that the surface rests on.
+    #[must_use]
+    pub fn shots(&self) -> usize {
+        self.kriging.shots.len()
+    }
+
+    /// Height of a place above the ellipsoid of the surface's body along the radius, metres, and how it changes with the
+    /// place.
+    #[must_use]
+    pub fn height_m(&self, place_m: &Vector3<f64>) -> (f64, Vector3<f64>) {
+        height_m(self.options.body.model(), place_m)
+    }
+
+    /// Heights of the surface at `places_m`, with the covariance of their errors.
+    #[must_use]
+    pub fn predict(&self, places_m: &[Vector3<f64>]) -> SurfaceHeights {
+        let at: Vec<Vector2<f64>> = places_m.iter().map(|place| self.plan.of(place)).collect();
+        let weights = self.kriging.weights(&at);
+        let slopes: Vec<Vector2<f64>> = at.iter().map(|place| self.slope(place)).collect();
+        let mut covariance_m2 = self.errors_m2(&at);
+        let of_profiles = self.kriging.weights_of_profiles(&weights);
+        covariance_m2 += of_profiles.tr_mul(&of_profiles) * self.options.profile_sigma_m.powi(2);
+        let without_plan_m2 = covariance_m2.clone();
+        let relief = self.options.relief_sigma_m.map(|sigma_m| Relief {
+            by_place: places_m
+                .iter()
+                .zip(&slopes)
+                .map(|(place, slope)| self.plan.by_place(place, slope))
+                .collect(),
+            profiles: self.on_relief(&slopes, &of_profiles, sigma_m),
+        });
+        if let Some(relief) = &relief {
+            for profile in &relief.profiles {
+                let mut in_plan = profile.by_shift.clone();
+                in_plan.row_mut(2).fill(0.0);
+                covariance_m2 += in_plan.tr_mul(&in_plan) * profile.sigma_m.x.powi(2);
+            }
+        } else {
+            let slopes_matrix = DMatrix::from_fn(2, at.len(), |axis, place| slopes[place][axis]);
+            covariance_m2 +=
+                slopes_matrix.tr_mul(&slopes_matrix) * self.options.plan_sigma_m.powi(2);
+        }
+        SurfaceHeights {
+            body: self.options.body,
+            without_plan_m2,
+            relief,
+            heights_m: at
+                .iter()
+                .map(|place| self.kriging.height_m(place))
+                .collect(),
+            nearest_m: at
+                .iter()
+                .map(|place| self.kriging.nearest_m(place))
+                .collect(),
+            slopes,
+            covariance_m2,
+        }
+    }
+
+    /// Each profile by its share in the heights, `of_profiles`.
+    fn on_relief(
+        &self,
+        slopes: &[Vector2<f64>],
+        of_profiles: &DMatrix<f64>,
+        sigma_m: f64,
+    ) -> Vec<ProfileOnRelief> {
+        let by_shift = |profile: usize| {
+            Matrix3xX::from_fn(slopes.len(), |axis, place| {
+                let shift = if axis < 2 { slopes[place][axis] } else { -1.0 };
+                of_profiles[(profile, place)] * shift
+            })
+        };
+        let profiles = self.profiles().into_iter();
+        profiles
+            .map(|profile| ProfileOnRelief {
+                profile,
+                by_shift: by_shift(profile),
+                sigma_m: Vector3::new(sigma_m, sigma_m, self.options.profile_sigma_m),
+            })
+            .collect()
+    }
+
+    /// Covariance of what the surface errs by where the places may truly be: an error in plan takes them away from a
+    /// profile, where the ground is known, as well as towards one.
+    fn errors_m2(&self, at: &[Vector2<f64>]) -> DMatrix<f64> {
+        let shift_m = std::f64::consts::SQRT_2 * self.options.plan_sigma_m;
+        let all_around = [
+            Vector2::new(shift_m, 0.0),
+            Vector2::new(-shift_m, 0.0),
+            Vector2::new(0.0, shift_m),
+            Vector2::new(0.0, -shift_m),
+        ];
+        let shifts = if shift_m > 0.0 {
+            &all_around[..]
+        } else {
+            &[Vector2::zeros()]
+        };
+        let mut covariance_m2 = DMatrix::zeros(at.len(), at.len());
+        for shift in shifts {
+            let shifted: Vec<Vector2<f64>> = at.iter().map(|place| place + shift).collect();
+            let weights = self.kriging.weights(&shifted);
+            covariance_m2 += self.kriging.covariance_m2(&shifted, &weights);
+        }
+        covariance_m2 / shifts.len() as f64
+    }
+
+    fn slope(&self, place: &Vector2<f64>) -> Vector2<f64> {
+        let along = |step: Vector2<f64>| {
+            let [after_m, before_m] =
+                [place + step, place - step].map(|place| self.kriging.height_m(&place));
+            (after_m - before_m) / (2.0 * GRADIENT_STEP_M)
+        };
+        Vector2::new(
+            along(Vector2::new(GRADIENT_STEP_M, 0.0)),
+            along(Vector2::new(0.0, GRADIENT_STEP_M)),
+        )
+    }
+}
+
+/// A shot in plan.
+#[derive(Debug, Clone, Copy)]
+struct Placed {
+    plan_m: Vector2<f64>,
+    height_m: f64,
+    profile: usize,
+}
+
+impl Placed {
+    fn new(model: &BodyModel, plan: &Plan, shot: &SurfaceShot) -> Self {
+        Self {
+            plan_m: plan.of(&shot.ground_m),
+            height_m: height_m(model, &shot.ground_m).0,
+            profile: shot.profile,
+        }
+    }
+}
+
+/// Of too many shots those near the places `around`.
+fn near(shots: Vec<Placed>, around: &[Vector2<f64>]) -> Vec<Placed> {
+    if shots.len() <= SHOTS_MAX || around.is_empty() {
+        return shots;
+    }
+    let is_near = |shot: &Placed| {
+        let mut distances_m = around.iter().map(|place| (place - shot.plan_m).norm());
+        distances_m.any(|distance_m| distance_m < NEAR_M)
+    };
+    shots.into_iter().filter(is_near).collect()
+}
+
+/// Of too many shots every second, third …
+fn thinned(shots: Vec<Placed>) -> Vec<Placed> {
+    let step = shots.len().div_ceil(SHOTS_MAX).max(1);
+    shots.into_iter().step_by(step).collect()
+}
+
+#[cfg(test)]
+mod tests;

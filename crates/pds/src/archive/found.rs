@@ -1,0 +1,165 @@
+//! What a search gives.
+
+use std::{collections::BTreeMap, fmt};
+
+use serde::{Deserialize, Serialize};
+
+use crate::pedr::{Complaint, Reason, SpoiledShots};
+use areograph_base::{
+    altimetry::ShotFilter,
+    footprints::{AsRead, Footprint, Footprints},
+};
+
+/// Why a shot inside a window was rejected; the first that applies counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ShotRejection {
+    /// No laser return.
+    NoReturn,
+    /// A radius, range or parallax that contradicts the record's other values.
+    Spoiled,
+    /// Classification not accepted.
+    Class,
+    /// Trigger channel not accepted.
+    Channel,
+    /// Attitude flag not accepted.
+    Attitude,
+    /// Off-nadir angle too large.
+    OffNadir,
+}
+
+impl ShotRejection {
+    /// Why a shot is rejected by what is spoiled in its frame, or by `filter`; none takes every shot with a return.
+    #[must_use]
+    pub fn of(
+        shot: &Footprint,
+        spoiled: &SpoiledShots,
+        filter: Option<&ShotFilter>,
+    ) -> Option<Self> {
+        // Written so that a range that is no number counts as none.
+        if !(shot.range_m > 0.0) {
+            return Some(Self::NoReturn);
+        }
+        if spoiled.contains(shot.shot) {
+            return Some(Self::Spoiled);
+        }
+        let filter = filter?;
+        if !filter.classes.contains(&shot.class) {
+            Some(Self::Class)
+        } else if !filter.channels.contains(&shot.channel) {
+            Some(Self::Channel)
+        } else if !filter.attitude_flags.contains(&shot.attitude_flag) {
+            Some(Self::Attitude)
+        } else if !(shot.off_nadir_rad.abs() <= filter.off_nadir_max_rad) {
+            Some(Self::OffNadir)
+        } else {
+            None
+        }
+    }
+}
+
+impl fmt::Display for ShotRejection {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::NoReturn => "no return",
+            Self::Spoiled => "spoiled values",
+            Self::Class => "class",
+            Self::Channel => "channel",
+            Self::Attitude => "attitude flag",
+            Self::OffNadir => "off-nadir angle",
+        })
+    }
+}
+
+/// The windows of every shot, however many windows there are.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct WindowLists {
+    /// Where the list of each shot ends in `windows`.
+    ends: Vec<usize>,
+    windows: Vec<u32>,
+}
+
+impl WindowLists {
+    /// The windows of the shot in row `row`, in ascending order; none of a row that is not there.
+    #[must_use]
+    pub fn of(&self, row: usize) -> &[u32] {
+        let end = |row: usize| self.ends.get(row).map_or(0, |end| *end);
+        let start = row.checked_sub(1).map_or(0, end);
+        self.windows.get(start..end(row)).unwrap_or_default()
+    }
+
+    fn push(&mut self, windows: &[u32]) {
+        self.windows.extend(windows);
+        self.ends.push(self.windows.len());
+    }
+
+    /// Appends the lists of other shots.
+    pub fn append(&mut self, other: &Self) {
+        let before = self.windows.len();
+        self.windows.extend(&other.windows);
+        self.ends.extend(other.ends.iter().map(|end| before + end));
+    }
+
+    /// Takes the lists from row `row` on away.
+    #[must_use]
+    pub fn split_off(&mut self, row: usize) -> Self {
+        let ends = self.ends.split_off(row.min(self.ends.len()));
+        let start = self.ends.last().copied().unwrap_or(0);
+        Self {
+            windows: self.windows.split_off(start),
+            ends: ends.into_iter().map(|end| end - start).collect(),
+        }
+    }
+}
+
+/// What a stretch of a file gave.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found {
+    /// Shots in the windows, ordered by record and shot, in the coordinates of their file; `windows` has bits for the
+    /// first 64 windows.
+    pub footprints: Footprints<AsRead>,
+    /// The windows of every shot.
+    pub windows: WindowLists,
+    /// What is wrong with the records that were judged.
+    pub complaints: Vec<Complaint>,
+    /// Complaints by reason.
+    pub complaint_counts: BTreeMap<Reason, u64>,
+    /// Rejected shots inside a window, by reason.
+    pub rejected: BTreeMap<ShotRejection, u64>,
+    /// Records looked at, be it by what an index says of them.
+    pub frames_read: u64,
+    /// Shots whose own position was tested, those of frames near a window.
+    pub shots_read: u64,
+}
+
+impl Found {
+    pub(super) const fn new() -> Self {
+        Self {
+            footprints: Footprints::new(Vec::new()),
+            windows: WindowLists {
+                ends: Vec::new(),
+                windows: Vec::new(),
+            },
+            complaints: Vec::new(),
+            complaint_counts: BTreeMap::new(),
+            rejected: BTreeMap::new(),
+            frames_read: 0,
+            shots_read: 0,
+        }
+    }
+
+    pub(super) fn complain(&mut self, complaint: Complaint) {
+        *self.complaint_counts.entry(complaint.reason).or_default() += 1;
+        self.complaints.push(complaint);
+    }
+
+    /// Adds a shot with its windows, in ascending order.
+    pub(super) fn push(&mut self, shot: &Footprint, windows: &[u32]) {
+        let bits = windows.iter().take_while(|window| **window < u64::BITS);
+        self.footprints.push(&Footprint {
+            windows: bits.fold(0, |bits, window| bits | 1 << window),
+            ..*shot
+        });
+        self.windows.push(windows);
+    }
+}

@@ -1,0 +1,73 @@
+//! The files that a user names, opened for a search.
+
+use std::path::PathBuf;
+
+use rayon::prelude::*;
+
+use super::{Index, Indexes, Listing, Source};
+use areograph_base::{
+    altimetry::DatumChoice,
+    error::{Cause, Error, Kind, Result},
+};
+
+/// Not as many files as a search can number.
+#[derive(Debug, thiserror::Error)]
+#[error("{0} PEDR files; expected 1 to 65535")]
+struct FileCount(usize);
+
+impl Cause for FileCount {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        "name PEDR files (AP#####v.B), or folders that hold them".to_owned()
+    }
+}
+
+/// Files of an archive that can be searched, and those that cannot.
+#[derive(Debug, Default)]
+pub struct Opened {
+    /// Files in the order of their first records.
+    pub sources: Vec<Source>,
+    /// Folders that cannot be listed, files that cannot be opened or hold no good record.
+    pub failures: Vec<Error>,
+}
+
+impl Opened {
+    /// Opens these files, and those with the ending `.b` in and below these folders, each once, with the indexes that lie
+    /// beside them.
+    ///
+    /// # Errors
+    /// No file, and why if something in its place cannot be read; more than 65,535.
+    pub fn all(paths: &[PathBuf]) -> Result<Self> {
+        let Listing {
+            paths: files,
+            mut failures,
+        } = Listing::of(paths);
+        if files.is_empty() && !failures.is_empty() {
+            return Err(failures.swap_remove(0));
+        }
+        let mut opened = Self {
+            sources: Vec::new(),
+            failures,
+        };
+        if files.is_empty() || files.len() > usize::from(u16::MAX) {
+            return Err(FileCount(files.len()).into());
+        }
+        let indexes = Indexes::beside(&files, Index::read);
+        let sources: Vec<Result<Source>> = files
+            .par_iter()
+            .map(|path| Source::open(path, DatumChoice::Auto, &indexes))
+            .collect();
+        for source in sources {
+            match source {
+                Ok(source) => opened.sources.push(source),
+                Err(failure) => opened.failures.push(failure),
+            }
+        }
+        let in_time = |a: &Source, b: &Source| a.first_s().total_cmp(&b.first_s());
+        opened.sources.sort_by(in_time);
+        Ok(opened)
+    }
+}

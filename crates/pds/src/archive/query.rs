@@ -1,0 +1,108 @@
+//! What is searched for.
+
+use std::f64::consts::FRAC_PI_2;
+
+use crate::pedr::Record;
+use areograph_base::{
+    altimetry::ShotFilter, body::Datum, time::Interval, units::RADIANS_PER_DEGREE,
+};
+use areograph_geom::window::{Region, WindowGrid};
+
+/// No two of the known datums are turned against each other by more than this, radians: 0.271° and
+/// 0.003° per decade, and pole differences of 0.0006°.
+const DATUM_MARGIN_RAD: f64 = 0.3 * RADIANS_PER_DEGREE;
+/// No shot is farther from its frame's mid-point than this, seconds: 9.5 shots of a clock that is one per cent off.
+const FRAME_MARGIN_S: f64 = 1.0;
+
+/// Which records are judged, and complained of when they are bad.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Judged {
+    /// All of them.
+    All,
+    /// Those that may have a shot in a window; of the others only the mid-point is looked at.
+    Near,
+}
+
+/// Windows and what else shots must be.
+#[derive(Debug)]
+pub struct Query<'a> {
+    pub(super) windows: WindowGrid,
+    /// Shots to keep; none keeps all with a return.
+    pub(super) filter: Option<&'a ShotFilter>,
+    /// Times of shots to keep, corrected; none keeps all.
+    pub(super) time: Option<Interval>,
+    /// Seconds to add to time tags.
+    pub(super) correction_s: f64,
+    pub(super) judged: Judged,
+}
+
+impl<'a> Query<'a> {
+    /// Shots in any of the windows that pass the filter.
+    #[must_use]
+    pub fn new(windows: Vec<Region>, filter: &'a ShotFilter, judged: Judged) -> Self {
+        Self {
+            filter: Some(filter),
+            ..Self::unfiltered(windows, judged)
+        }
+    }
+
+    /// Shots in any of the windows, of every class, channel and attitude.
+    #[must_use]
+    pub fn unfiltered(windows: Vec<Region>, judged: Judged) -> Self {
+        Self {
+            windows: WindowGrid::new(windows, DATUM_MARGIN_RAD),
+            filter: None,
+            time: None,
+            correction_s: 0.0,
+            judged,
+        }
+    }
+
+    /// The same with `correction_s` added to time tags.
+    #[must_use]
+    pub fn corrected(self, correction_s: f64) -> Self {
+        Self {
+            correction_s,
+            ..self
+        }
+    }
+
+    /// The same for shots of an interval alone, by their corrected time.
+    #[must_use]
+    pub fn within(self, time: Option<Interval>) -> Self {
+        Self { time, ..self }
+    }
+
+    /// How much farther than in the coordinates of its file a direction may be from a window, radians.
+    pub(super) fn margin_rad(datum: Datum) -> f64 {
+        if datum == Datum::Iau2000 {
+            0.0
+        } else {
+            DATUM_MARGIN_RAD
+        }
+    }
+
+    /// Whether a record may have a shot that is asked for; in doubt, and when its place is impossible, it may.
+    pub(super) fn may_matter(&self, record: &Record, datum: Datum) -> bool {
+        let mid = record.mid_point();
+        let margin_rad = mid.reach_rad + Self::margin_rad(datum);
+        let may_be_inside = mid.latitude_rad.abs() > FRAC_PI_2
+            || self
+                .windows
+                .any_within(mid.longitude_rad, mid.latitude_rad, margin_rad);
+        may_be_inside && {
+            // Most records have been passed over without a look at their time.
+            let tag_s = record.time_s.get();
+            self.may_have_time(tag_s, tag_s)
+        }
+    }
+
+    /// Whether shots of frames with these tags may be of the time that is asked for; tags that are no numbers may.
+    pub(super) fn may_have_time(&self, first_tag_s: f64, last_tag_s: f64) -> bool {
+        self.time.is_none_or(|time| {
+            let time = time.padded(FRAME_MARGIN_S);
+            !(first_tag_s + self.correction_s > time.stop.seconds()
+                || last_tag_s + self.correction_s < time.start.seconds())
+        })
+    }
+}

@@ -1,0 +1,412 @@
+//! The search: a load of pieces is read, then searched by all threads in waves, whose results are handed on in order.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    iter, mem,
+    ops::Range,
+    sync::atomic::AtomicBool,
+};
+
+use rayon::prelude::*;
+
+use super::{Found, Query, Source, scan::Scan};
+use crate::pedr::{Complaint, RECORD_BYTES, Reader, Stretch};
+use areograph_base::error::{Cause, Error, Kind, Result, Stopped};
+
+/// Records in memory at once: 51 MB, more than any day of the mission takes.
+pub(super) const LOAD_RECORDS: usize = 1 << 16;
+/// Pieces of a load: each may be of another file, which is open meanwhile.
+const PIECES_MAX: usize = 256;
+/// Records of a task: 0.4 MB, and at most 1.5 MB of shots.
+const TASK_RECORDS: usize = 512;
+/// Tasks of a wave for each thread, and the most of a wave: what they find stands in memory at once.
+const TASKS_PER_THREAD: usize = 16;
+const TASKS_MAX: usize = 64;
+
+/// Records that cannot be used: more than so many and `UNUSABLE_SHARE_MAX` of a file are damage of the file and not of some
+/// records. Files of the archive have none, or a few.
+pub const UNUSABLE_MAX: u64 = 10;
+/// The same of a file.
+pub const UNUSABLE_SHARE_MAX: f64 = 0.01;
+
+/// A file that has lost more than some records.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "{unusable} of {records} records cannot be used; expected at most {UNUSABLE_MAX} and one in a hundred. The first: {first}"
+)]
+struct Damaged {
+    unusable: u64,
+    records: u64,
+    first: String,
+}
+
+impl Cause for Damaged {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "the file was damaged on its way: fetch it again, or leave it out".to_owned()
+    }
+}
+
+/// Records of a file that cannot be used.
+#[derive(Default)]
+struct Unusable {
+    count: u64,
+    first: Option<String>,
+}
+
+impl Unusable {
+    fn add(&mut self, complaints: &[Complaint]) {
+        for complaint in complaints.iter().filter(|of| of.leaves_out()) {
+            self.count += 1;
+            self.first.get_or_insert_with(|| complaint.to_string());
+        }
+    }
+
+    /// Why a file with so many of them is not to be used.
+    fn failure(self, records: u64) -> Option<Damaged> {
+        let allowed = UNUSABLE_SHARE_MAX * records as f64 + UNUSABLE_MAX as f64;
+        let first = self.first.filter(|_| self.count as f64 > allowed)?;
+        Some(Damaged {
+            unusable: self.count,
+            records,
+            first,
+        })
+    }
+}
+
+/// Takes what a search gives, in the order of files, records and shots.
+pub trait Sink {
+    /// Takes what a stretch of file `file` gave.
+    ///
+    /// # Errors
+    /// One that ends the search.
+    fn found(&mut self, file: usize, found: Found) -> Result<()>;
+
+    /// Takes the failure of file `file`: nothing more comes of it, and what came may be incomplete.
+    ///
+    /// # Errors
+    /// One that ends the search.
+    fn failed(&mut self, file: usize, failure: Error) -> Result<()>;
+}
+
+/// Searches the files for shots that are asked for, and gives them to `sink`; `stop` is looked at before every piece.
+///
+/// What comes does not depend on the number of threads. There may be at most 65,535 files.
+///
+/// # Errors
+/// What `sink` gives; [`Stopped`].
+pub fn search(
+    sources: &[Source],
+    query: &Query<'_>,
+    stop: &AtomicBool,
+    sink: &mut dyn Sink,
+) -> Result<()> {
+    let mut search = Search {
+        sources,
+        query,
+        stop,
+        sink,
+        readers: BTreeMap::new(),
+        failed: BTreeSet::new(),
+        unusable: BTreeMap::new(),
+        buffers: Vec::new(),
+    };
+    let mut pieces: Vec<Piece> = Vec::new();
+    for (file, source) in sources.iter().enumerate() {
+        if let Some(next) = sources.get(file + 1) {
+            next.announce();
+        }
+        match source.rows_to_read(query, stop) {
+            Ok(rows) => pieces.extend(pieces_of(file, &rows)),
+            Err(failure) if failure.kind() == Kind::Interrupted => return Err(failure),
+            Err(failure) => {
+                search.load_all(&mut pieces, 0)?;
+                search.sink.failed(file, failure)?;
+            }
+        }
+        search.load_all(&mut pieces, LOAD_RECORDS)?;
+    }
+    search.load_all(&mut pieces, 0)
+}
+
+/// Successive rows of a file.
+struct Piece {
+    file: usize,
+    rows: Range<usize>,
+    /// Where the piece before ends.
+    after: usize,
+    is_first: bool,
+    is_last: bool,
+}
+
+/// The pieces of a file: at least one, which may be empty.
+fn pieces_of(file: usize, rows: &[Range<usize>]) -> Vec<Piece> {
+    let mut pieces: Vec<Piece> = rows
+        .iter()
+        .flat_map(|rows| {
+            let starts = rows.clone().step_by(LOAD_RECORDS);
+            starts.map(move |start| start..rows.end.min(start + LOAD_RECORDS))
+        })
+        .scan(0, |end, rows| {
+            let after = std::mem::replace(end, rows.end);
+            Some((after, rows))
+        })
+        .map(|(after, rows)| Piece {
+            file,
+            rows,
+            after,
+            is_first: false,
+            is_last: false,
+        })
+        .collect();
+    if pieces.is_empty() {
+        pieces.push(Piece {
+            file,
+            rows: 0..0,
+            after: 0,
+            is_first: false,
+            is_last: false,
+        });
+    }
+    pieces[0].is_first = true;
+    if let Some(last) = pieces.last_mut() {
+        last.is_last = true;
+    }
+    pieces
+}
+
+/// How many of the pieces, from the first on, fit into memory together; each does so by itself.
+fn next_load(pieces: &[Piece]) -> usize {
+    let mut records = 0;
+    let fit = pieces.iter().take(PIECES_MAX).take_while(|piece| {
+        records += piece.rows.len();
+        records <= LOAD_RECORDS
+    });
+    fit.count()
+}
+
+/// A search under way.
+struct Search<'a> {
+    sources: &'a [Source],
+    query: &'a Query<'a>,
+    stop: &'a AtomicBool,
+    sink: &'a mut dyn Sink,
+    /// Files that pieces in memory are of.
+    readers: BTreeMap<usize, Reader>,
+    failed: BTreeSet<usize>,
+    unusable: BTreeMap<usize, Unusable>,
+    /// Memory of earlier pieces, for the next ones: fresh memory costs as much as reading.
+    buffers: Vec<Vec<u8>>,
+}
+
+/// A part of a piece in memory, for one thread.
+struct Task {
+    piece: usize,
+    rows: Range<usize>,
+    /// Where the task before ends.
+    after: usize,
+    is_first: bool,
+    is_last: bool,
+}
+
+impl Search<'_> {
+    /// Reads and searches pieces, one load after the other, until few enough are left.
+    ///
+    /// * `left` – records that may be left, to be read with what comes next
+    fn load_all(&mut self, pieces: &mut Vec<Piece>, left: usize) -> Result<()> {
+        let are_few = |pieces: &[Piece]| {
+            let records: usize = pieces.iter().map(|piece| piece.rows.len()).sum();
+            pieces.is_empty() || records < left && pieces.len() < PIECES_MAX
+        };
+        while !are_few(pieces) {
+            let load = next_load(pieces);
+            self.load(&pieces[..load])?;
+            pieces.drain(..load);
+        }
+        Ok(())
+    }
+
+    /// Reads and searches pieces that fit into memory together.
+    fn load(&mut self, pieces: &[Piece]) -> Result<()> {
+        Stopped::check(self.stop)?;
+        let mut failures = self.open(pieces);
+        let stretches = self.read(pieces, &mut failures);
+        let tasks: Vec<Task> = (0..)
+            .zip(pieces)
+            .flat_map(|(number, piece)| tasks_of(number, piece))
+            .collect();
+        let (sources, query) = (self.sources, self.query);
+        let wave = (TASKS_PER_THREAD * rayon::current_num_threads()).min(TASKS_MAX);
+        for tasks in tasks.chunks(wave) {
+            Stopped::check(self.stop)?;
+            let scanned: Vec<Found> = tasks
+                .par_iter()
+                .map(|task| {
+                    let (piece, stretch) = (&pieces[task.piece], &stretches[task.piece]);
+                    scan(
+                        &sources[piece.file],
+                        query,
+                        piece.file,
+                        task,
+                        stretch.as_ref(),
+                    )
+                })
+                .collect();
+            for (task, found) in tasks.iter().zip(scanned) {
+                self.hand_on(pieces[task.piece].file, task, found, &mut failures)?;
+            }
+        }
+        let buffers = stretches.into_iter().flatten().map(Stretch::into_buffer);
+        let mut kept_bytes = 0;
+        self.buffers = buffers
+            .take_while(|buffer| {
+                kept_bytes += buffer.capacity();
+                kept_bytes <= 2 * LOAD_RECORDS * RECORD_BYTES
+            })
+            .collect();
+        Ok(())
+    }
+
+    /// Opens the files of these pieces, but those that failed, and closes others. Gives the failures.
+    fn open(&mut self, pieces: &[Piece]) -> BTreeMap<usize, Error> {
+        // By file, some rows of it.
+        let read = pieces.iter().filter(|piece| !piece.rows.is_empty());
+        let files: BTreeMap<usize, &Range<usize>> =
+            read.map(|piece| (piece.file, &piece.rows)).collect();
+        self.readers.retain(|file, _| files.contains_key(file));
+        let mut failures = BTreeMap::new();
+        for (file, rows) in files {
+            if self.failed.contains(&file) || self.readers.contains_key(&file) {
+                continue;
+            }
+            let opened = self.sources[file].reopen().and_then(|reader| {
+                reader.prepare(rows)?;
+                Ok(reader)
+            });
+            match opened {
+                Ok(reader) => drop(self.readers.insert(file, reader)),
+                Err(failure) => drop(failures.insert(file, failure)),
+            }
+        }
+        failures
+    }
+
+    /// Reads the pieces; none of a file that failed.
+    fn read(
+        &mut self,
+        pieces: &[Piece],
+        failures: &mut BTreeMap<usize, Error>,
+    ) -> Vec<Option<Stretch>> {
+        let earlier = mem::take(&mut self.buffers).into_iter();
+        let buffers: Vec<Vec<u8>> = earlier
+            .chain(iter::repeat_with(Vec::new))
+            .take(pieces.len())
+            .collect();
+        let readers = &self.readers;
+        let stretches: Vec<Option<Result<Stretch>>> = pieces
+            .par_iter()
+            .zip(buffers)
+            .map(|(piece, buffer)| {
+                let reader = readers.get(&piece.file)?;
+                Some(reader.stretch(piece.rows.clone(), buffer))
+            })
+            .collect();
+        let read = stretches.into_iter().zip(pieces);
+        read.map(|(stretch, piece)| match stretch? {
+            Ok(stretch) => Some(stretch),
+            Err(failure) => {
+                failures.entry(piece.file).or_insert(failure);
+                None
+            }
+        })
+        .collect()
+    }
+
+    /// Gives what was found to the sink, unless the file has failed.
+    fn hand_on(
+        &mut self,
+        file: usize,
+        task: &Task,
+        found: Found,
+        failures: &mut BTreeMap<usize, Error>,
+    ) -> Result<()> {
+        if self.failed.contains(&file) {
+            return Ok(());
+        }
+        let mut failure = failures.remove(&file);
+        if failure.is_none() && task.is_last {
+            let reader = self.readers.get(&file);
+            failure = reader.and_then(|reader| reader.unchanged().err());
+        }
+        if failure.is_none() {
+            let unusable = self.unusable.entry(file).or_default();
+            unusable.add(&found.complaints);
+            self.sink.found(file, found)?;
+            if task.is_last {
+                let source = &self.sources[file];
+                let unusable = self.unusable.remove(&file).unwrap_or_default();
+                let damaged = unusable.failure(source.records() as u64);
+                failure = damaged.map(|damaged| Error::from(damaged).in_file(source.path()));
+            }
+        }
+        if let Some(failure) = failure {
+            self.failed.insert(file);
+            self.sink.failed(file, failure)?;
+        }
+        Ok(())
+    }
+}
+
+/// Searches the rows of a task.
+fn scan(
+    source: &Source,
+    query: &Query<'_>,
+    file: usize,
+    task: &Task,
+    stretch: Option<&Stretch>,
+) -> Found {
+    let mut found = Found::new();
+    if task.is_first {
+        found.frames_read = source.records() as u64;
+        source.tell_of_head(&mut found);
+    }
+    if let Some(stretch) = stretch {
+        let scan = Scan {
+            source,
+            // The number of files was checked.
+            index: u16::try_from(file).unwrap_or(u16::MAX),
+            query,
+        };
+        scan.rows(stretch, task.rows.clone(), &mut found);
+    }
+    let end = if task.is_last {
+        source.records()
+    } else {
+        task.rows.end
+    };
+    source.tell_known(query, task.after..end, &mut found);
+    if task.is_last {
+        source.tell_of_end(&mut found);
+    }
+    found
+}
+
+/// The parts of a piece: at least one, which may be empty.
+fn tasks_of(number: usize, piece: &Piece) -> Vec<Task> {
+    let rows = piece.rows.clone();
+    let count = rows.len().div_ceil(TASK_RECORDS).max(1);
+    let task = |part: usize| {
+        let start = rows.start + part * TASK_RECORDS;
+        Task {
+            piece: number,
+            rows: start..rows.end.min(start + TASK_RECORDS),
+            after: if part == 0 { piece.after } else { start },
+            is_first: piece.is_first && part == 0,
+            is_last: piece.is_last && part + 1 == count,
+        }
+    };
+    (0..count).map(task).collect()
+}

@@ -1,0 +1,86 @@
+//! What keeps the rows of an image from being read.
+
+use areograph_base::error::{Cause, Kind};
+
+/// A file whose rows cannot be read, or are not those of its label.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum HrscError {
+    #[error("the label stands alone; expected the rows of the image behind it")]
+    NoRows,
+    #[error("the label has no {key}; expected {expected}")]
+    Lacking {
+        key: &'static str,
+        expected: &'static str,
+    },
+    #[error("{key} is {value:?}; expected {expected}")]
+    Raster {
+        key: &'static str,
+        value: String,
+        expected: String,
+    },
+    #[error(
+        "the file has {found} bytes; expected {expected}, as FILE_RECORDS and RECORD_BYTES of its label say"
+    )]
+    Size { found: u64, expected: u64 },
+    #[error(
+        "{lines} rows of {row_bytes} bytes from byte {start} on end at byte {end}; expected the end of the file, {bytes}"
+    )]
+    Rows {
+        lines: u32,
+        row_bytes: u64,
+        start: u64,
+        end: u64,
+        bytes: u64,
+    },
+    #[error("{key} of the VICAR label is {vicar}; expected {expected}, as the PDS label says")]
+    Vicar {
+        key: &'static str,
+        vicar: u64,
+        expected: u64,
+    },
+    #[error(
+        "SAMPLE_TYPE is {stated:?}, but {because}; expected samples in the order that it tells"
+    )]
+    ByteOrder { stated: String, because: String },
+    #[error(
+        "{known} of {lines} rows have a time and an exposure in their prefixes; expected all of them, or nearly so"
+    )]
+    NoTimes { known: usize, lines: usize },
+    #[error(
+        "rows {first} to {last} have no time in their prefixes, and those beside them do not tell it"
+    )]
+    TimeGap { first: usize, last: usize },
+    #[error(
+        "row {row} begins {early_s:.6} s before the exposure of the row before it ends, and rows beside them do not tell \
+         which time is wrong"
+    )]
+    Overlap { row: usize, early_s: f64 },
+}
+
+impl Cause for HrscError {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::NoRows => "give the file of the archive (.IMG), with its rows",
+            Self::Lacking { .. } | Self::Raster { .. } => {
+                "give a level-2 file of the archive (h…2.IMG) as it was delivered"
+            }
+            Self::Size { .. } | Self::Rows { .. } => {
+                "fetch the file again: it is cut off, prolonged, or not as the archive delivers it"
+            }
+            Self::Vicar { .. } => {
+                "fetch the file again: its labels are those of two images, or one of them was edited"
+            }
+            Self::ByteOrder { .. } => {
+                "fetch the file again: its samples were swapped after the label was written, or its label was edited"
+            }
+            Self::NoTimes { .. } | Self::TimeGap { .. } | Self::Overlap { .. } => {
+                "fetch the file again; or give the pieces of its line times as images.exposures, and its label without rows"
+            }
+        }
+        .to_owned()
+    }
+}

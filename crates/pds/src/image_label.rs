@@ -1,0 +1,166 @@
+//! What labels of images have in common, whichever camera took them: what is read of one, and how its values are.
+
+use super::label::{Entry, Label, LabelError};
+use areograph_base::{
+    constants::MARS_NAME,
+    image::ImageFields,
+    instruments::{Instrument, LabelNames},
+    line_times::LinePiece,
+};
+
+/// What the label of an image says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImageLabel {
+    /// Product, for example `M04/02852` or `H5270_0000_IR2.IMG`.
+    pub product_id: Option<String>,
+    /// The camera that took it.
+    pub instrument: Instrument,
+    /// Times, exposure, summing and size.
+    pub fields: ImageFields,
+    /// UTC of the end of the last line.
+    pub utc_stop: Option<String>,
+    /// Times of the lines, where each row of the file has its own.
+    pub lines: Option<RowTimes>,
+}
+
+/// Times of the lines of an image as its rows have them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RowTimes {
+    /// Number of lines.
+    pub lines: u32,
+    /// Pieces of one line period each, in order; between two of them may be a gap. None where the rows tell no times.
+    pub pieces: Vec<LinePiece>,
+    /// What is wrong with some of them, one sentence each.
+    pub remarks: Vec<String>,
+}
+
+/// The first of `cameras` whose names the label has, the filter under its PDS3 keyword or its ISIS keyword; a camera that
+/// is known without a filter takes any.
+pub(super) fn camera<'a>(
+    label: &Label,
+    cameras: &'a [Instrument],
+    [pds, isis]: [&str; 2],
+) -> Result<&'a Instrument, LabelError> {
+    let value = |pds, isis| {
+        let entry = either(label, pds, isis)?;
+        Ok(entry.map_or("", |entry| entry.value.as_str()))
+    };
+    let instrument = value("INSTRUMENT_ID", "INSTRUMENTID")?;
+    let filter = value(pds, isis)?;
+    let fits = |names: &LabelNames| {
+        let own_filter = names.filter.as_deref().unwrap_or(filter);
+        names.instrument.eq_ignore_ascii_case(instrument) && own_filter.eq_ignore_ascii_case(filter)
+    };
+    let found = cameras.iter().find(|camera| fits(&camera.label));
+    found.ok_or_else(|| LabelError::Instrument {
+        found: format!("{instrument} {filter}").trim().to_owned(),
+        known: cameras
+            .iter()
+            .map(|camera| camera.label.to_string())
+            .collect(),
+    })
+}
+
+/// Positions, attitudes and the shape of the target are those of this spacecraft, whose keywords are given, and Mars.
+pub(super) fn of_mars(
+    label: &Label,
+    spacecraft: [&str; 2],
+    expected: &'static str,
+) -> Result<(), LabelError> {
+    let required = [
+        (spacecraft, expected),
+        (["TARGET_NAME", "TARGETNAME"], MARS_NAME),
+    ];
+    for ([pds, isis], expected) in required {
+        if let Some(entry) = either(label, pds, isis)?
+            && !entry.value.replace('_', " ").eq_ignore_ascii_case(expected)
+        {
+            return Err(other_image(&entry.key, &entry.value, expected));
+        }
+    }
+    Ok(())
+}
+
+/// Lines and samples of a map are no places on a detector.
+pub(super) fn as_taken(label: &Label) -> Result<(), LabelError> {
+    match projection(label) {
+        Some(entry) => Err(other_image(
+            "OBJECT",
+            &entry.group,
+            "the image as its camera took it, which no map projection describes",
+        )),
+        None => Ok(()),
+    }
+}
+
+/// Something of the map projection of an image that has one.
+pub(super) fn projection(label: &Label) -> Option<&Entry> {
+    let mut entries = label.entries.iter();
+    entries.find(|entry| ["IMAGE_MAP_PROJECTION", "MAPPING"].contains(&&*entry.group))
+}
+
+pub(super) fn other_image(key: &str, value: &str, expected: &'static str) -> LabelError {
+    LabelError::OtherImage {
+        key: key.to_owned(),
+        value: value.to_owned(),
+        expected,
+    }
+}
+
+/// The entry under its PDS3 keyword or its ISIS keyword, unless it says that the value is not known.
+pub(super) fn either<'a>(
+    label: &'a Label,
+    pds: &str,
+    isis: &str,
+) -> Result<Option<&'a Entry>, LabelError> {
+    let entry = match label.only(pds)? {
+        None => label.only(isis)?,
+        found => found,
+    };
+    Ok(entry.filter(|entry| known(entry)))
+}
+
+/// Whether the entry has a value and not one of the words for "none".
+pub(super) fn known(entry: &Entry) -> bool {
+    !matches!(
+        entry.value.to_ascii_uppercase().as_str(),
+        "" | "UNK" | "N/A" | "NULL"
+    )
+}
+
+pub(super) fn text(entry: Option<&Entry>) -> Option<String> {
+    entry.map(|entry| entry.value.clone())
+}
+
+pub(super) fn value_error(entry: &Entry, expected: &'static str) -> LabelError {
+    LabelError::Value {
+        key: entry.key.clone(),
+        value: entry.written(),
+        expected,
+    }
+}
+
+pub(super) fn count(entry: &Entry, least: u32) -> Result<u32, LabelError> {
+    entry
+        .value
+        .parse()
+        .ok()
+        .filter(|count| (least..=1_000_000).contains(count))
+        .ok_or_else(|| {
+            value_error(
+                entry,
+                if least == 0 {
+                    "a count from 0"
+                } else {
+                    "a count from 1"
+                },
+            )
+        })
+}
+
+pub(super) fn optional_count(entry: Option<&Entry>, least: u32) -> Result<Option<u32>, LabelError> {
+    entry
+        .filter(|entry| known(entry))
+        .map(|entry| count(entry, least))
+        .transpose()
+}

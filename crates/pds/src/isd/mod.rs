@@ -1,0 +1,259 @@
+//! Image support data (ISD) of the Community Sensor Model, as ALE writes and usgscsm reads them: camera, line times and
+//! tables of positions and rotations of a line scanner.
+//!
+//! Numbers mean what usgscsm makes of them. The first line and the first sample have their centres at 0.5; a row
+//! `[line, time, period]` of `line_scan_rate` holds from that line coordinate on, and there
+//! `t = centre + time + period · (coordinate − line + 0.5)`.
+
+mod camera;
+mod document;
+mod rewrite;
+mod tables;
+mod target;
+
+use std::{fs, path::Path};
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use self::{
+    camera::{Samples, camera},
+    document::{IsdError, Object},
+    tables::span,
+};
+pub use self::{
+    rewrite::{StraightCamera, rewrite_isd},
+    tables::{Rotations, States},
+    target::ForeignBody,
+};
+use areograph_base::{
+    error::{IoError, Locate, Result},
+    image::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN},
+    instruments::Instrument,
+    line_times::{LinePiece, LineTimes},
+    time::{Et, Interval},
+    units::METRES_PER_KM,
+};
+
+/// Largest file that is read: a node for each of 52 000 lines makes 20 MB, and a document in memory is ten times its file.
+const BYTES_MAX: u64 = 1 << 26;
+/// Limits of line and sample numbers, beyond every camera.
+const LINES_MAX: u32 = 10_000_000;
+const SAMPLES_MAX: u32 = 1_000_000;
+const SUMMING_MAX: u32 = 1_000;
+/// Line scanners, the cameras that are read.
+const LINE_SCANNER: &str = "USGS_ASTRO_LINE_SCANNER_SENSOR_MODEL";
+/// Ephemeris times, seconds: five centuries around J2000.
+const ET_S: [f64; 2] = [-1e10, 1e10];
+/// Radii of a target, kilometres.
+const RADIUS_KM: [f64; 2] = [0.1, 1e6];
+
+/// What the support data of a line scanner say.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImageSupport {
+    /// The camera, its axes turned about the boresight where the line would not lie along Y.
+    pub instrument: Instrument,
+    /// When lines were exposed.
+    pub line_times: LineTimes,
+    /// Samples in a line.
+    pub samples: u32,
+    /// First detector pixel, counted from 0.
+    pub first_detector: u32,
+    /// Detector lines in a line.
+    pub downtrack_summing: u32,
+    /// Detector pixels in a sample.
+    pub crosstrack_summing: u32,
+    /// Equatorial and polar radius of the target, metres.
+    pub radii_m: [f64; 2],
+    /// Number of the target in NAIF's kernels, where it is told.
+    pub target: Option<i64>,
+    /// Name of the spacecraft.
+    pub platform: String,
+    /// Positions and rotations.
+    pub tables: SupportTables,
+}
+
+/// Where the spacecraft was and how it looked, over the time of an image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SupportTables {
+    /// The spacecraft.
+    pub position: States,
+    /// The Sun.
+    pub sun: States,
+    /// Attitude of the bus; what stays leads to the camera.
+    pub pointing: Rotations,
+    /// Rotation of the target.
+    pub body_rotation: Rotations,
+}
+
+/// Reads the support data of a line scanner.
+///
+/// # Errors
+/// The system's refusal to read; what is no JSON; another kind of camera, or a distortion that is not known; a key that
+/// is missing or holds what it cannot; tables that do not reach over the image.
+pub fn read_isd(path: &Path) -> Result<ImageSupport> {
+    let bytes = fs::metadata(path)
+        .map_err(IoError::on("read"))
+        .in_file(path)?
+        .len();
+    if bytes > BYTES_MAX {
+        let max = BYTES_MAX;
+        return Err(IsdError::TooLarge { bytes, max }).in_file(path);
+    }
+    let text = fs::read(path).map_err(IoError::on("read")).in_file(path)?;
+    parse(&text).in_file(path)
+}
+
+fn parse(text: &[u8]) -> Result<ImageSupport> {
+    let value: Value = serde_json::from_slice(text).map_err(|error| {
+        // Positions in the text say more than the kind of what was not expected.
+        IsdError::NotJson(error.to_string())
+    })?;
+    let document = Object::document(&value)?;
+    let model = document.text("name_model")?;
+    if model != LINE_SCANNER {
+        return Err(document.refused("name_model", LINE_SCANNER).into());
+    }
+    let samples = Samples {
+        crosstrack_summing: document.whole("detector_sample_summing", [1, SUMMING_MAX])?,
+        downtrack_summing: document.whole("detector_line_summing", [1, SUMMING_MAX])?,
+        first_detector: document.whole("starting_detector_sample", [0, SAMPLES_MAX])?,
+        samples: document.whole("image_samples", [1, SAMPLES_MAX])?,
+    };
+    let line_times = line_times(&document)?;
+    let radii_m = radii_m(&document)?;
+    let mut pointing = Rotations::of(&document, "instrument_pointing")?;
+    let (instrument, turn) = camera(&document, samples, &pointing.constant)?;
+    pointing.constant = turn * pointing.constant;
+    let tables = SupportTables {
+        position: States::of(&document, "instrument_position", radii_m[1])?,
+        sun: States::of(&document, "sun_position", radii_m[1])?,
+        pointing,
+        body_rotation: Rotations::of(&document, "body_rotation")?,
+    };
+    tables.reach_over(&document, &line_times)?;
+    Ok(ImageSupport {
+        instrument,
+        line_times,
+        samples: samples.samples,
+        first_detector: samples.first_detector,
+        downtrack_summing: samples.downtrack_summing,
+        crosstrack_summing: samples.crosstrack_summing,
+        radii_m,
+        target: target(&document)?,
+        platform: document.text("name_platform")?.to_owned(),
+        tables,
+    })
+}
+
+/// Equatorial and polar radius.
+fn radii_m(document: &Object<'_>) -> std::result::Result<[f64; 2], IsdError> {
+    let radii = document.object("radii")?;
+    let unit = radii.text("unit")?;
+    let metres = match unit {
+        "km" => METRES_PER_KM,
+        "m" => 1.0,
+        _ => return Err(radii.refused("unit", "km or m")),
+    };
+    let limits = RADIUS_KM.map(|km| km * METRES_PER_KM / metres);
+    let equatorial = radii.number("semimajor", limits)?;
+    let polar = radii.number("semiminor", [limits[0], equatorial])?;
+    Ok([equatorial * metres, polar * metres])
+}
+
+/// NAIF's number of the target, which ALE writes beside the camera.
+fn target(document: &Object<'_>) -> std::result::Result<Option<i64>, IsdError> {
+    const KEY: &str = "BODY_CODE";
+    if !document.has("naif_keywords") {
+        return Ok(None);
+    }
+    let keywords = document.object("naif_keywords")?;
+    keywords.has(KEY).then(|| keywords.code(KEY)).transpose()
+}
+
+/// Line times from the rows of `line_scan_rate`.
+fn line_times(document: &Object<'_>) -> Result<LineTimes> {
+    const KEY: &str = "line_scan_rate";
+    let lines = document.whole("image_lines", [IMAGE_LINES_MIN, LINES_MAX])?;
+    let centre_s = document.number("center_ephemeris_time", ET_S)?;
+    let start_s = document.number("starting_ephemeris_time", ET_S)?;
+    let rows = document.rows::<3>(KEY)?;
+    let mut pieces = Vec::with_capacity(rows.len());
+    for [line, time_s, period_s] in rows {
+        let first = line.floor();
+        if !(0.0..f64::from(lines)).contains(&first) {
+            let expected = format!("rows that begin within the {lines} lines of image_lines");
+            return Err(document.refused(KEY, expected).into());
+        }
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "within the lines of the image, as was just found"
+        )]
+        let first_line = first as u32;
+        let start = Et::from_seconds(centre_s + time_s + period_s * (first - line + 0.5));
+        pieces.push(LinePiece {
+            first_line,
+            start,
+            period_s,
+        });
+    }
+    let times = LineTimes::of_pieces(lines, &pieces)?;
+    let late_s = times.start().seconds() - start_s;
+    // Written so that NaN is refused too.
+    if !(late_s.abs() <= times.mean_period_s()) {
+        let expected = format!(
+            "the time of the first line by line_scan_rate and center_ephemeris_time, {:.6}, within a line",
+            times.start().seconds()
+        );
+        return Err(document.refused("starting_ephemeris_time", expected).into());
+    }
+    if !(times.duration_s() < IMAGE_DURATION_END_S) {
+        let expected = format!(
+            "less than {IMAGE_DURATION_END_S} s in all; {lines} lines take {:.1} s",
+            times.duration_s()
+        );
+        return Err(document.refused(KEY, expected).into());
+    }
+    Ok(times)
+}
+
+impl SupportTables {
+    /// Makes sure that every table reaches over the image, to a line at both ends.
+    fn reach_over(
+        &self,
+        document: &Object<'_>,
+        times: &LineTimes,
+    ) -> std::result::Result<(), IsdError> {
+        let exposed = times.interval();
+        let of_tables = [
+            ("instrument_position", &self.position.et_s),
+            ("instrument_pointing", &self.pointing.et_s),
+            ("body_rotation", &self.body_rotation.et_s),
+        ];
+        for (key, et_s) in of_tables {
+            let [first, last] = span(et_s).map(Et::from_seconds);
+            let held = Interval::new(first, last).padded(times.mean_period_s());
+            if !(held.contains(exposed.start) && held.contains(exposed.stop)) {
+                let expected = format!(
+                    "epochs over the whole image, which is exposed from {} to {}",
+                    exposed.start.seconds(),
+                    exposed.stop.seconds()
+                );
+                return Err(document.object(key)?.refused("ephemeris_times", expected));
+            }
+        }
+        Ok(())
+    }
+
+    /// First and last instant that positions and attitudes are both tabulated for.
+    #[must_use]
+    pub fn span(&self) -> Interval {
+        let [position, pointing] =
+            [&self.position.et_s, &self.pointing.et_s].map(|et_s| span(et_s));
+        Interval::new(
+            Et::from_seconds(position[0].max(pointing[0])),
+            Et::from_seconds(position[1].min(pointing[1])),
+        )
+    }
+}

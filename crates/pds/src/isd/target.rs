@@ -1,0 +1,111 @@
+//! Whether support data are of a body, and in its frame.
+
+use super::{ImageSupport, SupportTables};
+use areograph_base::{
+    body::Body,
+    error::{Cause, Kind},
+    time::Et,
+    units::METRES_PER_KM,
+};
+use areograph_geom::{attitude::rotation_vector, body_rotation::body_rotation};
+
+/// Radii within this are those of the products' frame, metres: files are written to ten metres.
+const RADIUS_TOLERANCE_M: f64 = 10.0;
+
+/// Support data of another body.
+#[derive(Debug, thiserror::Error)]
+pub enum ForeignBody {
+    /// By its number.
+    #[error(
+        "image {image}: naif_keywords.BODY_CODE is {code}; expected {}, {}",
+        .body.naif().body,
+        .body.names().name
+    )]
+    Code {
+        /// The image.
+        image: String,
+        /// The body that was expected.
+        body: Body,
+        /// The number of another one in NAIF's kernels.
+        code: i64,
+    },
+    /// By its radii.
+    #[error(
+        "image {image}: radii are {:.2} and {:.2} km; expected {:.2} and {:.2} km, those of {body} in {}",
+        .radii_m[0] / METRES_PER_KM,
+        .radii_m[1] / METRES_PER_KM,
+        .body.model().equatorial_radius_m / METRES_PER_KM,
+        .body.model().polar_radius_m / METRES_PER_KM,
+        .body.names().short_frame
+    )]
+    Radii {
+        /// The image.
+        image: String,
+        /// The body that was expected.
+        body: Body,
+        /// Equatorial and polar radius of another one, metres.
+        radii_m: [f64; 2],
+    },
+}
+
+impl Cause for ForeignBody {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        let (Self::Code { body, .. } | Self::Radii { body, .. }) = self;
+        format!(
+            "leave the image out, or write the body that its support data are of: expected is {body} (body = \"{}\")",
+            body.word()
+        )
+    }
+}
+
+impl ImageSupport {
+    /// Whether an image, known as `image`, sees `body`.
+    ///
+    /// # Errors
+    /// [`ForeignBody`], with the number or the radii that are not the body's.
+    pub fn sees(&self, body: Body, image: &str) -> Result<(), ForeignBody> {
+        let image = || image.to_owned();
+        let of_body = i64::from(body.naif().body);
+        if let Some(code) = self.target.filter(|code| *code != of_body) {
+            let image = image();
+            return Err(ForeignBody::Code { image, body, code });
+        }
+        let model = body.model();
+        let expected_m = [model.equatorial_radius_m, model.polar_radius_m];
+        let radii_m = self.radii_m;
+        let mut apart_m = radii_m.iter().zip(expected_m).map(|(a, b)| (a - b).abs());
+        if apart_m.any(|apart_m| apart_m > RADIUS_TOLERANCE_M) {
+            let image = image();
+            return Err(ForeignBody::Radii {
+                image,
+                body,
+                radii_m,
+            });
+        }
+        Ok(())
+    }
+}
+
+impl SupportTables {
+    /// What does not agree with the frame of products on `body` at the instant `at`, of the file `name`.
+    #[must_use]
+    pub fn frame_remark(&self, body: Body, name: &str, at: Et) -> Option<String> {
+        let rotation = &self.body_rotation;
+        let theirs = rotation.constant * rotation.at(at.seconds()).0;
+        let ours = *body_rotation(body, at).matrix();
+        let turn_rad = rotation_vector(&(theirs * ours.transpose())).norm();
+        // Written so that NaN is remarked on too.
+        if turn_rad <= body.rotation_tolerance_rad() {
+            return None;
+        }
+        Some(format!(
+            "the support data {name} turn {body} by {:.1} m on the equator against {}; positions are taken in their frame",
+            turn_rad * body.model().equatorial_radius_m,
+            body.names().short_frame
+        ))
+    }
+}

@@ -1,0 +1,416 @@
+//! Labels in the Object Description Language of PDS3 and its PVL dialect of ISIS: `KEY = value`,
+//! `OBJECT = …`/`END_OBJECT`, `GROUP = …`/`END_GROUP`, `END`.
+//!
+//! The parser is tolerant: what is no assignment is skipped, so that a label can stand before binary
+//! data and a damaged one still gives what it holds.
+
+use areograph_base::error::{Cause, Kind};
+
+/// Bytes of a file that are looked at; labels are a few kilobytes.
+pub const LABEL_BYTES_MAX: usize = 1 << 20;
+
+/// One `KEY = value` of a label.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Entry {
+    /// Name of the object or group that it stands in, upper case; empty outside of any.
+    pub group: String,
+    /// Number of that object or group, counted from 1 in the order of their openings; 0 outside of any.
+    pub block: usize,
+    /// The keyword in upper case.
+    pub key: String,
+    /// The value without quotes and unit, white space over line ends made one blank.
+    pub value: String,
+    /// The unit that stood in `<>`, lower case.
+    pub unit: Option<String>,
+}
+
+impl Entry {
+    /// The value with its unit, as it was written.
+    #[must_use]
+    pub fn written(&self) -> String {
+        match &self.unit {
+            Some(unit) => format!("{} <{unit}>", self.value),
+            None => self.value.clone(),
+        }
+    }
+}
+
+/// A parsed label.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Label {
+    /// The assignments in the order of the file.
+    pub entries: Vec<Entry>,
+    /// Whether the statement `END` was found behind them.
+    pub ended: bool,
+}
+
+/// A label is not what it should be.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum LabelError {
+    /// No assignment at all.
+    #[error("no label found: expected lines KEY = value in the first {LABEL_BYTES_MAX} bytes")]
+    NoLabel,
+    /// A value that is not of its kind.
+    #[error("{key} is {value:?}; expected {expected}")]
+    Value {
+        /// The keyword.
+        key: String,
+        /// Its value.
+        value: String,
+        /// What it should be.
+        expected: &'static str,
+    },
+    /// Nothing says that the label is whole.
+    #[error("the label has no END; expected that statement behind its last line")]
+    NoEnd,
+    /// Two values under one keyword.
+    #[error("{key} stands in the label as {first:?} and as {second:?}; expected one value")]
+    Twice {
+        /// The keyword.
+        key: String,
+        /// Its first value.
+        first: String,
+        /// The first one that differs from it.
+        second: String,
+    },
+    /// The image of another mission, of something else than Mars, or no longer as the camera took it.
+    #[error("{key} is {value:?}; expected {expected}")]
+    OtherImage {
+        /// The keyword.
+        key: String,
+        /// Its value.
+        value: String,
+        /// What it should be.
+        expected: &'static str,
+    },
+    /// Two values that are those of two images.
+    #[error("{} is {:?}, but {} is {:?}; expected those of one image", .keys[0], .values[0], .keys[1], .values[1])]
+    Contradiction {
+        /// Their keywords.
+        keys: [String; 2],
+        /// The values.
+        values: [String; 2],
+    },
+    /// Another instrument's image.
+    #[error("instrument is {found:?}; expected {}", listed(known))]
+    Instrument {
+        /// Instrument and filter of the label.
+        found: String,
+        /// Those of the cameras that are known.
+        known: Vec<String>,
+    },
+}
+
+impl Cause for LabelError {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::NoLabel => "give a PDS3 label (.lbl, .imq) or an ISIS label (.lbl, .cub)",
+            Self::NoEnd => "fetch the file again: its label is cut off or damaged",
+            Self::Twice { .. } => {
+                "find out which of the two holds, and leave only that in the label"
+            }
+            Self::OtherImage { .. } => {
+                "give the label of an image that the camera's spacecraft took of Mars, as the camera took it"
+            }
+            Self::Value { .. } => {
+                "correct the label, or write the key in the image's table of the configuration"
+            }
+            Self::Instrument { .. } => {
+                "name the camera that took it with `instrument` in the image's table: one of those that areograph knows, or an \
+                 instrument file"
+            }
+            Self::Contradiction { .. } => {
+                "check that files and labels are not exchanged or renamed; one of the two is of another image"
+            }
+        }
+        .to_owned()
+    }
+}
+
+/// `a, b or c`.
+fn listed(words: &[String]) -> String {
+    match words {
+        [first @ .., before, last] => [first, &[format!("{before} or {last}")]]
+            .concat()
+            .join(", "),
+        _ => words.concat(),
+    }
+}
+
+/// The label at the start of `bytes`; at most [`LABEL_BYTES_MAX`] of them are looked at.
+///
+/// # Errors
+/// [`LabelError::NoLabel`] when there is no assignment.
+pub fn parse(bytes: &[u8]) -> Result<Label, LabelError> {
+    parse_whole(&bytes[..bytes.len().min(LABEL_BYTES_MAX)])
+}
+
+/// The same for text of any length, as that of control networks.
+///
+/// # Errors
+/// [`LabelError::NoLabel`] when there is no assignment.
+pub fn parse_whole(bytes: &[u8]) -> Result<Label, LabelError> {
+    let mut scanner = Scanner { bytes, at: 0 };
+    let mut label = Label::default();
+    let mut groups: Vec<(String, usize)> = Vec::new();
+    let mut blocks = 0;
+    while let Some(word) = scanner.word() {
+        let key = word.to_ascii_uppercase();
+        let after_word = scanner.at;
+        if !(key.starts_with(|first: char| first.is_ascii_alphabetic() || first == '^')
+            && scanner.take(b'='))
+        {
+            match key.as_str() {
+                "END" => {
+                    label.ended = true;
+                    break;
+                }
+                "END_OBJECT" | "END_GROUP" | "ENDOBJECT" | "ENDGROUP" => drop(groups.pop()),
+                _ => {}
+            }
+            // The rest of the line is no assignment either: the mark of an SFDU, or junk.
+            scanner.at = after_word;
+            scanner.skip_line();
+            continue;
+        }
+        let (value, unit) = scanner.value();
+        match key.as_str() {
+            "OBJECT" | "GROUP" | "BEGIN_OBJECT" | "BEGIN_GROUP" => {
+                // Every entry repeats its group's name, so junk must not make it long.
+                let name: String = value.chars().take(64).collect();
+                blocks += 1;
+                groups.push((name.to_ascii_uppercase(), blocks));
+            }
+            "END_OBJECT" | "END_GROUP" | "ENDOBJECT" | "ENDGROUP" => drop(groups.pop()),
+            _ => {
+                let (group, block) = groups.last().cloned().unwrap_or_default();
+                label.entries.push(Entry {
+                    group,
+                    block,
+                    key,
+                    value,
+                    unit,
+                });
+            }
+        }
+    }
+    if label.entries.is_empty() {
+        return Err(LabelError::NoLabel);
+    }
+    Ok(label)
+}
+
+impl Label {
+    /// The first entry with this keyword (upper case), wherever it stands.
+    #[must_use]
+    pub fn find(&self, key: &str) -> Option<&Entry> {
+        self.entries.iter().find(|entry| entry.key == key)
+    }
+
+    /// The one value with this keyword (upper case), wherever it stands; it may stand there several times.
+    ///
+    /// # Errors
+    /// [`LabelError::Twice`] for another value under the same keyword.
+    pub fn only(&self, key: &str) -> Result<Option<&Entry>, LabelError> {
+        only(self.entries.iter().filter(|entry| entry.key == key))
+    }
+
+    /// The same directly in objects or groups of this name (upper case too).
+    ///
+    /// # Errors
+    /// [`LabelError::Twice`] for another value under the same keyword.
+    pub fn only_in(&self, group: &str, key: &str) -> Result<Option<&Entry>, LabelError> {
+        let entries = self.entries.iter();
+        only(entries.filter(|entry| entry.key == key && entry.group == group))
+    }
+}
+
+fn only<'a>(mut entries: impl Iterator<Item = &'a Entry>) -> Result<Option<&'a Entry>, LabelError> {
+    let first = entries.next();
+    let differs = |entry: &&Entry| {
+        first.is_some_and(|first| first.value != entry.value || first.unit != entry.unit)
+    };
+    match (first, entries.find(differs)) {
+        (Some(first), Some(second)) => Err(LabelError::Twice {
+            key: first.key.clone(),
+            first: first.written(),
+            second: second.written(),
+        }),
+        _ => Ok(first),
+    }
+}
+
+/// Walks over the bytes of a label; every step moves forward.
+struct Scanner<'a> {
+    bytes: &'a [u8],
+    at: usize,
+}
+
+impl Scanner<'_> {
+    fn peek(&self) -> Option<u8> {
+        self.bytes.get(self.at).copied()
+    }
+
+    fn take(&mut self, required: u8) -> bool {
+        self.skip_space();
+        let found = self.peek() == Some(required);
+        self.at += usize::from(found);
+        found
+    }
+
+    fn skip_line(&mut self) {
+        let rest = &self.bytes[self.at.min(self.bytes.len())..];
+        self.at += rest
+            .iter()
+            .position(|byte| matches!(byte, b'\n' | b'\r'))
+            .unwrap_or(rest.len());
+    }
+
+    /// Over white space, `/* … */` and `# …` comments.
+    fn skip_space(&mut self) {
+        while let Some(byte) = self.peek() {
+            if byte.is_ascii_whitespace() || byte == 0 {
+                self.at += 1;
+            } else if byte == b'#' {
+                self.skip_line();
+            } else if self.bytes[self.at..].starts_with(b"/*") {
+                // Comments end with their line, closed or not.
+                let rest = &self.bytes[self.at..];
+                let line = rest.split(|byte| *byte == b'\n').next().unwrap_or(rest);
+                let end = line.windows(2).position(|pair| pair == b"*/");
+                self.at += end.map_or(line.len(), |end| end + 2);
+            } else {
+                break;
+            }
+        }
+    }
+
+    /// The next run of bytes up to white space or `=`; `None` at the end.
+    fn word(&mut self) -> Option<String> {
+        self.skip_space();
+        let rest = self.bytes.get(self.at..).filter(|rest| !rest.is_empty())?;
+        let stops = |byte: &u8| byte.is_ascii_whitespace() || *byte == b'=';
+        // A lone "=" is a word of its own, so that junk cannot stop the walk.
+        let length = rest.iter().position(stops).unwrap_or(rest.len()).max(1);
+        self.at += length;
+        Some(String::from_utf8_lossy(&rest[..length]).into_owned())
+    }
+
+    /// A value and its unit.
+    fn value(&mut self) -> (String, Option<String>) {
+        self.skip_space();
+        let value = match self.peek() {
+            Some(quote @ (b'"' | b'\'')) => self.enclosed(quote),
+            Some(b'(') => self.enclosed(b')'),
+            Some(b'{') => self.enclosed(b'}'),
+            Some(_) => self.bare(),
+            None => String::new(),
+        };
+        while matches!(self.peek(), Some(b' ' | b'\t')) {
+            self.at += 1;
+        }
+        let unit = (self.peek() == Some(b'<')).then(|| self.enclosed(b'>').to_ascii_lowercase());
+        (value, unit)
+    }
+
+    /// What stands between the byte here and the next `close`, which may be lines away.
+    fn enclosed(&mut self, close: u8) -> String {
+        let rest = &self.bytes[self.at + 1..];
+        let length = rest.iter().position(|byte| *byte == close);
+        let inside = &rest[..length.unwrap_or(rest.len())];
+        self.at += 1 + inside.len() + usize::from(length.is_some());
+        let text = String::from_utf8_lossy(inside);
+        text.split_whitespace().collect::<Vec<_>>().join(" ")
+    }
+
+    /// A value without quotes: up to white space or a unit, on this line.
+    fn bare(&mut self) -> String {
+        let rest = &self.bytes[self.at..];
+        let stops = |byte: &u8| byte.is_ascii_whitespace() || *byte == b'<';
+        let length = rest.iter().position(stops).unwrap_or(rest.len());
+        self.at += length;
+        String::from_utf8_lossy(&rest[..length]).into_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn entry(label: &Label, key: &str) -> (String, Option<String>) {
+        let entry = label.find(key).unwrap();
+        (entry.value.clone(), entry.unit.clone())
+    }
+
+    #[test]
+    fn units_quotes_comments_and_nesting_are_understood() {
+        let text = b"CCSD3ZF0000100000001NJPL3IF0PDSX00000001\r\n/* a comment = no */\r\n\
+            A = 1.5 <MILLISECONDS> /* more */\r\nB = \"two\r\n   lines\"\r\n# C = 1\nC=(1, 2)\n\
+            Object = IsisCube\n Group = Dimensions\n  Lines = 12\n End_Group\n D = 4<km>\nEnd_Object\n\
+            E = '5'\nEND\nF = 6\n";
+        let label = parse(text).unwrap();
+        assert_eq!(
+            entry(&label, "A"),
+            ("1.5".into(), Some("milliseconds".into()))
+        );
+        assert_eq!(entry(&label, "B"), ("two lines".into(), None));
+        assert_eq!(entry(&label, "C"), ("1, 2".into(), None));
+        assert_eq!(entry(&label, "D"), ("4".into(), Some("km".into())));
+        assert_eq!(entry(&label, "E"), ("5".into(), None));
+        assert_eq!(label.find("F"), None);
+        let lines = label.only_in("DIMENSIONS", "LINES").unwrap().unwrap();
+        assert_eq!(lines.value, "12");
+        assert_eq!(label.only_in("ISISCUBE", "LINES"), Ok(None));
+        assert!(label.ended);
+        let blocks = ["A", "LINES", "D", "E"].map(|key| label.find(key).unwrap().block);
+        assert_eq!(blocks, [0, 2, 1, 0]);
+    }
+
+    #[test]
+    fn what_is_no_label_is_refused() {
+        for bytes in [&b""[..], b"END", b"\xFF\xD8\xFF\xE0\0\x10JFIF\0", b"= = ="] {
+            assert_eq!(parse(bytes), Err(LabelError::NoLabel));
+        }
+        assert_eq!(parse(b"no assignment\nat all"), Err(LabelError::NoLabel));
+    }
+
+    #[test]
+    fn one_keyword_has_one_value_and_a_whole_label_an_end() {
+        let label = parse(b"A = 1\nOBJECT = X\nA = 1\nB = 2\nEND_OBJECT\nB = 3 <km>\n").unwrap();
+        assert!(!label.ended);
+        assert_eq!(label.only("A").unwrap().unwrap().value, "1");
+        assert_eq!(label.only_in("X", "B").unwrap().unwrap().value, "2");
+        assert_eq!(label.only("C"), Ok(None));
+        assert_eq!(
+            label.only("B").unwrap_err().to_string(),
+            "B stands in the label as \"2\" and as \"3 <km>\"; expected one value"
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_parsed_or_refused(
+            bytes in proptest::collection::vec(any::<u8>(), 0..600)
+        ) {
+            let _ = parse(&bytes);
+        }
+
+        #[test]
+        fn any_mixture_of_label_pieces_is_parsed_or_refused(
+            pieces in proptest::collection::vec(
+                proptest::sample::select(vec![
+                    "OBJECT", "END_OBJECT", "GROUP", "=", "\"", "'", "(", ")", "<", ">", "/*", "*/",
+                    "#", "\n", "\r\n", " ", "KEY", "1.0", "END", "\0", "{", "}",
+                ]),
+                0..60,
+            )
+        ) {
+            let _ = parse(pieces.concat().as_bytes());
+        }
+    }
+}

@@ -1,0 +1,371 @@
+//! A PEDR file: its label, its records, and what is wrong with it.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    ops::Range,
+    path::{Path, PathBuf},
+    sync::{Arc, OnceLock},
+};
+
+use super::{
+    Complaint, FieldGuard, FileName, LABEL_BYTES, LABEL_RECORDS, PedrLabel, RECORD_BYTES, Reason,
+    Record, RecordError,
+    chronology::{Misplaced, in_order, misplaced},
+    foreign::{Foreign, label_records},
+};
+use areograph_base::error::{Cause, Error, IoError, Kind, Locate, Result};
+use areograph_store::files::file_name;
+
+/// A PEDR file in memory: all of it, or its head and some of its records.
+#[derive(Debug)]
+pub struct File {
+    path: PathBuf,
+    /// The label's bytes and then those of records.
+    bytes: Vec<u8>,
+    /// Bytes that the whole file has.
+    length: u64,
+    /// Row of the file that is the first in memory.
+    first_row: usize,
+    name: Option<FileName>,
+    label: PedrLabel,
+    /// Records that the label takes.
+    label_records: usize,
+    label_complaints: Vec<Complaint>,
+    /// Rows that do not fit into the chronology of the whole file.
+    misplaced: OnceLock<Chronology>,
+}
+
+/// A bad record, and what is wrong with it.
+#[derive(Debug)]
+pub(super) struct Bad {
+    row: usize,
+    record: Record,
+    error: RecordError,
+}
+
+/// Records that are judged at a time.
+const STEP: usize = 1_024;
+
+/// Rows of a file that do not fit into its chronology.
+pub(super) type Chronology = Arc<BTreeMap<usize, Misplaced>>;
+
+/// The path names something that cannot hold records.
+#[derive(Debug, thiserror::Error)]
+#[error("not a regular file")]
+struct NotAFile;
+
+impl Cause for NotAFile {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "name PEDR files (AP#####v.B) in pedr.files, not folders or devices".to_owned()
+    }
+}
+
+/// A file without a single good record.
+#[derive(Debug, thiserror::Error)]
+#[error("no good record: {why}")]
+struct NoGoodRecord {
+    why: String,
+    foreign: Option<Foreign>,
+}
+
+impl Cause for NoGoodRecord {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        self.foreign
+            .map_or(
+                "fetch the file again if it is a PEDR file (AP#####v.B), else leave it out",
+                Foreign::advice,
+            )
+            .to_owned()
+    }
+}
+
+/// Opens a file that can hold records.
+pub(super) fn open_regular(path: &Path) -> Result<fs::File> {
+    // Asked before opening: opening a pipe would wait for its writer.
+    let metadata = fs::metadata(path)
+        .map_err(IoError::on("open"))
+        .in_file(path)?;
+    if !metadata.is_file() {
+        return Err(NotAFile).in_file(path);
+    }
+    fs::File::open(path)
+        .map_err(IoError::on("open"))
+        .in_file(path)
+}
+
+impl File {
+    /// A file that is already in memory; `name` stands for its path.
+    #[must_use]
+    pub fn from_bytes(bytes: Vec<u8>, name: &Path) -> Self {
+        let length = bytes.len() as u64;
+        Self::of_length(bytes, length, name.to_owned())
+    }
+
+    /// A file of `length` bytes of which these are the first: at least those of the label, or all.
+    pub(super) fn of_length(bytes: Vec<u8>, length: u64, path: PathBuf) -> Self {
+        let mut file = Self {
+            name: FileName::parse(&path),
+            path,
+            bytes,
+            length,
+            first_row: 0,
+            label: PedrLabel::default(),
+            label_records: LABEL_RECORDS,
+            label_complaints: Vec::new(),
+            misplaced: OnceLock::new(),
+        };
+        file.read_label();
+        file
+    }
+
+    /// The same file with the records from row `first_row` on in memory: `bytes` holds them after as many bytes as the
+    /// label has. What does not fit into the chronology is told by the records in memory, unless `misplaced` says it.
+    pub(super) fn with_records(
+        &self,
+        first_row: usize,
+        bytes: Vec<u8>,
+        misplaced: Option<Chronology>,
+    ) -> Self {
+        Self {
+            path: self.path.clone(),
+            bytes,
+            length: self.length,
+            first_row,
+            name: self.name,
+            label: self.label.clone(),
+            label_records: self.label_records,
+            label_complaints: Vec::new(),
+            misplaced: misplaced.map_or_else(OnceLock::new, OnceLock::from),
+        }
+    }
+
+    /// The bytes of the label, as many as the file has of them.
+    #[must_use]
+    pub fn label_bytes(&self) -> &[u8] {
+        &self.bytes[..self.bytes.len().min(self.label_length())]
+    }
+
+    /// The memory of the file.
+    pub(super) fn into_bytes(self) -> Vec<u8> {
+        self.bytes
+    }
+
+    fn read_label(&mut self) {
+        let length = self.length;
+        if length < LABEL_BYTES as u64 {
+            let text = format!(
+                "the file has {length} bytes; expected at least the {LABEL_BYTES} of the label"
+            );
+            self.complain_of_label(Reason::TruncatedLabel, text);
+        }
+        match PedrLabel::parse(&self.bytes) {
+            Ok(label) => self.label = label,
+            Err(error) => self.complain_of_label(Reason::UnreadableLabel, error.to_string()),
+        }
+        let stated = self.label.label_records;
+        self.label_records = label_records(&self.bytes, stated, self.is_mapping(), self.guard());
+        if self.label_records != LABEL_RECORDS {
+            let text = format!(
+                "records begin after {} of the label; expected after {LABEL_RECORDS}",
+                self.label_records
+            );
+            self.complain_of_label(Reason::LabelKeyword, text);
+        }
+        for text in self.label.departures() {
+            self.complain_of_label(Reason::LabelKeyword, text);
+        }
+        let records = (self.label_records + self.record_count()) as u64;
+        if let Some(stated) = self.label.file_records.filter(|stated| *stated != records) {
+            let text = format!("the label states {stated} records; the file holds {records}");
+            self.complain_of_label(Reason::RecordCount, text);
+        }
+    }
+
+    fn complain_of_label(&mut self, reason: Reason, text: String) {
+        let complaint = self.complaint(None, reason, text);
+        self.label_complaints.push(complaint);
+    }
+
+    fn complaint(&self, record: Option<u32>, reason: Reason, text: String) -> Complaint {
+        Complaint {
+            file: file_name(&self.path),
+            record,
+            reason,
+            text,
+        }
+    }
+
+    /// The parts of the file's name, when it has the archive's form.
+    #[must_use]
+    pub const fn name(&self) -> Option<FileName> {
+        self.name
+    }
+
+    /// The attached label.
+    #[must_use]
+    pub const fn label(&self) -> &PedrLabel {
+        &self.label
+    }
+
+    /// Complaints of the label: they come before those of records.
+    #[must_use]
+    pub fn label_complaints(&self) -> &[Complaint] {
+        &self.label_complaints
+    }
+
+    /// Where the file lies.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Data records of the whole file, as many as its size has room for, whatever the label says.
+    #[must_use]
+    pub fn record_count(&self) -> usize {
+        let data = self.length.saturating_sub(self.label_length() as u64);
+        usize::try_from(data / RECORD_BYTES as u64).unwrap_or(usize::MAX)
+    }
+
+    /// The complaint of bytes after the last whole record, if there are any.
+    #[must_use]
+    pub fn trailing_complaint(&self) -> Option<Complaint> {
+        let data = self.length.checked_sub(self.label_length() as u64)?;
+        let trailing = data % RECORD_BYTES as u64;
+        (trailing > 0).then(|| {
+            let text =
+                format!("{trailing} bytes after the last whole record of {RECORD_BYTES}; ignored");
+            self.complaint(
+                Some(self.record_number(self.record_count())),
+                Reason::TrailingBytes,
+                text,
+            )
+        })
+    }
+
+    /// The complaint of the record in row `row`, counted from 0.
+    #[must_use]
+    pub fn record_complaint(&self, row: usize, error: &RecordError) -> Complaint {
+        self.complaint(
+            Some(self.record_number(row)),
+            error.reason(),
+            error.to_string(),
+        )
+    }
+
+    /// The data records in memory, as many as there is room for, whatever the label says.
+    #[must_use]
+    pub fn records(&self) -> &[Record] {
+        Record::slice_of(self.bytes.get(self.label_length()..).unwrap_or_default())
+    }
+
+    /// The rows of the file that are in memory.
+    #[must_use]
+    pub fn rows(&self) -> Range<usize> {
+        self.first_row..self.first_row + self.records().len()
+    }
+
+    /// The record in a row that is in memory.
+    pub(super) fn record(&self, row: usize) -> &Record {
+        &self.records()[row - self.first_row]
+    }
+
+    /// Makes sure that there is at least one good record in memory; a file of another kind holds none.
+    ///
+    /// # Errors
+    /// Of what kind the file is instead, what is wrong with the label, else with the first record.
+    pub fn require_records(&self) -> Result<()> {
+        let mut first = None;
+        for row in self.rows().step_by(STEP) {
+            if self.good_record(row..row + STEP, &mut first).is_some() {
+                return Ok(());
+            }
+        }
+        Err(self.no_good_record(first))
+    }
+
+    /// The first good record of these rows; without one, `first` is the first bad one of all that were looked at.
+    pub(super) fn good_record(
+        &self,
+        rows: Range<usize>,
+        first: &mut Option<Bad>,
+    ) -> Option<&Record> {
+        for (row, frame) in self.frames(rows, self.guard()) {
+            let record = self.record(row);
+            match frame {
+                Ok(_) => return Some(record),
+                Err(error) => {
+                    first.get_or_insert_with(|| Bad {
+                        row,
+                        record: Record::from_bytes(&record.to_bytes()),
+                        error,
+                    });
+                }
+            }
+        }
+        None
+    }
+
+    /// The failure of a file without a good record, of which this is the first, with what is wrong with it.
+    pub(super) fn no_good_record(&self, first: Option<Bad>) -> Error {
+        let record = first.as_ref().map(|bad| &bad.record);
+        let foreign = Foreign::of(&self.bytes, record);
+        let label = self.label_complaints.first();
+        let why = match (foreign, label, first) {
+            (Some(foreign), _, _) => foreign.to_string(),
+            (None, Some(complaint), _) => complaint.text.clone(),
+            (None, None, Some(bad)) => {
+                format!("record {}: {}", self.record_number(bad.row), bad.error)
+            }
+            (None, None, None) => format!("nothing of {RECORD_BYTES} bytes follows the label"),
+        };
+        Error::from(NoGoodRecord { why, foreign }).in_file(&self.path)
+    }
+
+    /// BLAKE3 of the file's bytes, hexadecimal.
+    #[must_use]
+    pub fn blake3(&self) -> String {
+        blake3::hash(&self.bytes).to_hex().to_string()
+    }
+
+    /// Rows that do not fit into the chronology of the file.
+    pub(super) fn misplaced(&self) -> &BTreeMap<usize, Misplaced> {
+        self.misplaced.get_or_init(|| {
+            // Told faster, and true of nearly every file.
+            if in_order(self.records().iter().map(|record| record.time_s.get())) {
+                return Chronology::default();
+            }
+            let times_s: Vec<Option<f64>> = self.sound_times().collect();
+            Arc::new(misplaced(&times_s))
+        })
+    }
+
+    /// Number of the record in row `row` of the data, counted from 1 with the label records.
+    #[must_use]
+    pub fn record_number(&self, row: usize) -> u32 {
+        u32::try_from(row + self.label_records + 1).unwrap_or(u32::MAX)
+    }
+
+    /// Bytes before the first data record.
+    pub(super) const fn label_length(&self) -> usize {
+        self.label_records * RECORD_BYTES
+    }
+
+    /// Which fields the file's software wrote.
+    pub(super) fn guard(&self) -> FieldGuard {
+        FieldGuard::new(self.label.software_version)
+    }
+
+    /// Whether the file's name is one of the mapping phase.
+    pub(super) fn is_mapping(&self) -> bool {
+        self.name.is_some_and(FileName::is_mapping)
+    }
+}

@@ -1,0 +1,409 @@
+//! A PEDR file read a stretch at a time: archives are searched where they lie, in little memory.
+//!
+//! Stretches are copied by `pread`. A mapping would save the copy, but whoever shortens a mapped file ends the process:
+//! docs/decisions/0020.
+
+use std::{
+    fs, io,
+    ops::Range,
+    os::unix::fs::{FileExt as _, MetadataExt as _},
+    path::Path,
+    sync::{Arc, OnceLock},
+    thread,
+    time::{Duration, SystemTime},
+};
+
+use rayon::prelude::*;
+use rustix::fs::Advice;
+use zerocopy::IntoBytes as _;
+
+use super::{
+    Complaint, FieldGuard, File, Frame, LABEL_BYTES, RECORD_BYTES, Record, RecordError,
+    chronology::{in_order, misplaced},
+    file::Chronology,
+    neighbours::NEIGHBOURS,
+};
+use areograph_base::error::{Cause, IoError, Kind, Locate, Result};
+use areograph_store::files::Identity;
+
+/// Records among which the first good one is looked for.
+const FIRST_RECORDS: usize = 16;
+const NEXT_RECORDS: usize = 1_024;
+/// How long a file is waited for that was written just now, and how often.
+const WAIT: Duration = Duration::from_millis(100);
+const WAITS: usize = 30;
+/// Records whose times are read at once.
+const CHRONOLOGY_RECORDS: usize = 1 << 14;
+/// Bytes that a thread reads at once.
+const READ_BYTES: usize = 1 << 20;
+
+/// A PEDR file open for reading.
+#[derive(Debug)]
+pub struct Reader {
+    handle: fs::File,
+    identity: Identity,
+    head: File,
+    /// What does not fit into the chronology of the file, once it is known.
+    misplaced: OnceLock<Chronology>,
+}
+
+/// Some successive records of a file, with neighbours to judge them by.
+#[derive(Debug)]
+pub struct Stretch {
+    file: File,
+    /// Rows that the stretch is about; neighbours of them are in memory as well.
+    inner: Range<usize>,
+}
+
+/// A file is not what it was when it was opened.
+#[derive(Debug, thiserror::Error)]
+enum Changed {
+    #[error("the file ended early while it was read: it had {0} bytes when it was opened")]
+    Shorter(u64),
+    #[error("the file changed while it was read")]
+    Content,
+    #[error("the file was removed while it was read")]
+    Removed,
+    #[error("the file is being written")]
+    Young,
+}
+
+impl Cause for Changed {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "run again when nobody is writing to the PEDR files".to_owned()
+    }
+}
+
+impl File {
+    /// Reads a file as a whole; a [`Reader`] reads one piece by piece.
+    ///
+    /// # Errors
+    /// The system's refusal; not a regular file; one that changes meanwhile. What is wrong inside is complained of, not
+    /// refused.
+    pub fn open(path: &Path) -> Result<Self> {
+        Reader::open(path)?.whole()
+    }
+}
+
+impl Reader {
+    /// Opens a file and reads its label.
+    ///
+    /// # Errors
+    /// As [`File::open`].
+    pub fn open(path: &Path) -> Result<Self> {
+        let handle = super::file::open_regular(path)?;
+        let metadata = handle.metadata();
+        let metadata = metadata.map_err(IoError::on("look at")).in_file(path)?;
+        let identity = Identity::of(&metadata);
+        let mut label = vec![0; LABEL_BYTES.min(usize::try_from(identity.bytes).unwrap_or(0))];
+        read_at(&handle, &mut label, 0, identity.bytes).in_file(path)?;
+        Ok(Self {
+            handle,
+            identity,
+            head: File::of_length(label, identity.bytes, path.to_owned()),
+            misplaced: OnceLock::new(),
+        })
+    }
+
+    /// The file without its records: name, label, and what is wrong with it as a whole.
+    #[must_use]
+    pub const fn head(&self) -> &File {
+        &self.head
+    }
+
+    /// What the file system said of the file when it was opened.
+    #[must_use]
+    pub const fn identity(&self) -> Identity {
+        self.identity
+    }
+
+    /// Reads some rows, counted from 0, into `buffer`; those that are not there are left out.
+    ///
+    /// # Errors
+    /// What the disk refuses; a file that has become shorter.
+    pub fn stretch(&self, rows: Range<usize>, buffer: Vec<u8>) -> Result<Stretch> {
+        let chronology = if self.reaches_all(&rows) {
+            None
+        } else {
+            Some(self.chronology()?)
+        };
+        self.stretch_in(rows, buffer, chronology)
+    }
+
+    /// Reads the chronology of the file, unless these rows tell it by themselves: once, before several threads ask for
+    /// stretches of the file.
+    ///
+    /// # Errors
+    /// What the disk refuses; a file that has become shorter.
+    pub fn prepare(&self, rows: &Range<usize>) -> Result<()> {
+        if !self.reaches_all(rows) {
+            self.chronology()?;
+        }
+        Ok(())
+    }
+
+    /// Whether all records of the file are in memory with these rows and their neighbours.
+    fn reaches_all(&self, rows: &Range<usize>) -> bool {
+        rows.start <= NEIGHBOURS && rows.end.saturating_add(NEIGHBOURS) >= self.head.record_count()
+    }
+
+    /// The same for records that nobody will judge: the rest of the file is not looked at.
+    ///
+    /// # Errors
+    /// As [`stretch`](Self::stretch).
+    pub fn unjudged(&self, rows: Range<usize>, buffer: Vec<u8>) -> Result<Stretch> {
+        self.stretch_in(rows, buffer, Some(Chronology::default()))
+    }
+
+    /// The same for a chronology that is known; without, it is told by the rows in memory.
+    fn stretch_in(
+        &self,
+        rows: Range<usize>,
+        buffer: Vec<u8>,
+        chronology: Option<Chronology>,
+    ) -> Result<Stretch> {
+        let end = rows.end.min(self.head.record_count());
+        let start = rows.start.min(end);
+        let first_row = start.saturating_sub(NEIGHBOURS);
+        let last_row = (end + NEIGHBOURS).min(self.head.record_count());
+        let buffer = self.read(first_row..last_row, buffer)?;
+        Ok(Stretch {
+            file: self.head.with_records(first_row, buffer, chronology),
+            inner: start..end,
+        })
+    }
+
+    /// The bytes of some rows, after as many as the label has, as in the file.
+    fn read(&self, rows: Range<usize>, mut buffer: Vec<u8>) -> Result<Vec<u8>> {
+        let label = self.head.label_length();
+        buffer.resize(label + rows.len() * RECORD_BYTES, 0);
+        let from = (label + rows.start * RECORD_BYTES) as u64;
+        let parts = buffer[label..].par_chunks_mut(READ_BYTES);
+        let read = |(number, part): (usize, &mut [u8])| {
+            let from = from + (number * READ_BYTES) as u64;
+            read_at(&self.handle, part, from, self.identity.bytes)
+        };
+        let read = parts.enumerate().try_for_each(read);
+        read.in_file(self.head.path())?;
+        Ok(buffer)
+    }
+
+    /// Takes the word of an index for it that every record fits into the chronology.
+    pub fn set_in_order(&self) {
+        let _ = self.misplaced.set(Chronology::default());
+    }
+
+    /// What does not fit into the chronology of the file, by all its records.
+    fn chronology(&self) -> Result<Chronology> {
+        if let Some(known) = self.misplaced.get() {
+            return Ok(Arc::clone(known));
+        }
+        let mut times_s = Vec::new();
+        let mut buffer = Vec::new();
+        let records = self.head.record_count();
+        for start in (0..records).step_by(CHRONOLOGY_RECORDS) {
+            buffer = self.read(start..records.min(start + CHRONOLOGY_RECORDS), buffer)?;
+            let piece = self.head.with_records(start, buffer, None);
+            times_s.extend(piece.sound_times());
+            buffer = piece.into_bytes();
+        }
+        let found = Chronology::new(misplaced(&times_s));
+        Ok(Arc::clone(self.misplaced.get_or_init(|| found)))
+    }
+
+    /// Reads all of the file.
+    ///
+    /// # Errors
+    /// What the disk refuses; a file that has become shorter, has changed or lost its name.
+    fn whole(&self) -> Result<File> {
+        let path = self.head.path();
+        let length = usize::try_from(self.identity.bytes).unwrap_or(usize::MAX);
+        let mut bytes = Vec::new();
+        bytes
+            .try_reserve_exact(length)
+            .map_err(|_| IoError::on("read")(io::ErrorKind::OutOfMemory.into()))
+            .in_file(path)?;
+        bytes.resize(length, 0);
+        read_at(&self.handle, &mut bytes, 0, self.identity.bytes).in_file(path)?;
+        self.unchanged()?;
+        Ok(File::from_bytes(bytes, path))
+    }
+
+    /// Has the system read the file ahead; whether it does is its own affair.
+    pub fn announce(&self) {
+        let _ = rustix::fs::fadvise(&self.handle, 0, None, Advice::WillNeed);
+    }
+
+    /// Makes sure that the file is what it was when it was opened, and still has a name.
+    ///
+    /// # Errors
+    /// It is not.
+    pub fn unchanged(&self) -> Result<()> {
+        let path = self.head.path();
+        let metadata = self.handle.metadata();
+        let metadata = metadata.map_err(IoError::on("look at")).in_file(path)?;
+        if metadata.nlink() == 0 {
+            return Err(Changed::Removed).in_file(path);
+        }
+        let now = Identity::of(&metadata);
+        if (now.bytes, now.modified) != (self.identity.bytes, self.identity.modified) {
+            return Err(Changed::Content).in_file(path);
+        }
+        Ok(())
+    }
+
+    /// Makes sure that the file is the one that had this identity before.
+    ///
+    /// # Errors
+    /// It is another one, or has changed.
+    pub fn require_identity(&self, earlier: &Identity) -> Result<()> {
+        let content = |of: &Identity| (of.device, of.inode, of.bytes, of.modified);
+        if content(&self.identity) == content(earlier) {
+            return Ok(());
+        }
+        Err(Changed::Content).in_file(self.head.path())
+    }
+
+    /// Makes sure that the file was not written just now, so that any later change shows in its times; a young file is
+    /// waited for.
+    ///
+    /// # Errors
+    /// It is still being written.
+    pub fn require_steady(&self) -> Result<()> {
+        for _ in 0..WAITS {
+            if self.identity.is_steady(SystemTime::now()) {
+                return self.unchanged();
+            }
+            thread::sleep(WAIT);
+        }
+        Err(Changed::Young).in_file(self.head.path())
+    }
+
+    /// The bytes after the last whole record.
+    ///
+    /// # Errors
+    /// What the disk refuses; a file that has become shorter.
+    pub fn trailing_bytes(&self) -> Result<Vec<u8>> {
+        let from = (self.head.label_length() + self.head.record_count() * RECORD_BYTES) as u64;
+        let length = self.identity.bytes.saturating_sub(from);
+        let mut bytes = vec![0; usize::try_from(length).unwrap_or(0)];
+        read_at(&self.handle, &mut bytes, from, self.identity.bytes).in_file(self.head.path())?;
+        Ok(bytes)
+    }
+
+    /// Time tag of the first good record, ET seconds; a file of another kind holds none.
+    ///
+    /// # Errors
+    /// What is wrong with the label, else with the first record; what the disk refuses.
+    pub fn require_records(&self) -> Result<f64> {
+        let (mut row, mut next, mut first) = (0, FIRST_RECORDS, None);
+        while row < self.head.record_count() {
+            // Of sound records one fits into any chronology.
+            let chronology = Chronology::default();
+            let stretch = self.stretch_in(row..row + next, Vec::new(), Some(chronology))?;
+            if let Some(good) = stretch.file.good_record(stretch.inner.clone(), &mut first) {
+                return Ok(good.time_s.get());
+            }
+            (row, next) = (row + next, NEXT_RECORDS);
+        }
+        Err(self.head.no_good_record(first))
+    }
+}
+
+impl Stretch {
+    /// Those of the records in rows `rows` of the file that the stretch is about, with their rows.
+    pub fn records(&self, rows: Range<usize>) -> impl Iterator<Item = (usize, &Record)> {
+        self.about(rows).map(|row| (row, self.file.record(row)))
+    }
+
+    /// The frames of the rows `rows` of the file that the stretch is about, with their rows: each is judged with its
+    /// neighbours, which cost less the more rows are asked for at once.
+    pub fn frames(
+        &self,
+        rows: Range<usize>,
+        guard: FieldGuard,
+    ) -> impl Iterator<Item = (usize, std::result::Result<Frame<'_>, RecordError>)> {
+        self.file.frames(self.about(rows), guard)
+    }
+
+    /// The complaint of the record in row `row` of the file.
+    #[must_use]
+    pub fn complaint(&self, row: usize, error: &RecordError) -> Complaint {
+        self.file.record_complaint(row, error)
+    }
+
+    /// Number of the record in row `row` of the file.
+    #[must_use]
+    pub fn record_number(&self, row: usize) -> u32 {
+        self.file.record_number(row)
+    }
+
+    /// Whether the records, and their neighbours in memory, follow each other in time without sharing a shot.
+    #[must_use]
+    pub fn is_in_order(&self) -> bool {
+        in_order(self.file.records().iter().map(|record| record.time_s.get()))
+    }
+
+    /// Those of the rows that the stretch is about.
+    fn about(&self, rows: Range<usize>) -> Range<usize> {
+        let start = rows.start.clamp(self.inner.start, self.inner.end);
+        start..rows.end.clamp(start, self.inner.end)
+    }
+
+    /// The bytes of the records that the stretch is about.
+    #[must_use]
+    pub fn bytes(&self) -> &[u8] {
+        let first = self.inner.start - self.file.rows().start;
+        self.file.records()[first..first + self.inner.len()].as_bytes()
+    }
+
+    /// The memory, for the next stretch.
+    #[must_use]
+    pub fn into_buffer(self) -> Vec<u8> {
+        self.file.into_bytes()
+    }
+}
+
+/// Fills `buffer` from the byte `from` of a file that had `bytes` bytes.
+fn read_at(handle: &fs::File, buffer: &mut [u8], from: u64, bytes: u64) -> Result<()> {
+    handle
+        .read_exact_at(buffer, from)
+        .map_err(|error| match error.kind() {
+            io::ErrorKind::UnexpectedEof => Changed::Shorter(bytes).into(),
+            _ => IoError::on("read")(error).into(),
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[allow(clippy::disallowed_methods, reason = "a file of a test")]
+    fn a_file_that_changes_while_it_is_read_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("ap19019l.b");
+        fs::write(&path, vec![b' '; 10_000]).unwrap();
+        assert_eq!(File::open(&path).unwrap().into_bytes(), vec![b' '; 10_000]);
+        let refused = |change: &dyn Fn(&fs::File)| {
+            let reader = Reader::open(&path).unwrap();
+            change(&fs::File::options().write(true).open(&path).unwrap());
+            let failure = reader.whole().unwrap_err();
+            assert_eq!(failure.kind(), Kind::Input);
+            failure.to_string()
+        };
+        let said = refused(&|file| file.set_len(9_000).unwrap());
+        assert!(said.contains("ap19019l.b: the file ended early"), "{said}");
+        let said = refused(&|file| file.set_len(10_000).unwrap());
+        assert!(said.contains("the file changed while"), "{said}");
+        // Other bytes, as many as before: the time tells.
+        let said = refused(&|file| file.set_modified(SystemTime::UNIX_EPOCH).unwrap());
+        assert!(said.contains("the file changed while"), "{said}");
+        let said = refused(&|_| fs::remove_file(&path).unwrap());
+        assert!(said.contains("the file was removed"), "{said}");
+    }
+}

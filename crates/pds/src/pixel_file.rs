@@ -1,0 +1,373 @@
+//! Files of pixels: images as the archive has them, MOC's and HRSC's, and what stands in for them: ISIS cubes, TIFF and PNG of
+//! one band of grey.
+//!
+//! All of them are read strip by strip, in 8 bits. Numbers of other kinds are shown between the least and the largest one.
+
+mod cube;
+mod pictures;
+mod prefixed;
+mod pyramid;
+mod rows;
+
+use std::path::{Path, PathBuf};
+
+pub use self::pyramid::Pyramid;
+use self::{
+    cube::Cube,
+    pictures::Picture,
+    rows::{Rows, Scale},
+};
+use super::{
+    hrsc::{Raster, is_hrsc},
+    image_file::{Complaint, ImageFile, LineState, Strip, Strips},
+    image_label::{ImageLabel, projection},
+    label::{Label, LabelError, parse},
+    moc::image_label,
+    read_label::Labelled,
+};
+use areograph_base::{
+    error::{Cause, IoError, Kind, Locate as _, Result},
+    instruments::Instrument,
+};
+
+/// A file of pixels that is opened.
+#[derive(Debug)]
+pub enum PixelFile {
+    /// An image as the archive has it.
+    Archive(Box<ImageFile>),
+    /// Anything else.
+    Other(Box<OtherFile>),
+}
+
+/// A cube, a picture, or an image whose rows are samples as they are.
+#[derive(Debug)]
+pub struct OtherFile {
+    path: PathBuf,
+    kind: OtherKind,
+    /// Lines and samples.
+    size: [u32; 2],
+    label: Option<ImageLabel>,
+    is_projected: bool,
+}
+
+#[derive(Debug)]
+enum OtherKind {
+    Cube(Cube),
+    Picture(Picture),
+    Prefixed(Raster),
+}
+
+/// A file whose pixels cannot be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PixelFileError {
+    /// A value of a label.
+    #[error("{key} is {value:?}; expected {expected}")]
+    Value {
+        /// The keyword.
+        key: &'static str,
+        /// Its value.
+        value: String,
+        /// What it should be.
+        expected: &'static str,
+    },
+    /// A cube whose pixels end before their last line.
+    #[error("the file has {found} bytes; expected {expected} by its label")]
+    Short {
+        /// Bytes of the file.
+        found: u64,
+        /// Bytes that the label tells.
+        expected: u64,
+    },
+    /// A picture that its library refuses, or of another kind.
+    #[error("{format}: {reason}")]
+    Picture {
+        /// Its format.
+        format: &'static str,
+        /// What is wrong.
+        reason: String,
+    },
+}
+
+impl Cause for PixelFileError {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::Value { .. } => {
+                "give a cube of one band as ISIS writes it, with the pixels in the file"
+            }
+            Self::Short { .. } => "fetch or write the cube again: it is cut off",
+            Self::Picture { .. } => {
+                "give a whole picture of one band of grey with 8, 16 or 32 bits a pixel, a TIFF without compression, with LZW or with deflate"
+            }
+        }
+        .to_owned()
+    }
+}
+
+impl PixelFile {
+    /// Opens a file by what stands in it: a cube, a TIFF, a PNG, or an image of the archive by one of `cameras`.
+    ///
+    /// # Errors
+    /// The system's refusal to read; those of [`ImageFile::open`] and of [`read_label`](super::read_label()); [`PixelFileError`].
+    pub fn open(path: &Path, cameras: &[Instrument]) -> Result<Self> {
+        let labelled = Labelled::open(path)?;
+        let start = &labelled.start;
+        if let Some(picture) = Picture::recognise(start) {
+            let size = picture.rows(path).in_file(path)?.size();
+            return Ok(Self::Other(Box::new(OtherFile {
+                path: path.to_owned(),
+                kind: OtherKind::Picture(picture),
+                size,
+                label: None,
+                is_projected: false,
+            })));
+        }
+        let label = parse(start).in_file(path)?;
+        if is_hrsc(&label) && !is_cube(&label) {
+            return Self::prefixed(&labelled, &label, cameras);
+        }
+        if !is_cube(&label) {
+            return Ok(Self::Archive(Box::new(ImageFile::open(path, cameras)?)));
+        }
+        let cube = Cube::of(&label, path).in_file(path)?;
+        Ok(Self::Other(Box::new(OtherFile {
+            path: path.to_owned(),
+            size: cube.size(),
+            kind: OtherKind::Cube(cube),
+            is_projected: projection(&label).is_some(),
+            // A cube need not be of a camera that is known.
+            label: image_label(&label, cameras).ok(),
+        })))
+    }
+
+    /// An image whose rows have prefixes.
+    fn prefixed(labelled: &Labelled, label: &Label, cameras: &[Instrument]) -> Result<Self> {
+        let path = &labelled.path;
+        if !label.ended {
+            return Err(LabelError::NoEnd).in_file(path);
+        }
+        let image = labelled.hrsc(label, cameras)?;
+        let raster = image.rows().in_file(path)?;
+        Ok(Self::Other(Box::new(OtherFile {
+            path: path.clone(),
+            kind: OtherKind::Prefixed(raster),
+            size: [raster.lines, raster.samples],
+            label: Some(image.label),
+            is_projected: false,
+        })))
+    }
+
+    /// Where the file is.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Archive(image) => image.path(),
+            Self::Other(other) => &other.path,
+        }
+    }
+
+    /// Lines.
+    #[must_use]
+    pub fn lines(&self) -> u32 {
+        match self {
+            Self::Archive(image) => image.layout().lines,
+            Self::Other(other) => other.size[0],
+        }
+    }
+
+    /// Samples of a line.
+    #[must_use]
+    pub fn samples(&self) -> u32 {
+        match self {
+            Self::Archive(image) => image.layout().samples,
+            Self::Other(other) => other.size[1],
+        }
+    }
+
+    /// What the label says of times, size and camera; a picture has none.
+    #[must_use]
+    pub fn label(&self) -> Option<&ImageLabel> {
+        match self {
+            Self::Archive(image) => Some(image.label()),
+            Self::Other(other) => other.label.as_ref(),
+        }
+    }
+
+    /// Whether these are no pixels as the camera took them, but those of a map.
+    #[must_use]
+    pub fn is_projected(&self) -> bool {
+        match self {
+            Self::Archive(_) => false,
+            Self::Other(other) => other.is_projected,
+        }
+    }
+
+    /// The image as the archive has it, if it is one.
+    #[must_use]
+    pub fn archive(&self) -> Option<&ImageFile> {
+        match self {
+            Self::Archive(image) => Some(image),
+            Self::Other(_) => None,
+        }
+    }
+
+    /// What kind of pixels a file has that is not as the archive has it.
+    #[must_use]
+    pub fn other_kind(&self) -> Option<String> {
+        match self {
+            Self::Archive(_) => None,
+            Self::Other(other) => Some(match &other.kind {
+                OtherKind::Cube(cube) => cube.to_string(),
+                OtherKind::Picture(picture) => picture.to_string(),
+                OtherKind::Prefixed(raster) => prefixed::description(raster),
+            }),
+        }
+    }
+
+    /// The image from its first line on, strip by strip.
+    ///
+    /// # Errors
+    /// The system's refusal to read; pictures that their libraries refuse.
+    pub fn strips(&self) -> Result<PixelStrips> {
+        let source = match self {
+            Self::Archive(image) => Source::Archive(Box::new(image.strips()?)),
+            Self::Other(other) => {
+                let scale = other.scale()?;
+                Source::Rows {
+                    rows: other.rows()?,
+                    scale,
+                    line: 0,
+                }
+            }
+        };
+        Ok(PixelStrips {
+            path: self.path().to_owned(),
+            source,
+        })
+    }
+}
+
+/// The lines of a TIFF as numbers, from the first one on.
+///
+/// # Errors
+/// The system's refusal to read; a picture that is not of one band of grey, or that its library refuses.
+pub(super) fn tiff_rows(path: &Path) -> Result<Box<dyn Rows>> {
+    Picture::Tiff.rows(path)
+}
+
+/// Whether the label describes pixels as ISIS has them.
+fn is_cube(label: &Label) -> bool {
+    label.entries.iter().any(|entry| entry.group == "CORE")
+}
+
+impl OtherFile {
+    fn rows(&self) -> Result<Box<dyn Rows>> {
+        match &self.kind {
+            OtherKind::Cube(cube) => cube.rows(&self.path),
+            OtherKind::Picture(picture) => picture.rows(&self.path),
+            OtherKind::Prefixed(raster) => prefixed::rows(raster, &self.path),
+        }
+        .in_file(&self.path)
+    }
+
+    /// How numbers become bytes: as they are where they are bytes.
+    fn scale(&self) -> Result<Scale> {
+        let mut rows = self.rows()?;
+        if rows.is_bytes() {
+            return Ok(Scale::Bytes);
+        }
+        let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
+        while let Some(numbers) = rows.next_rows().in_file(&self.path)? {
+            for number in numbers.into_iter().filter(|number| number.is_finite()) {
+                ends = [ends[0].min(number), ends[1].max(number)];
+            }
+        }
+        Ok(Scale::Between(ends))
+    }
+}
+
+/// Reads an image from its first line to its last.
+#[derive(Debug)]
+pub struct PixelStrips {
+    path: PathBuf,
+    source: Source,
+}
+
+#[derive(Debug)]
+enum Source {
+    Archive(Box<Strips>),
+    Rows {
+        rows: Box<dyn Rows>,
+        scale: Scale,
+        line: u32,
+    },
+}
+
+impl PixelStrips {
+    /// The next lines; `None` behind the last one that is there.
+    ///
+    /// # Errors
+    /// The system's refusal to read; a picture that its library refuses.
+    pub fn next_strip(&mut self) -> Result<Option<Strip>> {
+        match &mut self.source {
+            Source::Archive(strips) => {
+                let strip = strips.next_strip().map_err(IoError::on("read"));
+                strip.in_file(&self.path)
+            }
+            Source::Rows { rows, scale, line } => {
+                let [_, samples] = rows.size();
+                let Some(numbers) = rows.next_rows().in_file(&self.path)? else {
+                    return Ok(None);
+                };
+                let strip = strip(&numbers, *scale, *line, samples);
+                *line += u32::try_from(strip.states.len()).unwrap_or_default();
+                Ok(Some(strip))
+            }
+        }
+    }
+
+    /// What was found wrong while decoding so far, and how much that is in all.
+    #[must_use]
+    pub fn complaints(&self) -> (&[Complaint], u64) {
+        match &self.source {
+            Source::Archive(strips) => (strips.complaints().kept(), strips.complaints().count()),
+            Source::Rows { .. } => (&[], 0),
+        }
+    }
+
+    /// The numbers that are 1 and 255 here, of a file whose numbers are not bytes.
+    #[must_use]
+    pub const fn range(&self) -> Option<[f64; 2]> {
+        match self.source {
+            Source::Rows {
+                scale: Scale::Between(ends),
+                ..
+            } => Some(ends),
+            _ => None,
+        }
+    }
+}
+
+/// Numbers as bytes; a line without a number is missing.
+fn strip(numbers: &[f64], scale: Scale, first_line: u32, samples: u32) -> Strip {
+    let state = |line: &[f64]| {
+        if line.iter().any(|number| number.is_finite()) {
+            LineState::Good
+        } else {
+            LineState::Missing
+        }
+    };
+    Strip {
+        first_line,
+        samples,
+        pixels: numbers.iter().map(|number| scale.byte(*number)).collect(),
+        states: numbers.chunks_exact(samples as usize).map(state).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,75 @@
+//! Lines of numbers in order, some at a time.
+
+use areograph_base::error::Result;
+
+/// Largest size of a line that is believed, samples: the largest line of any camera here has 5184.
+pub(super) const SAMPLES_MAX: u32 = 65_536;
+/// The same of an image, lines.
+pub(super) const LINES_MAX: u32 = 10_000_000;
+
+/// Most numbers that are read at a time: those of a row of tiles.
+const NUMBERS_MAX: u64 = 1 << 24;
+
+/// Whether so many lines can be read at a time.
+pub(super) fn fits(lines: u32, samples: u32) -> bool {
+    u64::from(lines) * u64::from(samples) <= NUMBERS_MAX
+}
+
+/// Reads an image from its first line to its last.
+pub(crate) trait Rows: std::fmt::Debug {
+    /// Lines and samples.
+    fn size(&self) -> [u32; 2];
+
+    /// Whether all numbers are whole, from 0 to 255.
+    fn is_bytes(&self) -> bool;
+
+    /// Whole lines that follow those before; NaN where there is no number. `None` behind the last line.
+    ///
+    /// # Errors
+    /// The system's refusal to read; a picture that its library refuses.
+    fn next_rows(&mut self) -> Result<Option<Vec<f64>>>;
+}
+
+/// How numbers become bytes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Scale {
+    /// As they are.
+    Bytes,
+    /// From 1 to 255 between the two; what is no number is 0.
+    Between([f64; 2]),
+}
+
+impl Scale {
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped to a byte just before, and NaN becomes 0"
+    )]
+    pub(super) fn byte(self, number: f64) -> u8 {
+        match self {
+            Self::Bytes => number.clamp(0.0, 255.0) as u8,
+            Self::Between(_) if number.is_nan() => 0,
+            Self::Between([low, high]) => {
+                let share = (number - low) / (high - low).max(f64::MIN_POSITIVE);
+                (1.0 + 254.0 * share).round().clamp(1.0, 255.0) as u8
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_between_the_ends_are_spread_and_none_is_none() {
+        let scale = Scale::Between([-2.0, 2.0]);
+        let bytes = [-2.0, 0.0, 2.0, f64::NAN, f64::INFINITY].map(|number| scale.byte(number));
+        assert_eq!(bytes, [1, 128, 255, 0, 255]);
+        assert_eq!(Scale::Between([3.0, 3.0]).byte(3.0), 1);
+        assert_eq!(
+            [7.0, f64::NAN].map(|number| Scale::Bytes.byte(number)),
+            [7, 0]
+        );
+    }
+}

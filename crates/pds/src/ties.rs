@@ -1,0 +1,389 @@
+//! Tie points from a table, and from ISIS control networks as text (PVL).
+//!
+//! Both count lines and samples as ISIS does: the middle of the first pixel is 1.
+
+mod network;
+
+use std::{collections::BTreeMap, fs, path::Path};
+
+use super::label::LabelError;
+use areograph_base::{
+    error::{Cause, IoError, Kind, Locate, Result},
+    ties::{KnownGround, TieMeasure, TiePoint},
+};
+use network::parse_network;
+
+/// Where ISIS has the middle of the first pixel, we have its outer edge at 0.
+pub const ISIS_TO_EDGE: f64 = -0.5;
+
+/// Tie points of a file, and what was not taken.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct TieFile {
+    /// Points in the order of their first measurement, also those measured once.
+    pub ties: Vec<TiePoint<String>>,
+    /// Measurements and points that the network itself says to ignore.
+    pub ignored: usize,
+    /// Records that are not what they should be.
+    pub complaints: Vec<TieComplaint>,
+}
+
+/// A skipped record.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TieComplaint {
+    /// Line of a table, or number of the object or group in a network, both from 1.
+    pub record: u64,
+    /// What was found, and what was expected.
+    pub text: String,
+}
+
+/// A file that holds no tie points.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+enum TieError {
+    #[error("this is a binary control network; expected its text form (PVL)")]
+    Binary,
+    #[error("no ControlNetwork object found")]
+    NoNetwork,
+    #[error("column {0} is missing; expected point_id, serial_number, sample and line")]
+    Column(&'static str),
+    #[error(
+        "column {0} is missing; a table has both of line_sigma_px and sample_sigma_px, or neither"
+    )]
+    Sigma(&'static str),
+    #[error("the table cannot be read: {0}")]
+    Table(String),
+    #[error("not one of its records can be read ({records} in all); record {record}: {text}")]
+    Unreadable {
+        records: usize,
+        record: u64,
+        text: String,
+    },
+    #[error(transparent)]
+    Label(#[from] LabelError),
+}
+
+impl Cause for TieError {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::Binary => "convert it with ISIS: cnetbin2pvl from=control.net to=control.pvl",
+            Self::NoNetwork | Self::Label(_) => "give an ISIS control network in PVL, or a CSV table",
+            Self::Column(_) | Self::Sigma(_) | Self::Table(_) | Self::Unreadable { .. } => {
+                "give a comma-separated table with a header line; lines and samples count from 1 at the middle of the first pixel"
+            }
+        }
+        .to_owned()
+    }
+}
+
+/// Reads tie points; a file whose name ends in `.csv` is a table, any other a control network.
+///
+/// # Errors
+/// The system's refusal to read; a binary network; no network; columns that are missing; records of which none
+/// can be read.
+pub fn read_ties(path: &Path) -> Result<TieFile> {
+    let bytes = fs::read(path).map_err(IoError::on("read")).in_file(path)?;
+    let table = path
+        .extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
+    let ties = if table {
+        parse_table(&bytes)
+    } else {
+        parse_network(&bytes)
+    };
+    ties.and_then(readable).in_file(path)
+}
+
+/// A file of which nothing was taken says why.
+fn readable(file: TieFile) -> std::result::Result<TieFile, TieError> {
+    match file.complaints.first() {
+        Some(first) if file.ties.is_empty() => Err(TieError::Unreadable {
+            records: file.complaints.len(),
+            record: first.record,
+            text: first.text.clone(),
+        }),
+        _ => Ok(file),
+    }
+}
+
+/// The table of some tie points, as [`read_ties`] reads it; places to a ten-thousandth of a pixel. It has columns for
+/// standard deviations where a measurement has its own.
+#[must_use]
+pub fn ties_table(ties: &[TiePoint<String>]) -> String {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    let mut measures = ties.iter().flat_map(|tie| &tie.measures);
+    let has_sigmas = measures.any(|measure| measure.sigma_px.is_some());
+    let sigma_columns = SIGMA_COLUMNS.iter().filter(|_| has_sigmas);
+    // Writing into memory cannot fail.
+    let _infallible = table.write_record(COLUMNS.iter().chain(sigma_columns));
+    for tie in ties {
+        for measure in &tie.measures {
+            let [sample, line] =
+                [measure.sample, measure.line].map(|edge| format!("{:.4}", edge - ISIS_TO_EDGE));
+            let mut record = vec![tie.id.clone(), measure.image.clone(), sample, line];
+            if has_sigmas {
+                let sigmas = measure
+                    .sigma_px
+                    .map(|sigmas| sigmas.map(|sigma| format!("{sigma:.5}")));
+                record.extend(sigmas.unwrap_or_default());
+            }
+            let _infallible = table.write_record(&record);
+        }
+    }
+    let bytes = table.into_inner().unwrap_or_default();
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// Columns of a table; others are left alone.
+const COLUMNS: [&str; 4] = ["point_id", "serial_number", "sample", "line"];
+/// Columns that a table may have: standard deviations of a measurement; an empty field is none.
+const SIGMA_COLUMNS: [&str; 2] = ["line_sigma_px", "sample_sigma_px"];
+
+/// Where a table has its columns.
+struct Places {
+    required: [usize; 4],
+    sigmas: [Option<usize>; 2],
+}
+
+impl Places {
+    fn of(header: &csv::StringRecord) -> std::result::Result<Self, TieError> {
+        let position = |column| header.iter().position(|name| name == column);
+        let mut required = [0; 4];
+        for (place, column) in required.iter_mut().zip(COLUMNS) {
+            *place = position(column).ok_or(TieError::Column(column))?;
+        }
+        let sigmas = SIGMA_COLUMNS.map(position);
+        if let [Some(_), None] | [None, Some(_)] = sigmas {
+            let missing = usize::from(sigmas[0].is_some());
+            return Err(TieError::Sigma(SIGMA_COLUMNS[missing]));
+        }
+        Ok(Self { required, sigmas })
+    }
+}
+
+/// Standard deviations of line and sample as a file writes them; both, or none where both are missing.
+///
+/// # Errors
+/// What was found instead of two positive numbers.
+fn sigmas(written: [Option<&str>; 2]) -> std::result::Result<Option<[f64; 2]>, String> {
+    if written == [None, None] {
+        return Ok(None);
+    }
+    let positive = |text: Option<&str>| finite(text?).filter(|sigma| *sigma > 0.0);
+    if let [Some(line), Some(sample)] = written.map(positive) {
+        return Ok(Some([line, sample]));
+    }
+    let [line, sample] = written.map(|text| text.unwrap_or("missing"));
+    Err(format!(
+        "standard deviations of line {line}, of sample {sample}: expected two numbers above 0, or neither"
+    ))
+}
+
+fn finite(text: &str) -> Option<f64> {
+    text.parse().ok().filter(|number: &f64| number.is_finite())
+}
+
+/// Gathers measurements into points by their identifiers.
+#[derive(Default)]
+struct Gathered {
+    file: TieFile,
+    index: BTreeMap<String, usize>,
+}
+
+impl Gathered {
+    /// The point of this identifier, new where there was none.
+    fn point(&mut self, id: String) -> &mut TiePoint<String> {
+        let ties = &mut self.file.ties;
+        let at = *self.index.entry(id).or_insert_with_key(|id| {
+            ties.push(TiePoint {
+                id: id.clone(),
+                known: None,
+                measures: Vec::new(),
+            });
+            ties.len() - 1
+        });
+        &mut ties[at]
+    }
+
+    /// Adds a measurement whose place is counted as ISIS does.
+    fn add(&mut self, id: String, known: Option<KnownGround>, measure: TieMeasure<String>) {
+        let point = self.point(id);
+        point.known = point.known.or(known);
+        point.measures.push(TieMeasure {
+            line: measure.line + ISIS_TO_EDGE,
+            sample: measure.sample + ISIS_TO_EDGE,
+            ..measure
+        });
+    }
+
+    fn complain(&mut self, record: u64, text: String) {
+        self.file.complaints.push(TieComplaint { record, text });
+    }
+}
+
+fn parse_table(bytes: &[u8]) -> std::result::Result<TieFile, TieError> {
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .from_reader(bytes);
+    let unreadable = |error: csv::Error| TieError::Table(error.to_string());
+    let header = reader.headers().map_err(unreadable)?.clone();
+    let places = Places::of(&header)?;
+    let mut gathered = Gathered::default();
+    for record in reader.into_records() {
+        let record = match record {
+            Ok(record) => record,
+            Err(error) => {
+                let line = error.position().map_or(0, csv::Position::line);
+                gathered.complain(line, unreadable_record(&error));
+                continue;
+            }
+        };
+        let line = record.position().map_or(0, csv::Position::line);
+        match measurement(&places, &record) {
+            Ok((id, measure)) => gathered.add(id, None, measure),
+            Err(text) => gathered.complain(line, text),
+        }
+    }
+    Ok(gathered.file)
+}
+
+/// The measurement of a record with the identifier of its point; otherwise what it lacks.
+fn measurement(
+    places: &Places,
+    record: &csv::StringRecord,
+) -> std::result::Result<(String, TieMeasure<String>), String> {
+    let [id, image, sample, line] = places.required.map(|at| record.get(at).unwrap_or_default());
+    let numbers = finite(line).zip(finite(sample));
+    let Some((line, sample)) = numbers.filter(|_| !id.is_empty() && !image.is_empty()) else {
+        return Err(format!(
+            "point_id {id:?}, serial_number {image:?}, sample {sample:?}, line {line:?}: expected two names and two \
+             numbers"
+        ));
+    };
+    let written = places
+        .sigmas
+        .map(|at| record.get(at?).filter(|text| !text.is_empty()));
+    let measure = TieMeasure {
+        image: image.to_owned(),
+        line,
+        sample,
+        sigma_px: sigmas(written)?,
+    };
+    Ok((id.to_owned(), measure))
+}
+
+/// Why a record is none, without the place that is told with it.
+fn unreadable_record(error: &csv::Error) -> String {
+    match error.kind() {
+        csv::ErrorKind::UnequalLengths {
+            expected_len, len, ..
+        } => format!("{len} fields; expected {expected_len}, as in the header"),
+        _ => error.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// A measurement without standard deviations.
+    pub(in crate::ties) fn measure(image: &str, line: f64, sample: f64) -> TieMeasure<String> {
+        TieMeasure {
+            image: image.to_owned(),
+            line,
+            sample,
+            sigma_px: None,
+        }
+    }
+
+    #[test]
+    fn a_table_is_read_and_bad_rows_are_told() {
+        let table = "point_id,serial_number,type,sample,line\n1,A,0,2.5,1\n2,A,0,x,1\n1, B,3,7,8\n3,A\n4,A,0,NaN,1\n";
+        let file = parse_table(table.as_bytes()).unwrap();
+        assert_eq!(file.ties.len(), 1);
+        assert_eq!(
+            file.ties[0].measures,
+            [measure("A", 0.5, 2.0), measure("B", 7.5, 6.5)]
+        );
+        let rows: Vec<u64> = file
+            .complaints
+            .iter()
+            .map(|complaint| complaint.record)
+            .collect();
+        assert_eq!(rows, [3, 5, 6]);
+        assert_eq!(
+            parse_table(b"point_id,line\n"),
+            Err(TieError::Column("serial_number"))
+        );
+    }
+
+    #[test]
+    fn standard_deviations_of_measurements_are_read_where_a_table_has_them() {
+        let table = "point_id,serial_number,sample,line,line_sigma_px,sample_sigma_px\n\
+            1,A,2.5,1,0.3,0.2\n1,B,7,8,,\n2,A,1,1,0.3,\n2,B,1,1,0,0.2\n";
+        let file = parse_table(table.as_bytes()).unwrap();
+        let sigmas: Vec<_> = file.ties[0].measures.iter().map(|of| of.sigma_px).collect();
+        assert_eq!(sigmas, [Some([0.3, 0.2]), None]);
+        assert_eq!(file.ties.len(), 1);
+        let texts: Vec<&str> = file.complaints.iter().map(|of| &*of.text).collect();
+        let expected = "expected two numbers above 0, or neither";
+        assert_eq!(
+            texts,
+            [("0.3", "missing"), ("0", "0.2")].map(|(line, sample)| format!(
+                "standard deviations of line {line}, of sample {sample}: {expected}"
+            ))
+        );
+        assert_eq!(
+            parse_table(b"point_id,serial_number,sample,line,sample_sigma_px\n"),
+            Err(TieError::Sigma("line_sigma_px"))
+        );
+    }
+
+    #[test]
+    fn a_file_without_a_readable_record_says_what_these_lack() {
+        let refused = |rows: &str| {
+            let table = format!("point_id,serial_number,sample,line\n{rows}");
+            readable(parse_table(table.as_bytes()).unwrap())
+                .unwrap_err()
+                .to_string()
+        };
+        assert_eq!(
+            refused("1,A,,2\n1,B,3,x\n"),
+            "not one of its records can be read (2 in all); record 2: point_id \"1\", serial_number \"A\", sample \"\", line \
+             \"2\": expected two names and two numbers"
+        );
+        assert_eq!(
+            refused("1,A,1\n"),
+            "not one of its records can be read (1 in all); record 2: 3 fields; expected 4, as in the header"
+        );
+        assert!(refused(",A,1,2\n").contains("point_id \"\""));
+        assert!(readable(parse_table(b"point_id,serial_number,sample,line\n").unwrap()).is_ok());
+    }
+
+    #[test]
+    fn a_table_that_is_written_is_read_again() {
+        let ties = [("1", 0.5), ("two, or 2", 7.25)].map(|(id, line)| TiePoint {
+            id: id.to_owned(),
+            known: None,
+            measures: vec![measure("A", line, 3.0), measure("B", 9.0, line)],
+        });
+        let file = parse_table(ties_table(&ties).as_bytes()).unwrap();
+        assert_eq!(file.ties, ties);
+        let mut with_sigmas = ties;
+        with_sigmas[1].measures[0].sigma_px = Some([0.05, 0.125]);
+        let file = parse_table(ties_table(&with_sigmas).as_bytes()).unwrap();
+        assert_eq!(file.ties, with_sigmas);
+        assert_eq!((file.ignored, file.complaints.len()), (0, 0));
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_read_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..400)) {
+            let _ = parse_network(&bytes);
+            let _ = parse_table(&bytes);
+        }
+    }
+}

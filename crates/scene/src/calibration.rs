@@ -1,0 +1,247 @@
+//! A synthetic camera of two stereo lines in two orbits, with its support data, tie points, laser control and the truth.
+
+use std::{collections::BTreeMap, fmt::Write as _, path::Path};
+
+use nalgebra::Vector3;
+use serde::Serialize;
+
+use super::{
+    files::{Draft, put},
+    pushbroom_pair::{LONG, Orbit, OrbitError, StereoLine},
+    random::Random,
+};
+use areograph_base::error::{Locate as _, Result};
+use areograph_geom::{calibration::Offset, ellipsoid::local_axes};
+
+const README: &str = "Two stereo lines of a camera in two orbits: support data, tie points, laser control, a calibration file.\n\
+    The lines are mounted askew and the orbits are wrong by hundreds of metres; truth.json tells by how much, and where\n\
+    everything is.\n\
+    Next: areograph calibrate calibration.toml\n";
+
+/// Noise: tie points and control in images, pixels; control on the ground, metres.
+const TIE_PX: f64 = 0.2;
+const CONTROL_PX: f64 = 1.0;
+const HORIZONTAL_M: f64 = 100.0;
+const VERTICAL_M: f64 = 10.0;
+/// Points of the calibration orbit (those of Li et al. 2023), and of the other one.
+const POINTS: [[usize; 2]; 2] = [[206, 476], [80, 160]];
+/// Share of the swath that points are drawn from, the middle.
+const SWATH: f64 = 0.92;
+
+/// The lines as they truly are. Sample errors are those of the paper's synthetic case: 2e-7 and 1e-7 a pixel, 1e-11 a pixel squared.
+fn lines() -> [StereoLine; 2] {
+    let offset = |phi: f64, omega: f64, kappa: f64| Offset {
+        phi_rad: phi.to_radians(),
+        omega_rad: omega.to_radians(),
+        kappa_rad: kappa.to_radians(),
+    };
+    let half = 0.5 * f64::from(LONG[1]);
+    let errors = |sense: f64| {
+        [
+            sense * 2e-7 * half,
+            sense * 1e-7 * half,
+            sense * 1e-11 * half * half,
+        ]
+    };
+    [
+        StereoLine {
+            name: "s1",
+            pitch_deg: 18.9,
+            offset: offset(0.055, 0.020, 0.030),
+            errors: errors(1.0),
+        },
+        StereoLine {
+            name: "s2",
+            pitch_deg: -18.9,
+            offset: offset(-0.050, -0.015, -0.020),
+            errors: errors(-1.0),
+        },
+    ]
+}
+
+/// The orbits: that of the calibration, and another one, whose error as seen from its track is the same but for a fifth.
+fn orbits() -> [Orbit; 2] {
+    [
+        Orbit {
+            name: "i864",
+            start_et_s: 596_764_800.0,
+            longitude_deg: -63.13,
+            latitude_deg: -33.0,
+            size: LONG,
+            is_steered: false,
+            error: OrbitError {
+                bias_m: [350.0, 500.0, -420.0],
+                drift_m_per_line: [0.006, -0.006, 0.006],
+            },
+        },
+        Orbit {
+            name: "i818",
+            start_et_s: 595_641_600.0,
+            longitude_deg: -45.31,
+            latitude_deg: -30.0,
+            size: LONG,
+            is_steered: false,
+            error: OrbitError {
+                bias_m: [150.0, 470.0, -340.0],
+                drift_m_per_line: [-0.004, 0.003, 0.004],
+            },
+        },
+    ]
+}
+
+/// The file of the truth.
+#[derive(Serialize)]
+struct Truth {
+    seed: u64,
+    /// φ, ω and κ of every line, degrees.
+    angles_deg: BTreeMap<&'static str, [f64; 3]>,
+    /// Bias of every orbit, true minus support data, Mars-fixed metres.
+    orbit_bias_m: BTreeMap<&'static str, [f64; 3]>,
+    /// Its drift, metres a line.
+    orbit_drift_m_per_line: BTreeMap<&'static str, [f64; 3]>,
+    /// Places of the points of every orbit, Mars-fixed metres.
+    points_m: BTreeMap<&'static str, BTreeMap<String, [f64; 3]>>,
+}
+
+/// Tables of an orbit, and where its points are.
+struct Tables {
+    ties: String,
+    control: String,
+    points_m: BTreeMap<String, [f64; 3]>,
+}
+
+/// Writes a synthetic camera of two stereo lines into `directory`, replacing an older scene that nobody added to or changed.
+/// The same seed gives the same bytes.
+///
+/// # Errors
+/// [`SceneError`](super::SceneError) when the folder holds something else; the system's refusal to write.
+pub fn write_calibration_scene(directory: &Path, seed: u64) -> Result<String> {
+    let draft = Draft::begin(directory, README)?;
+    let isd = draft.folder("isd")?;
+    let (lines, orbits) = (lines(), orbits());
+    let mut truth = Truth {
+        seed,
+        angles_deg: lines
+            .iter()
+            .map(|line| {
+                let of = &line.offset;
+                let angles = [of.phi_rad, of.omega_rad, of.kappa_rad];
+                (line.name, angles.map(f64::to_degrees))
+            })
+            .collect(),
+        orbit_bias_m: orbits.iter().map(|of| (of.name, of.error.bias_m)).collect(),
+        orbit_drift_m_per_line: (orbits.iter())
+            .map(|of| (of.name, of.error.drift_m_per_line))
+            .collect(),
+        points_m: BTreeMap::new(),
+    };
+    for (orbit, counts) in orbits.iter().zip(POINTS) {
+        for line in &lines {
+            let path = isd.join(format!("{}_{}.json", orbit.name, line.name));
+            put(&path, &orbit.support_data(line)).in_file(&path)?;
+        }
+        let tables = tables(orbit, &lines, counts, seed);
+        for (kind, text) in [("ties", &tables.ties), ("control", &tables.control)] {
+            let path = draft.root().join(format!("{}_{kind}.csv", orbit.name));
+            put(&path, text).in_file(&path)?;
+        }
+        truth.points_m.insert(orbit.name, tables.points_m);
+    }
+    let truth = serde_json::to_string_pretty(&truth).unwrap_or_default() + "\n";
+    for (name, text) in [("truth.json", &*truth), ("calibration.toml", CALIBRATION)] {
+        let path = draft.root().join(name);
+        put(&path, text).in_file(&path)?;
+    }
+    draft.finish()?;
+    let [ties, control] = POINTS[0];
+    Ok(format!(
+        "{}: two stereo lines in two orbits, {ties} tie points, {control} laser points; next: areograph calibrate {}",
+        directory.display(),
+        directory.join("calibration.toml").display()
+    ))
+}
+
+fn tables(orbit: &Orbit, lines: &[StereoLine; 2], counts: [usize; 2], seed: u64) -> Tables {
+    let mut random = Random::new(seed, &format!("calibration points of {}", orbit.name));
+    let mut tables = Tables {
+        ties: "point,camera,line,sample\n".to_owned(),
+        control: "point,camera,line,sample,longitude_deg,latitude_deg,radius_m\n".to_owned(),
+        points_m: BTreeMap::new(),
+    };
+    for (kind, count) in ["T", "L"].into_iter().zip(counts) {
+        let mut number = 0;
+        while number < count {
+            let place_m = orbit.ground(random.between(0.0, 1.0), random.between(-SWATH, SWATH));
+            let seen = lines.each_ref().map(|line| orbit.sees(line, &place_m));
+            let [Some(first), Some(second)] = seen else {
+                continue;
+            };
+            number += 1;
+            let name = format!("{kind}{number:03}");
+            let noise_px = if kind == "T" { TIE_PX } else { CONTROL_PX };
+            let laser_m = laser(&place_m, &mut random);
+            for (line, place) in lines.iter().zip([first, second]) {
+                let at = place.map(|at| at + noise_px * random.normal());
+                let image = format!("{name},{},{:.4},{:.4}", line.name, at[0], at[1]);
+                // Writing to a string cannot fail.
+                let _infallible = if kind == "T" {
+                    writeln!(tables.ties, "{image}")
+                } else {
+                    writeln!(tables.control, "{image},{}", degrees(&laser_m))
+                };
+            }
+            tables.points_m.insert(name, place_m.into());
+        }
+    }
+    tables
+}
+
+/// Where the laser says that a place is.
+fn laser(place_m: &Vector3<f64>, random: &mut Random) -> Vector3<f64> {
+    let off_m = Vector3::new(
+        HORIZONTAL_M * random.normal(),
+        HORIZONTAL_M * random.normal(),
+        0.0,
+    );
+    let moved_m = place_m + local_axes(place_m).tr_mul(&off_m);
+    moved_m.normalize() * (place_m.norm() + VERTICAL_M * random.normal())
+}
+
+/// Longitude and latitude in degrees, radius in metres.
+fn degrees(place_m: &Vector3<f64>) -> String {
+    let radius_m = place_m.norm();
+    format!(
+        "{:.9},{:.9},{radius_m:.4}",
+        place_m.y.atan2(place_m.x).to_degrees(),
+        (place_m.z / radius_m).asin().to_degrees()
+    )
+}
+
+const CALIBRATION: &str = "\
+calibration = \"synthetic_lines\"
+description = \"Two synthetic stereo lines after Li et al. 2023\"
+
+[[cameras]]
+id = \"s1\"
+isd = \"isd/i864_s1.json\"
+
+[[cameras]]
+id = \"s2\"
+isd = \"isd/i864_s2.json\"
+
+[ties]
+files = [\"i864_ties.csv\"]
+sigma_px = 0.2
+
+[control]
+files = [\"i864_control.csv\"]
+sigma_px = 1.0
+sigma_horizontal_m = 100.0
+sigma_vertical_m = 10.0
+
+[[validation]]
+id = \"i818\"
+isd = [\"isd/i818_*.json\"]
+ties = [\"i818_ties.csv\"]
+control = [\"i818_control.csv\"]
+";

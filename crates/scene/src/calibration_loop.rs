@@ -1,0 +1,230 @@
+//! Three lines of a camera in one orbit with their pixels, laser passes over the ground in two directions, and the truth: what
+//! `areograph calibrate` works on from pixels.
+
+use std::{collections::BTreeMap, path::Path};
+
+use serde::Serialize;
+
+use super::{
+    error_sources::{Relief, Roughness},
+    files::{Draft, put},
+    line_images::LineImages,
+    passes::Passes,
+    pushbroom_pair::{Orbit, OrbitError, StereoLine},
+    terrain::Terrain,
+};
+use areograph_base::{
+    error::{Locate as _, Result},
+    units::RADIANS_PER_DEGREE,
+};
+use areograph_geom::calibration::Offset;
+
+const README: &str = "Three lines of a camera in one orbit: support data (isd/), pixels (images/), PEDR files of laser passes in two\n\
+    directions over their ground (pedr/), a calibration file. The lines are mounted askew and the orbit is wrong by hundreds of\n\
+    metres; truth.json tells by how much, and where the lines truly see places of the ground.\n\
+    Next: areograph calibrate calibration.toml\n";
+
+/// Middle of the ground.
+const LONGITUDE_DEG: f64 = -63.13;
+const LATITUDE_DEG: f64 = -33.0;
+/// Lines and samples of an image: 65 by 22 km.
+const SIZE: [u32; 2] = [2_400, 800];
+/// Laser passes: those of a direction lie 1.4 km apart, of both as dense as the 126 over a whole swath in Li et al. 2023.
+const PASSES: Passes = Passes {
+    longitude_rad: LONGITUDE_DEG * RADIANS_PER_DEGREE,
+    latitude_rad: LATITUDE_DEG * RADIANS_PER_DEGREE,
+    of_direction: 17,
+    half_width_m: 12_000.0,
+    half_s: 12.0,
+};
+/// Places along and across the ground at which the truth is told, and the share of the swath that they cover.
+const CHECKED: [u32; 2] = [19, 7];
+const CHECKED_SHARE: [f64; 2] = [0.84, 0.9];
+
+/// The lines as they truly are: offsets and errors of the paper's synthetic case, and a third line between them.
+fn lines() -> [StereoLine; 3] {
+    let offset = |angles_deg: [f64; 3]| {
+        let [phi_rad, omega_rad, kappa_rad] = angles_deg.map(f64::to_radians);
+        Offset {
+            phi_rad,
+            omega_rad,
+            kappa_rad,
+        }
+    };
+    let half = 0.5 * f64::from(SIZE[1]);
+    let errors = |sense: f64| {
+        let [m1, n1, n2] = [2e-7 * half, 1e-7 * half, 1e-11 * half * half];
+        [sense * m1, sense * n1, sense * n2]
+    };
+    [
+        StereoLine {
+            name: "s1",
+            pitch_deg: 18.9,
+            offset: offset([0.055, 0.020, 0.030]),
+            errors: errors(1.0),
+        },
+        StereoLine {
+            name: "nd",
+            pitch_deg: 0.0,
+            offset: offset([0.010, -0.012, 0.015]),
+            errors: errors(0.5),
+        },
+        StereoLine {
+            name: "s2",
+            pitch_deg: -18.9,
+            offset: offset([-0.050, -0.015, -0.020]),
+            errors: errors(-1.0),
+        },
+    ]
+}
+
+fn orbit() -> Orbit {
+    Orbit {
+        name: "i864",
+        start_et_s: 596_764_800.0,
+        longitude_deg: LONGITUDE_DEG,
+        latitude_deg: LATITUDE_DEG,
+        size: SIZE,
+        is_steered: true,
+        error: OrbitError {
+            bias_m: [350.0, 500.0, -420.0],
+            drift_m_per_line: [0.006, -0.006, 0.006],
+        },
+    }
+}
+
+/// The file of the truth.
+#[derive(Serialize)]
+struct Truth {
+    made_by: &'static str,
+    synthetic: &'static str,
+    seed: u64,
+    /// φ, ω and κ of every line, degrees.
+    angles_deg: BTreeMap<&'static str, [f64; 3]>,
+    /// Bias of the orbit, true minus support data, Mars-fixed metres.
+    orbit_bias_m: [f64; 3],
+    /// Its drift, metres a line.
+    orbit_drift_m_per_line: [f64; 3],
+    /// Places of the ground that all lines see.
+    checked: Vec<Checked>,
+}
+
+/// A place and where the lines truly see it.
+#[derive(Serialize)]
+struct Checked {
+    /// Mars-fixed metres.
+    place_m: [f64; 3],
+    /// Line and sample.
+    seen: BTreeMap<&'static str, [f64; 2]>,
+}
+
+/// Writes three lines with their pixels and laser passes into `directory`, replacing an older scene that nobody added to or
+/// changed. The same seed gives the same bytes.
+///
+/// # Errors
+/// [`SceneError`](super::SceneError) when the folder holds something else; the system's refusal to write.
+pub fn write_calibration_loop_scene(directory: &Path, seed: u64) -> Result<String> {
+    let draft = Draft::begin(directory, README)?;
+    let [isd, images, pedr] = ["isd", "images", "pedr"].map(|folder| draft.folder(folder));
+    let (isd, images, pedr) = (isd?, images?, pedr?);
+    let (lines, orbit) = (lines(), orbit());
+    let middle = orbit.ground(0.5, 0.0).normalize();
+    let terrain = Terrain::new(seed, &[middle], Relief::SelfAffine(Roughness::Rough));
+    let rendered = LineImages {
+        orbit: &orbit,
+        terrain: &terrain,
+        seed,
+    };
+    for line in &lines {
+        let path = isd.join(format!("{}.json", line.name));
+        put(&path, &orbit.support_data(line)).in_file(&path)?;
+        let path = images.join(format!("{}.tif", line.name));
+        rendered.write(&path, line).in_file(&path)?;
+    }
+    PASSES.write(&pedr, &terrain, seed)?;
+    let truth = Truth {
+        made_by: "areograph scene",
+        synthetic: "not from mission data",
+        seed,
+        angles_deg: (lines.iter())
+            .map(|line| {
+                let of = &line.offset;
+                let angles = [of.phi_rad, of.omega_rad, of.kappa_rad];
+                (line.name, angles.map(f64::to_degrees))
+            })
+            .collect(),
+        orbit_bias_m: orbit.error.bias_m,
+        orbit_drift_m_per_line: orbit.error.drift_m_per_line,
+        checked: checked(&orbit, &lines, &terrain),
+    };
+    let truth = serde_json::to_string_pretty(&truth).unwrap_or_default() + "\n";
+    for (name, text) in [("truth.json", &*truth), ("calibration.toml", CALIBRATION)] {
+        let path = draft.root().join(name);
+        put(&path, text).in_file(&path)?;
+    }
+    draft.finish()?;
+    Ok(format!(
+        "{}: three lines with their pixels, {} laser passes over their ground; next: areograph calibrate {}",
+        directory.display(),
+        PASSES.count(),
+        directory.join("calibration.toml").display()
+    ))
+}
+
+/// Places on an even lattice that all lines see.
+fn checked(orbit: &Orbit, lines: &[StereoLine], terrain: &Terrain) -> Vec<Checked> {
+    let [along, across] = CHECKED;
+    let share = |at: u32, of: u32| f64::from(at) / f64::from(of - 1) - 0.5;
+    let all = (0..along).flat_map(|row| (0..across).map(move |column| [row, column]));
+    let checked = all.filter_map(|[row, column]| {
+        let along = 0.5 + CHECKED_SHARE[0] * share(row, along);
+        let across = 2.0 * CHECKED_SHARE[1] * share(column, across);
+        let direction = orbit.ground(along, across).normalize();
+        let place_m = direction * terrain.radius_m(&direction);
+        let seen = lines
+            .iter()
+            .map(|line| Some((line.name, orbit.sees(line, &place_m)?)));
+        Some(Checked {
+            place_m: place_m.into(),
+            seen: seen.collect::<Option<_>>()?,
+        })
+    });
+    checked.collect()
+}
+
+const CALIBRATION: &str = "\
+calibration = \"synthetic_loop\"
+description = \"Three synthetic lines from their pixels, after Li et al. 2023\"
+
+[[cameras]]
+id = \"s1\"
+isd = \"isd/s1.json\"
+pixels = \"images/s1.tif\"
+
+[[cameras]]
+id = \"nd\"
+isd = \"isd/nd.json\"
+pixels = \"images/nd.tif\"
+
+[[cameras]]
+id = \"s2\"
+isd = \"isd/s2.json\"
+pixels = \"images/s2.tif\"
+
+[ties]
+match = true
+
+[laser]
+files = [\"pedr/*.b\"]
+cell_m = 100
+search_cells = 30
+
+[control]
+sigma_px = 0.03
+sigma_horizontal_m = 1.0
+sigma_vertical_m = 1.0
+
+[a_priori]
+control_angle_deg = 0.3
+look_px = 10.0
+";

@@ -1,0 +1,127 @@
+//! What can go wrong while a mission is invented.
+
+use areograph_base::error::{Cause, Kind};
+
+/// Faults of the scene writer.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneError {
+    /// The folder holds something that is not an older scene.
+    #[error(
+        "the folder is not empty and holds no scene of areograph (no list {list} of its files)"
+    )]
+    NotAScene {
+        /// File by which a scene is recognised.
+        list: &'static str,
+    },
+    /// The folder holds more than an older scene.
+    #[error("the folder holds {entry}, which `areograph scene` did not write")]
+    Foreign {
+        /// Path below the folder.
+        entry: String,
+    },
+    /// A file of the older scene is not what was written.
+    #[error("{file} was changed since `areograph scene` wrote it")]
+    Changed {
+        /// Path below the folder.
+        file: String,
+    },
+    /// No orbit shows the site as asked.
+    #[error(
+        "no orbit found that shows {image} as planned: last step {step} rad after {iterations} iterations, expected below 1e-13 rad"
+    )]
+    NoOrbit {
+        /// Image id.
+        image: String,
+        /// Size of the last Newton step.
+        step: f64,
+        /// Steps taken.
+        iterations: u32,
+    },
+    /// The true orientation of an image is none.
+    #[error("image {image}: no camera sees its tie points: {error}")]
+    NoCamera {
+        /// Image id.
+        image: String,
+        /// What is wrong with it.
+        error: String,
+    },
+    /// An image that cannot be rendered or coded.
+    #[error("image {image}: {error}")]
+    Image {
+        /// Image id.
+        image: String,
+        /// What is wrong with it.
+        error: String,
+    },
+    /// The beam leaves Mars.
+    #[error("the laser beam misses Mars at ET {et_s:.3}")]
+    BeamMisses {
+        /// True time of the shot.
+        et_s: f64,
+    },
+    /// A frame asks for an instant that was not tabulated.
+    #[error("no beam was tabulated for ET {et_s:.6}")]
+    NotTabulated {
+        /// True time that was asked for.
+        et_s: f64,
+    },
+    /// A number out of its range: a day shorter than its image or longer than a file may be, more noise than images
+    /// have room for.
+    #[error("{option} is {value}; expected {least} to {most}")]
+    Option {
+        /// Name of the option.
+        option: &'static str,
+        /// What was asked.
+        value: f64,
+        /// Least value.
+        least: f64,
+        /// Largest value.
+        most: f64,
+    },
+    /// The kernels to fly along do not cover a single stretch of 20 s.
+    #[error(
+        "the kernels have no stretch of {least_s} s or more in which both orbit and attitude are known"
+    )]
+    NothingToFly {
+        /// Shortest stretch that is flown, seconds.
+        least_s: f64,
+    },
+}
+
+impl Cause for SceneError {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::NotAScene { .. }
+            | Self::Foreign { .. }
+            | Self::Changed { .. }
+            | Self::Option { .. } => Kind::Configuration,
+            Self::NoOrbit { .. }
+            | Self::NoCamera { .. }
+            | Self::Image { .. }
+            | Self::NotTabulated { .. } => Kind::Bug,
+            Self::BeamMisses { .. } => Kind::Input,
+            Self::NothingToFly { .. } => Kind::Coverage,
+        }
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::NotAScene { .. } => "choose an empty or new folder",
+            Self::Foreign { .. } | Self::Changed { .. } => {
+                "a new scene would remove it: move it elsewhere, or choose another folder"
+            }
+            Self::NoOrbit { .. }
+            | Self::NoCamera { .. }
+            | Self::Image { .. }
+            | Self::NotTabulated { .. } => {
+                "report this with the seed and the kernels that were used"
+            }
+            Self::BeamMisses { .. } => "the attitude kernels do not point +Z at Mars there; leave them out",
+            Self::Option { .. } => "choose a value within these bounds",
+            Self::NothingToFly { .. } => {
+                "check that the metakernel loads SPK for -94 and 499 and CK for -94000 of the same time"
+            }
+        }
+        .to_owned()
+    }
+}

@@ -1,0 +1,118 @@
+//! Images of the synthetic mission as the camera takes them: every pixel shows the ground that ties and shots are measured on,
+//! by its albedo and its slope towards the Sun, with the blur and the noise of the camera.
+
+mod light;
+mod rendering;
+
+use std::{fs::File, io::Write as _, path::Path};
+
+use rayon::prelude::*;
+
+use self::rendering::Rendering;
+use super::{drawn::Flown, error::SceneError, terrain::Terrain, truth::RenderedTruth};
+use areograph_base::{
+    error::{IoError, Locate as _, Result},
+    units::SECONDS_PER_MS,
+};
+use areograph_config::usual_instrument;
+use areograph_pds::image_file::{Coding, NewImage, Predictor, Transform, encode};
+use areograph_spice::Session;
+
+/// Lines that are rendered at a time.
+const STRIP_LINES: u32 = 128;
+
+/// How images are coded: by a coder that the spacecraft had.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Coder {
+    /// By what the pixel before says, without loss; the archive has most images in this code.
+    Predictive,
+    /// By cosines over squares of 16 × 16 pixels, in steps of two numbers: with loss.
+    Transform,
+}
+
+impl Coder {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Predictive => "predictive",
+            Self::Transform => "transform",
+        }
+    }
+
+    const fn coding(self) -> Coding {
+        match self {
+            Self::Predictive => Coding::Predictive {
+                predictor: Predictor::X,
+                table: 5,
+            },
+            Self::Transform => Coding::Transform {
+                transform: Transform::Cosine,
+                groups: 4,
+                spacing: 32,
+            },
+        }
+    }
+}
+
+/// Name of the file of an image.
+pub(super) fn image_name(id: &str) -> String {
+    format!("{}.imq", id.replace('-', "").to_lowercase())
+}
+
+/// Writes the images that came down into `folder`; how each of them was made.
+///
+/// # Errors
+/// An image that sees no ground, or cannot be coded; the system's refusal to write.
+pub(super) fn write_images(
+    folder: &Path,
+    days: &[Flown],
+    terrain: &Terrain,
+    (seed, coder): (u64, Coder),
+    session: &Session,
+) -> Result<Vec<RenderedTruth>> {
+    let mut truth = Vec::new();
+    for flown in days.iter().filter(|flown| flown.arc.image.is_delivered()) {
+        let planned = flown.arc.image;
+        let camera = Rendering::new(flown, terrain, seed)?;
+        let lines = planned.lines_delivered / 16 * 16;
+        let starts: Vec<u32> = (0..lines).step_by(STRIP_LINES as usize).collect();
+        let strips = starts.into_par_iter().map(|first| {
+            camera.pixels(first..lines.min(first + STRIP_LINES), 0..planned.samples())
+        });
+        let strips: Vec<Vec<u8>> = strips.collect::<Result<_>>()?;
+        let stop = session.et_to_utc(flown.arc.exposed.stop)?;
+        let bytes = encoded(flown, &strips.concat(), &stop, coder)?;
+        let path = folder.join(image_name(planned.id));
+        let written = File::create(&path).and_then(|mut file| file.write_all(&bytes));
+        written.map_err(IoError::on("write")).in_file(&path)?;
+        truth.push(RenderedTruth::new(planned, coder.name(), camera.sun_deg()));
+    }
+    Ok(truth)
+}
+
+fn encoded(flown: &Flown, pixels: &[u8], stop: &str, coder: Coder) -> Result<Vec<u8>> {
+    let planned = flown.arc.image;
+    let failed = |error: &str| SceneError::Image {
+        image: planned.id.to_owned(),
+        error: error.to_owned(),
+    };
+    let clock = planned
+        .sclk_start
+        .split_once(':')
+        .and_then(|(seconds, ticks)| Some((seconds.parse().ok()?, ticks.parse().ok()?)));
+    let image = NewImage {
+        product_id: &planned.id.replace('-', "/"),
+        instrument: [&usual_instrument().label.instrument, ""],
+        clock: clock.ok_or_else(|| failed("its clock string has no seconds and ticks"))?,
+        utc: [planned.utc_start, stop],
+        exposure_s: planned.exposure_ms * SECONDS_PER_MS,
+        summing: u8::try_from(planned.summing).unwrap_or(u8::MAX),
+        first_detector: 0,
+        samples: planned.samples(),
+        pixels,
+        coding: coder.coding(),
+    };
+    Ok(encode(&image).map_err(|error| failed(&error.to_string()))?)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,359 @@
+//! Kernels of the invented mission: text ones as shipped, binary ones by CSPICE's own writers.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use super::{
+    arc::Arc,
+    files::put,
+    orbit::Orbit,
+    plan::PlannedImage,
+    sun::mars_state_from_sun,
+    versions::{FAMILIES, Version},
+};
+use areograph_base::{
+    constants::{NAIF_MARS, NAIF_SOLAR_SYSTEM_BARYCENTRE, NAIF_SUN, SPACECRAFT},
+    error::{IoError, Locate, Result},
+    frames::Position,
+    time::{Et, Interval},
+    units::SECONDS_PER_DAY,
+};
+use areograph_config::usual_instrument;
+use areograph_geom::attitude::make_continuous;
+use areograph_spice::{CkSegment, KernelSet, Session, SpkSegment, State, write_ck, write_spk};
+
+/// NAIF id of the barycentre of Mars and its moons.
+const NAIF_MARS_BARYCENTRE: i32 = 4;
+/// Seconds between states of an arc: degree 7 over four states leaves nanometres.
+const SPK_STEP_S: f64 = 60.0;
+/// Degree of Hermite interpolation.
+const SPK_DEGREE: i32 = 7;
+/// Name of the kernel with the frames of the wide-angle cameras.
+const WIDE_ANGLE_NAME: &str = "moc_wa.ti";
+/// Name of the attitude kernel.
+const CK_NAME: &str = "mgs_sc_scene.bc";
+/// Name of the kernel with Mars and the Sun.
+const PLANETS_NAME: &str = "mars_sun_scene.bsp";
+/// The first words of every comment area.
+const SYNTHETIC: &str = "SYNTHETIC: written by areograph scene, not from mission data.";
+
+/// Text kernels by file name, in load order of the first four.
+const TEXT_KERNELS: [(&str, &str); 7] = [
+    (
+        "leapseconds.tls",
+        include_str!("../../../kernels.example/leapseconds.tls"),
+    ),
+    (
+        "mgs_clock.tsc",
+        include_str!("../../../kernels.example/mgs_clock.tsc"),
+    ),
+    (
+        "mars_iau2000.tpc",
+        include_str!("../../../kernels.example/mars_iau2000.tpc"),
+    ),
+    ("moc.ti", include_str!("../../../kernels.example/moc.ti")),
+    (
+        "mars_iau1991.tpc",
+        include_str!("../../../kernels.example/mars_iau1991.tpc"),
+    ),
+    (
+        "mars_iau1994.tpc",
+        include_str!("../../../kernels.example/mars_iau1994.tpc"),
+    ),
+    (
+        WIDE_ANGLE_NAME,
+        include_str!("../../../kernels.example/moc_wa.ti"),
+    ),
+];
+/// How many of them a metakernel loads; the other Mars models would replace the first.
+const LOADED: usize = 4;
+
+/// How many of them an archive's metakernel loads: there are no images.
+const ARCHIVE_LOADED: usize = 3;
+/// Its name.
+pub(super) const ARCHIVE_METAKERNEL: &str = "archive.tm";
+/// The orbit of an archive reaches so far beyond its files, seconds.
+const ARCHIVE_MARGIN_S: f64 = 60.0;
+
+/// File name of the orbit of one family.
+fn spk_name(family: &str) -> String {
+    format!("mgs_{family}_scene.bsp")
+}
+
+/// Writes text kernels and metakernels into `folder`.
+pub(super) fn write_text_kernels(folder: &Path) -> Result<()> {
+    fs::create_dir_all(folder)
+        .map_err(IoError::on("create"))
+        .in_file(folder)?;
+    for (name, text) in TEXT_KERNELS {
+        put(&folder.join(name), text)?;
+    }
+    for family in FAMILIES {
+        let mut names: Vec<String> = TEXT_KERNELS[..LOADED]
+            .iter()
+            .map(|(name, _)| (*name).to_owned())
+            .collect();
+        names.extend([
+            PLANETS_NAME.to_owned(),
+            spk_name(family),
+            CK_NAME.to_owned(),
+        ]);
+        put(
+            &folder.join(format!("{family}.tm")),
+            &metakernel(family, &names),
+        )?;
+        names.push(WIDE_ANGLE_NAME.to_owned());
+        put(
+            &folder.join(wide_angle_metakernel(family)),
+            &metakernel(family, &names),
+        )?;
+    }
+    Ok(())
+}
+
+/// Name of the metakernel that knows the wide-angle cameras too.
+pub(super) fn wide_angle_metakernel(family: &str) -> String {
+    format!("{family}_wa.tm")
+}
+
+fn metakernel(family: &str, names: &[String]) -> String {
+    let list: Vec<String> = names.iter().map(|name| format!("'{name}'")).collect();
+    format!(
+        "KPL/MK\n\nKernels of a synthetic mission with the orbit of family {family}; written by\n\
+         `areograph scene`. Paths count from the folder of this file.\n\n\\begindata\n\n\
+         KERNELS_TO_LOAD = ( {} )\n\n\\begintext\n",
+        list.join("\n                    ")
+    )
+}
+
+/// A session with the clock and the leap seconds of `folder`.
+pub(super) fn clock_session(folder: &Path) -> Result<Session> {
+    let files: Vec<PathBuf> = TEXT_KERNELS[..2]
+        .iter()
+        .map(|(name, _)| folder.join(name))
+        .collect();
+    Session::open(&KernelSet::from_files(&files)?)
+}
+
+/// When the first line of a planned image begins, by its clock string.
+pub(super) fn image_start(session: &Session, image: &PlannedImage) -> Result<Et> {
+    session.sclk_to_et(image.sclk_start)
+}
+
+/// Attitude samples of an arc as a C-kernel takes them.
+struct AttitudeColumns {
+    instants: Vec<Et>,
+    quaternions: Vec<[f64; 4]>,
+    rates_rad_s: Vec<[f64; 3]>,
+}
+
+impl AttitudeColumns {
+    fn of(arc: &Arc) -> Self {
+        let samples = arc.attitude.samples();
+        let mut quaternions: Vec<[f64; 4]> = samples
+            .iter()
+            .map(|sample| {
+                let q = sample.j2000_to_bus;
+                [q.w, q.i, q.j, q.k]
+            })
+            .collect();
+        make_continuous(&mut quaternions);
+        Self {
+            instants: samples
+                .iter()
+                .map(|sample| {
+                    usual_instrument()
+                        .pointing_bias()
+                        .lookup(sample.et)
+                        .kernel_time()
+                })
+                .collect(),
+            quaternions,
+            rates_rad_s: samples
+                .iter()
+                .map(|sample| sample.rate_rad_s.into())
+                .collect(),
+        }
+    }
+}
+
+/// Writes the attitude of all arcs: the attitude of true time `t` stands at `t − 1.15 s`.
+pub(super) fn write_attitude(folder: &Path, session: &Session, arcs: &[Arc]) -> Result<()> {
+    let columns: Vec<AttitudeColumns> = arcs.iter().map(AttitudeColumns::of).collect();
+    let segments: Vec<CkSegment> = arcs
+        .iter()
+        .zip(&columns)
+        .map(|(arc, columns)| CkSegment {
+            name: arc.image.id,
+            instants: &columns.instants,
+            quaternions: &columns.quaternions,
+            angular_velocities_rad_s: &columns.rates_rad_s,
+            interval_starts: &columns.instants[..1],
+        })
+        .collect();
+    let comment = format!(
+        "{SYNTHETIC}\nTime tags carry the error of the mission's kernels: the attitude of time t \
+         stands at t - 1.15 s."
+    );
+    write_ck(&folder.join(CK_NAME), session, &segments, &comment)
+}
+
+/// Writes one SPK per family and one for Mars and the Sun.
+pub(super) fn write_orbits(folder: &Path, arcs: &[Arc], seed: u64) -> Result<()> {
+    for (index, family) in FAMILIES.iter().enumerate() {
+        let tables: Vec<(Vec<Et>, Vec<State>)> = arcs
+            .iter()
+            .map(|arc| {
+                let version = &versions(arc, seed)[index];
+                let epochs = epochs(arc.kernel_span(), SPK_STEP_S);
+                let states = epochs
+                    .iter()
+                    .map(|et| kernel_state(&version.state(&arc.orbit, *et)))
+                    .collect();
+                (epochs, states)
+            })
+            .collect();
+        let segments: Vec<SpkSegment> = arcs
+            .iter()
+            .zip(&tables)
+            .map(|(arc, (epochs, states))| SpkSegment {
+                target: SPACECRAFT.naif,
+                centre: NAIF_MARS_BARYCENTRE,
+                name: arc.image.id,
+                degree: SPK_DEGREE,
+                epochs,
+                states,
+            })
+            .collect();
+        let comment =
+            format!("{SYNTHETIC}\nOrbit of family {family}; the truth is that of family gsfc.");
+        write_spk(&folder.join(spk_name(family)), &segments, &comment)?;
+    }
+    match (arcs.first(), arcs.last()) {
+        (Some(first), Some(last)) => {
+            let span = Interval::new(first.frames.start, last.frames.stop);
+            write_planets(folder, span)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The three versions of an arc's orbit, in the order of [`FAMILIES`].
+pub(super) fn versions(arc: &Arc, seed: u64) -> [Version; 3] {
+    let middle = arc.exposed.start.plus(arc.exposed.duration_s() / 2.0);
+    FAMILIES.map(|family| Version::new(family, arc.image.id, seed, middle))
+}
+
+/// Mars around the Sun; the Sun stands at the barycentre, and Mars at its own, for want of moons.
+fn write_planets(folder: &Path, span: Interval) -> Result<()> {
+    let days = |days: f64| days * SECONDS_PER_DAY;
+    let epochs = epochs(span.padded(days(4.0)), days(1.0));
+    let at_rest = State {
+        position: Position::new(nalgebra::Vector3::zeros()),
+        velocity_m_s: nalgebra::Vector3::zeros(),
+    };
+    let resting = vec![at_rest; epochs.len()];
+    let moving: Vec<State> = epochs
+        .iter()
+        .map(|et| kernel_state(&mars_state_from_sun(*et)))
+        .collect();
+    let segment = |target, centre, name, states| SpkSegment {
+        target,
+        centre,
+        name,
+        degree: SPK_DEGREE,
+        epochs: &epochs,
+        states,
+    };
+    let segments = [
+        segment(
+            NAIF_SUN,
+            NAIF_SOLAR_SYSTEM_BARYCENTRE,
+            "Sun at the barycentre",
+            &resting,
+        ),
+        segment(
+            NAIF_MARS_BARYCENTRE,
+            NAIF_SOLAR_SYSTEM_BARYCENTRE,
+            "Mars, Standish elements",
+            &moving,
+        ),
+        segment(
+            NAIF_MARS,
+            NAIF_MARS_BARYCENTRE,
+            "Mars without moons",
+            &resting,
+        ),
+    ];
+    let comment = format!(
+        "{SYNTHETIC}\nMars by Standish's approximate elements; the Sun rests at the solar system barycentre."
+    );
+    write_spk(&folder.join(PLANETS_NAME), &segments, &comment)
+}
+
+/// Writes the kernels of an archive: text ones, the orbit over each of `spans`, Mars and the Sun, a metakernel.
+pub(super) fn write_archive_kernels(
+    folder: &Path,
+    orbit: &Orbit,
+    spans: &[Interval],
+) -> Result<()> {
+    let texts = &TEXT_KERNELS[..ARCHIVE_LOADED];
+    for (name, text) in texts {
+        put(&folder.join(name), text)?;
+    }
+    let spk = spk_name("archive");
+    let names = texts.iter().map(|(name, _)| (*name).to_owned());
+    let names: Vec<String> = names
+        .chain([PLANETS_NAME.to_owned(), spk.clone()])
+        .collect();
+    let metakernel = metakernel("archive", &names);
+    put(&folder.join(ARCHIVE_METAKERNEL), &metakernel)?;
+    let tables: Vec<(Vec<Et>, Vec<State>)> = spans
+        .iter()
+        .map(|span| {
+            let epochs = epochs(span.padded(ARCHIVE_MARGIN_S), SPK_STEP_S);
+            let states = epochs.iter().map(|et| kernel_state(&orbit.state(*et)));
+            let states = states.collect();
+            (epochs, states)
+        })
+        .collect();
+    let segments: Vec<SpkSegment> = tables
+        .iter()
+        .map(|(epochs, states)| SpkSegment {
+            target: SPACECRAFT.naif,
+            centre: NAIF_MARS_BARYCENTRE,
+            name: "archive",
+            degree: SPK_DEGREE,
+            epochs,
+            states,
+        })
+        .collect();
+    let comment = format!("{SYNTHETIC}\nThe orbit of an invented archive of PEDR files.");
+    write_spk(&folder.join(spk), &segments, &comment)?;
+    match (spans.first(), spans.last()) {
+        (Some(first), Some(last)) => write_planets(folder, Interval::new(first.start, last.stop)),
+        _ => Ok(()),
+    }
+}
+
+fn kernel_state(state: &super::orbit::OrbitState) -> State {
+    State {
+        position: Position::new(state.position_m),
+        velocity_m_s: state.velocity_m_s,
+    }
+}
+
+/// Instants `step_s` apart that reach from the start of `span` to its end or just beyond.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a day has some thousand states"
+)]
+fn epochs(span: Interval, step_s: f64) -> Vec<Et> {
+    let count = (span.duration_s() / step_s).ceil() as usize + 1;
+    (0..count)
+        .map(|index| span.start.plus(step_s * index as f64))
+        .collect()
+}

@@ -1,0 +1,148 @@
+//! A synthetic mission with known truth: kernels, PEDR files, labels and site configurations.
+//!
+//! | file | what it invents |
+//! |---|---|
+//! | `plan` | six images, three sites, which days are written in full |
+//! | `error_sources`, `drawn` | what is wrong with the data: kinds and sizes, and what one mission has of them |
+//! | `orbit`, `versions` | the true orbit of a day, and two rivals that are metres off |
+//! | `attitude`, `arc` | pointing, and orbit and attitude solved so that an image shows its site |
+//! | `terrain`, `roughness`, `laser` | the ground, and laser shots on it as a PEDR frame tells them |
+//! | `images` | what the six images show, pixel by pixel |
+//! | `context` | wide-angle images around two of the six, a fourth site |
+//! | `telemetry` | what the instrument tells of its echoes besides ranges |
+//! | `archive`, `archive_frames` | PEDR files of any number of days, with kernels to check them by |
+//! | `ties` | places that two images show, in images that were truly taken elsewhere and at other times |
+//! | `calibration`, `pushbroom_pair` | two stereo lines of a camera for its calibration |
+//! | `calibration_loop`, `line_images` | three lines with their pixels and laser passes: the calibration from pixels |
+//! | `terrain_model`, `passes` | a terrain model that lies aside, laser passes over it |
+//! | `kernels`, `pedr`, `sites`, `truth` | the files |
+//! | `mission`, `along` | the entry points of a mission |
+//!
+//! Injected errors: attitude stands 1.15 s early in the C-kernel, laser time tags are 0.117 s late,
+//! version K files are in IAU 1991; tie points see images that were exposed some lines off their labels,
+//! and a few of them are blunders. [`SceneErrors`] has more of them. `truth.json` tells all of it.
+
+mod along;
+mod arc;
+mod archive;
+mod archive_frames;
+mod attitude;
+mod calibration;
+mod calibration_loop;
+mod context;
+mod drawn;
+mod error;
+mod error_sources;
+mod files;
+mod images;
+mod kernels;
+mod laser;
+mod line_images;
+mod mission;
+mod orbit;
+mod passes;
+mod pedr;
+pub mod plan;
+mod plane;
+mod plane_net;
+mod pushbroom_pair;
+mod roughness;
+mod sites;
+mod sun;
+mod telemetry;
+mod terrain;
+mod terrain_model;
+mod ties;
+mod truth;
+mod value_noise;
+mod versions;
+
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+};
+
+use areograph_geom::random;
+
+pub use along::write_scene_along;
+pub use archive::{ArchiveOptions, ArchiveSummary, write_archive};
+pub use calibration::write_calibration_scene;
+pub use calibration_loop::write_calibration_loop_scene;
+pub use error::SceneError;
+pub use error_sources::{
+    AltimeterErrors, AttitudeErrors, Jitter, Misregistration, PositionErrors, Relief, Roughness,
+    SceneErrors,
+};
+pub use images::Coder;
+pub use mission::{write_scene, write_scene_with_images};
+pub use plane::write_plane_scene;
+pub use plane_net::{PlaneRecipe, PlaneScene};
+pub use terrain_model::write_terrain_model_scene;
+
+/// How a mission is invented.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SceneOptions {
+    /// Seed of terrain, clouds, orbit differences and all errors that are drawn.
+    pub seed: u64,
+    /// Seconds of frames in the files of whole days, 600 to 90 000; other files hold at most one revolution.
+    pub day_s: f64,
+    /// What is wrong with the data, and the relief.
+    pub errors: SceneErrors,
+}
+
+impl Default for SceneOptions {
+    /// Seed 1, days of 24 h, errors of the worked example.
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            day_s: areograph_base::units::SECONDS_PER_DAY,
+            errors: SceneErrors::demo(),
+        }
+    }
+}
+
+/// What was written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SceneSummary {
+    /// Folder of the mission.
+    pub directory: PathBuf,
+    /// Site configurations.
+    pub sites: usize,
+    /// Images.
+    pub images: usize,
+    /// PEDR files.
+    pub pedr_files: usize,
+    /// Frames in them.
+    pub frames: u64,
+}
+
+impl SceneSummary {
+    fn of(directory: &Path, truth: &truth::Truth, sites: usize) -> Self {
+        Self {
+            directory: directory.to_owned(),
+            sites,
+            images: truth.images.len() + truth.wide_angle.len(),
+            pedr_files: truth.files.len(),
+            frames: truth.files.iter().map(|file| file.frames).sum(),
+        }
+    }
+}
+
+impl fmt::Display for SceneSummary {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let plural = |count: usize| if count == 1 { "" } else { "s" };
+        write!(
+            formatter,
+            "{}: {} site{}, {} image{}, {} frames in {} PEDR file{}; next: areograph run {}/sites/*.toml",
+            self.directory.display(),
+            self.sites,
+            plural(self.sites),
+            self.images,
+            plural(self.images),
+            self.frames,
+            self.pedr_files,
+            plural(self.pedr_files),
+            self.directory.display(),
+        )
+    }
+}

@@ -1,0 +1,165 @@
+//! What the lines of a stereo camera show of invented ground, pixel by pixel.
+
+use std::{fs::File, io::BufWriter, path::Path};
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+use tiff::encoder::{TiffEncoder, colortype::Gray8};
+
+use super::{
+    error::SceneError,
+    pushbroom_pair::{Orbit, StereoLine},
+    random::{mix, normal_of, unit_of},
+    terrain::Terrain,
+    value_noise::noise,
+};
+use areograph_base::error::{Error, IoError, Result};
+use areograph_geom::ellipsoid::local_axes;
+
+/// Spacings of the lattices of albedo, metres: the finest is two pixels.
+const LATTICES_M: [f64; 5] = [54.0, 108.0, 216.0, 432.0, 864.0];
+/// Share of albedo that a lattice adds or takes at most.
+const CONTRAST: f64 = 0.14;
+/// Numbers of a flat place of mean albedo, and of a black one.
+const LEVEL_DN: [f64; 2] = [130.0, 12.0];
+/// Noise of a pixel.
+const NOISE_DN: f64 = 1.0;
+/// Share of its light that a pixel gets from either neighbour on an axis.
+const BLUR: f64 = 0.12;
+/// Towards the Sun from the middle of the ground: east, north and up. All lines fly over within two minutes.
+const SUN: [f64; 3] = [-0.75, 0.25, 0.61];
+/// Ground is met within so many metres of height: a thousandth of a pixel.
+const TOLERANCE_M: f64 = 0.05;
+/// Lines that are rendered at a time.
+const STRIP: u32 = 100;
+
+/// The ground and its light.
+pub(super) struct LineImages<'a> {
+    pub(super) orbit: &'a Orbit,
+    pub(super) terrain: &'a Terrain,
+    pub(super) seed: u64,
+}
+
+impl LineImages<'_> {
+    /// Writes what a line shows as a TIFF of 8 bits.
+    ///
+    /// # Errors
+    /// A pixel that sees no ground; the system's refusal to write.
+    pub(super) fn write(&self, path: &Path, line: &StereoLine) -> Result<()> {
+        let [lines, samples] = self.orbit.size;
+        let pixels = self.pixels(line)?;
+        let file = File::create(path).map_err(IoError::on("create"))?;
+        let written = TiffEncoder::new(BufWriter::new(file))
+            .and_then(|mut encoder| encoder.write_image::<Gray8>(samples, lines, &pixels));
+        written.map_err(|error| {
+            Error::from(IoError {
+                action: "write",
+                source: std::io::Error::other(error),
+            })
+        })
+    }
+
+    fn pixels(&self, line: &StereoLine) -> Result<Vec<u8>> {
+        let lines = self.orbit.size[0];
+        let starts: Vec<u32> = (0..lines).step_by(STRIP as usize).collect();
+        let strips = starts.into_par_iter().map(|start| {
+            let end = (start + STRIP).min(lines);
+            self.strip(line, start..end)
+        });
+        let strips: Vec<Vec<u8>> = strips.collect::<Result<_>>()?;
+        Ok(strips.concat())
+    }
+
+    fn strip(&self, line: &StereoLine, lines: std::ops::Range<u32>) -> Result<Vec<u8>> {
+        let sun = self.sun();
+        // Slopes take a place on every side, blurring another one.
+        let rows = i64::from(lines.start) - 2..i64::from(lines.end) + 2;
+        let rows = rows.map(|row| self.ground_m(line, row as f64 + 0.5));
+        let rows: Option<Vec<Vec<Vector3<f64>>>> = rows.collect();
+        let rows = rows.ok_or_else(|| SceneError::Image {
+            image: line.name.to_owned(),
+            error: format!("lines {} to {} see no ground", lines.start, lines.end),
+        })?;
+        let sharp: Vec<Vec<f64>> = rows
+            .windows(3)
+            .map(|rows| {
+                let (above, here, below) = (&rows[0], &rows[1], &rows[2]);
+                let number = |at: usize| {
+                    let slope = (here[at + 1] - here[at - 1]).cross(&(below[at] - above[at]));
+                    self.number(&here[at], &slope, &sun)
+                };
+                (1..here.len() - 1).map(number).collect()
+            })
+            .collect();
+        let mut pixels = Vec::new();
+        for (rows, number) in sharp.windows(3).zip(lines) {
+            let down =
+                |at: usize| BLUR * (rows[0][at] + rows[2][at]) + (1.0 - 2.0 * BLUR) * rows[1][at];
+            for sample in 0..self.orbit.size[1] {
+                let at = sample as usize;
+                let dn = BLUR * (down(at) + down(at + 2)) + (1.0 - 2.0 * BLUR) * down(at + 1);
+                pixels.push(self.read_out(line, dn, number, sample));
+            }
+        }
+        Ok(pixels)
+    }
+
+    fn sun(&self) -> Vector3<f64> {
+        let middle = self.orbit.ground(0.5, 0.0);
+        local_axes(&middle).tr_mul(&Vector3::from(SUN)).normalize()
+    }
+
+    /// Ground at the middles of the samples of a line and of two more on either side.
+    fn ground_m(&self, line: &StereoLine, at_line: f64) -> Option<Vec<Vector3<f64>>> {
+        let samples = self.orbit.samples();
+        let camera = line.truth(samples);
+        let pose = self.orbit.true_pose(line, &camera, at_line);
+        let mut near_m = None;
+        let mut ground_m = Vec::new();
+        for sample in -2..=i64::from(self.orbit.size[1]) + 1 {
+            let tangents = camera.tangents(2.0 * (sample as f64 + 0.5) / samples - 1.0);
+            let look = Vector3::new(tangents.x, tangents.y, 1.0).normalize();
+            let direction = pose.to_mars * look;
+            let start_m = match near_m {
+                Some(near_m) => near_m,
+                None => self.terrain.range_m(&pose.position_m, &direction)?,
+            };
+            let range_m =
+                self.terrain
+                    .range_near_m(&pose.position_m, &direction, start_m, TOLERANCE_M)?;
+            near_m = Some(range_m);
+            ground_m.push(pose.position_m + range_m * direction);
+        }
+        Some(ground_m)
+    }
+
+    /// The number of a place by the albedo and the slope of its ground.
+    fn number(&self, ground_m: &Vector3<f64>, slope: &Vector3<f64>, sun: &Vector3<f64>) -> f64 {
+        let normal = slope.normalize() * slope.dot(ground_m).signum();
+        let light = normal.dot(sun).max(0.0) / sun.dot(&ground_m.normalize());
+        let key = mix(self.seed ^ 0x00A1_BED0);
+        let albedo: f64 = (0..)
+            .zip(LATTICES_M)
+            .map(|(octave, spacing_m)| {
+                CONTRAST * noise(&(ground_m / spacing_m), key.wrapping_add(octave))
+            })
+            .sum();
+        let [level_dn, black_dn] = LEVEL_DN;
+        black_dn + (level_dn - black_dn) * (1.0 + albedo) * light
+    }
+
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped to a byte just before; 0 stands for no pixel"
+    )]
+    fn read_out(&self, line: &StereoLine, dn: f64, at_line: u32, sample: u32) -> u8 {
+        let key = line
+            .name
+            .bytes()
+            .fold(mix(self.seed), |key, byte| mix(key ^ u64::from(byte)));
+        let pixel = mix(key ^ (u64::from(at_line) << 32 | u64::from(sample)));
+        let noise_dn = NOISE_DN * normal_of(unit_of(pixel), unit_of(mix(pixel)));
+        (dn + noise_dn).round().clamp(1.0, 255.0) as u8
+    }
+}

@@ -1,0 +1,290 @@
+//! The whole invented mission, from plan to folder.
+
+use std::path::Path;
+
+use super::{
+    SceneOptions, SceneSummary,
+    arc::Arc,
+    context::{CONTEXT_SITE, ContextImage, context_site, context_ties, in_window},
+    drawn::{DayErrors, Flown},
+    error::SceneError,
+    files::{Draft, put},
+    images::{Coder, write_images},
+    kernels::{
+        clock_session, image_start, versions, write_attitude, write_orbits, write_text_kernels,
+    },
+    laser::{LaserErrors, Shot},
+    pedr::{PedrRequest, frame_tags, write_pedr},
+    plan::{IMAGES, LOST_IMAGE, SITES},
+    sites::{README, planned_label, planned_site},
+    terrain::Terrain,
+    ties::{ties_name, write_ties},
+    truth::{
+        ContextTruth, DrawnTruth, FileTruth, ImageTruth, KeptShot, OrbitDifference, ProfileTruth,
+        Truth,
+    },
+};
+use areograph_base::{
+    body::MARS_IAU2000,
+    error::{IoError, Locate, Result},
+};
+use areograph_geom::{body_rotation::body_matrix, ellipsoid::Spherical};
+use areograph_pds::ties::ties_table;
+
+/// Fewest and most seconds of frames in a day's file.
+const DAY_S: [f64; 2] = [600.0, 90_000.0];
+/// Least and largest noise of tie points: what is left of the edge that images keep free for it.
+const TIE_NOISE_PX: [f64; 2] = [0.0, 5.0];
+
+/// Writes the synthetic mission into `directory`, replacing an older one that nobody added to or changed.
+///
+/// The same seed gives the same bytes. Everything is written beside `directory` and renamed at the end.
+/// No session may be open on this thread.
+///
+/// # Errors
+/// [`SceneError::NotAScene`], [`SceneError::Foreign`] and [`SceneError::Changed`] when the folder holds
+/// something else, [`SceneError::Option`], the system's refusal to write.
+pub fn write_scene(directory: &Path, options: &SceneOptions) -> Result<SceneSummary> {
+    write(directory, options, None)
+}
+
+/// The same with the pixels of the narrow-angle images (`images/*.imq`, named in the site files), which takes minutes.
+///
+/// # Errors
+/// Those of [`write_scene`].
+pub fn write_scene_with_images(
+    directory: &Path,
+    options: &SceneOptions,
+    coder: Coder,
+) -> Result<SceneSummary> {
+    write(directory, options, Some(coder))
+}
+
+fn write(directory: &Path, options: &SceneOptions, images: Option<Coder>) -> Result<SceneSummary> {
+    check(options)?;
+    let draft = Draft::begin(directory, README)?;
+    let fly = |arc: Arc| {
+        let errors = DayErrors::draw(&options.errors, &arc, options.seed);
+        Flown { arc, errors }
+    };
+    let days: Vec<Flown> = write_kernels(&draft, options)?
+        .into_iter()
+        .map(fly)
+        .collect();
+
+    let directions = SITES.map(super::plan::Site::direction);
+    let terrain = Terrain::new(options.seed, &directions, options.errors.relief);
+    let mut truth = Truth::new(options.seed, options.errors);
+    let pedr = draft.folder("pedr")?;
+    let mut kept = Vec::new();
+    for flown in &days {
+        let day = write_day(&pedr, flown, &terrain, options)?;
+        truth.files.push(day.file);
+        kept.push(day.kept);
+        if flown.arc.image.is_delivered() {
+            let versions = versions(&flown.arc, options.seed);
+            truth.images.push(ImageTruth::of(&flown.arc, &versions));
+            truth.errors_drawn.push(DrawnTruth::of(flown));
+            truth.profiles.push(day.profile);
+        }
+    }
+    let sites = draft.folder("sites")?;
+    let ties = draft.folder("ties")?;
+    for site in SITES {
+        let own: Vec<&Flown> = days
+            .iter()
+            .filter(|flown| flown.arc.image.site.id == site.id)
+            .collect();
+        if let [first, second] = own[..] {
+            let noise_px = options.errors.tie_noise_px;
+            let pair = write_ties(&ties, [first, second], &terrain, noise_px, options.seed)?;
+            let arcs = [&first.arc, &second.arc];
+            let file = planned_site(site, arcs, &options.errors, &pair, images.is_some());
+            put(&sites.join(format!("{}.toml", site.id)), &file.to_toml())?;
+            truth.ties.push(pair);
+        }
+    }
+    truth.wide_angle = write_context(&draft, &days, &kept, &terrain, options)?;
+    if let Some(coder) = images {
+        let session = clock_session(&draft.folder("kernels")?)?;
+        let folder = draft.folder("images")?;
+        let how = (options.seed, coder);
+        truth.rendered = write_images(&folder, &days, &terrain, how, &session)?;
+    }
+    write_truth(&draft, &truth)?;
+    draft.finish()?;
+    Ok(SceneSummary::of(directory, &truth, SITES.len() + 1))
+}
+
+/// Refuses options that no mission can be made with.
+fn check(options: &SceneOptions) -> Result<()> {
+    let named = [
+        ("day_s", options.day_s, DAY_S),
+        ("tie_noise_px", options.errors.tie_noise_px, TIE_NOISE_PX),
+    ];
+    for (option, value, [least, most]) in named {
+        if !(least..=most).contains(&value) {
+            return Err(SceneError::Option {
+                option,
+                value,
+                least,
+                most,
+            }
+            .into());
+        }
+    }
+    Ok(())
+}
+
+/// Writes labels, tie points and the site file of the wide-angle images; `kept` are the shots of each day.
+fn write_context(
+    draft: &Draft,
+    days: &[Flown],
+    kept: &[Vec<KeptShot>],
+    terrain: &Terrain,
+    options: &SceneOptions,
+) -> Result<Vec<ContextTruth>> {
+    let session = clock_session(&draft.folder("kernels")?)?;
+    let images = ContextImage::all(days, &session)?;
+    let labels = draft.folder("labels")?;
+    for image in &images {
+        let path = labels.join(format!("{}.lbl", image.id()));
+        put(&path, &image.label(&session)?)?;
+    }
+    let id = CONTEXT_SITE.id;
+    let ties = context_ties(&images, terrain, options.seed);
+    put(
+        &draft.folder("ties")?.join(ties_name(id)),
+        &ties_table(&ties),
+    )?;
+    let site = context_site(&images, &options.errors);
+    let path = draft.folder("sites")?.join(format!("{id}.toml"));
+    put(&path, &site.to_toml())?;
+    let shots = |image: &ContextImage<'_>| {
+        let days = days.iter().zip(kept);
+        let mut own = days.filter(|(flown, _)| image.is_of(flown));
+        own.next().map_or(&[][..], |(_, kept)| kept)
+    };
+    Ok(images
+        .iter()
+        .map(|image| image.truth(shots(image)))
+        .collect())
+}
+
+/// Writes `truth.json`.
+pub(super) fn write_truth(draft: &Draft, truth: &Truth) -> Result<()> {
+    let path = draft.root().join("truth.json");
+    let text = serde_json::to_string(truth)
+        .map_err(|error| IoError {
+            action: "write",
+            source: error.into(),
+        })
+        .in_file(&path)?;
+    put(&path, &text)
+}
+
+/// Solves the arcs and writes their kernels, and labels of the images that came down.
+fn write_kernels(draft: &Draft, options: &SceneOptions) -> Result<Vec<Arc>> {
+    let kernels = draft.folder("kernels")?;
+    let labels = draft.folder("labels")?;
+    write_text_kernels(&kernels)?;
+    let session = clock_session(&kernels)?;
+    let mut arcs = IMAGES
+        .iter()
+        .chain([&LOST_IMAGE])
+        .map(|image| {
+            let start = image_start(&session, image)?;
+            Arc::new(image, start, image.pedr_duration_s(options.day_s))
+        })
+        .collect::<Result<Vec<Arc>>>()?;
+    arcs.sort_by(|a, b| {
+        a.exposed
+            .start
+            .seconds()
+            .total_cmp(&b.exposed.start.seconds())
+    });
+    for arc in arcs.iter().filter(|arc| arc.image.is_delivered()) {
+        put(
+            &labels.join(format!("{}.lbl", arc.image.id)),
+            &planned_label(arc, &session)?,
+        )?;
+    }
+    write_attitude(&kernels, &session, &arcs)?;
+    drop(session);
+    write_orbits(&kernels, &arcs, options.seed)?;
+    Ok(arcs)
+}
+
+/// What was written for one day.
+struct Day {
+    file: FileTruth,
+    /// Over the day's site.
+    profile: ProfileTruth,
+    /// Shots in the window of the wide-angle images.
+    kept: Vec<KeptShot>,
+}
+
+/// Writes the PEDR file of one day.
+fn write_day(
+    folder: &Path,
+    flown: &Flown,
+    terrain: &Terrain,
+    options: &SceneOptions,
+) -> Result<Day> {
+    let Flown { arc, errors } = flown;
+    let image = arc.image;
+    let first = arc.orbit.revolution(arc.frames.start);
+    let name = image.pedr_name();
+    let request = PedrRequest {
+        name: &name,
+        tags: &frame_tags(arc.frames),
+        datum: image.datum(),
+        // Names of the mapping phase are orbit numbers plus 10 000.
+        orbit: &|et| {
+            (image.pedr_number - 10_000).saturating_add_signed(arc.orbit.revolution(et) - first)
+        },
+        seed: options.seed ^ u64::from(image.pedr_number),
+        errors: LaserErrors {
+            altimeter: options.errors.altimeter,
+            shift: errors.profile_shift.clone(),
+        },
+    };
+    let within = |holds: &dyn Fn(f64, f64) -> bool, shot: &Shot| {
+        let ground = Spherical::from_xyz_m(&shot.ground_m);
+        holds(ground.longitude_rad, ground.latitude.0)
+    };
+    let in_site = |shot: &Shot| within(&|east, north| image.site.contains(east, north), shot);
+    let in_context = |shot: &Shot| within(&in_window, shot);
+    let (file, shots) = write_pedr(folder, flown, terrain, &request, |shot| {
+        in_site(shot) || in_context(shot)
+    })?;
+    let (mut kept, mut context) = (shots.clone(), shots);
+    kept.retain(|kept| in_site(&kept.truth));
+    context.retain(|kept| in_context(&kept.truth));
+    let mut profile = ProfileTruth::new(image.site.id, &name, &kept);
+    profile.image = Some(image.id);
+    for version in versions(arc, options.seed) {
+        let mean_m = mean(kept.iter().map(|kept| {
+            let KeptShot { truth, .. } = kept;
+            let rival_m =
+                body_matrix(&MARS_IAU2000, truth.et) * version.position_m(&arc.orbit, truth.et);
+            truth.range_m - (rival_m - truth.told_ground_m).norm()
+        }));
+        let difference = OrbitDifference {
+            radial_along_cross_m: version.offset_m.into(),
+            expected_range_minus_distance_mean_m: mean_m,
+        };
+        profile.orbit_differences.insert(version.family, difference);
+    }
+    Ok(Day {
+        file,
+        profile,
+        kept: context,
+    })
+}
+
+/// Mean of some values, 0 of none.
+fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len().max(1) as f64;
+    values.sum::<f64>() / count
+}

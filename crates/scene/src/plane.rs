@@ -1,0 +1,187 @@
+//! A synthetic net of rectified pictures as files, with blunders, gross controls and the truth.
+
+use std::{collections::BTreeMap, fmt::Write as _, path::Path};
+
+use serde::Serialize;
+
+use super::{
+    files::{Draft, put},
+    plane_net::{PlaneRecipe, PlaneScene},
+    random::Random,
+};
+use areograph_base::error::{Locate, Result};
+use areograph_geom::plane::Place;
+
+const README: &str = "A net of 25 rectified pictures for plane triangulation: measurements, controls, a net file.\n\
+    Some measurements and two controls are wrong on purpose; truth.json tells which, and where everything is.\n\
+    Next: areograph triangulate net.toml\n";
+
+/// The tertiary net of the paper with more points and controls, and noise.
+const RECIPE: PlaneRecipe = PlaneRecipe {
+    points: 600,
+    noise_m: 30.0,
+    controls: 12,
+    control_sigma_m: 800.0,
+    ..PlaneRecipe::TERTIARY
+};
+/// Ties that are misidentified, and by how far, metres.
+const BLUNDERS: usize = 3;
+const BLUNDER_M: f64 = 2_000.0;
+/// Errors of two controls in Y, metres, as in the secondary net of the paper.
+const GROSS_M: [f64; 2] = [17_000.0, 19_000.0];
+
+/// The file of the truth.
+#[derive(Serialize)]
+struct Truth {
+    seed: u64,
+    noise_m: f64,
+    control_sigma_m: f64,
+    /// Measurements that are misidentified: picture and point.
+    blunders: Vec<[String; 2]>,
+    /// Controls that are wrong.
+    gross_controls: Vec<String>,
+    /// East and north of every point on the map, metres.
+    points_m: BTreeMap<String, [f64; 2]>,
+    /// `P`, `Q`, `A`, `B` of every picture, metres.
+    pictures: BTreeMap<String, [f64; 4]>,
+}
+
+/// Writes a synthetic net into `directory`, replacing an older scene that nobody added to or changed. The same seed gives the
+/// same bytes.
+///
+/// # Errors
+/// [`SceneError`](super::SceneError) when the folder holds something else; the system's refusal to write.
+pub fn write_plane_scene(directory: &Path, seed: u64) -> Result<String> {
+    let draft = Draft::begin(directory, README)?;
+    let mut scene = RECIPE.simulate(seed);
+    let blunders = misidentify(&mut scene, seed);
+    let gross = [0, 1].map(|of| scene.net.controls.len() / 2 + of);
+    for (control, error_m) in gross.iter().zip(GROSS_M) {
+        scene.net.controls[*control].at += Place::new(0.0, error_m);
+    }
+    let picture = |index: usize| format!("P{:02}", index + 1);
+    let point = |index: usize| format!("{}", index + 1);
+    let mut measurements = "picture,point,x,y\n".to_owned();
+    for of in &scene.net.measurements {
+        // Writing to a string cannot fail.
+        let _infallible = writeln!(
+            measurements,
+            "{},{},{:.6},{:.6}",
+            picture(of.picture),
+            point(of.point),
+            of.at.re,
+            of.at.im
+        );
+    }
+    let mut controls = "point,x_km,y_km\n".to_owned();
+    for of in &scene.net.controls {
+        let _infallible = writeln!(
+            controls,
+            "{},{:.6},{:.6}",
+            point(of.point),
+            of.at.re / 1e3,
+            of.at.im / 1e3
+        );
+    }
+    let mut pictures = "picture,brick,metres_per_unit\n".to_owned();
+    for (index, way) in scene.pictures.iter().enumerate() {
+        // Three bricks of neighbouring columns.
+        let brick = ["west", "middle", "east"][index % RECIPE.grid[0] * 3 / RECIPE.grid[0]];
+        let _infallible = writeln!(pictures, "{},{brick},{:.3}", picture(index), way.scale());
+    }
+    let truth = Truth {
+        seed,
+        noise_m: RECIPE.noise_m,
+        control_sigma_m: RECIPE.control_sigma_m,
+        blunders: blunders
+            .iter()
+            .map(|index| {
+                let of = &scene.net.measurements[*index];
+                [picture(of.picture), point(of.point)]
+            })
+            .collect(),
+        gross_controls: gross
+            .iter()
+            .map(|index| point(scene.net.controls[*index].point))
+            .collect(),
+        points_m: scene
+            .points
+            .iter()
+            .enumerate()
+            .map(|(index, place)| (point(index), [place.re, place.im]))
+            .collect(),
+        pictures: scene
+            .pictures
+            .iter()
+            .enumerate()
+            .map(|(index, way)| {
+                (
+                    picture(index),
+                    [way.turn.re, way.turn.im, way.shift.re, way.shift.im],
+                )
+            })
+            .collect(),
+    };
+    let truth = serde_json::to_string_pretty(&truth).unwrap_or_default() + "\n";
+    for (name, text) in [
+        ("measurements.csv", &*measurements),
+        ("controls.csv", &*controls),
+        ("pictures.csv", &*pictures),
+        ("truth.json", &*truth),
+        ("net.toml", NET),
+    ] {
+        let path = draft.root().join(name);
+        put(&path, text).in_file(&path)?;
+    }
+    draft.finish()?;
+    Ok(format!(
+        "{}: {} pictures, {} points, {} measurements; next: areograph triangulate {}",
+        directory.display(),
+        scene.net.pictures,
+        scene.net.points,
+        scene.net.measurements.len(),
+        directory.join("net.toml").display()
+    ))
+}
+
+const NET: &str = "\
+net = \"synthetic_net\"
+description = \"Synthetic net after the tertiary net of Arthur & McMacken 1977\"
+
+[measurements]
+files = [\"measurements.csv\"]
+
+[controls]
+files = [\"controls.csv\"]
+
+[pictures]
+files = [\"pictures.csv\"]
+
+[map]
+latitude_deg = 0.0
+longitude_deg = 0.0
+
+[triangulation]
+local = \"yes\"
+";
+
+/// Moves some measurements of points on three pictures or more by what a wrong crater does; their indices.
+fn misidentify(scene: &mut PlaneScene, seed: u64) -> Vec<usize> {
+    let mut views = vec![0; scene.net.points];
+    for of in &scene.net.measurements {
+        views[of.point] += 1;
+    }
+    let mut random = Random::new(seed, "plane blunders");
+    let many: Vec<usize> = (0..scene.net.measurements.len())
+        .filter(|index| views[scene.net.measurements[*index].point] > 2)
+        .collect();
+    let chosen: Vec<usize> = (0..BLUNDERS)
+        .map(|number| many[(number * many.len() + many.len() / 2) / BLUNDERS % many.len().max(1)])
+        .collect();
+    for index in &chosen {
+        let of = &mut scene.net.measurements[*index];
+        let direction = random.between(0.0, std::f64::consts::TAU);
+        of.at += Place::from_polar(BLUNDER_M, direction) / scene.pictures[of.picture].turn;
+    }
+    chosen
+}

@@ -1,0 +1,309 @@
+//! Self-affine ground around a site: noise in octaves from 51 km to 25 m, and craters.
+//!
+//! A height is a sum of octaves of value noise on square lattices whose nodes are hashed, so that nothing is stored
+//! and any point costs the same: about a quarter of a microsecond, and the craters near it.
+
+use std::collections::HashMap;
+
+use nalgebra::{Vector2, Vector3};
+
+use super::{
+    error_sources::Roughness,
+    random::{Random, mix, unit_of},
+};
+
+/// Spacing of the finest lattice, metres: the shortest wavelength is twice that.
+const FINEST_M: f64 = 12.5;
+/// Octaves; the coarsest lattice has 51.2 km.
+const OCTAVES: i32 = 13;
+/// Exponent of Hurst.
+const HURST: f64 = 0.7;
+/// Amplitude of an octave in units of `ν (spacing / 300 m)^H` by which the sum of all has structure function
+/// `ν² (d / 300 m)^2H`, to 4 % in height from 50 m to 2 km.
+const OCTAVE_SHARE: f64 = 0.4251;
+/// Full roughness up to here from the site, none from there on, metres; windows reach 33 km.
+const REACH_M: [f64; 2] = [40_000.0, 60_000.0];
+
+/// Craters with a diameter of 100 m or more per square kilometre; with the square of the diameter fewer are larger,
+/// hence one of 1 km in 1 000 km². The order of what Martian plains have.
+const CRATERS_PER_KM2: f64 = 0.1;
+/// Smallest and largest radius, metres.
+const CRATER_RADIUS_M: [f64; 2] = [50.0, 2_000.0];
+/// Depth over radius of worn craters; fresh ones have 0.4.
+const CRATER_DEPTH: f64 = 0.16;
+/// Edge of a cell of the crater grid, metres.
+const CELL_M: f64 = 1_000.0;
+
+/// The ground around one site, added to what lies below.
+pub(super) struct RoughPatch {
+    centre: Vector3<f64>,
+    east: Vector3<f64>,
+    north: Vector3<f64>,
+    octaves: Vec<Octave>,
+    craters: Vec<Crater>,
+    cells: HashMap<[i32; 2], Vec<usize>>,
+}
+
+/// Noise on a square lattice.
+struct Octave {
+    /// Lattice spacings a metre, and their direction.
+    per_m: Vector2<f64>,
+    offset: Vector2<f64>,
+    height_m: f64,
+    key: u64,
+}
+
+/// A bowl with a raised rim.
+pub(super) struct Bowl {
+    pub radius_m: f64,
+    pub depth_m: f64,
+}
+
+struct Crater {
+    centre_m: Vector2<f64>,
+    bowl: Bowl,
+}
+
+impl RoughPatch {
+    /// The ground of this roughness around `centre`, a direction.
+    pub(super) fn new(seed: u64, centre: &Vector3<f64>, roughness: Roughness) -> Self {
+        let place = [centre.x, centre.y, centre.z].map(f64::to_bits);
+        let key = place.into_iter().fold(seed, |key, bits| mix(key ^ bits));
+        let mut random = Random::new(key, "roughness");
+        let east = Vector3::z().cross(centre).normalize();
+        let octaves = (0..OCTAVES)
+            .map(|octave| Octave::new(octave, roughness, &mut random))
+            .collect();
+        let craters = craters(&mut random);
+        Self {
+            centre: *centre,
+            east,
+            north: centre.cross(&east),
+            octaves,
+            cells: grid(&craters),
+            craters,
+        }
+    }
+
+    /// Height at a place on the reference sphere, metres; `None` where the patch has ended.
+    pub(super) fn height_m(&self, place_m: &Vector3<f64>) -> Option<f64> {
+        let plan_m = Vector2::new(self.east.dot(place_m), self.north.dot(place_m));
+        let distance_m = plan_m.norm();
+        let [full_m, end_m] = REACH_M;
+        if distance_m >= end_m || self.centre.dot(place_m) < 0.0 {
+            return None;
+        }
+        let share = ((end_m - distance_m) / (end_m - full_m)).min(1.0);
+        let near = self.cells.get(&cell(&plan_m)).into_iter().flatten();
+        let bowls_m: f64 = near
+            .map(|&index| {
+                let crater = &self.craters[index];
+                crater.bowl.height_m((plan_m - crater.centre_m).norm())
+            })
+            .sum();
+        Some(fade(share) * (self.noise_m(&plan_m) + bowls_m))
+    }
+
+    /// Height without craters, metres.
+    fn noise_m(&self, plan_m: &Vector2<f64>) -> f64 {
+        let octaves = self.octaves.iter();
+        octaves.map(|octave| octave.height_m(plan_m)).sum()
+    }
+}
+
+impl Octave {
+    fn new(octave: i32, roughness: Roughness, random: &mut Random) -> Self {
+        let spacing_m = FINEST_M * 2.0_f64.powi(octave);
+        let (sin, cos) = random.between(0.0, std::f64::consts::TAU).sin_cos();
+        Self {
+            per_m: Vector2::new(cos, sin) / spacing_m,
+            offset: Vector2::from_fn(|_, _| random.between(0.0, 1.0)),
+            height_m: OCTAVE_SHARE
+                * roughness.height_difference_at_300_m()
+                * (spacing_m / 300.0).powf(HURST),
+            key: random.bits(),
+        }
+    }
+
+    fn height_m(&self, plan_m: &Vector2<f64>) -> f64 {
+        let x = self.per_m.dot(plan_m) + self.offset.x;
+        let y = self.per_m.perp(plan_m) + self.offset.y;
+        let (west, south) = (x.floor(), y.floor());
+        let (along_x, along_y) = (fade(x - west), fade(y - south));
+        let node = |east: f64, north: f64| self.node(west + east, south + north);
+        let between = |from: f64, to: f64, share: f64| from + share * (to - from);
+        let lower = between(node(0.0, 0.0), node(1.0, 0.0), along_x);
+        let upper = between(node(0.0, 1.0), node(1.0, 1.0), along_x);
+        self.height_m * between(lower, upper, along_y)
+    }
+
+    /// Value of a node: evenly spread, of mean 0 and standard deviation 1.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a patch has some ten thousand nodes across; signs wrap into other hashes"
+    )]
+    fn node(&self, x: f64, y: f64) -> f64 {
+        let place = u64::from(x as i32 as u32) << 32 | u64::from(y as i32 as u32);
+        f64::sqrt(12.0) * (unit_of(mix(self.key ^ mix(place))) - 0.5)
+    }
+}
+
+impl Bowl {
+    /// Reach of the ejecta in crater radii.
+    pub(super) const REACH: f64 = 2.5;
+
+    /// Height at a distance from the centre, metres.
+    pub(super) fn height_m(&self, distance_m: f64) -> f64 {
+        let distance = distance_m / self.radius_m;
+        let rim_m = 0.2 * self.depth_m;
+        if distance < 1.0 {
+            rim_m + self.depth_m * (distance * distance - 1.0)
+        } else if distance < Self::REACH {
+            rim_m * ((Self::REACH - distance) / (Self::REACH - 1.0)).powi(2)
+        } else {
+            0.0
+        }
+    }
+}
+
+/// Rises from 0 to 1 with two derivatives of 0 at either end.
+fn fade(share: f64) -> f64 {
+    share * share * share * (10.0 + share * (6.0 * share - 15.0))
+}
+
+/// Craters of the square around the site that the patch lies in.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "some thousand craters"
+)]
+fn craters(random: &mut Random) -> Vec<Crater> {
+    let [smallest_m, largest_m] = CRATER_RADIUS_M;
+    let half_m = REACH_M[1];
+    let count = CRATERS_PER_KM2 * (2.0 * half_m / 1_000.0).powi(2);
+    (0..count as usize)
+        .map(|_| {
+            // The share of craters that are larger falls with the square of the radius.
+            let share = random.between((smallest_m / largest_m).powi(2), 1.0);
+            let radius_m = smallest_m / share.sqrt();
+            Crater {
+                centre_m: Vector2::from_fn(|_, _| random.between(-half_m, half_m)),
+                bowl: Bowl {
+                    radius_m,
+                    depth_m: CRATER_DEPTH * radius_m,
+                },
+            }
+        })
+        .collect()
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "a patch is some hundred cells across"
+)]
+fn cell(plan_m: &Vector2<f64>) -> [i32; 2] {
+    [plan_m.x, plan_m.y].map(|component_m| (component_m / CELL_M).floor() as i32)
+}
+
+/// Which craters can reach into which cell.
+fn grid(craters: &[Crater]) -> HashMap<[i32; 2], Vec<usize>> {
+    let mut cells: HashMap<[i32; 2], Vec<usize>> = HashMap::new();
+    for (index, crater) in craters.iter().enumerate() {
+        let reach_m = Vector2::repeat(Bowl::REACH * crater.bowl.radius_m);
+        let low = cell(&(crater.centre_m - reach_m));
+        let high = cell(&(crater.centre_m + reach_m));
+        for x in low[0]..=high[0] {
+            for y in low[1]..=high[1] {
+                cells.entry([x, y]).or_default().push(index);
+            }
+        }
+    }
+    cells
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::terrain::REFERENCE_RADIUS_M;
+
+    const SITE: Vector3<f64> = Vector3::new(0.6, 0.8, 0.0);
+
+    /// How much heights `apart_m` apart differ (root mean square), over places and directions of some patches, metres.
+    fn differ_m(roughness: Roughness, apart_m: f64) -> f64 {
+        const PATCHES: u64 = 12;
+        const PAIRS: u64 = 1_500;
+        let mut squares_m2 = 0.0;
+        for seed in 0..PATCHES {
+            let patch = RoughPatch::new(seed, &SITE, roughness);
+            let mut random = Random::new(seed, "pairs");
+            for _ in 0..PAIRS {
+                let from_m = Vector2::from_fn(|_, _| random.between(-30_000.0, 30_000.0));
+                let (sin, cos) = random.between(0.0, std::f64::consts::TAU).sin_cos();
+                let to_m = from_m + apart_m * Vector2::new(cos, sin);
+                squares_m2 += (patch.noise_m(&to_m) - patch.noise_m(&from_m)).powi(2);
+            }
+        }
+        (squares_m2 / (PATCHES * PAIRS) as f64).sqrt()
+    }
+
+    #[test]
+    fn heights_differ_as_the_structure_function_says() {
+        for roughness in [Roughness::Plains, Roughness::Medium, Roughness::Rough] {
+            for apart_m in [50.0, 100.0, 300.0, 1_000.0, 2_000.0_f64] {
+                let expected_m =
+                    roughness.height_difference_at_300_m() * (apart_m / 300.0).powf(HURST);
+                let found_m = differ_m(roughness, apart_m);
+                println!("{roughness:?} {apart_m} m: {found_m:.3} m, expected {expected_m:.3} m");
+                // 4 % because there are but thirteen octaves; 18 000 pairs, fewer independent ones at 2 km: 1 %.
+                assert!(
+                    (found_m / expected_m - 1.0).abs() < 0.07,
+                    "{found_m} {expected_m}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn the_finest_waves_are_some_25_m_long() {
+        // Below the finest lattice the ground is smooth: heights differ in proportion to the distance.
+        let [near_m, nearer_m] = [2.0, 1.0].map(|apart_m| differ_m(Roughness::Medium, apart_m));
+        assert!(
+            (near_m / nearer_m - 2.0).abs() < 0.05,
+            "{near_m} {nearer_m}"
+        ); // 2^0.7 = 1.62 if it went on
+    }
+
+    #[test]
+    fn craters_are_as_many_as_told_and_few_are_large() {
+        let craters = craters(&mut Random::new(1, "craters"));
+        assert_eq!(craters.len(), 1_440); // 120 km squared, 0.1 a square kilometre
+        let beyond = |radius_m: f64| {
+            let larger = craters
+                .iter()
+                .filter(|crater| crater.bowl.radius_m > radius_m);
+            larger.count()
+        };
+        // Of diameters above 200 m there are a quarter: 360, and 16 in standard deviation; times four.
+        assert!(beyond(100.0).abs_diff(360) < 65, "{}", beyond(100.0));
+        assert!((3..30).contains(&beyond(500.0)), "{}", beyond(500.0)); // 14 of 1 km
+        let all_in = craters.iter().all(|crater| {
+            (CRATER_RADIUS_M[0]..=CRATER_RADIUS_M[1]).contains(&crater.bowl.radius_m)
+        });
+        assert!(all_in);
+    }
+
+    #[test]
+    fn a_patch_ends_without_a_step() {
+        let patch = RoughPatch::new(1, &SITE, Roughness::Rough);
+        let place = |north_m: f64| {
+            let angle_rad = north_m / REFERENCE_RADIUS_M;
+            REFERENCE_RADIUS_M * (angle_rad.cos() * SITE + angle_rad.sin() * Vector3::z())
+        };
+        assert!(patch.height_m(&place(30_000.0)).unwrap().abs() > 0.1);
+        // A metre before the end nothing is left; beyond it, and on the other side of Mars, there is none.
+        assert!(patch.height_m(&place(59_998.0)).unwrap().abs() < 1e-3);
+        assert!(patch.height_m(&place(60_010.0)).is_none());
+        assert!(patch.height_m(&-place(0.0)).is_none());
+    }
+}

@@ -1,0 +1,360 @@
+//! Tie points of an image pair, as images show them that were taken at other times and from other places
+//! than labels and kernels say.
+
+use std::path::Path;
+
+use nalgebra::Vector3;
+
+use super::{
+    drawn::Flown,
+    error::SceneError,
+    files::put,
+    random::Random,
+    terrain::Terrain,
+    truth::{BlunderTruth, Poses, TieCameraTruth, TieTruth, TiesTruth},
+};
+use areograph_base::{
+    error::Result,
+    line_times::LineTimes,
+    ties::{TieMeasure, TiePoint},
+    time::Et,
+};
+use areograph_config::usual_instrument;
+use areograph_geom::{
+    light_time::light_time_s,
+    oriented_camera::OrientedCamera,
+    pushbroom::{Detector, ExteriorOrientation, Pose, Projector, SampledOrientation},
+};
+use areograph_pds::ties::ties_table;
+
+/// Tie points of a pair, as many as the paper has at Gusev; fewer where the images hardly overlap.
+const TIES: usize = 154;
+/// Places of the first image that are looked at for one tie point.
+const PLACES_PER_TIE: usize = 20;
+/// No tie point is nearer to the edge of an image, pixels: blunders stay inside, and noise of a pixel.
+const EDGE_PX: f64 = BLUNDER_PX[1] + 5.0;
+/// One tie point of so many is a blunder, the first of them in the middle of the first so many.
+const BLUNDER_EVERY: usize = 20;
+/// Shortest and longest blunder, in any direction.
+const BLUNDER_PX: [f64; 2] = [20.0, 100.0];
+/// Intervals between poses of an image, a tenth of a second each: where the bus changes its rate,
+/// interpolation is off by 0.1 mm on the ground.
+const INTERVALS: u32 = 160;
+/// The same of an image with jitter, 2 to 5 ms each: a twentieth of the shortest period, for 2 mm on the ground.
+const INTERVALS_OF_JITTER: u32 = 3_600;
+/// Height errors that ranges of neighbouring pixels end at, metres: a thousandth of a pixel.
+const NEIGHBOUR_M: f64 = 1e-3;
+/// Lines at which the truth tells the pose: the ends of 30 equal intervals.
+const TOLD_POSES: u32 = 31;
+
+/// An image as it was truly taken.
+pub(super) struct TrueImage<'a> {
+    pub(super) flown: &'a Flown,
+    pub(super) oriented_camera: OrientedCamera<SampledOrientation>,
+}
+
+/// A point on the ground and where both images see it.
+struct Tie {
+    ground_m: Vector3<f64>,
+    measures: [TieMeasure<String>; 2],
+}
+
+impl<'a> TrueImage<'a> {
+    /// The image of the day `flown`.
+    pub(super) fn new(flown: &'a Flown, terrain: &Terrain) -> Result<Self> {
+        let image = flown.arc.image;
+        let intervals = if flown.errors.has_jitter() {
+            INTERVALS_OF_JITTER
+        } else {
+            INTERVALS
+        };
+        let orientation = SampledOrientation::new(&poses(flown, terrain, intervals)?)
+            .map_err(|error| no_camera(flown, &error))?;
+        let detector = Detector::new(usual_instrument(), image.summing, 0, image.samples());
+        Ok(Self {
+            flown,
+            oriented_camera: OrientedCamera {
+                id: image.id.to_owned(),
+                orientation,
+                detector,
+                line_times: LineTimes::even(
+                    flown.arc.exposed.start,
+                    image.lines_header,
+                    image.line_period_s(),
+                )?,
+            },
+        })
+    }
+
+    pub(super) fn projector(&self) -> Result<Projector<'_, SampledOrientation>> {
+        let projector = Projector::new(
+            &self.oriented_camera.orientation,
+            self.oriented_camera.lines(),
+        );
+        Ok(projector.map_err(|error| no_camera(self.flown, &error))?)
+    }
+
+    /// Line and sample at the far edges of where tie points may lie.
+    fn extent_px(&self) -> [f64; 2] {
+        let lines = f64::from(self.flown.arc.image.lines_delivered);
+        [lines, self.oriented_camera.detector.samples].map(|length| length - EDGE_PX)
+    }
+
+    /// The ground that a random place of the image shows.
+    fn any_ground_m(&self, terrain: &Terrain, random: &mut Random) -> Option<Vector3<f64>> {
+        let [line, sample] = self
+            .extent_px()
+            .map(|end_px| random.between(EDGE_PX, end_px));
+        self.ground_m(terrain, line, sample)
+    }
+
+    /// The ground that a place of the image shows.
+    pub(super) fn ground_m(
+        &self,
+        terrain: &Terrain,
+        line: f64,
+        sample: f64,
+    ) -> Option<Vector3<f64>> {
+        let (x_lines, _) = self.oriented_camera.focal_plane_coordinates(line, sample);
+        let pose = self.oriented_camera.orientation.pose(x_lines);
+        let camera = self.oriented_camera.detector.look(sample);
+        let direction = pose.mars_to_camera.tr_mul(&camera).normalize();
+        let range_m = terrain.range_m(&pose.position_m, &direction)?;
+        Some(pose.position_m + range_m * direction)
+    }
+
+    /// The ground that some neighbouring samples of a line show, to a millimetre: each range starts from those before it.
+    pub(super) fn ground_of_line_m(
+        &self,
+        terrain: &Terrain,
+        line: f64,
+        samples: impl Iterator<Item = f64>,
+    ) -> Vec<Option<Vector3<f64>>> {
+        let (x_lines, _) = self.oriented_camera.focal_plane_coordinates(line, 0.0);
+        let pose = self.oriented_camera.orientation.pose(x_lines);
+        let mut before: [Option<f64>; 2] = [None; 2];
+        let ground = samples.map(|sample| {
+            let camera = self.oriented_camera.detector.look(sample);
+            let direction = pose.mars_to_camera.tr_mul(&camera).normalize();
+            let range_m = match before {
+                [Some(last_m), Some(earlier_m)] => {
+                    let start_m = 2.0 * last_m - earlier_m;
+                    terrain.range_near_m(&pose.position_m, &direction, start_m, NEIGHBOUR_M)
+                }
+                _ => terrain.range_m(&pose.position_m, &direction),
+            };
+            before = [range_m, before[0]];
+            range_m.map(|range_m| pose.position_m + range_m * direction)
+        });
+        ground.collect()
+    }
+
+    /// Where the image shows a point, unless that is outside or too near to an edge.
+    pub(super) fn measure(
+        &self,
+        projector: &Projector<'_, SampledOrientation>,
+        ground_m: &Vector3<f64>,
+    ) -> Option<TieMeasure<String>> {
+        let seen = projector.project(ground_m).ok()?;
+        let y_px = self
+            .oriented_camera
+            .detector
+            .focal_px(&seen.camera_m)
+            .ok()?
+            .y;
+        let measure = TieMeasure {
+            image: self.oriented_camera.id.clone(),
+            line: seen.x + 0.5 * self.oriented_camera.lines(),
+            sample: self.oriented_camera.detector.sample(y_px),
+            sigma_px: None,
+        };
+        let [line_end, sample_end] = self.extent_px();
+        let inside = (EDGE_PX..line_end).contains(&measure.line)
+            && (EDGE_PX..sample_end).contains(&measure.sample);
+        inside.then_some(measure)
+    }
+
+    /// How many focal-plane pixels a line is in the middle of the image.
+    fn focal_px_per_line(&self, terrain: &Terrain) -> Result<f64> {
+        let camera = &self.oriented_camera;
+        let [line, sample] = [camera.lines(), camera.detector.samples].map(|length| 0.5 * length);
+        let et_s = exposed(self.flown, line).seconds();
+        let ground_m = self.ground_m(terrain, line, sample);
+        let ground_m = ground_m.ok_or(SceneError::BeamMisses { et_s })?;
+        Ok(camera.focal_px_per_line(0.0, &ground_m))
+    }
+
+    fn truth(&self, terrain: &Terrain) -> Result<TieCameraTruth> {
+        let errors = &self.flown.errors;
+        let lines = self.oriented_camera.lines();
+        let step = lines / f64::from(TOLD_POSES - 1);
+        let told: Vec<f64> = (0..TOLD_POSES).map(|row| step * f64::from(row)).collect();
+        let times: Vec<Et> = told.iter().map(|line| exposed(self.flown, *line)).collect();
+        let light_times_s = times
+            .iter()
+            .map(|et| seen_after_s(self.flown, terrain, *et));
+        let light_time_s = light_times_s.collect::<Result<_>>()?;
+        let times = times.into_iter();
+        let poses: Vec<(Et, Pose)> = times.map(|et| (et, pose(self.flown, et, 0.0))).collect();
+        Ok(TieCameraTruth {
+            image: self.flown.arc.image.id,
+            time_bias_lines: errors.time_bias_lines,
+            position_bias_m: (errors.bus_position_m + errors.camera_position_m).into(),
+            focal_px_per_line: self.focal_px_per_line(terrain)?,
+            line: told,
+            light_time_s,
+            poses: Poses::of(&poses),
+        })
+    }
+}
+
+/// When a line was truly exposed, counted from the outer edge of the first one.
+fn exposed(flown: &Flown, line: f64) -> Et {
+    let arc = &flown.arc;
+    let exposed_s = (line + flown.errors.time_bias_lines) * arc.image.line_period_s();
+    arc.exposed.start.plus(exposed_s)
+}
+
+/// True pose of the camera, or the one that sees ground along straight rays after a light time.
+fn pose(flown: &Flown, exposure: Et, light_time_s: f64) -> Pose {
+    let mut pose = flown.camera_pose(usual_instrument(), exposure, light_time_s);
+    pose.position_m += flown.errors.camera_position_m;
+    pose
+}
+
+/// Light time from the ground on the boresight, seconds: within the narrow swath it changes by less than what MGS
+/// flies a centimetre in.
+fn seen_after_s(flown: &Flown, terrain: &Terrain, exposure: Et) -> Result<f64> {
+    let pose = pose(flown, exposure, 0.0);
+    let boresight = pose.mars_to_camera.row(2).transpose();
+    let range_m = terrain.range_m(&pose.position_m, &boresight);
+    let et_s = exposure.seconds();
+    Ok(light_time_s(
+        range_m.ok_or(SceneError::BeamMisses { et_s })?,
+    ))
+}
+
+/// Lines from the middle with the poses that see the ground along straight rays.
+fn poses(flown: &Flown, terrain: &Terrain, intervals: u32) -> Result<Vec<(f64, Pose)>> {
+    let lines = f64::from(flown.arc.image.lines_header);
+    (0..=intervals)
+        .map(|index| {
+            let line = lines * f64::from(index) / f64::from(intervals);
+            let exposure = exposed(flown, line);
+            let pose = pose(flown, exposure, seen_after_s(flown, terrain, exposure)?);
+            Ok((line - 0.5 * lines, pose))
+        })
+        .collect()
+}
+
+fn no_camera(flown: &Flown, error: &dyn std::error::Error) -> SceneError {
+    SceneError::NoCamera {
+        image: flown.arc.image.id.to_owned(),
+        error: error.to_string(),
+    }
+}
+
+/// Writes the tie points of a pair into `folder`, measured with noise of `noise_px`.
+///
+/// # Errors
+/// [`SceneError::NoCamera`]; the system's refusal to write.
+pub(super) fn write_ties(
+    folder: &Path,
+    [first, second]: [&Flown; 2],
+    terrain: &Terrain,
+    noise_px: f64,
+    seed: u64,
+) -> Result<TiesTruth> {
+    let site = first.arc.image.site.id;
+    let pair = [
+        TrueImage::new(first, terrain)?,
+        TrueImage::new(second, terrain)?,
+    ];
+    let mut random = Random::new(seed, &format!("ties {site}"));
+    let exact = exact_ties(&pair, terrain, &mut random)?;
+    let (measured, truth) = spoil(exact, noise_px, &mut random);
+    put(&folder.join(ties_name(site)), &ties_table(&measured))?;
+    Ok(TiesTruth {
+        site,
+        cameras: [pair[0].truth(terrain)?, pair[1].truth(terrain)?],
+        ties: truth,
+    })
+}
+
+/// Name of the file of a site.
+pub(super) fn ties_name(site: &str) -> String {
+    format!("{site}.csv")
+}
+
+/// Tie points spread over the ground that both images show, measured without error.
+fn exact_ties(
+    pair: &[TrueImage<'_>; 2],
+    terrain: &Terrain,
+    random: &mut Random,
+) -> Result<Vec<Tie>> {
+    let projectors = [pair[0].projector()?, pair[1].projector()?];
+    let tie = |_place| {
+        let ground_m = pair[0].any_ground_m(terrain, random)?;
+        let first = pair[0].measure(&projectors[0], &ground_m)?;
+        let second = pair[1].measure(&projectors[1], &ground_m)?;
+        Some(Tie {
+            ground_m,
+            measures: [first, second],
+        })
+    };
+    let places = 0..TIES * PLACES_PER_TIE;
+    Ok(places.filter_map(tie).take(TIES).collect())
+}
+
+/// Adds noise to all measurements, and blunders to a few.
+fn spoil(
+    ties: Vec<Tie>,
+    noise_px: f64,
+    random: &mut Random,
+) -> (Vec<TiePoint<String>>, Vec<TieTruth>) {
+    let spoilt = ties.into_iter().enumerate().map(|(index, tie)| {
+        let id = format!("tie-{:03}", index + 1);
+        let mut measures = tie.measures.to_vec();
+        for measure in &mut measures {
+            measure.line += noise_px * random.normal();
+            measure.sample += noise_px * random.normal();
+        }
+        let blunder =
+            (index % BLUNDER_EVERY == BLUNDER_EVERY / 2).then(|| blunder(&mut measures, random));
+        let truth = TieTruth {
+            id: id.clone(),
+            ground_iau2000_m: tie.ground_m.into(),
+            blunder,
+        };
+        let known = None;
+        (
+            TiePoint {
+                id,
+                known,
+                measures,
+            },
+            truth,
+        )
+    });
+    spoilt.unzip()
+}
+
+/// Moves one of the measurements far away.
+fn blunder(measures: &mut [TieMeasure<String>], random: &mut Random) -> BlunderTruth {
+    let image = usize::from(random.between(0.0, 1.0) < 0.5);
+    let [least_px, most_px] = BLUNDER_PX;
+    let length_px = random.between(least_px, most_px);
+    let (sin, cos) = random.between(0.0, std::f64::consts::TAU).sin_cos();
+    let [line_error, sample_error] = [length_px * cos, length_px * sin];
+    let measure = &mut measures[image];
+    measure.line += line_error;
+    measure.sample += sample_error;
+    BlunderTruth {
+        image: measure.image.clone(),
+        line_error,
+        sample_error,
+    }
+}
+
+#[cfg(test)]
+mod tests;

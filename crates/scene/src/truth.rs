@@ -1,0 +1,371 @@
+//! What the mission really did, for `truth.json`.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::{
+    arc::Arc,
+    drawn::{DayErrors, Flown},
+    error_sources::SceneErrors,
+    laser::{CROSSOVER_AMPLITUDE_M, CROSSOVER_PERIOD_S, Shot},
+    plan::{Look, PlannedImage},
+    versions::Version,
+};
+use areograph_base::{body::MARS_IAU2000, time::Et, units::SECONDS_PER_MS};
+use areograph_config::{usual_altimeter, usual_instrument};
+use areograph_geom::{
+    attitude::{make_continuous, spice_quaternion},
+    body_rotation::body_matrix,
+    pushbroom::Pose,
+};
+
+/// Epochs of an image: the ends of 30 equal intervals.
+const EPOCHS: u32 = 31;
+
+/// The whole truth.
+#[derive(Debug, Serialize)]
+pub(super) struct Truth {
+    pub made_by: &'static str,
+    pub synthetic: &'static str,
+    pub orbit: &'static str,
+    pub table_2: &'static str,
+    pub seed: u64,
+    pub errors: SceneErrors,
+    pub errors_rule: &'static str,
+    pub errors_drawn: Vec<DrawnTruth>,
+    pub biases: Biases,
+    pub crossover: Crossover,
+    pub frame_model: &'static str,
+    pub images: Vec<ImageTruth>,
+    pub files: Vec<FileTruth>,
+    pub profiles: Vec<ProfileTruth>,
+    pub tie_rule: &'static str,
+    pub ties: Vec<TiesTruth>,
+    pub wide_angle_rule: &'static str,
+    pub wide_angle: Vec<ContextTruth>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub rendered: Vec<RenderedTruth>,
+}
+
+/// How the pixels of an image were made.
+#[derive(Debug, Serialize)]
+pub(super) struct RenderedTruth {
+    image: &'static str,
+    coder: &'static str,
+    /// Zenith angle of the Sun over the site.
+    sun_incidence_deg: f64,
+    /// Where the Sun stands, from north to east.
+    sun_azimuth_deg: f64,
+}
+
+impl RenderedTruth {
+    /// An image in the light of a Sun at this zenith angle and azimuth, degrees.
+    pub(super) const fn new(
+        image: &PlannedImage,
+        coder: &'static str,
+        [sun_incidence_deg, sun_azimuth_deg]: [f64; 2],
+    ) -> Self {
+        Self {
+            image: image.id,
+            coder,
+            sun_incidence_deg,
+            sun_azimuth_deg,
+        }
+    }
+}
+
+/// The errors of the day of one image.
+#[derive(Debug, Serialize)]
+pub(super) struct DrawnTruth {
+    image: &'static str,
+    #[serde(flatten)]
+    errors: DayErrors,
+}
+
+impl DrawnTruth {
+    /// What was drawn for a day.
+    pub(super) fn of(flown: &Flown) -> Self {
+        Self {
+            image: flown.arc.image.id,
+            errors: flown.errors.clone(),
+        }
+    }
+}
+
+/// Poses of a camera.
+#[derive(Debug, Serialize)]
+pub(super) struct Poses {
+    epochs_et_s: Vec<f64>,
+    position_iau2000_m: Vec<[f64; 3]>,
+    camera_to_mars_quaternion_wxyz: Vec<[f64; 4]>,
+}
+
+impl Poses {
+    /// These poses, in order of time.
+    pub(super) fn of(poses: &[(Et, Pose)]) -> Self {
+        let mut quaternions: Vec<[f64; 4]> = poses
+            .iter()
+            .map(|(_, pose)| spice_quaternion(&pose.mars_to_camera.transpose()))
+            .collect();
+        make_continuous(&mut quaternions);
+        Self {
+            epochs_et_s: poses.iter().map(|(et, _)| et.seconds()).collect(),
+            position_iau2000_m: poses
+                .iter()
+                .map(|(_, pose)| pose.position_m.into())
+                .collect(),
+            camera_to_mars_quaternion_wxyz: quaternions,
+        }
+    }
+}
+
+/// Injected time errors.
+#[derive(Debug, Serialize)]
+pub(super) struct Biases {
+    ck_bias_s: f64,
+    ck_rule: &'static str,
+    mola_clock_bias_s: f64,
+    mola_clock_sign: &'static str,
+    mola_clock_rule: &'static str,
+}
+
+/// Injected crossover residual.
+#[derive(Debug, Serialize)]
+pub(super) struct Crossover {
+    amplitude_m: f64,
+    period_s: f64,
+    rule: &'static str,
+}
+
+/// One image.
+#[derive(Debug, Serialize)]
+pub(super) struct ImageTruth {
+    id: &'static str,
+    site: &'static str,
+    start_et_s: f64,
+    line_period_s: f64,
+    lines_header: u32,
+    lines_delivered: u32,
+    look: &'static str,
+    emission_deg: Option<f64>,
+    /// By the label's times, the orbit `gsfc` and the attitude of the C-kernel, one entry per epoch.
+    #[serde(flatten)]
+    poses: Poses,
+    /// Each family's orbit minus `gsfc` along the radial, along-track and cross-track axes of `gsfc`, metres, one
+    /// entry per epoch.
+    orbit_radial_along_cross_m: BTreeMap<&'static str, Vec<[f64; 3]>>,
+}
+
+/// One PEDR file.
+#[derive(Debug, Serialize)]
+pub(super) struct FileTruth {
+    pub file: String,
+    pub datum: &'static str,
+    pub frames: u64,
+    pub shots_ground: u64,
+    pub shots_cloud: u64,
+    pub shots_missing: u64,
+    /// Shots that the linear frame model places more than 0.2 m from the truth.
+    pub shots_beyond_frame_model: u64,
+    /// Lowest |latitude| of such shots in nadir-pointing frames, degrees.
+    pub beyond_frame_model_from_latitude_deg: Option<f64>,
+}
+
+/// A shot that met the ground, and where its record is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct KeptShot {
+    /// Record of the file, counted from 1 with the label records.
+    pub record: u32,
+    /// Shot in the frame, 1 to 20.
+    pub shot: u8,
+    /// The truth.
+    pub truth: Shot,
+}
+
+/// A wide-angle image in `truth.json`.
+#[derive(Debug, Serialize)]
+pub(super) struct ContextTruth {
+    pub id: &'static str,
+    pub camera: &'static str,
+    pub start_et_s: f64,
+    pub line_period_s: f64,
+    pub lines: u32,
+    #[serde(flatten)]
+    pub poses: Poses,
+    /// Shots of the PEDR file of the image's day that the image shows.
+    pub shots: Vec<ContextShot>,
+}
+
+/// Where an image shows a shot; lines and samples are 0 at the outer edge of the first one.
+#[derive(Debug, Serialize)]
+pub(super) struct ContextShot {
+    pub record: u32,
+    pub shot: u8,
+    pub line: f64,
+    pub sample: f64,
+}
+
+/// The shots of one file in one window.
+#[derive(Debug, Serialize)]
+pub(super) struct ProfileTruth {
+    pub window: String,
+    pub image: Option<&'static str>,
+    pub file: String,
+    pub orbit_differences: BTreeMap<&'static str, OrbitDifference>,
+    /// Largest distance between the linear frame model and where the file should have a shot, metres, before rounding.
+    pub frame_error_max_m: f64,
+    /// Record of the file, counted from 1 with the label, one entry per shot that met the ground.
+    pub record: Vec<u32>,
+    pub shot: Vec<u8>,
+    pub et_s: Vec<f64>,
+    pub ground_iau2000_m: Vec<[f64; 3]>,
+}
+
+/// How one family's orbit differs from the truth over a profile.
+#[derive(Debug, Serialize)]
+pub(super) struct OrbitDifference {
+    /// At the middle of the image, metres.
+    pub radial_along_cross_m: [f64; 3],
+    /// Mean of range minus distance from this family's spacecraft to the footprint, metres.
+    pub expected_range_minus_distance_mean_m: f64,
+}
+
+/// The tie points of one site.
+#[derive(Debug, Serialize)]
+pub(super) struct TiesTruth {
+    pub site: &'static str,
+    /// The two images, in the order of time.
+    pub cameras: [TieCameraTruth; 2],
+    /// In the order of the file.
+    pub ties: Vec<TieTruth>,
+}
+
+/// How an image was truly taken.
+#[derive(Debug, Serialize)]
+pub(super) struct TieCameraTruth {
+    pub image: &'static str,
+    pub time_bias_lines: f64,
+    pub position_bias_m: [f64; 3],
+    /// How many focal-plane pixels a line is, in the middle of the image.
+    pub focal_px_per_line: f64,
+    /// Lines, 0 at the outer edge of the first one, with the poses in which they were truly exposed.
+    pub line: Vec<f64>,
+    /// How much earlier the light left the ground on the boresight, one entry per line.
+    pub light_time_s: Vec<f64>,
+    #[serde(flatten)]
+    pub poses: Poses,
+}
+
+/// One tie point.
+#[derive(Debug, Serialize)]
+pub(super) struct TieTruth {
+    pub id: String,
+    pub ground_iau2000_m: [f64; 3],
+    pub blunder: Option<BlunderTruth>,
+}
+
+/// A measurement that was moved far away.
+#[derive(Debug, Serialize)]
+pub(super) struct BlunderTruth {
+    pub image: String,
+    pub line_error: f64,
+    pub sample_error: f64,
+}
+
+impl Truth {
+    /// The truth that all missions share; images, files and profiles are still to come.
+    pub(super) fn new(seed: u64, errors: SceneErrors) -> Self {
+        Self {
+            made_by: "areograph scene",
+            synthetic: "all of this is invented; only ids, times, summing, lines, line periods and emission angles of the narrow-angle images follow Shan et al. 2005",
+            table_2: "emission angles are those of Shan et al. 2005, Table 2, taken at the ground; of E04-01275 the table prints 7424 header lines, of which the RMSE of the first order in their Table 4 would be 9.7 m instead of the 11.45 m printed: it has 8064 here, of which 7424 are delivered",
+            orbit: "positions of images belong to the orbit gsfc (kernels/gsfc.tm), which is the true one but for errors_drawn; nav and ipng, and the site files use nav, differ from it by orbit_differences",
+            seed,
+            errors,
+            errors_rule: "errors are standard deviations and ranges, errors_drawn what was drawn from them for the day of each image; lines were exposed time_bias_lines later than the label says; the bus had the attitude that the C-kernel, its bias removed, has attitude_clock_s later, turned by attitude: matrix from J2000 to the bus = exp([e]x) times that of the kernel, e = constant + linear x + quadratic x^2 (x = (et - middle) / half_image, held beyond -4 and 4) + jitter; bus_position_m (camera and laser) and camera_position_m (camera alone) are added to the orbit gsfc, IAU 2000; the laser points boresight_rad from +Z of the bus towards its X and Y, the same in the whole mission; east_north_radial_m is where the PEDR file has its shots minus where they were, and its spacecraft is that of gsfc, moved along the beam until ranges agree with the ground as the file has it",
+            errors_drawn: Vec::new(),
+            biases: Biases {
+                ck_bias_s: usual_instrument().pointing.ck_bias_s,
+                ck_rule: "the attitude of true time t stands in the C-kernel at t + ck_bias_s",
+                mola_clock_bias_s: usual_altimeter().clock_bias_s,
+                mola_clock_sign: "late",
+                mola_clock_rule: "true time = tag - mola_clock_bias_s, in all files; coordinates hold at the true time",
+            },
+            crossover: Crossover {
+                amplitude_m: CROSSOVER_AMPLITUDE_M,
+                period_s: CROSSOVER_PERIOD_S,
+                rule: "residual = amplitude_m sin(2 pi et / period_s) at the frame's mid-point; radii are the raw ones, before its subtraction",
+            },
+            frame_model: "a PEDR frame is linear in latitude and longitude: near the poles, in slews and on steep ground seen off nadir it cannot hold 20 true footprints to 0.2 m, nor does it know of jitter; the counts are under files and profiles",
+            images: Vec::new(),
+            files: Vec::new(),
+            profiles: Vec::new(),
+            tie_rule: "line n of an image was truly exposed when its label has line n + time_bias_lines, from the place of the orbit gsfc at that time plus position_bias_m (IAU 2000), with the true attitude of that time (errors_rule); line, position and quaternion of a camera are its true poses; it sees ground by light that left it light_time_s before the exposure, from where the camera and Mars were then, with the attitude of the exposure (light time and aberration); tie points are measured in images taken like that, at ground_iau2000_m; the position bias against nav is position_bias_m less the orbit difference of nav; measurements have the noise tie_noise_px of errors in lines and samples, blunders come on top of it",
+            ties: Vec::new(),
+            wide_angle_rule: "wide-angle images are taken when their labels say, from the true place of the bus with its true attitude, by light that left the ground as much earlier as it takes from each point; lines and samples of shots follow the formula of the instrument kernel moc20.ti",
+            wide_angle: Vec::new(),
+            rendered: Vec::new(),
+        }
+    }
+}
+
+impl ImageTruth {
+    /// Orientation of the arc's image as the kernels tell it, and how far the rival orbits are off.
+    pub(super) fn of(arc: &Arc, versions: &[Version]) -> Self {
+        let image = arc.image;
+        let step_s = arc.exposed.duration_s() / f64::from(EPOCHS - 1);
+        let epochs: Vec<_> = (0..EPOCHS)
+            .map(|index| arc.exposed.start.plus(step_s * f64::from(index)))
+            .collect();
+        let pose = |et: Et| Pose {
+            position_m: body_matrix(&MARS_IAU2000, et) * arc.orbit.state(et).position_m,
+            mars_to_camera: arc.camera_to_mars(et).transpose(),
+        };
+        let poses: Vec<(Et, Pose)> = epochs.iter().map(|et| (*et, pose(*et))).collect();
+        let (look, emission_deg) = match image.look {
+            Look::Nadir => ("nadir", None),
+            Look::Roll { emission_deg, .. } => ("off nadir, held inertially", Some(emission_deg)),
+        };
+        Self {
+            id: image.id,
+            site: image.site.id,
+            start_et_s: arc.exposed.start.seconds(),
+            line_period_s: image.exposure_ms * SECONDS_PER_MS * f64::from(image.summing),
+            lines_header: image.lines_header,
+            lines_delivered: image.lines_delivered,
+            look,
+            emission_deg,
+            poses: Poses::of(&poses),
+            orbit_radial_along_cross_m: versions
+                .iter()
+                .map(|version| {
+                    let off = epochs
+                        .iter()
+                        .map(|et| version.radial_along_cross_m(*et).into());
+                    (version.family, off.collect())
+                })
+                .collect(),
+        }
+    }
+}
+
+impl ProfileTruth {
+    /// The kept shots of one file in one window.
+    pub(super) fn new(window: &str, file: &str, kept: &[KeptShot]) -> Self {
+        Self {
+            window: window.to_owned(),
+            image: None,
+            file: file.to_owned(),
+            orbit_differences: BTreeMap::new(),
+            frame_error_max_m: kept
+                .iter()
+                .map(|kept| kept.truth.frame_error_m)
+                .fold(0.0, f64::max),
+            record: kept.iter().map(|kept| kept.record).collect(),
+            shot: kept.iter().map(|kept| kept.shot).collect(),
+            et_s: kept.iter().map(|kept| kept.truth.et.seconds()).collect(),
+            ground_iau2000_m: kept.iter().map(|kept| kept.truth.ground_m.into()).collect(),
+        }
+    }
+}

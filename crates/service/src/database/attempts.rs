@@ -1,0 +1,133 @@
+//! Attempts: worker processes, one after the other, of a job.
+
+use rusqlite::{Connection, Row, Transaction, params};
+
+use super::Stored;
+use crate::worker::process::ProcessIdentity;
+
+/// An attempt.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Attempt {
+    /// Its job.
+    pub job: i64,
+    /// Its number in the job, from 1.
+    pub n: i64,
+    /// Its process, once that was started.
+    pub process: Option<ProcessIdentity>,
+    /// The stage at work when last heard.
+    pub stage: Option<String>,
+    /// When it began, milliseconds of UTC since 1970.
+    pub started_ms: i64,
+    /// When it ended.
+    pub ended_ms: Option<i64>,
+}
+
+/// Notes that an attempt begins; its log is a path below the folder of the state.
+///
+/// # Errors
+/// SQLite's own.
+pub fn begin_attempt(
+    transaction: &Transaction<'_>,
+    now_ms: i64,
+    job: i64,
+    n: i64,
+    log: &str,
+) -> Stored<()> {
+    transaction.execute(
+        "INSERT INTO attempt (job, n, started_ms, beat_ms, log) VALUES (?1, ?2, ?3, ?3, ?4)",
+        params![job, n, now_ms, log],
+    )?;
+    Ok(())
+}
+
+/// Notes the process of an attempt.
+///
+/// # Errors
+/// SQLite's own.
+pub fn put_process(
+    transaction: &Transaction<'_>,
+    (job, n): (i64, i64),
+    process: &ProcessIdentity,
+) -> Stored<()> {
+    let start = i64::try_from(process.start).unwrap_or(i64::MAX);
+    transaction.execute(
+        "UPDATE attempt SET pid = ?3, pid_start = ?4, boot_id = ?5 WHERE job = ?1 AND n = ?2",
+        params![job, n, process.pid, start, process.boot_id],
+    )?;
+    Ok(())
+}
+
+/// Notes a sign of life.
+///
+/// # Errors
+/// SQLite's own.
+pub fn put_beat(
+    transaction: &Transaction<'_>,
+    now_ms: i64,
+    (job, n): (i64, i64),
+    rss_kib: Option<u64>,
+    stage: Option<&str>,
+) -> Stored<()> {
+    let rss_kib = rss_kib.and_then(|kib| i64::try_from(kib).ok());
+    transaction.execute(
+        "UPDATE attempt SET beat_ms = ?3, rss_kib = coalesce(?4, rss_kib), stage = coalesce(?5, stage) WHERE job = ?1 AND n = ?2",
+        params![job, n, now_ms, rss_kib, stage],
+    )?;
+    Ok(())
+}
+
+/// How an attempt ended.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct AttemptEnd<'a> {
+    /// In words.
+    pub how: &'a str,
+    /// Exit code.
+    pub exit: Option<i32>,
+    /// Signal.
+    pub signal: Option<i32>,
+}
+
+/// Notes how an attempt ended; the first note stays. Says whether this is the first.
+///
+/// # Errors
+/// SQLite's own.
+pub fn end_attempt(
+    transaction: &Transaction<'_>,
+    now_ms: i64,
+    (job, n): (i64, i64),
+    end: AttemptEnd<'_>,
+) -> Stored<bool> {
+    let noted = transaction.execute(
+        "UPDATE attempt SET ended_ms = ?3, how = ?4, exit = ?5, signal = ?6 WHERE job = ?1 AND n = ?2 AND ended_ms IS NULL",
+        params![job, n, now_ms, end.how, end.exit, end.signal],
+    )?;
+    Ok(noted > 0)
+}
+
+/// Attempts of a job, in their order.
+///
+/// # Errors
+/// SQLite's own.
+pub fn attempts(connection: &Connection, job: i64) -> Stored<Vec<Attempt>> {
+    let mut query = connection.prepare_cached("SELECT * FROM attempt WHERE job = ?1 ORDER BY n")?;
+    let found = query.query_map([job], attempt_row)?;
+    Ok(found.collect::<Result<_, _>>()?)
+}
+
+fn attempt_row(row: &Row<'_>) -> rusqlite::Result<Attempt> {
+    let (pid, start, boot_id): (Option<u32>, Option<i64>, Option<String>) =
+        (row.get("pid")?, row.get("pid_start")?, row.get("boot_id")?);
+    let process = pid.zip(start).zip(boot_id);
+    Ok(Attempt {
+        job: row.get("job")?,
+        n: row.get("n")?,
+        process: process.map(|((pid, start), boot_id)| ProcessIdentity {
+            pid,
+            start: start.unsigned_abs(),
+            boot_id,
+        }),
+        stage: row.get("stage")?,
+        started_ms: row.get("started_ms")?,
+        ended_ms: row.get("ended_ms")?,
+    })
+}

@@ -1,0 +1,169 @@
+//! After a start: what an earlier service left. Its workers are ended, what they published is adopted, the rest is queued
+//! again; the links on the disk win over the database.
+
+use rusqlite::Transaction;
+use serde_json::{Value, json};
+
+use super::{
+    core::{Core, site_folder},
+    ending::{Attempt, finish},
+    runs::{Published, current, finished_ms, read_run, row, run_id, tidy},
+    workers::Workers,
+};
+use crate::{
+    database::{
+        Job, Stored, attempts,
+        attempts::Attempt as AttemptRow,
+        facts, jobs_in,
+        runs::{put_current, put_run, run},
+        sites::{SiteRow, sites},
+    },
+    state::JobState,
+    worker::{
+        parent::{Ended, How},
+        process::ProcessIdentity,
+        protocol::CancelWhy,
+    },
+};
+use areograph_base::error::{Locate as _, Result};
+
+/// How often the end of a worker is looked for, and how long between two looks.
+const LOOKS: u32 = 200;
+const LOOK: std::time::Duration = std::time::Duration::from_millis(50);
+
+/// Takes over from an earlier service.
+///
+/// # Errors
+/// The database or the folder of the products cannot be read or written.
+pub fn adopt<W: Workers>(core: &Core<W>) -> Result<()> {
+    let state = core.shared.config().outputs.state.clone();
+    adopt_jobs(core).in_file(&state)?;
+    for site in core.shared.read(sites).in_file(&state)? {
+        adopt_runs(core, &site)?;
+    }
+    new_version(core).in_file(&state)
+}
+
+fn adopt_jobs<W: Workers>(core: &Core<W>) -> Stored<()> {
+    let states = [JobState::Starting, JobState::Running, JobState::Cancelling];
+    for state in states {
+        for job in core.shared.read(|connection| jobs_in(connection, state))? {
+            let rows = core
+                .shared
+                .read(|connection| attempts::attempts(connection, job.id))?;
+            let newest = rows.into_iter().next_back();
+            if let Some(process) = newest.as_ref().and_then(|newest| newest.process.as_ref()) {
+                end(process);
+            }
+            finish_for(core, &job, newest)?;
+        }
+    }
+    Ok(())
+}
+
+/// Ends a worker that outlived its service, and waits until it has gone.
+fn end(process: &ProcessIdentity) {
+    if !process.end() {
+        return;
+    }
+    for _ in 0..LOOKS {
+        if !process.is_there() {
+            return;
+        }
+        std::thread::sleep(LOOK);
+    }
+    // Its site's lock keeps the next worker out.
+    tracing::warn!("process {} cannot be ended", process.pid);
+}
+
+fn finish_for<W: Workers>(core: &Core<W>, job: &Job, newest: Option<AttemptRow>) -> Stored<()> {
+    let ended = Ended {
+        how: How::Cancelled,
+        answer: None,
+        rss_peak_kib: 0,
+    };
+    let attempt = Attempt {
+        job: job.id,
+        n: job.attempt,
+        site: job.site.clone(),
+        run: newest
+            .as_ref()
+            .map(|newest| run_id(newest.started_ms, job.id, job.attempt))
+            .unwrap_or_default(),
+        stage: newest.and_then(|newest| newest.stage),
+    };
+    finish(core, &attempt, &ended, Some(CancelWhy::Shutdown)).map(|_| ())
+}
+
+/// Removes half-made runs, notes those that the database does not know, and follows the link.
+fn adopt_runs<W: Workers>(core: &Core<W>, site: &SiteRow) -> Result<()> {
+    let products = core.shared.config().outputs.products.clone();
+    let folder = site_folder(&products, &site.name);
+    let linked = current(&folder);
+    for path in tidy(&folder)? {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let known = core.shared.read(|connection| run(connection, &name));
+        if known.in_file(&path)?.is_some() {
+            continue;
+        }
+        match read_run(&path) {
+            Ok(published) => note(core, &published).in_file(&path)?,
+            Err(failure) => tracing::warn!("a run that is not used: {failure}"),
+        }
+    }
+    let Some(linked) = linked.filter(|linked| site.current_run.as_ref() != Some(linked)) else {
+        return Ok(());
+    };
+    let now_ms = core.now_ms();
+    core.shared
+        .write(|transaction| {
+            let since_ms = run(transaction, &linked)?.map_or(now_ms, |run| run.published_ms);
+            put_current(transaction, &site.name, &linked, since_ms)
+        })
+        .in_file(&folder)
+}
+
+fn note<W: Workers>(core: &Core<W>, published: &Published) -> Stored<()> {
+    let published_ms = finished_ms(&published.manifest).unwrap_or_else(|| core.now_ms());
+    let because = json!(["found on the disk when the service started"]);
+    let run = row(
+        published,
+        because,
+        Value::Array(Vec::new()),
+        None,
+        published_ms,
+    );
+    core.shared.write(|transaction| {
+        put_run(transaction, &run)?;
+        after_job(transaction, run.job)
+    })
+}
+
+/// Numbers of jobs that runs on the disk bear are not given again.
+///
+/// # Errors
+/// SQLite's own.
+pub fn after_job(transaction: &Transaction<'_>, job: i64) -> Stored<()> {
+    transaction.execute(
+        "INSERT INTO sqlite_sequence (name, seq) SELECT 'job', 0 WHERE NOT EXISTS (SELECT 1 FROM sqlite_sequence WHERE name = 'job')",
+        [],
+    )?;
+    transaction.execute(
+        "UPDATE sqlite_sequence SET seq = max(seq, ?1) WHERE name = 'job'",
+        [job],
+    )?;
+    Ok(())
+}
+
+/// With another version of areograph every site is planned again.
+fn new_version<W: Workers>(core: &Core<W>) -> Stored<()> {
+    let version = env!("CARGO_PKG_VERSION");
+    core.shared.write(|transaction| {
+        let before = facts::fact(transaction, facts::TOOL_VERSION)?;
+        if before.as_deref() != Some(version) {
+            transaction.execute("UPDATE site SET round = 0", [])?;
+            facts::note(transaction, facts::TOOL_VERSION, version)?;
+        }
+        Ok(())
+    })
+}

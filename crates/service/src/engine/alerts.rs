@@ -1,0 +1,137 @@
+//! What people are told of: once when it begins and once when it ends, whatever happens in between.
+
+use rusqlite::Transaction;
+use serde_json::{Value, json};
+
+use crate::{
+    clock::utc_text,
+    database::{
+        About, Stored,
+        alerts::{Edge, put_alert_state, put_letter},
+        append,
+    },
+};
+use areograph_config::{AlertKind, ServiceConfig};
+
+/// Something that people are told of.
+#[derive(Debug, Clone, Copy)]
+pub struct Alert<'a> {
+    /// Its kind.
+    pub kind: AlertKind,
+    /// The site that it concerns.
+    pub site: Option<&'a str>,
+    /// The run that it concerns.
+    pub run: Option<&'a str>,
+    /// In words.
+    pub text: &'a str,
+}
+
+/// Tells people: as an event, and by a letter to each hook that wants this kind.
+///
+/// # Errors
+/// SQLite's own.
+pub fn tell(
+    transaction: &Transaction<'_>,
+    config: &ServiceConfig,
+    now_ms: i64,
+    alert: &Alert<'_>,
+    more: &Value,
+) -> Stored<()> {
+    match alert.kind {
+        AlertKind::Recovered | AlertKind::RootBack | AlertKind::NightComplete => {
+            tracing::info!(site = alert.site, "{}", alert.text);
+        }
+        _ => tracing::warn!(site = alert.site, "{}", alert.text),
+    }
+    let about = About {
+        site: alert.site,
+        job: None,
+        run: alert.run,
+    };
+    let data = json!({ "alert": alert.kind, "text": alert.text, "more": more });
+    let event = append(transaction, now_ms, "alert", about, &data)?;
+    let body = json!({
+        "service": config.name,
+        "event": event,
+        "kind": alert.kind,
+        "at": utc_text(now_ms),
+        "site": alert.site,
+        "run": alert.run,
+        "text": alert.text,
+        "more": more,
+    });
+    let kind = json!(alert.kind);
+    for (place, hook) in config.hooks.iter().enumerate() {
+        if hook.events.is_empty() || hook.events.contains(&alert.kind) {
+            let kind = kind.as_str().unwrap_or_default();
+            put_letter(transaction, now_ms, place, kind, &body.to_string())?;
+        }
+    }
+    Ok(())
+}
+
+/// How a site stands, for telling its edges.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Standing {
+    /// Its last job gave valid products, or nothing had to be made.
+    Well,
+    /// Its last job failed, or waits for another input.
+    Failed,
+    /// Its last job made products that are not valid.
+    Invalid,
+}
+
+/// Tells of a site when it stands otherwise than before.
+///
+/// # Errors
+/// SQLite's own.
+pub fn tell_standing(
+    transaction: &Transaction<'_>,
+    config: &ServiceConfig,
+    now_ms: i64,
+    site: &str,
+    standing: Standing,
+    text: &str,
+) -> Stored<()> {
+    let state = match standing {
+        Standing::Well => "well",
+        Standing::Failed => "failed",
+        Standing::Invalid => "invalid",
+    };
+    let edge = put_alert_state(transaction, now_ms, &format!("site {site}"), state)?;
+    let kind = match (standing, edge) {
+        (_, Edge::None) | (Standing::Well, Edge::First) => return Ok(()),
+        (Standing::Well, Edge::From(_)) => AlertKind::Recovered,
+        (Standing::Failed, _) => AlertKind::Failed,
+        (Standing::Invalid, _) => AlertKind::Invalid,
+    };
+    let alert = Alert {
+        kind,
+        site: Some(site),
+        run: None,
+        text,
+    };
+    tell(transaction, config, now_ms, &alert, &Value::Null)
+}
+
+/// Tells that something is wrong, or with another kind that it is well again, when it was otherwise before.
+///
+/// # Errors
+/// SQLite's own.
+pub fn tell_edge(
+    transaction: &Transaction<'_>,
+    config: &ServiceConfig,
+    now_ms: i64,
+    (subject, wrong): (&str, bool),
+    (begins, ends): (&Alert<'_>, Option<&Alert<'_>>),
+) -> Stored<()> {
+    let state = if wrong { "wrong" } else { "well" };
+    match put_alert_state(transaction, now_ms, subject, state)? {
+        Edge::None => Ok(()),
+        Edge::First if !wrong => Ok(()),
+        _ if wrong => tell(transaction, config, now_ms, begins, &Value::Null),
+        _ => ends.map_or(Ok(()), |ends| {
+            tell(transaction, config, now_ms, ends, &Value::Null)
+        }),
+    }
+}

@@ -1,0 +1,304 @@
+//! Jobs are taken, one attempt each, and followed to their end.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::Duration,
+};
+
+use rusqlite::Transaction;
+use serde_json::json;
+use tokio::{sync::watch, time::sleep};
+
+use super::{
+    core::{Core, log_of, runs, working},
+    ending::{Attempt, finish},
+    hold::{hold, not_ready},
+    runs::run_id,
+    workers::Workers,
+};
+use crate::{
+    database::{
+        About, Job, Moved, Priority, Stored, advance, append,
+        attempts::{begin_attempt, put_beat, put_process},
+        job, jobs_in, next_queued,
+        runs::RunRow,
+        sites::site,
+    },
+    state::JobState,
+    worker::{
+        parent::Heard,
+        protocol::{CancelWhy, Line, What},
+    },
+};
+
+/// Time between two tries to note the end of an attempt while the database cannot be written.
+const NOTE_AGAIN: Duration = Duration::from_secs(1);
+
+/// Attempts at work, by job.
+#[derive(Debug, Default)]
+pub struct AtWork {
+    by_job: Mutex<BTreeMap<i64, Place>>,
+}
+
+#[derive(Debug)]
+struct Place {
+    backfill: bool,
+    cancel: watch::Sender<Option<CancelWhy>>,
+}
+
+impl AtWork {
+    /// How many.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.lock().len()
+    }
+
+    fn backfills(&self) -> usize {
+        self.lock().values().filter(|place| place.backfill).count()
+    }
+
+    /// Asks the worker of a job to stop, if there is one; the first reason stays.
+    pub fn cancel(&self, job: i64, why: CancelWhy) -> bool {
+        let places = self.lock();
+        let Some(place) = places.get(&job) else {
+            return false;
+        };
+        place.cancel.send_if_modified(|asked| {
+            let first = asked.is_none();
+            asked.get_or_insert(why);
+            first
+        });
+        true
+    }
+
+    /// Nobody works for the job any more.
+    pub fn leave(&self, job: i64) {
+        self.lock().remove(&job);
+    }
+
+    /// Asks all to stop.
+    pub fn cancel_all(&self, why: CancelWhy) {
+        let jobs: Vec<i64> = self.lock().keys().copied().collect();
+        for job in jobs {
+            self.cancel(job, why);
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<i64, Place>> {
+        self.by_job.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A job that was taken, and where its worker is asked to stop.
+#[derive(Debug)]
+pub struct Taken {
+    job: Job,
+    site_file: String,
+    config_blake3: String,
+    attempt: Attempt,
+    cancel: watch::Receiver<Option<CancelWhy>>,
+}
+
+impl Taken {
+    /// The number of the job.
+    #[must_use]
+    pub const fn job(&self) -> i64 {
+        self.job.id
+    }
+}
+
+/// Takes the next job, if one may be taken now.
+///
+/// # Errors
+/// The database cannot be written.
+pub fn take<W: Workers>(core: &Core<W>, at_work: &AtWork) -> Stored<Option<Taken>> {
+    let count = usize::from(core.shared.config().workers.count);
+    let queued = core
+        .shared
+        .read(|connection| jobs_in(connection, JobState::Queued))?;
+    if at_work.count() >= count || queued.is_empty() {
+        return Ok(None);
+    }
+    // A backfill leaves room for what changes meanwhile.
+    let backfill = at_work.backfills() < count.saturating_sub(1).max(1);
+    let now_ms = core.now_ms();
+    let taken = core.shared.write(|transaction| {
+        let waits = not_ready(transaction)?;
+        // Those that cannot begin now leave the queue.
+        while let Some(next) = next_queued(transaction, now_ms, backfill)? {
+            if let Some(why) = waits.of(&next.site) {
+                hold(transaction, now_ms, &next, &why)?;
+            } else if let Some(begun) = begin(transaction, now_ms, &next)? {
+                return Ok(Some(begun));
+            }
+        }
+        Ok(None)
+    })?;
+    Ok(taken.map(|(job, site_file, config_blake3)| {
+        let (stop, cancel) = watch::channel(None);
+        let place = Place {
+            backfill: job.priority == Priority::Backfill,
+            cancel: stop,
+        };
+        at_work.lock().insert(job.id, place);
+        let attempt = Attempt {
+            job: job.id,
+            n: job.attempt,
+            site: job.site.clone(),
+            run: run_id(now_ms, job.id, job.attempt),
+            ..Attempt::default()
+        };
+        Taken {
+            job,
+            site_file,
+            config_blake3,
+            attempt,
+            cancel,
+        }
+    }))
+}
+
+/// A job whose site is gone ends here.
+fn begin(
+    transaction: &Transaction<'_>,
+    now_ms: i64,
+    next: &Job,
+) -> Stored<Option<(Job, String, String)>> {
+    let site = site(transaction, &next.site)?.filter(|site| site.enabled);
+    let Some(site) = site else {
+        let moved = Moved {
+            outcome: Some(json!({ "text": "its site file is gone" })),
+            ..Moved::default()
+        };
+        advance(transaction, now_ms, next.id, JobState::Cancelled, &moved)?;
+        return Ok(None);
+    };
+    advance(
+        transaction,
+        now_ms,
+        next.id,
+        JobState::Starting,
+        &Moved::default(),
+    )?;
+    let Some(job) = job(transaction, next.id)? else {
+        return Ok(None);
+    };
+    begin_attempt(
+        transaction,
+        now_ms,
+        job.id,
+        job.attempt,
+        &log_of(job.id, job.attempt),
+    )?;
+    Ok(Some((job, site.file, site.config_blake3)))
+}
+
+/// Follows an attempt to its end; gives the run that it published.
+pub async fn follow<W: Workers>(core: Arc<Core<W>>, taken: Taken) -> Option<RunRow> {
+    let Taken {
+        job,
+        site_file,
+        config_blake3,
+        mut attempt,
+        cancel,
+    } = taken;
+    let config = core.shared.config();
+    let products = &config.outputs.products;
+    // What cannot be made is met by the worker.
+    let _ = fs::create_dir_all(runs(products, &job.site));
+    let what = What::Run {
+        site_file: site_file.into(),
+        config_blake3,
+        out: working(products, &job.site),
+        runs: runs(products, &job.site),
+        run: attempt.run.clone(),
+        force: job.force,
+    };
+    tracing::info!(
+        site = job.site,
+        job = job.id,
+        attempt = attempt.n,
+        "started"
+    );
+    let ended = {
+        let task = core.task(job.id, attempt.n, what);
+        let limits = core.limits(config.workers.deadline_s);
+        let log = config.outputs.state.join(log_of(job.id, attempt.n));
+        let heard = |heard: Heard<'_>| hear(&core, &mut attempt, heard);
+        core.workers
+            .work(task, limits, &log, cancel.clone(), heard)
+            .await
+    };
+    let why = *cancel.borrow();
+    loop {
+        // A full disk: what happened is not forgotten before it can be noted.
+        match finish(&core, &attempt, &ended, why) {
+            Ok(run) => return run,
+            Err(error) => tracing::error!(job = job.id, "the end of an attempt: {error}"),
+        }
+        if core.shared.ending.is_cancelled() {
+            // The next service finds the run on the disk.
+            return None;
+        }
+        sleep(NOTE_AGAIN).await;
+    }
+}
+
+/// Notes what a worker says; a line that cannot be noted is lost, its work is not.
+fn hear<W: Workers>(core: &Core<W>, attempt: &mut Attempt, heard: Heard<'_>) {
+    let now_ms = core.now_ms();
+    let at = (attempt.job, attempt.n);
+    let line = match heard {
+        Heard::Started(process) => {
+            let noted = core
+                .shared
+                .write(|transaction| put_process(transaction, at, process));
+            return told(noted, attempt);
+        }
+        Heard::Line(line) => line,
+    };
+    let noted = core.shared.write(|transaction| match line {
+        Line::Hello { .. } => {
+            let stands = job(transaction, attempt.job)?.map(|job| job.state);
+            if stands == Some(JobState::Starting) {
+                let running = Moved::default();
+                advance(
+                    transaction,
+                    now_ms,
+                    attempt.job,
+                    JobState::Running,
+                    &running,
+                )?;
+            }
+            Ok(())
+        }
+        Line::Stage {
+            stage,
+            state,
+            because,
+            seconds,
+        } => {
+            attempt.stage = Some(stage.clone());
+            put_beat(transaction, now_ms, at, None, Some(stage))?;
+            let about = About {
+                site: Some(&attempt.site),
+                job: Some(attempt.job),
+                run: None,
+            };
+            let data =
+                json!({ "stage": stage, "state": state, "because": because, "seconds": seconds });
+            append(transaction, now_ms, "stage", about, &data).map(|_| ())
+        }
+        Line::Beat { rss_kib } => put_beat(transaction, now_ms, at, Some(*rss_kib), None),
+        Line::Answer(_) | Line::Failure(_) | Line::Piece { .. } => Ok(()),
+    });
+    told(noted, attempt);
+}
+
+fn told(noted: Stored<()>, attempt: &Attempt) {
+    if let Err(error) = noted {
+        tracing::warn!(job = attempt.job, "a line of a worker: {error}");
+    }
+}

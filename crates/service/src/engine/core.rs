@@ -1,0 +1,186 @@
+//! What every part of the engine works with: the shared service, workers, random numbers, and work that belongs to no job.
+
+use std::{
+    collections::BTreeSet,
+    fs,
+    path::{Path, PathBuf},
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::Duration,
+};
+
+use tokio::{sync::watch, time::timeout};
+
+use super::workers::Workers;
+use crate::{
+    random::Random,
+    shared::Shared,
+    worker::{
+        parent::{Ended, How, WorkerLimits},
+        protocol::{CancelWhy, PROTOCOL, Task, What},
+    },
+};
+use areograph_base::error::{IoError, Locate as _, Result};
+
+/// Time within which a worker that took too long is ended by force, unless a dead mount holds it.
+const ENDED_WITHIN: Duration = Duration::from_secs(25);
+
+/// The engine, as its parts see it.
+#[derive(Debug)]
+pub struct Core<W> {
+    /// The service.
+    pub shared: Arc<Shared>,
+    /// Those who do the work.
+    pub workers: W,
+    /// Random numbers.
+    pub random: Random,
+    /// Work that was given up and has not ended: a dead mount holds its processes.
+    stuck: Mutex<BTreeSet<String>>,
+    scratch: AtomicU64,
+}
+
+impl<W: Workers> Core<W> {
+    /// A core over a service; files of work that was under way are removed.
+    ///
+    /// # Errors
+    /// The folder of the state cannot be written.
+    pub fn new(shared: Arc<Shared>, workers: W, random: Random) -> Result<Self> {
+        let state = shared.config().outputs.state.clone();
+        let _ = fs::remove_dir_all(state.join(WORK));
+        for folder in [WORK, LOGS, COPIES] {
+            let folder = state.join(folder);
+            fs::create_dir_all(&folder)
+                .map_err(IoError::on("create the folder"))
+                .in_file(&folder)?;
+        }
+        Ok(Self {
+            shared,
+            workers,
+            random,
+            stuck: Mutex::new(BTreeSet::new()),
+            scratch: AtomicU64::new(0),
+        })
+    }
+
+    /// The time, milliseconds of UTC since 1970.
+    #[must_use]
+    pub fn now_ms(&self) -> i64 {
+        self.shared.now_ms()
+    }
+
+    /// A path for a file of work under way.
+    #[must_use]
+    pub fn scratch(&self) -> PathBuf {
+        let number = self.scratch.fetch_add(1, Ordering::Relaxed);
+        let state = &self.shared.config().outputs.state;
+        state.join(WORK).join(number.to_string())
+    }
+
+    /// A task of a job, or with number 0 of none.
+    #[must_use]
+    pub fn task(&self, job: i64, attempt: i64, what: What) -> Task {
+        let config = self.shared.config();
+        let inputs = &config.inputs;
+        let roots = inputs.sites.iter().chain(&inputs.kernels);
+        Task {
+            v: PROTOCOL,
+            job,
+            attempt,
+            what,
+            hashes_file: config.outputs.state.join("hashes"),
+            roots: roots.chain(&inputs.data).cloned().collect(),
+            threads: config.workers.threads,
+            memory_mib: config.workers.memory_mib,
+        }
+    }
+
+    /// Has work done that belongs to no job. After `limit` it is ended; what cannot be ended, since a dead mount holds it, is
+    /// given up, and nothing is begun for the same subject before it ends.
+    pub async fn ask(self: &Arc<Self>, subject: &str, what: What, limit: Duration) -> Ended {
+        if !self.stuck().insert(subject.to_owned()) {
+            return silent();
+        }
+        let (stop, cancel) = watch::channel(None);
+        let limits = self.limits(limit.as_secs_f64());
+        let (core, task) = (Arc::clone(self), self.task(0, 1, what));
+        let of_work = subject.to_owned();
+        let mut work = tokio::spawn(async move {
+            let log = core.scratch();
+            let ended = core.workers.work(task, limits, &log, cancel, |_| ()).await;
+            core.stuck().remove(&of_work);
+            let _ = fs::remove_file(log);
+            ended
+        });
+        let ended = tokio::select! {
+            ended = timeout(limit + ENDED_WITHIN, &mut work) => ended.ok(),
+            () = self.shared.ending.cancelled() => {
+                stop.send_replace(Some(CancelWhy::Shutdown));
+                timeout(ENDED_WITHIN, &mut work).await.ok()
+            }
+        };
+        match ended {
+            Some(Ok(ended)) => ended,
+            Some(Err(panicked)) => {
+                tracing::error!("work for {subject}: {panicked}");
+                silent()
+            }
+            None => silent(),
+        }
+    }
+
+    /// Limits of a worker.
+    #[must_use]
+    pub fn limits(&self, deadline_s: f64) -> WorkerLimits {
+        let workers = &self.shared.config().workers;
+        WorkerLimits {
+            deadline_s,
+            silence_s: workers.silence_s,
+            log_max_kib: workers.log_max_kib,
+        }
+    }
+
+    fn stuck(&self) -> MutexGuard<'_, BTreeSet<String>> {
+        self.stuck.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Folder of files of work under way, in the folder of the state.
+const WORK: &str = "work";
+/// Folder of logs of attempts, in the folder of the state.
+pub const LOGS: &str = "logs";
+/// Folder of copies of the database, in the folder of the state.
+pub const COPIES: &str = "copies";
+
+/// Where the log of an attempt lies in the folder of the state.
+#[must_use]
+pub fn log_of(job: i64, attempt: i64) -> String {
+    format!("{LOGS}/{job}-{attempt}.jsonl")
+}
+
+/// Folder of a site.
+#[must_use]
+pub fn site_folder(products: &Path, site: &str) -> PathBuf {
+    products.join(site)
+}
+
+/// Folder whose subfolder of the site's name a site's worker works in.
+#[must_use]
+pub fn working(products: &Path, site: &str) -> PathBuf {
+    site_folder(products, site).join("working")
+}
+
+/// Folder of the runs of a site.
+#[must_use]
+pub fn runs(products: &Path, site: &str) -> PathBuf {
+    site_folder(products, site).join("runs")
+}
+
+fn silent() -> Ended {
+    Ended {
+        how: How::Silent,
+        answer: None,
+        rss_peak_kib: 0,
+    }
+}

@@ -1,0 +1,91 @@
+//! Files as a worker listed them.
+
+use std::{
+    collections::BTreeMap,
+    fs::File,
+    io::{BufRead as _, BufReader},
+    path::Path,
+};
+
+use crate::{
+    database::files::{RootKind, path_text},
+    worker::protocol::Listed,
+};
+use areograph_store::files::Identity;
+
+/// How names of files end that are being written.
+const UNFINISHED: [&str; 5] = [".part", ".partial", ".tmp", ".filepart", ".crdownload"];
+
+/// Files below a folder by path; those that are being transferred are left out.
+///
+/// # Errors
+/// Why the folder could not be listed whole, in words.
+pub fn read_list(
+    list: &Path,
+    root: &Path,
+    kind: RootKind,
+) -> Result<BTreeMap<String, Identity>, String> {
+    let mut files = BTreeMap::new();
+    let mut whole = false;
+    let file = File::open(list).map_err(|error| error.to_string())?;
+    for line in BufReader::new(file).lines() {
+        let line = line.map_err(|error| error.to_string())?;
+        match serde_json::from_str(&line).map_err(|error| error.to_string())? {
+            Listed::File { path, identity } => {
+                if counts(&path, root, kind) {
+                    let path = path_text(&path).map_err(|error| error.to_string())?;
+                    files.insert(path.to_owned(), identity);
+                }
+            }
+            // A file that cannot be looked at is as good as missing; many of them make the folder unavailable.
+            Listed::Unreadable { path, problem } => {
+                tracing::warn!("{}: {problem}", path.display());
+            }
+            Listed::Root { problem, .. } => {
+                whole = true;
+                if let Some(problem) = problem {
+                    return Err(problem);
+                }
+            }
+        }
+    }
+    if whole {
+        return Ok(files);
+    }
+    Err("the list of its files has no end".to_owned())
+}
+
+/// Whether a file is an input: site files lie directly in their folder, and rsync and others name unfinished files so that
+/// they can be told.
+fn counts(path: &Path, root: &Path, kind: RootKind) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let unfinished = name.starts_with('.')
+        || name.ends_with('~')
+        || UNFINISHED.iter().any(|ending| name.ends_with(ending));
+    if unfinished {
+        return false;
+    }
+    kind != RootKind::Sites || (path.parent() == Some(root) && name.ends_with(".toml"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_under_way_do_not_count() {
+        let counts = |path: &str, kind| counts(Path::new(path), Path::new("/m"), kind);
+        assert!(counts("/m/ck/mgs_sc_ext1.bc", RootKind::Kernels));
+        for name in [
+            ".mgs_sc_ext1.bc.Xa8k2F",
+            "mgs.bc.part",
+            "mgs.bc.tmp",
+            "mgs.tf~",
+        ] {
+            assert!(!counts(&format!("/m/{name}"), RootKind::Kernels), "{name}");
+        }
+        assert!(counts("/m/gusev.toml", RootKind::Sites));
+        assert!(!counts("/m/old/gusev.toml", RootKind::Sites));
+        assert!(!counts("/m/gusev.geojson", RootKind::Sites));
+    }
+}

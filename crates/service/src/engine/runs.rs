@@ -1,0 +1,215 @@
+//! Runs on the disk: checked, made current, noted.
+
+use std::{
+    fs,
+    os::unix::fs::symlink,
+    path::{Path, PathBuf},
+};
+
+use chrono::DateTime;
+use serde_json::{Value, json};
+
+use crate::{
+    database::runs::RunRow,
+    worker::run_folder::{RUN_RECORD, RunRecord, remove},
+};
+use areograph_base::error::{Cause, IoError, Kind, Locate as _, Result};
+use areograph_store::{
+    atomic::sync_folder, manifest::Manifest, publish::MANIFEST, published::read_published,
+};
+
+/// Leads to the run that readers get.
+pub const CURRENT: &str = "current";
+/// The identifier of the run that an attempt makes.
+#[must_use]
+pub fn run_id(started_ms: i64, job: i64, attempt: i64) -> String {
+    let started = DateTime::from_timestamp_millis(started_ms).unwrap_or_default();
+    format!("{}_j{job}_a{attempt}", started.format("%Y%m%d_%H%M%S"))
+}
+
+/// A run on the disk whose products are those of its manifest.
+#[derive(Debug)]
+pub struct Published {
+    /// Which attempt published it.
+    pub by: RunRecord,
+    /// Its manifest.
+    pub manifest: Manifest,
+    /// BLAKE3 of the manifest.
+    pub manifest_blake3: String,
+}
+
+/// The folder holds another run than it should.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "this is the run of job {job}, attempt {attempt}, named {run}; expected that of its folder"
+)]
+struct Foreign {
+    job: i64,
+    attempt: i64,
+    run: String,
+}
+
+impl Cause for Foreign {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "move the folder away; the site is run again".to_owned()
+    }
+}
+
+/// Reads a run, every product checked against its manifest.
+///
+/// # Errors
+/// It is not whole, or is another one's; the disk's refusal.
+pub fn read_run(folder: &Path) -> Result<Published> {
+    let path = folder.join(RUN_RECORD);
+    let read = |path: &Path| fs::read(path).map_err(IoError::on("read")).in_file(path);
+    let by: RunRecord = serde_json::from_slice(&read(&path)?)
+        .map_err(|error| IoError::on("read")(error.into()))
+        .in_file(&path)?;
+    if folder.file_name() != Some(by.run.as_ref()) {
+        let RunRecord {
+            run, job, attempt, ..
+        } = by;
+        return Err(Foreign { job, attempt, run }).in_file(folder);
+    }
+    let manifest = read_published(folder)?;
+    let bytes = read(&folder.join(MANIFEST))?;
+    Ok(Published {
+        by,
+        manifest,
+        manifest_blake3: blake3::hash(&bytes).to_hex().to_string(),
+    })
+}
+
+/// The run that readers get, by the link.
+#[must_use]
+pub fn current(site_folder: &Path) -> Option<String> {
+    let target = fs::read_link(site_folder.join(CURRENT)).ok()?;
+    let name = target.file_name()?.to_str()?;
+    site_folder
+        .join("runs")
+        .join(name)
+        .is_dir()
+        .then(|| name.to_owned())
+}
+
+/// Makes a run the one that readers get: at every instant there is the old one or the new one.
+///
+/// # Errors
+/// The disk's refusal.
+pub fn make_current(site_folder: &Path, run: &str) -> Result<()> {
+    let fresh = site_folder.join(format!(".{CURRENT}-{run}"));
+    let _ = fs::remove_file(&fresh);
+    symlink(PathBuf::from("runs").join(run), &fresh)
+        .and_then(|()| fs::rename(&fresh, site_folder.join(CURRENT)))
+        .map_err(IoError::on("link"))
+        .in_file(site_folder.join(CURRENT))?;
+    sync_folder(site_folder);
+    Ok(())
+}
+
+/// What the database is to know of a run.
+#[must_use]
+pub fn row(
+    published: &Published,
+    because: Value,
+    stages: Value,
+    predecessor: Option<String>,
+    published_ms: i64,
+) -> RunRow {
+    let manifest = &published.manifest;
+    let kernels = manifest.kernels.iter();
+    let kernels: Vec<Value> = kernels
+        .map(|kernel| json!({ "name": kernel.name, "role": kernel.role, "blake3": kernel.blake3 }))
+        .collect();
+    RunRow {
+        id: published.by.run.clone(),
+        site: manifest.site.clone(),
+        job: published.by.job,
+        attempt: published.by.attempt,
+        version: manifest.version.clone(),
+        manifest_blake3: published.manifest_blake3.clone(),
+        valid: manifest.verdict.valid,
+        verdict: manifest.verdict.word().to_owned(),
+        reasons: json!(manifest.verdict.reasons),
+        because,
+        stages,
+        counts: json!(manifest.counts),
+        figures: json!(manifest.figures),
+        kernels: json!(kernels),
+        predecessor,
+        published_ms,
+        pinned: false,
+        removed_ms: None,
+    }
+}
+
+/// When a run was published, by its manifest.
+#[must_use]
+pub fn finished_ms(manifest: &Manifest) -> Option<i64> {
+    let finished = DateTime::parse_from_rfc3339(&manifest.finished_utc).ok()?;
+    Some(finished.timestamp_millis())
+}
+
+/// Folders of runs of a site that were published, by name; of those that were not, nothing is left.
+///
+/// # Errors
+/// The disk's refusal.
+pub fn tidy(site_folder: &Path) -> Result<Vec<PathBuf>> {
+    let runs = site_folder.join("runs");
+    let mut published = Vec::new();
+    let Ok(entries) = fs::read_dir(&runs) else {
+        return Ok(published);
+    };
+    for entry in entries {
+        let path = entry.map_err(IoError::on("list")).in_file(&runs)?.path();
+        if path.join(MANIFEST).is_file() && path.extension().is_none() {
+            published.push(path);
+        } else if path.is_dir() {
+            remove(&path)?;
+        }
+    }
+    published.sort();
+    Ok(published)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_link_leads_to_one_whole_run_after_the_other() {
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(current(folder.path()), None);
+        for run in ["20261122_093000_j1_a1", "20261123_093000_j2_a1"] {
+            fs::create_dir_all(folder.path().join("runs").join(run)).unwrap();
+            make_current(folder.path(), run).unwrap();
+            make_current(folder.path(), run).unwrap();
+            assert_eq!(current(folder.path()).as_deref(), Some(run));
+        }
+        fs::remove_dir(folder.path().join("runs/20261123_093000_j2_a1")).unwrap();
+        assert_eq!(current(folder.path()), None);
+        assert_eq!(run_id(0, 12, 3), "19700101_000000_j12_a3");
+    }
+
+    #[test]
+    fn what_was_not_published_is_removed() {
+        use std::os::unix::fs::PermissionsExt as _;
+        let folder = tempfile::tempdir().unwrap();
+        let run = |name: &str| folder.path().join("runs").join(name);
+        for name in ["a", "b", "c.partial"] {
+            fs::create_dir_all(run(name).join("report")).unwrap();
+        }
+        for name in ["b", "c.partial"] {
+            fs::File::create(run(name).join(MANIFEST)).unwrap();
+        }
+        let read_only = fs::Permissions::from_mode(0o555);
+        fs::set_permissions(run("a").join("report"), read_only.clone()).unwrap();
+        fs::set_permissions(run("a"), read_only).unwrap();
+        assert_eq!(tidy(folder.path()).unwrap(), [run("b")]);
+        assert!(!run("a").exists() && !run("c.partial").exists());
+    }
+}

@@ -1,0 +1,242 @@
+//! At which instants all sites are looked at.
+
+use std::str::FromStr as _;
+
+use chrono::{DateTime, Utc};
+use chrono_tz::Tz;
+use croner::Cron;
+
+use areograph_base::error::{Cause, Kind};
+use areograph_config::ScheduleConfig;
+
+/// Most instants that are looked at: a cron of every minute over the longest time to catch up.
+const INSTANTS_MAX: usize = 1_000_000;
+/// Instants that were missed and are named one by one; older ones are many at most.
+pub const MISSED_MAX: usize = 100;
+
+/// Cron fields in a time zone, checked.
+#[derive(Debug, Clone)]
+pub struct Schedule {
+    cron: Cron,
+    zone: Tz,
+    text: String,
+}
+
+/// Fields that name no instant.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("schedule.cron is `{cron}`: {reason}")]
+pub struct BadSchedule {
+    cron: String,
+    reason: String,
+}
+
+impl Cause for BadSchedule {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        "give five fields as in `30 2 * * *` that name an instant which comes".to_owned()
+    }
+}
+
+/// What is due.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Due {
+    /// The instant that is to be made up for now, milliseconds of UTC since 1970.
+    pub instant_ms: Option<i64>,
+    /// Whether it is one of several, or came while nobody looked.
+    pub late: bool,
+    /// Instants that are left out, the newest of them.
+    pub missed_ms: Vec<i64>,
+}
+
+/// How late a night may begin and still be on time.
+const ON_TIME_MS: i64 = 5 * 60_000;
+
+impl Schedule {
+    /// Reads the fields, and makes sure that they name an instant after `now_ms`.
+    ///
+    /// # Errors
+    /// [`BadSchedule`].
+    pub fn of(config: &ScheduleConfig, now_ms: i64) -> Result<Self, BadSchedule> {
+        let bad = |reason: String| BadSchedule {
+            cron: config.cron.clone(),
+            reason,
+        };
+        let cron = Cron::from_str(&config.cron).map_err(|error| bad(error.to_string()))?;
+        let zone = Tz::from_str(&config.zone).map_err(|error| bad(error.to_string()))?;
+        let schedule = Self {
+            cron,
+            zone,
+            text: format!("{} {}", config.cron, config.zone),
+        };
+        match schedule.next_after(now_ms) {
+            Some(_) => Ok(schedule),
+            None => Err(bad("it names no instant that ever comes".to_owned())),
+        }
+    }
+
+    /// Fields and zone, for telling whether they were edited.
+    #[must_use]
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The first instant after `after_ms`.
+    #[must_use]
+    pub fn next_after(&self, after_ms: i64) -> Option<i64> {
+        let after = DateTime::<Utc>::from_timestamp_millis(after_ms)?.with_timezone(&self.zone);
+        let next = self.cron.find_next_occurrence(&after, false).ok()?;
+        Some(next.timestamp_millis())
+    }
+
+    /// What is due at `now_ms` when the instant of `last_ms` was the last that was seen to.
+    #[must_use]
+    pub fn due(&self, last_ms: i64, now_ms: i64, catch_up_ms: i64) -> Due {
+        let mut instants = Vec::new();
+        let mut seen_ms = last_ms;
+        while let Some(next_ms) = self.next_after(seen_ms)
+            && next_ms <= now_ms
+            && instants.len() < INSTANTS_MAX
+        {
+            instants.push(next_ms);
+            seen_ms = next_ms;
+        }
+        let newest = instants.pop();
+        let instant_ms =
+            newest.filter(|instant_ms| now_ms - instant_ms <= catch_up_ms.max(ON_TIME_MS));
+        if instant_ms.is_none() {
+            instants.extend(newest);
+        }
+        let missed_ms = instants.split_off(instants.len().saturating_sub(MISSED_MAX));
+        let late = instant_ms.is_some_and(|instant_ms| now_ms - instant_ms > ON_TIME_MS);
+        Due {
+            instant_ms,
+            late,
+            missed_ms,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HOUR_MS: i64 = 3_600_000;
+
+    fn schedule(cron: &str, zone: &str) -> Result<Schedule, BadSchedule> {
+        let config = ScheduleConfig {
+            cron: cron.to_owned(),
+            zone: zone.to_owned(),
+            catch_up_h: 36.0,
+        };
+        Schedule::of(&config, at("2026-01-01T00:00:00Z"))
+    }
+
+    fn at(text: &str) -> i64 {
+        DateTime::parse_from_rfc3339(text)
+            .unwrap()
+            .timestamp_millis()
+    }
+
+    /// Instants from one to the other, UTC.
+    fn between(cron: &str, zone: &str, from: &str, to: &str) -> Vec<String> {
+        let schedule = schedule(cron, zone).unwrap();
+        let (mut seen_ms, to_ms) = (at(from), at(to));
+        let mut found = Vec::new();
+        while let Some(next_ms) = schedule.next_after(seen_ms).filter(|next| *next <= to_ms) {
+            let next = DateTime::<Utc>::from_timestamp_millis(next_ms).unwrap();
+            found.push(next.format("%dT%H:%M").to_string());
+            seen_ms = next_ms;
+        }
+        found
+    }
+
+    #[test]
+    fn no_night_is_lost_or_doubled_when_clocks_change() {
+        // The hour left out is made up for at its end; of the hour that comes twice the first counts.
+        for (zone, spring, expected) in [
+            (
+                "Europe/Berlin",
+                "2026-03-28T12:00:00Z",
+                ["29T01:00", "30T00:30"],
+            ),
+            (
+                "America/New_York",
+                "2026-03-07T12:00:00Z",
+                ["08T07:00", "09T06:30"],
+            ),
+            (
+                "Australia/Sydney",
+                "2026-10-03T12:00:00Z",
+                ["03T16:00", "04T15:30"],
+            ),
+        ] {
+            let end = at(spring) + 48 * HOUR_MS;
+            let end = crate::clock::utc_text(end);
+            assert_eq!(
+                between("30 2 * * *", zone, spring, &end),
+                expected,
+                "{zone}"
+            );
+        }
+        for (zone, autumn, expected) in [
+            (
+                "Europe/Berlin",
+                "2026-10-24T12:00:00Z",
+                ["25T00:30", "26T01:30"],
+            ),
+            (
+                "America/New_York",
+                "2026-10-31T12:00:00Z",
+                ["01T05:30", "02T06:30"],
+            ),
+            (
+                "Australia/Sydney",
+                "2026-04-04T12:00:00Z",
+                ["04T15:30", "05T16:30"],
+            ),
+        ] {
+            let end = at(autumn) + 48 * HOUR_MS;
+            let end = crate::clock::utc_text(end);
+            let cron = if zone == "America/New_York" {
+                "30 1 * * *"
+            } else {
+                "30 2 * * *"
+            };
+            assert_eq!(between(cron, zone, autumn, &end), expected, "{zone}");
+        }
+    }
+
+    #[test]
+    fn of_several_missed_nights_the_newest_is_caught_up_with() {
+        let schedule = schedule("30 2 * * *", "UTC").unwrap();
+        let last = at("2026-05-01T02:30:00Z");
+        let due = |now: &str| schedule.due(last, at(now), 36 * HOUR_MS);
+        assert_eq!(due("2026-05-02T02:29:59Z"), Due::default());
+        let on_time = due("2026-05-02T02:30:01Z");
+        assert_eq!(
+            (on_time.instant_ms, on_time.late),
+            (Some(at("2026-05-02T02:30:00Z")), false)
+        );
+        let late = due("2026-05-05T20:00:00Z");
+        assert_eq!(
+            (late.instant_ms, late.late),
+            (Some(at("2026-05-05T02:30:00Z")), true)
+        );
+        assert_eq!(late.missed_ms.len(), 3);
+        // A monthly one, missed for longer than is caught up with.
+        let monthly = super::tests::schedule("0 0 1 * *", "UTC").unwrap();
+        let due = monthly.due(last, at("2026-06-10T00:00:00Z"), 36 * HOUR_MS);
+        assert_eq!(due.instant_ms, None);
+        assert_eq!(due.missed_ms, [at("2026-06-01T00:00:00Z")]);
+    }
+
+    #[test]
+    fn a_date_that_never_comes_is_refused() {
+        let refused = schedule("0 0 31 2 *", "UTC").unwrap_err().to_string();
+        assert!(refused.contains("`0 0 31 2 *`"), "{refused}");
+        schedule("0 25 * * *", "UTC").unwrap_err();
+    }
+}

@@ -1,0 +1,235 @@
+//! Files whose folder has been quiet are read: the same content again changes nothing, and a kernel is used when CSPICE opens it.
+
+use std::{path::Path, sync::Arc, time::Duration};
+
+use serde_json::json;
+use tokio::task::JoinSet;
+
+use super::{core::Core, sweep::is_missing, workers::Workers, workers::words};
+use crate::{
+    database::{
+        About, Stored, append,
+        files::{FileRow, FileState, knows_coverage, put_coverage, put_file},
+    },
+    worker::{
+        parent::Ended,
+        protocol::{Answer, Hashed, Probed, What},
+    },
+};
+use areograph_store::files::file_name;
+
+/// Files that one process hashes, and kernels that one opens.
+const HASHED_TOGETHER: usize = 256;
+const PROBED_TOGETHER: usize = 16;
+/// Longest time for such a part: 256 PEDR files of an archive on a slow disk.
+const LIMIT: Duration = Duration::from_mins(30);
+/// How names of kernels end that CSPICE opens by themselves.
+const KERNELS: [&str; 10] = [
+    "bc", "bsp", "bpc", "tls", "tsc", "tpc", "tf", "ti", "bds", "tk",
+];
+
+/// Reads files that have settled, and notes what they are. Those that cannot be read now stay as they are.
+///
+/// # Errors
+/// The database cannot be written.
+pub async fn settle<W: Workers>(
+    core: &Arc<Core<W>>,
+    settled: Vec<FileRow>,
+    round: i64,
+) -> Stored<()> {
+    let now_ms = core.now_ms();
+    let (missing, there): (Vec<FileRow>, Vec<FileRow>) = settled.into_iter().partition(is_missing);
+    core.shared.write(|transaction| {
+        for file in missing {
+            tracing::info!("{} is gone", file.path);
+            let gone = FileRow {
+                state: FileState::Gone,
+                detail: String::new(),
+                changed_ms: now_ms,
+                round,
+                ..file
+            };
+            put_file(transaction, &gone)?;
+        }
+        Ok(())
+    })?;
+    let mut parts = JoinSet::new();
+    let places = Arc::new(tokio::sync::Semaphore::new(usize::from(
+        core.shared.config().workers.count,
+    )));
+    for (number, part) in there.chunks(HASHED_TOGETHER).enumerate() {
+        let (core, places, part) = (Arc::clone(core), Arc::clone(&places), part.to_vec());
+        parts.spawn(async move {
+            let _place = places.acquire_owned().await;
+            read_part(&core, number, part, round).await
+        });
+    }
+    while let Some(done) = parts.join_next().await {
+        match done {
+            Ok(done) => done?,
+            Err(panicked) => tracing::error!("reading files: {panicked}"),
+        }
+    }
+    Ok(())
+}
+
+async fn read_part<W: Workers>(
+    core: &Arc<Core<W>>,
+    number: usize,
+    part: Vec<FileRow>,
+    round: i64,
+) -> Stored<()> {
+    let files = part.iter().map(|file| file.path.clone().into()).collect();
+    let what = What::Hash {
+        files,
+        rehash: false,
+    };
+    let ended = core.ask(&format!("hash {number}"), what, LIMIT).await;
+    let Some(hashed) = hashes(&ended).filter(|hashed| hashed.len() == part.len()) else {
+        tracing::warn!("files could not be read: {}", words(&ended));
+        return Ok(());
+    };
+    let read: Vec<(FileRow, Hashed)> = part.into_iter().zip(hashed).collect();
+    for kernels in read.chunks(PROBED_TOGETHER) {
+        let problems = probe_together(core, number, kernels).await?;
+        let now_ms = core.now_ms();
+        core.shared.write(|transaction| {
+            for ((file, hashed), problem) in kernels.iter().zip(&problems) {
+                let file = judged(file, hashed, problem.as_ref(), round, now_ms);
+                if let Some(note) = &file.1 {
+                    tracing::info!("{note}");
+                    let data = json!({ "path": file_name(Path::new(&file.0.path)), "text": note });
+                    append(transaction, now_ms, "file", About::default(), &data)?;
+                }
+                put_file(transaction, &file.0)?;
+            }
+            Ok(())
+        })?;
+    }
+    Ok(())
+}
+
+/// The hashes that a worker told.
+#[must_use]
+pub fn hashes(ended: &Ended) -> Option<Vec<Hashed>> {
+    match &ended.answer {
+        Some(Ok(Answer::Hash { files })) => Some(files.clone()),
+        _ => None,
+    }
+}
+
+/// What a file is, now that it has been read, and what there is to say.
+fn judged(
+    file: &FileRow,
+    hashed: &Hashed,
+    problem: Option<&String>,
+    round: i64,
+    now_ms: i64,
+) -> (FileRow, Option<String>) {
+    let name = file_name(Path::new(&file.path));
+    let same = hashed.blake3.is_some() && hashed.blake3 == file.blake3;
+    let problem = hashed.problem.as_ref().or(problem);
+    let (state, detail) = match problem {
+        Some(problem) => (FileState::Bad, problem.clone()),
+        None if same => (FileState::Ready, "touched, content unchanged".to_owned()),
+        None => (FileState::Ready, String::new()),
+    };
+    let note = match (state, same, &file.blake3) {
+        (FileState::Bad, ..) => Some(format!("`{name}` cannot be used: {detail}")),
+        (_, true, _) => Some(format!("`{name}` was touched, content unchanged")),
+        (_, false, Some(_)) => Some(format!("`{name}` has new content")),
+        // The first files of a service are many.
+        (_, false, None) => None,
+    };
+    let judged = FileRow {
+        state,
+        detail,
+        checked_ms: Some(now_ms),
+        round: if same || state == FileState::Bad {
+            file.round
+        } else {
+            round
+        },
+        blake3: hashed.blake3.clone().or_else(|| file.blake3.clone()),
+        ..file.clone()
+    };
+    (judged, note)
+}
+
+fn is_kernel(path: &str) -> bool {
+    let ending = Path::new(path)
+        .extension()
+        .and_then(|ending| ending.to_str());
+    ending.is_some_and(|ending| KERNELS.contains(&ending))
+}
+
+/// Why each of these files is no kernel that can be used; nothing of files that are none, or whose content is known.
+async fn probe_together<W: Workers>(
+    core: &Arc<Core<W>>,
+    number: usize,
+    files: &[(FileRow, Hashed)],
+) -> Stored<Vec<Option<String>>> {
+    let mut problems = vec![None; files.len()];
+    let mut unknown = Vec::new();
+    for (place, (file, hashed)) in files.iter().enumerate() {
+        let Some(blake3) = hashed.blake3.as_ref().filter(|_| is_kernel(&file.path)) else {
+            continue;
+        };
+        let known = core
+            .shared
+            .read(|connection| knows_coverage(connection, blake3))?;
+        if !known {
+            unknown.push(place);
+        }
+    }
+    let path = |place: &usize| files[*place].0.path.clone();
+    match probe(core, number, unknown.iter().map(path).collect()).await? {
+        Ok(found) => {
+            for (place, problem) in unknown.into_iter().zip(found) {
+                problems[place] = problem;
+            }
+        }
+        // One of them crashes CSPICE: which one is found out by opening each alone.
+        Err(_) => {
+            for place in unknown {
+                problems[place] = match probe(core, number, vec![path(&place)]).await? {
+                    Ok(mut found) => found.pop().flatten(),
+                    Err(why) => Some(why),
+                };
+            }
+        }
+    }
+    Ok(problems)
+}
+
+/// Has kernels opened, and notes what they cover; why each cannot be used, or why there is no answer.
+async fn probe<W: Workers>(
+    core: &Arc<Core<W>>,
+    number: usize,
+    paths: Vec<String>,
+) -> Stored<Result<Vec<Option<String>>, String>> {
+    if paths.is_empty() {
+        return Ok(Ok(Vec::new()));
+    }
+    let count = paths.len();
+    let files = paths.into_iter().map(Into::into).collect();
+    let what = What::Probe { files };
+    let ended = core.ask(&format!("probe {number}"), what, LIMIT).await;
+    let Some(Ok(Answer::Probe { kernels })) = &ended.answer else {
+        return Ok(Err(words(&ended)));
+    };
+    if kernels.len() != count {
+        return Ok(Err("the worker did not tell of every kernel".to_owned()));
+    }
+    core.shared.write(|transaction| {
+        for Probed {
+            blake3, coverage, ..
+        } in kernels.iter().filter(|kernel| kernel.problem.is_none())
+        {
+            put_coverage(transaction, blake3, coverage)?;
+        }
+        Ok(())
+    })?;
+    let problems = kernels.iter().map(|kernel| kernel.problem.clone());
+    Ok(Ok(problems.collect()))
+}

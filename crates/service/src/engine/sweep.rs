@@ -1,0 +1,318 @@
+//! What a list of a folder says: which files changed, and whether the folder can be used at all.
+
+use std::collections::BTreeMap;
+
+use crate::{
+    clock::utc_text,
+    database::files::{FileRow, FileState, RootRow, RootState},
+};
+use areograph_store::files::Identity;
+
+/// What was known of a folder and what was found in it.
+#[derive(Debug)]
+pub struct Sweep<'a> {
+    /// The folder as it was.
+    pub root: &'a RootRow,
+    /// Files known below it.
+    pub known: &'a BTreeMap<String, FileRow>,
+    /// Files found below it, or why it could not be listed.
+    pub found: Result<&'a BTreeMap<String, Identity>, &'a str>,
+    /// When, milliseconds of UTC since 1970.
+    pub now_ms: i64,
+    /// Larger shares of files that are lost mean that the folder is not what it was.
+    pub max_loss: f64,
+    /// It is used when nothing has changed for so long.
+    pub quiet_ms: i64,
+}
+
+/// What came of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Swept {
+    /// The folder as it is.
+    pub root: RootRow,
+    /// Files that are not as they were known.
+    pub changed: Vec<FileRow>,
+    /// Files whose folder has been quiet for long enough: their content can be read now.
+    pub settled: Vec<FileRow>,
+}
+
+/// Compares. A folder that is unavailable changes no file.
+#[must_use]
+pub fn compare(sweep: &Sweep<'_>) -> Swept {
+    let found = match unavailable(sweep) {
+        Ok(found) => found,
+        Err(detail) => {
+            return Swept {
+                root: with_state(sweep, RootState::Unavailable, sweep.root.files, detail),
+                changed: Vec::new(),
+                settled: Vec::new(),
+            };
+        }
+    };
+    let changed = changed(sweep, found);
+    let news: BTreeMap<&str, &FileRow> = changed.iter().map(|file| (&*file.path, file)).collect();
+    let known = sweep.known.values();
+    // A file counts as settling from the sweep that saw it change; only a later one may find it quiet.
+    let waiting: Vec<&FileRow> = known
+        .filter(|file| file.state == FileState::Settling && !news.contains_key(&*file.path))
+        .collect();
+    let last_change_ms = waiting
+        .iter()
+        .copied()
+        .chain(news.values().copied())
+        .map(last_change_ms)
+        .max();
+    let files = i64::try_from(found.len()).unwrap_or(i64::MAX);
+    let quiet_from_ms = last_change_ms.map(|change_ms| change_ms.saturating_add(sweep.quiet_ms));
+    let (state, settled, detail) = match quiet_from_ms {
+        None => (RootState::Available, Vec::new(), String::new()),
+        Some(from_ms) if news.is_empty() && from_ms <= sweep.now_ms => {
+            let settled = waiting.into_iter().cloned().collect();
+            (RootState::Available, settled, String::new())
+        }
+        Some(from_ms) => {
+            let count = waiting.len() + news.len();
+            let until = utc_text(from_ms.max(sweep.now_ms));
+            let files = if count == 1 { "file" } else { "files" };
+            let detail = format!("{count} {files} changed; waiting for quiet period until {until}");
+            (RootState::Settling, Vec::new(), detail)
+        }
+    };
+    Swept {
+        root: with_state(sweep, state, files, detail),
+        changed,
+        settled,
+    }
+}
+
+/// The files, or why the folder cannot be what it was.
+fn unavailable<'a>(sweep: &Sweep<'a>) -> Result<&'a BTreeMap<String, Identity>, String> {
+    let found = sweep.found.map_err(str::to_owned)?;
+    if found.is_empty() {
+        return Err("the folder is empty".to_owned());
+    }
+    let there = |file: &&FileRow| file.state != FileState::Gone;
+    let known = sweep.known.values().filter(there).count();
+    let is_lost = |file: &&FileRow| there(file) && !found.contains_key(&file.path);
+    let lost = sweep.known.values().filter(is_lost).count();
+    if lost as f64 > sweep.max_loss * known as f64 {
+        return Err(format!(
+            "{lost} of {known} files are gone, more than changes.max_loss = {} allows; if that is meant, raise it until \
+             the next sweep",
+            sweep.max_loss
+        ));
+    }
+    Ok(found)
+}
+
+fn with_state(sweep: &Sweep<'_>, state: RootState, files: i64, detail: String) -> RootRow {
+    let since_ms = if state == sweep.root.state {
+        sweep.root.since_ms
+    } else {
+        sweep.now_ms
+    };
+    RootRow {
+        files,
+        state,
+        since_ms,
+        detail,
+        ..sweep.root.clone()
+    }
+}
+
+fn changed(sweep: &Sweep<'_>, found: &BTreeMap<String, Identity>) -> Vec<FileRow> {
+    let mut changed = Vec::new();
+    for (path, identity) in found {
+        match sweep.known.get(path) {
+            Some(file)
+                if file.identity == *identity
+                    && file.state != FileState::Gone
+                    && !is_missing(file) => {}
+            Some(file) => changed.push(FileRow {
+                identity: *identity,
+                changed_ms: sweep.now_ms,
+                state: FileState::Settling,
+                detail: String::new(),
+                ..file.clone()
+            }),
+            None => changed.push(FileRow {
+                path: path.clone(),
+                identity: *identity,
+                blake3: None,
+                first_seen_ms: sweep.now_ms,
+                changed_ms: sweep.now_ms,
+                checked_ms: None,
+                state: FileState::Settling,
+                detail: String::new(),
+                round: 0,
+            }),
+        }
+    }
+    let missing = sweep.known.values().filter(|file| {
+        file.state != FileState::Gone && !is_missing(file) && !found.contains_key(&file.path)
+    });
+    changed.extend(missing.map(|file| FileRow {
+        changed_ms: sweep.now_ms,
+        state: FileState::Settling,
+        detail: MISSING.to_owned(),
+        ..file.clone()
+    }));
+    changed
+}
+
+/// Detail of a settling file that is not there: mirrors remove files before they bring others.
+const MISSING: &str = "missing";
+
+/// Whether a settling file was not there when its folder was last listed.
+#[must_use]
+pub fn is_missing(file: &FileRow) -> bool {
+    file.state == FileState::Settling && file.detail == MISSING
+}
+
+/// When a file changed: as the file system says, since a service that starts has just seen everything for the first time, but not later
+/// than it was noticed.
+fn last_change_ms(file: &FileRow) -> i64 {
+    if is_missing(file) {
+        return file.changed_ms;
+    }
+    let [seconds, nanoseconds] = file.identity.changed;
+    let changed_ms = seconds.saturating_mul(1000) + nanoseconds / 1_000_000;
+    file.changed_ms.min(changed_ms)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::database::files::RootKind;
+
+    const QUIET_MS: i64 = 600_000;
+
+    fn identity(inode: u64, changed_ms: i64) -> Identity {
+        Identity {
+            device: 1,
+            inode,
+            bytes: 100,
+            modified: [5, 0],
+            changed: [changed_ms / 1000, changed_ms % 1000 * 1_000_000],
+        }
+    }
+
+    /// A folder that is swept again and again, and whose settled files are taken for read.
+    struct Folder {
+        root: RootRow,
+        known: BTreeMap<String, FileRow>,
+        files: BTreeMap<String, Identity>,
+    }
+
+    impl Folder {
+        fn new(count: u64) -> Self {
+            let root = RootRow {
+                path: "/k".to_owned(),
+                kind: RootKind::Kernels,
+                files: 0,
+                state: RootState::Available,
+                since_ms: 0,
+                detail: String::new(),
+            };
+            let files = (0..count).map(|n| (format!("/k/{n:03}.bc"), identity(n, 0)));
+            Self {
+                root,
+                known: BTreeMap::new(),
+                files: files.collect(),
+            }
+        }
+
+        /// Paths that were found to have changed, and those that settled.
+        fn sweep(&mut self, now_ms: i64, found: Result<(), &str>) -> (usize, usize) {
+            let swept = compare(&Sweep {
+                root: &self.root,
+                known: &self.known,
+                found: found.map(|()| &self.files),
+                now_ms,
+                max_loss: 0.2,
+                quiet_ms: QUIET_MS,
+            });
+            let counts = (swept.changed.len(), swept.settled.len());
+            self.root = swept.root;
+            let settled = swept.settled.into_iter().map(|file| FileRow {
+                state: if is_missing(&file) {
+                    FileState::Gone
+                } else {
+                    FileState::Ready
+                },
+                ..file
+            });
+            for file in swept.changed.into_iter().chain(settled) {
+                self.known.insert(file.path.clone(), file);
+            }
+            counts
+        }
+    }
+
+    #[test]
+    fn a_new_service_uses_old_files_at_its_second_sweep() {
+        let mut folder = Folder::new(10);
+        assert_eq!(folder.sweep(QUIET_MS, Ok(())), (10, 0));
+        assert_eq!(folder.root.state, RootState::Settling);
+        assert_eq!(folder.sweep(QUIET_MS + 1, Ok(())), (0, 10));
+        assert_eq!(folder.root.state, RootState::Available);
+        assert_eq!(folder.sweep(QUIET_MS + 2, Ok(())), (0, 0));
+    }
+
+    #[test]
+    fn a_copy_in_pieces_is_used_once_at_its_end() {
+        let mut folder = Folder::new(10);
+        folder.sweep(QUIET_MS, Ok(()));
+        folder.sweep(QUIET_MS + 1, Ok(()));
+        let begin_ms = 2 * QUIET_MS;
+        let mut settled = 0;
+        // Pieces every five minutes, an old time of modification, sweeps every minute.
+        for minute in 0..40 {
+            let now_ms = begin_ms + minute * 60_000;
+            if minute <= 20 && minute % 5 == 0 {
+                let slow = Identity {
+                    bytes: 10 + minute.unsigned_abs(),
+                    ..identity(77, now_ms)
+                };
+                folder.files.insert("/k/slow.bc".to_owned(), slow);
+            }
+            let (_, now_settled) = folder.sweep(now_ms, Ok(()));
+            assert!(
+                now_settled == 0 || minute == 30,
+                "settled in minute {minute}"
+            );
+            settled += now_settled;
+        }
+        assert_eq!(settled, 1);
+    }
+
+    #[test]
+    fn a_folder_that_vanishes_or_loses_much_changes_no_file() {
+        let mut folder = Folder::new(100);
+        folder.sweep(QUIET_MS, Ok(()));
+        folder.sweep(QUIET_MS + 1, Ok(()));
+        let (known, files) = (folder.known.clone(), folder.files.clone());
+        assert_eq!(folder.sweep(QUIET_MS + 2, Err("not there")), (0, 0));
+        assert_eq!(folder.root.state, RootState::Unavailable);
+        assert_eq!(folder.root.since_ms, QUIET_MS + 2);
+        folder.files.clear();
+        assert_eq!(folder.sweep(QUIET_MS + 3, Ok(())), (0, 0));
+        assert!(folder.root.detail.contains("is empty"));
+        folder.files = files.clone();
+        folder.files.retain(|path, _| path.as_str() >= "/k/021.bc");
+        assert_eq!(folder.sweep(QUIET_MS + 4, Ok(())), (0, 0));
+        assert!(folder.root.detail.contains("21 of 100 files are gone"));
+        assert_eq!(folder.root.since_ms, QUIET_MS + 2);
+        assert_eq!(folder.known, known);
+        // Back as it was: nothing happened.
+        folder.files = files;
+        assert_eq!(folder.sweep(QUIET_MS + 5, Ok(())), (0, 0));
+        assert_eq!(folder.root.state, RootState::Available);
+        // A single file less is a change, after the quiet period.
+        folder.files.remove("/k/005.bc");
+        assert_eq!(folder.sweep(2 * QUIET_MS, Ok(())), (1, 0));
+        assert_eq!(folder.sweep(3 * QUIET_MS - 1, Ok(())), (0, 0));
+        assert_eq!(folder.sweep(3 * QUIET_MS, Ok(())), (0, 1));
+        assert_eq!(folder.known["/k/005.bc"].state, FileState::Gone);
+    }
+}

@@ -1,0 +1,64 @@
+//! Those who do the work: worker processes, or in tests whoever takes their place.
+
+use std::{
+    future::Future,
+    path::{Path, PathBuf},
+};
+
+use tokio::sync::watch;
+
+use crate::worker::{
+    parent::{Ended, Heard, How, WorkerLimits, work},
+    protocol::{CancelWhy, Task},
+};
+
+/// Those who do the work.
+pub trait Workers: Send + Sync + 'static {
+    /// Does a task to its end, as [`work`] says.
+    fn work(
+        &self,
+        task: Task,
+        limits: WorkerLimits,
+        log: &Path,
+        cancel: watch::Receiver<Option<CancelWhy>>,
+        heard: impl FnMut(Heard<'_>) + Send,
+    ) -> impl Future<Output = Ended> + Send;
+}
+
+/// Worker processes of a program.
+#[derive(Debug, Clone)]
+pub struct Processes {
+    /// The program: this one.
+    pub program: PathBuf,
+}
+
+impl Workers for Processes {
+    async fn work(
+        &self,
+        task: Task,
+        limits: WorkerLimits,
+        log: &Path,
+        cancel: watch::Receiver<Option<CancelWhy>>,
+        heard: impl FnMut(Heard<'_>) + Send,
+    ) -> Ended {
+        work(&self.program, &task, &limits, log, cancel, heard).await
+    }
+}
+
+/// How a worker ended, in words.
+#[must_use]
+pub fn words(ended: &Ended) -> String {
+    match (&ended.answer, &ended.how) {
+        (Some(Ok(_)), _) => "done".to_owned(),
+        (Some(Err(failure)), _) => failure.text.clone(),
+        (None, How::Exited(code)) => format!("the worker ended with code {code} and no answer"),
+        (None, How::Signalled(signal)) => format!("the worker was ended by signal {signal}"),
+        (None, How::Silent) => "the worker gave no sign of life and was ended".to_owned(),
+        (None, How::DeadlinePassed) => "the worker took too long and was ended".to_owned(),
+        (None, How::Cancelled) => "the worker was stopped".to_owned(),
+        (None, How::NoHello) => "the worker never said hello".to_owned(),
+        (None, How::ForeignVersion(version)) => format!("the worker is areograph {version}"),
+        (None, How::Garbled(what)) => format!("the worker said what no worker says: {what}"),
+        (None, How::NotStarted(why)) => format!("the worker could not be started: {why}"),
+    }
+}

@@ -1,0 +1,135 @@
+//! What all requests share.
+
+use std::{
+    net::SocketAddr,
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicUsize, Ordering},
+    },
+};
+
+use rusqlite::{Connection, Transaction};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+
+use super::{hidden::Hidden, metrics::Metrics, plans::Plans, problem::Problem, rate::Rates};
+use crate::{database::Stored, shared::Shared};
+use areograph_config::ServiceConfig;
+
+/// Reads of the database at the same time.
+const READS: usize = 8;
+/// Streams of events at the same time.
+pub(super) const STREAMS: usize = 64;
+
+/// Workers that plan or search at the same time.
+const WORKERS: usize = 2;
+
+/// What all requests share.
+pub(super) struct App {
+    pub(super) shared: Arc<Shared>,
+    /// Where the service listens.
+    pub(super) local: SocketAddr,
+    pub(super) metrics: Metrics,
+    pub(super) rates: Rates,
+    pub(super) streams: Arc<Semaphore>,
+    pub(super) connections: AtomicUsize,
+    /// Workers that plan or search.
+    pub(super) workers: Arc<Semaphore>,
+    pub(super) plans: Plans,
+    reads: Arc<Semaphore>,
+    /// For the configuration that they were taken from.
+    hidden: Mutex<(Arc<ServiceConfig>, Arc<Hidden>)>,
+}
+
+impl App {
+    pub(super) fn new(shared: Arc<Shared>, local: SocketAddr) -> Self {
+        let config = shared.config();
+        let hidden = Arc::new(Hidden::of(&config, &shared.program));
+        Self {
+            hidden: Mutex::new((config, hidden)),
+            shared,
+            local,
+            metrics: Metrics::new(),
+            rates: Rates::default(),
+            streams: Arc::new(Semaphore::new(STREAMS)),
+            connections: AtomicUsize::new(0),
+            workers: Arc::new(Semaphore::new(WORKERS)),
+            plans: Plans::default(),
+            reads: Arc::new(Semaphore::new(READS)),
+        }
+    }
+
+    pub(super) fn config(&self) -> Arc<ServiceConfig> {
+        self.shared.config()
+    }
+
+    pub(super) fn now_ms(&self) -> i64 {
+        self.shared.now_ms()
+    }
+
+    /// What clients must not read: where things lie on this machine.
+    pub(super) fn hidden(&self) -> Arc<Hidden> {
+        let config = self.config();
+        let mut kept = self.hidden.lock().unwrap_or_else(PoisonError::into_inner);
+        if !Arc::ptr_eq(&kept.0, &config) {
+            let hidden = Arc::new(Hidden::of(&config, &self.shared.program));
+            *kept = (config, hidden);
+        }
+        Arc::clone(&kept.1)
+    }
+
+    /// How many streams of events are open.
+    pub(super) fn open_streams(&self) -> usize {
+        STREAMS - self.streams.available_permits()
+    }
+
+    /// How many connections are open.
+    pub(super) fn open_connections(&self) -> usize {
+        self.connections.load(Ordering::Relaxed)
+    }
+
+    /// Looks at the database without holding up other requests.
+    pub(super) async fn read<T: Send + 'static>(
+        &self,
+        look: impl FnOnce(&Connection) -> Stored<T> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let permit = self.turn().await?;
+        let shared = Arc::clone(&self.shared);
+        blocking(move || {
+            let seen = shared.read(look);
+            drop(permit);
+            seen
+        })
+        .await?
+        .map_err(Problem::from)
+    }
+
+    /// Changes the database; the engine looks at once whether there is something to do.
+    pub(super) async fn write<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&Transaction<'_>) -> Stored<T> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let permit = self.turn().await?;
+        let shared = Arc::clone(&self.shared);
+        blocking(move || {
+            let done = shared.write(work);
+            drop(permit);
+            done
+        })
+        .await?
+        .map_err(Problem::from)
+    }
+
+    async fn turn(&self) -> Result<OwnedSemaphorePermit, Problem> {
+        let turn = Arc::clone(&self.reads).acquire_owned();
+        turn.await.map_err(Problem::internal)
+    }
+}
+
+/// Does `work` where waiting for the disk holds up nobody.
+pub(super) async fn blocking<T: Send + 'static>(
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<T, Problem> {
+    tokio::task::spawn_blocking(work)
+        .await
+        .map_err(Problem::internal)
+}

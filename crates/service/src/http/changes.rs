@@ -1,0 +1,196 @@
+//! What people ask the engine for, the same from pages and from programs: each with a line of who asked.
+
+use std::sync::Arc;
+
+use axum::http::StatusCode;
+use serde_json::Value;
+
+use super::{app::App, caller::Caller, problem::Problem};
+use crate::{
+    audit::{Change, note_change},
+    database::{
+        Ask, Asked, CauseKind, CauseRow, Job, Priority, ask, ask_cancel, job,
+        shown::{pin_run, run, site},
+    },
+    state::JobState,
+};
+
+/// Jobs that are asked for.
+#[derive(Debug, Clone)]
+pub(super) struct Wanted {
+    pub(super) sites: Vec<String>,
+    pub(super) force: bool,
+    pub(super) reason: String,
+}
+
+/// Asks for jobs of sites that are there.
+pub(super) fn ask_for(
+    transaction: &rusqlite::Transaction<'_>,
+    now_ms: i64,
+    wanted: &Wanted,
+    caller: &Caller,
+) -> crate::database::Stored<Vec<(String, Asked)>> {
+    let who = caller.name();
+    let cause = CauseRow::plain(CauseKind::Asked, &wanted.reason, now_ms);
+    let mut jobs = Vec::new();
+    for site in &wanted.sites {
+        let wish = Ask {
+            site,
+            priority: Priority::Asked,
+            force: wanted.force,
+            night: None,
+            asked_by: Some(&who),
+            ready: true,
+            causes: std::slice::from_ref(&cause),
+        };
+        let asked = ask(transaction, now_ms, &wish)?;
+        let change = Change {
+            who: &who,
+            action: if wanted.force { "run by force" } else { "run" },
+            target: &format!("site {site}, job {}", asked.job),
+            remote: &caller.remote.to_string(),
+        };
+        note_change(transaction, now_ms, change)?;
+        jobs.push((site.clone(), asked));
+    }
+    Ok(jobs)
+}
+
+/// Asks for a job of one site.
+pub(super) async fn run_site(
+    app: &Arc<App>,
+    caller: Caller,
+    wanted: Wanted,
+) -> Result<Option<i64>, Problem> {
+    let now_ms = app.now_ms();
+    let asked = app
+        .write(move |transaction| {
+            for name in &wanted.sites {
+                if site(transaction, name)?.is_none() {
+                    return Ok(Vec::new());
+                }
+            }
+            ask_for(transaction, now_ms, &wanted, &caller)
+        })
+        .await?;
+    app.shared.wake.notify_one();
+    Ok(asked.first().map(|(_, asked)| asked.job))
+}
+
+/// Asks a job to stop.
+pub(super) async fn cancel(app: &Arc<App>, caller: Caller, id: i64) -> Result<Job, Problem> {
+    let now_ms = app.now_ms();
+    let done = app
+        .write(move |transaction| {
+            let Some(found) = job(transaction, id)? else {
+                return Ok(None);
+            };
+            let stopped = matches!(found.state, JobState::Cancelled | JobState::Cancelling);
+            if found.state.is_final() || stopped {
+                return Ok(Some((found, stopped)));
+            }
+            ask_cancel(transaction, now_ms, id)?;
+            note(transaction, now_ms, &caller, "cancel", &format!("job {id}"))?;
+            Ok(job(transaction, id)?.map(|job| (job, true)))
+        })
+        .await?;
+    app.shared.wake.notify_one();
+    match done {
+        None => Err(no_job()),
+        Some((job, true)) => Ok(job),
+        Some((job, false)) => Err(Problem::conflict(format!(
+            "Job {id} has ended: it is {}.",
+            job.state
+        ))),
+    }
+}
+
+/// Tries a job again: one that waits or is blocked at once, one that ended without valid products as a new job.
+pub(super) async fn retry(app: &Arc<App>, caller: Caller, id: i64) -> Result<Job, Problem> {
+    let now_ms = app.now_ms();
+    let done = app
+        .write(move |transaction| {
+            let Some(found) = job(transaction, id)? else {
+                return Ok(Err(no_job()));
+            };
+            let kind = match found.state {
+                JobState::Held | JobState::Queued => return Ok(Ok(found)),
+                JobState::Waiting | JobState::Blocked => CauseKind::Asked,
+                JobState::Failed | JobState::Invalid | JobState::Cancelled => CauseKind::RetryOf,
+                state => {
+                    let text = format!("Job {id} is {state}: there is nothing to try again.");
+                    return Ok(Err(Problem::conflict(text)));
+                }
+            };
+            let who = caller.name();
+            let detail = format!("job {id} is tried again");
+            let wish = Ask {
+                site: &found.site,
+                priority: Priority::Asked,
+                force: found.force,
+                night: None,
+                asked_by: Some(&who),
+                ready: true,
+                causes: &[CauseRow::plain(kind, &detail, now_ms)],
+            };
+            let asked = ask(transaction, now_ms, &wish)?;
+            note(transaction, now_ms, &caller, "retry", &format!("job {id}"))?;
+            let again = job(transaction, asked.job)?;
+            Ok(again.ok_or_else(no_job))
+        })
+        .await?;
+    app.shared.wake.notify_one();
+    done
+}
+
+/// Keeps a run for good, or no longer.
+pub(super) async fn pin(
+    app: &Arc<App>,
+    caller: Caller,
+    id: String,
+    pinned: bool,
+) -> Result<crate::database::shown::Run, Problem> {
+    let now_ms = app.now_ms();
+    app.write(move |transaction| {
+        let Some(mut found) = run(transaction, &id)? else {
+            return Ok(Err(Problem::not_found("There is no such run.")));
+        };
+        if pinned && found.removed_utc.is_some() {
+            let text = "The products of this run were removed; there is nothing to keep.";
+            return Ok(Err(Problem::conflict(text)));
+        }
+        if found.pinned != pinned {
+            pin_run(transaction, &id, pinned)?;
+            let action = if pinned { "pin" } else { "unpin" };
+            note(transaction, now_ms, &caller, action, &format!("run {id}"))?;
+            found.pinned = pinned;
+        }
+        Ok(Ok(found))
+    })
+    .await?
+}
+
+fn note(
+    transaction: &rusqlite::Transaction<'_>,
+    now_ms: i64,
+    caller: &Caller,
+    action: &str,
+    target: &str,
+) -> crate::database::Stored<()> {
+    let change = Change {
+        who: &caller.name(),
+        action,
+        target,
+        remote: &caller.remote.to_string(),
+    };
+    note_change(transaction, now_ms, change)
+}
+
+fn no_job() -> Problem {
+    Problem::new(StatusCode::NOT_FOUND, "There is no such job.")
+}
+
+/// The text of an outcome.
+pub(super) fn outcome_text(job: &Job) -> Option<&str> {
+    job.outcome.as_ref()?.get("text").and_then(Value::as_str)
+}

@@ -1,0 +1,46 @@
+//! Where things lie on this machine is not for clients: folders of the configuration lose what leads to them.
+
+use std::path::Path;
+
+use areograph_config::ServiceConfig;
+
+/// Folders as they stand in texts, with what takes their place; the longest first.
+#[derive(Debug)]
+pub(super) struct Hidden(Vec<(String, String)>);
+
+impl Hidden {
+    pub(super) fn of(config: &ServiceConfig, program: &Path) -> Self {
+        let inputs = &config.inputs;
+        let lists = [&inputs.sites, &inputs.kernels, &inputs.data];
+        let outputs = [&config.outputs.products, &config.outputs.state];
+        let folders = lists.into_iter().flatten().chain(outputs);
+        let mut hidden: Vec<(String, String)> = folders
+            .map(|folder| &**folder)
+            .chain([config.file.as_path(), program])
+            .flat_map(|path| {
+                let canonical = path.canonicalize().ok();
+                [Some(path.to_owned()), canonical]
+            })
+            .flatten()
+            .filter_map(|path| {
+                let parent = path.parent()?.to_string_lossy().into_owned();
+                (parent.len() > 1).then(|| (parent + "/", String::new()))
+            })
+            .collect();
+        hidden.sort_by(|a, b| b.0.len().cmp(&a.0.len()).then_with(|| a.0.cmp(&b.0)));
+        hidden.dedup();
+        Self(hidden)
+    }
+
+    /// `text` without the folders that lead to those of the configuration.
+    pub(super) fn strip(&self, text: String) -> String {
+        let strip = |text: String, (folder, instead): &(String, String)| {
+            if text.contains(&**folder) {
+                text.replace(&**folder, instead)
+            } else {
+                text
+            }
+        };
+        self.0.iter().fold(text, strip)
+    }
+}

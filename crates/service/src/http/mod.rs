@@ -1,0 +1,56 @@
+//! The service over HTTP: an interface for programs, pages for people, figures for monitors.
+
+mod accept;
+mod api;
+mod app;
+mod caller;
+mod changes;
+mod coverage;
+mod extract;
+mod files;
+mod frame;
+mod guard;
+mod hidden;
+mod logs;
+mod metrics;
+mod pages;
+mod plans;
+mod problem;
+mod rate;
+mod stall;
+mod work;
+
+use std::sync::Arc;
+
+use axum::{Router, middleware::from_fn_with_state};
+use tokio::net::TcpListener;
+use tower_http::{catch_panic::CatchPanicLayer, csrf::CsrfLayer};
+
+use super::shared::Shared;
+use app::App;
+use areograph_base::error::{Error, IoError, Result};
+
+/// Answers requests until the service ends; then streams of events end first, and requests under way within 10 s.
+///
+/// # Errors
+/// The listener has no address.
+pub async fn serve(listener: TcpListener, shared: Arc<Shared>) -> Result<()> {
+    let local = listener.local_addr();
+    let local = local.map_err(|error| Error::new(IoError::on("ask for the address")(error)))?;
+    let app = Arc::new(App::new(shared, local));
+    accept::run(listener, router(&app), &app).await;
+    Ok(())
+}
+
+/// All routes, and around them, from the outside: frame, panics, guard, forged forms.
+fn router(app: &Arc<App>) -> Router {
+    Router::new()
+        .merge(api::routes())
+        .merge(pages::routes())
+        .fallback(|| async { problem::Problem::not_found("There is nothing at this address.") })
+        .layer(CsrfLayer::new())
+        .layer(from_fn_with_state(Arc::clone(app), guard::guard))
+        .layer(CatchPanicLayer::custom(frame::panicked))
+        .layer(from_fn_with_state(Arc::clone(app), frame::frame))
+        .with_state(Arc::clone(app))
+}

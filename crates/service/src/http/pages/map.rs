@@ -1,0 +1,172 @@
+//! Where the sites lie: Mars from 0° to 360° E, equidistant cylindrical.
+
+use maud::{Markup, html};
+
+use super::parts::{counted, tone};
+use crate::database::shown::Site;
+
+/// Units of the picture for a degree.
+const SCALE: f64 = 2.0;
+/// Room for the names of parallels and meridians.
+const LEFT: f64 = 64.0;
+const TOP: f64 = 10.0;
+const RIGHT: f64 = 22.0;
+/// Windows smaller than this are drawn so large.
+const LEAST: f64 = 9.0;
+/// More names than this would lie over each other.
+const NAMES: usize = 30;
+/// Width of a letter and height of a line, as the names are written.
+const LETTER: f64 = 9.0;
+const LINE: f64 = 18.0;
+
+/// The map, and what it shows in words.
+pub(super) fn map(sites: &[Site]) -> Markup {
+    let placed: Vec<(&Site, [f64; 4])> = sites
+        .iter()
+        .filter_map(|site| Some((site, site.bounds_deg?)))
+        .collect();
+    let (width, height) = (360.0 * SCALE, 180.0 * SCALE);
+    let names = names(&placed, width);
+    html! {
+        figure class="map" {
+            svg viewBox={ "0 0 " (LEFT + width + RIGHT) " " (TOP + height + 28.0) } role="group" aria-label="Map of the sites" {
+                @for k in 0..=12_u32 {
+                    @let longitude = f64::from(30 * k);
+                    @let x = LEFT + longitude * SCALE;
+                    line x1=(x) y1=(TOP) x2=(x) y2=(TOP + height) stroke="#E2E2E2" {}
+                    @if k % 2 == 0 { text x=(x) y=(TOP + height + 22.0) text-anchor="middle" font-size="17" fill="#222222" { (longitude) "°" } }
+                }
+                @for k in 0..=6_u32 {
+                    @let latitude = 90.0 - f64::from(30 * k);
+                    @let y = TOP + (90.0 - latitude) * SCALE;
+                    line x1=(LEFT) y1=(y) x2=(LEFT + width) y2=(y) stroke="#E2E2E2" {}
+                    text x=(LEFT - 6.0) y=(y + 6.0) text-anchor="end" font-size="17" fill="#222222" { (latitude_name(latitude)) }
+                }
+                @for (site, bounds_deg) in &placed {
+                    a href={ "/sites/" (site.name) } aria-label={ (site.name) ": " (site.verdict.as_deref().unwrap_or("no run yet")) } {
+                        @for [x, y, wide, high] in rectangles(*bounds_deg) {
+                            rect class={ "site " (tone(site.verdict.as_deref())) } x=(x) y=(y) width=(wide) height=(high) {}
+                        }
+                    }
+                }
+                @for name in &names {
+                    text x=(name.x) y=(name.y) text-anchor=(name.anchor) font-size="17" fill="#222222" { (name.text) }
+                }
+            }
+            figcaption {
+                (counted(placed.len(), "site")) " with windows; east longitude and areocentric latitude. The colour is that of the verdict."
+                @if sites.len() > placed.len() { " The windows of the others are not known yet." }
+            }
+        }
+    }
+}
+
+/// A name beside its window.
+struct Name<'a> {
+    text: &'a str,
+    x: f64,
+    y: f64,
+    anchor: &'static str,
+}
+
+/// Names of the sites from north to south; one that would lie over another goes below it. None where they are too many.
+fn names<'a>(placed: &[(&'a Site, [f64; 4])], width: f64) -> Vec<Name<'a>> {
+    if placed.len() > NAMES {
+        return Vec::new();
+    }
+    let beside = |(site, bounds_deg): &(&'a Site, [f64; 4])| {
+        let [x, y, wide, high] = rectangles(*bounds_deg)[0];
+        let (x, anchor) = if x + wide > LEFT + 0.8 * width {
+            (x - 4.0, "end")
+        } else {
+            (x + wide + 4.0, "start")
+        };
+        Name {
+            text: &site.name,
+            x,
+            y: y + high / 2.0 + 6.0,
+            anchor,
+        }
+    };
+    let mut names: Vec<Name> = placed.iter().map(beside).collect();
+    names.sort_by(|one, other| one.y.total_cmp(&other.y));
+    for index in 1..names.len() {
+        let (above, below) = names.split_at_mut(index);
+        let name = &mut below[0];
+        for other in above {
+            let wide = LETTER * other.text.len().max(name.text.len()) as f64;
+            if (name.x - other.x).abs() < wide && name.y - other.y < LINE {
+                name.y = other.y + LINE;
+            }
+        }
+    }
+    names
+}
+
+fn latitude_name(latitude_deg: f64) -> String {
+    let side = if latitude_deg > 0.0 {
+        " N"
+    } else if latitude_deg < 0.0 {
+        " S"
+    } else {
+        ""
+    };
+    format!("{}°{side}", latitude_deg.abs())
+}
+
+/// A window on the map as left, top, width, height; one across the prime meridian is in two parts.
+fn rectangles([west, south, east, north]: [f64; 4]) -> Vec<[f64; 4]> {
+    let (west, mut east) = (west.rem_euclid(360.0), east.rem_euclid(360.0));
+    if east <= west {
+        east += 360.0;
+    }
+    let spans = if east > 360.0 {
+        vec![(west, 360.0), (0.0, east - 360.0)]
+    } else {
+        vec![(west, east)]
+    };
+    let high = ((north - south) * SCALE).max(LEAST);
+    let middle = TOP + (90.0 - f64::midpoint(north, south)) * SCALE;
+    let one = |(west, east): (f64, f64)| {
+        let wide = ((east - west) * SCALE).max(LEAST);
+        let x = LEFT + f64::midpoint(west, east) * SCALE - wide / 2.0;
+        [x, middle - high / 2.0, wide, high]
+    };
+    spans.into_iter().map(one).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_window_across_the_prime_meridian_lies_at_both_edges() {
+        let parts = rectangles([350.0, -10.0, 10.0, 10.0]);
+        assert_eq!(parts.len(), 2);
+        for (part, middle_deg) in parts.iter().zip([355.0, 5.0]) {
+            let middle = LEFT + middle_deg * SCALE;
+            assert!((part[0] + part[2] / 2.0 - middle).abs() < 1e-9); // rounding
+            assert!((part[2] - 20.0).abs() < 1e-9);
+        }
+        assert_eq!(rectangles([355.0, 0.0, 360.0, 1.0]).len(), 1);
+    }
+
+    #[test]
+    fn names_of_neighbours_stand_below_each_other() {
+        let site = |name: &str| Site {
+            name: name.to_owned(),
+            ..Site::default()
+        };
+        let sites = ["gusev_context", "gusev_crater", "isidis"].map(site);
+        let bounds = [
+            [173.8, -15.6, 176.8, -13.6],
+            [175.0, -15.1, 175.6, -14.1],
+            [87.7, 4.0, 88.3, 5.0],
+        ];
+        let placed: Vec<(&Site, [f64; 4])> = sites.iter().zip(bounds).collect();
+        let names = names(&placed, 360.0 * SCALE);
+        assert_eq!(names.len(), 3);
+        let apart = names[2].y - names[1].y;
+        assert!((apart - LINE).abs() < 1e-9 || apart > LINE, "{apart}"); // rounding
+    }
+}

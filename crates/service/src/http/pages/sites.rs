@@ -1,0 +1,374 @@
+//! The first page, and the page of a site.
+
+use std::sync::Arc;
+
+use axum::{
+    extract::State,
+    http::StatusCode,
+    response::{IntoResponse as _, Redirect, Response},
+};
+use maud::{Markup, html};
+use serde::Deserialize;
+
+use super::{
+    layout::{Page, form_token, operator},
+    map::map,
+    parts::{
+        Times, counted, figure, figure_name, lead, more, prose, said, state, table, times, tone,
+        verdict,
+    },
+    trend::{figures, headline, trends},
+};
+use crate::{
+    database::{
+        JobFilter, jobs,
+        shown::{Night, RootFolder, Run, Site, nights, roots, runs_of_site, site, sites},
+    },
+    http::{
+        app::App,
+        caller::{Caller, Reader},
+        changes::{Wanted, run_site},
+        extract::{Asked, At, Filled, name},
+        problem::Problem,
+    },
+    state::JobState,
+};
+
+/// Sites on one page.
+const SITES: u32 = 500;
+/// Runs whose figures are plotted.
+const TREND: u32 = 120;
+/// Runs in the table.
+const RUNS: usize = 30;
+
+/// Where a list goes on.
+#[derive(Debug, Deserialize)]
+pub(super) struct From {
+    after: Option<String>,
+}
+
+/// All sites: map, table, last night, work.
+pub(super) async fn home(
+    Reader(caller): Reader,
+    State(app): State<Arc<App>>,
+    Asked(from): Asked<From>,
+) -> Result<Response, Problem> {
+    let after = from.after.unwrap_or_default();
+    let (found, roots, nights, work) = app
+        .read(move |connection| {
+            let mut work = Vec::new();
+            for state in [
+                JobState::Running,
+                JobState::Starting,
+                JobState::Cancelling,
+                JobState::Queued,
+            ] {
+                let filter = JobFilter {
+                    state: Some(state),
+                    ..JobFilter::default()
+                };
+                work.extend(jobs(connection, &filter, 20)?);
+            }
+            Ok((
+                sites(connection, &after, SITES + 1)?,
+                roots(connection)?,
+                nights(connection, None, 1)?,
+                work,
+            ))
+        })
+        .await?;
+    let times = times(&app);
+    let shown = &found[..found.len().min(SITES as usize)];
+    let next = (found.len() > shown.len())
+        .then(|| shown.last().map(|site| format!("/?after={}", site.name)));
+    let body = html! {
+        div id="state" data-live="" { (standing(shown, &roots, app.shared.problem().as_deref(), &times)) }
+        section {
+            h2 { "Map" }
+            div id="map" data-live="" { (map(shown)) }
+        }
+        section {
+            h2 { "Sites" }
+            div id="sites" data-live="" { (site_table(shown, &times)) }
+            @if let Some(Some(next)) = next { p { a href=(next) rel="next" { "More sites" } } }
+        }
+        section {
+            h2 { "Last night" }
+            div id="night" data-live="" { (last_night(nights.first(), &times)) }
+        }
+        section {
+            h2 { "Work" }
+            div id="work" data-live="" { (super::jobs::job_table("Jobs at work and queued", &work, &times)) }
+        }
+    };
+    Ok(Page {
+        title: "Sites",
+        place: "/",
+    }
+    .answer(&app, &caller, &body))
+}
+
+/// The box at the top: what needs attention.
+fn standing(sites: &[Site], roots: &[RootFolder], problem: Option<&str>, times: &Times) -> Markup {
+    let count = |wanted: &str| {
+        sites
+            .iter()
+            .filter(|site| tone(site.verdict.as_deref()) == wanted)
+            .count()
+    };
+    let stale = sites
+        .iter()
+        .filter(|site| site.stale_since_utc.is_some())
+        .count();
+    let away: Vec<&RootFolder> = roots
+        .iter()
+        .filter(|root| root.state == "unavailable")
+        .collect();
+    let wrong: Vec<&Site> = sites.iter().filter(|site| site.problem.is_some()).collect();
+    let refused = sites
+        .iter()
+        .filter(|site| site.newest_valid == Some(false))
+        .count();
+    let worst = if !away.is_empty()
+        || problem.is_some()
+        || !wrong.is_empty()
+        || refused > 0
+        || count("invalid") > 0
+    {
+        "invalid"
+    } else if stale > 0 || count("none") > 0 {
+        "remarks"
+    } else {
+        "valid"
+    };
+    let headline = match (sites.len(), stale) {
+        (0, _) => "No site yet: put site files into the folder of sites".to_owned(),
+        (all, 0) => format!("{}, none of them stale", counted(all, "site")),
+        (all, stale) => format!("{}, {stale} of them stale", counted(all, "site")),
+    };
+    lead(
+        worst,
+        &headline,
+        &html! {
+            ul {
+                @for root in &away { li { "The folder " code { (root.path) } " is not available since " (times.at(root.since_utc)) ": " (root.detail) ". Its sites are held; nothing is lost." } }
+                @if let Some(problem) = problem { li { "The changed configuration was refused, the old one stays in force: " (problem) } }
+                @for site in &wrong { li { a href={ "/sites/" (site.name) } { (site.name) } ": " (site.problem.as_deref().unwrap_or_default()) } }
+                @if refused > 0 { li { "The newest run of " (counted(refused, "site")) " is not valid; earlier products stay current." } }
+                @if count("remarks") > 0 { li { (count("remarks")) " valid with remarks." } }
+                @if count("none") > 0 { li { (count("none")) " without a run." } }
+            }
+        },
+    )
+}
+
+fn site_table(sites: &[Site], times: &Times) -> Markup {
+    let heads = [
+        "Site",
+        "Verdict",
+        "Current since, UTC",
+        "Checked",
+        "State",
+        "Job",
+    ];
+    table(
+        "All sites",
+        &heads,
+        &html! {
+            @for site in sites {
+                tr {
+                    th scope="row" { a href={ "/sites/" (site.name) } { (site.name) } }
+                    td { (verdict(site.verdict.as_deref())) @if site.newest_valid == Some(false) { " " small { "newest run not valid" } } }
+                    td { (times.maybe(site.current_since_utc)) }
+                    td { @match site.checked_utc { Some(at) => (times.age(at)), None => "never" } }
+                    td class="long" { (freshness(site, times)) }
+                    td { @if let (Some(job), Some(at)) = (site.job, site.job_state) { a href={ "/jobs/" (job) } { (job) } " " (state(at)) } }
+                }
+            }
+        },
+    )
+}
+
+/// Fresh, or stale since when and why.
+fn freshness(site: &Site, times: &Times) -> Markup {
+    html! {
+        @if !site.enabled { "Not run: its site file is gone, or says so." }
+        @else if let Some(problem) = &site.problem { "Not run: " (problem) }
+        @else if let Some(since) = site.stale_since_utc {
+            "Stale since " (times.at(since)) ": " (prose(site.stale_because.as_deref().unwrap_or("its inputs changed")))
+        }
+        @else if site.current_run.is_some() { "Fresh." @if let Some(note) = &site.note { " Last decision: " (prose(note)) "." } }
+        @else { (prose(site.note.as_deref().unwrap_or("No run yet."))) }
+    }
+}
+
+/// What the last night did.
+fn last_night(night: Option<&Night>, times: &Times) -> Markup {
+    html! {
+        @match night {
+            None => p { "No night yet." }
+            Some(night) => p {
+                a href={ "/nights/" (night.id) } { "Night of " (times.at(night.due_utc)) }
+                ": " (counted(night.sites_checked, "site")) " checked, "
+                (counted(night.runs, "run")) ", " (counted(night.failures, "failure")) ". "
+                @match (night.started_utc, night.ended_utc) {
+                    (_, Some(at)) => { "Complete " (times.age(at)) "." }
+                    (Some(_), None) => "Under way.",
+                    (None, None) => "Not begun.",
+                }
+            }
+        }
+    }
+}
+
+/// One site: how it stands, its trends, its runs.
+pub(super) async fn one(
+    Reader(caller): Reader,
+    State(app): State<Arc<App>>,
+    At(wanted): At<String>,
+    Asked(from): Asked<From>,
+) -> Result<Response, Problem> {
+    let wanted = name(&wanted)?.to_owned();
+    let after = from.after;
+    let found = app
+        .read(move |connection| {
+            let Some(site) = site(connection, &wanted)? else {
+                return Ok(None);
+            };
+            let filter = JobFilter {
+                site: Some(&wanted),
+                ..JobFilter::default()
+            };
+            let jobs = jobs(connection, &filter, 10)?;
+            let runs = runs_of_site(connection, &wanted, after.as_deref(), TREND)?;
+            Ok(Some((site, runs, jobs)))
+        })
+        .await?;
+    let (site, runs, jobs) = found.ok_or_else(|| Problem::not_found("There is no such site."))?;
+    let times = times(&app);
+    let oldest =
+        (runs.len() > RUNS).then(|| format!("/sites/{}?after={}", site.name, runs[RUNS - 1].id));
+    let body = html! {
+        div id="state" data-live="" { (site_lead(&site, runs.first(), &times)) }
+        (run_buttons(&site, &caller))
+        section {
+            h2 { "Jobs" }
+            div id="jobs" data-live="" { (super::jobs::job_table("Newest jobs of this site", &jobs, &times)) }
+        }
+        section {
+            h2 { "Trends" }
+            div id="trends" data-live="" {
+                @if runs.is_empty() { p { "No run yet." } } @else { (trends(&runs, &times)) }
+            }
+        }
+        section {
+            h2 { "Runs" }
+            div id="runs" data-live="" { (run_table(&site, &runs[..runs.len().min(RUNS)], &times)) }
+            (more(oldest))
+        }
+    };
+    Ok(Page {
+        title: &site.name,
+        place: "/",
+    }
+    .answer(&app, &caller, &body))
+}
+
+fn site_lead(site: &Site, newest: Option<&Run>, times: &Times) -> Markup {
+    let headline = site.verdict.as_deref().unwrap_or("no run yet");
+    lead(
+        tone(site.verdict.as_deref()),
+        headline,
+        &html! {
+            p { (freshness(site, times)) }
+            @if let Some(run) = &site.current_run {
+                p {
+                    "Current is run " a href={ "/runs/" (run) } { (run) } " of " (times.maybe(site.current_since_utc)) ". "
+                    a href={ "/api/v1/sites/" (site.name) "/current/report/index.html" } { "Report" }
+                }
+            }
+            @if let Some(run) = newest.filter(|run| !run.valid) {
+                p { "The newest run, " a href={ "/runs/" (run.id) } { (run.id) } ", is not valid and did not become current:" }
+                (said(&super::parts::sentences(&run.reasons)))
+            }
+            p { "Inputs last compared: " (times.maybe(site.checked_utc)) "." }
+        },
+    )
+}
+
+fn run_buttons(site: &Site, caller: &Caller) -> Markup {
+    html! {
+        @if let Some(session) = &caller.session && caller.operates() {
+            form method="post" action={ "/sites/" (site.name) "/run" } class="actions" {
+                (form_token(&session.form_token))
+                label for="reason" { "Reason" }
+                input id="reason" name="reason" maxlength="200" autocomplete="off";
+                button type="submit" name="force" value="false" { "Bring up to date" }
+                button type="submit" name="force" value="true" { "Run every stage" }
+            }
+        }
+    }
+}
+
+fn run_table(site: &Site, runs: &[Run], times: &Times) -> Markup {
+    html! {
+        (table("Runs, the newest first", &["Run", "Published, UTC", "Verdict", "Moved", "Figures"], &html! {
+            @for run in runs {
+                tr {
+                    th scope="row" {
+                        a href={ "/runs/" (run.id) } { (run.id) }
+                        @if site.current_run.as_ref() == Some(&run.id) { " " small { "current" } }
+                        @if run.pinned { " " small { "pinned" } }
+                    }
+                    td { (times.at(run.published_utc)) }
+                    td { (verdict(Some(&run.verdict))) }
+                    td class="long" { (headline(run)) }
+                    td class="long" {
+                        @for (k, (name, value)) in figures(run).iter().enumerate() { @if k > 0 { "; " } (figure_name(name)) ": " (figure(*value)) }
+                    }
+                }
+            }
+        }))
+    }
+}
+
+/// What the buttons of a site send.
+#[derive(Debug, Deserialize)]
+pub(super) struct RunForm {
+    form_token: String,
+    #[serde(default)]
+    reason: String,
+    force: bool,
+}
+
+/// Asks for a job of a site.
+pub(super) async fn run_now(
+    Reader(caller): Reader,
+    State(app): State<Arc<App>>,
+    At(site): At<String>,
+    Filled(form): Filled<RunForm>,
+) -> Result<Response, Problem> {
+    let caller = operator(caller, &form.form_token)?;
+    let reason: String = form
+        .reason
+        .chars()
+        .filter(|c| !c.is_control())
+        .take(200)
+        .collect();
+    let wanted = Wanted {
+        sites: vec![name(&site)?.to_owned()],
+        force: form.force,
+        reason: if reason.is_empty() {
+            "asked on its page".to_owned()
+        } else {
+            reason
+        },
+    };
+    match run_site(&app, caller, wanted).await? {
+        Some(job) => Ok(Redirect::to(&format!("/jobs/{job}")).into_response()),
+        None => Err(Problem::new(
+            StatusCode::NOT_FOUND,
+            "There is no such site.",
+        )),
+    }
+}

@@ -1,0 +1,198 @@
+//! How a site's figures went over its runs, with the changes of kernels.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use maud::{Markup, html};
+use serde_json::Value;
+
+use super::parts::{Times, counted, figure, figure_name, sentences, table, verdict};
+use crate::{clock::utc_text, database::shown::Run};
+
+const WIDTH: f64 = 520.0;
+const HEIGHT: f64 = 190.0;
+const LEFT: f64 = 74.0;
+const RIGHT: f64 = 14.0;
+const TOP: f64 = 14.0;
+const BOTTOM: f64 = 30.0;
+
+/// What changed in the kernels from one run to the next.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub(super) struct KernelChange {
+    pub(super) changed: Vec<String>,
+    pub(super) added: Vec<String>,
+    pub(super) removed: Vec<String>,
+}
+
+impl KernelChange {
+    /// From the kernels of `before` to those of `after`.
+    pub(super) fn between(before: &Run, after: &Run) -> Self {
+        let (before, after) = (kernels(before), kernels(after));
+        let named = |set: &BTreeSet<&String>| set.iter().map(|name| (*name).clone()).collect();
+        let (old, new): (BTreeSet<_>, BTreeSet<_>) =
+            (before.keys().collect(), after.keys().collect());
+        let both = old
+            .intersection(&new)
+            .filter(|name| before[**name] != after[**name]);
+        Self {
+            changed: both.map(|name| (*name).clone()).collect(),
+            added: named(&new.difference(&old).copied().collect()),
+            removed: named(&old.difference(&new).copied().collect()),
+        }
+    }
+
+    /// In words; nothing where nothing changed.
+    pub(super) fn words(&self) -> Option<String> {
+        let parts = [
+            ("changed", &self.changed),
+            ("added", &self.added),
+            ("removed", &self.removed),
+        ];
+        let parts: Vec<String> = parts
+            .iter()
+            .filter(|(_, names)| !names.is_empty())
+            .map(|(what, names)| format!("{} {what}", names.join(", ")))
+            .collect();
+        (!parts.is_empty()).then(|| parts.join("; "))
+    }
+}
+
+/// Kernels of a run by name, with their hashes.
+fn kernels(run: &Run) -> BTreeMap<String, String> {
+    let text = |kernel: &Value, name: &str| Some(kernel.get(name)?.as_str()?.to_owned());
+    let all = run
+        .kernels
+        .as_array()
+        .map(Vec::as_slice)
+        .unwrap_or_default();
+    all.iter()
+        .filter_map(|kernel| Some((text(kernel, "name")?, text(kernel, "blake3")?)))
+        .collect()
+}
+
+/// Figures of a run by name.
+pub(super) fn figures(run: &Run) -> BTreeMap<String, f64> {
+    let all = run.figures.as_object().into_iter().flatten();
+    all.filter_map(|(name, value)| Some((name.clone(), value.as_f64()?)))
+        .collect()
+}
+
+/// Plots of all figures of `runs`, the newest first, and a table of the steps.
+pub(super) fn trends(runs: &[Run], times: &Times) -> Markup {
+    let oldest_first: Vec<&Run> = runs.iter().rev().collect();
+    let steps: Vec<Option<String>> = oldest_first
+        .iter()
+        .enumerate()
+        .map(|(k, run)| {
+            let before = k.checked_sub(1).map(|k| oldest_first[k])?;
+            KernelChange::between(before, run).words()
+        })
+        .collect();
+    let all: Vec<BTreeMap<String, f64>> = oldest_first.iter().map(|run| figures(run)).collect();
+    let names: BTreeSet<&String> = all.iter().flat_map(BTreeMap::keys).collect();
+    html! {
+        @if runs.len() < 2 { p { "Plots begin with the second run." } }
+        @else {
+            div class="plots" {
+                @for name in names {
+                    @let values: Vec<Option<f64>> = all.iter().map(|figures| figures.get(name).copied()).collect();
+                    (plot(name, &oldest_first, &values, &steps))
+                }
+            }
+        }
+        (table("Steps of the kernels and of the verdict", &["Run", "Published, UTC", "Verdict", "Kernels", "Moved"], &html! {
+            @for (k, run) in oldest_first.iter().enumerate().rev() {
+                @let other_verdict = k.checked_sub(1).is_some_and(|k| oldest_first[k].verdict != run.verdict);
+                @if k == 0 || other_verdict || steps[k].is_some() {
+                    tr {
+                        th scope="row" { a href={ "/runs/" (run.id) } { (run.id) } }
+                        td { (times.at(run.published_utc)) }
+                        td { (verdict(Some(&run.verdict))) }
+                        td class="long" { (steps[k].as_deref().unwrap_or(if k == 0 { "first run shown" } else { "as before" })) }
+                        td class="long" { (headline(run)) }
+                    }
+                }
+            }
+        }))
+    }
+}
+
+/// What moved, in one sentence.
+pub(super) fn headline(run: &Run) -> String {
+    let headline = run.moved.get("headline").and_then(Value::as_str);
+    headline.map_or_else(|| sentences(&run.moved).join(" "), str::to_owned)
+}
+
+fn plot(name: &str, runs: &[&Run], values: &[Option<f64>], steps: &[Option<String>]) -> Markup {
+    let known: Vec<f64> = values
+        .iter()
+        .flatten()
+        .copied()
+        .filter(|value| value.is_finite())
+        .collect();
+    let (Some(first), Some(last)) = (known.first(), known.last()) else {
+        return html! {};
+    };
+    let low = known.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = known.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    // A figure that stays the same is a line in the middle.
+    let margin = (0.08 * (high - low))
+        .max(1e-3 * high.abs())
+        .max(f64::MIN_POSITIVE);
+    let (floor, ceiling) = (low - margin, high + margin);
+    let x = |k: usize| LEFT + (k as f64 + 0.5) / runs.len() as f64 * (WIDTH - LEFT - RIGHT);
+    let y = |value: f64| TOP + (ceiling - value) / (ceiling - floor) * (HEIGHT - TOP - BOTTOM);
+    let points: Vec<(usize, f64)> = values
+        .iter()
+        .enumerate()
+        .filter_map(|(k, value)| Some((k, value.filter(|value| value.is_finite())?)))
+        .collect();
+    let path: Vec<String> = points
+        .iter()
+        .map(|(k, value)| format!("{:.1},{:.1}", x(*k), y(*value)))
+        .collect();
+    let title = figure_name(name);
+    html! {
+        figure {
+            h3 { (title) }
+            svg viewBox={ "0 0 " (WIDTH) " " (HEIGHT) } role="img" aria-label={ (title) ", from " (figure(*first)) " to " (figure(*last)) } {
+                rect x=(LEFT) y=(TOP) width=(WIDTH - LEFT - RIGHT) height=(HEIGHT - TOP - BOTTOM) fill="none" stroke="#E2E2E2" {}
+                @for value in [high, low] {
+                    @if (value - low).abs() > 0.0 || high - low <= 0.0 || value <= low {
+                        text x=(LEFT - 6.0) y=(format!("{:.1}", y(value) + 5.0)) text-anchor="end" font-size="15" fill="#222222" { (figure(value)) }
+                    }
+                }
+                @for (k, step) in steps.iter().enumerate() {
+                    @if let Some(words) = step {
+                        line x1=(format!("{:.1}", x(k))) x2=(format!("{:.1}", x(k))) y1=(TOP) y2=(HEIGHT - BOTTOM) stroke="#FF610D" stroke-dasharray="4 3" {
+                            title { (words) }
+                        }
+                    }
+                }
+                polyline points=(path.join(" ")) fill="none" stroke="#0E5A99" stroke-width="2" {}
+                @for (k, value) in &points {
+                    @let run = runs[*k];
+                    @let (across, down) = (x(*k), y(*value));
+                    @if run.valid {
+                        circle cx=(format!("{across:.1}")) cy=(format!("{down:.1}")) r="3.5" fill="#0E5A99" { title { (run.id) ": " (figure(*value)) } }
+                    } @else {
+                        path d=(format!("M{:.1} {:.1}l10 10m0 -10l-10 10", across - 5.0, down - 5.0)) stroke="#C10019" stroke-width="2.5" {
+                            title { (run.id) ": " (figure(*value)) ", not valid" }
+                        }
+                    }
+                }
+                text x=(LEFT) y=(HEIGHT - 8.0) font-size="15" fill="#222222" { (day(runs.first())) }
+                text x=(WIDTH - RIGHT) y=(HEIGHT - 8.0) text-anchor="end" font-size="15" fill="#222222" { (day(runs.last())) }
+            }
+            figcaption {
+                "From " (figure(*first)) " to " (figure(*last)) " over " (counted(points.len(), "run")) "."
+                @if steps.iter().any(Option::is_some) { " Broken lines: kernels changed." }
+                @if runs.iter().any(|run| !run.valid) { " Crosses: not valid." }
+            }
+        }
+    }
+}
+
+fn day(run: Option<&&Run>) -> String {
+    let text = run.map(|run| utc_text(run.published_utc.0));
+    text.unwrap_or_default().chars().take(10).collect()
+}

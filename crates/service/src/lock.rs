@@ -1,0 +1,171 @@
+//! One service at a time has a folder of state.
+
+use std::{
+    fs::{self, File, TryLockError},
+    io::{Seek as _, Write as _},
+    path::Path,
+};
+
+use serde::{Deserialize, Serialize};
+
+use super::clock::utc_text;
+use areograph_base::error::{Cause, IoError, Kind, Locate as _, Result};
+
+/// Name of the lock in the folder of the state.
+const LOCK: &str = "service.lock";
+
+/// Types of file systems on which neither locks nor the database can be trusted.
+const NETWORK: [(i64, &str); 5] = [
+    (0x6969, "NFS"),
+    (0x517b, "SMB"),
+    (0xff53_4d42, "CIFS"),
+    (0xfe53_4d42, "SMB2"),
+    (0x0002_3c37, "Coda"),
+];
+
+/// Held while a service runs; the system frees it when the process ends, however it ends.
+#[derive(Debug)]
+pub struct ServiceLock {
+    file: File,
+}
+
+/// Who holds the lock.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Owner {
+    /// Process.
+    pub pid: u32,
+    /// What runs: `serve`, `nightly` or another command.
+    pub command: String,
+    /// Address of its pages; empty without.
+    pub address: String,
+    /// When it began, milliseconds of UTC since 1970.
+    pub started_ms: i64,
+}
+
+#[derive(Debug, thiserror::Error)]
+enum LockError {
+    #[error("{} has been using this folder since {}", .0.words(), utc_text(.0.started_ms))]
+    Taken(Owner),
+    #[error("another service is using this folder")]
+    TakenByUnknown,
+    #[error("the folder is on a network file system ({0}), where the database cannot be trusted")]
+    Network(&'static str),
+}
+
+impl Cause for LockError {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::Taken(_) | Self::TakenByUnknown => Kind::Io,
+            Self::Network(_) => Kind::Configuration,
+        }
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::Taken(owner) if !owner.address.is_empty() => {
+                format!(
+                    "look at http://{}, or end that process first",
+                    owner.address
+                )
+            }
+            Self::Taken(_) | Self::TakenByUnknown => "end that process first".to_owned(),
+            Self::Network(_) => "give outputs.state a folder on a local disk".to_owned(),
+        }
+    }
+}
+
+impl Owner {
+    fn words(&self) -> String {
+        format!("areograph {} (process {})", self.command, self.pid)
+    }
+}
+
+impl ServiceLock {
+    /// Takes the lock of `folder`, which is made if need be, and says who has it now.
+    ///
+    /// # Errors
+    /// Another process holds it; the folder is on a network file system, or cannot be written.
+    pub fn take(folder: &Path, owner: &Owner) -> Result<Self> {
+        fs::create_dir_all(folder)
+            .map_err(IoError::on("create the folder"))
+            .in_file(folder)?;
+        if let Some(network) = network_file_system(folder) {
+            return Err(LockError::Network(network)).in_file(folder);
+        }
+        let path = folder.join(LOCK);
+        let file = File::options()
+            .create(true)
+            .truncate(false)
+            .read(true)
+            .write(true)
+            .open(&path)
+            .map_err(IoError::on("create"))
+            .in_file(&path)?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                let taken = owner_of(&path).map_or(LockError::TakenByUnknown, LockError::Taken);
+                return Err(taken).in_file(folder);
+            }
+            Err(TryLockError::Error(error)) => {
+                return Err(IoError::on("lock")(error)).in_file(&path);
+            }
+        }
+        let lock = Self { file };
+        lock.tell(owner)
+            .map_err(IoError::on("write"))
+            .in_file(&path)?;
+        Ok(lock)
+    }
+
+    /// Says who has the lock, for whoever meets it.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn tell(&self, owner: &Owner) -> std::io::Result<()> {
+        let mut file = &self.file;
+        file.set_len(0)?;
+        file.rewind()?;
+        serde_json::to_writer(file, owner)?;
+        file.flush()
+    }
+}
+
+fn owner_of(path: &Path) -> Option<Owner> {
+    serde_json::from_slice(&fs::read(path).ok()?).ok()
+}
+
+fn network_file_system(folder: &Path) -> Option<&'static str> {
+    let found = rustix::fs::statfs(folder).ok()?.f_type;
+    let network = NETWORK.iter().find(|(kind, _)| *kind == found);
+    network.map(|(_, name)| *name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_second_service_is_refused_and_told_where_the_first_is() {
+        let folder = tempfile::tempdir().unwrap();
+        let owner = Owner {
+            pid: 4711,
+            command: "serve".to_owned(),
+            address: "127.0.0.1:8470".to_owned(),
+            started_ms: 0,
+        };
+        let lock = ServiceLock::take(folder.path(), &owner).unwrap();
+        let refused = ServiceLock::take(folder.path(), &owner).unwrap_err();
+        assert_eq!(refused.kind(), Kind::Io);
+        let text = refused.to_string();
+        for told in [
+            "process 4711",
+            "1970-01-01T00:00:00",
+            "http://127.0.0.1:8470",
+        ] {
+            assert!(text.contains(told), "{text}");
+        }
+        drop(lock);
+        ServiceLock::take(folder.path(), &owner).unwrap();
+    }
+}

@@ -1,0 +1,154 @@
+//! What the engine and the HTTP service share.
+
+use std::{
+    path::PathBuf,
+    sync::{Arc, PoisonError, RwLock},
+};
+
+use rusqlite::{Connection, Transaction};
+use tokio::sync::{Notify, watch};
+use tokio_util::sync::CancellationToken;
+
+use super::{
+    clock::Clock,
+    database::{Database, Stored, newest_event},
+};
+use areograph_config::ServiceConfig;
+
+/// A running service, as every part of it sees it.
+#[derive(Debug)]
+pub struct Shared {
+    config: RwLock<Arc<ServiceConfig>>,
+    problem: RwLock<Option<String>>,
+    database: Database,
+    newest: watch::Sender<i64>,
+    /// What time it is.
+    pub clock: Clock,
+    /// The program that workers are started from: this one.
+    pub program: PathBuf,
+    /// The engine looks at once whether there is something to do.
+    pub wake: Notify,
+    /// The service ends: no job is taken, streams of events end.
+    pub ending: CancellationToken,
+}
+
+impl Shared {
+    /// A service that has just begun.
+    ///
+    /// # Errors
+    /// The database cannot be read.
+    pub fn new(
+        config: ServiceConfig,
+        database: Database,
+        clock: Clock,
+        program: PathBuf,
+    ) -> Stored<Self> {
+        let newest = database.read(newest_event)?;
+        Ok(Self {
+            config: RwLock::new(Arc::new(config)),
+            problem: RwLock::new(None),
+            database,
+            newest: watch::Sender::new(newest),
+            clock,
+            program,
+            wake: Notify::new(),
+            ending: CancellationToken::new(),
+        })
+    }
+
+    /// The configuration in force.
+    #[must_use]
+    pub fn config(&self) -> Arc<ServiceConfig> {
+        let config = self.config.read().unwrap_or_else(PoisonError::into_inner);
+        Arc::clone(&config)
+    }
+
+    /// Puts another configuration in force.
+    pub fn set_config(&self, config: ServiceConfig) {
+        *self.config.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(config);
+        self.set_problem(None);
+    }
+
+    /// Why the configuration in force is not the one of the file.
+    #[must_use]
+    pub fn problem(&self) -> Option<String> {
+        let problem = self.problem.read().unwrap_or_else(PoisonError::into_inner);
+        problem.clone()
+    }
+
+    /// Notes why the configuration of the file was not taken.
+    pub fn set_problem(&self, problem: Option<String>) {
+        *self.problem.write().unwrap_or_else(PoisonError::into_inner) = problem;
+    }
+
+    /// The time, milliseconds of UTC since 1970.
+    #[must_use]
+    pub fn now_ms(&self) -> i64 {
+        self.clock.now_ms()
+    }
+
+    /// The database; what writes events goes through [`Self::write`].
+    #[must_use]
+    pub fn database(&self) -> &Database {
+        &self.database
+    }
+
+    /// Does `look` on one state of the database.
+    ///
+    /// # Errors
+    /// What `look` gives, or SQLite's own.
+    pub fn read<T>(&self, look: impl FnOnce(&Connection) -> Stored<T>) -> Stored<T> {
+        self.database.read(look)
+    }
+
+    /// Does `work` as one transaction and tells those who follow the events.
+    ///
+    /// # Errors
+    /// What `work` gives, and then nothing is written; or SQLite's own.
+    pub fn write<T>(&self, work: impl FnOnce(&Transaction<'_>) -> Stored<T>) -> Stored<T> {
+        let (done, newest) = self.database.write(|transaction| {
+            let done = work(transaction)?;
+            Ok((done, newest_event(transaction)?))
+        })?;
+        self.newest.send_if_modified(|known| {
+            let newer = newest > *known;
+            *known = newest.max(*known);
+            newer
+        });
+        Ok(done)
+    }
+
+    /// Follows the number of the newest event.
+    #[must_use]
+    pub fn follow(&self) -> watch::Receiver<i64> {
+        self.newest.subscribe()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::database::{About, append};
+    use areograph_config::parse_service;
+
+    #[test]
+    fn whoever_follows_hears_of_an_event_and_of_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let text = "[inputs]\nsites = [\".\"]\nkernels = [\".\"]\ndata = [\".\"]\n";
+        let config = parse_service(text, &folder.path().join("areograph.toml")).unwrap();
+        let database = Database::open(folder.path()).unwrap();
+        let clock = Clock::set_to(7);
+        let shared = Shared::new(config.service, database, clock, PathBuf::new()).unwrap();
+        let mut newest = shared.follow();
+        shared
+            .write(|transaction| Ok(transaction.execute("INSERT INTO fact VALUES ('a', 'b')", [])?))
+            .unwrap();
+        assert!(!newest.has_changed().unwrap());
+        let note = |transaction: &Transaction<'_>| {
+            append(transaction, 7, "config", About::default(), &().into())
+        };
+        let seq = shared.write(note).unwrap();
+        assert!(newest.has_changed().unwrap());
+        assert_eq!(*newest.borrow_and_update(), seq);
+    }
+}

@@ -1,0 +1,207 @@
+//! A service begins: configuration, lock, database, all checked; and takes another configuration while it runs.
+
+use std::{net::SocketAddr, path::Path, process};
+
+use rusqlite::{Connection, Transaction};
+use serde_json::json;
+
+use super::{
+    clock::Clock,
+    database::{About, Database, Stored, append, files::roots, service::put_service},
+    engine::{folders::folders, schedule::Schedule},
+    lock::{Owner, ServiceLock},
+    shared::Shared,
+    worker::process::ProcessIdentity,
+};
+use areograph_base::error::{Cause, IoError, Kind, Locate as _, Result};
+use areograph_config::{ServiceConfig, load_service};
+
+/// A service that has begun; its folder of state is its own as long as this lives.
+#[derive(Debug)]
+pub struct Started {
+    /// The service.
+    pub shared: Shared,
+    /// Its lock.
+    pub lock: ServiceLock,
+    /// Who it is.
+    pub owner: Owner,
+}
+
+/// An address, or a change, that a service does not take.
+#[derive(Debug, thiserror::Error)]
+enum Refused {
+    #[error("{0} is no address of this machine alone")]
+    Public(SocketAddr),
+    #[error("{0} changed")]
+    NeedsRestart(&'static str),
+    #[error("inputs.{0}: {1} is no folder that is there, and this service has never seen it")]
+    NeverSeen(&'static str, String),
+}
+
+impl Cause for Refused {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::Public(_) => {
+                "listen on 127.0.0.1, or set http.behind_tls_proxy = \"yes\" behind a proxy that encrypts"
+            }
+            Self::NeedsRestart(_) => "restart the service, or put the former value back",
+            Self::NeverSeen(..) => {
+                "correct the path, or mount the folder; one that was seen may be away later"
+            }
+        }
+        .to_owned()
+    }
+}
+
+/// Reads and checks the configuration `file`, with another address if one is given.
+///
+/// # Errors
+/// Everything that is wrong with it.
+pub fn configuration(
+    file: &Path,
+    listen: Option<SocketAddr>,
+    now_ms: i64,
+) -> Result<ServiceConfig> {
+    // Paths of tasks must not depend on the working folder.
+    let file = std::path::absolute(file)
+        .map_err(IoError::on("resolve"))
+        .in_file(file)?;
+    let loaded = load_service(&file)?;
+    for warning in loaded.warnings {
+        tracing::warn!("{warning}");
+    }
+    let mut config = loaded.service;
+    Schedule::of(&config.schedule, now_ms).in_file(&file)?;
+    if let Some(listen) = listen {
+        if !listen.ip().is_loopback() && !config.http.behind_tls_proxy {
+            return Err(Refused::Public(listen).into());
+        }
+        config.http.listen = listen;
+    }
+    Ok(config)
+}
+
+/// Begins a service: `command` is what others are told that runs.
+///
+/// # Errors
+/// Another service runs on the same folder of state; the database is damaged or newer; the disk's refusal.
+pub fn start(config: ServiceConfig, command: &str, clock: Clock) -> Result<Started> {
+    let state = config.outputs.state.clone();
+    let owner = Owner {
+        pid: process::id(),
+        command: command.to_owned(),
+        address: String::new(),
+        started_ms: clock.now_ms(),
+    };
+    let lock = ServiceLock::take(&state, &owner)?;
+    for folder in [&config.outputs.products, &state] {
+        std::fs::create_dir_all(folder)
+            .map_err(IoError::on("create the folder"))
+            .in_file(folder)?;
+    }
+    let database = Database::open(&state)?;
+    database
+        .read(|connection| seen(connection, &config))
+        .in_file(&state)??;
+    let program = std::env::current_exe()
+        .map_err(IoError::on("find"))
+        .in_file("areograph")?;
+    let shared = Shared::new(config, database, clock, program).in_file(&state)?;
+    Ok(Started {
+        shared,
+        lock,
+        owner,
+    })
+}
+
+/// Every folder of inputs was seen by the service, or is there. A known one is not looked at: its mount may be dead.
+fn seen(connection: &Connection, config: &ServiceConfig) -> Stored<Result<()>> {
+    let known = roots(connection)?;
+    let unseen = folders(&config.inputs)?.into_iter().find(|folder| {
+        known.iter().all(|root| root.path != folder.path) && !Path::new(&folder.path).is_dir()
+    });
+    Ok(match unseen {
+        None => Ok(()),
+        Some(folder) => {
+            Err(Refused::NeverSeen(folder.kind.name(), folder.path)).in_file(&config.file)
+        }
+    })
+}
+
+/// Says where the service listens: in its lock and in the database.
+///
+/// # Errors
+/// The disk's refusal.
+pub fn tell_address(
+    lock: &ServiceLock,
+    owner: &Owner,
+    shared: &Shared,
+    address: &str,
+) -> Result<()> {
+    let state = &shared.config().outputs.state;
+    let owner = Owner {
+        address: address.to_owned(),
+        ..owner.clone()
+    };
+    lock.tell(&owner)
+        .map_err(IoError::on("write"))
+        .in_file(state)?;
+    if let Some(process) = ProcessIdentity::of(owner.pid) {
+        let noted = shared
+            .write(|transaction| put_service(transaction, &process, address, shared.now_ms()));
+        noted.in_file(state)?;
+    }
+    Ok(())
+}
+
+/// Takes the configuration of the file again. One that is not valid changes nothing, and is told on the pages.
+///
+/// # Errors
+/// The database cannot be written.
+pub fn reload(shared: &Shared, listen: Option<SocketAddr>) -> Stored<()> {
+    let before = shared.config();
+    let now_ms = shared.now_ms();
+    let loaded = configuration(&before.file, listen, now_ms).and_then(|after| {
+        unchangeable(&before, &after)?;
+        shared
+            .read(|connection| seen(connection, &after))
+            .in_file(&before.file)??;
+        Ok(after)
+    });
+    let text = match loaded {
+        Ok(after) => {
+            shared.set_config(after);
+            shared.wake.notify_one();
+            None
+        }
+        Err(failure) => {
+            let text = failure.to_string();
+            shared.set_problem(Some(text.clone()));
+            Some(text)
+        }
+    };
+    match &text {
+        None => tracing::info!("{} is in force", before.file.display()),
+        Some(text) => tracing::error!("the configuration in force stays: {text}"),
+    }
+    shared.write(|transaction: &Transaction<'_>| {
+        let data = json!({ "taken": text.is_none(), "text": text });
+        append(transaction, now_ms, "config", About::default(), &data).map(|_| ())
+    })
+}
+
+/// What cannot change while the service runs.
+fn unchangeable(before: &ServiceConfig, after: &ServiceConfig) -> Result<()> {
+    let what = if before.outputs != after.outputs {
+        "a folder of outputs"
+    } else if before.http != after.http {
+        "the table http"
+    } else {
+        return Ok(());
+    };
+    Err(Refused::NeedsRestart(what)).in_file(&after.file)
+}

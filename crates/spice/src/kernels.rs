@@ -1,0 +1,293 @@
+//! Kernel files: what they are, by their content, and in which order they are loaded.
+
+use std::{
+    fs::{self, File},
+    io::Read,
+    path::{Path, PathBuf},
+};
+
+use serde::Serialize;
+
+use super::{daf, error::SpiceError, ffi, role::KernelRole, text_kernel};
+use areograph_base::error::{IoError, Locate, Result};
+use areograph_store::files::{InputFiles, file_name, hash_file};
+
+/// Largest text kernel that is read, bytes; the archive's largest is below 2 MB.
+const TEXT_SIZE_MAX: u64 = 64 << 20;
+/// What a file should have been, for messages.
+const EXPECTED: &str =
+    "a binary SPK, CK or PCK (DAF/...) or a text kernel with a \\begindata block";
+
+/// A kernel file as it was when it was chosen.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Kernel {
+    /// Path as given or found.
+    pub path: PathBuf,
+    /// What it is for.
+    pub role: KernelRole,
+    /// Size.
+    pub bytes: u64,
+    /// BLAKE3 of its content, hexadecimal.
+    pub blake3: String,
+}
+
+impl Kernel {
+    /// Looks into a file, hashes it and checks the words of a binary one, unless this content passed the check before.
+    ///
+    /// # Errors
+    /// [`IoError`]; [`SpiceError::NotAKernel`]; [`SpiceError::DamagedKernel`].
+    pub fn inspect(path: &Path, files: &InputFiles) -> Result<Self> {
+        ffi::c_path(path).in_file(path)?;
+        files.admit(path)?;
+        let role = role_of(path)?;
+        let file = files.hash(path)?;
+        let binary = first_bytes(path)?.starts_with(b"DAF/");
+        if binary && !files.has_passed(&file.blake3, daf::CHECK) {
+            daf::check_contents(path, role)?;
+            // What was checked is what was hashed.
+            files.verify(path)?;
+            files.note_passed(&file.blake3, daf::CHECK);
+        }
+        Ok(Self {
+            path: file.path,
+            role,
+            bytes: file.bytes,
+            blake3: file.blake3,
+        })
+    }
+
+    /// Name of the file without its folder.
+    #[must_use]
+    pub fn file_name(&self) -> String {
+        file_name(&self.path)
+    }
+}
+
+/// Kernels in load order (later ones win), and why each is there.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct KernelSet {
+    pub(super) kernels: Vec<Kernel>,
+    pub(super) explanation: Vec<String>,
+}
+
+impl KernelSet {
+    /// These files in this order; of files with the same content the last one is loaded, as SPICE lets
+    /// the last one win.
+    ///
+    /// # Errors
+    /// [`IoError`] for a file that cannot be read, [`SpiceError::NotAKernel`] for a file that is none
+    /// (its role is found by content, never by name), [`SpiceError::DamagedKernel`] for a truncated one.
+    pub fn from_files(files: &[PathBuf]) -> Result<Self> {
+        Self::from_files_of(&InputFiles::default(), files)
+    }
+
+    /// As [`Self::from_files`], with the hashes that a run has of its input files.
+    ///
+    /// # Errors
+    /// Those of [`Self::from_files`]; a file that is no longer what the run has read.
+    pub fn from_files_of(run: &InputFiles, files: &[PathBuf]) -> Result<Self> {
+        let mut set = Self::default();
+        for path in files {
+            set.add(path, "listed", run)?;
+        }
+        Ok(set)
+    }
+
+    /// The same kernels and behind them one that was looked into.
+    #[must_use]
+    pub fn with(mut self, kernel: Kernel) -> Self {
+        self.kernels.push(kernel);
+        self
+    }
+
+    /// The same kernels and behind them `files`, which therefore win.
+    ///
+    /// # Errors
+    /// As [`Self::from_files`].
+    pub fn followed_by(&self, files: &[PathBuf]) -> Result<Self> {
+        let mut set = self.clone();
+        for path in files {
+            set.add(path, "follows the listed ones", &InputFiles::default())?;
+        }
+        Ok(set)
+    }
+
+    /// Appends a file; an earlier one of the same content gives up its place, since later files win.
+    pub(super) fn add(&mut self, path: &Path, reason: &str, files: &InputFiles) -> Result<()> {
+        let kernel = Kernel::inspect(path, files)?;
+        if kernel.role == KernelRole::Meta {
+            let error = SpiceError::NotAKernel {
+                found: "a metakernel".to_owned(),
+                expected: "a kernel; a metakernel stands alone and lists no other",
+            };
+            return Err(error).in_file(path);
+        }
+        let name = kernel.file_name();
+        self.explanation.push(format!("{name}: {reason}"));
+        let same = |held: &Kernel| held.blake3 == kernel.blake3;
+        if let Some(index) = self.kernels.iter().position(same) {
+            let earlier = self.kernels.remove(index).file_name();
+            self.explanation.push(format!(
+                "{earlier}: not loaded at its earlier place, same content as {name}"
+            ));
+        }
+        self.kernels.push(kernel);
+        Ok(())
+    }
+
+    /// The kernels in load order.
+    #[must_use]
+    pub fn kernels(&self) -> &[Kernel] {
+        &self.kernels
+    }
+
+    /// The kernels of some roles, in the same order.
+    #[must_use]
+    pub fn of_roles(&self, required: impl Fn(KernelRole) -> bool) -> Self {
+        let kernels = self.kernels.iter().filter(|kernel| required(kernel.role));
+        Self {
+            kernels: kernels.cloned().collect(),
+            explanation: self.explanation.clone(),
+        }
+    }
+
+    /// Why each kernel was chosen or left out, one line each.
+    #[must_use]
+    pub fn explanation(&self) -> &[String] {
+        &self.explanation
+    }
+
+    /// What of the explanation the list of kernels does not say itself: all but that one was listed.
+    pub fn notes(&self) -> impl Iterator<Item = &String> {
+        let plain = |line: &str| {
+            let mut kernels = self.kernels.iter();
+            kernels.any(|kernel| {
+                let reason = line.strip_prefix(&kernel.file_name());
+                reason.is_some_and(|reason| reason.starts_with(": listed"))
+            })
+        };
+        self.explanation.iter().filter(move |line| !plain(line))
+    }
+
+    /// Hashes every kernel again, after use.
+    ///
+    /// # Errors
+    /// [`SpiceError::KernelChanged`] naming the file that is no longer what was loaded.
+    pub fn verify_unchanged(&self) -> Result<()> {
+        for kernel in &self.kernels {
+            let (is, _) = hash_file(&kernel.path)?;
+            if is != kernel.blake3 {
+                let was = kernel.blake3.clone();
+                return Err(SpiceError::KernelChanged { was, is }).in_file(&kernel.path);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What a file is, by its content.
+pub(super) fn role_of(path: &Path) -> Result<KernelRole> {
+    let start = first_bytes(path)?;
+    let role = match start.as_slice() {
+        [] => return not_a_kernel(path, "an empty file"),
+        bytes if bytes.starts_with(b"DAF/SPK") => KernelRole::Spk,
+        bytes if bytes.starts_with(b"DAF/CK") => KernelRole::Ck,
+        bytes if bytes.starts_with(b"DAF/PCK") => KernelRole::Pck,
+        bytes if bytes.starts_with(b"DAFETF") || bytes.starts_with(b"DASETF") => {
+            return not_a_kernel(path, "a transfer file (make it binary with NAIF's tobin)");
+        }
+        bytes if bytes.starts_with(b"NAIF/DA") || bytes.starts_with(b"DAS/") => {
+            return not_a_kernel(path, "a binary NAIF file of another kind");
+        }
+        _ => return text_role(path),
+    };
+    daf::segments(path).map(|_| role)
+}
+
+fn not_a_kernel<T>(path: &Path, found: &str) -> Result<T> {
+    Err(SpiceError::NotAKernel {
+        found: found.to_owned(),
+        expected: EXPECTED,
+    })
+    .in_file(path)
+}
+
+/// At most eight bytes from the start of a regular file.
+fn first_bytes(path: &Path) -> Result<Vec<u8>> {
+    let metadata = fs::metadata(path)
+        .map_err(IoError::on("open kernel"))
+        .in_file(path)?;
+    if !metadata.is_file() {
+        return not_a_kernel(path, "no regular file");
+    }
+    let mut start = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(8).read_to_end(&mut start))
+        .map_err(IoError::on("open kernel"))
+        .in_file(path)?;
+    Ok(start)
+}
+
+/// The text of a text kernel.
+///
+/// # Errors
+/// [`SpiceError::NotAKernel`] for other files.
+pub(super) fn read_text(path: &Path) -> Result<String> {
+    let mut bytes = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(TEXT_SIZE_MAX + 1).read_to_end(&mut bytes))
+        .map_err(IoError::on("read kernel"))
+        .in_file(path)?;
+    if bytes.contains(&0) {
+        return not_a_kernel(path, "a binary file of another kind");
+    }
+    if bytes.len() as u64 > TEXT_SIZE_MAX {
+        return not_a_kernel(path, "too long for a text kernel");
+    }
+    let text = String::from_utf8_lossy(&bytes).into_owned();
+    if text.lines().any(|line| line.trim() == "\\begindata") {
+        return Ok(text);
+    }
+    let found = if text.trim_start().starts_with('<') {
+        "a web page"
+    } else {
+        "a text without a \\begindata block"
+    };
+    not_a_kernel(path, found)
+}
+
+fn text_role(path: &Path) -> Result<KernelRole> {
+    let text = read_text(path)?;
+    let assignments = text_kernel::assignments(&text).in_file(path)?;
+    let defines = |part: &str| assignments.iter().any(|found| found.name.starts_with(part));
+    // Whatever the header says: CSPICE loads what such a variable lists, unseen and unhashed.
+    if defines("KERNELS_TO_LOAD") {
+        return Ok(KernelRole::Meta);
+    }
+    let header = text.lines().next().unwrap_or_default().trim();
+    let by_header = match header {
+        "KPL/LSK" => Some(KernelRole::Lsk),
+        "KPL/SCLK" => Some(KernelRole::Sclk),
+        "KPL/PCK" => Some(KernelRole::Pck),
+        "KPL/FK" => Some(KernelRole::Fk),
+        "KPL/IK" => Some(KernelRole::Ik),
+        "KPL/MK" => Some(KernelRole::Meta),
+        _ => None,
+    };
+    if let Some(role) = by_header {
+        return Ok(role);
+    }
+    let by_variable = [
+        ("DELTET/", KernelRole::Lsk),
+        ("SCLK", KernelRole::Sclk),
+        ("INS-", KernelRole::Ik),
+        ("FRAME_", KernelRole::Fk),
+        ("TKFRAME_", KernelRole::Fk),
+        ("BODY", KernelRole::Pck),
+    ];
+    let role = by_variable.into_iter().find(|(part, _)| defines(part));
+    role.map_or_else(
+        || not_a_kernel(path, "a text kernel of unknown kind"),
+        |(_, role)| Ok(role),
+    )
+}

@@ -1,0 +1,106 @@
+//! What times and geometry need from text kernels, and how its absence is told.
+
+use std::borrow::Cow;
+
+use super::{
+    error::SpiceError,
+    kernels::{Kernel, KernelSet, read_text},
+    role::KernelRole,
+    text_kernel::{self, values_of},
+};
+use areograph_base::{constants::Spacecraft, instruments::Instrument};
+
+/// Something that one text kernel of a set must define.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Need {
+    /// A variable by which it is recognised.
+    pub(super) variable: Cow<'static, str>,
+    /// What it is.
+    pub(super) what: Cow<'static, str>,
+    /// The kernel that usually holds it.
+    pub(super) kernel: Cow<'static, str>,
+    /// A file of the mission's archive that holds it.
+    pub(super) example: Cow<'static, str>,
+}
+
+pub(super) const LEAP_SECONDS: Need = Need {
+    variable: Cow::Borrowed("DELTET/DELTA_AT"),
+    what: Cow::Borrowed("leap seconds"),
+    kernel: Cow::Borrowed("leap-second kernel (.tls)"),
+    example: Cow::Borrowed("naif0012.tls"),
+};
+/// The clock of a spacecraft.
+pub(super) fn clock(of: &'static Spacecraft) -> Need {
+    Need {
+        variable: format!("SCLK_DATA_TYPE_{}", of.naif.unsigned_abs()).into(),
+        what: format!("the {} clock", of.name).into(),
+        kernel: format!("spacecraft clock kernel of {} (.tsc)", of.name).into(),
+        example: Cow::Borrowed(&of.clock_kernel),
+    }
+}
+pub(super) const MARS: Need = Need {
+    variable: Cow::Borrowed("BODY499_PM"),
+    what: Cow::Borrowed("the rotation of Mars"),
+    kernel: Cow::Borrowed("planetary constants kernel (.tpc)"),
+    example: Cow::Borrowed("pck00010.tpc"),
+};
+/// The frame of the bus of a spacecraft.
+pub(super) fn bus_frame(of: &'static Spacecraft) -> Need {
+    Need {
+        variable: format!("FRAME_{}_NAME", of.bus).into(),
+        what: format!("the frame of the {} bus", of.name).into(),
+        kernel: format!(
+            "kernel that defines the frame {} (.tsc or .tf)",
+            of.bus_frame
+        )
+        .into(),
+        example: Cow::Borrowed(&of.frame_kernel),
+    }
+}
+/// The frame of a camera.
+pub(super) fn camera_frame(instrument: &Instrument) -> Need {
+    let naif = &instrument.naif;
+    Need {
+        variable: format!("FRAME_{}_NAME", naif.frame_id).into(),
+        what: format!("the frame of the {} camera", instrument.name).into(),
+        kernel: if naif.frame_id == naif.instrument {
+            format!("instrument kernel of {} (.ti)", instrument.name).into()
+        } else {
+            format!("kernel that defines the frame {} (.tf or .ti)", naif.frame).into()
+        },
+        example: instrument.naif.kernel.clone().into(),
+    }
+}
+
+/// What clock strings and attitude need.
+pub(super) fn clocks(of: &'static Spacecraft) -> [Need; 2] {
+    [LEAP_SECONDS, clock(of)]
+}
+
+/// An error of CSPICE, or the kernel whose absence explains it: the first of `needs` that no text
+/// kernel of `set` defines.
+pub(super) fn explain(set: &KernelSet, error: SpiceError, needs: &[Need]) -> SpiceError {
+    let texts = set.kernels().iter().filter(|kernel| {
+        !matches!(
+            kernel.role,
+            KernelRole::Spk | KernelRole::Ck | KernelRole::Meta
+        )
+    });
+    // Binary planetary constants are no text, and define none of these.
+    let defined: Vec<_> = texts
+        .filter_map(|kernel| text_kernel::assignments(&read_text(&kernel.path).ok()?).ok())
+        .collect();
+    let missing = needs.iter().find(|need| {
+        let defines = |text| !values_of(text, &need.variable).is_empty();
+        !defined.iter().any(|text| defines(text))
+    });
+    match missing {
+        None => error,
+        Some(need) => SpiceError::MissingText {
+            kernel: need.kernel.clone().into_owned(),
+            variable: need.variable.clone().into_owned(),
+            example: need.example.clone().into_owned(),
+            set: set.kernels().iter().map(Kernel::file_name).collect(),
+        },
+    }
+}

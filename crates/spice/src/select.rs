@@ -1,0 +1,455 @@
+//! Choosing kernels from a folder, with a reason for each.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::LazyLock,
+};
+
+use super::{
+    coverage::{RequiredCoverage, interval_of},
+    daf::{self, Segment},
+    error::SpiceError,
+    kernels::{KernelSet, read_text, role_of},
+    needs::{LEAP_SECONDS, MARS, Need, bus_frame, camera_frame, clock},
+    role::KernelRole,
+    session::Session,
+    text_kernel::{self, Assignment, values_of},
+};
+use areograph_base::{
+    body::MARS_IAU2000,
+    constants::SPACECRAFT,
+    error::{Error, IoError, Kind, Locate, Result},
+    instruments::Instrument,
+    kernel_source::{CkQuality, KernelSelection},
+    time::Intervals,
+};
+use areograph_store::files::{InputFiles, file_name};
+
+/// Deepest folder below the root that is searched.
+const DEPTH_MAX: usize = 16;
+/// Most files that are looked into.
+const FILES_MAX: usize = 100_000;
+/// What time tagging and geometry need from text kernels, but for the frame of the camera.
+static NEEDS: LazyLock<[Need; 4]> = LazyLock::new(|| {
+    [
+        LEAP_SECONDS,
+        clock(&SPACECRAFT),
+        MARS,
+        bus_frame(&SPACECRAFT),
+    ]
+});
+/// Orbit solutions that mark their files by name; a file without a mark is `nav`.
+const MARKED_FAMILIES: [&str; 2] = ["gsfc", "ipng"];
+
+/// Files of a folder by what they hold.
+#[derive(Default)]
+struct Found {
+    texts: Vec<(PathBuf, Vec<Assignment>)>,
+    ephemerides: Vec<(PathBuf, Vec<Segment>)>,
+    attitudes: Vec<PathBuf>,
+    notes: Vec<String>,
+}
+
+impl KernelSet {
+    /// Chooses from a folder: the latest text kernels (pinned ones win), planetary ephemerides, the
+    /// chosen orbit solution, and attitudes from the worst quality to the best, so that the best wins.
+    ///
+    /// * `cameras` – cameras whose frames the text kernels may define, one of them at least
+    /// * `required` – instants that ephemerides and attitudes must touch; without any, only text
+    ///   kernels are chosen, which is enough to tag times
+    ///
+    /// # Errors
+    /// [`SpiceError::NothingToSelect`] when a needed text kernel or the orbit solution is missing;
+    /// [`IoError`] when the folder cannot be read.
+    pub fn select(
+        selection: &KernelSelection,
+        cameras: &[Instrument],
+        required: &RequiredCoverage,
+    ) -> Result<Self> {
+        Self::select_of(&InputFiles::default(), selection, cameras, required)
+    }
+
+    /// As [`Self::select`], with the hashes that a run has of its input files.
+    ///
+    /// # Errors
+    /// Those of [`Self::select`]; a file that is no longer what the run has read.
+    pub fn select_of(
+        run: &InputFiles,
+        selection: &KernelSelection,
+        cameras: &[Instrument],
+        required: &RequiredCoverage,
+    ) -> Result<Self> {
+        let found = Found::in_folder(&selection.root, run)?;
+        let mut set = Selected {
+            set: Self::default(),
+            run,
+        };
+        select_texts(selection, cameras, &found.texts, &mut set).in_file(&selection.root)?;
+        if *required != RequiredCoverage::default() {
+            select_ephemerides(selection, &found.ephemerides, &required.positions, &mut set)
+                .in_file(&selection.root)?;
+            select_attitudes(selection, &found.attitudes, &required.attitudes, &mut set)?;
+        }
+        set.set.explanation.extend(found.notes);
+        Ok(set.set)
+    }
+}
+
+/// The kernels chosen so far, and the hashes that the run has.
+struct Selected<'a> {
+    set: KernelSet,
+    run: &'a InputFiles,
+}
+
+impl Selected<'_> {
+    fn add(&mut self, path: &Path, reason: &str) -> Result<()> {
+        self.set.add(path, reason, self.run)
+    }
+}
+
+impl Found {
+    fn in_folder(root: &Path, run: &InputFiles) -> Result<Self> {
+        let mut found = Self::default();
+        for path in files_below(root)? {
+            run.admit(&path)?;
+            let role = match role_of(&path) {
+                Ok(role) => role,
+                Err(failure) if failure.kind() == Kind::Io => return Err(failure),
+                Err(failure) => {
+                    found.leave_out(&path, &failure);
+                    continue;
+                }
+            };
+            match role {
+                KernelRole::Spk => {
+                    let segments = daf::segments(&path)?;
+                    found.ephemerides.push((path, segments));
+                }
+                KernelRole::Ck => found.attitudes.push(path),
+                KernelRole::Meta => {
+                    let note = format!("{}: not used, a metakernel", file_name(&path));
+                    found.notes.push(note);
+                }
+                _ => match read_text(&path).and_then(|text| Ok(text_kernel::assignments(&text)?)) {
+                    Ok(assignments) => found.texts.push((path, assignments)),
+                    Err(failure) => found.leave_out(&path, &failure),
+                },
+            }
+        }
+        Ok(found)
+    }
+
+    fn leave_out(&mut self, path: &Path, failure: &Error) {
+        let note = format!("{}: not used, {}", file_name(path), failure.cause);
+        self.notes.push(note);
+    }
+}
+
+/// All regular files below `root`, sorted; links to folders are not followed.
+fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    let mut folders = vec![(root.to_owned(), 0)];
+    while let Some((folder, depth)) = folders.pop() {
+        let entries = fs::read_dir(&folder)
+            .map_err(IoError::on("list folder"))
+            .in_file(&folder)?;
+        for entry in entries {
+            let entry = entry.map_err(IoError::on("list folder")).in_file(&folder)?;
+            let kind = entry
+                .file_type()
+                .map_err(IoError::on("list folder"))
+                .in_file(entry.path())?;
+            if kind.is_dir() && depth < DEPTH_MAX {
+                folders.push((entry.path(), depth + 1));
+            } else if entry.path().is_file() {
+                files.push(entry.path());
+            }
+            if files.len() > FILES_MAX {
+                let what = format!("could be found among more than {FILES_MAX} files");
+                return Err(SpiceError::NothingToSelect { what }).in_file(root);
+            }
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+fn defines(assignments: &[Assignment], variable: &str) -> bool {
+    !values_of(assignments, variable).is_empty()
+}
+
+/// What all images need, and the frames of those cameras that `texts` know: one at least.
+fn needs(texts: &[(PathBuf, Vec<Assignment>)], cameras: &[Instrument]) -> Vec<Need> {
+    let cameras: Vec<Need> = cameras.iter().map(camera_frame).collect();
+    let known = |need: &&Need| {
+        texts
+            .iter()
+            .any(|(_, assignments)| defines(assignments, &need.variable))
+    };
+    let known_cameras: Vec<Need> = cameras.iter().filter(known).cloned().collect();
+    let cameras = if known_cameras.is_empty() {
+        cameras.into_iter().take(1).collect()
+    } else {
+        known_cameras
+    };
+    NEEDS.iter().cloned().chain(cameras).collect()
+}
+
+/// For each need the pinned kernel that defines it, or the latest one.
+fn select_texts(
+    selection: &KernelSelection,
+    cameras: &[Instrument],
+    texts: &[(PathBuf, Vec<Assignment>)],
+    set: &mut Selected<'_>,
+) -> Result<()> {
+    let pinned = |path: &Path| selection.pinned.iter().any(|name| *name == file_name(path));
+    for name in &selection.pinned {
+        if !texts.iter().any(|(path, _)| file_name(path) == *name) {
+            let what = format!("is the text kernel {name}, which the configuration pins");
+            return Err(SpiceError::NothingToSelect { what }.into());
+        }
+    }
+    let mut chosen: Vec<&Path> = Vec::new();
+    for Need { variable, what, .. } in needs(texts, cameras) {
+        let mut candidates: Vec<&(PathBuf, Vec<Assignment>)> = texts
+            .iter()
+            .filter(|(path, assignments)| {
+                defines(assignments, &variable)
+                    && (pinned(path) || mars_fits(&variable, assignments))
+            })
+            .collect();
+        candidates.sort_by_key(|(path, _)| version_of(path));
+        let Some((best, _)) = candidates.last() else {
+            let what = format!("defines {what} ({variable})");
+            return Err(SpiceError::NothingToSelect { what }.into());
+        };
+        // One file may serve two needs: the clock kernel of MGS also defines its bus frame.
+        let served = candidates
+            .iter()
+            .any(|(path, _)| pinned(path) || chosen.contains(&path.as_path()));
+        if !served {
+            let reason = format!("latest of {} with {what}", candidates.len());
+            set.add(best, &reason)?;
+            chosen.push(best);
+        }
+    }
+    // Last, so that a pinned file wins whatever else defines the same variables.
+    for name in &selection.pinned {
+        for (path, _) in texts.iter().filter(|(path, _)| file_name(path) == *name) {
+            set.add(path, "pinned")?;
+        }
+    }
+    Ok(())
+}
+
+/// Whether planetary constants have the Mars of IAU 2000, the frame of every product.
+fn mars_fits(variable: &str, assignments: &[Assignment]) -> bool {
+    variable != MARS.variable
+        || values_of(assignments, variable)
+            .first()
+            .and_then(|value| value.number())
+            .is_some_and(|meridian_deg| (meridian_deg - MARS_IAU2000.meridian_deg).abs() < 1e-6)
+}
+
+/// Ephemerides without MGS, then those of MGS in the chosen orbit solution.
+fn select_ephemerides(
+    selection: &KernelSelection,
+    ephemerides: &[(PathBuf, Vec<Segment>)],
+    required: &Intervals,
+    set: &mut Selected<'_>,
+) -> Result<()> {
+    let holds_spacecraft =
+        |segments: &[Segment]| segments.iter().any(|s| s.integers[0] == SPACECRAFT.naif);
+    let family = selection.spk_family.to_ascii_lowercase();
+    let of_spacecraft = ephemerides
+        .iter()
+        .filter(|(_, segments)| holds_spacecraft(segments));
+    if !of_spacecraft
+        .clone()
+        .any(|(path, _)| family_of(path, &family))
+    {
+        let names: Vec<String> = of_spacecraft.map(|(path, _)| file_name(path)).collect();
+        let what = format!(
+            "holds the orbit of {} in the solution {family} (found: {})",
+            SPACECRAFT.name,
+            names.join(", ")
+        );
+        return Err(SpiceError::NothingToSelect { what }.into());
+    }
+    // Planets first; of several versions the latest last, so that it wins.
+    let mut ordered: Vec<&(PathBuf, Vec<Segment>)> = ephemerides.iter().collect();
+    ordered.sort_by_key(|(path, segments)| (holds_spacecraft(segments), natural_order(path)));
+    for (path, segments) in ordered {
+        let own = holds_spacecraft(segments);
+        let held = segments
+            .iter()
+            .filter(|segment| !own || segment.integers[0] == SPACECRAFT.naif)
+            .map(|segment| interval_of([segment.start, segment.stop]));
+        let touches = !Intervals::union_of(held)
+            .intersection(required)
+            .as_slice()
+            .is_empty();
+        let name = file_name(path);
+        if own && !family_of(path, &family) {
+            let line = format!("{name}: not used, not of the orbit solution {family}");
+            set.set.explanation.push(line);
+        } else if !touches {
+            let line = format!("{name}: not used, holds none of the required times");
+            set.set.explanation.push(line);
+        } else if own {
+            set.add(
+                path,
+                &format!("orbit of {}, solution {family}", SPACECRAFT.name),
+            )?;
+        } else {
+            set.add(path, "ephemeris of planets")?;
+        }
+    }
+    Ok(())
+}
+
+/// Attitudes that touch the required times, the worst quality first, and what commanded ones fill in.
+fn select_attitudes(
+    selection: &KernelSelection,
+    attitudes: &[PathBuf],
+    required: &Intervals,
+    set: &mut Selected<'_>,
+) -> Result<()> {
+    // Times of a C-kernel are clock ticks: the text kernels chosen so far turn them into ET.
+    let session = Session::open(&set.set)?;
+    let (mut telemetry, mut commanded) = (Vec::new(), Vec::new());
+    for quality in selection.ck_quality.iter().rev() {
+        let mut of_quality: Vec<&PathBuf> = attitudes
+            .iter()
+            .filter(|path| quality_of(path) == *quality)
+            .collect();
+        of_quality.sort_by_key(|path| natural_order(path));
+        for path in of_quality {
+            let name = file_name(path);
+            let held = session
+                .cspice()
+                .ck_coverage(path, SPACECRAFT.bus)
+                .in_file(path)?;
+            let hull = held.first().zip(held.last());
+            let hull = hull.map(|(first, last)| interval_of([first[0], last[1]]));
+            let hull = Intervals::union_of(hull);
+            if hull.intersection(required).as_slice().is_empty() {
+                let line = format!("{name}: not used, holds no attitude near the required times");
+                set.set.explanation.push(line);
+                continue;
+            }
+            let held = held.into_iter().map(interval_of);
+            if *quality == CkQuality::Nominal {
+                let name_of = &SPACECRAFT.name;
+                set.add(
+                    path,
+                    &format!("NOMINAL attitude of {name_of}: commanded, not measured"),
+                )?;
+                commanded.push((name, Intervals::union_of(held)));
+            } else {
+                set.add(
+                    path,
+                    &format!("Reconstructed attitude of {}", SPACECRAFT.name),
+                )?;
+                telemetry.extend(held);
+            }
+        }
+    }
+    for path in attitudes {
+        let quality = quality_of(path);
+        if !selection.ck_quality.contains(&quality) {
+            let line = format!("{}: not used, {quality:?} attitude", file_name(path));
+            set.set.explanation.push(line);
+        }
+    }
+    if selection.ck_quality.first() == Some(&CkQuality::Nominal) {
+        telemetry.clear();
+    }
+    explain_commanded(required, &Intervals::union_of(telemetry), commanded, set);
+    Ok(())
+}
+
+/// Says which required attitudes come from commanded kernels, because no telemetry that wins holds them.
+fn explain_commanded(
+    required: &Intervals,
+    telemetry: &Intervals,
+    commanded: Vec<(String, Intervals)>,
+    set: &mut Selected<'_>,
+) {
+    let mut missing = required.without(telemetry);
+    // The last one wins where several hold the same instant.
+    for (name, held) in commanded.into_iter().rev() {
+        for filled in missing.intersection(&held).as_slice() {
+            if filled.duration_s() > 0.0 {
+                let line = format!("attitude of {filled} comes from nominal {name}");
+                set.set.explanation.push(line);
+            }
+        }
+        missing = missing.without(&held);
+    }
+}
+
+/// Parts of a name between `_`, `-` and `.`, in lower case.
+fn name_parts(path: &Path) -> Vec<String> {
+    file_name(path)
+        .to_ascii_lowercase()
+        .split(['_', '-', '.'])
+        .map(str::to_owned)
+        .collect()
+}
+
+fn family_of(path: &Path, family: &str) -> bool {
+    let parts = name_parts(path);
+    let unmarked = || {
+        !parts
+            .iter()
+            .any(|part| MARKED_FAMILIES.contains(&part.as_str()))
+    };
+    parts.iter().any(|part| part == family) || (family == "nav" && unmarked())
+}
+
+/// Commanded attitude is told by its name: `mgs_ext_roto_all_v*`.
+#[must_use]
+pub fn quality_of(path: &Path) -> CkQuality {
+    let parts = name_parts(path);
+    if parts.iter().any(|part| part == "roto" || part == "nominal") {
+        CkQuality::Nominal
+    } else {
+        CkQuality::Reconstructed
+    }
+}
+
+/// Sorts names with their numbers as numbers: `v9` before `v10`; in a tie by path.
+fn natural_order(path: &Path) -> (Vec<(usize, String)>, PathBuf) {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let stem = stem.to_ascii_lowercase();
+    let is_digit = |character: char| character.is_ascii_digit();
+    let mut pieces = Vec::new();
+    let mut rest = stem.as_str();
+    while let Some(first) = rest.chars().next() {
+        let end = rest
+            .find(|next| is_digit(next) != is_digit(first))
+            .unwrap_or(rest.len());
+        let (piece, behind) = rest.split_at(end);
+        // Without leading zeros the longer number is the larger one; words have no length.
+        let number = piece.trim_start_matches('0');
+        pieces.push(if is_digit(first) {
+            (number.len(), number.to_owned())
+        } else {
+            (0, piece.to_owned())
+        });
+        rest = behind;
+    }
+    (pieces, path.to_owned())
+}
+
+/// The last number in a name: 61 of `MGS_SCLKSCET.00061.tsc`, 10 of `pck00010.tpc`.
+fn version_of(path: &Path) -> u64 {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let digits = stem.rsplit(|c: char| !c.is_ascii_digit());
+    digits
+        .map(str::parse)
+        .find_map(std::result::Result::ok)
+        .unwrap_or(0)
+}

@@ -1,0 +1,383 @@
+//! A session with CSPICE: times, states and attitudes from one set of kernels.
+
+use std::{cell::OnceCell, ffi::CString, rc::Rc};
+
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    coverage::Coverage,
+    error::SpiceError,
+    ffi::{Cspice, Rows, StateKm},
+    kernels::KernelSet,
+    needs::{LEAP_SECONDS, Need, bus_frame, camera_frame, clocks, explain},
+    origin::{self, Origin, all_finite},
+    role::KernelRole,
+};
+use areograph_base::{
+    body::Body,
+    constants::{NAIF_MARS, NAIF_SOLAR_SYSTEM_BARYCENTRE, NAIF_SUN, SPACECRAFT, Spacecraft},
+    error::{Error, Locate, Result},
+    frames::{CameraFrame, J2000, Position, Rotation, SpacecraftBus},
+    instruments::Instrument,
+    time::{CkLookup, Et},
+    units::METRES_PER_KM,
+};
+use areograph_geom::body_rotation::frame_rotation_3;
+
+/// Digits of a second in UTC strings for people.
+const UTC_DECIMALS: u8 = 3;
+
+/// Position and velocity relative to the centre of Mars, inertial.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct State {
+    /// Position, metres.
+    pub position: Position<J2000>,
+    /// Velocity in J2000, metres per second.
+    pub velocity_m_s: Vector3<f64>,
+}
+
+impl State {
+    fn from_km(state_km: StateKm) -> Self {
+        let [x, y, z, vx, vy, vz] = state_km.map(|value| value * METRES_PER_KM);
+        Self {
+            position: Position::new(Vector3::new(x, y, z)),
+            velocity_m_s: Vector3::new(vx, vy, vz),
+        }
+    }
+}
+
+/// Attitude of the bus at an exposure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Attitude {
+    /// From J2000 to the bus; stamped with the exposure's instant, not the kernel's.
+    pub inertial_to_bus: Rotation<J2000, SpacecraftBus>,
+    /// Angular velocity of the bus, J2000 components, radians per second.
+    pub angular_velocity_rad_s: Vector3<f64>,
+    /// How far from the asked instant the kernel's attitude holds, seconds; 0 inside its intervals.
+    pub distance_s: f64,
+}
+
+/// The only way to CSPICE: holds the process-wide lock and one set of loaded kernels.
+///
+/// A second session on another thread waits for this one to end; on the same thread it is refused.
+/// Kernels are unloaded when the session goes. Clock, orbit and attitude are those of one spacecraft, that of the laser
+/// unless [`Session::of`] says otherwise.
+///
+/// ```
+/// use std::path::Path;
+///
+/// use areograph::spice::{KernelSet, Session};
+///
+/// # fn main() -> areograph::error::Result<()> {
+/// let kernels = KernelSet::from_metakernel(Path::new("kernels.example/example.tm"))?;
+/// let session = Session::open(&kernels)?;
+/// let start = session.sclk_to_et("619971158:28")?;
+/// assert_eq!(session.et_to_utc(start)?, "1999-08-24T14:12:13.635");
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug)]
+pub struct Session {
+    loaded: Rc<Loaded>,
+    spacecraft: &'static Spacecraft,
+}
+
+/// CSPICE with its kernels, and what they hold of every spacecraft, once it was asked for.
+#[derive(Debug)]
+struct Loaded {
+    cspice: Cspice,
+    kernels: KernelSet,
+    /// In the order of [`Spacecraft::all`].
+    coverages: Vec<OnceCell<Coverage>>,
+}
+
+impl Session {
+    /// Waits for the lock and loads `kernels` in their order.
+    ///
+    /// # Errors
+    /// [`SpiceError::Spice`] with the file whose loading failed; [`SpiceError::SessionOpen`].
+    pub fn open(kernels: &KernelSet) -> Result<Self> {
+        let cspice = Cspice::lock()?;
+        for kernel in kernels.kernels() {
+            cspice.furnish(&kernel.path).in_file(&kernel.path)?;
+        }
+        let loaded = Loaded {
+            cspice,
+            kernels: kernels.clone(),
+            coverages: vec![OnceCell::new(); Spacecraft::all().len()],
+        };
+        Ok(Self {
+            loaded: Rc::new(loaded),
+            spacecraft: &SPACECRAFT,
+        })
+    }
+
+    /// The same session for the clock, orbit and attitude of `spacecraft`.
+    #[must_use]
+    pub fn of(&self, spacecraft: &'static Spacecraft) -> Self {
+        Self {
+            loaded: Rc::clone(&self.loaded),
+            spacecraft,
+        }
+    }
+
+    /// The spacecraft whose clock, orbit and attitude are read.
+    #[must_use]
+    pub const fn spacecraft(&self) -> &'static Spacecraft {
+        self.spacecraft
+    }
+
+    pub(super) fn cspice(&self) -> &Cspice {
+        &self.loaded.cspice
+    }
+
+    /// The version of CSPICE, for example `CSPICE_N0067`.
+    ///
+    /// # Errors
+    /// [`SpiceError::SessionOpen`] on a thread that holds a session.
+    pub fn version_of_cspice() -> Result<String> {
+        Ok(Cspice::lock()?.version()?)
+    }
+
+    /// The kernels of this session.
+    #[must_use]
+    pub fn kernels(&self) -> &KernelSet {
+        &self.loaded.kernels
+    }
+
+    /// What all loaded kernels hold of the spacecraft, at the level of intervals.
+    ///
+    /// # Errors
+    /// [`SpiceError::Spice`] when a C-kernel cannot be read; [`SpiceError::MissingText`] without clock.
+    pub fn coverage(&self) -> Result<&Coverage> {
+        let known = &self.loaded.coverages[self.spacecraft.place()];
+        if let Some(coverage) = known.get() {
+            return Ok(coverage);
+        }
+        let coverage = Coverage::of(self.kernels(), self.cspice(), self.spacecraft)?;
+        Ok(known.get_or_init(|| coverage))
+    }
+
+    /// An error of CSPICE, or the absence of a kernel that explains it.
+    fn explain(&self, error: SpiceError, needs: &[Need]) -> SpiceError {
+        explain(self.kernels(), error, needs)
+    }
+
+    /// Instant of a UTC string such as `1999-08-24T14:12:13.64`, with or without a closing `Z`.
+    ///
+    /// # Errors
+    /// [`SpiceError::Spice`] when the string is no date; [`SpiceError::MissingText`].
+    pub fn utc_to_et(&self, utc: &str) -> Result<Et> {
+        let utc = utc.trim();
+        let seconds = self
+            .cspice()
+            .utc_to_et(utc.strip_suffix('Z').unwrap_or(utc))
+            .map_err(|error| self.explain(error, &[LEAP_SECONDS]))?;
+        Ok(Et::from_seconds(seconds))
+    }
+
+    /// ISO calendar UTC with three decimals, for example `1999-08-24T14:12:13.635`.
+    ///
+    /// # Errors
+    /// [`SpiceError::MissingText`] without a leap-second kernel.
+    pub fn et_to_utc(&self, et: Et) -> Result<String> {
+        self.et_to_utc_with(et, UTC_DECIMALS)
+    }
+
+    /// UTC of an instant with so many digits of a second, ISO 8601 without a zone letter.
+    ///
+    /// # Errors
+    /// [`SpiceError::MissingText`] without a leap-second kernel.
+    pub fn et_to_utc_with(&self, et: Et, decimals: u8) -> Result<String> {
+        let utc = self.cspice().et_to_utc(et.seconds(), decimals);
+        Ok(utc.map_err(|error| self.explain(error, &[LEAP_SECONDS]))?)
+    }
+
+    /// Instant of a string of the spacecraft's clock, such as `619971158:28` or `1/0844996544.086`.
+    ///
+    /// # Errors
+    /// [`SpiceError::Spice`] when the string is no clock reading; [`SpiceError::MissingText`].
+    pub fn sclk_to_et(&self, sclk: &str) -> Result<Et> {
+        let seconds = self.cspice().sclk_to_et(self.spacecraft.naif, sclk.trim());
+        let seconds = seconds.map_err(|error| self.explain(error, &clocks(self.spacecraft)))?;
+        Ok(Et::from_seconds(seconds))
+    }
+
+    /// String of the spacecraft's clock, with partition, rounded to a tick.
+    ///
+    /// # Errors
+    /// [`SpiceError::Spice`] outside the clock kernel's range; [`SpiceError::MissingText`].
+    pub fn et_to_sclk(&self, et: Et) -> Result<String> {
+        let sclk = self.cspice().et_to_sclk(self.spacecraft.naif, et.seconds());
+        Ok(sclk.map_err(|error| self.explain(error, &clocks(self.spacecraft)))?)
+    }
+
+    /// Geometric state of the spacecraft relative to Mars: no light time, no aberration.
+    ///
+    /// # Errors
+    /// [`SpiceError::Spice`], of kind coverage when the kernels do not reach there;
+    /// [`SpiceError::NotFinite`] with the kernel that holds NaN or an infinity.
+    pub fn state(&self, et: Et) -> Result<State> {
+        let state = self
+            .cspice()
+            .geometric_state(self.spacecraft.naif, et.seconds(), NAIF_MARS)?;
+        self.finite("position or velocity", &self.spacecraft.name, et, state)
+    }
+
+    /// State of the spacecraft as seen from the centre of Mars, corrected for light time and aberration (`LT+S`).
+    ///
+    /// The geometry takes it only where a run follows the convention of ISIS and ALE.
+    ///
+    /// # Errors
+    /// As [`Self::state`].
+    pub fn apparent_state(&self, et: Et) -> Result<State> {
+        let state = self
+            .cspice()
+            .apparent_state(self.spacecraft.naif, et.seconds(), NAIF_MARS)?;
+        self.finite(
+            "apparent position or velocity",
+            &self.spacecraft.name,
+            et,
+            state,
+        )
+    }
+
+    /// Geometric state of Mars relative to the barycentre of the solar system.
+    ///
+    /// # Errors
+    /// As [`Self::state`].
+    pub fn mars_state(&self, et: Et) -> Result<State> {
+        let state =
+            self.cspice()
+                .geometric_state(NAIF_MARS, et.seconds(), NAIF_SOLAR_SYSTEM_BARYCENTRE)?;
+        self.finite("position or velocity", "Mars", et, state)
+    }
+
+    /// State of the Sun as seen from the centre of Mars (`LT+S`).
+    ///
+    /// # Errors
+    /// As [`Self::state`].
+    pub fn sun_state(&self, et: Et) -> Result<State> {
+        let state = self
+            .cspice()
+            .apparent_state(NAIF_SUN, et.seconds(), NAIF_MARS)?;
+        self.finite("apparent position or velocity", "the Sun", et, state)
+    }
+
+    /// The state in metres, refused with the kernel that makes it no number.
+    fn finite(&self, what: &str, of: &str, et: Et, state_km: StateKm) -> Result<State> {
+        let state = State::from_km(state_km);
+        let finite = all_finite(state.position.xyz_m.as_slice())
+            && all_finite(state.velocity_m_s.as_slice());
+        if finite {
+            return Ok(state);
+        }
+        let origin = origin::of_state(self.kernels(), self.cspice(), et);
+        Err(self.not_finite(format!("{what} of {of}"), et, origin))
+    }
+
+    fn not_finite(&self, what: String, instant: Et, origin: Option<Origin>) -> Error {
+        let utc = self.et_to_utc(instant);
+        let part = origin.as_ref().map(|origin| origin.part);
+        let failure = Error::from(SpiceError::NotFinite {
+            what,
+            instant,
+            utc: utc.unwrap_or_else(|_| "unknown".to_owned()),
+            part: part.map_or_else(String::new, |part| format!(", in its part of {part}")),
+        });
+        match origin {
+            Some(origin) => failure.in_file(origin.path),
+            None => failure,
+        }
+    }
+
+    /// Attitude of the bus at `exposure`, read from the C-kernel at `lookup`.
+    ///
+    /// * `lookup` – made by [`areograph_base::time::PointingBias::lookup`] from the same exposure
+    /// * `tolerance_s` – how far outside its intervals the C-kernel may be asked, seconds
+    ///
+    /// # Errors
+    /// [`SpiceError::NoAttitude`] when there is no attitude with rates within the tolerance;
+    /// [`SpiceError::NotFinite`] with the kernel that holds NaN or an infinity;
+    /// [`SpiceError::MissingText`] without clock or leap seconds.
+    pub fn attitude(&self, lookup: CkLookup, exposure: Et, tolerance_s: f64) -> Result<Attitude> {
+        let kernel_time = lookup.kernel_time();
+        let ticks = self.et_to_ticks(kernel_time)?;
+        let ticks_per_s = self.et_to_ticks(kernel_time.plus(1.0))? - ticks;
+        let pointing = self
+            .cspice()
+            .pointing(self.spacecraft.bus, ticks, tolerance_s * ticks_per_s)?
+            .ok_or_else(|| SpiceError::NoAttitude {
+                of: self.whom(KernelRole::Ck),
+                kernel_time,
+                tolerance_s,
+            })?;
+        let rows = pointing.matrix.as_flattened();
+        let rates = &pointing.angular_velocity_rad_s;
+        if !(all_finite(rows) && all_finite(rates) && pointing.ticks.is_finite()) {
+            let reach_s = tolerance_s.max(0.0);
+            let bus = self.spacecraft.bus;
+            let (set, cspice) = (self.kernels(), self.cspice());
+            let origin = origin::of_attitude(set, cspice, bus, kernel_time, reach_s);
+            let what = format!("attitude of {} or its rate", self.spacecraft.name);
+            return Err(self.not_finite(what, kernel_time, origin));
+        }
+        Ok(Attitude {
+            inertial_to_bus: Rotation::new(matrix(&pointing.matrix), exposure),
+            angular_velocity_rad_s: Vector3::from(pointing.angular_velocity_rad_s),
+            distance_s: (pointing.ticks - ticks).abs() / ticks_per_s,
+        })
+    }
+
+    /// Encoded clock of the spacecraft, ticks.
+    ///
+    /// # Errors
+    /// As [`Self::et_to_sclk`].
+    pub fn et_to_ticks(&self, et: Et) -> Result<f64> {
+        let ticks = self
+            .cspice()
+            .et_to_ticks(self.spacecraft.naif, et.seconds());
+        Ok(ticks.map_err(|error| self.explain(error, &clocks(self.spacecraft)))?)
+    }
+
+    /// Mounting of `instrument` as the loaded kernels have it, turned to its camera axes.
+    ///
+    /// # Errors
+    /// [`SpiceError::MissingText`] when no loaded kernel defines the two frames.
+    pub fn mounting(
+        &self,
+        instrument: &Instrument,
+        et: Et,
+    ) -> Result<Rotation<SpacecraftBus, CameraFrame>> {
+        let [bus, camera] = [&instrument.naif.bus_frame, &instrument.naif.frame]
+            // A name with a zero byte is cut there, and then no kernel defines it.
+            .map(|name| CString::new(name.split('\0').next().unwrap_or_default()));
+        let needs = [camera_frame(instrument), bus_frame(instrument.spacecraft)];
+        let rows = self
+            .cspice()
+            .frame_matrix(
+                &bus.unwrap_or_default(),
+                &camera.unwrap_or_default(),
+                et.seconds(),
+            )
+            .map_err(|error| self.explain(error, &needs))?;
+        let turn = frame_rotation_3(instrument.naif.turn_rad);
+        Ok(Rotation::new(turn * matrix(&rows), et))
+    }
+
+    /// Matrix from J2000 to the frame of `body` in the loaded planetary constants, to tell which report they follow.
+    ///
+    /// # Errors
+    /// [`SpiceError::Spice`] when no planetary constants of the body are loaded.
+    pub fn body_matrix(&self, body: Body, et: Et) -> Result<Matrix3<f64>> {
+        // The name is one of the program's own.
+        let frame = CString::new(&*body.naif().pck_frame).unwrap_or_default();
+        let rows = self.cspice().frame_matrix(c"J2000", &frame, et.seconds())?;
+        Ok(matrix(&rows))
+    }
+}
+
+fn matrix(rows: &Rows) -> Matrix3<f64> {
+    Matrix3::from_fn(|row, column| rows[row][column])
+}

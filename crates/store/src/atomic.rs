@@ -1,0 +1,45 @@
+//! Files appear under their final name whole or not at all.
+
+use std::{fs::File, io::Write as _, path::Path};
+
+use crate::files::StagedFile;
+use areograph_base::error::{IoError, Locate, Result};
+
+/// Writes `bytes` beside `path` under a temporary name, flushes them to the disk and renames.
+///
+/// # Errors
+/// The folder cannot be made or written, or the disk is full; `path` is then as it was.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_parts(path, &[bytes])
+}
+
+/// The same for bytes in several parts, one behind the other.
+///
+/// # Errors
+/// Those of [`write()`].
+pub fn write_parts(path: &Path, parts: &[&[u8]]) -> Result<()> {
+    let staged = StagedFile::create(path)?;
+    let mut writer = staged.writer()?;
+    let written = parts.iter().try_for_each(|part| writer.write_all(part));
+    written.map_err(IoError::on("write")).in_file(path)?;
+    staged.finish()?;
+    sync_folder(path.parent().unwrap_or(Path::new(".")));
+    Ok(())
+}
+
+/// Flushes a file that is about to be renamed.
+///
+/// # Errors
+/// The file cannot be opened or flushed.
+pub fn sync_file(path: &Path) -> Result<()> {
+    File::open(path)
+        .and_then(|file| file.sync_all())
+        .map_err(IoError::on("flush"))
+        .in_file(path)
+}
+
+/// Makes renames in `folder` durable, where the system can do that.
+pub fn sync_folder(folder: &Path) {
+    // Some file systems refuse to flush folders; the data are safe all the same.
+    let _ = File::open(folder).and_then(|folder| folder.sync_all());
+}

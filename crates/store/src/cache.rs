@@ -1,0 +1,170 @@
+//! Stage outputs on disk, each with the inputs it was made from.
+
+use std::{
+    collections::BTreeSet,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+
+use super::atomic;
+use crate::stage::{Inputs, Output, Provenance, Reason};
+use areograph_base::error::{Cause, Kind, Locate, Result};
+
+/// Outputs of a site's stages, in `<out>/<site>/.cache`.
+#[derive(Debug)]
+pub struct StageCache {
+    folder: PathBuf,
+    forced: bool,
+}
+
+/// What stands before a stage output in its file, both in postcard: outputs are large, so they are not copied.
+#[derive(Serialize, Deserialize)]
+struct Head {
+    inputs: Inputs,
+    blake3: String,
+    payload_bytes: u64,
+}
+
+/// A stage output that cannot be stored.
+#[derive(Debug, thiserror::Error)]
+#[error("the output of {stage} cannot be stored: {source}")]
+struct Unstorable {
+    stage: String,
+    source: postcard::Error,
+}
+
+impl Cause for Unstorable {
+    fn kind(&self) -> Kind {
+        Kind::Bug
+    }
+
+    fn advice(&self) -> String {
+        "this is a bug in areograph; please report it with the configuration".to_owned()
+    }
+}
+
+impl StageCache {
+    /// The cache in `folder`; when `forced`, no stored output is used.
+    #[must_use]
+    pub fn new(folder: &Path, forced: bool) -> Self {
+        Self {
+            folder: folder.to_owned(),
+            forced,
+        }
+    }
+
+    /// The stored output of the stage with this label for these inputs, or why the stage has to run.
+    ///
+    /// # Errors
+    /// The reason, never [`Reason::Unchanged`].
+    pub fn load<T: DeserializeOwned>(
+        &self,
+        label: &str,
+        inputs: &Inputs,
+    ) -> std::result::Result<Output<T>, Reason> {
+        if self.forced {
+            return Err(Reason::Forced);
+        }
+        let bytes = fs::read(self.path(label)).map_err(|_| Reason::First)?;
+        let (stored, payload): (Head, &[u8]) =
+            postcard::take_from_bytes(&bytes).map_err(|_| Reason::Damaged)?;
+        let changes = inputs.changed_since(&stored.inputs);
+        if !changes.is_empty() {
+            return Err(Reason::Changed(changes));
+        }
+        let is_whole =
+            u64::try_from(payload.len()).is_ok_and(|bytes| bytes == stored.payload_bytes);
+        if !is_whole || *blake3::hash(payload).to_hex() != *stored.blake3 {
+            return Err(Reason::Damaged);
+        }
+        let value = postcard::from_bytes(payload).map_err(|_| Reason::Damaged)?;
+        let provenance = Provenance {
+            blake3: stored.blake3,
+            fingerprint: inputs.fingerprint(),
+        };
+        Ok(Output::known(label.to_owned(), value, provenance))
+    }
+
+    /// Stores the output of the stage with this label, with the inputs it was made from.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub fn store<T: Serialize>(&self, label: &str, inputs: Inputs, value: T) -> Result<Output<T>> {
+        let unstorable = |source| Unstorable {
+            stage: label.to_owned(),
+            source,
+        };
+        let payload = postcard::to_stdvec(&value).map_err(unstorable)?;
+        let provenance = Provenance {
+            blake3: blake3::hash(&payload).to_hex().to_string(),
+            fingerprint: inputs.fingerprint(),
+        };
+        let head = Head {
+            inputs,
+            blake3: provenance.blake3.clone(),
+            payload_bytes: payload.len() as u64,
+        };
+        let head = postcard::to_stdvec(&head).map_err(unstorable)?;
+        let path = self.path(label);
+        atomic::write_parts(&path, &[&head, &payload]).in_file(path)?;
+        Ok(Output::known(label.to_owned(), value, provenance))
+    }
+
+    /// Forgets the output of `stage`, so that it runs again.
+    pub fn forget(&self, stage: &str) {
+        // Nothing to forget is as good as forgotten.
+        let _ = fs::remove_file(self.path(stage));
+    }
+
+    /// Forgets all stages but these, such as those of an image that is no longer configured.
+    pub fn keep_only<'s>(&self, stages: impl IntoIterator<Item = &'s str>) {
+        let kept: BTreeSet<PathBuf> = stages.into_iter().map(|stage| self.path(stage)).collect();
+        let entries = fs::read_dir(&self.folder).into_iter().flatten().flatten();
+        for path in entries.map(|entry| entry.path()) {
+            if !kept.contains(&path) {
+                // What cannot be removed costs room and nothing else: nobody asks for it.
+                let _ = fs::remove_file(path);
+            }
+        }
+    }
+
+    fn path(&self, stage: &str) -> PathBuf {
+        self.folder.join(stage.replace('/', "+"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_output_is_kept_until_an_input_changes_or_the_file_is_damaged() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = StageCache::new(folder.path(), false);
+        let inputs = |value: u32| {
+            let mut inputs = Inputs::new(1);
+            inputs.setting("windows", &value);
+            inputs
+        };
+        let why = |cache: &StageCache, value| cache.load::<u32>("search", &inputs(value)).err();
+        assert_eq!(why(&cache, 1), Some(Reason::First));
+        let stored = cache.store("search", inputs(1), 10_u32).unwrap();
+        let loaded = cache.load::<u32>("search", &inputs(1)).unwrap();
+        assert_eq!(loaded.value().unwrap(), &10);
+        assert_eq!(loaded.provenance(), stored.provenance());
+        let changed = Reason::Changed(vec!["key windows changed".to_owned()]);
+        assert_eq!(why(&cache, 2), Some(changed));
+        let path = folder.path().join("search");
+        let mut bytes = fs::read(&path).unwrap();
+        let last = bytes.len() - 1;
+        bytes[last] ^= 1;
+        atomic::write(&path, &bytes).unwrap();
+        assert_eq!(why(&cache, 1), Some(Reason::Damaged));
+        let forced = StageCache::new(folder.path(), true);
+        assert_eq!(why(&forced, 1), Some(Reason::Forced));
+        cache.forget("search");
+        assert_eq!(why(&cache, 1), Some(Reason::First));
+    }
+}

@@ -1,0 +1,394 @@
+//! Files as several floors need them: their hash, read once as long as they do not change, their name without folders, and
+//! how they come under that name whole or not at all.
+
+mod known;
+mod outputs;
+mod staged;
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs::File,
+    path::{Path, PathBuf},
+    sync::{Mutex, PoisonError},
+    time::{SystemTime, UNIX_EPOCH},
+};
+
+use rayon::prelude::*;
+
+pub use self::known::{Identity, KnownFile, KnownFiles};
+pub use self::outputs::require_apart;
+pub use self::staged::{StagedFile, TEMPORARY};
+use areograph_base::{
+    error::{Cause, IoError, Kind, Locate, Result},
+    watch::Watch,
+};
+
+/// A file as it was when it was first read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct HashedFile {
+    /// Path as given.
+    pub path: PathBuf,
+    /// Size.
+    pub bytes: u64,
+    /// BLAKE3 of its content, hexadecimal.
+    pub blake3: String,
+}
+
+/// Input files of one run: each is hashed once, and must stay what it was.
+#[derive(Debug, Default)]
+pub struct InputFiles {
+    earlier: KnownFiles,
+    roots: Vec<PathBuf>,
+    seen: Mutex<Seen>,
+}
+
+/// What a run has found out.
+#[derive(Debug, Default)]
+struct Seen {
+    files: BTreeMap<PathBuf, SeenFile>,
+    /// Hashes of contents that passed a check of kernels, with its version.
+    passed: BTreeSet<(String, u32)>,
+}
+
+/// A file that the run has met.
+#[derive(Debug, Clone)]
+struct SeenFile {
+    identity: Identity,
+    file: HashedFile,
+    /// When it was read, seconds of UTC since 1970; none of a file that changed just before, or meanwhile.
+    read_s: Option<u64>,
+}
+
+/// A file that is no longer what was read earlier in the run.
+#[derive(Debug, thiserror::Error)]
+#[error("the file changed while it was in use: its hash was {was} and is {is}")]
+struct ChangedFile {
+    was: String,
+    is: String,
+}
+
+impl Cause for ChangedFile {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "run again when nobody is writing to the input files".to_owned()
+    }
+}
+
+/// A file that lies elsewhere than it may.
+#[derive(Debug, thiserror::Error)]
+#[error("a path below {}; this one leads to {}", listed(.roots), .leads_to.display())]
+pub struct Outside {
+    leads_to: PathBuf,
+    roots: Vec<PathBuf>,
+}
+
+/// An input file that a run must not read.
+#[derive(Debug, thiserror::Error)]
+#[error("is not read here; expected {0}")]
+struct NotAdmitted(Outside);
+
+impl Cause for NotAdmitted {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        "move the file below one of these folders, or have its folder added to them".to_owned()
+    }
+}
+
+/// Why the file must not be read, if it lies below none of the folders `roots`, links followed. Without folders there is no
+/// such rule.
+///
+/// * `roots` – without links
+#[must_use]
+pub fn outside(path: &Path, roots: &[PathBuf]) -> Option<Outside> {
+    if roots.is_empty() {
+        return None;
+    }
+    // What is not there leads nowhere.
+    let leads_to = path.canonicalize().ok()?;
+    let within = roots.iter().any(|root| leads_to.starts_with(root));
+    (!within).then(|| Outside {
+        leads_to,
+        roots: roots.to_vec(),
+    })
+}
+
+fn listed(folders: &[PathBuf]) -> String {
+    let folders = folders.iter().map(|folder| folder.display().to_string());
+    folders.collect::<Vec<_>>().join(", ")
+}
+
+impl InputFiles {
+    /// Those of a run that does not read again what is known from earlier ones.
+    #[must_use]
+    pub fn knowing(earlier: KnownFiles) -> Self {
+        let checked = earlier.iter().filter(|file| file.checked > 0);
+        let passed = checked.map(|file| (hexadecimal(file.blake3), file.checked));
+        Self {
+            seen: Mutex::new(Seen {
+                passed: passed.collect(),
+                ..Seen::default()
+            }),
+            earlier,
+            roots: Vec::new(),
+        }
+    }
+
+    /// The same of a run that may read only below the folders `roots`; see [`outside`].
+    #[must_use]
+    pub fn within(self, roots: &[PathBuf]) -> Self {
+        Self {
+            roots: roots.to_vec(),
+            ..self
+        }
+    }
+
+    /// Makes sure that the run may read a file.
+    ///
+    /// # Errors
+    /// The file lies elsewhere, of kind configuration.
+    pub fn admit(&self, path: &Path) -> Result<()> {
+        match outside(path, &self.roots) {
+            None => Ok(()),
+            Some(outside) => Err(NotAdmitted(outside)).in_file(path),
+        }
+    }
+
+    /// The file with its hash; a file that was hashed before is not read again.
+    ///
+    /// # Errors
+    /// The file cannot be read, must not be, or is no longer what it was.
+    pub fn hash(&self, path: &Path) -> Result<HashedFile> {
+        self.admit(path)?;
+        let now = identity(path)?;
+        let earlier = self.lock().files.get(path).cloned();
+        if let Some(seen) = &earlier
+            && seen.identity == now
+        {
+            return Ok(seen.file.clone());
+        }
+        let seen = match self.earlier.get(&now) {
+            Some(known) => SeenFile::known(path, known),
+            None => SeenFile::read(path)?,
+        };
+        if let Some(earlier) = earlier {
+            unchanged(&earlier.file, &seen.file)?;
+        }
+        let file = seen.file.clone();
+        self.lock().files.insert(path.to_owned(), seen);
+        Ok(file)
+    }
+
+    /// Whether the run has hashed this file before.
+    #[must_use]
+    pub fn knows(&self, path: &Path) -> bool {
+        self.lock().files.contains_key(path)
+    }
+
+    /// Whether content with this hash has passed that version of the check of kernels.
+    #[must_use]
+    pub fn has_passed(&self, blake3: &str, check: u32) -> bool {
+        self.lock().passed.contains(&(blake3.to_owned(), check))
+    }
+
+    /// Notes that content with this hash has passed that version of the check of kernels.
+    pub fn note_passed(&self, blake3: &str, check: u32) {
+        self.lock().passed.insert((blake3.to_owned(), check));
+    }
+
+    /// All files that the run has met.
+    #[must_use]
+    pub fn all(&self) -> Vec<HashedFile> {
+        let seen = self.lock();
+        seen.files.values().map(|seen| seen.file.clone()).collect()
+    }
+
+    /// What later runs need not find out again, beyond what was known.
+    #[must_use]
+    pub fn learnt(&self) -> Vec<KnownFile> {
+        let seen = self.lock();
+        let known = seen.files.values().filter_map(|of| {
+            let passed = seen.passed.iter();
+            let checks = passed.filter(|(blake3, _)| *blake3 == of.file.blake3);
+            Some(KnownFile {
+                identity: of.identity,
+                blake3: *blake3::Hash::from_hex(&of.file.blake3).ok()?.as_bytes(),
+                checked: checks.map(|(_, check)| *check).max().unwrap_or(0),
+                read_s: of.read_s?,
+            })
+        });
+        let new = known.filter(|file| self.earlier.get(&file.identity) != Some(file));
+        new.collect()
+    }
+
+    /// Several files in their order; `watch` is looked at before each, and counts those that were not known before.
+    ///
+    /// # Errors
+    /// As [`Self::hash`]; [`Stopped`](areograph_base::error::Stopped).
+    pub fn hash_all<'a>(
+        &self,
+        paths: &[PathBuf],
+        watch: impl Into<Watch<'a>>,
+    ) -> Result<Vec<HashedFile>> {
+        let watch = watch.into();
+        let unknown = paths.iter().filter(|path| !self.knows(path)).count();
+        watch.announce(unknown);
+        let hash = |path: &PathBuf| {
+            watch.check()?;
+            let is_known = self.knows(path);
+            let hashed = self.hash(path)?;
+            if !is_known {
+                watch.step(1, "files hashed");
+            }
+            Ok(hashed)
+        };
+        paths.par_iter().map(hash).collect()
+    }
+
+    /// Makes sure that a file which was hashed is still what it was. Other files are no concern.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is no longer what it was.
+    pub fn verify(&self, path: &Path) -> Result<()> {
+        if !self.knows(path) {
+            return Ok(());
+        }
+        self.hash(path).map(|_| ())
+    }
+
+    /// Makes sure that every file is still what it was.
+    ///
+    /// # Errors
+    /// As [`Self::verify`], for the first of them.
+    pub fn verify_all(&self) -> Result<()> {
+        let paths: Vec<PathBuf> = self.lock().files.keys().cloned().collect();
+        paths.iter().try_for_each(|path| self.verify(path))
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, Seen> {
+        // Each entry is whole, whatever happened to the thread that wrote another one.
+        self.seen.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl SeenFile {
+    /// A file that an earlier run has read.
+    fn known(path: &Path, known: &KnownFile) -> Self {
+        Self {
+            identity: known.identity,
+            file: HashedFile {
+                path: path.to_owned(),
+                bytes: known.identity.bytes,
+                blake3: hexadecimal(known.blake3),
+            },
+            read_s: Some(known.read_s),
+        }
+    }
+
+    fn read(path: &Path) -> Result<Self> {
+        let begun = SystemTime::now();
+        let file = open(path)?;
+        let identity = identity_of(&file).in_file(path)?;
+        let (blake3, bytes) = hash_open(&file).in_file(path)?;
+        let steady = identity.is_steady(begun) && identity_of(&file).in_file(path)? == identity;
+        let read_s = begun.duration_since(UNIX_EPOCH).ok().filter(|_| steady);
+        Ok(Self {
+            identity,
+            file: HashedFile {
+                path: path.to_owned(),
+                bytes,
+                blake3,
+            },
+            read_s: read_s.map(|since| since.as_secs()),
+        })
+    }
+}
+
+fn identity(path: &Path) -> Result<Identity> {
+    let metadata = path.metadata().map_err(IoError::on("open")).in_file(path)?;
+    Ok(Identity::of(&metadata))
+}
+
+fn identity_of(file: &File) -> std::result::Result<Identity, IoError> {
+    let metadata = file.metadata().map_err(IoError::on("look at"))?;
+    Ok(Identity::of(&metadata))
+}
+
+fn hexadecimal(blake3: [u8; 32]) -> String {
+    blake3::Hash::from_bytes(blake3).to_hex().to_string()
+}
+
+fn unchanged(earlier: &HashedFile, now: &HashedFile) -> Result<()> {
+    if earlier.blake3 == now.blake3 {
+        return Ok(());
+    }
+    Err(ChangedFile {
+        was: short_hash(&earlier.blake3),
+        is: short_hash(&now.blake3),
+    })
+    .in_file(&now.path)
+}
+
+/// BLAKE3 of a file, hexadecimal, and its size in bytes.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn hash_file(path: &Path) -> Result<(String, u64)> {
+    hash_open(&open(path)?).in_file(path)
+}
+
+fn open(path: &Path) -> Result<File> {
+    File::open(path).map_err(IoError::on("open")).in_file(path)
+}
+
+fn hash_open(mut file: &File) -> std::result::Result<(String, u64), IoError> {
+    let mut hasher = blake3::Hasher::new();
+    let bytes = std::io::copy(&mut file, &mut hasher).map_err(IoError::on("read"))?;
+    Ok((hasher.finalize().to_hex().to_string(), bytes))
+}
+
+/// The name of a file without its folders, as products quote it: they do not depend on where files lie.
+#[must_use]
+pub fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    name.to_string_lossy().into_owned()
+}
+
+/// The first digits of a hash: enough for people to tell files apart.
+#[must_use]
+pub fn short_hash(blake3: &str) -> String {
+    blake3.chars().take(12).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[allow(clippy::disallowed_methods, reason = "files of a test")]
+    fn a_file_that_changes_during_a_run_is_found_and_one_that_is_touched_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mgs.tsc");
+        std::fs::write(&path, b"one").unwrap();
+        let files = InputFiles::default();
+        let first = files.hash(&path).unwrap();
+        assert_eq!(first.bytes, 3);
+        std::fs::write(&path, b"one").unwrap();
+        files.verify_all().unwrap();
+        std::fs::write(&path, b"three").unwrap();
+        let failure = files.verify(&path).unwrap_err();
+        assert_eq!(failure.kind(), Kind::Input);
+        assert!(
+            failure
+                .to_string()
+                .contains("mgs.tsc: the file changed while it was in use")
+        );
+        assert!(files.hash(&path).is_err());
+        files.verify(&folder.path().join("another")).unwrap();
+    }
+}

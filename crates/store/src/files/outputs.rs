@@ -1,0 +1,118 @@
+//! Files that a command is to write, held against those that it reads and against each other.
+
+use std::{
+    fs,
+    os::unix::fs::MetadataExt as _,
+    path::{Path, PathBuf, absolute},
+};
+
+use areograph_base::error::{Cause, Kind, Locate, Result};
+
+/// What a file is known by, whatever its names.
+#[derive(Debug, PartialEq, Eq)]
+enum Place {
+    /// Device and inode.
+    Node(u64, u64),
+    /// Where a file that is not there yet will be.
+    Path(PathBuf),
+}
+
+impl Place {
+    fn of(path: &Path) -> Self {
+        if let Ok(metadata) = fs::metadata(path) {
+            return Self::Node(metadata.dev(), metadata.ino());
+        }
+        let whole = absolute(path).unwrap_or_else(|_| path.to_owned());
+        let folder = whole.parent().and_then(|folder| folder.canonicalize().ok());
+        Self::Path(match (folder, whole.file_name()) {
+            (Some(folder), Some(name)) => folder.join(name),
+            _ => whole,
+        })
+    }
+}
+
+/// A file that would be lost.
+#[derive(Debug, thiserror::Error)]
+enum Overwritten {
+    #[error("would be written over {0}, which is read; expected a file of its own")]
+    Input(PathBuf),
+    #[error("would be written twice: as {0} too; expected a file of its own for each")]
+    Output(PathBuf),
+}
+
+impl Cause for Overwritten {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        "give the file to write another name or folder".to_owned()
+    }
+}
+
+/// Makes sure that no file of `outputs` is one of `inputs` or another output, under whatever names and links. Files that are
+/// not there are compared by their paths.
+///
+/// # Errors
+/// One is, of kind configuration; both are named.
+pub fn require_apart<'a>(
+    outputs: impl IntoIterator<Item = &'a Path>,
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> Result<()> {
+    let inputs: Vec<(&Path, Place)> = inputs
+        .into_iter()
+        .map(|path| (path, Place::of(path)))
+        .collect();
+    let mut earlier: Vec<(&Path, Place)> = Vec::new();
+    for output in outputs {
+        let place = Place::of(output);
+        let same = |(_, other): &&(&Path, Place)| *other == place;
+        if let Some((input, _)) = inputs.iter().find(same) {
+            return Err(Overwritten::Input((*input).to_owned())).in_file(output);
+        }
+        if let Some((other, _)) = earlier.iter().find(same) {
+            return Err(Overwritten::Output((*other).to_owned())).in_file(output);
+        }
+        earlier.push((output, place));
+    }
+    Ok(())
+}
+
+/// Something that a file would take the place of.
+#[derive(Debug, thiserror::Error)]
+#[error("is {0}; expected a file, or nothing yet")]
+struct NotAFile(&'static str);
+
+impl Cause for NotAFile {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        "name a file in a folder: a file is written beside its place and then takes it, which would put an end to what is \
+         there"
+            .to_owned()
+    }
+}
+
+/// Makes sure that at `path` there is nothing or a regular file.
+///
+/// # Errors
+/// A link, a folder, a device, a pipe or a socket is there.
+pub(super) fn require_replaceable(path: &Path) -> Result<()> {
+    use std::os::unix::fs::FileTypeExt as _;
+    let found = match fs::symlink_metadata(path) {
+        Ok(metadata) => metadata.file_type(),
+        // Whoever writes the file says what is wrong with its folder.
+        Err(_) => return Ok(()),
+    };
+    let what = match found {
+        found if found.is_file() => return Ok(()),
+        found if found.is_symlink() => "a link",
+        found if found.is_dir() => "a folder",
+        found if found.is_fifo() => "a pipe",
+        found if found.is_socket() => "a socket",
+        _ => "a device",
+    };
+    Err(NotAFile(what)).in_file(path)
+}

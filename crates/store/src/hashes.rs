@@ -1,0 +1,200 @@
+//! Hashes of input files, kept from run to run: a file that did not change is not read again.
+//!
+//! What is kept saves time and nothing else. A file of hashes that is damaged, foreign or cannot be written is as good as
+//! none.
+
+use std::{
+    ffi::OsString,
+    fs::{self, File, TryLockError},
+    path::{Path, PathBuf},
+    thread,
+    time::Duration,
+};
+
+use super::atomic;
+use crate::files::{InputFiles, KnownFile, KnownFiles};
+use areograph_base::error::{IoError, Locate, Result};
+
+/// Name of the file in a folder of products.
+pub const HASHES: &str = ".hashes";
+
+/// How the file begins: what it is, and the form of its entries. BLAKE3 of the rest follows, then the entries in postcard.
+const HEADER: &[u8] = b"areograph hashes 1\n";
+/// Bytes of a BLAKE3 hash.
+const HASH_SIZE: usize = 32;
+/// Most files that are kept; those that were read first go.
+const FILES_MAX: usize = 200_000;
+/// Largest file of hashes that is read, bytes: more than so many entries take.
+const SIZE_MAX: u64 = 64 << 20;
+/// How often another process that writes the same file is waited for, and how long each time.
+const WAITS: usize = 40;
+const WAIT: Duration = Duration::from_millis(50);
+
+/// A file of hashes that runs share.
+#[derive(Debug, Clone)]
+pub struct HashCache {
+    path: PathBuf,
+    rehash: bool,
+}
+
+impl HashCache {
+    /// The hashes in the file `path`; when `rehash`, they are not believed, but made anew.
+    #[must_use]
+    pub fn new(path: &Path, rehash: bool) -> Self {
+        Self {
+            path: path.to_owned(),
+            rehash,
+        }
+    }
+
+    /// The hashes in a folder of products.
+    #[must_use]
+    pub fn in_folder(out: &Path, rehash: bool) -> Self {
+        Self::new(&out.join(HASHES), rehash)
+    }
+
+    /// Input files of a run that knows these hashes.
+    #[must_use]
+    pub fn files(&self) -> InputFiles {
+        if self.rehash {
+            return InputFiles::default();
+        }
+        InputFiles::knowing(self.known())
+    }
+
+    /// What the file holds.
+    #[must_use]
+    pub fn known(&self) -> KnownFiles {
+        read(&self.path).unwrap_or_default()
+    }
+
+    /// Adds what a run has learnt of its input files. Nothing is kept in a folder that is not there.
+    pub fn keep(&self, files: &InputFiles) {
+        let learnt = files.learnt();
+        if learnt.is_empty() || !self.folder().is_dir() {
+            return;
+        }
+        if let Err(failure) = self.add(&learnt) {
+            tracing::warn!("hashes of input files are not kept: {failure}");
+        }
+    }
+
+    fn folder(&self) -> &Path {
+        match self.path.parent() {
+            Some(folder) if folder != Path::new("") => folder,
+            _ => Path::new("."),
+        }
+    }
+
+    fn add(&self, learnt: &[KnownFile]) -> Result<()> {
+        let mut name = OsString::from(&self.path);
+        name.push(".lock");
+        let Some(_lock) = wait_for_lock(Path::new(&name))? else {
+            // Whoever holds it is stopped. To read files again costs less than to wait for it.
+            return Ok(());
+        };
+        let mut known: Vec<KnownFile> = {
+            let mut known = self.known();
+            for file in learnt {
+                known.add(*file);
+            }
+            known.iter().copied().collect()
+        };
+        known.sort_by_key(|file| std::cmp::Reverse(file.read_s));
+        known.truncate(FILES_MAX);
+        let Ok(entries) = postcard::to_stdvec(&known) else {
+            return Ok(());
+        };
+        let hash = blake3::hash(&entries);
+        atomic::write(&self.path, &[HEADER, hash.as_bytes(), &entries].concat())
+    }
+}
+
+fn read(path: &Path) -> Option<KnownFiles> {
+    let metadata = fs::metadata(path).ok()?;
+    if !metadata.is_file() || metadata.len() > SIZE_MAX {
+        return None;
+    }
+    let bytes = fs::read(path).ok()?;
+    let (hash, entries) = bytes.strip_prefix(HEADER)?.split_at_checked(HASH_SIZE)?;
+    if blake3::hash(entries).as_bytes() != hash {
+        return None;
+    }
+    let known: Vec<KnownFile> = postcard::from_bytes(entries).ok()?;
+    Some(known.into_iter().collect())
+}
+
+/// The lock in a file of its own, since the file of hashes is replaced; none when another process does not give it back.
+fn wait_for_lock(path: &Path) -> Result<Option<File>> {
+    let file = File::create(path)
+        .map_err(IoError::on("create"))
+        .in_file(path)?;
+    for _ in 0..WAITS {
+        match file.try_lock() {
+            Ok(()) => return Ok(Some(file)),
+            Err(TryLockError::WouldBlock) => thread::sleep(WAIT),
+            Err(TryLockError::Error(error)) => {
+                return Err(IoError::on("lock")(error)).in_file(path);
+            }
+        }
+    }
+    Ok(None)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::Identity;
+
+    fn file(inode: u64) -> KnownFile {
+        KnownFile {
+            identity: Identity {
+                device: 1,
+                inode,
+                bytes: 2,
+                modified: [3, 4],
+                changed: [5, 6],
+            },
+            blake3: [7; 32],
+            checked: 0,
+            read_s: 1_000 + inode,
+        }
+    }
+
+    #[test]
+    fn hashes_come_back_and_every_damaged_bit_leaves_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = HashCache::in_folder(folder.path(), false);
+        assert_eq!(cache.known(), KnownFiles::default());
+        cache.add(&[file(1), file(2)]).unwrap();
+        cache.add(&[file(3)]).unwrap();
+        assert_eq!(cache.known(), (1..=3).map(file).collect());
+        let path = folder.path().join(HASHES);
+        let good = fs::read(&path).unwrap();
+        for bit in 0..8 * good.len() {
+            let mut bytes = good.clone();
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            atomic::write(&path, &bytes).unwrap();
+            assert_eq!(cache.known(), KnownFiles::default(), "bit {bit}");
+        }
+        atomic::write(&path, &good[..10]).unwrap();
+        cache.add(&[file(4)]).unwrap();
+        assert_eq!(cache.known(), [file(4)].into_iter().collect());
+    }
+
+    #[test]
+    fn writers_at_the_same_time_lose_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = &HashCache::in_folder(folder.path(), false);
+        thread::scope(|scope| {
+            for writer in 0..8 {
+                scope.spawn(move || {
+                    for part in 0..5 {
+                        cache.add(&[file(5 * writer + part)]).unwrap();
+                    }
+                });
+            }
+        });
+        assert_eq!(cache.known(), (0..40).map(file).collect());
+    }
+}

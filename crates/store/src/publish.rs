@@ -1,0 +1,314 @@
+//! Staged products go under their final names, and products that are no longer made go away.
+//!
+//! Renaming many files is not one step for the file system, so a journal says that it has begun and
+//! which files may be concerned. While it lasts there is no manifest: a reader without a manifest has
+//! no products. Whoever finds a journal finishes the work by publishing again.
+
+use std::{
+    collections::BTreeSet,
+    fs,
+    ops::Deref,
+    path::{Component, Path, PathBuf},
+};
+
+use rayon::prelude::*;
+
+use super::{
+    atomic,
+    manifest::{Manifest, ProductEntry},
+};
+use crate::files::{hash_file, short_hash};
+use areograph_base::error::{Cause, IoError, Kind, Locate, Result};
+
+/// Name of the manifest in a site's folder.
+pub const MANIFEST: &str = "manifest.json";
+
+/// Name of the last stage of every flow.
+const PUBLISH: &str = "publish";
+
+/// Name of the folder of stored stages.
+pub const CACHE: &str = ".cache";
+
+/// Name of the folder of half-made products.
+pub(super) const STAGING: &str = ".staging";
+
+/// Paths below the site's folder that a publication under way may have made or will remove.
+pub(super) const JOURNAL: &str = ".publishing";
+
+/// The manifest of the products that stood in the folder before those that stand there.
+pub const PREVIOUS: &str = ".previous.json";
+
+/// Why the last run of the site failed; there is none after a run that did not.
+const FAILED: &str = ".failed";
+
+/// Keeps why a run of the site failed, for the page over all sites; `None` when it did not.
+///
+/// What the disk refuses is no matter here: the failure itself is told by whoever calls.
+pub fn note_failure(site_folder: &Path, failure: Option<&str>) {
+    let path = site_folder.join(FAILED);
+    if let Some(text) = failure {
+        let _ = atomic::write(&path, text.as_bytes());
+    } else {
+        let _ = fs::remove_file(path);
+    }
+}
+
+/// Why the last run of the site failed.
+#[must_use]
+pub fn last_failure(site_folder: &Path) -> Option<String> {
+    fs::read_to_string(site_folder.join(FAILED)).ok()
+}
+
+/// Where products of a site are made.
+#[must_use]
+pub fn staging_path(site_folder: &Path) -> PathBuf {
+    site_folder.join(STAGING)
+}
+
+/// A folder for half-made products, which goes away with this value.
+#[derive(Debug)]
+pub struct Staging {
+    folder: PathBuf,
+}
+
+impl Deref for Staging {
+    type Target = Path;
+
+    fn deref(&self) -> &Path {
+        &self.folder
+    }
+}
+
+impl Drop for Staging {
+    fn drop(&mut self) {
+        // After a publication it is gone; what the disk does not give back now, the next run removes.
+        let _ = fs::remove_dir_all(&self.folder);
+    }
+}
+
+/// An empty folder for half-made products inside the site's folder, hence on the same file system.
+///
+/// # Errors
+/// The folder cannot be made, or an earlier one could not be removed.
+pub fn staging(site_folder: &Path) -> Result<Staging> {
+    let folder = site_folder.join(STAGING);
+    fs::create_dir(&folder)
+        .map_err(IoError::on("create the folder"))
+        .in_file(&folder)?;
+    Ok(Staging { folder })
+}
+
+/// Whether a run ever worked in the folder: it holds stored stages or a publication under way.
+#[must_use]
+pub fn has_work(site_folder: &Path) -> bool {
+    [CACHE, STAGING, JOURNAL, FAILED]
+        .iter()
+        .any(|name| site_folder.join(name).exists())
+}
+
+/// Hashes and flushes staged files, given as paths below `staging` with their rows.
+///
+/// # Errors
+/// A file cannot be read or flushed.
+pub fn entries(staging: &Path, files: &[(PathBuf, u64)]) -> Result<Vec<ProductEntry>> {
+    files
+        .par_iter()
+        .map(|(relative, rows)| {
+            let path = staging.join(relative);
+            atomic::sync_file(&path)?;
+            let (blake3, bytes) = hash_file(&path)?;
+            Ok(ProductEntry {
+                path: relative.to_string_lossy().replace('\\', "/"),
+                bytes,
+                blake3,
+                rows: *rows,
+            })
+        })
+        .collect()
+}
+
+/// Products of another kind in the folder, which a publication would remove.
+#[derive(Debug, thiserror::Error)]
+#[error("there are products of something else: {name}, made by {stage}")]
+struct OtherKind {
+    name: String,
+    stage: String,
+}
+
+impl Cause for OtherKind {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        "give it another name, or its products another folder (--out)".to_owned()
+    }
+}
+
+/// Makes sure that what stands in the folder was made by the same flow, if it was made: by one of the same stages.
+fn require_same_kind(site_folder: &Path, next: &Manifest) -> Result<()> {
+    let Some(standing) = read_manifest(site_folder) else {
+        return Ok(());
+    };
+    let own = standing.stages.iter().filter(|stage| stage.name != PUBLISH);
+    let is_shared = |name: &str| next.stages.iter().any(|stage| stage.name == name);
+    if own.clone().any(|stage| is_shared(&stage.name)) {
+        return Ok(());
+    }
+    match own.into_iter().next() {
+        Some(stage) => Err(OtherKind {
+            name: standing.site.clone(),
+            stage: stage.name.clone(),
+        })
+        .in_file(site_folder),
+        None => Ok(()),
+    }
+}
+
+/// Renames staged products into place, removes earlier ones that are no longer made, writes the manifest last.
+///
+/// # Errors
+/// Products of another kind; a file that cannot be renamed or removed: publishing again repairs the folder.
+pub fn publish(site_folder: &Path, staging: &Path, manifest: &Manifest) -> Result<()> {
+    require_same_kind(site_folder, manifest)?;
+    let made: BTreeSet<&str> = manifest
+        .products
+        .iter()
+        .map(|product| &*product.path)
+        .collect();
+    let earlier = earlier_products(site_folder);
+    let concerned: Vec<&str> = made
+        .iter()
+        .copied()
+        .chain(earlier.iter().map(|path| &**path))
+        .collect();
+    keep_previous(site_folder, manifest)?;
+    let journal = site_folder.join(JOURNAL);
+    atomic::write(&journal, concerned.join("\n").as_bytes())?;
+    remove_if_there(&site_folder.join(MANIFEST))?;
+
+    let mut folders = BTreeSet::from([site_folder.to_owned()]);
+    for path in &made {
+        let target = site_folder.join(path);
+        let folder = target.parent().unwrap_or(site_folder).to_owned();
+        fs::create_dir_all(&folder)
+            .map_err(IoError::on("create the folder"))
+            .in_file(&folder)?;
+        fs::rename(staging.join(path), &target)
+            .map_err(IoError::on("rename into place"))
+            .in_file(&target)?;
+        folders.insert(folder);
+    }
+    for path in earlier.iter().filter(|path| !made.contains(&***path)) {
+        let path = site_folder.join(path);
+        remove_if_there(&path)?;
+        // The folder of an image that is no longer configured goes with its last file.
+        let _ = path.parent().map(fs::remove_dir);
+    }
+    for folder in &folders {
+        atomic::sync_folder(folder);
+    }
+    atomic::write(&site_folder.join(MANIFEST), &manifest_bytes(manifest)?)?;
+    remove_if_there(&journal)?;
+    fs::remove_dir_all(staging)
+        .map_err(IoError::on("remove the folder"))
+        .in_file(staging)
+}
+
+/// Keeps the manifest that stands in the folder, if its products are others than those of `next`.
+fn keep_previous(site_folder: &Path, next: &Manifest) -> Result<()> {
+    match read_manifest(site_folder) {
+        Some(standing) if standing.products != next.products => {
+            atomic::write(&site_folder.join(PREVIOUS), &manifest_bytes(&standing)?)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The manifest of the products before those that stand in the folder; none of the first ones.
+#[must_use]
+pub fn read_previous(site_folder: &Path) -> Option<Manifest> {
+    let text = fs::read_to_string(site_folder.join(PREVIOUS)).ok()?;
+    serde_json::from_str(&text).ok()
+}
+
+/// Products that earlier runs may have left: those of the manifest and of an unfinished journal.
+///
+/// Paths that lead out of the site's folder, which areograph never writes, are left out.
+fn earlier_products(site_folder: &Path) -> BTreeSet<String> {
+    let journal = fs::read_to_string(site_folder.join(JOURNAL)).unwrap_or_default();
+    let manifest = read_manifest(site_folder).map_or_else(Vec::new, |manifest| manifest.products);
+    let inside = |path: &String| {
+        let mut components = Path::new(path).components();
+        components.all(|component| matches!(component, Component::Normal(_)))
+    };
+    journal
+        .lines()
+        .map(str::to_owned)
+        .chain(manifest.into_iter().map(|product| product.path))
+        .filter(|path| !path.is_empty() && inside(path))
+        .collect()
+}
+
+fn remove_if_there(path: &Path) -> Result<()> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(IoError::on("remove")(error)).in_file(path)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// A manifest that cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[error("the manifest cannot be written as JSON: {0}")]
+struct Unwritable(serde_json::Error);
+
+impl Cause for Unwritable {
+    fn kind(&self) -> Kind {
+        Kind::Bug
+    }
+
+    fn advice(&self) -> String {
+        "this is a bug in areograph; please report it with the configuration".to_owned()
+    }
+}
+
+fn manifest_bytes(manifest: &Manifest) -> Result<Vec<u8>> {
+    let mut bytes = serde_json::to_vec_pretty(manifest).map_err(Unwritable)?;
+    bytes.push(b'\n');
+    Ok(bytes)
+}
+
+/// The manifest that lies in the folder, if it can be read.
+#[must_use]
+pub fn read_manifest(site_folder: &Path) -> Option<Manifest> {
+    serde_json::from_slice(&fs::read(site_folder.join(MANIFEST)).ok()?).ok()
+}
+
+/// Products that are not what the manifest says, with what is there instead, or why it cannot be read.
+pub(super) fn damaged<'a>(
+    site_folder: &Path,
+    manifest: &'a Manifest,
+) -> impl Iterator<Item = (&'a ProductEntry, Result<String>)> {
+    manifest.products.iter().filter_map(move |product| {
+        let path = site_folder.join(&product.path);
+        let found = match hash_file(&path) {
+            Ok((blake3, _)) if blake3 == product.blake3 => return None,
+            Ok((blake3, bytes)) => Ok(format!(
+                "has {bytes} bytes with the hash {}",
+                short_hash(&blake3)
+            )),
+            Err(_) if !path.exists() => Ok("is missing".to_owned()),
+            Err(failure) => Err(failure),
+        };
+        Some((product, found))
+    })
+}
+
+/// The first product that is missing or not what the manifest says.
+#[must_use]
+pub fn damaged_product(site_folder: &Path, manifest: &Manifest) -> Option<String> {
+    let (product, _) = damaged(site_folder, manifest).next()?;
+    Some(product.path.clone())
+}

@@ -1,0 +1,142 @@
+//! Products as a reader finds them: whole and as the manifest says, or not to be used.
+
+use std::{fs, io::ErrorKind, path::Path};
+
+use super::{
+    manifest::Manifest,
+    publish::{JOURNAL, MANIFEST, damaged, has_work, read_manifest},
+};
+use crate::files::short_hash;
+use areograph_base::error::{Cause, IoError, Kind, Locate, Result};
+
+/// Why products in a folder are not to be used.
+#[derive(Debug, thiserror::Error)]
+pub enum PublishedError {
+    /// Nothing was published.
+    #[error("there is no {MANIFEST}, so there are no products")]
+    NoManifest,
+    /// A run was killed, or is at work, while files got their final names.
+    #[error("the publication of products into this folder was not finished")]
+    Unfinished,
+    /// The manifest is damaged, or of a version with other entries.
+    #[error("this is no manifest of areograph {}: {reason}", env!("CARGO_PKG_VERSION"))]
+    Unreadable {
+        /// The parser's reason, with line and column.
+        reason: String,
+    },
+    /// Products of a version that may have computed or kept other things.
+    #[error("these are products of areograph {found}; expected {}, which this is", env!("CARGO_PKG_VERSION"))]
+    OtherVersion {
+        /// That version.
+        found: String,
+    },
+    /// A product is not the one that was published.
+    #[error(
+        "{found}; expected {expected_bytes} bytes with the BLAKE3 hash {expected} of {MANIFEST}"
+    )]
+    Contradicts {
+        /// What is there instead.
+        found: String,
+        /// Size in the manifest.
+        expected_bytes: u64,
+        /// Hash in the manifest, shortened.
+        expected: String,
+    },
+    /// Another run published meanwhile.
+    #[error("products were published again while they were read")]
+    Replaced,
+}
+
+impl Cause for PublishedError {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::Replaced => Kind::Io,
+            _ => Kind::Input,
+        }
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::NoManifest => "name a site's folder of products, and run the site to the end",
+            Self::Unfinished => "wait for the run in progress, or run the site again to repair it",
+            Self::Unreadable { .. } | Self::Contradicts { .. } => {
+                "run the site again, which writes damaged products again"
+            }
+            Self::OtherVersion { .. } => "run the site again with this version, or use that one",
+            Self::Replaced => "try again when the run has finished",
+        }
+        .to_owned()
+    }
+}
+
+/// Whether the folder is, or was meant to be, that of a site's products.
+#[must_use]
+pub fn is_site_folder(folder: &Path) -> bool {
+    folder.join(MANIFEST).exists() || has_work(folder)
+}
+
+/// The manifest of a site's folder, every product checked against it.
+///
+/// # Errors
+/// [`PublishedError`], of kind input; the disk's refusal.
+pub fn read_published(folder: &Path) -> Result<Manifest> {
+    read_published_but(folder, |_| false)
+}
+
+/// The same without those products, by their path, that will be made again; of this version of areograph.
+///
+/// # Errors
+/// As [`read_published`], and [`PublishedError::OtherVersion`].
+pub fn read_published_by_this_version(
+    folder: &Path,
+    made_again: impl Fn(&str) -> bool,
+) -> Result<Manifest> {
+    let manifest = read_published_but(folder, made_again)?;
+    if manifest.version == env!("CARGO_PKG_VERSION") {
+        return Ok(manifest);
+    }
+    Err(PublishedError::OtherVersion {
+        found: manifest.version,
+    })
+    .in_file(folder)
+}
+
+fn read_published_but(folder: &Path, made_again: impl Fn(&str) -> bool) -> Result<Manifest> {
+    if folder.join(JOURNAL).exists() {
+        return Err(PublishedError::Unfinished).in_file(folder);
+    }
+    let path = folder.join(MANIFEST);
+    let bytes = match fs::read(&path) {
+        Err(error) if error.kind() == ErrorKind::NotFound && folder.is_dir() => {
+            return Err(PublishedError::NoManifest).in_file(folder);
+        }
+        read => read.map_err(IoError::on("read")).in_file(&path)?,
+    };
+    let manifest: Manifest = serde_json::from_slice(&bytes)
+        .map_err(|error| PublishedError::Unreadable {
+            reason: error.to_string(),
+        })
+        .in_file(&path)?;
+    let mut damaged = damaged(folder, &manifest).filter(|(product, _)| !made_again(&product.path));
+    if let Some((product, found)) = damaged.next() {
+        return Err(PublishedError::Contradicts {
+            found: found?,
+            expected_bytes: product.bytes,
+            expected: short_hash(&product.blake3),
+        })
+        .in_file(folder.join(&product.path));
+    }
+    drop(damaged);
+    Ok(manifest)
+}
+
+/// Checks that `manifest` still stands when its products have been read.
+///
+/// # Errors
+/// [`PublishedError::Replaced`].
+pub fn still_published(folder: &Path, manifest: &Manifest) -> Result<()> {
+    if read_manifest(folder).as_ref() == Some(manifest) {
+        return Ok(());
+    }
+    Err(PublishedError::Replaced).in_file(folder)
+}

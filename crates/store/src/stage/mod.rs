@@ -1,0 +1,172 @@
+//! What a stage is: a name, everything that it may see, and a function of that.
+//!
+//! [`stage_inputs!`](areograph_store::stage_inputs) declares the struct of what a stage sees. Its fields are its fingerprint:
+//! what is no field cannot be used, and what is a field cannot be forgotten.
+
+mod inputs;
+mod output;
+mod reason;
+
+use std::sync::atomic::AtomicBool;
+
+use serde::{Serialize, de::DeserializeOwned};
+
+pub use inputs::{InOrder, Input, Inputs};
+pub use output::{Output, Provenance};
+pub use reason::Reason;
+
+use areograph_base::{error::Result, watch::Watch};
+
+/// Whether a stage works on the orientation of the kernels or on the adjusted one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Round {
+    /// The orientation of the kernels.
+    Initial,
+    /// An adjustment by tie points that were matched with the orientation of the kernels, made to match them again.
+    Matching,
+    /// The adjusted orientation.
+    Adjusted,
+}
+
+impl Round {
+    /// Part of a stage that runs once a site in each round.
+    #[must_use]
+    pub fn part(self) -> Option<String> {
+        self.name().map(str::to_owned)
+    }
+
+    /// Part of a stage that runs for `image` in each round.
+    #[must_use]
+    pub fn part_of(self, image: &str) -> Option<String> {
+        Some(match self.name() {
+            None => image.to_owned(),
+            Some(round) => format!("{image}/{round}"),
+        })
+    }
+
+    /// What a stage that makes the orientation of this round is marked by: the last adjustment of a site is the adjustment.
+    #[must_use]
+    pub const fn of_adjustment(self) -> Self {
+        match self {
+            Self::Matching => Self::Matching,
+            Self::Initial | Self::Adjusted => Self::Initial,
+        }
+    }
+
+    const fn name(self) -> Option<&'static str> {
+        match self {
+            Self::Initial => None,
+            Self::Matching => Some("matching"),
+            Self::Adjusted => Some("adjusted"),
+        }
+    }
+}
+
+/// The outputs differ by the round, and enter under their labels.
+impl Input for Round {
+    fn add_to(&self, _field: &str, _inputs: &mut Inputs) {}
+}
+
+/// A step of the flow: a function of its fields, and of nothing else.
+pub trait Stage {
+    /// Name as logs, messages, the manifest and the command line write it.
+    const NAME: &'static str;
+    /// Raised when the stage computes something else from the same inputs, or lays its output out anew.
+    const METHOD: u32 = 1;
+    /// Whether `check` runs the stage; the others only look at their inputs, by [`Stage::examine`].
+    const CHECKED: bool = false;
+    /// What it makes; stored, and handed to later stages.
+    type Output: Serialize + DeserializeOwned;
+
+    /// Everything that the stage sees, by name; made by [`stage_inputs!`](areograph_store::stage_inputs).
+    fn inputs(&self) -> Inputs;
+
+    /// What the stage is run for when it is run several times in a site: an image, or the second round.
+    fn part(&self) -> Option<String> {
+        None
+    }
+
+    /// Computes the output. `stop` is looked at inside long loops.
+    ///
+    /// # Errors
+    /// What the stage's own documentation says; [`Stopped`](areograph_base::error::Stopped).
+    fn run(&self, stop: &AtomicBool) -> Result<Self::Output>;
+
+    /// The same, with the steps of long loops counted; of a stage that counts none as without.
+    ///
+    /// # Errors
+    /// As [`Stage::run`].
+    fn run_watched(&self, watch: Watch<'_>) -> Result<Self::Output> {
+        self.run(watch.stop())
+    }
+
+    /// What `check` finds in the inputs without running the stage: every finding and every failure.
+    fn examine(&self) -> Vec<Result<String>> {
+        Vec::new()
+    }
+
+    /// What `check` tells of the output.
+    fn findings(&self, _output: &Self::Output) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Name of the stage followed by its part, for example `register/E02-00665`.
+    fn label(&self) -> String {
+        self.part().map_or_else(
+            || Self::NAME.to_owned(),
+            |part| format!("{}/{part}", Self::NAME),
+        )
+    }
+}
+
+/// Declares what a stage may see. The fields are its fingerprint, each by its [`Input`].
+///
+/// ```
+/// use areograph::{stage::{Output, Stage}, stage_inputs};
+///
+/// stage_inputs! {
+///     /// Multiplies what was counted.
+///     pub struct Multiply<'a> {
+///         /// What was counted.
+///         pub counted: &'a Output<u32>,
+///         /// Factor of the configuration.
+///         pub factor: &'a u32,
+///     }
+/// }
+///
+/// impl Stage for Multiply<'_> {
+///     const NAME: &'static str = "multiply";
+///     type Output = u32;
+///     areograph::stage_inputs!(fingerprint);
+///
+///     fn run(&self, _stop: &std::sync::atomic::AtomicBool) -> areograph::error::Result<u32> {
+///         Ok(self.counted.value()? * *self.factor)
+///     }
+/// }
+/// ```
+#[macro_export]
+macro_rules! stage_inputs {
+    (
+        $(#[$doc:meta])*
+        pub struct $name:ident<$life:lifetime> {
+            $($(#[$field_doc:meta])* pub $field:ident: $kind:ty,)*
+        }
+    ) => {
+        $(#[$doc])*
+        #[derive(Debug)]
+        pub struct $name<$life> { $($(#[$field_doc])* pub $field: $kind,)* }
+
+        impl $name<'_> {
+            fn fingerprint(&self, inputs: &mut $crate::stage::Inputs) {
+                $($crate::stage::Input::add_to(&self.$field, stringify!($field), inputs);)*
+            }
+        }
+    };
+    (fingerprint) => {
+        fn inputs(&self) -> $crate::stage::Inputs {
+            let mut inputs = $crate::stage::Inputs::new(Self::METHOD);
+            self.fingerprint(&mut inputs);
+            inputs
+        }
+    };
+}

@@ -1,0 +1,259 @@
+//! A worker process: one task, from its line to the answer.
+//!
+//! What it does can be ended at any moment: nothing half-made stands under a final name.
+
+mod hash;
+mod kernels;
+mod limits;
+mod list;
+mod shots;
+mod site;
+mod voice;
+
+use std::{
+    any::Any,
+    io::{BufRead as _, Read as _},
+    panic::{AssertUnwindSafe, catch_unwind},
+    path::PathBuf,
+    process::{self, ExitCode},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread,
+    time::Duration,
+};
+
+use crate::service::worker::protocol::{
+    ANSWER_MAX, Answer, Cancel, Failure, Line, PROTOCOL, Task, What,
+};
+use crate::{
+    difference::{Limits, Outcome, compare},
+    error::{Error, Kind, Result},
+    report::difference_page,
+    store::{hashes::HashCache, lock::Busy, page::PagePath},
+};
+use shots::{Search, search};
+use voice::Voice;
+
+/// Time between two signs of life.
+const BEAT: Duration = Duration::from_secs(2);
+/// How long a worker goes on to a good place to stop when the service is gone.
+const ORPHANED: Duration = Duration::from_secs(10);
+
+/// What the parts of a worker share.
+struct Worker {
+    task: Task,
+    voice: Arc<Voice>,
+    stop: Arc<AtomicBool>,
+    hashes: HashCache,
+    /// Folders below which input files must lie, links resolved.
+    roots: Vec<PathBuf>,
+}
+
+/// Says hello, reads a task from standard input, does it and answers.
+///
+/// * `parent` – the process of the service, whose end is the worker's
+#[must_use]
+pub fn main(parent: Option<u32>) -> ExitCode {
+    let interrupted = ExitCode::from(Kind::Interrupted.exit_code());
+    if !limits::end_with(parent) {
+        return interrupted;
+    }
+    let voice = match Voice::take() {
+        Ok(voice) => Arc::new(voice),
+        Err(error) => {
+            tracing::error!("standard output cannot be kept for the service: {error}");
+            return ExitCode::from(Kind::Io.exit_code());
+        }
+    };
+    voice.say(&Line::Hello {
+        v: PROTOCOL,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        pid: process::id(),
+    });
+    let task = match read_task() {
+        None => return interrupted,
+        Some(Err(text)) => return fail(&voice, bug(text)),
+        Some(Ok(task)) => task,
+    };
+    let stop = Arc::new(AtomicBool::new(false));
+    // Without these two threads the worker could neither be stopped nor told from one that hangs.
+    let threads = listen(&stop).and_then(|()| beat(&voice));
+    if let Err(error) = threads {
+        return fail(&voice, bug(format!("no thread can be started: {error}")));
+    }
+    limits::keep_to(&task);
+    let worker = Worker {
+        hashes: HashCache::new(&task.hashes_file, false),
+        roots: task
+            .roots
+            .iter()
+            .map(|root| root.canonicalize().unwrap_or_else(|_| root.clone()))
+            .collect(),
+        task,
+        voice,
+        stop,
+    };
+    match catch_unwind(AssertUnwindSafe(|| worker.work())) {
+        Ok(Ok(answer)) => {
+            // Work that is done at once ends before the first sign of life.
+            worker.voice.beat();
+            worker.voice.say(&Line::Answer(answer));
+            ExitCode::SUCCESS
+        }
+        Ok(Err(failure)) => fail(&worker.voice, described(&failure)),
+        Err(panic) => fail(&worker.voice, panicked(&*panic)),
+    }
+}
+
+/// The task; none when the service is gone, or why it is none.
+fn read_task() -> Option<std::result::Result<Task, String>> {
+    let mut line = Vec::new();
+    let input = std::io::stdin().lock();
+    let read = input.take(ANSWER_MAX as u64).read_until(b'\n', &mut line);
+    if read.is_err() || line.is_empty() {
+        return None;
+    }
+    let task =
+        serde_json::from_slice::<Task>(&line).map_err(|error| format!("this is no task: {error}"));
+    Some(task.and_then(|task| {
+        if task.v == PROTOCOL {
+            Ok(task)
+        } else {
+            Err(format!(
+                "the task is of version {}; expected {PROTOCOL}",
+                task.v
+            ))
+        }
+    }))
+}
+
+/// Sets `stop` when the service says so or is gone.
+fn listen(stop: &Arc<AtomicBool>) -> std::io::Result<()> {
+    let stop = Arc::clone(stop);
+    let listener = move || {
+        for line in std::io::stdin().lock().lines() {
+            let Ok(line) = line else { break };
+            match serde_json::from_str::<Cancel>(&line) {
+                Ok(Cancel { cancel }) => {
+                    tracing::info!(?cancel, "the service asks to stop");
+                    stop.store(true, Ordering::Relaxed);
+                }
+                Err(error) => tracing::warn!("the service said what no service says: {error}"),
+            }
+        }
+        tracing::warn!("the service is gone");
+        stop.store(true, Ordering::Relaxed);
+        thread::sleep(ORPHANED);
+        process::exit(i32::from(Kind::Interrupted.exit_code()));
+    };
+    thread::Builder::new().spawn(listener).map(drop)
+}
+
+/// Gives signs of life from now on.
+fn beat(voice: &Arc<Voice>) -> std::io::Result<()> {
+    let voice = Arc::clone(voice);
+    let beats = move || {
+        loop {
+            voice.beat();
+            thread::sleep(BEAT);
+        }
+    };
+    thread::Builder::new().spawn(beats).map(drop)
+}
+
+impl Worker {
+    fn work(&self) -> Result<Answer> {
+        match &self.task.what {
+            What::Run { .. } => self.run().map(Answer::Run),
+            What::Plan { site_file, out } => self.plan(site_file, out).map(Answer::Plan),
+            What::Diff {
+                before,
+                after,
+                page,
+                limit_m,
+                limit_arcsec,
+            } => {
+                let page = page.as_deref().map(PagePath::new).transpose()?;
+                let limits = Limits {
+                    movement_m: Some(*limit_m),
+                    pointing_arcsec: Some(*limit_arcsec),
+                };
+                let difference = compare(before, after, &limits)?;
+                if let Some(page) = page {
+                    page.write(&difference_page(&[&difference], &[])?)?;
+                }
+                Ok(Answer::Diff {
+                    headline: difference.headline(),
+                    sentences: difference.sentences(),
+                    beyond_limit: difference.outcome == Outcome::BeyondLimit,
+                })
+            }
+            What::Probe { files } => self.probe(files).map(|kernels| Answer::Probe { kernels }),
+            What::Hash { files, rehash } => self
+                .hash(files, *rehash)
+                .map(|files| Answer::Hash { files }),
+            What::List { roots, into } => {
+                list::list(roots, into, &self.stop).map(|files| Answer::List { files })
+            }
+            What::Shots {
+                runs,
+                polygon,
+                rows_max,
+                format,
+                into,
+            } => {
+                let asked = Search {
+                    runs,
+                    polygon,
+                    rows_max: *rows_max,
+                    format,
+                    into,
+                };
+                let (rows, complete) = search(&asked, &self.stop)?;
+                Ok(Answer::Shots { rows, complete })
+            }
+        }
+    }
+}
+
+/// Tells a failure; its code is that of the process.
+fn fail(voice: &Voice, failure: Failure) -> ExitCode {
+    let code = failure.code;
+    tracing::error!("{}", failure.text);
+    voice.say(&Line::Failure(failure));
+    ExitCode::from(code)
+}
+
+fn described(failure: &Error) -> Failure {
+    Failure {
+        code: failure.kind().exit_code(),
+        busy: Busy::is_cause_of(failure),
+        site: failure.site.clone(),
+        stage: failure.stage.clone(),
+        file: failure.file.clone(),
+        text: failure.to_string(),
+    }
+}
+
+fn panicked(panic: &(dyn Any + Send)) -> Failure {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    let text = text.or(panic.downcast_ref::<&str>().copied());
+    bug(format!(
+        "areograph itself failed: {}",
+        text.unwrap_or("for no stated reason")
+    ))
+}
+
+/// A failure that is nobody's input: of areograph, or of the service.
+fn bug(text: String) -> Failure {
+    Failure {
+        code: Kind::Bug.exit_code(),
+        busy: false,
+        site: None,
+        stage: None,
+        file: None,
+        text,
+    }
+}
