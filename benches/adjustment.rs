@@ -8,13 +8,7 @@
     reason = "a benchmark prints its times, writes no product and may fail loudly"
 )]
 
-#[path = "../tests/network/orbits.rs"]
-mod orbits;
-#[path = "../tests/network/recipe.rs"]
-mod recipe;
-#[path = "../tests/pushbroom/scene.rs"]
-mod scene;
-
+use areograph_testing::{orbits, recipe};
 use std::{path::Path, time::Instant};
 
 use areograph::geom::{

@@ -8,9 +8,7 @@
     reason = "a benchmark may fail loudly and prints its figures"
 )]
 
-#[path = "../tests/pushbroom/scene.rs"]
-mod scene;
-
+use areograph_testing::scene;
 use std::{hint::black_box, time::Instant};
 
 use areograph::geom::pushbroom::{FixedPoint, FrameFirst, Limits, Projector, Solution, Unseen};

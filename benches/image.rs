@@ -10,10 +10,7 @@
     reason = "a benchmark may fail loudly, and makes pixels of sines"
 )]
 
-#[path = "../tests/common/moc_file.rs"]
-#[allow(dead_code, reason = "the tests use more of it")]
-mod moc_file;
-
+use areograph_testing::moc_file;
 use std::{
     fs,
     hint::black_box,

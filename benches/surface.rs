@@ -8,10 +8,7 @@
     reason = "a benchmark may fail loudly, and works in temporary folders"
 )]
 
-#[path = "../tests/common/moc_file.rs"]
-#[allow(dead_code, reason = "the tests use more of it")]
-mod moc_file;
-
+use areograph_testing::moc_file;
 use std::{fs, path::Path, sync::atomic::AtomicBool, time::Instant};
 
 use areograph::{

@@ -213,7 +213,8 @@ fn errors_px(mission: &Mission, products: &Path) -> Vec<[Vector2<f64>; 2]> {
 
 /// Adjusted tie points by their identifiers, metres Mars-fixed; those that were rejected are not there.
 fn adjusted_m(products: &Path) -> BTreeMap<String, Vector3<f64>> {
-    use arrow_array::{Array as _, AsArray as _};
+    use arrow_array::Array as _;
+    use arrow_array::cast::AsArray as _;
     use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
     let file = File::open(products.join("ties.parquet")).unwrap();

@@ -1,0 +1,4 @@
+//! Cameras and adjustments against published recipes.
+
+mod adjust_recipe;
+mod pushbroom;

@@ -1,0 +1,7 @@
+//! The engine of the service with workers that only pretend: changes, jobs, nights.
+
+mod fake;
+mod service_engine;
+mod service_jobs;
+mod service_nights;
+mod service_scale;

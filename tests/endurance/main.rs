@@ -1,0 +1,6 @@
+//! Runs that are changed, killed and taken up again.
+
+mod changes;
+#[path = "../common/mod.rs"]
+mod common;
+mod killed;

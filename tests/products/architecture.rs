@@ -1,0 +1,337 @@
+//! Arrows point down: a room uses the floors below it, never one above; files use each other one way;
+//! no stage calls another.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests may fail loudly"
+)]
+
+mod uses;
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+    path::Path,
+};
+
+use uses::{Module, Sources, files_below};
+
+/// Rooms by floor, the lowest first; see ARCHITECTURE.md.
+const FLOORS: [&[&str]; 7] = [
+    &[
+        "units",
+        "time",
+        "frames",
+        "body",
+        "constants",
+        "error",
+        "footprints",
+        "ties",
+        "files",
+        "stage",
+        "schema",
+        "altimetry",
+        "image",
+        "instruments",
+        "kernel_source",
+        "line_times",
+        "watch",
+        "wording",
+    ],
+    &["geom", "config", "imaging"],
+    &["spice", "pds", "scene"],
+    &["stages"],
+    &["flow", "report", "difference", "products", "store", "sql"],
+    &["service"],
+    &["cli"],
+];
+
+/// Arrows inside a floor that are meant: the configuration speaks of windows and camera models, the scene is
+/// written with the fence and the PEDR writer, the flow publishes, the difference reads what was published, the report tells of both, and columns of shots are those of products.
+const SAME_FLOOR: [(&str, &str); 11] = [
+    ("config", "geom"),
+    ("scene", "spice"),
+    ("scene", "pds"),
+    ("flow", "products"),
+    ("flow", "store"),
+    ("flow", "report"),
+    ("difference", "products"),
+    ("difference", "store"),
+    ("report", "products"),
+    ("report", "difference"),
+    ("sql", "products"),
+];
+
+/// Tests that only the whole flow can answer: matched tie points against what the images of the scene truly show.
+const WHOLE_FLOW: &str = "scene/images/tests/matching";
+
+fn floor(room: &str) -> usize {
+    FLOORS
+        .iter()
+        .position(|rooms| rooms.contains(&room))
+        .unwrap_or_else(|| {
+            panic!("`{room}` is in no floor: add it to ARCHITECTURE.md and to this test")
+        })
+}
+
+#[test]
+fn arrows_point_down() {
+    let sources = Sources::of_this_crate();
+    let mut wrong = Vec::new();
+    let judged = |module: &&Vec<String>| module.join("/") != WHOLE_FLOW;
+    for module in sources.modules().filter(judged) {
+        let room = &module[0];
+        for used in sources.uses(module) {
+            let Some(used) = used.file.first() else {
+                continue;
+            };
+            let down = floor(used) < floor(room);
+            let ground_floor = floor(used) == 0 && floor(room) == 0;
+            let meant = SAME_FLOOR.contains(&(&**room, &**used));
+            if used != room && !down && !ground_floor && !meant {
+                wrong.push(format!("{}: {room} -> {used}", module.join("/")));
+            }
+        }
+    }
+    assert!(
+        wrong.is_empty(),
+        "arrows that do not point down:\n{}",
+        wrong.join("\n")
+    );
+}
+
+/// Arrows from file to file that lie on a circle.
+fn circles(sources: &Sources) -> Vec<String> {
+    let files_used = |module: &Module| -> BTreeSet<Module> {
+        let uses = sources.uses(module).into_iter();
+        uses.map(|used| used.file).collect()
+    };
+    let arrows: BTreeMap<&Module, BTreeSet<Module>> = sources
+        .modules()
+        .map(|module| (module, files_used(module)))
+        .collect();
+    let leads_back = |from: &Module, to: &Module| {
+        let (mut seen, mut ahead) = (BTreeSet::new(), vec![from]);
+        while let Some(module) = ahead.pop() {
+            let next = arrows.get(module).into_iter().flatten();
+            ahead.extend(next.filter(|next| seen.insert(*next)));
+        }
+        seen.contains(to)
+    };
+    let all = arrows
+        .iter()
+        .flat_map(|(from, to)| to.iter().map(move |to| (*from, to)));
+    all.filter(|(from, to)| leads_back(to, from))
+        .map(|(from, to)| format!("{} -> {}", from.join("/"), to.join("/")))
+        .collect()
+}
+
+#[test]
+fn files_use_each_other_one_way() {
+    let circles = circles(&Sources::of_this_crate());
+    assert!(
+        circles.is_empty(),
+        "files that use each other in a circle:\n{}",
+        circles.join("\n")
+    );
+}
+
+/// Stages share types; what one of them does is for the flow alone to ask.
+#[test]
+fn no_stage_calls_another() {
+    let sources = Sources::of_this_crate();
+    let mut calls = Vec::new();
+    for module in sources.modules().filter(|module| module[0] == "stages") {
+        for used in sources.uses(module) {
+            let other =
+                used.file.len() > 1 && used.file[0] == "stages" && used.file[1] != module[1];
+            let name = used.item.unwrap_or_default();
+            let function = name.starts_with(|first: char| first.is_ascii_lowercase());
+            if other && function {
+                calls.push(format!("{}: {name}", module.join("/")));
+            }
+        }
+    }
+    assert!(
+        calls.is_empty(),
+        "functions of other stages:\n{}",
+        calls.join("\n")
+    );
+}
+
+/// What products hold is known before they are written: writers and pages see no kernels loaded.
+#[test]
+fn no_writer_opens_spice() {
+    let sources = Sources::of_this_crate();
+    let mut opened = Vec::new();
+    let writers = sources.modules().filter(|module| {
+        let rooms = ["products", "report", "difference", "store"];
+        rooms.contains(&&*module[0])
+    });
+    for module in writers {
+        for used in sources.uses(module) {
+            let file = used.file.join("/");
+            if ["spice/session", "spice/view"].contains(&&*file) {
+                opened.push(format!("{}: {file}", module.join("/")));
+            }
+        }
+    }
+    assert!(
+        opened.is_empty(),
+        "writers that open SPICE:\n{}",
+        opened.join("\n")
+    );
+}
+
+fn texts(files: &[(&str, &str)]) -> Sources {
+    let module = |path: &str| path.split_terminator('/').map(str::to_owned).collect();
+    Sources::of_texts(
+        files
+            .iter()
+            .map(|(path, text)| (module(path), (*text).to_owned())),
+    )
+}
+
+#[test]
+fn uses_are_read_whatever_their_form() {
+    let text = "use crate::{a::{self, b as bee, c}, d,\n  e::f};\n/// [`crate::y`]\nuse super::h::T;\n\
+                fn x() { crate::g::h::<u8>(); println!(\"crate::z {}\", crate::p::Q::new()); inner::i(); }\n\
+                #[cfg(test)]\nmod tests { use crate::z; }\nmod inner;";
+    let mut files = vec![("room/one", text), ("room", "pub use two::T as h;\n")];
+    files.push(("room/one/inner", ""));
+    files.push(("room/h", ""));
+    files.extend(["a", "d", "e", "g", "y", "z", "p"].map(|name| (name, "")));
+    let uses = texts(&files).uses(&vec!["room".to_owned(), "one".to_owned()]);
+    let told: Vec<String> = uses
+        .into_iter()
+        .map(|used| format!("{} {}", used.file.join("/"), used.item.unwrap_or_default()))
+        .collect();
+    assert_eq!(
+        told,
+        [
+            "a ",
+            "a b",
+            "a c",
+            "d ",
+            "e f",
+            "g h",
+            "p Q",
+            "room/h T",
+            "room/one/inner i"
+        ]
+    );
+}
+
+#[test]
+fn a_circle_is_found_through_what_a_folder_passes_on() {
+    let sources = texts(&[
+        (
+            "room",
+            "mod one; mod two; pub use one::Thing; fn all() { two::run(); one::run() }",
+        ),
+        ("room/one", "use super::two::run; pub struct Thing;"),
+        ("room/two", "use super::Thing;"),
+        ("other", "use crate::room::Thing;"),
+    ]);
+    assert_eq!(
+        circles(&sources),
+        ["room/one -> room/two", "room/two -> room/one"]
+    );
+}
+
+#[test]
+fn files_stay_short() {
+    let mut files = Vec::new();
+    files_below(
+        &Path::new(env!("CARGO_MANIFEST_DIR")).join("src"),
+        &mut files,
+    );
+    for file in files {
+        let lines = fs::read_to_string(&file).unwrap().lines().count();
+        assert!(
+            lines <= 450,
+            "{} has {lines} lines: split it",
+            file.display()
+        );
+    }
+}
+
+/// Words that name a spacecraft or one of its cameras.
+const INSTRUMENT_WORDS: [&str; 4] = ["mgs", "moc", "mex", "hrsc"];
+
+/// Where they may stand in code, and why; comments may say where a rule comes from.
+const NAME_INSTRUMENTS: [(&str, &str); 9] = [
+    ("src/pds", "reads the labels and files of the mission"),
+    ("src/scene", "imitates the mission, whose files it names"),
+    (
+        "src/constants.rs",
+        "the lines that take in the files of the spacecraft",
+    ),
+    (
+        "src/config/instruments.rs",
+        "the list of instrument files that are built in",
+    ),
+    ("src/config/calibration.rs", "examples of keys"),
+    ("src/config/images.rs", "examples of keys"),
+    ("src/config/kernels.rs", "examples of keys"),
+    ("src/config/pointing.rs", "examples of keys"),
+    ("src/products/kernel_report.rs", "keys of SpiceQL"),
+];
+
+#[test]
+fn only_data_and_label_reading_name_an_instrument() {
+    let mut named = Vec::new();
+    let mut unused: BTreeSet<&str> = NAME_INSTRUMENTS.iter().map(|(path, _)| *path).collect();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files = Vec::new();
+    files_below(&root.join("src"), &mut files);
+    for file in files {
+        let text = fs::read_to_string(&file).unwrap();
+        let path = file.strip_prefix(root).unwrap();
+        // Tests of a file stand at its end, and may take their examples from the mission.
+        let code = text.split("#[cfg(test)]").next().unwrap();
+        let lines = code.lines().enumerate();
+        let naming = lines.filter(|(_, line)| !line.trim_start().starts_with("//") && names(line));
+        for (number, line) in naming {
+            let excused = NAME_INSTRUMENTS
+                .iter()
+                .find(|(allowed, _)| path.starts_with(allowed));
+            match excused {
+                Some((allowed, _)) => {
+                    unused.remove(allowed);
+                }
+                None => named.push(format!(
+                    "{}:{}: {}",
+                    path.display(),
+                    number + 1,
+                    line.trim()
+                )),
+            }
+        }
+    }
+    assert!(
+        named.is_empty(),
+        "put what belongs to an instrument into a file under config/:\n{}",
+        named.join("\n")
+    );
+    assert!(
+        unused.is_empty(),
+        "nothing to excuse any more in {unused:?}"
+    );
+}
+
+/// Whether one of the words stands in a line of code, alone or as a part of a name.
+fn names(line: &str) -> bool {
+    // `MocLabel` and `NAIF_MGS` are words with parts, as `moc_na` is.
+    let mut parts = String::new();
+    let mut before = ' ';
+    for c in line.chars() {
+        if c.is_uppercase() && before.is_lowercase() {
+            parts.push(' ');
+        }
+        parts.push(if c.is_alphanumeric() { c } else { ' ' });
+        before = c;
+    }
+    let mut parts = parts.split_whitespace();
+    parts.any(|part| INSTRUMENT_WORDS.contains(&&*part.to_lowercase()))
+}

@@ -1,0 +1,90 @@
+//! Every printed number of the five papers beside areograph's, in one list; `docs/fidelity.md` and the page of the
+//! report are made from it.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests may fail loudly"
+)]
+
+use areograph_testing::eos_2002;
+use areograph_testing::kept;
+use areograph_testing::recipe;
+use areograph_testing::scene;
+
+mod arthur_1977;
+mod document;
+mod li_2023;
+mod pairs;
+mod row;
+mod shan_2002;
+mod shan_2005;
+mod table_2;
+mod yoon_2004;
+
+use std::{fmt::Write as _, fs, path::Path};
+
+use areograph::report::fidelity_page;
+use kept::is_up_to_date;
+use row::{Account, Outcome, Paper};
+
+/// The papers in the order of the page.
+const PAPERS: [&Paper; 5] = [
+    &shan_2005::PAPER,
+    &shan_2002::PAPER,
+    &yoon_2004::PAPER,
+    &li_2023::PAPER,
+    &arthur_1977::PAPER,
+];
+
+fn outcomes(paper: &Paper) -> Vec<Outcome> {
+    let rows = paper.rows.iter().flat_map(|rows| rows.iter());
+    rows.map(Outcome::of).collect()
+}
+
+#[test]
+fn every_row_stands_once_in_its_order() {
+    for paper in PAPERS {
+        let rows = paper.rows.iter().flat_map(|rows| rows.iter());
+        let found: Vec<&str> = rows.map(|row| row.id).collect();
+        let numbers = 1..=paper.count;
+        let expected: Vec<String> = numbers
+            .map(|number| format!("{}-{number:02}", paper.prefix))
+            .collect();
+        assert_eq!(found, expected, "{}", paper.name);
+    }
+}
+
+#[test]
+fn every_row_comes_out_as_declared() {
+    let papers = PAPERS.map(|paper| (paper, outcomes(paper)));
+    let outcomes = papers.iter().flat_map(|(_, outcomes)| outcomes);
+    let complaints: String = outcomes.map(Outcome::complaint).collect();
+    let fidelity = document::fidelity(&papers);
+    let mut counts = String::new();
+    for (words, rows, _) in &fidelity.verdicts {
+        write!(counts, "{rows} {words}, ").unwrap();
+    }
+    println!("fidelity: {}", counts.trim_end_matches(", "));
+    assert!(complaints.is_empty(), "{complaints}");
+    is_up_to_date("docs/fidelity.md", &document::markdown(&fidelity));
+    is_up_to_date("docs/fidelity.html", &fidelity_page(&fidelity));
+}
+
+#[test]
+fn tests_that_inputs_name_exist() {
+    let rows = PAPERS
+        .iter()
+        .flat_map(|paper| paper.rows.iter().flat_map(|rows| rows.iter()));
+    for row in rows {
+        if let Account::Input { test, .. } = row.account {
+            let (file, name) = test.split_once("::").unwrap();
+            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
+            let text = fs::read_to_string(&path).unwrap_or_default();
+            assert!(
+                text.contains(&format!("fn {name}(")),
+                "{}: no {test}",
+                row.id
+            );
+        }
+    }
+}

@@ -1,0 +1,29 @@
+//! What is generated from declarations and kept in the repository is what the declarations say now;
+//! `SNAPSHOTS=overwrite cargo test --test generated` writes it anew.
+#![allow(
+    clippy::disallowed_methods,
+    clippy::unwrap_used,
+    reason = "the test may fail loudly, and writes into the repository when asked"
+)]
+
+use areograph_testing::kept;
+
+use areograph::schema::DocumentSchema;
+use kept::is_up_to_date;
+
+#[test]
+fn the_list_of_products_is_up_to_date() {
+    is_up_to_date("docs/products.md", &areograph::products::documentation());
+}
+
+#[test]
+fn schemas_are_up_to_date() {
+    let mut schemas = areograph::products::schemas();
+    schemas.push(areograph::store::manifest::schema());
+    schemas.push(areograph::difference::schema());
+    schemas.push(areograph::flow::comparison_schema());
+    for DocumentSchema { name, schema } in schemas {
+        let text = serde_json::to_string_pretty(&schema).unwrap() + "\n";
+        is_up_to_date(&format!("config/schema/{name}.schema.json"), &text);
+    }
+}

@@ -1,0 +1,15 @@
+//! Products, pages, configuration and documents: what is written, and who can read it.
+
+mod architecture;
+#[path = "../common/mod.rs"]
+mod common;
+mod config_arbitrary;
+mod config_bad;
+mod config_valid;
+mod exchange_readers;
+mod fidelity;
+mod generated;
+mod products_site;
+mod report_geometric;
+mod report_page;
+mod report_products;

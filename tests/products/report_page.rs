@@ -1,0 +1,210 @@
+//! The report page of a small site: what its first lines say, and that nothing in it is lost or leaks.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::disallowed_methods,
+    reason = "helpers of tests may fail loudly and write as they like"
+)]
+
+use crate::common::products_site as fixture;
+
+use std::{collections::BTreeSet, fs, path::Path};
+
+use areograph::report;
+use fixture::{SHOTS, Site};
+
+/// The page, also left below `target`, where a person may look at it.
+fn page(name: &str, site: &Site, image: bool) -> String {
+    let page = site.with(image, report::page).unwrap();
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report_page");
+    fs::create_dir_all(&folder).unwrap();
+    fs::write(folder.join(format!("{name}.html")), &page).unwrap();
+    page
+}
+
+/// What stands between `start` and the next `end` after each `start`.
+fn between<'a>(text: &'a str, start: &'a str, end: char) -> impl Iterator<Item = &'a str> {
+    text.split(start)
+        .skip(1)
+        .map(move |rest| rest.split(end).next().unwrap())
+}
+
+#[test]
+fn a_failed_range_check_is_said_in_the_first_lines() {
+    let mut site = Site::small();
+    site.ranges.profiles[0].range_minus_distance_m.mean = 11.0;
+    site.ranges.profiles[0].mean_without_outliers_m = 11.0;
+    let page = page("small", &site, true);
+    let lead = page.split("<nav").next().unwrap();
+    assert!(lead.contains("class=\"verdict invalid\""));
+    assert!(lead.contains("<strong>Invalid, for one reason:</strong>"));
+    assert!(lead.contains("<li>profile antimeridian/9019: mean of range − distance 11.000 m"));
+    assert!(lead.contains("skipped records: ap19019l.b record 4"));
+    assert!(page.contains("beyond the limit"));
+    // The checks stand in the lead too, the worst first, each with a link to what tells more.
+    let checks = lead.split("<caption>Checks</caption>").nth(1).unwrap();
+    let outcomes: Vec<&str> = between(checks, "<span class=\"outcome ", '"').collect();
+    assert!(outcomes.len() > 8, "{outcomes:?}");
+    let order = ["invalid", "remarks", "valid"];
+    let ranks = outcomes
+        .iter()
+        .map(|of| order.iter().position(|word| word == of).unwrap());
+    assert!(ranks.is_sorted(), "{outcomes:?}");
+    assert!(checks.contains("<a href=\"#range-check\">Range − distance (mean)</a>"));
+}
+
+#[test]
+fn what_came_from_files_stays_text() {
+    let page = page("escaped", &Site::small(), true);
+    assert!(page.contains("One orbit &amp; one image &lt;made by hand&gt;"));
+    assert!(page.contains("record 4: &lt;script&gt;alert(1)&lt;/script&gt; &amp; more"));
+    assert!(page.contains("class 0 &lt;cloud&gt;"));
+    assert!(!page.contains("<script"));
+    assert!(page.contains(">naif0012.tls</th>"));
+    assert!(page.contains("<li>ap19019l.b: in IAU 2000 already"));
+}
+
+#[test]
+fn nothing_is_fetched_and_every_plot_is_told_in_words_and_numbers() {
+    let page = page("alone", &Site::small(), true);
+    for outside in [
+        "src=",
+        "url(",
+        "@import",
+        "<iframe",
+        "<link rel=\"stylesheet\"",
+    ] {
+        assert!(!page.contains(outside), "{outside}");
+    }
+    for target in between(&page, "href=\"", '"') {
+        let inside = ["#", "data:", "../", "figures/"]
+            .iter()
+            .any(|start| target.starts_with(start));
+        assert!(inside, "{target:.60}");
+    }
+    let ids: Vec<&str> = between(&page, " id=\"", '"').collect();
+    let unique: BTreeSet<&str> = ids.iter().copied().collect();
+    assert_eq!(ids.len(), unique.len(), "names inside the page are unique");
+    for named in between(&page, "aria-labelledby=\"", '"') {
+        for id in named.split(' ') {
+            assert!(unique.contains(id), "{id}");
+        }
+    }
+    for anchor in between(&page, "href=\"#", '"') {
+        assert!(unique.contains(anchor), "{anchor}");
+    }
+    // Residuals, scan, image, image plane, convergence, map and the kernels of one stretch of time.
+    assert_eq!(page.matches("<svg").count(), 7);
+    assert_eq!(page.matches("<svg role=\"img\"").count(), 7);
+    assert_eq!(page.matches("href=\"data:text/csv").count(), 7);
+    // Every shot is in the data of the residuals, once as residual and once as angle.
+    let name = "download=\"range-distance-along-antimeridian-9019.csv\" href=\"";
+    let residuals = between(&page, name, '"').next().unwrap();
+    let lines = residuals.matches("%0A").count();
+    let trend_ends = 2;
+    assert_eq!(lines, 1 + 2 * SHOTS as usize + trend_ends);
+}
+
+#[test]
+fn a_gap_in_attitude_is_seen_and_measured() {
+    let page = page("gap", &Site::small(), true);
+    let picture = page.split("<figure id=\"kernels-at-").nth(1).unwrap();
+    let caption = between(picture, "<figcaption>", '\n').next().unwrap();
+    assert!(
+        caption.contains(
+            "Of the requested time, margins included, 2.000 s are not covered, the first 2.000 s at"
+        ),
+        "{caption:.300}"
+    );
+    // One red bar for the gap; the swatch of its key is not part of the picture.
+    let svg = picture.split("</svg>").next().unwrap();
+    assert_eq!(svg.matches("fill=\"#C10019\"").count(), 1);
+}
+
+#[test]
+fn many_profiles_share_plots_and_the_page_stays_small() {
+    let mut site = Site::small();
+    let (profile, ranges) = (site.profiles[0].clone(), site.ranges.profiles[0].clone());
+    let shots = site.ranges.shots.clone();
+    for copy in 1..300_u32 {
+        let mut profile = profile.clone();
+        profile.id = format!("antimeridian/{}", 9019 + copy);
+        let mut ranges = ranges.clone();
+        ranges.profile.clone_from(&profile.id);
+        site.profiles.push(profile);
+        site.ranges.profiles.push(ranges);
+        let all = &mut site.ranges.shots;
+        all.profile.extend(shots.profile.iter().map(|_| copy));
+        all.row.extend(&shots.row);
+        all.range_minus_distance_m
+            .extend(&shots.range_minus_distance_m);
+        all.range_minus_distance_crossover_m
+            .extend(&shots.range_minus_distance_crossover_m);
+        all.decoding_m.extend(&shots.decoding_m);
+        all.spacecraft_radial_m.extend(&shots.spacecraft_radial_m);
+        all.spacecraft_along_m.extend(&shots.spacecraft_along_m);
+        all.spacecraft_cross_m.extend(&shots.spacecraft_cross_m);
+        all.outlier.extend(&shots.outlier);
+    }
+    let page = page("many", &site, false);
+    // All profiles in one plot and the worst six alone, each with its scan; one map, one stretch of kernels.
+    assert_eq!(page.matches("<svg").count(), 1 + 6 + 6 + 1 + 1);
+    // The verdict stays on one screen, however many profiles break their limit.
+    assert!(page.contains("Invalid, for 300 reasons:"));
+    assert!(page.contains("And 296 more, all of them in ../manifest.json."));
+    assert!(page.len() < 2_000_000, "{} bytes", page.len());
+}
+
+#[test]
+fn the_map_tells_heights_of_shots_that_it_does_not_draw() {
+    let mut site = Site::small();
+    let shot = site.footprints.row(0);
+    for _ in 0..10_000 {
+        site.footprints.push(&shot);
+    }
+    // 10060 shots: every third is drawn, the first, the fourth …
+    site.footprints.radius_crossover_m[1] += 4_000.0;
+    let page = page("high", &site, false);
+    assert!(page.contains(
+        "10\u{202f}060 footprints (dots, profiles named by orbit), −1499 to 2501 m above the areoid."
+    ));
+}
+
+#[test]
+fn maps_work_at_the_pole_and_across_the_antimeridian() {
+    for (name, site, longitude) in [
+        ("antimeridian", Site::small(), "180° E"),
+        ("polar", Site::polar(), "270° E"),
+    ] {
+        let page = page(name, &site, true);
+        let map = page
+            .split("<figure id=\"windows-footprints-and-images\"")
+            .nth(1)
+            .unwrap();
+        let svg = map.split("</svg>").next().unwrap();
+        assert!(svg.contains(longitude), "{name}");
+        // All shots are on the sheet: dots whose centre lies inside the picture.
+        let width = between(svg, "viewBox=\"0 0 ", ' ').next().unwrap();
+        let width: f64 = width.parse().unwrap();
+        let centres: Vec<f64> = between(svg, "<circle ", '>')
+            .filter(|circle| circle.contains(" r=\"2\""))
+            .map(|circle| {
+                between(circle, "cx=\"", '"')
+                    .next()
+                    .unwrap()
+                    .parse()
+                    .unwrap()
+            })
+            .collect();
+        assert_eq!(centres.len(), SHOTS as usize, "{name}");
+        assert!(centres.iter().all(|x| (0.0..=width).contains(x)), "{name}");
+    }
+}
+
+#[test]
+fn a_site_without_shots_and_images_has_a_page_too() {
+    let page = page("empty", &Site::empty(), false);
+    assert!(page.contains("Invalid, for one reason:"));
+    assert!(page.contains("no footprint in any window"));
+    assert_eq!(page.matches("<svg").count(), 2); // the window and the kernels
+}

@@ -1,0 +1,16 @@
+//! Real kernels, shots, cubes, labels and camera files, against what other programs make of them.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod exchange_isd;
+mod hrsc_images;
+mod hrsc_orientation;
+mod real_adjustment;
+mod real_orientation;
+mod real_ranges;
+mod real_registration;
+mod real_site;
+mod real_ties;
+mod support_data;
+mod table_shots;
+mod usgscsm;

@@ -1,0 +1,11 @@
+//! The service with its worker processes: commands, pages, interface.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod service_commands;
+mod service_http;
+mod service_http_hostile;
+mod service_http_many;
+mod service_run;
+mod worker;
+mod world;

@@ -1,0 +1,225 @@
+//! Commands round the service: nights for a timer, copies, tokens, units of systemd.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::disallowed_methods,
+    reason = "helpers of tests may fail loudly"
+)]
+
+use crate::common;
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Output},
+};
+
+use common::{
+    mission::{areograph, succeed},
+    outside,
+};
+
+struct Keeper {
+    folder: tempfile::TempDir,
+}
+
+impl Keeper {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        succeed(
+            areograph()
+                .args(["serve", "--init"])
+                .arg(folder.path().join("demo")),
+        );
+        let keeper = Self { folder };
+        let file = keeper.file("areograph.toml");
+        let text = fs::read_to_string(&file).unwrap();
+        let text = text.replace("quiet_period_s = 5.0", "quiet_period_s = 0.5");
+        let text = text.replace("scan_interval_s = 2.0", "scan_interval_s = 0.3");
+        fs::write(
+            file,
+            text.replace("min_free_mib = 1024", "min_free_mib = 1"),
+        )
+        .unwrap();
+        keeper
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.folder.path().join("demo").join(name)
+    }
+
+    fn nightly(&self) -> Output {
+        let mut command = areograph();
+        command
+            .args(["--quiet", "nightly"])
+            .arg(self.file("areograph.toml"));
+        command.output().unwrap()
+    }
+
+    fn service(&self, arguments: &[&str], more: &[&str]) -> Output {
+        let mut command = areograph();
+        command
+            .arg("service")
+            .args(arguments)
+            .arg(self.file("areograph.toml"));
+        command.args(more).output().unwrap()
+    }
+}
+
+fn said(output: &Output) -> String {
+    let text = [&output.stdout[..], &output.stderr[..]].concat();
+    String::from_utf8(text).unwrap()
+}
+
+#[test]
+fn a_night_without_a_service_does_what_is_to_be_done() {
+    let keeper = Keeper::new();
+    let first = keeper.nightly();
+    assert_eq!(said(&first), "4 sites compared, 4 runs, 0 failures\n");
+    assert_eq!(first.status.code(), Some(0));
+    let second = keeper.nightly();
+    assert_eq!(said(&second), "4 sites compared, 0 runs, 0 failures\n");
+    // A new database knows the runs.
+    let copy = keeper.folder.path().join("copy.db");
+    assert_eq!(
+        said(&keeper.service(&["backup"], &[copy.to_str().unwrap()])),
+        format!("copied to {}\n", copy.display())
+    );
+    let again = keeper.service(&["backup"], &[copy.to_str().unwrap()]);
+    assert_eq!(again.status.code(), Some(2), "{}", said(&again));
+    assert_eq!(
+        said(&keeper.service(&["rebuild"], &[])),
+        "4 sites, 4 runs\n"
+    );
+    assert_eq!(
+        said(&keeper.nightly()),
+        "4 sites compared, 0 runs, 0 failures\n"
+    );
+    // A site that cannot be run: the night is done, and says so by its exit code.
+    let site = keeper.file("sites/isidis.toml");
+    let text = fs::read_to_string(&site).unwrap();
+    fs::write(&site, format!("{text}\n[nonsense]\n")).unwrap();
+    let failed = keeper.nightly();
+    assert_eq!(said(&failed), "4 sites compared, 0 runs, 1 failure\n");
+    assert_eq!(failed.status.code(), Some(2));
+    assert!(
+        keeper
+            .file("products/isidis/current/report/index.html")
+            .is_file()
+    );
+    // Half a database is told as such, and where the copies are.
+    let database = keeper.file("state/areograph.db");
+    let bytes = fs::read(&database).unwrap();
+    fs::write(
+        &database,
+        [&bytes[..100], &vec![0xff; bytes.len() - 100]].concat(),
+    )
+    .unwrap();
+    for ending in ["-wal", "-shm"] {
+        let _ = fs::remove_file(keeper.file(&format!("state/areograph.db{ending}")));
+    }
+    let damaged = keeper.nightly();
+    assert_eq!(damaged.status.code(), Some(3), "{}", said(&damaged));
+    assert!(
+        said(&damaged).contains("areograph service rebuild"),
+        "{}",
+        said(&damaged)
+    );
+}
+
+#[test]
+fn a_token_is_shown_once_listed_and_revoked() {
+    let keeper = Keeper::new();
+    let made = said(&keeper.service(
+        &["token", "add"],
+        &["--role", "operate", "--note", "night shift", "--days", "3"],
+    ));
+    let token = made.trim();
+    assert!(token.starts_with("areo_") && token.len() == 78, "{made}");
+    let id = &token[5..13];
+    let list = said(&keeper.service(&["token", "list"], &[]));
+    assert!(
+        list.starts_with(&format!("{id}  operate  until 20"))
+            && list.ends_with("never used  night shift\n"),
+        "{list}"
+    );
+    assert!(!list.contains(&token[14..]));
+    let revoked = keeper.service(&["token", "revoke"], &[id]);
+    assert_eq!(said(&revoked), format!("{id} is revoked\n"));
+    assert!(said(&keeper.service(&["token", "list"], &[])).contains("revoked 20"));
+    let unknown = keeper.service(&["token", "revoke"], &["00000000"]);
+    assert_eq!(unknown.status.code(), Some(2));
+}
+
+#[test]
+fn a_configuration_stands_and_an_address_is_refused() {
+    let keeper = Keeper::new();
+    let again = areograph()
+        .args(["serve", "--init"])
+        .arg(keeper.folder.path().join("demo"))
+        .output()
+        .unwrap();
+    assert_eq!(again.status.code(), Some(2));
+    assert!(said(&again).contains("there is a configuration already"));
+    let mut serve = areograph();
+    serve.arg("serve").arg(keeper.file("areograph.toml"));
+    let public = serve.args(["--listen", "0.0.0.0:0"]).output().unwrap();
+    assert_eq!(public.status.code(), Some(2));
+    assert!(
+        said(&public).contains("behind_tls_proxy"),
+        "{}",
+        said(&public)
+    );
+}
+
+#[test]
+fn a_folder_that_was_never_seen_must_be_there() {
+    let keeper = Keeper::new();
+    fs::rename(keeper.file("kernels"), keeper.file("elsewhere")).unwrap();
+    let night = keeper.nightly();
+    assert_eq!(night.status.code(), Some(2));
+    for part in ["areograph.toml", "inputs.kernels", "never seen", "mount"] {
+        assert!(said(&night).contains(part), "{}", said(&night));
+    }
+}
+
+#[test]
+fn units_of_systemd_are_sound() {
+    let test = "units_of_systemd_are_sound";
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("config/systemd");
+    if Command::new("systemd-analyze")
+        .arg("--version")
+        .output()
+        .is_err()
+    {
+        outside::skipped(test, "no systemd-analyze");
+        return;
+    }
+    outside::found(test);
+    // The program that the units name is where a package puts it; here any will do.
+    let copy = tempfile::tempdir().unwrap();
+    let mut units = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let text = fs::read_to_string(&path).unwrap();
+        let unit = copy.path().join(path.file_name().unwrap());
+        fs::write(&unit, text.replace("/usr/local/bin/areograph", "/bin/true")).unwrap();
+        units.push(unit);
+    }
+    assert_eq!(units.len(), 3);
+    let verified = Command::new("systemd-analyze")
+        .arg("verify")
+        .args(["--man=no", "--recursive-errors=no"])
+        .args(&units)
+        .output()
+        .unwrap();
+    assert!(verified.status.success(), "{}", said(&verified));
+    let service = copy.path().join("areograph.service");
+    let exposed = Command::new("systemd-analyze")
+        .args(["security", "--offline=yes", "--threshold=40"])
+        .arg(service)
+        .output()
+        .unwrap();
+    // 4.0 of 10: what is left is the network, for the pages.
+    assert!(exposed.status.success(), "{}", said(&exposed));
+}

@@ -1,0 +1,8 @@
+//! Stated accuracies and verdicts against the truth of synthetic missions.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod scene_errors;
+mod scene_mission;
+mod scene_ties;
+mod truth;

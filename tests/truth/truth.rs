@@ -1,0 +1,370 @@
+//! What products state of accuracy, held against the truth of synthetic missions: ten seeds and the built-in one.
+//!
+//! Nothing here is computed by what is judged: errors come from `truth.json`, which no stage reads.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::disallowed_methods,
+    reason = "helpers of tests may fail loudly, and write site files"
+)]
+
+use crate::common;
+
+mod across;
+mod attitude_clock;
+mod common_bus;
+mod footprint_heights;
+mod light_time;
+mod misregistration;
+mod orbit;
+mod overlays;
+mod relief;
+
+use std::{
+    collections::BTreeMap,
+    fs::{self, File},
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use arrow_array::cast::AsArray;
+use arrow_array::types::Float64Type;
+use arrow_array::{Array as _, RecordBatch};
+use common::{
+    json,
+    mission::{areograph, mission, succeed},
+};
+use nalgebra::{Matrix3, Vector3};
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use serde_json::Value;
+
+const SITES: [&str; 3] = ["eos_chasma", "gusev_crater", "isidis"];
+const SEEDS: std::ops::RangeInclusive<u32> = 2..=11;
+
+/// Errors of a site's good tie points against truth, and what is stated of them.
+struct Judged {
+    name: String,
+    /// East, north and up, metres.
+    errors_m: Vec<Vector3<f64>>,
+    /// Stated standard deviations of the same.
+    sigmas_m: Vec<Vector3<f64>>,
+    /// Stated standard deviations of their mean.
+    mean_sigmas_m: Vector3<f64>,
+    /// Median height above the MOLA surface before the adjustment, and the true error of heights then, metres.
+    against_mola_m: f64,
+    before_m: f64,
+    /// Stated standard deviation of the mean height of the surface, metres.
+    surface_sigma_m: f64,
+    /// Standard deviation of unit weight along the track.
+    along: f64,
+    /// Estimate of the attitude's clock with its standard deviation, seconds, where it is an unknown.
+    clock_s: Option<(f64, f64)>,
+    /// By the other reading of what images disagree by: mean minus that of the adjustment, and its standard deviations,
+    /// towards east, north and up, metres.
+    other_m: Option<[Vector3<f64>; 2]>,
+    lost: Vec<String>,
+    kept_blunders: Vec<String>,
+}
+
+fn table(path: &Path) -> RecordBatch {
+    let builder = ParquetRecordBatchReaderBuilder::try_new(File::open(path).unwrap()).unwrap();
+    // All rows at once.
+    let reader = builder.with_batch_size(1 << 20).build();
+    reader.unwrap().next().unwrap().unwrap()
+}
+
+/// A column of texts.
+fn texts(table: &RecordBatch, name: &str) -> Vec<String> {
+    let column = table.column_by_name(name).unwrap().as_string::<i32>();
+    column.iter().map(|text| text.unwrap().to_owned()).collect()
+}
+
+fn vector(value: &Value) -> Vector3<f64> {
+    Vector3::from_fn(|axis, _| value[axis].as_f64().unwrap())
+}
+
+/// Rows towards east, north and up.
+fn local(place_m: &Vector3<f64>) -> Matrix3<f64> {
+    let up = place_m.normalize();
+    let east = Vector3::z().cross(&up).normalize();
+    Matrix3::from_rows(&[
+        east.transpose(),
+        up.cross(&east).transpose(),
+        up.transpose(),
+    ])
+}
+
+impl Judged {
+    fn of(mission: &Path, out: &Path, site: &str) -> Self {
+        let truth = json(&mission.join("truth.json"));
+        let mut sites = truth["ties"].as_array().unwrap().iter();
+        let own = sites.find(|of| of["site"] == site).unwrap();
+        let ties: BTreeMap<&str, &Value> = own["ties"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|tie| (tie["id"].as_str().unwrap(), tie))
+            .collect();
+        let folder = out.join(site);
+        let found = table(&folder.join("ties.parquet"));
+        let names = found.column_by_name("tie").unwrap().as_string::<i32>();
+        let numbers = |name: &str, row: usize| {
+            let column = found.column_by_name(name).unwrap();
+            let column = column.as_primitive::<Float64Type>();
+            (!column.is_null(row)).then(|| column.value(row))
+        };
+        let three = |names: [&str; 3], row: usize| {
+            let values = names.map(|name| numbers(name, row));
+            Some(Vector3::new(values[0]?, values[1]?, values[2]?))
+        };
+        let document = json(&folder.join("adjustment.json"));
+        let summary = &document["adjustment"]["summary"];
+        let mut judged = Self {
+            name: format!("{} {site}", mission.file_name().unwrap().to_string_lossy()),
+            errors_m: Vec::new(),
+            sigmas_m: Vec::new(),
+            mean_sigmas_m: vector(&document["adjustment"]["heights"]["mean_sigma_m"]),
+            against_mola_m: document["before"]["heights"]["above_surface_m"]["median"]
+                .as_f64()
+                .unwrap(),
+            before_m: 0.0,
+            surface_sigma_m: document["before"]["heights"]["mean_sigma_m"]
+                .as_f64()
+                .unwrap(),
+            along: summary["tie_components"][0].as_f64().unwrap(),
+            clock_s: document["adjustment"]["attitude_clock_s"]
+                .as_array()
+                .map(|clock| {
+                    let [offset_s, sigma_s] = [0, 1].map(|at| clock[at].as_f64().unwrap());
+                    (offset_s, sigma_s)
+                }),
+            other_m: document["adjustment"]
+                .get("other_reading")
+                .map(|other| [vector(&other["moved_m"]), vector(&other["mean_sigma_m"])]),
+            lost: Vec::new(),
+            kept_blunders: Vec::new(),
+        };
+        let mut before_m = Vec::new();
+        // Every other row: a tie point has two measurements.
+        for row in (0..found.num_rows()).step_by(2) {
+            let name = names.value(row);
+            let tie = ties[name];
+            let true_m = vector(&tie["ground_iau2000_m"]);
+            let adjusted = three(["adjusted_x_m", "adjusted_y_m", "adjusted_z_m"], row);
+            match (adjusted, tie["blunder"].is_null()) {
+                (Some(_), false) => judged.kept_blunders.push(name.to_owned()),
+                (None, true) => judged.lost.push(name.to_owned()),
+                (None, false) => {}
+                (Some(adjusted_m), true) => {
+                    let axes = local(&true_m);
+                    let initial_m = three(["x_m", "y_m", "z_m"], row).unwrap();
+                    before_m.push((axes * (initial_m - true_m)).z);
+                    judged.errors_m.push(axes * (adjusted_m - true_m));
+                    let sigmas = ["sigma_east_m", "sigma_north_m", "sigma_up_m"];
+                    judged.sigmas_m.push(three(sigmas, row).unwrap());
+                }
+            }
+        }
+        before_m.sort_by(f64::total_cmp);
+        judged.before_m = before_m[before_m.len() / 2];
+        judged
+    }
+
+    /// Mean error of adjusted heights, metres, whatever is stated of them.
+    fn height_error_m(mission: &Path, out: &Path, site: &str) -> f64 {
+        let truth = json(&mission.join("truth.json"));
+        let mut sites = truth["ties"].as_array().unwrap().iter();
+        let own = sites.find(|of| of["site"] == site).unwrap();
+        let found = table(&out.join(site).join("ties.parquet"));
+        let names = texts(&found, "tie");
+        let axes = ["adjusted_x_m", "adjusted_y_m", "adjusted_z_m"].map(|axis| {
+            let column = found.column_by_name(axis).unwrap();
+            column.as_primitive::<Float64Type>().clone()
+        });
+        let errors = own["ties"].as_array().unwrap().iter().filter_map(|tie| {
+            let row = names.iter().position(|name| tie["id"] == name.as_str())?;
+            let is_good = tie["blunder"].is_null() && !axes[0].is_null(row);
+            is_good.then(|| {
+                let true_m = vector(&tie["ground_iau2000_m"]);
+                let adjusted_m = Vector3::from_fn(|axis, _| axes[axis].value(row));
+                adjusted_m.norm() - true_m.norm()
+            })
+        });
+        let errors: Vec<f64> = errors.collect();
+        errors.iter().sum::<f64>() / errors.len() as f64
+    }
+
+    fn mean_m(&self) -> Vector3<f64> {
+        self.errors_m.iter().sum::<Vector3<f64>>() / self.errors_m.len() as f64
+    }
+
+    /// Root mean square of the height errors about their mean, metres.
+    fn relative_height_m(&self) -> f64 {
+        let mean_m = self.mean_m().z;
+        let squares = self.errors_m.iter().map(|error| (error.z - mean_m).powi(2));
+        (squares.sum::<f64>() / self.errors_m.len() as f64).sqrt()
+    }
+}
+
+/// What the observations allow of [`Judged::relative_height_m`], metres.
+///
+/// The adjustment is linear and weighs all observations by their covariance: what it states is then the least variance that
+/// any unbiased estimate can have (Gauss and Markov; Cramér and Rao where errors are normal). Of the single heights'
+/// variances the mean of all is no part of the relative error.
+fn relative_bound_m(site: &Judged) -> f64 {
+    let singles = site.sigmas_m.iter().map(|sigma| sigma.z);
+    (root_mean_square(singles).powi(2) - site.mean_sigmas_m.z.powi(2)).sqrt()
+}
+
+/// A mission of this seed, with `options`.
+fn scene(folder: &Path, seed: u32, options: &[&str]) -> PathBuf {
+    let path = folder.join(format!("seed-{seed}"));
+    let mut scene = areograph();
+    scene.args([
+        "--quiet",
+        "scene",
+        "--day-s",
+        "600",
+        "--seed",
+        &seed.to_string(),
+    ]);
+    succeed(scene.args(options).arg(&path));
+    path
+}
+
+/// The command that runs every site of a mission.
+fn run(mission: &Path, out: &Path) -> Command {
+    let mut run = areograph();
+    run.args(["--quiet", "run"]);
+    for site in SITES {
+        run.arg(mission.join(format!("sites/{site}.toml")));
+    }
+    run.arg("--out").arg(out);
+    run
+}
+
+/// Every site of every mission, run into `folder`.
+fn judged(folder: &Path, missions: &[PathBuf]) -> Vec<Judged> {
+    let of_mission = |mission: &PathBuf| {
+        let out = folder.join("out").join(mission.file_name().unwrap());
+        succeed(&mut run(mission, &out));
+        let judged = SITES.map(|site| Judged::of(mission, &out, site));
+        fs::remove_dir_all(&out).unwrap();
+        judged
+    };
+    missions.iter().flat_map(of_mission).collect()
+}
+
+fn root_mean_square(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len() as f64;
+    (values.map(|value| value * value).sum::<f64>() / count).sqrt()
+}
+
+#[test]
+fn stated_heights_hold_against_truth() {
+    let folder = tempfile::tempdir().unwrap();
+    let seeds = SEEDS.map(|seed| scene(folder.path(), seed, &[]));
+    let missions: Vec<PathBuf> = [mission()].into_iter().chain(seeds).collect();
+    let all = judged(folder.path(), &missions);
+    for site in &all {
+        let (mean_m, sigma_m) = (site.mean_m(), site.mean_sigmas_m);
+        println!(
+            "{:28} mean {:6.1} {:6.1} {:5.2} ± {:.0} {:.0} {:.2} m; relative height {:.1} m of {:.1} m; MOLA said {:.1} ± {:.1}, truth {:.1} m",
+            site.name,
+            mean_m.x,
+            mean_m.y,
+            mean_m.z,
+            sigma_m.x,
+            sigma_m.y,
+            sigma_m.z,
+            site.relative_height_m(),
+            relative_bound_m(site),
+            site.against_mola_m,
+            site.surface_sigma_m,
+            site.before_m
+        );
+        // Metres, and in stated standard deviations: one of 400 exceeds three of them by chance.
+        assert!(mean_m.z.abs() < 6.0, "{}: {} m", site.name, mean_m.z);
+        assert!(mean_m.z.abs() < 3.0 * sigma_m.z, "{}", site.name);
+        // The place is not determined, and stated as such: to 110 m on an axis.
+        for axis in 0..2 {
+            assert!(mean_m[axis].abs() < 3.0 * sigma_m[axis], "{}", site.name);
+            assert!(sigma_m[axis] > 100.0, "{}: {sigma_m}", site.name);
+        }
+        // Bends and tilts of heights within a site, noise of a line included: what the surface controls.
+        assert!(site.relative_height_m() < 10.0, "{}", site.name);
+        // Before the adjustment MOLA measures the true error, without knowing it: to four standard deviations of what
+        // its surface errs by at all tie points.
+        let off_m = site.against_mola_m - site.before_m;
+        assert!(
+            off_m.abs() < 4.0 * site.surface_sigma_m,
+            "{}: {off_m} m",
+            site.name
+        );
+        assert!(
+            (0.5..1.2).contains(&site.along),
+            "{}: {}",
+            site.name,
+            site.along
+        );
+        assert_eq!(site.kept_blunders, [""; 0], "{}", site.name);
+    }
+    let pooled = root_mean_square(
+        all.iter()
+            .map(|site| site.mean_m().z / site.mean_sigmas_m.z),
+    );
+    println!("mean heights over their standard deviations: {pooled:.2}");
+    // 33 sites: chance alone gives 0.75 to 1.25; the surface's least roughness overstates it a little.
+    assert!((0.7..1.3).contains(&pooled), "{pooled}");
+    let relative_m = root_mean_square(all.iter().map(Judged::relative_height_m));
+    assert!(relative_m < 8.0, "{relative_m} m");
+    let single: Vec<f64> = all
+        .iter()
+        .flat_map(|site| site.errors_m.iter().zip(&site.sigmas_m))
+        .map(|(error, sigma)| error.z / sigma.z)
+        .collect();
+    let single = root_mean_square(single.into_iter());
+    println!("single heights over theirs: {single:.2}; relative {relative_m:.1} m");
+    assert!((0.7..1.3).contains(&single), "{single}");
+    // Good tie points lost: 0.2 % at most.
+    let lost: usize = all.iter().map(|site| site.lost.len()).sum();
+    let good: usize = all.iter().map(|site| site.errors_m.len()).sum();
+    println!("{lost} of {good} good tie points lost");
+    assert!(500 * lost <= good, "{lost} of {good}");
+}
+
+/// Twelve missions that may be wrong in all that the real one may have been wrong in, over ground of three kinds: what
+/// is stated holds on every axis, the place included, although nothing but prior knowledge says it.
+#[test]
+fn stated_heights_and_places_hold_where_everything_errs() {
+    let folder = tempfile::tempdir().unwrap();
+    let missions: Vec<PathBuf> = (101..=112)
+        .zip(["plains", "medium", "rough"].into_iter().cycle())
+        .map(|(seed, ground)| scene(folder.path(), seed, &["--realistic", "--roughness", ground]))
+        .collect();
+    let all = judged(folder.path(), &missions);
+    assert_eq!(all.len(), 36);
+    for (axis, name) in ["east", "north", "up"].into_iter().enumerate() {
+        let normalised: Vec<f64> = all
+            .iter()
+            .map(|site| site.mean_m()[axis] / site.mean_sigmas_m[axis])
+            .collect();
+        let largest = normalised
+            .iter()
+            .fold(0.0, |most: f64, z| most.max(z.abs()));
+        let pooled = root_mean_square(normalised.into_iter());
+        println!(
+            "{name}: errors of the mean over stated standard deviations {pooled:.2}, largest {largest:.2}"
+        );
+        // Chance gives 36 values between 0.77 and 1.23 in 95 of 100 cases; one in 2000 exceeds 3.5.
+        assert!((0.75..1.3).contains(&pooled), "{name}: {pooled}");
+        assert!(largest < 3.5, "{name}: {largest}");
+    }
+    let lost: usize = all.iter().map(|site| site.lost.len()).sum();
+    let good: usize = all.iter().map(|site| site.errors_m.len()).sum();
+    println!("{lost} of {good} good tie points lost");
+    assert!(500 * lost <= good, "{lost} of {good}");
+    for site in &all {
+        assert_eq!(site.kept_blunders, [""; 0], "{}", site.name);
+    }
+}
