@@ -319,7 +319,7 @@ fn the_schema_takes_the_example_and_refuses_what_the_loader_refuses() {
     }
 }
 
-/// What is made from the declarations of the keys; `SNAPSHOTS=overwrite cargo test --test config_valid` writes
+/// What is made from the declarations of the keys; `SNAPSHOTS=overwrite cargo test --test products config_valid` writes
 /// both files anew.
 #[test]
 fn example_and_schema_are_made_from_the_declarations() {

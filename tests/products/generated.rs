@@ -1,5 +1,5 @@
 //! What is generated from declarations and kept in the repository is what the declarations say now;
-//! `SNAPSHOTS=overwrite cargo test --test generated` writes it anew.
+//! `SNAPSHOTS=overwrite cargo test --test products generated` writes it anew.
 #![allow(
     clippy::disallowed_methods,
     clippy::unwrap_used,

@@ -10,7 +10,7 @@
 )]
 #![allow(
     clippy::print_stderr,
-    reason = "the numbers are worth seeing: cargo test --test real_adjustment -- --nocapture"
+    reason = "the numbers are worth seeing: cargo test --test real real_adjustment -- --nocapture"
 )]
 
 use crate::common;

@@ -621,7 +621,7 @@ fn tells(world: &World, answer: &Answer) -> Option<String> {
         "SELECT",
         "sqlite",
         "panicked",
-        "src/service",
+        "crates/service/src",
         "rusqlite",
         "[inputs]",
         "<script>alert",

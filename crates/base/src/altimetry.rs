@@ -1,5 +1,6 @@
 //! Vocabulary of the altimeter: its clock bias, the datum of its files, the shots that are kept.
 
+#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -7,10 +8,11 @@ use crate::body::Datum;
 use crate::time::Et;
 
 /// The clock bias of MOLA: how shot tags become shot times.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 pub struct MolaClock {
     /// Size, seconds, not negative.
-    #[schemars(range(min = 0.0))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 0.0)))]
     pub bias_s: f64,
     /// On which side of the true time the tags lie.
     pub sign: TagSign,
@@ -21,7 +23,8 @@ pub struct MolaClock {
 }
 
 /// On which side of the true time a tag lies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum TagSign {
     /// Tags are late: true time = tag − bias.
@@ -31,7 +34,8 @@ pub enum TagSign {
 }
 
 /// What the corrected shot time is used for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum BiasScope {
     /// The spacecraft's position in the range check: the default, one of three readings of Shan et al. 2005.

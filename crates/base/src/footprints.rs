@@ -25,6 +25,7 @@
 
 use std::marker::PhantomData;
 
+#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -48,7 +49,8 @@ pub struct SourceFile {
 }
 
 /// What controls an adjustment.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum AdjustmentModel {
     /// Heights of tie points by the surface of all MOLA shots; orientations by what is known of orbit and attitude.
@@ -76,7 +78,8 @@ impl AdjustmentModel {
 }
 
 /// What image coordinates of footprints are to an adjustment.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum FootprintImageCoordinates {
     /// Observations with their own standard deviations, as in the paper.

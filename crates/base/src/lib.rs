@@ -1,4 +1,17 @@
-//! The vocabulary of areograph: units, instants, frames, bodies, instruments, footprints, errors, and what a stage is.
+//! The vocabulary of areograph: units, instants, frames, bodies, instruments, footprints, errors and verdicts.
+//!
+//! Numbers are `f64`: metres, radians, and seconds of ephemeris time (TDB) past J2000. A position carries its frame as a
+//! type, a number its unit in its name.
+//!
+//! ```
+//! use areograph_base::{body::Body, time::Et, units::RADIANS_PER_DEGREE};
+//!
+//! let launch = Et::from_seconds(-99_403_140.0);
+//! assert!(launch.seconds() < 0.0);
+//! // IAU 2000: 3396.19 km at the equator.
+//! assert!((Body::Mars.model().equatorial_radius_m - 3_396_190.0).abs() < 1e-6);
+//! assert!((180.0 * RADIANS_PER_DEGREE - std::f64::consts::PI).abs() < 1e-15);
+//! ```
 
 pub mod altimetry;
 pub mod body;
@@ -10,6 +23,7 @@ pub mod image;
 pub mod instruments;
 pub mod kernel_source;
 pub mod line_times;
+#[cfg(feature = "schema")]
 pub mod schema;
 pub mod style;
 pub mod ties;

@@ -6,11 +6,13 @@ mod kind;
 pub use check::{Check, CheckOutcome};
 pub use kind::CheckKind;
 
+#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Whether the products keep the limits of the configuration.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 pub struct Verdict {
     /// No limit is broken.
     pub valid: bool,

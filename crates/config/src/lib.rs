@@ -4,6 +4,14 @@
 //! problems of a file are reported together, each as `file:line:column: key is value; expected …`.
 //! Each table has a file here, in which its keys are declared; `config/sites/example.toml`, which
 //! documents every key, and `config/schema/site.schema.json` are made from the declarations.
+//!
+//! ```
+//! use std::path::Path;
+//!
+//! let problems = areograph_config::parse("site = \"gusev\"\nwindow = 3\n", Path::new("gusev.toml"));
+//! // The unknown key, and what is missing, each with its line.
+//! assert!(problems.unwrap_err().to_string().contains("gusev.toml:2"));
+//! ```
 
 mod adjustment;
 mod calibration;

@@ -1,6 +1,7 @@
 //! Intersection of the rays of one ground point from two or more images of known orientation.
 
 use nalgebra::{Matrix3, Vector2, Vector3};
+#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -15,22 +16,23 @@ const STEP_M: f64 = 1e-4;
 const CONDITION_MAX: f64 = 1e12;
 
 /// What a measuring error is the same for in all images.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Weighting {
     /// Standard deviation of both focal coordinates.
     Focal {
         /// Pixels.
-        #[schemars(extend("exclusiveMinimum" = 0))]
+        #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
         sigma_px: f64,
     },
     /// Standard deviations along the track in lines and across it in pixels.
     Line {
         /// Lines.
-        #[schemars(extend("exclusiveMinimum" = 0))]
+        #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
         along_lines: f64,
         /// Pixels.
-        #[schemars(extend("exclusiveMinimum" = 0))]
+        #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
         across_px: f64,
     },
 }

@@ -1,4 +1,25 @@
-//! Pure geometry: no files, no clocks, no SPICE.
+//! Pure geometry of photogrammetry at Mars: no files, no clocks, no SPICE.
+//!
+//! | to | use |
+//! |---|---|
+//! | project ground points into a pushbroom image | [`pushbroom`] |
+//! | intersect rays, adjust a block | [`intersection`], [`bundle`] |
+//! | triangulate pictures in the plane | [`plane`] |
+//! | calibrate the lines of a camera | [`calibration`] |
+//! | convert datums and coordinates | [`body_rotation`], [`ellipsoid`], [`map_projection`] |
+//! | say which shots lie in a window | [`window`] |
+//! | match patches of pixels | [`imaging`] |
+//!
+//! ```
+//! use areograph_geom::ellipsoid::{Spherical, spherical_to_xyz_m};
+//!
+//! // Gusev crater: east longitude and areocentric latitude, radians; radius, metres.
+//! let (longitude_rad, latitude_rad) = (175.5_f64.to_radians(), -14.6_f64.to_radians());
+//! let xyz_m = spherical_to_xyz_m(longitude_rad, latitude_rad, 3_393_000.0);
+//! let back = Spherical::from_xyz_m(&xyz_m);
+//! assert!((back.longitude_rad - longitude_rad).abs() < 1e-12);
+//! assert!((back.latitude.0 - latitude_rad).abs() < 1e-12);
+//! ```
 
 pub mod attitude;
 pub mod block_equations;

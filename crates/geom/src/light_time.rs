@@ -9,6 +9,7 @@
 //! what is left out is of the order `(V/c)²` of the range, with the 24 km/s of Mars 1 mm at 380 km.
 
 use nalgebra::Vector3;
+#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -18,9 +19,8 @@ use areograph_base::{constants::SPEED_OF_LIGHT_M_S, time::Interval};
 const STEPS: u32 = 4;
 
 /// Which positions of the camera the geometry uses: one convention for a whole run.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum LightTime {
     /// Where the camera was when the light left the ground: light time to the surface point and aberration.

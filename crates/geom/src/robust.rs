@@ -1,22 +1,24 @@
 //! Weight functions of robust estimation.
 
+#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How the weight of an observation falls with its normalised residual `z = v/σ`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(tag = "function", rename_all = "snake_case")]
 pub enum RobustWeight {
     /// `1` up to the limit, then `limit/|z|`.
     Huber {
         /// Normalised residual from which the weight falls.
-        #[schemars(extend("exclusiveMinimum" = 0))]
+        #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
         limit: f64,
     },
     /// `1 / (1 + (z/limit)²)`.
     Cauchy {
         /// Normalised residual with half the weight.
-        #[schemars(extend("exclusiveMinimum" = 0))]
+        #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
         limit: f64,
     },
 }

@@ -1,5 +1,6 @@
 //! Plain and robust statistics of residuals.
 
+#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -37,19 +38,20 @@ pub fn unit_weight_limits(redundancy: f64) -> Option<[f64; 2]> {
 }
 
 /// Statistics of a column; all 0 for an empty one.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 pub struct Summary {
     /// Number of values.
     pub n: u32,
     /// Mean, in the unit of the values.
     pub mean: f64,
     /// Standard deviation with divisor n − 1.
-    #[schemars(range(min = 0.0))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 0.0)))]
     pub standard_deviation: f64,
     /// Median.
     pub median: f64,
     /// Normalised median absolute deviation, 1.4826 · median |v − median|.
-    #[schemars(range(min = 0.0))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 0.0)))]
     pub nmad: f64,
     /// Smallest value.
     pub min: f64,
@@ -159,7 +161,8 @@ const BLOCKS: usize = 10;
 const BLOCK_MIN: usize = 10;
 
 /// Straight line through values, in most uses over time.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 pub struct Trend {
     /// Slope, unit of the values per unit of the abscissa (per second).
     pub slope: f64,

@@ -5,13 +5,15 @@
 //! paper does so, across the track it takes their average, which makes heights better by √2. Both
 //! readings are given.
 
+#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use areograph_base::error::{Cause, Kind};
 
 /// Mean and standard deviation of the reprojection residuals of one image.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 pub struct ResidualMoments {
     /// Mean along the track, lines.
     pub mean_x: f64,
@@ -51,7 +53,8 @@ pub struct BudgetInput {
 }
 
 /// Planimetric and height uncertainty from one reading of the across-track input.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 pub struct PointUncertainty {
     /// Across-track discrepancy due to orientation, pixels.
     pub across_px: f64,
@@ -66,7 +69,8 @@ pub struct PointUncertainty {
 }
 
 /// What the ground points themselves contribute along the track.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum GroundPart {
     /// The rest of the discrepancy of footprints, pixels.
@@ -79,7 +83,8 @@ pub enum GroundPart {
 }
 
 /// The budget.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 pub struct UncertaintyBudget {
     /// Along-track discrepancy due to orientation, eq. 7, pixels.
     pub along_px: f64,

@@ -1,5 +1,32 @@
 //! Bytes to typed records and back: MOLA PEDR files, images of MOC and HRSC and their labels, image support data, tie points,
 //! terrain models.
+//!
+//! | to read | use |
+//! |---|---|
+//! | a PEDR file | [`pedr::File`] |
+//! | an archive of them, by windows | [`archive`] |
+//! | the label of an image | [`read_label`] |
+//! | the pixels of a MOC image; of any image | [`image_file::ImageFile`]; [`pixel_file::PixelFile`] |
+//! | image support data (ISD) | [`isd`] |
+//! | tables of shots, tie points, control points | [`shot_table`], [`ties`], [`calibration_tables`] |
+//!
+//! ```
+//! use std::{fs, path::Path};
+//!
+//! use areograph_pds::pedr::{FieldGuard, File};
+//!
+//! let name = Path::new("../../tests/pedr_table/AP00002L.B");
+//! let file = File::from_bytes(fs::read(name).unwrap(), name);
+//! let guard = FieldGuard::new(file.label().software_version);
+//! let frames = file.frames(file.rows(), guard);
+//! let shots: usize = frames
+//!     .filter_map(|(_, frame)| frame.ok())
+//!     .map(|frame| (1..=20).filter_map(|shot| frame.shot(shot)).count())
+//!     .sum();
+//! assert!(shots > 0);
+//! ```
+//!
+//! `examples/shots.rs` prints the shots of a file, `examples/decode.rs` decodes an image.
 
 pub mod archive;
 pub mod calibration_tables;

@@ -20,7 +20,16 @@
 //!
 //! Injected errors: attitude stands 1.15 s early in the C-kernel, laser time tags are 0.117 s late,
 //! version K files are in IAU 1991; tie points see images that were exposed some lines off their labels,
-//! and a few of them are blunders. [`SceneErrors`] has more of them. `truth.json` tells all of it.
+//! and a few of them are blunders. [`SceneErrors`] has more of them. `truth.json` holds all of it.
+//!
+//! ```
+//! use areograph_scene::{SceneOptions, write_scene};
+//!
+//! let folder = tempfile::tempdir().unwrap();
+//! let options = SceneOptions { day_s: 600.0, ..SceneOptions::default() };
+//! let summary = write_scene(&folder.path().join("mission"), &options).unwrap();
+//! assert_eq!(summary.sites, 4);
+//! ```
 
 mod along;
 mod arc;

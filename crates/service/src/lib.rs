@@ -3,6 +3,15 @@
 //! Truth about products is on the disk, in their manifests; the database remembers and is compared with the disk at
 //! start. Files are listed, not watched. A job brings one site up to date, an attempt is one worker process, a run is what
 //! one attempt published.
+//!
+//! The service does not know the pipeline: worker processes speak with it in lines of JSON ([`worker::protocol`]).
+//!
+//! ```
+//! use areograph_service::worker::protocol::{Line, PROTOCOL};
+//!
+//! assert!(serde_json::from_str::<Line>("not a line of a worker").is_err());
+//! assert!(PROTOCOL > 0);
+//! ```
 
 pub mod audit;
 pub mod clock;

@@ -10,6 +10,23 @@
 //! | write kernels: of an invented mission, of adjusted orientations | [`write_spk`], [`write_ck`], [`write_encoded_ck`] |
 //!
 //! Kilometres become metres here, and nowhere else.
+//!
+//! ```
+//! use std::path::PathBuf;
+//!
+//! use areograph_spice::{KernelSet, Session};
+//!
+//! # fn main() -> Result<(), areograph_base::error::Error> {
+//! let leapseconds = PathBuf::from("../../kernels.example/leapseconds.tls");
+//! let session = Session::open(&KernelSet::from_files(&[leapseconds])?)?;
+//! let et = session.utc_to_et("2000-01-01T12:00:00")?;
+//! // TDB is 64.184 s ahead of UTC, and within 2 ms of TT.
+//! assert!((et.seconds() - 64.184).abs() < 2e-3);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! `examples/state.rs` prints the state of the spacecraft at an instant.
 
 mod coverage;
 mod daf;

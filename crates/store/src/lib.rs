@@ -1,5 +1,18 @@
-//! What lies in a site's output folder besides the products: stage outputs with their fingerprints,
-//! the manifest, the lock; and how files get under their final names.
+//! Files known by their hashes, what a stage is, and what lies in a site's output folder besides the products: stage outputs
+//! with their fingerprints, the manifest, the lock; and how files get under their final names.
+//!
+//! ```
+//! use areograph_store::stage::Inputs;
+//!
+//! let fingerprint = |exposure_ms: f64| {
+//!     let mut inputs = Inputs::new(1);
+//!     inputs.setting("exposure_ms", &exposure_ms);
+//!     inputs
+//! };
+//! // Equal inputs have equal fingerprints; a stage whose fingerprint is known does not run again.
+//! assert_eq!(fingerprint(0.5), fingerprint(0.5));
+//! assert_ne!(fingerprint(0.5), fingerprint(0.6));
+//! ```
 
 pub mod atomic;
 pub mod cache;

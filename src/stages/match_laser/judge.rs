@@ -15,7 +15,7 @@ const UNITS_MIN: usize = 10;
 /// Share of the units that match by themselves which must agree with each other: of shifts by chance few do.
 const AGREE_MIN: f64 = 0.5;
 /// Concordance takes a bias for a misfit, and moves to where there is less of it: on synthetic ground a bias of 0.4 of the relief
-/// drives shifts off by more than a cell (median), where correlation is off by less than half (`tests/match_laser.rs`). Up to this share of the relief
+/// drives shifts off by more than a cell (median), where correlation is off by less than half (`tests/stages/match_laser.rs`). Up to this share of the relief
 /// a bias costs half a per cent of similarity; and never beyond so many metres (the fact sheet's limit).
 const BIAS_SHARE: f64 = 0.1;
 const BIAS_MAX_M: f64 = 100.0;

@@ -6,6 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use areograph_testing::checkout;
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 
 /// A file as its module path: `["spice", "session"]`; `mod.rs` stands for its folder, `lib.rs` is empty.
@@ -38,16 +39,20 @@ pub(crate) struct Use {
 }
 
 impl Sources {
-    /// The crate's own sources; `main.rs` is a crate of its own.
-    pub(crate) fn of_this_crate() -> Self {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    /// The sources of the program's own crate; `main.rs` is a crate of its own.
+    pub(crate) fn of_the_program() -> Self {
+        Self::below(&checkout().join("src"))
+    }
+
+    /// The sources of a crate in their folder.
+    pub(crate) fn below(root: &Path) -> Self {
         let mut files = Vec::new();
-        files_below(&root, &mut files);
+        files_below(root, &mut files);
         files.retain(|file| !file.ends_with("main.rs"));
-        assert!(files.len() > 30, "the sources were not found");
+        assert!(files.len() > 5, "the sources were not found");
         let texts = files.iter().map(|file| {
             let text = fs::read_to_string(file).unwrap();
-            (module_of(file.strip_prefix(&root).unwrap()), text)
+            (module_of(file.strip_prefix(root).unwrap()), text)
         });
         Self::of_texts(texts)
     }
@@ -67,6 +72,12 @@ impl Sources {
     /// All files but the root.
     pub(crate) fn modules(&self) -> impl Iterator<Item = &Module> {
         self.files.keys().filter(|module| !module.is_empty())
+    }
+
+    /// Every path that a file names, from the root of its crate.
+    pub(crate) fn paths(&self, module: &Module) -> impl Iterator<Item = &Module> {
+        let paths = self.files[module].paths.iter();
+        paths.filter(|path| !path.is_empty())
     }
 
     /// What a file uses of others. Its folder's `mod.rs` and those above are left out: they hold the words that the

@@ -334,7 +334,7 @@ static ROWS: [Row; 15] = [
         account: Account::Input {
             from: "the recipe of the synthetic tertiary net",
             ours: pictures,
-            test: "tests/plane.rs::seams_are_wider_than_bricks_are_within_and_local_evens_them_out",
+            test: "tests/stages/plane.rs::seams_are_wider_than_bricks_are_within_and_local_evens_them_out",
         },
         note: "Orthographic pictures are used as if they were conformal, which leaves the second number.",
     },
@@ -365,7 +365,7 @@ static ROWS: [Row; 15] = [
         account: Account::Input {
             from: "bricks grown in the synthetic tertiary net",
             ours: bricks,
-            test: "tests/plane.rs::bricks_extended_and_scaled_are_the_one_shot_solution",
+            test: "tests/stages/plane.rs::bricks_extended_and_scaled_are_the_one_shot_solution",
         },
         note: "",
     },
@@ -414,7 +414,7 @@ static ROWS: [Row; 15] = [
         account: Account::Data {
             printed: "97.9 169.7, 53.9 84.7",
         },
-        note: "Larger than within bricks: so it is in the synthetic net, and LOCAL lowers it (tests/plane.rs::seams_are_wider_than_bricks_are_within_and_local_evens_them_out).",
+        note: "Larger than within bricks: so it is in the synthetic net, and LOCAL lowers it (tests/stages/plane.rs::seams_are_wider_than_bricks_are_within_and_local_evens_them_out).",
     },
     Row {
         id: "A77-10",

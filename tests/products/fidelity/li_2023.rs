@@ -394,7 +394,7 @@ static ROWS: [Row; 20] = [
         account: Account::Input {
             from: "defaults of `[a_priori]`, `config/calibrations/example.toml`",
             ours: expected_errors,
-            test: "tests/calibrate.rs::every_step_has_the_size_of_the_paper",
+            test: "tests/stages/calibrate.rs::every_step_has_the_size_of_the_paper",
         },
         note: "",
     },
@@ -437,7 +437,7 @@ static ROWS: [Row; 20] = [
         account: Account::Input {
             from: "`areograph scene --calibration`",
             ours: points,
-            test: "tests/calibrate.rs::every_step_has_the_size_of_the_paper",
+            test: "tests/stages/calibrate.rs::every_step_has_the_size_of_the_paper",
         },
         note: "",
     },

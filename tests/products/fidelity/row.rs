@@ -59,7 +59,7 @@ pub(crate) enum Account {
         from: &'static str,
         /// Printed and ours.
         ours: fn() -> Vec<Comparison>,
-        /// File and function of the test that it is used: `tests/mission.rs::orientation_comes_back`.
+        /// File and function of the test that it is used: `tests/commands/mission.rs::orientation_comes_back`.
         test: &'static str,
     },
     /// Needs data that nobody here has.

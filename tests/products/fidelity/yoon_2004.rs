@@ -269,7 +269,7 @@ static ROWS: [Row; 23] = [
         account: Account::Input {
             from: "start times of the synthetic mission",
             ours: inputs,
-            test: "tests/scene_mission.rs::the_images_are_flown_as_table_2_prints_them",
+            test: "tests/truth/scene_mission.rs::the_images_are_flown_as_table_2_prints_them",
         },
         note: "As S05-17 to S05-23; no header lines and no sum factor here.",
     },
@@ -280,7 +280,7 @@ static ROWS: [Row; 23] = [
         account: Account::Input {
             from: "defaults of `[adjustment]` with `model = \"published\"`",
             ours: priors,
-            test: "tests/adjust_recipe.rs::the_recipe_comes_out_as_verified",
+            test: "crates/geom/tests/geometry/adjust_recipe.rs::the_recipe_comes_out_as_verified",
         },
         note: "That of MOLA's image coordinates is not printed: 74 and 4 px are our choice. 100 and 200 m for angles \
                and rates as well; turned into angles by the range.",

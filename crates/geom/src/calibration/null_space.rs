@@ -1,6 +1,7 @@
 //! What tie points see of the offset angles, and what they do not.
 
 use nalgebra::DMatrix;
+#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +22,8 @@ const SHARE_MIN: f64 = 0.9;
 const ROUNDING: f64 = 1e-13;
 
 /// An axis of the spacecraft.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Axis {
     /// φ.
@@ -33,7 +35,8 @@ pub enum Axis {
 }
 
 /// What the angles of the cameras have in common, or differ by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Combination {
     /// All cameras alike.
@@ -45,7 +48,8 @@ pub enum Combination {
 }
 
 /// An angle of the cameras together.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 pub struct AngleCombination {
     /// Alike, or by how much they differ.
     pub combination: Combination,

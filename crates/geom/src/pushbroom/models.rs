@@ -1,6 +1,7 @@
 //! Orientation as polynomials: with pointing angles, and with a rotation vector.
 
 use nalgebra::{Matrix3, Vector3};
+#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -11,9 +12,8 @@ use crate::{
 };
 
 /// The forms of an image's orientation.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum CameraModel {
     /// Positions and angles as polynomials of first order.

@@ -356,7 +356,7 @@ pub(super) static ROWS: [Row; 11] = [
         account: Account::Input {
             from: "default of `orientation.intervals`",
             ours: sampling,
-            test: "tests/mission.rs::orientation_comes_back",
+            test: "tests/commands/mission.rs::orientation_comes_back",
         },
         note: "31 instants: both ends.",
     },

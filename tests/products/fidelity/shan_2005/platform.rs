@@ -144,7 +144,7 @@ pub(super) static ROWS: [Row; 16] = [
         account: Account::Input {
             from: "the circular orbit of the rows below",
             ours: orbit,
-            test: "tests/fidelity.rs::every_row_comes_out_as_declared",
+            test: "tests/products/fidelity.rs::every_row_comes_out_as_declared",
         },
         note: "Over the three sites MGS is 380 to 385 km high. Real kernels give 92.896°.",
     },
@@ -184,7 +184,7 @@ pub(super) static ROWS: [Row; 16] = [
         account: Account::Input {
             from: "config/instruments/moc_na.toml",
             ours: detector,
-            test: "tests/products_site.rs::camera_model_times_and_detectors_are_those_of_a_summed_image",
+            test: "tests/products/products_site.rs::camera_model_times_and_detectors_are_those_of_a_summed_image",
         },
         note: "The paper has no pitch of the detectors (13 µm).",
     },
@@ -214,7 +214,7 @@ pub(super) static ROWS: [Row; 16] = [
         account: Account::Input {
             from: "20 shots in the 2 s of a PEDR frame",
             ours: laser_rate,
-            test: "tests/scene_mission.rs::footprints_come_back_within_0_2_m_and_times_within_2_us",
+            test: "tests/truth/scene_mission.rs::footprints_come_back_within_0_2_m_and_times_within_2_us",
         },
         note: "",
     },
@@ -265,7 +265,7 @@ pub(super) static ROWS: [Row; 16] = [
         account: Account::Input {
             from: "config/instruments/moc_na.toml",
             ours: attitude_bias,
-            test: "tests/mission.rs::without_the_pointing_bias_a_nadir_image_moves_380_m",
+            test: "tests/commands/mission.rs::without_the_pointing_bias_a_nadir_image_moves_380_m",
         },
         note: "",
     },
@@ -276,7 +276,7 @@ pub(super) static ROWS: [Row; 16] = [
         account: Account::Input {
             from: "config/altimeters/mola.toml",
             ours: clock_bias,
-            test: "tests/mission.rs::the_three_readings_of_the_clock_bias_differ_as_told",
+            test: "tests/commands/mission.rs::the_three_readings_of_the_clock_bias_differ_as_told",
         },
         note: "Neither sign nor formula is printed. Three readings are scopes of `mola_clock.scope`: `spk_lookup` \
                (default), `both`, `rotation`.",
@@ -289,6 +289,6 @@ pub(super) static ROWS: [Row; 16] = [
             printed: "0–50 m apart, mostly across the track; NAV nearest to the mean",
         },
         note: "Closed loop: orbits that a synthetic mission shifts come back to the metre, and the one nearest to \
-               their mean is chosen (tests/compare_kernels.rs).",
+               their mean is chosen (tests/commands/compare_kernels.rs).",
     },
 ];

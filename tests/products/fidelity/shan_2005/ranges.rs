@@ -63,7 +63,7 @@ pub(super) static ROWS: [Row; 3] = [
                       E02-01453: 124, −4.029, 0.299; E02-01301: 71, −25.359, 1.077; E02-02016: 107, −1.435, 0.635",
         },
         note: "Closed loop: an orbit that a synthetic mission shifts comes back as the mean of its ranges \
-               (tests/mission.rs::profile_means_are_the_injected_orbit_differences). The paper has no limit: \
+               (tests/commands/mission.rs::profile_means_are_the_injected_orbit_differences). The paper has no limit: \
                E02-01301 would break any of 10 m.",
     },
     Row {

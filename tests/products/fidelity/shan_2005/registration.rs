@@ -111,7 +111,7 @@ pub(super) static ROWS: [Row; 7] = [
         account: Account::Input {
             from: "default of `registration.tolerance_lines`",
             ours: tolerance,
-            test: "tests/registration.rs::iterations_are_counted_for_every_point_within_the_lines",
+            test: "tests/stages/registration.rs::iterations_are_counted_for_every_point_within_the_lines",
         },
         note: "One line in x.",
     },
@@ -173,7 +173,7 @@ pub(super) static ROWS: [Row; 7] = [
         account: Account::Input {
             from: "default of `adjustment.tie_sigma_px`",
             ours: measuring,
-            test: "tests/stereo_intersection.rs::noise_comes_out_as_simulated_and_as_the_covariance_says",
+            test: "tests/stages/stereo_intersection.rs::noise_comes_out_as_simulated_and_as_the_covariance_says",
         },
         note: "areograph reads tie points; it does not measure them.",
     },

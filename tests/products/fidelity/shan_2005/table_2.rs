@@ -150,7 +150,7 @@ pub(super) static ROWS: [Row; 11] = [
         account: Account::Input {
             from: "the synthetic mission, at the ground in the middle of the image",
             ours: emission,
-            test: "tests/scene_mission.rs::the_images_are_flown_as_table_2_prints_them",
+            test: "tests/truth/scene_mission.rs::the_images_are_flown_as_table_2_prints_them",
         },
         note: "By the paper's text the angle is at the camera, by the archive's use at the ground; only the latter \
                gives its base of 155 km (S05-60).",
@@ -162,7 +162,7 @@ pub(super) static ROWS: [Row; 11] = [
         account: Account::Input {
             from: "labels of the synthetic mission",
             ours: start,
-            test: "tests/scene_mission.rs::image_starts_are_the_published_times_to_the_clock_tick",
+            test: "tests/truth/scene_mission.rs::image_starts_are_the_published_times_to_the_clock_tick",
         },
         note: "Rounded to 10 ms, which is 3 to 5 lines; the clock strings of labels tell more.",
     },
@@ -173,7 +173,7 @@ pub(super) static ROWS: [Row; 11] = [
         account: Account::Input {
             from: "exposure of a detector line times the sum factor",
             ours: exposure,
-            test: "src/scene/plan.rs::line_periods_are_those_of_table_2",
+            test: "crates/scene/src/plan.rs::line_periods_are_those_of_table_2",
         },
         note: "The period of a summed line: times the ground speed it gives the printed pixel size (S05-23).",
     },
@@ -184,7 +184,7 @@ pub(super) static ROWS: [Row; 11] = [
         account: Account::Input {
             from: "labels of the synthetic mission",
             ours: summing,
-            test: "tests/scene_mission.rs::the_images_are_flown_as_table_2_prints_them",
+            test: "tests/truth/scene_mission.rs::the_images_are_flown_as_table_2_prints_them",
         },
         note: "",
     },
@@ -195,7 +195,7 @@ pub(super) static ROWS: [Row; 11] = [
         account: Account::Input {
             from: "labels of the synthetic mission",
             ours: header_lines,
-            test: "tests/scene_mission.rs::the_images_are_flown_as_table_2_prints_them",
+            test: "tests/truth/scene_mission.rs::the_images_are_flown_as_table_2_prints_them",
         },
         note: "A contradiction of the paper: its table 4 wants 8064 lines of E04-01275 (S05-33). They are flown; the \
                7424 that are printed are delivered.",
@@ -207,7 +207,7 @@ pub(super) static ROWS: [Row; 11] = [
         account: Account::Input {
             from: "the synthetic mission; samples are 2048 over the sum factor, down to a multiple of 16",
             ours: file_size,
-            test: "tests/scene_mission.rs::the_images_are_flown_as_table_2_prints_them",
+            test: "tests/truth/scene_mission.rs::the_images_are_flown_as_table_2_prints_them",
         },
         note: "Three files have fewer lines than their header.",
     },
