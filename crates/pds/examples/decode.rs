@@ -6,12 +6,12 @@
 
 use std::{
     env,
-    error::Error,
-    io::{Write as _, stdout},
+    io::{self, Write as _},
     path::Path,
     process::ExitCode,
 };
 
+use areograph_base::error::{Error, IoError, Locate as _};
 use areograph_config::all_instruments;
 use areograph_pds::image_file::ImageFile;
 
@@ -29,17 +29,26 @@ fn main() -> ExitCode {
     }
 }
 
-fn decode(path: &Path) -> Result<(), Box<dyn Error>> {
+fn decode(path: &Path) -> Result<(), Error> {
     let image = ImageFile::open(path, all_instruments())?;
-    let mut pixels = Vec::new();
+    let (mut samples, mut lines, mut pixels) = (0, 0, Vec::new());
     let mut strips = image.strips()?;
-    while let Some(strip) = strips.next_strip()? {
+    while let Some(strip) = strips
+        .next_strip()
+        .map_err(IoError::on("read"))
+        .in_file(path)?
+    {
+        samples = strip.samples;
+        lines += strip.states.len();
         pixels.extend_from_slice(&strip.pixels);
     }
-    let samples = image.samples();
-    let lines = pixels.len() / samples.max(1) as usize;
-    let mut out = stdout().lock();
+    write_map(samples, lines, &pixels)
+        .map_err(IoError::on("write"))
+        .in_file("standard output")
+}
+
+fn write_map(samples: u32, lines: usize, pixels: &[u8]) -> io::Result<()> {
+    let mut out = io::stdout().lock();
     write!(out, "P5\n{samples} {lines}\n255\n")?;
-    out.write_all(&pixels)?;
-    Ok(())
+    out.write_all(pixels)
 }
