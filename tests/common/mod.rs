@@ -54,6 +54,25 @@ pub(crate) fn real_data(relative: &str, test: &str) -> Option<PathBuf> {
     None
 }
 
+/// Whether this is the long run, `scripts/test --long`: tests then take as many cases as they can.
+#[allow(
+    clippy::disallowed_methods,
+    reason = "how long tests may take is said by an environment variable"
+)]
+pub(crate) fn long() -> bool {
+    std::env::var_os("AREOGRAPH_LONG").is_some()
+}
+
+/// Whether `test` runs: one of more than 20 s is left to the long run, and notes it.
+#[allow(clippy::print_stderr, reason = "tests say what they leave out")]
+pub(crate) fn long_test(test: &str) -> bool {
+    let runs = long();
+    if !runs {
+        eprintln!("left to scripts/test --long: {test}");
+    }
+    runs
+}
+
 /// A JSON file.
 pub(crate) fn json(path: &Path) -> serde_json::Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
