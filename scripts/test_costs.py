@@ -47,6 +47,8 @@ def main(log, notes):
     for test in sorted(skipped):
         with open(os.path.join(notes, "skipped", test), encoding="utf-8") as why:
             print(f"skipped {test}: {why.read()}")
+    for test in sorted(names(os.path.join(notes, "left"))):
+        print(f"left to scripts/test --long: {test}")
     found = len(names(os.path.join(notes, "found")) - skipped)
     print(f"\ntests that need something from outside: {found} had it, {len(skipped)} skipped")
 

@@ -20,14 +20,22 @@ use std::{
 
 use common::{
     case::Case,
+    long,
     mission::{areograph, mission, products, succeed},
 };
 use traced::{Call, Then, traced};
 
-/// Kills of first runs: half of them at any change of a file, half where files get their names.
-const KILLS: usize = 20;
-/// Kills of each part of a run over a published site.
-const KILLS_REPUBLISHING: usize = 12;
+/// Kills of first runs: half of them at any change of a file, half where files get their names; 20 in the long run. Each
+/// is followed by a whole run.
+fn kills() -> usize {
+    if long() { 20 } else { 6 }
+}
+
+/// Kills of each part of a run over a published site; 12 in the long run. Four are one of each kind: images come or go, and the
+/// next run is of this configuration or of the one before.
+fn kills_republishing() -> usize {
+    if long() { 12 } else { 4 }
+}
 
 fn run(site: &Path, out: &Path, threads: &str) -> Command {
     let mut command = areograph();
@@ -94,7 +102,7 @@ fn names_files(call: &Call) -> bool {
 }
 
 #[test]
-fn killed_at_twenty_changes_of_a_first_run() {
+fn killed_at_changes_of_a_first_run() {
     let site = mission().join("sites/isidis.toml");
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path().canonicalize().unwrap();
@@ -103,9 +111,9 @@ fn killed_at_twenty_changes_of_a_first_run() {
     let undisturbed = products(&undisturbed_out);
     assert!(undisturbed.len() > 10);
     let all = places(&changes, |_| true);
-    let mut kills = spread(&all, KILLS / 2);
-    kills.extend(spread(&places(&changes, names_files), KILLS / 2));
-    for place in kills {
+    let mut chosen = spread(&all, kills() / 2);
+    chosen.extend(spread(&places(&changes, names_files), kills() / 2));
+    for place in chosen {
         let call = &changes[place];
         let out = root.join(format!("killed-{place}"));
         kill_before(&run(&site, &out, "2"), &out, place);
@@ -165,9 +173,9 @@ fn kill_republishing(of: fn(&[Call]) -> Vec<usize>) {
     let [(adding, with), (removing, without)] = &measured;
     assert!(with.len() > without.len());
     let [adding, removing] =
-        [adding, removing].map(|changes| (changes, spread(&of(changes), KILLS_REPUBLISHING / 2)));
+        [adding, removing].map(|changes| (changes, spread(&of(changes), kills_republishing() / 2)));
     let mut second_image = false;
-    for attempt in 0..KILLS_REPUBLISHING {
+    for attempt in 0..kills_republishing() {
         second_image = !second_image;
         change(&case, second_image);
         let (changes, kills) = if second_image { &adding } else { &removing };

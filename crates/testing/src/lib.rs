@@ -66,6 +66,20 @@ pub fn real_data(relative: &str, test: &str) -> Option<PathBuf> {
     None
 }
 
+/// Whether this is the long run, `scripts/test --long`: tests then take as many cases as they can.
+pub fn long() -> bool {
+    std::env::var_os("AREOGRAPH_LONG").is_some()
+}
+
+/// Whether `test` runs: one of more than 20 s is left to the long run, and notes it.
+pub fn long_test(test: &str) -> bool {
+    let runs = long();
+    if !runs {
+        outside::left(test);
+    }
+    runs
+}
+
 /// Whether this process runs the test alone; if not, a process of its own has run it, and it has passed there. For
 /// what is measured of a whole process.
 pub fn alone() -> bool {

@@ -34,3 +34,8 @@ pub fn skipped(test: &str, why: &str) {
     eprintln!("skipped {test}: {why}");
     note("skipped", test, why);
 }
+
+/// The test is left to the long run.
+pub fn left(test: &str) {
+    note("left", test, test);
+}

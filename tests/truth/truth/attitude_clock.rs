@@ -3,15 +3,16 @@
 
 use std::{fs, path::Path};
 
-use super::{Judged, SITES, common::json, root_mean_square, run, scene};
+use super::{Judged, SITES, common::json, is_within, root_mean_square, run, scene, seeds};
 
 /// Missions with the option on, run.
 fn by_the_clock(
     folder: &Path,
-    seeds: std::ops::RangeInclusive<u32>,
+    seeds: impl IntoIterator<Item = u32>,
     scene_options: &[&str],
 ) -> Vec<Judged> {
     let missions: Vec<_> = seeds
+        .into_iter()
         .map(|seed| {
             let mission = scene(folder, seed, scene_options);
             for site in SITES {
@@ -83,7 +84,7 @@ fn the_place_is_right_by_the_clock_where_the_clock_is_wrong() {
     let folder = tempfile::tempdir().unwrap();
     let sites = by_the_clock(
         folder.path(),
-        206..=210,
+        seeds(206..=210, 2),
         &["--realistic", "--attitude-clock"],
     );
     for site in &sites {
@@ -96,7 +97,10 @@ fn the_place_is_right_by_the_clock_where_the_clock_is_wrong() {
         let pooled = root_mean_square(z);
         println!("{name}: errors of the mean over stated standard deviations {pooled:.2}");
         // 15 values: chance gives 0.56 to 1.44 in 99 of 100 cases.
-        assert!((0.5..1.45).contains(&pooled), "{name}: {pooled}");
+        assert!(
+            is_within(pooled, [0.5, 1.45], sites.len()),
+            "{name}: {pooled}"
+        );
     }
     // The offset itself, one draw a mission.
     for site in &sites {
@@ -133,7 +137,7 @@ fn the_place_is_right_by_the_clock_where_the_clock_is_wrong() {
         errors_m.len()
     );
     assert!(
-        errors_m.len() >= 5 && 1.5 * clock_m < even_m,
+        3 * errors_m.len() >= sites.len() && 1.5 * clock_m < even_m,
         "{clock_m} {even_m}"
     );
 }
@@ -141,7 +145,7 @@ fn the_place_is_right_by_the_clock_where_the_clock_is_wrong() {
 #[test]
 fn the_place_by_the_clock_is_not_to_be_trusted_where_every_image_errs_for_itself() {
     let folder = tempfile::tempdir().unwrap();
-    let sites = by_the_clock(folder.path(), 211..=215, &["--realistic"]);
+    let sites = by_the_clock(folder.path(), seeds(211..=215, 2), &["--realistic"]);
     for site in &sites {
         println!("{}", line(site));
     }
@@ -160,5 +164,5 @@ fn the_place_by_the_clock_is_not_to_be_trusted_where_every_image_errs_for_itself
             .iter()
             .map(|site| site.mean_m().z / site.mean_sigmas_m.z),
     );
-    assert!((0.5..1.45).contains(&heights), "{heights}");
+    assert!(is_within(heights, [0.5, 1.45], sites.len()), "{heights}");
 }

@@ -3,11 +3,7 @@
 use arrow_array::cast::AsArray;
 use arrow_array::types::Float64Type;
 
-use super::{
-    Judged, SITES,
-    common::mission::{areograph, mission, succeed},
-    table, texts,
-};
+use super::{Judged, SITES, common::mission::mission, default_run, table, texts};
 
 /// Where the second image shows a footprint is transformed from the tie points around it, to within 3.4 m on the ground (see
 /// `misregistration`); across the track that is height, 2.5 times as much at the pairs' base to height.
@@ -15,15 +11,11 @@ const TRANSFORMED_M: f64 = 2.5 * 3.4;
 
 #[test]
 fn footprints_tell_the_height_error_of_a_pair_before_and_after_the_adjustment() {
-    let out = tempfile::tempdir().unwrap();
+    let out = default_run();
     let mut before_m = Vec::new();
     for site in SITES {
-        let mut run = areograph();
-        run.args(["--quiet", "run"]);
-        run.arg(mission().join(format!("sites/{site}.toml")));
-        succeed(run.arg("--out").arg(out.path()));
-        let truth = Judged::of(&mission(), out.path(), site);
-        let heights = table(&out.path().join(site).join("height_check.parquet"));
+        let truth = Judged::of(&mission(), out, site);
+        let heights = table(&out.join(site).join("height_check.parquet"));
         let kinds = texts(&heights, "kind");
         let median_m = |column: &str| {
             let column = heights.column_by_name(column).unwrap();

@@ -14,11 +14,8 @@ use serde_json::Value;
 
 use super::{
     SITES,
-    common::{
-        json,
-        mission::{areograph, mission, succeed},
-    },
-    table, vector,
+    common::{json, mission::mission},
+    default_run, table, vector,
 };
 
 /// A camera as it truly saw, and how many lines its image has: from where it was when the light left the ground.
@@ -129,14 +126,10 @@ pub(super) const TRANSFORMED_M: f64 = 3.4;
 
 #[test]
 fn footprints_fall_as_far_apart_in_two_images_as_is_stated() {
-    let out = tempfile::tempdir().unwrap();
+    let out = default_run();
     let truth = json(&mission().join("truth.json"));
     for site in SITES {
-        let mut run = areograph();
-        run.args(["--quiet", "run"]);
-        run.arg(mission().join(format!("sites/{site}.toml")));
-        succeed(run.arg("--out").arg(out.path()));
-        let folder = out.path().join(site);
+        let folder = out.join(site);
         let found = json(&folder.join("adjustment.json"));
         let ground_m = true_footprints_m(&truth, &table(&folder.join("footprints.parquet")));
         let mut sites = truth["ties"].as_array().unwrap().iter();

@@ -18,7 +18,7 @@ use crate::{
     random::Random,
     shared::Shared,
     worker::{
-        parent::{Ended, How, WorkerLimits},
+        parent::{Ended, How, Times, WorkerLimits},
         protocol::{CancelWhy, PROTOCOL, Task, What},
     },
 };
@@ -138,6 +138,7 @@ impl<W: Workers> Core<W> {
             deadline_s,
             silence_s: workers.silence_s,
             log_max_kib: workers.log_max_kib,
+            times: Times::USUAL,
         }
     }
 

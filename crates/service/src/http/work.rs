@@ -7,7 +7,7 @@ use tokio::sync::{OwnedSemaphorePermit, watch};
 
 use super::{app::App, problem::Problem};
 use crate::worker::{
-    parent::{WorkerLimits, work},
+    parent::{Times, WorkerLimits, work},
     protocol::{Answer, CancelWhy, Failure, PROTOCOL, Task, What},
 };
 
@@ -52,6 +52,7 @@ pub(super) async fn ask(
         deadline_s,
         silence_s: config.workers.silence_s,
         log_max_kib: LOG_KIB,
+        times: Times::USUAL,
     };
     let folder = config.outputs.state.join("requests");
     fs::create_dir_all(&folder).map_err(Problem::internal)?;

@@ -19,12 +19,31 @@ use super::{
     protocol::{Answer, Cancel, CancelWhy, Failure, Line, PROTOCOL, Task},
 };
 
-/// How long a worker may take to say hello.
-const HELLO: Duration = Duration::from_secs(20);
-/// When a worker that was asked to stop is told so by a signal, and when it is ended.
-const PATIENCE: [Duration; 2] = [Duration::from_secs(10), Duration::from_secs(20)];
-/// How long the pipes of a worker that has ended may stay open.
-const DRAIN: Duration = Duration::from_secs(2);
+/// How long the service's side waits for a process, whatever its task is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Times {
+    /// How long a worker may take to say hello.
+    pub hello: Duration,
+    /// When a worker that was asked to stop gets a signal to do so, and when it is ended; both since it was asked.
+    pub patience: [Duration; 2],
+    /// How long the pipes of a worker that has ended may stay open.
+    pub drain: Duration,
+}
+
+impl Times {
+    /// Those of the service.
+    pub const USUAL: Self = Self {
+        hello: Duration::from_secs(20),
+        patience: [Duration::from_secs(10), Duration::from_secs(20)],
+        drain: Duration::from_secs(2),
+    };
+}
+
+impl Default for Times {
+    fn default() -> Self {
+        Self::USUAL
+    }
+}
 
 /// How long a worker may take, and how much it may say.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,6 +54,8 @@ pub struct WorkerLimits {
     pub silence_s: f64,
     /// Longest log, kibibytes.
     pub log_max_kib: u32,
+    /// How long it is waited for.
+    pub times: Times,
 }
 
 /// What is heard of a worker while it lives.
@@ -147,6 +168,7 @@ async fn asked(cancel: &mut watch::Receiver<Option<CancelWhy>>) -> CancelWhy {
 struct Worker {
     pid: u32,
     process: Option<ProcessIdentity>,
+    times: Times,
     input: Option<ChildStdin>,
     lines: LineReader<BufReader<ChildStdout>>,
     /// Whether its standard output is open, and makes sense.
@@ -189,13 +211,14 @@ impl Worker {
         Ok(Self {
             pid,
             process,
+            times: limits.times,
             input: input.map(ChildStdin::from_std).transpose()?,
             lines: LineReader::new(BufReader::new(ChildStdout::from_std(output)?)),
             speaks: true,
             log: tokio::spawn(async move { log::copy(errors, &log, max_kib).await }),
             exit,
             hello: false,
-            hello_by: now + HELLO,
+            hello_by: now + limits.times.hello,
             silence: after(limits.silence_s),
             heard_at: now,
             deadline: far(now, after(limits.deadline_s)),
@@ -213,7 +236,7 @@ impl Worker {
         };
         line.push(b'\n');
         // A worker that hangs does not read: its pipe must not hold the service.
-        let _ = timeout(DRAIN, input.write_all(&line)).await;
+        let _ = timeout(self.times.drain, input.write_all(&line)).await;
     }
 
     fn take(&mut self, line: &Line) {
@@ -253,13 +276,13 @@ impl Worker {
     /// The same without waiting for the worker to stop by itself.
     fn end_at_once(&mut self, how: How) {
         let now = Instant::now();
-        self.end(how, now.checked_sub(PATIENCE[0]).unwrap_or(now));
+        self.end(how, now.checked_sub(self.times.patience[0]).unwrap_or(now));
     }
 
     /// When there is something to do, whatever is heard.
     fn next_instant(&self) -> Instant {
         if let Some(ending) = &self.ending {
-            let patience = PATIENCE.get(ending.sent).copied();
+            let patience = self.times.patience.get(ending.sent).copied();
             return far(ending.since, patience.unwrap_or(Duration::MAX));
         }
         let silent = far(self.heard_at, self.silence);
@@ -275,7 +298,7 @@ impl Worker {
     async fn wake(&mut self) {
         let now = Instant::now();
         if let Some(ending) = &mut self.ending {
-            if now < far(ending.since, PATIENCE[ending.sent.min(1)]) {
+            if now < far(ending.since, self.times.patience[ending.sent.min(1)]) {
                 return;
             }
             let signal = [Signal::TERM, Signal::KILL][ending.sent.min(1)];
@@ -301,6 +324,7 @@ impl Worker {
         heard: &mut (impl FnMut(Heard<'_>) + Send),
     ) -> Ended {
         drop(self.input.take());
+        let drain = self.times.drain;
         let rest = async {
             while self.speaks {
                 match self.lines.next().await {
@@ -313,8 +337,8 @@ impl Worker {
                 }
             }
         };
-        let _ = timeout(DRAIN, rest).await;
-        match timeout(DRAIN, &mut self.log).await {
+        let _ = timeout(drain, rest).await;
+        match timeout(drain, &mut self.log).await {
             Ok(Ok(Ok(()))) => {}
             // The pipe is still open somewhere, or the disk is full: what is written of the log stays.
             Err(_) => self.log.abort(),

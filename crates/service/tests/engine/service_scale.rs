@@ -1,4 +1,4 @@
-//! A thousand sites and ten thousand kernels, and many kills: slower than other tests, run by `cargo test --test service_scale -- --ignored`.
+//! A thousand sites and ten thousand kernels, and many kills: all but fifty of these are left to the long run.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -7,6 +7,8 @@
 )]
 
 use crate::fake;
+
+mod common;
 
 use std::{
     collections::BTreeSet,
@@ -25,8 +27,10 @@ const KERNELS: usize = 10_000;
 const READ: usize = 20;
 
 #[test]
-#[ignore = "a measurement of a minute: 1,000 sites, 10,000 kernels"]
 fn nothing_changed_for_a_thousand_sites() {
+    if !common::long_test("1,000 sites and 10,000 kernels, a minute") {
+        return;
+    }
     let more = "[changes]\nquiet_period_s = 0.0\n[workers]\nmin_free_mib = 0\ncount = 2\n[retention]\nevents = 1000\n";
     let world = World::new(NOON_MS, more);
     for number in 0..KERNELS {
@@ -99,9 +103,11 @@ fn held(world: &World) -> (u64, u64, usize) {
 }
 
 #[test]
-#[ignore = "a measurement of minutes: what 10,000 jobs leave behind"]
 fn ten_thousand_jobs_leave_no_more_than_two_thousand() {
     const SITES: usize = 50;
+    if !common::long_test("what 10,000 jobs leave behind, minutes") {
+        return;
+    }
     let more = "[changes]\nquiet_period_s = 0.0\n[workers]\nmin_free_mib = 0\ncount = 4\n\
                 [retention]\nruns = 3\nweeks = 2\nevents = 2000\nlogs_days = 10.0\nhistory_days = 10.0\ncopies = 2\n";
     let world = World::new(NOON_MS, more);
@@ -215,7 +221,9 @@ fn fifty_kills_of_the_service_under_load() {
 }
 
 #[test]
-#[ignore = "minutes: fifty of these kills are in every run"]
 fn a_thousand_kills_of_the_service_under_load() {
+    if !common::long_test("1,000 kills of the service, minutes") {
+        return;
+    }
     kills(1000);
 }

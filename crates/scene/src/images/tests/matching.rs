@@ -281,8 +281,12 @@ fn matched_ties_are_within_what_they_state_and_adjust_as_well_as_given_ones() {
     let mission = Mission::new(&folder.path().join("mission"));
     let truth: serde_json::Value =
         serde_json::from_slice(&fs::read(mission.folder.join("truth.json")).unwrap()).unwrap();
-    let in_other_files = mission.in_other_files("gusev_crater");
+    // In every run one site, matched, adjusted and mapped; in the long run all.
+    let is_long = std::env::var_os("AREOGRAPH_LONG").is_some();
     for site in SITES {
+        if !is_long && site.id != "gusev_crater" {
+            continue;
+        }
         let products = run(&mission.matched_site(site.id), folder.path());
         let errors = errors_px(&mission, &products);
         assert!(errors.len() >= 150, "{}", errors.len());
@@ -309,9 +313,9 @@ fn matched_ties_are_within_what_they_state_and_adjust_as_well_as_given_ones() {
         let ties = read_ties(&products.join("exchange/matched_ties.csv"))
             .unwrap()
             .ties;
-        if site.id == "gusev_crater" {
+        if is_long && site.id == "gusev_crater" {
             // Whatever files the same pixels are in.
-            let others = run(&in_other_files, folder.path());
+            let others = run(&mission.in_other_files(site.id), folder.path());
             let others = read_ties(&others.join("exchange/matched_ties.csv")).unwrap();
             assert_eq!(others.ties, ties);
         }
