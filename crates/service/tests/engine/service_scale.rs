@@ -8,7 +8,7 @@
 
 use crate::fake;
 
-mod common;
+use areograph_testing as common;
 
 use std::{
     collections::BTreeSet,

@@ -282,7 +282,7 @@ fn matched_ties_are_within_what_they_state_and_adjust_as_well_as_given_ones() {
     let truth: serde_json::Value =
         serde_json::from_slice(&fs::read(mission.folder.join("truth.json")).unwrap()).unwrap();
     // In every run one site, matched, adjusted and mapped; in the long run all.
-    let is_long = std::env::var_os("AREOGRAPH_LONG").is_some();
+    let is_long = areograph_testing::long();
     for site in SITES {
         if !is_long && site.id != "gusev_crater" {
             continue;
