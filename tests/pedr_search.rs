@@ -17,11 +17,9 @@ use std::{
 };
 
 use areograph::body::Datum;
-use arrow::{
-    array::AsArray as _,
-    datatypes::{Float64Type, UInt32Type},
-    record_batch::RecordBatch,
-};
+use arrow_array::RecordBatch;
+use arrow_array::cast::AsArray as _;
+use arrow_array::types::{Float64Type, UInt32Type};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::Value;
 use track::{FRAMES, write};
@@ -77,7 +75,7 @@ fn batch(path: &Path) -> (RecordBatch, Value) {
     let told = serde_json::from_str(told.value.as_deref().unwrap()).unwrap();
     let schema = builder.schema().clone();
     let batches: Vec<RecordBatch> = builder.build().unwrap().map(Result::unwrap).collect();
-    let batch = arrow::compute::concat_batches(&schema, &batches).unwrap();
+    let batch = arrow_select::concat::concat_batches(&schema, &batches).unwrap();
     (batch, told)
 }
 

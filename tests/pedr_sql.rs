@@ -20,7 +20,8 @@ use std::{
 
 use areograph::body::Datum;
 use areograph::{pds::archive::Opened, sql::ShotsTable};
-use arrow::{compute::concat_batches, record_batch::RecordBatch};
+use arrow_array::RecordBatch;
+use arrow_select::concat::concat_batches;
 use datafusion::{
     datasource::MemTable,
     prelude::{SessionConfig, SessionContext},
@@ -60,7 +61,7 @@ fn ask(context: &SessionContext, question: &str) -> RecordBatch {
     let batches = runtime.block_on(async { context.sql(question).await?.collect().await });
     let batches = batches.unwrap_or_else(|error| panic!("{question}: {error}"));
     let schema = batches.first().map_or_else(
-        || Arc::new(arrow::datatypes::Schema::empty()),
+        || Arc::new(arrow_schema::Schema::empty()),
         RecordBatch::schema,
     );
     concat_batches(&schema, &batches).unwrap()

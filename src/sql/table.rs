@@ -28,10 +28,10 @@ use tokio_stream::StreamExt as _;
 use super::conditions::Conditions;
 use crate::{
     error::{Cause, Error, Kind, Locate as _, Result, Stopped},
-    footprints::SourceFile,
+    footprints::{AsRead, Footprints, SourceFile},
     geom::window::Region,
     pds::{
-        archive::{Found, Judged, Query, Sink, Source, search},
+        archive::{Found, Judged, Query, Seen, Sink, Source, search},
         pedr::Reason,
     },
     products::ShotColumns,
@@ -39,8 +39,6 @@ use crate::{
     time::Interval,
 };
 
-/// Half the time between two shots, seconds: shots of two files nearer to each other are one shot.
-const SAME_SHOT_S: f64 = 0.05;
 /// Pieces of an answer that wait for the query: a megabyte or so each.
 const PIECES_WAITING: usize = 2;
 
@@ -59,10 +57,10 @@ pub struct Tally {
 
 /// Two files hold the same shots.
 #[derive(Debug, thiserror::Error)]
-#[error("record {record} is no later than what {before} ends with: its shots would count twice")]
+#[error("record {record} has a shot that {other} holds as well: it would count twice")]
 struct Overlap {
     record: u32,
-    before: String,
+    other: String,
 }
 
 impl Cause for Overlap {
@@ -203,7 +201,7 @@ impl PartitionStream for Shots {
             tally: Arc::clone(&self.tally),
             stop: Arc::clone(&self.stop),
             rows: stream.tx(),
-            last: None,
+            seen: Seen::default(),
         };
         let (sources, regions, time) = (Arc::clone(&self.sources), self.regions.clone(), self.time);
         let is_over = Arc::new(AtomicBool::new(false));
@@ -234,8 +232,7 @@ struct HandOn {
     tally: Arc<Mutex<Tally>>,
     stop: Arc<AtomicBool>,
     rows: Sender<Answer<RecordBatch>>,
-    /// The last file with rows, and the latest time tag so far, ET seconds.
-    last: Option<(usize, f64)>,
+    seen: Seen,
 }
 
 impl HandOn {
@@ -253,25 +250,16 @@ impl HandOn {
         let _ = self.rows.blocking_send(Err(told));
     }
 
-    /// Makes sure that the rows of a file follow those of the files before.
-    fn follow(&mut self, file: usize, found: &Found) -> Result<()> {
-        let shots = &found.footprints;
-        let (mut first_s, mut last_s) = (f64::INFINITY, f64::NEG_INFINITY);
-        for tag_s in &shots.et_tag_s {
-            (first_s, last_s) = (first_s.min(*tag_s), last_s.max(*tag_s));
-        }
-        if let Some((before, before_s)) = self.last {
-            if before != file && first_s < before_s + SAME_SHOT_S {
-                let overlap = Overlap {
-                    record: shots.record.first().copied().unwrap_or_default(),
-                    before: self.paths[before].display().to_string(),
-                };
-                return Err(overlap).in_file(&self.paths[file]);
-            }
-            last_s = last_s.max(before_s);
-        }
-        self.last = Some((file, last_s));
-        Ok(())
+    /// Makes sure that no file before holds one of these shots.
+    fn require_distinct(&mut self, file: usize, shots: &Footprints<AsRead>) -> Result<()> {
+        let Some((row, other)) = self.seen.take_all(file, &shots.et_tag_s) else {
+            return Ok(());
+        };
+        let overlap = Overlap {
+            record: shots.record[row],
+            other: self.paths[other].display().to_string(),
+        };
+        Err(overlap).in_file(&self.paths[file])
     }
 }
 
@@ -289,7 +277,7 @@ impl Sink for HandOn {
         if found.footprints.is_empty() {
             return Ok(());
         }
-        self.follow(file, &found)?;
+        self.require_distinct(file, &found.footprints)?;
         let batch = self
             .columns
             .batch(&convert_at_tags(found.footprints, &self.files))?;
@@ -299,5 +287,41 @@ impl Sink for HandOn {
 
     fn failed(&mut self, _file: usize, failure: Error) -> Result<()> {
         Err(failure)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stages::shot_cases::CASES;
+
+    #[test]
+    fn shots_of_two_files_have_no_answer_together() {
+        for case in CASES {
+            let files = 0..case.files.len();
+            let paths: Vec<PathBuf> = files.clone().map(|file| case.path(file)).collect();
+            let mut hand_on = HandOn {
+                paths: paths.clone(),
+                files: files.clone().map(|file| case.source(file)).collect(),
+                columns: ShotColumns::default(),
+                tally: Arc::default(),
+                stop: Arc::default(),
+                rows: tokio::sync::mpsc::channel(1).0,
+                seen: Seen::default(),
+            };
+            let mut checked =
+                files.map(|file| hand_on.require_distinct(file, &case.footprints(file)));
+            let refused = checked.find_map(Result::err);
+            let named = refused.map(|error| (error.file.clone(), error.cause.to_string()));
+            match (named, case.shared) {
+                (None, None) => {}
+                (Some((path, why)), Some([other, file])) => {
+                    assert_eq!(path.as_ref(), Some(&paths[file]), "{}", case.name);
+                    let other = paths[other].display().to_string();
+                    assert!(why.contains(&other), "{}: {why}", case.name);
+                }
+                (found, _) => panic!("{}: {found:?}", case.name),
+            }
+        }
     }
 }
