@@ -112,7 +112,7 @@ async fn answer(table: ShotsTable, arguments: &Arguments, stop: &AtomicBool) -> 
     let rows = ask(table, &arguments.question).await;
     let mut rows = rows.map_err(Question)?;
     let mut answer = match &arguments.out {
-        Some(out) => Answer::in_file(out, rows.schema())?,
+        Some(out) => Answer::in_file(out, &rows.schema())?,
         None => Answer::printed(arguments.format, rows.schema())?,
     };
     while let Some(batch) = rows.next().await {

@@ -1,8 +1,7 @@
 //! How an answer is printed or written, piece by piece.
 
 use std::{
-    fs::File,
-    io::{self, BufWriter, Stdout, Write},
+    io::{self, Stdout, Write},
     path::Path,
     sync::{
         Arc,
@@ -10,21 +9,22 @@ use std::{
     },
 };
 
-use ::parquet::{
-    arrow::ArrowWriter,
-    basic::{Compression, ZstdLevel},
-    file::properties::WriterProperties,
-};
 use datafusion::arrow::{
-    csv, datatypes::SchemaRef, record_batch::RecordBatch,
-    util::pretty::pretty_format_batches_with_schema,
+    array::{Array as _, ArrayRef, StringArray},
+    datatypes::{DataType, Field, Fields, Schema, SchemaRef},
+    error::ArrowError,
+    record_batch::RecordBatch,
+    util::{
+        display::{ArrayFormatter, FormatOptions},
+        pretty::pretty_format_batches_with_schema,
+    },
 };
 
 use super::Format;
 use crate::cli::output;
 use crate::{
-    error::{Cause, IoError, Kind, Locate as _, Result},
-    files::StagedFile,
+    error::{Cause, Kind, Locate as _, Result},
+    products::{RowsFormat, RowsWriter},
 };
 
 /// Rows of a table that is printed.
@@ -55,7 +55,7 @@ impl Cause for NotWritten {
 
     fn advice(&self) -> String {
         match self {
-            Self::Refused(_) => "check the disk; a column of lists goes into Parquet, not into CSV",
+            Self::Refused(_) => "write the answer to a file (--out)",
             Self::Ending(_) => "give the file another ending",
         }
         .to_owned()
@@ -69,16 +69,16 @@ pub(super) enum Answer {
         schema: SchemaRef,
         batches: Vec<RecordBatch>,
     },
-    /// Comma-separated values on standard output, and whether its reader is gone.
-    Csv(csv::Writer<Reader>, Arc<AtomicBool>),
-    /// Comma-separated values in a file.
-    CsvFile(StagedFile, csv::Writer<BufWriter<File>>),
-    /// Parquet.
-    Parquet(StagedFile, Box<ArrowWriter<File>>),
+    /// Rows in a file or on standard output, and whether the reader of the latter is gone.
+    Rows {
+        writer: RowsWriter,
+        format: RowsFormat,
+        is_gone: Arc<AtomicBool>,
+    },
 }
 
 /// Whoever reads standard output: one who went away (`| head`) is no failure, a disk that refuses is one.
-pub(super) struct Reader {
+struct Reader {
     out: Stdout,
     is_gone: Arc<AtomicBool>,
 }
@@ -108,14 +108,6 @@ impl Write for Reader {
     }
 }
 
-/// A writer of comma-separated values that has written their names, also of an answer without rows.
-fn begun<W: Write>(out: W, schema: SchemaRef) -> std::result::Result<csv::Writer<W>, NotWritten> {
-    let mut writer = csv::Writer::new(out);
-    let names = writer.write(&RecordBatch::new_empty(schema));
-    names.map_err(NotWritten::refused)?;
-    Ok(writer)
-}
-
 impl Answer {
     /// An answer on standard output.
     pub(super) fn printed(format: Format, schema: SchemaRef) -> Result<Self> {
@@ -126,39 +118,36 @@ impl Answer {
             },
             Format::Csv => {
                 let is_gone = Arc::new(AtomicBool::new(false));
-                let reader = Reader {
+                let reader = Box::new(Reader {
                     out: io::stdout(),
                     is_gone: Arc::clone(&is_gone),
-                };
-                Self::Csv(begun(reader, schema)?, is_gone)
+                });
+                let format = RowsFormat::Csv;
+                Self::Rows {
+                    writer: RowsWriter::new(reader, format, as_text(&schema))?,
+                    format,
+                    is_gone,
+                }
             }
         })
     }
 
     /// An answer in a file, which appears when it is whole.
-    pub(super) fn in_file(path: &Path, schema: SchemaRef) -> Result<Self> {
+    pub(super) fn in_file(path: &Path, schema: &SchemaRef) -> Result<Self> {
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
-        match ending.to_str() {
-            Some("csv") => {
-                let file = StagedFile::create(path)?;
-                let writer = begun(BufWriter::new(file.writer()?), schema).in_file(path)?;
-                Ok(Self::CsvFile(file, writer))
-            }
-            Some("parquet") => {
-                let file = StagedFile::create(path)?;
-                let properties = WriterProperties::builder()
-                    .set_created_by(concat!("areograph ", env!("CARGO_PKG_VERSION")).to_owned())
-                    .set_compression(Compression::ZSTD(ZstdLevel::default()))
-                    .build();
-                let writer = ArrowWriter::try_new(file.writer()?, schema, Some(properties));
-                let writer = writer.map_err(NotWritten::refused).in_file(path)?;
-                Ok(Self::Parquet(file, Box::new(writer)))
-            }
+        let (format, schema) = match ending.to_str() {
+            Some("csv") => (RowsFormat::Csv, as_text(schema)),
+            Some("parquet") => (RowsFormat::Parquet, SchemaRef::clone(schema)),
             _ => {
                 let ending = ending.to_string_lossy().into_owned();
-                Err(NotWritten::Ending(ending)).in_file(path)
+                return Err(NotWritten::Ending(ending)).in_file(path);
             }
-        }
+        };
+        Ok(Self::Rows {
+            writer: RowsWriter::create(path, format, schema)?,
+            format,
+            is_gone: Arc::default(),
+        })
     }
 
     /// Takes rows, and says whether it wants more.
@@ -168,17 +157,18 @@ impl Answer {
                 batches.push(batch);
                 Ok(rows(batches) <= TABLE_ROWS_MAX)
             }
-            Self::Csv(writer, is_gone) => {
-                writer.write(&batch).map_err(NotWritten::refused)?;
+            Self::Rows {
+                writer,
+                format,
+                is_gone,
+            } => {
+                match format {
+                    RowsFormat::Csv => {
+                        writer.write(&printed(&batch).map_err(NotWritten::refused)?)?
+                    }
+                    RowsFormat::Parquet | RowsFormat::GeoJson => writer.write(&batch)?,
+                }
                 Ok(!is_gone.load(Ordering::Relaxed))
-            }
-            Self::CsvFile(file, writer) => {
-                let written = writer.write(&batch).map_err(NotWritten::refused);
-                written.in_file(file.path()).map(|()| true)
-            }
-            Self::Parquet(file, writer) => {
-                let written = writer.write(&batch).map_err(NotWritten::refused);
-                written.in_file(file.path()).map(|()| true)
             }
         }
     }
@@ -187,22 +177,39 @@ impl Answer {
     pub(super) fn finish(self) -> Result<()> {
         match self {
             Self::Table { schema, batches } => print_table(schema, &batches),
-            Self::Csv(writer, _) => {
-                let flushed = writer.into_inner().flush();
-                Ok(flushed.map_err(IoError::on("write standard output"))?)
-            }
-            Self::CsvFile(file, writer) => {
-                let flushed = writer.into_inner().flush().map_err(IoError::on("write"));
-                flushed.in_file(file.path())?;
-                file.finish()
-            }
-            Self::Parquet(file, writer) => {
-                let closed = writer.close().map_err(NotWritten::refused);
-                closed.in_file(file.path())?;
-                file.finish()
-            }
+            Self::Rows { writer, .. } => writer.finish(Vec::new()).map(drop),
         }
     }
+}
+
+/// Columns of any type as text; lists and groups stay, and the writer withholds them.
+fn as_text(schema: &SchemaRef) -> SchemaRef {
+    let text = |field: &Arc<Field>| {
+        if field.data_type().is_nested() {
+            Arc::clone(field)
+        } else {
+            Arc::new(Field::new(field.name(), DataType::Utf8, true))
+        }
+    };
+    let fields: Fields = schema.fields().iter().map(text).collect();
+    Arc::new(Schema::new(fields))
+}
+
+/// Rows in the columns of [`as_text`], in the words of Arrow; empty where there is no value.
+fn printed(batch: &RecordBatch) -> std::result::Result<RecordBatch, ArrowError> {
+    let options = FormatOptions::default();
+    let text = |column: &ArrayRef| -> std::result::Result<ArrayRef, ArrowError> {
+        if column.data_type().is_nested() {
+            return Ok(Arc::clone(column));
+        }
+        let formatter = ArrayFormatter::try_new(column, &options)?;
+        let texts = (0..column.len()).map(|row| formatter.value(row).try_to_string());
+        let texts: Vec<String> = texts.collect::<std::result::Result<_, _>>()?;
+        Ok(Arc::new(StringArray::from(texts)))
+    };
+    let columns = batch.columns().iter().map(text);
+    let columns = columns.collect::<std::result::Result<Vec<_>, _>>()?;
+    RecordBatch::try_new(as_text(&batch.schema()), columns)
 }
 
 fn rows(batches: &[RecordBatch]) -> usize {
