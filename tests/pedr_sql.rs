@@ -19,13 +19,13 @@ use std::{
 };
 
 use areograph::body::Datum;
-use areograph::{pds::archive::Opened, sql::ShotsTable};
-use arrow_array::RecordBatch;
-use arrow_select::concat::concat_batches;
-use datafusion::{
+use areograph::sql::datafusion::{
     datasource::MemTable,
     prelude::{SessionConfig, SessionContext},
 };
+use areograph::{pds::archive::Opened, products::ShotColumns, sql::ShotsTable};
+use arrow_array::RecordBatch;
+use arrow_select::concat::concat_batches;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use proptest::{prelude::*, strategy::ValueTree as _, test_runner::TestRunner};
 use track::{FRAMES, write};
@@ -46,7 +46,7 @@ fn archive(folder: &Path) -> PathBuf {
 fn shots(archive: &Path) -> ShotsTable {
     let Opened { sources, failures } = Opened::all(&[archive.to_owned()]).unwrap();
     assert!(failures.is_empty());
-    ShotsTable::new(sources, Arc::default())
+    ShotsTable::new(sources, Arc::new(ShotColumns::default()), Arc::default())
 }
 
 fn context() -> SessionContext {

@@ -9,22 +9,15 @@ use std::{
     },
 };
 
-use datafusion::arrow::{
-    array::{Array as _, ArrayRef, StringArray},
-    datatypes::{DataType, Field, Fields, Schema, SchemaRef},
-    error::ArrowError,
-    record_batch::RecordBatch,
-    util::{
-        display::{ArrayFormatter, FormatOptions},
-        pretty::pretty_format_batches_with_schema,
-    },
-};
+use arrow_array::RecordBatch;
+use arrow_schema::SchemaRef;
 
 use super::Format;
 use crate::cli::output;
 use crate::{
     error::{Cause, Kind, Locate as _, Result},
     products::{RowsFormat, RowsWriter},
+    sql::{as_table, as_text, as_text_schema},
 };
 
 /// Rows of a table that is printed.
@@ -124,7 +117,7 @@ impl Answer {
                 });
                 let format = RowsFormat::Csv;
                 Self::Rows {
-                    writer: RowsWriter::new(reader, format, as_text(&schema))?,
+                    writer: RowsWriter::new(reader, format, as_text_schema(&schema))?,
                     format,
                     is_gone,
                 }
@@ -136,7 +129,7 @@ impl Answer {
     pub(super) fn in_file(path: &Path, schema: &SchemaRef) -> Result<Self> {
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
         let (format, schema) = match ending.to_str() {
-            Some("csv") => (RowsFormat::Csv, as_text(schema)),
+            Some("csv") => (RowsFormat::Csv, as_text_schema(schema)),
             Some("parquet") => (RowsFormat::Parquet, SchemaRef::clone(schema)),
             _ => {
                 let ending = ending.to_string_lossy().into_owned();
@@ -164,7 +157,7 @@ impl Answer {
             } => {
                 match format {
                     RowsFormat::Csv => {
-                        writer.write(&printed(&batch).map_err(NotWritten::refused)?)?
+                        writer.write(&as_text(&batch).map_err(NotWritten::refused)?)?
                     }
                     RowsFormat::Parquet | RowsFormat::GeoJson => writer.write(&batch)?,
                 }
@@ -182,36 +175,6 @@ impl Answer {
     }
 }
 
-/// Columns of any type as text; lists and groups stay, and the writer withholds them.
-fn as_text(schema: &SchemaRef) -> SchemaRef {
-    let text = |field: &Arc<Field>| {
-        if field.data_type().is_nested() {
-            Arc::clone(field)
-        } else {
-            Arc::new(Field::new(field.name(), DataType::Utf8, true))
-        }
-    };
-    let fields: Fields = schema.fields().iter().map(text).collect();
-    Arc::new(Schema::new(fields))
-}
-
-/// Rows in the columns of [`as_text`], in the words of Arrow; empty where there is no value.
-fn printed(batch: &RecordBatch) -> std::result::Result<RecordBatch, ArrowError> {
-    let options = FormatOptions::default();
-    let text = |column: &ArrayRef| -> std::result::Result<ArrayRef, ArrowError> {
-        if column.data_type().is_nested() {
-            return Ok(Arc::clone(column));
-        }
-        let formatter = ArrayFormatter::try_new(column, &options)?;
-        let texts = (0..column.len()).map(|row| formatter.value(row).try_to_string());
-        let texts: Vec<String> = texts.collect::<std::result::Result<_, _>>()?;
-        Ok(Arc::new(StringArray::from(texts)))
-    };
-    let columns = batch.columns().iter().map(text);
-    let columns = columns.collect::<std::result::Result<Vec<_>, _>>()?;
-    RecordBatch::try_new(as_text(&batch.schema()), columns)
-}
-
 fn rows(batches: &[RecordBatch]) -> usize {
     batches.iter().map(RecordBatch::num_rows).sum()
 }
@@ -227,7 +190,7 @@ fn print_table(schema: SchemaRef, batches: &[RecordBatch]) -> Result<()> {
             batch
         })
         .collect();
-    let table = pretty_format_batches_with_schema(schema, &shown);
+    let table = as_table(schema, &shown);
     output::line(table.map_err(NotWritten::refused)?);
     if rows(batches) > TABLE_ROWS_MAX {
         tracing::warn!(

@@ -2,6 +2,7 @@
 
 use std::{
     collections::BTreeMap,
+    fmt,
     path::PathBuf,
     sync::{
         Arc, Mutex, PoisonError,
@@ -26,21 +27,36 @@ use tokio::sync::mpsc::Sender;
 use tokio_stream::StreamExt as _;
 
 use super::conditions::Conditions;
-use crate::{
+use areograph_base::{
     error::{Cause, Error, Kind, Locate as _, Result, Stopped},
     footprints::{AsRead, Footprints, SourceFile},
-    geom::window::Region,
-    pds::{
-        archive::{Found, Judged, Query, Seen, Sink, Source, search},
-        pedr::Reason,
-    },
-    products::ShotColumns,
-    stages::convert_datum::convert_at_tags,
     time::Interval,
+};
+use areograph_geom::window::Region;
+use areograph_pds::{
+    archive::{Found, Judged, Query, Seen, Sink, Source, search},
+    pedr::Reason,
 };
 
 /// Pieces of an answer that wait for the query: a megabyte or so each.
 const PIECES_WAITING: usize = 2;
+
+/// The columns of the table, and how they are made of shots.
+pub trait Columns: fmt::Debug + Send + Sync {
+    /// Names and types; units and descriptions are the fields' metadata.
+    fn schema(&self) -> SchemaRef;
+
+    /// Those at these places alone, counted from 0, in this order.
+    fn pick(&self, places: &[usize]) -> Arc<dyn Columns>;
+
+    /// The values of these shots, in IAU 2000 at their time tags.
+    ///
+    /// * `files` – the files that the column `file` counts into
+    ///
+    /// # Errors
+    /// A number that is not finite.
+    fn batch(&self, shots: Footprints<AsRead>, files: &[SourceFile]) -> Result<RecordBatch>;
+}
 
 /// What queries met beside rows.
 #[derive(Debug, Default)]
@@ -83,7 +99,7 @@ impl Cause for Overlap {
 #[derive(Debug)]
 pub struct ShotsTable {
     sources: Arc<[Source]>,
-    columns: ShotColumns,
+    columns: Arc<dyn Columns>,
     schema: SchemaRef,
     tally: Arc<Mutex<Tally>>,
     stop: Arc<AtomicBool>,
@@ -92,8 +108,7 @@ pub struct ShotsTable {
 impl ShotsTable {
     /// The table of these files, at most 65,535; queries of it fail once `stop` is set.
     #[must_use]
-    pub fn new(sources: Vec<Source>, stop: Arc<AtomicBool>) -> Self {
-        let columns = ShotColumns::default();
+    pub fn new(sources: Vec<Source>, columns: Arc<dyn Columns>, stop: Arc<AtomicBool>) -> Self {
         Self {
             sources: sources.into(),
             schema: columns.schema(),
@@ -145,7 +160,7 @@ impl TableProvider for ShotsTable {
         let allowed = |source: &&Source| conditions.allow_file(&source.file().name);
         let columns = match projection {
             Some(places) => self.columns.pick(places),
-            None => self.columns.clone(),
+            None => Arc::clone(&self.columns),
         };
         let schema = columns.schema();
         let shots: Arc<dyn PartitionStream> = Arc::new(Shots {
@@ -168,7 +183,7 @@ struct Shots {
     sources: Arc<[Source]>,
     regions: Vec<Region>,
     time: Option<Interval>,
-    columns: ShotColumns,
+    columns: Arc<dyn Columns>,
     schema: SchemaRef,
     tally: Arc<Mutex<Tally>>,
     stop: Arc<AtomicBool>,
@@ -197,7 +212,7 @@ impl PartitionStream for Shots {
         let mut hand_on = HandOn {
             paths: self.sources.iter().map(|of| of.path().to_owned()).collect(),
             files: self.sources.iter().map(Source::file).collect(),
-            columns: self.columns.clone(),
+            columns: Arc::clone(&self.columns),
             tally: Arc::clone(&self.tally),
             stop: Arc::clone(&self.stop),
             rows: stream.tx(),
@@ -228,7 +243,7 @@ impl PartitionStream for Shots {
 struct HandOn {
     paths: Vec<PathBuf>,
     files: Vec<SourceFile>,
-    columns: ShotColumns,
+    columns: Arc<dyn Columns>,
     tally: Arc<Mutex<Tally>>,
     stop: Arc<AtomicBool>,
     rows: Sender<Answer<RecordBatch>>,
@@ -250,13 +265,13 @@ impl HandOn {
         let _ = self.rows.blocking_send(Err(told));
     }
 
-    /// Makes sure that no file before holds one of these shots.
-    fn require_distinct(&mut self, file: usize, shots: &Footprints<AsRead>) -> Result<()> {
-        let Some((row, other)) = self.seen.take_all(file, &shots.et_tag_s) else {
+    /// Makes sure that no file before holds one of these shots, which are in these records.
+    fn require_distinct(&mut self, file: usize, tags_s: &[f64], records: &[u32]) -> Result<()> {
+        let Some((row, other)) = self.seen.take_all(file, tags_s) else {
             return Ok(());
         };
         let overlap = Overlap {
-            record: shots.record[row],
+            record: records[row],
             other: self.paths[other].display().to_string(),
         };
         Err(overlap).in_file(&self.paths[file])
@@ -277,10 +292,9 @@ impl Sink for HandOn {
         if found.footprints.is_empty() {
             return Ok(());
         }
-        self.require_distinct(file, &found.footprints)?;
-        let batch = self
-            .columns
-            .batch(&convert_at_tags(found.footprints, &self.files))?;
+        let shots = &found.footprints;
+        self.require_distinct(file, &shots.et_tag_s, &shots.record)?;
+        let batch = self.columns.batch(found.footprints, &self.files)?;
         let sent = self.rows.blocking_send(Ok(batch));
         sent.map_err(|_gone| Stopped.into())
     }
@@ -291,26 +305,53 @@ impl Sink for HandOn {
 }
 
 #[cfg(test)]
+#[path = "../../pds/src/archive/distinct/cases.rs"]
+mod cases;
+
+#[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::stages::shot_cases::CASES;
+    use datafusion::arrow::datatypes::Schema;
+
+    use super::{cases::CASES, *};
+
+    #[derive(Debug)]
+    struct NoColumns;
+
+    impl Columns for NoColumns {
+        fn schema(&self) -> SchemaRef {
+            Arc::new(Schema::empty())
+        }
+
+        fn pick(&self, _places: &[usize]) -> Arc<dyn Columns> {
+            Arc::new(Self)
+        }
+
+        fn batch(&self, _shots: Footprints<AsRead>, _files: &[SourceFile]) -> Result<RecordBatch> {
+            Ok(RecordBatch::new_empty(self.schema()))
+        }
+    }
 
     #[test]
     fn shots_of_two_files_have_no_answer_together() {
         for case in CASES {
             let files = 0..case.files.len();
-            let paths: Vec<PathBuf> = files.clone().map(|file| case.path(file)).collect();
+            let paths: Vec<PathBuf> = files
+                .clone()
+                .map(|file| PathBuf::from(format!("file{file}.b")))
+                .collect();
             let mut hand_on = HandOn {
                 paths: paths.clone(),
-                files: files.clone().map(|file| case.source(file)).collect(),
-                columns: ShotColumns::default(),
+                files: Vec::new(),
+                columns: Arc::new(NoColumns),
                 tally: Arc::default(),
                 stop: Arc::default(),
                 rows: tokio::sync::mpsc::channel(1).0,
                 seen: Seen::default(),
             };
-            let mut checked =
-                files.map(|file| hand_on.require_distinct(file, &case.footprints(file)));
+            let mut checked = files.map(|file| {
+                let tags_s = case.tags_s(file);
+                hand_on.require_distinct(file, &tags_s, &vec![1; tags_s.len()])
+            });
             let refused = checked.find_map(Result::err);
             let named = refused.map(|error| (error.file.clone(), error.cause.to_string()));
             match (named, case.shared) {
