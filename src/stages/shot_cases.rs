@@ -12,21 +12,22 @@ use crate::{
     footprints::{AsRead, Footprint, Footprints, SourceFile},
 };
 
+/// File `file`, by a name of its own.
+pub(crate) fn source(file: usize) -> SourceFile {
+    SourceFile {
+        name: format!("file{file}.b"),
+        version: None,
+        datum: Datum::Iau2000,
+        blake3: String::new(),
+    }
+}
+
+/// Where it lies.
+pub(crate) fn path(file: usize) -> PathBuf {
+    PathBuf::from(source(file).name)
+}
+
 impl Case {
-    /// File `file`, by a name of its own.
-    pub(crate) fn source(&self, file: usize) -> SourceFile {
-        SourceFile {
-            name: format!("file{file}.b"),
-            version: None,
-            datum: Datum::Iau2000,
-            blake3: String::new(),
-        }
-    }
-
-    pub(crate) fn path(&self, file: usize) -> PathBuf {
-        PathBuf::from(self.source(file).name)
-    }
-
     /// The shots of file `file`.
     pub(crate) fn footprints(&self, file: usize) -> Footprints<AsRead> {
         let mut footprints = Footprints::new(Vec::new());

@@ -241,7 +241,7 @@ impl Sink for Answer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stages::shot_cases::{CASES, Case};
+    use crate::stages::shot_cases::{CASES, Case, source};
 
     fn is_in_order(case: &Case) -> bool {
         let tags_s: Vec<f64> = (0..case.files.len())
@@ -255,7 +255,7 @@ mod tests {
         for case in CASES {
             let files = 0..case.files.len();
             let mut answer = Answer {
-                files: files.clone().map(|file| case.source(file)).collect(),
+                files: files.clone().map(source).collect(),
                 ..Answer::default()
             };
             for file in files {
@@ -269,8 +269,8 @@ mod tests {
                 case.shared,
                 is_in_order(case) || case.files.len() == 2,
             ) {
-                assert_eq!(path, PathBuf::from(case.source(file).name), "{}", case.name);
-                assert_eq!(disorder.before, case.source(other).name, "{}", case.name);
+                assert_eq!(path, PathBuf::from(source(file).name), "{}", case.name);
+                assert_eq!(disorder.before, source(other).name, "{}", case.name);
             }
         }
     }

@@ -131,7 +131,9 @@ fn enter(seen: &mut Seen, file: usize, profiles: &[ArchiveProfile]) -> Option<(u
         .collect();
     let shared = (spans.iter()).find_map(|(orbit, span)| Some((*orbit, seen.holder(span)?)));
     if shared.is_none() {
-        spans.into_iter().for_each(|(_, span)| seen.add(span));
+        for (_, span) in spans {
+            seen.add(span);
+        }
     }
     shared
 }

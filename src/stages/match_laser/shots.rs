@@ -246,7 +246,7 @@ pub(super) fn is_kept(grid: &HeightGrid, segment: &[Shot], options: &MatchOption
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stages::shot_cases::CASES;
+    use crate::stages::shot_cases::{CASES, path, source};
 
     #[test]
     fn files_with_the_same_shots_are_refused() {
@@ -259,7 +259,7 @@ mod tests {
         };
         for case in CASES {
             let files = 0..case.files.len();
-            let names: Vec<String> = files.clone().map(|file| case.source(file).name).collect();
+            let names: Vec<String> = files.clone().map(|file| source(file).name).collect();
             let mut gathered = Gathered {
                 grid: &grid,
                 names: names.clone(),
@@ -274,8 +274,8 @@ mod tests {
             let named = refused.map(|error| (error.file.clone(), error.cause.to_string()));
             match (named, case.shared) {
                 (None, None) => {}
-                (Some((path, why)), Some([other, file])) => {
-                    assert_eq!(path, Some(case.path(file)), "{}", case.name);
+                (Some((refused, why)), Some([other, file])) => {
+                    assert_eq!(refused, Some(path(file)), "{}", case.name);
                     assert!(why.contains(&names[other]), "{}: {why}", case.name);
                 }
                 (found, _) => panic!("{}: {found:?}", case.name),

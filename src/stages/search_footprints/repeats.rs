@@ -68,12 +68,12 @@ pub(super) fn require_distinct(footprints: &Footprints<AsRead>, paths: &[PathBuf
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stages::shot_cases::CASES;
+    use crate::stages::shot_cases::{CASES, path};
 
     #[test]
     fn files_with_the_same_shots_are_refused() {
         for case in CASES {
-            let paths: Vec<PathBuf> = (0..case.files.len()).map(|file| case.path(file)).collect();
+            let paths: Vec<PathBuf> = (0..case.files.len()).map(path).collect();
             let mut footprints = Footprints::new(Vec::new());
             for file in 0..case.files.len() {
                 footprints.append(case.footprints(file));

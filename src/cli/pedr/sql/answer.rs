@@ -157,7 +157,8 @@ impl Answer {
             } => {
                 match format {
                     RowsFormat::Csv => {
-                        writer.write(&as_text(&batch).map_err(NotWritten::refused)?)?
+                        let texts = as_text(&batch).map_err(NotWritten::refused)?;
+                        writer.write(&texts)?;
                     }
                     RowsFormat::Parquet | RowsFormat::GeoJson => writer.write(&batch)?,
                 }
