@@ -9,8 +9,6 @@ pub mod difference;
 pub mod flow;
 pub mod products;
 pub mod report;
-#[cfg(feature = "sql")]
-pub mod sql;
 pub mod stages;
 pub mod worker;
 
@@ -24,4 +22,6 @@ pub use areograph_pds as pds;
 pub use areograph_scene as scene;
 pub use areograph_service as service;
 pub use areograph_spice as spice;
+#[cfg(feature = "sql")]
+pub use areograph_sql as sql;
 pub use areograph_store::{self as store, files, stage, stage_inputs};

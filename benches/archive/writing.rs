@@ -6,7 +6,7 @@ use areograph::{
     error::{Error, Result},
     footprints::SourceFile,
     pds::archive::{Found, Indexes, Judged, Query, Sink, Source, search},
-    products::{ShotsFile, ShotsFormat},
+    products::{RowsFormat, ShotsFile},
 };
 use serde_json::{Value, json};
 
@@ -38,7 +38,7 @@ pub(super) fn rows_per_s(archive: &Archive, folder: &Path) -> Value {
         .take(FILES)
         .collect();
     let files: Vec<SourceFile> = sources.iter().map(Source::file).collect();
-    let rate = |format: ShotsFormat, name: &str| {
+    let rate = |format: RowsFormat, name: &str| {
         let mut kept = Kept::default();
         let query = Query::unfiltered(vec![everywhere()], Judged::Near);
         search(&sources, &query, &RUN_ON, &mut kept).unwrap();
@@ -55,7 +55,7 @@ pub(super) fn rows_per_s(archive: &Archive, folder: &Path) -> Value {
         rows as f64 / taken_s
     };
     json!({
-        "parquet": rate(ShotsFormat::Parquet, "written.parquet"),
-        "csv": rate(ShotsFormat::Csv, "written.csv"),
+        "parquet": rate(RowsFormat::Parquet, "written.parquet"),
+        "csv": rate(RowsFormat::Csv, "written.csv"),
     })
 }

@@ -13,7 +13,7 @@ use serde::{Serialize, Serializer, ser::SerializeMap as _};
 use serde_json::{Map, Value, json};
 
 use super::{
-    coordinates::bounding_box_deg,
+    coordinates::{bounding_box_deg, frame},
     error::ProductError,
     files::{create, finish, open, to_value},
     gis::Features,
@@ -34,6 +34,25 @@ pub(super) struct Feature<'a> {
     properties: Properties<'a>,
 }
 
+impl<'a> Feature<'a> {
+    /// The point at this place with the attributes of a row.
+    const fn of(
+        names: &'a [&'a str],
+        values: &'a [Values],
+        row: usize,
+        coordinates: [f64; 2],
+    ) -> Self {
+        Self {
+            r#type: "Feature",
+            geometry: Point {
+                r#type: "Point",
+                coordinates,
+            },
+            properties: Properties { names, values, row },
+        }
+    }
+}
+
 #[derive(Serialize)]
 struct Point {
     r#type: &'static str,
@@ -42,7 +61,7 @@ struct Point {
 
 /// The attributes of a row in the order of their columns; those without a value are left out.
 struct Properties<'a> {
-    columns: &'a [Meaning],
+    names: &'a [&'a str],
     values: &'a [Values],
     row: usize,
 }
@@ -50,18 +69,18 @@ struct Properties<'a> {
 impl Serialize for Properties<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;
-        for (column, values) in self.columns.iter().zip(self.values) {
+        for (name, values) in self.names.iter().zip(self.values) {
             match values {
-                Values::Real(of) => map.serialize_entry(column.name, &of[self.row])?,
+                Values::Real(of) => map.serialize_entry(name, &of[self.row])?,
                 Values::OptionalReal(of) => {
                     if let Some(value) = of[self.row] {
-                        map.serialize_entry(column.name, &value)?;
+                        map.serialize_entry(name, &value)?;
                     }
                 }
-                Values::Natural(of) => map.serialize_entry(column.name, &of[self.row])?,
-                Values::Integer(of) => map.serialize_entry(column.name, &of[self.row])?,
-                Values::Flag(of) => map.serialize_entry(column.name, &of[self.row])?,
-                Values::Text(of) => map.serialize_entry(column.name, &of[self.row])?,
+                Values::Natural(of) => map.serialize_entry(name, &of[self.row])?,
+                Values::Integer(of) => map.serialize_entry(name, &of[self.row])?,
+                Values::Flag(of) => map.serialize_entry(name, &of[self.row])?,
+                Values::Text(of) => map.serialize_entry(name, &of[self.row])?,
                 Values::Bytes(_) => {}
             }
         }
@@ -177,47 +196,55 @@ fn each(
     rows: Range<usize>,
     mut take: impl FnMut(usize, &Feature) -> std::result::Result<(), ProductError>,
 ) -> std::result::Result<(), ProductError> {
-    let columns: Vec<Meaning> = features.attributes.columns().cloned().collect();
+    let columns = features.attributes.columns();
+    let names: Vec<&str> = columns.map(|column| column.name).collect();
     let values = features.attributes.values(rows.clone())?;
     for (row, index) in rows.enumerate() {
         let [longitude_deg, latitude_deg, _] = features.points[index];
-        let feature = Feature {
-            r#type: "Feature",
-            geometry: Point {
-                r#type: "Point",
-                coordinates: [longitude_deg, latitude_deg],
-            },
-            properties: Properties {
-                columns: &columns,
-                values: &values,
-                row,
-            },
-        };
+        let feature = Feature::of(&names, &values, row, [longitude_deg, latitude_deg]);
         take(index, &feature)?;
     }
     Ok(())
+}
+
+/// Points with attributes, a line each but for the end of the last one.
+pub(super) fn points_as_text(
+    names: &[&str],
+    values: &[Values],
+    points_deg: &[[f64; 2]],
+) -> std::result::Result<Vec<u8>, ProductError> {
+    let mut text = Vec::new();
+    for (row, point_deg) in points_deg.iter().enumerate() {
+        if row > 0 {
+            text.extend_from_slice(SEPARATOR.as_bytes());
+        }
+        let feature = Feature::of(names, values, row, *point_deg);
+        serde_json::to_writer(&mut text, &feature)
+            .map_err(ProductError::refused("encode GeoJSON"))?;
+    }
+    Ok(text)
 }
 
 /// Writes all features, a line each but for the end of the last one.
 ///
 /// # Errors
 /// Numbers that are not finite; what the disk refuses.
-pub(super) fn write_features(file: &mut impl Write, features: &Features) -> Result<()> {
+fn write_features(file: &mut impl Write, features: &Features) -> Result<()> {
+    let columns = features.attributes.columns();
+    let names: Vec<&str> = columns.map(|column| column.name).collect();
+    let points_deg = features.points_deg();
     let text_of = |rows: Range<usize>| {
-        let mut text = Vec::new();
-        each(features, rows, |index, feature| {
-            if index > 0 {
-                text.extend_from_slice(SEPARATOR.as_bytes());
-            }
-            serde_json::to_writer(&mut text, feature)
-                .map_err(ProductError::refused("encode GeoJSON"))
-        })?;
-        Ok(text)
+        let values = features.attributes.values(rows.clone())?;
+        Ok(points_as_text(&names, &values, &points_deg[rows])?)
     };
+    let mut is_first = true;
     for wave in features.attributes.waves() {
         let texts: Vec<Result<Vec<u8>>> = wave.into_par_iter().map(text_of).collect();
         for text in texts {
-            file.write_all(&text?).map_err(IoError::on("write"))?;
+            let separator = if is_first { "" } else { SEPARATOR };
+            is_first = false;
+            let text = [separator.as_bytes(), &text?].concat();
+            file.write_all(&text).map_err(IoError::on("write"))?;
         }
     }
     Ok(())
@@ -239,17 +266,26 @@ fn write_lines(path: &Path, head: &str, features: &Features) -> Result<()> {
     finish(path, file)
 }
 
-/// The lines before the first feature.
-pub(super) fn head(features: &Features) -> std::result::Result<String, ProductError> {
-    let crs = json!({ "type": "name", "properties": { "name": crs_urn(features.body) } });
+fn head(features: &Features) -> std::result::Result<String, ProductError> {
+    let bounds_deg = bounding_box_deg(&features.points_deg());
+    head_of(features.name, features.body, bounds_deg)
+}
+
+/// The lines before the first feature of points on `body`.
+pub(super) fn head_of(
+    name: &str,
+    body: Body,
+    bounds_deg: Option<[f64; 4]>,
+) -> std::result::Result<String, ProductError> {
+    let crs = json!({ "type": "name", "properties": { "name": crs_urn(body) } });
     let mut members = vec![
         ("type", json!("FeatureCollection")),
-        ("name", json!(features.name)),
+        ("name", json!(name)),
         ("crs", crs),
-        ("frame", json!(features.frame)),
+        ("frame", json!(frame(body))),
     ];
-    if let Some(bounds) = bounding_box_deg(&features.points_deg()) {
-        members.push(("bbox", to_value(&bounds)?));
+    if let Some(bounds_deg) = bounds_deg {
+        members.push(("bbox", to_value(&bounds_deg)?));
     }
     let mut head = "{\n".to_owned();
     for (name, member) in members {

@@ -15,6 +15,15 @@ pub(super) fn well_known_binary(point: [f64; 2]) -> Vec<u8> {
     bytes
 }
 
+/// The place of such a point.
+pub(super) fn point_of(bytes: &[u8]) -> Option<[f64; 2]> {
+    let (head, bytes) = bytes.split_at_checked(5)?;
+    let (axes, _) = bytes.as_chunks();
+    let point = axes.iter().map(|axis| f64::from_le_bytes(*axis));
+    let point: [f64; 2] = point.collect::<Vec<_>>().try_into().ok()?;
+    (head == [1, 1, 0, 0, 0]).then_some(point)
+}
+
 /// The `geo` key of a table of points on `body` within a box (west, south, east, north, degrees).
 ///
 /// * `covering` – where each row has its own box, if it has one

@@ -43,6 +43,7 @@ mod ranges;
 pub mod read;
 mod registration;
 mod registry;
+mod rows_file;
 #[cfg(feature = "sql")]
 mod shot_columns;
 mod site;
@@ -65,7 +66,7 @@ pub use exchange::{
     NetworkMeasure, NetworkPoint, isis_serial_number, write_control_network, write_gcp,
     write_lidar_data,
 };
-pub use found_shots::{ShotsFile, ShotsFormat};
+pub use found_shots::ShotsFile;
 pub use generated::{documentation, schemas};
 pub use laser_match::{MatchProducts, write_match_products};
 pub use listed::{Listed, listed};
@@ -75,6 +76,7 @@ pub use page::REPORT;
 pub use page_data::{PAGE_DATA, PageData};
 pub use picture::{PictureFile, PictureFormat, PictureHead};
 pub use product::{Pages, Product};
+pub use rows_file::{Out, RowsFormat, RowsWriter};
 #[cfg(feature = "sql")]
 pub use shot_columns::ShotColumns;
 pub use site::{AdjustmentProducts, GeometricProducts, ImageProducts, Program, SiteProducts};

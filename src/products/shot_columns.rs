@@ -1,6 +1,8 @@
 //! Shots of an archive as columns of a table that is queried: those of `footprints.parquet` that need neither windows
 //! nor kernels.
 
+use std::sync::Arc;
+
 use arrow_array::{RecordBatch, RecordBatchOptions};
 use arrow_schema::SchemaRef;
 
@@ -10,7 +12,12 @@ use super::{
     parquet,
     table::Table,
 };
-use crate::{error::Result, footprints::Footprints, frames::BodyFixed};
+use crate::{
+    error::Result,
+    footprints::{AsRead, Footprints, SourceFile},
+    sql::Columns,
+    stages::convert_datum::convert_at_tags,
+};
 
 /// What is asked of a shot, in the order of the answer.
 #[derive(Debug, Clone)]
@@ -50,34 +57,27 @@ impl Default for ShotColumns {
     }
 }
 
-impl ShotColumns {
-    /// Those at these places alone, in this order.
-    #[must_use]
-    pub fn pick(&self, places: &[usize]) -> Self {
-        let places = places.iter().filter_map(|place| self.places.get(*place));
-        let places: Vec<usize> = places.copied().collect();
-        let schema = parquet::schema(&table(Vec::new()).pick(&places));
-        Self { places, schema }
-    }
-
-    /// Names and types; units and descriptions are the fields' metadata.
-    #[must_use]
-    pub fn schema(&self) -> SchemaRef {
+impl Columns for ShotColumns {
+    fn schema(&self) -> SchemaRef {
         SchemaRef::clone(&self.schema)
     }
 
-    /// The values of these shots.
-    ///
-    /// # Errors
-    /// A number that is not finite.
-    pub fn batch(&self, footprints: &Footprints<BodyFixed>) -> Result<RecordBatch> {
-        let rows = footprints.len();
+    fn pick(&self, places: &[usize]) -> Arc<dyn Columns> {
+        let places = places.iter().filter_map(|place| self.places.get(*place));
+        let places: Vec<usize> = places.copied().collect();
+        let schema = parquet::schema(&table(Vec::new()).pick(&places));
+        Arc::new(Self { places, schema })
+    }
+
+    fn batch(&self, shots: Footprints<AsRead>, files: &[SourceFile]) -> Result<RecordBatch> {
+        let rows = shots.len();
         if self.places.is_empty() {
             let rows = RecordBatchOptions::new().with_row_count(Some(rows));
             let batch = RecordBatch::try_new_with_options(self.schema(), Vec::new(), &rows);
             return Ok(batch.map_err(ProductError::refused("assemble columns"))?);
         }
-        let table = table(Shot::all_of(footprints, &Nameless)).pick(&self.places);
+        let shots = convert_at_tags(shots, files);
+        let table = table(Shot::all_of(&shots, &Nameless)).pick(&self.places);
         Ok(parquet::record_batch(&table, &self.schema, 0..rows)?)
     }
 }

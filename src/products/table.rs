@@ -15,7 +15,7 @@ use crate::wording::Wording;
 /// Rows whose values stand in memory at once.
 const ROWS_AT_ONCE: usize = 65_536;
 /// Rows that a thread turns into text at once, and how often in a wave: text of a wave, 3 MB a thread, stands in memory.
-const ROWS_OF_A_TASK: usize = 2_048;
+pub(super) const ROWS_OF_A_TASK: usize = 2_048;
 const TASKS_OF_A_THREAD: usize = 4;
 
 /// What a column counts in; names of our own columns end in it.
@@ -370,7 +370,8 @@ impl<'a> Table<'a> {
     }
 }
 
-fn pieces(rows: usize, size: usize) -> impl Iterator<Item = Range<usize>> {
+/// So many rows in pieces of at most this size.
+pub(super) fn pieces(rows: usize, size: usize) -> impl Iterator<Item = Range<usize>> {
     (0..rows)
         .step_by(size)
         .map(move |start| start..rows.min(start + size))

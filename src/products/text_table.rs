@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::{
     error::ProductError,
     files::{create, finish, open},
-    table::{Kind, Meaning, Table, Values},
+    table::{Meaning, Table, Values},
 };
 use crate::error::{Error, IoError, Locate, Result};
 
@@ -26,21 +26,21 @@ pub(super) fn write(path: &Path, table: Table) -> Result<u64> {
 }
 
 fn encode(file: &mut (impl Write + Send), table: &Table) -> Result<()> {
-    write_names(file, table)?;
+    let names: Vec<&str> = table.columns().map(|column| column.name).collect();
+    write_names(file, &names)?;
     write_rows(file, table)
 }
 
 /// Writes the names of the columns.
-pub(super) fn write_names(file: &mut impl Write, table: &Table) -> Result<()> {
+pub(super) fn write_names(file: &mut impl Write, names: &[&str]) -> Result<()> {
     let mut writer = csv::Writer::from_writer(file);
-    let names = table.columns().map(|column| column.name);
     writer.write_record(names).map_err(refused)?;
     writer.flush().map_err(IoError::on("write"))?;
     Ok(())
 }
 
 /// Writes the rows.
-pub(super) fn write_rows(file: &mut (impl Write + Send), table: &Table) -> Result<()> {
+fn write_rows(file: &mut (impl Write + Send), table: &Table) -> Result<()> {
     let encoded = |wave: Vec<Range<usize>>| -> Vec<Result<Vec<u8>>> {
         let rows = wave.into_par_iter();
         rows.map(|rows| rows_as_text(table, rows)).collect()
@@ -67,24 +67,30 @@ fn put(file: &mut impl Write, text: &[u8]) -> Result<()> {
 /// Some rows of the table, which it must have.
 fn rows_as_text(table: &Table, rows: Range<usize>) -> Result<Vec<u8>> {
     let values = table.values(rows.clone())?;
-    let columns: Vec<(&Meaning, &Values)> = table.columns().zip(&values).collect();
+    let decimals = table.columns().map(|column| column.decimals);
+    let columns: Vec<_> = decimals.zip(&values).collect();
+    Ok(values_as_text(&columns, rows.len()))
+}
+
+/// The first rows of these columns, each with the decimals of its numbers.
+pub(super) fn values_as_text(columns: &[(Option<usize>, &Values)], rows: usize) -> Vec<u8> {
     let (mut text, mut cell) = (Vec::new(), Vec::new());
-    for row in 0..rows.len() {
-        for (place, (column, values)) in columns.iter().enumerate() {
+    for row in 0..rows {
+        for (place, (decimals, values)) in columns.iter().enumerate() {
             if place > 0 {
                 text.push(b',');
             }
-            if column.kind == Kind::Text {
+            if matches!(values, Values::Text(_)) {
                 cell.clear();
-                put_cell(&mut cell, column, values, row);
+                put_cell(&mut cell, *decimals, values, row);
                 put_quoted(&mut text, &cell, columns.len());
             } else {
-                put_cell(&mut text, column, values, row);
+                put_cell(&mut text, *decimals, values, row);
             }
         }
         text.push(b'\n');
     }
-    Ok(text)
+    text
 }
 
 /// Appends the field of a row of `columns` columns, in quotes where RFC 4180 asks for them, and where a row would be an
@@ -114,12 +120,12 @@ fn refused(error: csv::Error) -> Error {
 }
 
 /// Appends the text of a value.
-fn put_cell(text: &mut Vec<u8>, column: &Meaning, values: &Values, row: usize) {
+fn put_cell(text: &mut Vec<u8>, decimals: Option<usize>, values: &Values, row: usize) {
     let put = |text: &mut Vec<u8>, value: fmt::Arguments<'_>| {
         // A vector refuses nothing.
         let _infallible = text.write_fmt(value);
     };
-    let number = |text: &mut Vec<u8>, value: f64| match column.decimals {
+    let number = |text: &mut Vec<u8>, value: f64| match decimals {
         Some(decimals) => put(text, format_args!("{value:.decimals$}")),
         None => put_shortest(text, value),
     };
@@ -172,7 +178,7 @@ fn holds(column: &Meaning, values: &Values, row: usize, text: &str, cell: &mut V
         Values::OptionalReal(values) => values[row].map_or(text.is_empty(), same),
         _ => {
             cell.clear();
-            put_cell(cell, column, values, row);
+            put_cell(cell, column.decimals, values, row);
             text.as_bytes() == cell
         }
     }

@@ -34,6 +34,8 @@ pub mod register;
 pub mod reorient;
 pub mod sample_orientation;
 pub mod search_footprints;
+#[cfg(test)]
+pub(crate) mod shot_cases;
 pub(crate) mod shot_heights;
 pub mod site_image;
 pub mod tabulate_kernels;

@@ -12,7 +12,7 @@ use std::{
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use self::repeats::{Copies, require_distinct};
+use self::repeats::require_distinct;
 use super::outline_windows::Windows;
 pub use crate::pds::archive::ShotRejection;
 use crate::{
@@ -23,7 +23,7 @@ use crate::{
     footprints::{AsRead, Footprints, SourceFile},
     geom::window::Region,
     pds::{
-        archive::{Found, Indexes, Judged, Query, Sink, Source, search},
+        archive::{Copies, Found, Indexes, Judged, Query, Sink, Source, search},
         pedr::{Complaint, Reason},
     },
     stage::{InOrder, Input, Inputs, Stage},
@@ -105,7 +105,7 @@ impl Input for KnownPlaces<'_> {
 
 impl Stage for SearchFootprints<'_> {
     const NAME: &'static str = STAGE;
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     const CHECKED: bool = true;
     type Output = SearchResult;
     stage_inputs!(fingerprint);
@@ -246,7 +246,8 @@ impl Gathered<'_> {
             datum: source.datum(),
             blake3: file.blake3.clone(),
         };
-        let original = self.copies.original_of(index, &enlisted, &self.files);
+        let copies = &mut self.copies;
+        let original = copies.original_of(index, &enlisted.blake3, enlisted.datum);
         if let Some(original) = original {
             self.copy_notes.push(format!(
                 "PEDR file {} ({}) holds the same bytes as file {} ({}): read once",

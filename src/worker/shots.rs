@@ -2,30 +2,20 @@
 
 use std::{
     fs::File,
-    io::{BufWriter, Write as _},
     path::{Path, PathBuf},
     sync::{Arc, atomic::AtomicBool},
 };
 
-use arrow_array::{
-    Array, ArrayRef, BooleanArray, Float64Array, Int32Array, RecordBatch, StringArray, UInt32Array,
-};
+use arrow_array::{Array, ArrayRef, BooleanArray, Float64Array, RecordBatch, StringArray};
 use arrow_schema::{DataType, Field, Schema, SchemaRef};
 use arrow_select::filter::filter_record_batch;
-use parquet::{
-    arrow::{
-        ArrowWriter,
-        arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder},
-    },
-    basic::{Compression, ZstdLevel},
-    file::{metadata::KeyValue, properties::WriterProperties},
-};
-use serde_json::{Map, Value, json};
-use tempfile::NamedTempFile;
+use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
+use serde_json::Value;
 
 use crate::{
     error::{Cause, Error, IoError, Kind, Locate, Result, Stopped},
     geom::window::Region,
+    products::{RowsFormat, RowsWriter},
     store::publish::read_manifest,
     units::RADIANS_PER_DEGREE,
 };
@@ -101,13 +91,7 @@ pub(super) struct Search<'a> {
 /// No region, no such format; a run that is none; what the disk refuses; [`Stopped`].
 pub(super) fn search(search: &Search<'_>, stop: &AtomicBool) -> Result<(u64, bool)> {
     let region = region(search.polygon)?;
-    let folder = search.into.parent().unwrap_or(Path::new("."));
-    let file = tempfile::Builder::new()
-        .prefix(".partial-")
-        .tempfile_in(folder)
-        .map_err(IoError::on("create a file"))
-        .in_file(folder)?;
-    let mut answer = Writer::new(search.format, file)?;
+    let mut answer = Answer::new(search.format, search.into)?;
     let mut left = search.rows_max;
     let mut complete = true;
     for run in search.runs {
@@ -124,7 +108,7 @@ pub(super) fn search(search: &Search<'_>, stop: &AtomicBool) -> Result<(u64, boo
             left -= rows;
             let found = found.slice(0, usize::try_from(rows).unwrap_or(usize::MAX));
             let found = with_site(&found, &site).in_file(&path)?;
-            answer.write(&found).in_file(search.into)?;
+            answer.write(&found)?;
             if !complete {
                 break;
             }
@@ -133,7 +117,7 @@ pub(super) fn search(search: &Search<'_>, stop: &AtomicBool) -> Result<(u64, boo
             break;
         }
     }
-    answer.finish(search.into)?;
+    answer.finish()?;
     Ok((search.rows_max - left, complete))
 }
 
@@ -206,109 +190,61 @@ fn with_site(batch: &RecordBatch, site: &str) -> Result<RecordBatch> {
     RecordBatch::try_new(Arc::new(schema), columns.collect()).map_err(refused("searched"))
 }
 
-/// An answer that is being written; it gets its name when it is whole.
-struct Writer {
-    file: NamedTempFile,
-    form: Form,
+/// An answer, which begins with its first rows: they say what columns it has.
+struct Answer<'a> {
+    format: RowsFormat,
+    into: &'a Path,
+    begun: Option<(RowsWriter, SchemaRef)>,
 }
 
-enum Form {
-    Csv(Option<csv::Writer<File>>),
-    GeoJson { out: BufWriter<File>, rows: u64 },
-    Parquet(Option<ArrowWriter<File>>),
-}
-
-impl Writer {
-    fn new(format: &str, file: NamedTempFile) -> Result<Self> {
-        let form = match format {
-            "csv" => Form::Csv(None),
-            "geojson" => Form::GeoJson {
-                out: BufWriter::new(again(&file)?),
-                rows: 0,
-            },
-            "parquet" => Form::Parquet(None),
+impl<'a> Answer<'a> {
+    fn new(format: &str, into: &'a Path) -> Result<Self> {
+        let format = match format {
+            "csv" => RowsFormat::Csv,
+            "geojson" => RowsFormat::GeoJson,
+            "parquet" => RowsFormat::Parquet,
             other => return Err(ShotsError::Format(other.to_owned()).into()),
         };
-        Ok(Self { file, form })
+        Ok(Self {
+            format,
+            into,
+            begun: None,
+        })
+    }
+
+    fn begin(&mut self, schema: &SchemaRef) -> Result<&mut RowsWriter> {
+        let (writer, _) = match &mut self.begun {
+            Some(begun) => begun,
+            begun @ None => {
+                let bare = Arc::new(Schema::new(schema.fields().clone()));
+                let writer = RowsWriter::create(self.into, self.format, bare)?;
+                begun.insert((writer, SchemaRef::clone(schema)))
+            }
+        };
+        Ok(writer)
     }
 
     fn write(&mut self, batch: &RecordBatch) -> Result<()> {
-        match &mut self.form {
-            Form::Csv(writer) => {
-                let fields = batch.schema();
-                let columns: Vec<(&str, &ArrayRef)> = attributes(&fields, batch).collect();
-                if writer.is_none() {
-                    let mut first = csv::Writer::from_writer(again(&self.file)?);
-                    first
-                        .write_record(columns.iter().map(|(name, _)| name))
-                        .map_err(refused("written as CSV"))?;
-                    *writer = Some(first);
-                }
-                for row in 0..batch.num_rows() {
-                    let values = columns.iter().map(|(_, column)| match value(column, row) {
-                        Value::String(text) => text,
-                        Value::Null => String::new(),
-                        other => other.to_string(),
-                    });
-                    let written = writer.as_mut().map(|writer| writer.write_record(values));
-                    written.transpose().map_err(refused("written as CSV"))?;
-                }
-            }
-            Form::GeoJson { out, rows } => {
-                write_features(out, rows, batch).map_err(IoError::on("write"))?;
-            }
-            Form::Parquet(writer) => {
-                let writer = match writer {
-                    Some(writer) => writer,
-                    None => writer.insert(parquet_writer(again(&self.file)?, &batch.schema())?),
-                };
-                writer.write(batch).map_err(refused("written as Parquet"))?;
-            }
-        }
-        Ok(())
+        self.begin(&batch.schema())?.write(batch)
     }
 
     /// Ends the answer and gives it its name. One without any run is empty.
-    fn finish(self, into: &Path) -> Result<()> {
-        match self.form {
-            Form::Csv(writer) => {
-                let flushed = writer.map(|mut writer| writer.flush());
-                flushed
-                    .transpose()
-                    .map_err(IoError::on("write"))
-                    .in_file(into)?;
-            }
-            Form::GeoJson { mut out, rows } => {
-                let begin = if rows == 0 { BEGIN } else { "" };
-                write!(out, "{begin}\n]}}\n")
-                    .and_then(|()| out.flush())
-                    .map_err(IoError::on("write"))
-                    .in_file(into)?;
-            }
-            Form::Parquet(writer) => {
-                let none = Schema::new(vec![Field::new(SITE, DataType::Utf8, false)]);
-                let empty = || parquet_writer(again(&self.file)?, &none);
-                let closed = writer
-                    .map_or_else(empty, Ok)
-                    .and_then(|writer| writer.close().map_err(refused("written as Parquet")));
-                closed.in_file(into)?;
-            }
+    fn finish(mut self) -> Result<()> {
+        let empty = Schema::new(vec![Field::new(SITE, DataType::Utf8, false)]);
+        self.begin(&Arc::new(empty))?;
+        if let Some((file, schema)) = self.begun {
+            let notes = match self.format {
+                RowsFormat::Parquet => notes(&schema),
+                RowsFormat::Csv | RowsFormat::GeoJson => Vec::new(),
+            };
+            file.finish(notes)?;
         }
-        self.file
-            .persist(into)
-            .map_err(|error| IoError::on("rename into place")(error.error))
-            .in_file(into)?;
         Ok(())
     }
 }
 
-/// The same open file.
-fn again(file: &NamedTempFile) -> std::result::Result<File, IoError> {
-    file.as_file().try_clone().map_err(IoError::on("write"))
-}
-
-/// With the metadata of the footprints, but for the box of those of one site.
-fn parquet_writer(file: File, schema: &Schema) -> Result<ArrowWriter<File>> {
+/// The metadata of the footprints, but for the box of those of one site.
+fn notes(schema: &Schema) -> Vec<(&str, String)> {
     let metadata = schema.metadata().iter().map(|(key, text)| {
         let mut geo: Value = serde_json::from_str(text).unwrap_or_default();
         let boxes = geo
@@ -320,98 +256,7 @@ fn parquet_writer(file: File, schema: &Schema) -> Result<ArrowWriter<File>> {
         } else {
             text.clone()
         };
-        KeyValue::new(key.clone(), text)
+        (&**key, text)
     });
-    let properties = WriterProperties::builder()
-        .set_created_by(concat!("areograph ", env!("CARGO_PKG_VERSION")).to_owned())
-        .set_compression(Compression::ZSTD(ZstdLevel::default()))
-        .set_key_value_metadata(Some(metadata.collect()))
-        .build();
-    let bare = Arc::new(Schema::new(schema.fields().clone()));
-    ArrowWriter::try_new(file, bare, Some(properties)).map_err(refused("written as Parquet"))
-}
-
-/// How an answer in GeoJSON begins.
-const BEGIN: &str = "{\"type\":\"FeatureCollection\",\"crs\":{\"type\":\"name\",\"properties\":{\"name\":\"urn:ogc:def:crs:IAU:2015:49900\"}},\"features\":[";
-
-fn write_features(
-    out: &mut impl std::io::Write,
-    rows: &mut u64,
-    batch: &RecordBatch,
-) -> std::io::Result<()> {
-    let fields = batch.schema();
-    let columns: Vec<(&str, &ArrayRef)> = attributes(&fields, batch).collect();
-    for row in 0..batch.num_rows() {
-        let properties: Map<String, Value> = columns
-            .iter()
-            .map(|(name, column)| ((*name).to_owned(), value(column, row)))
-            .collect();
-        let [longitude, latitude] = PLACE.map(|name| {
-            properties
-                .get(name)
-                .and_then(Value::as_f64)
-                .unwrap_or_default()
-        });
-        let signed = if longitude >= 180.0 {
-            longitude - 360.0
-        } else {
-            longitude
-        };
-        let feature = json!({
-            "type": "Feature",
-            "geometry": { "type": "Point", "coordinates": [signed, latitude] },
-            "properties": properties,
-        });
-        let before = if *rows == 0 { BEGIN } else { "," };
-        write!(out, "{before}\n{feature}")?;
-        *rows += 1;
-    }
-    Ok(())
-}
-
-/// Columns that are no geometry, by name.
-fn attributes<'a>(
-    fields: &'a SchemaRef,
-    batch: &'a RecordBatch,
-) -> impl Iterator<Item = (&'a str, &'a ArrayRef)> {
-    let named = fields.fields().iter().zip(batch.columns());
-    named
-        .filter(|(field, _)| *field.data_type() != DataType::Binary)
-        .map(|(field, column)| (&**field.name(), column))
-}
-
-/// What a column holds in a row.
-fn value(column: &ArrayRef, row: usize) -> Value {
-    if column.is_null(row) {
-        return Value::Null;
-    }
-    let column = column.as_any();
-    let real = column
-        .downcast_ref::<Float64Array>()
-        .map(|of| json!(of.value(row)));
-    let natural = || {
-        column
-            .downcast_ref::<UInt32Array>()
-            .map(|of| json!(of.value(row)))
-    };
-    let integer = || {
-        column
-            .downcast_ref::<Int32Array>()
-            .map(|of| json!(of.value(row)))
-    };
-    let flag = || {
-        column
-            .downcast_ref::<BooleanArray>()
-            .map(|of| json!(of.value(row)))
-    };
-    let text = || {
-        column
-            .downcast_ref::<StringArray>()
-            .map(|of| json!(of.value(row)))
-    };
-    real.or_else(natural)
-        .or_else(integer)
-        .or_else(flag)
-        .or_else(text)
-        .unwrap_or_default()
+    metadata.collect()
 }

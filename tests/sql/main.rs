@@ -16,14 +16,14 @@ use std::{
 };
 
 use areograph::body::Datum;
-use areograph::{pds::archive::Opened, sql::ShotsTable};
-use areograph_testing::track::{FRAMES, write};
-use arrow_array::RecordBatch;
-use arrow_select::concat::concat_batches;
-use datafusion::{
+use areograph::sql::datafusion::{
     datasource::MemTable,
     prelude::{SessionConfig, SessionContext},
 };
+use areograph::{pds::archive::Opened, products::ShotColumns, sql::ShotsTable};
+use areograph_testing::track::{FRAMES, write};
+use arrow_array::RecordBatch;
+use arrow_select::concat::concat_batches;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use proptest::{prelude::*, strategy::ValueTree as _, test_runner::TestRunner};
 
@@ -43,7 +43,7 @@ fn archive(folder: &Path) -> PathBuf {
 fn shots(archive: &Path) -> ShotsTable {
     let Opened { sources, failures } = Opened::all(&[archive.to_owned()]).unwrap();
     assert!(failures.is_empty());
-    ShotsTable::new(sources, Arc::default())
+    ShotsTable::new(sources, Arc::new(ShotColumns::default()), Arc::default())
 }
 
 fn context() -> SessionContext {

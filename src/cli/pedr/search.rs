@@ -14,12 +14,12 @@ use crate::{
     files::file_name,
     footprints::{AsRead, Footprints, SourceFile},
     geom::window::Region,
-    pds::archive::{Found, Judged, Opened, Query, Sink, Source, search},
+    pds::archive::{Found, Judged, Opened, Query, Seen, Sink, Source, search},
     products::ShotsFile,
     time::{Et, Interval},
 };
 
-/// Rows that are not in the order of time.
+/// Rows that are not in the order of time, or stand in an earlier file as well.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "{rows} rows are not in the order of time, the first in record {record}, after a shot of {before}"
@@ -41,8 +41,6 @@ impl Cause for NotInOrder {
     }
 }
 
-/// Half the time between two shots, seconds: two rows nearer to each other are one shot of two files.
-const SAME_SHOT_S: f64 = 0.05;
 /// Complaints that are printed and kept with their text; all are counted.
 const COMPLAINTS_MAX: usize = 20;
 
@@ -106,8 +104,9 @@ struct Answer {
     rejected: BTreeMap<String, u64>,
     frames_read: u64,
     shots_read: u64,
-    /// File, record and time tag of the last row.
-    last: Option<(u16, f64)>,
+    seen: Seen,
+    /// File and time tag of the latest row so far.
+    latest: Option<(usize, f64)>,
     disorder: Option<(NotInOrder, PathBuf)>,
 }
 
@@ -179,31 +178,32 @@ impl Answer {
         Err(first)
     }
 
-    /// Notices rows that do not follow the ones before in time.
-    fn follow(&mut self, footprints: &Footprints<AsRead>) {
-        for row in 0..footprints.len() {
-            let (file, tag_s) = (footprints.file[row], footprints.et_tag_s[row]);
-            if let Some((before, before_s)) = self.last
-                && (tag_s < before_s || (file != before && tag_s - before_s < SAME_SHOT_S))
-            {
-                let name = |file: u16| self.files[usize::from(file)].name.clone();
+    /// Notices rows that are earlier than one before them, or that an earlier file holds as well.
+    fn follow(&mut self, file: usize, footprints: &Footprints<AsRead>) {
+        for (record, tag_s) in footprints.record.iter().zip(&footprints.et_tag_s) {
+            let holder = self.seen.take(file, *tag_s);
+            let later = self.latest.filter(|(_, latest_s)| tag_s < latest_s);
+            if let Some(before) = holder.or(later.map(|(before, _)| before)) {
+                let name = |file: usize| self.files[file].name.clone();
                 let (disorder, _) = self.disorder.get_or_insert_with(|| {
                     let disorder = NotInOrder {
                         rows: 0,
-                        record: footprints.record[row],
+                        record: *record,
                         before: name(before),
                     };
                     (disorder, PathBuf::from(name(file)))
                 });
                 disorder.rows += 1;
             }
-            self.last = Some((file, tag_s));
+            if later.is_none() {
+                self.latest = Some((file, *tag_s));
+            }
         }
     }
 }
 
 impl Sink for Answer {
-    fn found(&mut self, _file: usize, found: Found) -> Result<()> {
+    fn found(&mut self, file: usize, found: Found) -> Result<()> {
         for complaint in &found.complaints {
             self.records_left_out += u64::from(complaint.leaves_out());
             if self.complaints.len() < COMPLAINTS_MAX {
@@ -225,7 +225,7 @@ impl Sink for Answer {
                 self.counts[*window as usize] += 1;
             }
         }
-        self.follow(&found.footprints);
+        self.follow(file, &found.footprints);
         match &mut self.file {
             Some(file) => file.write(found.footprints, &found.windows),
             None => Ok(()),
@@ -235,5 +235,43 @@ impl Sink for Answer {
     fn failed(&mut self, _file: usize, failure: Error) -> Result<()> {
         self.failures.push(failure);
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stages::shot_cases::{CASES, Case, source};
+
+    fn is_in_order(case: &Case) -> bool {
+        let tags_s: Vec<f64> = (0..case.files.len())
+            .flat_map(|file| case.tags_s(file))
+            .collect();
+        tags_s.is_sorted()
+    }
+
+    #[test]
+    fn rows_that_stand_in_two_files_are_noticed() {
+        for case in CASES {
+            let files = 0..case.files.len();
+            let mut answer = Answer {
+                files: files.clone().map(source).collect(),
+                ..Answer::default()
+            };
+            for file in files {
+                answer.follow(file, &case.footprints(file));
+            }
+            let noticed = answer.disorder;
+            let is_expected = case.shared.is_some() || !is_in_order(case);
+            assert_eq!(noticed.is_some(), is_expected, "{}", case.name);
+            if let (Some((disorder, path)), Some([other, file]), true) = (
+                noticed,
+                case.shared,
+                is_in_order(case) || case.files.len() == 2,
+            ) {
+                assert_eq!(path, PathBuf::from(source(file).name), "{}", case.name);
+                assert_eq!(disorder.before, source(other).name, "{}", case.name);
+            }
+        }
     }
 }

@@ -8,21 +8,15 @@ use std::{
 };
 
 use clap::{Args, ValueEnum};
-use datafusion::{
-    common::DataFusionError,
-    execution::{
-        SendableRecordBatchStream, memory_pool::FairSpillPool, runtime_env::RuntimeEnvBuilder,
-    },
-    prelude::{SQLOptions, SessionConfig, SessionContext},
-};
 use tokio_stream::StreamExt as _;
 
 use self::answer::Answer;
 use crate::cli::{output, stop::Signals};
 use crate::{
-    error::{Cause, IoError, Kind, Result, Stopped},
+    error::{IoError, Result, Stopped},
     pds::archive::Opened,
-    sql::{ShotsTable, Tally},
+    products::ShotColumns,
+    sql::{Question, ShotsTable, Tally, ask},
 };
 
 /// Answers a question in SQL about the shots of an archive, the table `shots`.
@@ -59,36 +53,6 @@ enum Format {
     Csv,
 }
 
-/// Memory for sorting and grouping; more goes to temporary files.
-const MEMORY_BYTES: usize = 128 << 20;
-/// The name of the table.
-const TABLE: &str = "shots";
-
-/// A question that has no answer.
-#[derive(Debug, thiserror::Error)]
-#[error("{}", .0.strip_backtrace())]
-struct Question(DataFusionError);
-
-impl Cause for Question {
-    fn kind(&self) -> Kind {
-        match self.0.find_root() {
-            DataFusionError::IoError(_) => Kind::Io,
-            _ => Kind::Configuration,
-        }
-    }
-
-    fn advice(&self) -> String {
-        match self.0.find_root() {
-            DataFusionError::ResourcesExhausted(_) => {
-                "ask for fewer columns, or for less to be sorted and grouped at once"
-            }
-            DataFusionError::IoError(_) => "check the disk of temporary files, then ask again",
-            _ => "\"describe shots\" lists the columns; text stands in 'single quotes'",
-        }
-        .to_owned()
-    }
-}
-
 pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let Opened { sources, failures } = Opened::all(&arguments.paths)?;
     let mut failures = failures.into_iter();
@@ -97,7 +61,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
         return Err(first);
     }
     let signals = Signals::heard()?;
-    let table = ShotsTable::new(sources, Arc::clone(signals.stop()));
+    let table = ShotsTable::new(
+        sources,
+        Arc::new(ShotColumns::default()),
+        Arc::clone(signals.stop()),
+    );
     let tally = table.tally();
     let runtime = tokio::runtime::Builder::new_current_thread().build();
     let runtime = runtime.map_err(IoError::on("begin an asynchronous runtime"))?;
@@ -109,39 +77,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
 }
 
 async fn answer(table: ShotsTable, arguments: &Arguments, stop: &AtomicBool) -> Result<()> {
-    let rows = ask(table, &arguments.question).await;
-    let mut rows = rows.map_err(Question)?;
+    let mut rows = ask(table, &arguments.question).await?;
     let mut answer = match &arguments.out {
-        Some(out) => Answer::in_file(out, rows.schema())?,
+        Some(out) => Answer::in_file(out, &rows.schema())?,
         None => Answer::printed(arguments.format, rows.schema())?,
     };
     while let Some(batch) = rows.next().await {
         Stopped::check(stop)?;
-        if !answer.take(batch.map_err(Question)?)? {
+        if !answer.take(batch.map_err(Question::from)?)? {
             break;
         }
     }
     answer.finish()
-}
-
-/// The rows of the answer, one thread after the search: their order is that of the search, or the one that was asked for.
-async fn ask(
-    table: ShotsTable,
-    question: &str,
-) -> std::result::Result<SendableRecordBatchStream, DataFusionError> {
-    let memory =
-        RuntimeEnvBuilder::new().with_memory_pool(Arc::new(FairSpillPool::new(MEMORY_BYTES)));
-    let config = SessionConfig::new()
-        .with_target_partitions(1)
-        .with_information_schema(true);
-    let context = SessionContext::new_with_config_rt(config, memory.build_arc()?);
-    context.register_table(TABLE, Arc::new(table))?;
-    let read_only = SQLOptions::new()
-        .with_allow_ddl(false)
-        .with_allow_dml(false)
-        .with_allow_statements(false);
-    let frame = context.sql_with_options(question, read_only).await?;
-    frame.execute_stream().await
 }
 
 /// Complaints, on standard error.

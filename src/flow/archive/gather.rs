@@ -9,11 +9,9 @@ use super::checker::Results;
 use crate::{
     error::{Cause, Error, Kind},
     files::{Identity, file_name},
+    pds::archive::{Copies, Seen, Span},
     stages::check_archive::{ArchiveProfile, CheckedFile, FileCopy, FileFailure},
 };
-
-/// Half the time between two shots, seconds: shots of two files nearer to each other are one shot.
-const SAME_SHOT_S: f64 = 0.05;
 
 /// What files gave.
 pub(super) struct Gathered {
@@ -80,65 +78,64 @@ pub(super) fn gather(
 
 /// Takes out files with the bytes of an earlier one, understood alike.
 fn without_copies(files: &mut Vec<CheckedFile>) -> Vec<FileCopy> {
-    let mut by_content: BTreeMap<_, PathBuf> = BTreeMap::new();
+    let paths: Vec<PathBuf> = files.iter().map(|file| file.path.clone()).collect();
+    let mut by_content = Copies::default();
     let mut copies = Vec::new();
-    files.retain(|file| {
-        let content = (file.found.blake3.clone(), file.found.datum);
-        match by_content.get(&content) {
-            None => {
-                by_content.insert(content, file.path.clone());
-                true
-            }
-            Some(original) => {
-                copies.push(FileCopy {
-                    file: file.path.display().to_string(),
-                    of: original.display().to_string(),
-                });
-                false
-            }
-        }
+    let mut index = 0..;
+    files.retain(|CheckedFile { path, found, .. }| {
+        let index = index.next().unwrap_or_default();
+        let datum = found.datum;
+        let original = datum.and_then(|datum| by_content.original_of(index, &found.blake3, datum));
+        copies.extend(original.map(|original| FileCopy {
+            file: path.display().to_string(),
+            of: paths[original].display().to_string(),
+        }));
+        original.is_none()
     });
     copies
 }
 
-/// Takes out files with profiles in the time of profiles of an earlier one.
+/// Takes out files with shots that an earlier one holds as well.
 fn without_rivals(files: &mut Vec<CheckedFile>) -> Vec<Error> {
-    let overlaps = overlaps(files);
-    let mut out: BTreeMap<usize, Error> = BTreeMap::new();
-    for ((file, earlier), orbit) in overlaps {
-        if !out.contains_key(&earlier) && !out.contains_key(&file) {
-            let other = files[earlier].path.clone();
-            let failure = Error::from(SharedShots { orbit, other });
-            out.insert(file, failure.in_file(&files[file].path));
-        }
-    }
+    let paths: Vec<PathBuf> = files.iter().map(|file| file.path.clone()).collect();
+    let mut seen = Seen::default();
+    let mut failures = Vec::new();
     let mut index = 0..;
-    files.retain(|_| index.next().is_some_and(|index| !out.contains_key(&index)));
-    out.into_values().collect()
+    files.retain(|CheckedFile { path, found, .. }| {
+        let shared = enter(&mut seen, index.next().unwrap_or_default(), &found.profiles);
+        failures.extend(shared.map(|(orbit, other)| {
+            let other = paths[other].clone();
+            Error::from(SharedShots { orbit, other }).in_file(path)
+        }));
+        shared.is_none()
+    });
+    failures
 }
 
-/// Every file with an earlier one whose profiles overlap with its own, and the orbit of its first profile that does.
-fn overlaps(files: &[CheckedFile]) -> BTreeMap<(usize, usize), u32> {
-    let mut all: Vec<(usize, &ArchiveProfile)> = Vec::new();
-    for (index, file) in files.iter().enumerate() {
-        all.extend(file.found.profiles.iter().map(|profile| (index, profile)));
-    }
-    all.sort_by(|(_, a), (_, b)| a.tags_et_s[0].total_cmp(&b.tags_et_s[0]));
-    let mut overlaps = BTreeMap::new();
-    let mut open: Vec<(usize, &ArchiveProfile)> = Vec::new();
-    for (file, profile) in all {
-        open.retain(|(_, of)| profile.tags_et_s[0] < of.tags_et_s[1] + SAME_SHOT_S);
-        for (other, of) in open.iter().filter(|(other, _)| *other != file) {
-            let (later, orbit) = if file > *other {
-                (file, profile.orbit)
-            } else {
-                (*other, of.orbit)
-            };
-            overlaps.entry((later, file.min(*other))).or_insert(orbit);
+/// Enters the shots of a file, unless an earlier file holds some of them: the orbit of the first such profile, and that file.
+fn enter(seen: &mut Seen, file: usize, profiles: &[ArchiveProfile]) -> Option<(u32, usize)> {
+    let spans: Vec<(u32, Span)> = profiles
+        .iter()
+        .flat_map(|profile| {
+            let spans = profile.spans_et_s.iter();
+            spans.map(|[first_s, last_s]| {
+                let [first_s, last_s] = [*first_s, *last_s];
+                let span = Span {
+                    file,
+                    first_s,
+                    last_s,
+                };
+                (profile.orbit, span)
+            })
+        })
+        .collect();
+    let shared = (spans.iter()).find_map(|(orbit, span)| Some((*orbit, seen.holder(span)?)));
+    if shared.is_none() {
+        for (_, span) in spans {
+            seen.add(span);
         }
-        open.push((file, profile));
     }
-    overlaps
+    shared
 }
 
 /// Files of equal names in several folders are told apart by their paths.
@@ -162,5 +159,29 @@ pub(super) fn file_failure(failure: &Error) -> FileFailure {
     FileFailure {
         file: failure.file.as_deref().map(file_name).unwrap_or_default(),
         why: failure.cause.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{pds::archive::spans, stages::shot_cases::CASES};
+
+    #[test]
+    fn a_file_with_shots_of_an_earlier_one_is_left_out() {
+        for case in CASES {
+            let mut seen = Seen::default();
+            let mut files = 0..case.files.len();
+            let shared = files.find_map(|file| {
+                let spans = spans(file, case.tags_s(file));
+                let profile = ArchiveProfile {
+                    spans_et_s: spans.iter().map(|of| [of.first_s, of.last_s]).collect(),
+                    ..ArchiveProfile::default()
+                };
+                let (_, other) = enter(&mut seen, file, &[profile])?;
+                Some([other, file])
+            });
+            assert_eq!(shared, case.shared, "{}", case.name);
+        }
     }
 }

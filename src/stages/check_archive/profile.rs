@@ -10,6 +10,7 @@ use super::{
 use crate::{
     footprints::Footprint,
     geom::{range_residuals::RangeResiduals, statistics::Summary},
+    pds::archive::spans,
     spice::Trajectory,
     stages::{
         check_ranges::{BiasScan, RangeFigures, ScannedRadius},
@@ -47,6 +48,8 @@ pub struct ArchiveProfile {
     pub stop_et_s: f64,
     /// Time tags of first and last shot, ET seconds.
     pub tags_et_s: [f64; 2],
+    /// The same of every part without a missing frame, ET seconds.
+    pub spans_et_s: Vec<[f64; 2]>,
     /// Shots that were checked.
     pub shots: u32,
     /// Shots without a position in the kernels.
@@ -251,6 +254,8 @@ impl ArchiveProfile {
             (profile.first_record, profile.last_record) = (first.record, last.record);
             (profile.start_et_s, profile.stop_et_s) = (first.et_s, last.et_s);
             profile.tags_et_s = [first.et_tag_s, last.et_tag_s];
+            let spans = spans(0, shots.iter().map(|shot| shot.et_tag_s));
+            profile.spans_et_s = spans.iter().map(|of| [of.first_s, of.last_s]).collect();
         }
         profile.judge(rules);
         (profile, bins)

@@ -15,7 +15,7 @@ use crate::{
         height_grid::{HeightGrid, Probe},
         window::{Region, WindowShape},
     },
-    pds::archive::{Found, Judged, Opened, Query, Sink, search},
+    pds::archive::{Found, Judged, Opened, Query, Seen, Sink, search},
     stages::convert_datum::DatumTurn,
     units::wrap_two_pi,
 };
@@ -26,8 +26,6 @@ const JUMP_RAD: f64 = 0.1 * std::f64::consts::PI / 180.0;
 const PAUSE_S: f64 = 30.0;
 /// A segment ends at a gap of three spacings of shots, which come every 0.1 s.
 const GAP_S: f64 = 0.3;
-/// Shots of two files nearer to each other are one shot, seconds.
-const SAME_SHOT_S: f64 = 0.05;
 /// Of the points of a segment so many must have a height in the model.
 const COVERED: f64 = 13.0 / 15.0;
 /// Edges to the east and the north of a rectangle of ground that is held back or not: a few units of shots, and two segments of a
@@ -124,6 +122,7 @@ pub(super) fn shots_over(
         turns: (sources.iter())
             .map(|source| DatumTurn::at_tags(source.datum()))
             .collect(),
+        seen: Seen::default(),
         found: Vec::new(),
         shots: Shots::default(),
     };
@@ -131,32 +130,34 @@ pub(super) fn shots_over(
     let Gathered {
         mut found,
         mut shots,
-        names,
         ..
     } = gathered;
-    found.sort_by(|(_, a), (_, b)| a.tag_s.total_cmp(&b.tag_s));
-    if let Some(pair) = found
-        .windows(2)
-        .find(|pair| pair[0].0 != pair[1].0 && pair[1].1.tag_s - pair[0].1.tag_s < SAME_SHOT_S)
-    {
-        let (file, other) = (names[pair[1].0].clone(), names[pair[0].0].clone());
-        return Err(MatchError::SharedShots { other }).in_file(file);
-    }
-    shots.shots = found.into_iter().map(|(_, shot)| shot).collect();
+    found.sort_by(|a, b| a.tag_s.total_cmp(&b.tag_s));
+    shots.shots = found;
     shots.number_tracks();
     Ok(shots)
 }
 
-/// Takes shots as they are found, with the number of their file.
+/// Takes shots as they are found.
 struct Gathered<'a> {
     grid: &'a HeightGrid,
     names: Vec<String>,
     turns: Vec<DatumTurn>,
-    found: Vec<(usize, Shot)>,
+    seen: Seen,
+    found: Vec<Shot>,
     shots: Shots,
 }
 
 impl Gathered<'_> {
+    /// Makes sure that no file before holds one of these shots.
+    fn require_distinct(&mut self, file: usize, footprints: &Footprints<AsRead>) -> Result<()> {
+        let Some((_, other)) = self.seen.take_all(file, &footprints.et_tag_s) else {
+            return Ok(());
+        };
+        let other = self.names[other].clone();
+        Err(MatchError::SharedShots { other }).in_file(&self.names[file])
+    }
+
     fn take(&mut self, file: usize, footprints: &Footprints<AsRead>) {
         let [longitude_rad, latitude_rad] = self.grid.middle_rad();
         let middle = self.grid.cell_of(longitude_rad, latitude_rad);
@@ -179,7 +180,7 @@ impl Gathered<'_> {
                 ],
                 track: 0,
             };
-            self.found.push((file, found));
+            self.found.push(found);
         }
     }
 }
@@ -192,6 +193,7 @@ impl Sink for Gathered<'_> {
                 self.shots.complaints.push(complaint.to_string());
             }
         }
+        self.require_distinct(file, &found.footprints)?;
         self.take(file, &found.footprints);
         Ok(())
     }
@@ -239,4 +241,45 @@ pub(super) fn is_kept(grid: &HeightGrid, segment: &[Shot], options: &MatchOption
     let mean_m = segment.iter().map(|shot| shot.height_m).sum::<f64>() / count;
     let squares = segment.iter().map(|shot| (shot.height_m - mean_m).powi(2));
     covered.count() as f64 >= needed && squares.sum::<f64>() / count > options.least_variance_m2
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stages::shot_cases::{CASES, path, source};
+
+    #[test]
+    fn files_with_the_same_shots_are_refused() {
+        let grid = HeightGrid {
+            size: [1, 1],
+            first_rad: [0.0, 0.0],
+            cell_rad: [0.1, 0.1],
+            radius_m: RADIUS_M,
+            heights_m: vec![0.0],
+        };
+        for case in CASES {
+            let files = 0..case.files.len();
+            let names: Vec<String> = files.clone().map(|file| source(file).name).collect();
+            let mut gathered = Gathered {
+                grid: &grid,
+                names: names.clone(),
+                turns: Vec::new(),
+                seen: Seen::default(),
+                found: Vec::new(),
+                shots: Shots::default(),
+            };
+            let mut checked =
+                files.map(|file| gathered.require_distinct(file, &case.footprints(file)));
+            let refused = checked.find_map(Result::err);
+            let named = refused.map(|error| (error.file.clone(), error.cause.to_string()));
+            match (named, case.shared) {
+                (None, None) => {}
+                (Some((refused, why)), Some([other, file])) => {
+                    assert_eq!(refused, Some(path(file)), "{}", case.name);
+                    assert!(why.contains(&names[other]), "{}: {why}", case.name);
+                }
+                (found, _) => panic!("{}: {found:?}", case.name),
+            }
+        }
+    }
 }

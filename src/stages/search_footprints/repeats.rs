@@ -1,16 +1,13 @@
-//! Shots that the site's files hold twice: a copy of a file is read once, versions of one orbit are refused.
+//! Shots that two of the site's files hold: versions of one orbit are refused.
 
-use std::{collections::BTreeMap, path::PathBuf};
+use std::path::PathBuf;
 
 use crate::{
     error::{Cause, Error, Kind, Result},
-    footprints::{AsRead, Footprints, SourceFile},
+    footprints::{AsRead, Footprints},
+    pds::archive::Seen,
     time::Et,
 };
-
-/// Half the time between two shots of the laser, seconds: shots of two files that lie nearer to each
-/// other are one shot, even if a later version of the file moved its time tag.
-const SAME_SHOT_S: f64 = 0.05;
 
 /// Two files with the same shots, of which neither is a copy of the other.
 #[derive(Debug, thiserror::Error)]
@@ -19,7 +16,7 @@ const SAME_SHOT_S: f64 = 0.05;
      (there in record {other_record}, orbit {orbit}) at {at}"
 )]
 struct SharedShots {
-    shots: u64,
+    shots: usize,
     other: String,
     record: u32,
     other_record: u32,
@@ -39,60 +36,59 @@ impl Cause for SharedShots {
     }
 }
 
-/// The earliest file by the hash of its bytes.
-#[derive(Default)]
-pub(super) struct Copies(BTreeMap<String, usize>);
-
-impl Copies {
-    /// The file, counted from 0, that file `index` is a copy of: equal bytes, understood alike.
-    pub(super) fn original_of(
-        &mut self,
-        index: usize,
-        source: &SourceFile,
-        earlier: &[SourceFile],
-    ) -> Option<usize> {
-        let first = *self.0.entry(source.blake3.clone()).or_insert(index);
-        earlier
-            .get(first)
-            .is_some_and(|original| original.datum == source.datum)
-            .then_some(first)
-    }
-}
-
 /// Makes sure that no two files hold the same shot; `paths` are those that `file` counts into.
 ///
 /// # Errors
 /// The two files whose common shot is the earliest.
 pub(super) fn require_distinct(footprints: &Footprints<AsRead>, paths: &[PathBuf]) -> Result<()> {
-    let tag_s = |row: usize| footprints.et_tag_s[row];
-    let mut rows: Vec<usize> = (0..footprints.len()).collect();
-    // Files come in order of time, so that there is little to sort; equal times stay in their order.
-    rows.sort_by(|a, b| tag_s(*a).total_cmp(&tag_s(*b)));
-    let files = |pair: &[usize]| {
-        let (one, other) = (footprints.file[pair[0]], footprints.file[pair[1]]);
-        (one.min(other), one.max(other))
-    };
-    let mut shared = rows.windows(2).filter(|pair| {
-        footprints.file[pair[0]] != footprints.file[pair[1]]
-            && tag_s(pair[1]) - tag_s(pair[0]) <= SAME_SHOT_S
-    });
-    let Some(first) = shared.next() else {
+    let (tags_s, files) = (&footprints.et_tag_s, &footprints.file);
+    let mut seen = Seen::default();
+    let shared: Vec<(usize, usize)> = (0..footprints.len())
+        .filter_map(|row| Some((row, seen.take(usize::from(files[row]), tags_s[row])?)))
+        .collect();
+    let earliest = (shared.iter()).min_by(|(a, _), (b, _)| tags_s[*a].total_cmp(&tags_s[*b]));
+    let Some((row, other)) = earliest.copied() else {
         return Ok(());
     };
-    let others = shared.filter(|pair| files(pair) == files(first)).count();
-    let (earlier, later) = if footprints.file[first[0]] < footprints.file[first[1]] {
-        (first[0], first[1])
-    } else {
-        (first[1], first[0])
-    };
-    let path = |row: usize| &paths[usize::from(footprints.file[row])];
+    let is_of_both = |(of, with): &&(usize, usize)| files[*of] == files[row] && *with == other;
+    let apart_s = |of: &usize| (tags_s[*of] - tags_s[row]).abs();
+    let others = (0..footprints.len()).filter(|of| usize::from(files[*of]) == other);
+    let other_row = others.min_by(|a, b| apart_s(a).total_cmp(&apart_s(b)));
     let error = SharedShots {
-        shots: others as u64 + 1,
-        other: path(earlier).display().to_string(),
-        record: footprints.record[later],
-        other_record: footprints.record[earlier],
-        orbit: footprints.orbit[later],
-        at: Et::from_seconds(tag_s(later)),
+        shots: shared.iter().filter(is_of_both).count(),
+        other: paths[other].display().to_string(),
+        record: footprints.record[row],
+        other_record: footprints.record[other_row.unwrap_or(row)],
+        orbit: footprints.orbit[row],
+        at: Et::from_seconds(tags_s[row]),
     };
-    Err(Error::from(error).in_file(path(later)))
+    Err(Error::from(error).in_file(&paths[usize::from(files[row])]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stages::shot_cases::{CASES, path};
+
+    #[test]
+    fn files_with_the_same_shots_are_refused() {
+        for case in CASES {
+            let paths: Vec<PathBuf> = (0..case.files.len()).map(path).collect();
+            let mut footprints = Footprints::new(Vec::new());
+            for file in 0..case.files.len() {
+                footprints.append(case.footprints(file));
+            }
+            let refused = require_distinct(&footprints, &paths).err();
+            let named = refused.map(|error| (error.file.clone(), error.cause.to_string()));
+            match (named, case.shared) {
+                (None, None) => {}
+                (Some((path, why)), Some([other, file])) => {
+                    assert_eq!(path.as_ref(), Some(&paths[file]), "{}", case.name);
+                    let other = paths[other].display().to_string();
+                    assert!(why.contains(&other), "{}: {why}", case.name);
+                }
+                (found, _) => panic!("{}: {found:?}", case.name),
+            }
+        }
+    }
 }

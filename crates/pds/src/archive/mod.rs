@@ -5,6 +5,7 @@
 //! position in IAU 2000. An index of the archive spares the search to look at most records; what it finds is the same.
 
 mod block;
+mod distinct;
 mod folder;
 mod found;
 mod index;
@@ -16,6 +17,7 @@ mod scan;
 mod search;
 mod source;
 
+pub use distinct::{Copies, SAME_SHOT_S, Seen, Span, spans};
 pub use folder::Listing;
 pub use found::{Found, ShotRejection, WindowLists};
 pub use index::{INDEX, Index, IndexedFile, Indexes};

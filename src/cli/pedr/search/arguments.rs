@@ -10,7 +10,7 @@ use crate::{
     error::{Cause, Error, Kind, Result},
     files::require_apart,
     pds::archive::Source,
-    products::ShotsFormat,
+    products::RowsFormat,
     spice::{KernelSet, Session},
     time::{Et, Interval},
 };
@@ -111,7 +111,7 @@ impl Cause for Usage {
 
 impl Arguments {
     /// None only counts.
-    pub(super) fn format(&self) -> Result<Option<ShotsFormat>> {
+    pub(super) fn format(&self) -> Result<Option<RowsFormat>> {
         let out = self.out.as_deref();
         let named = || out.unwrap_or(Path::new("")).display().to_string();
         let format = match (self.format, out, out.and_then(Format::of_ending)) {
@@ -127,9 +127,9 @@ impl Arguments {
             (None, None, _) => Format::Count,
         };
         Ok(match format {
-            Format::Parquet => Some(ShotsFormat::Parquet),
-            Format::Csv => Some(ShotsFormat::Csv),
-            Format::Geojson => Some(ShotsFormat::GeoJson),
+            Format::Parquet => Some(RowsFormat::Parquet),
+            Format::Csv => Some(RowsFormat::Csv),
+            Format::Geojson => Some(RowsFormat::GeoJson),
             Format::Count => None,
         })
     }
@@ -158,7 +158,7 @@ impl Arguments {
             name.push(".json");
             PathBuf::from(name)
         });
-        let is_csv = self.format()? == Some(ShotsFormat::Csv);
+        let is_csv = self.format()? == Some(RowsFormat::Csv);
         let outputs = self.out.iter().chain(beside.iter().filter(|_| is_csv));
         let read = sources.iter().map(Source::path);
         let unread = failures

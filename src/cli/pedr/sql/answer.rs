@@ -1,8 +1,7 @@
 //! How an answer is printed or written, piece by piece.
 
 use std::{
-    fs::File,
-    io::{self, BufWriter, Stdout, Write},
+    io::{self, Stdout, Write},
     path::Path,
     sync::{
         Arc,
@@ -10,21 +9,15 @@ use std::{
     },
 };
 
-use ::parquet::{
-    arrow::ArrowWriter,
-    basic::{Compression, ZstdLevel},
-    file::properties::WriterProperties,
-};
-use datafusion::arrow::{
-    csv, datatypes::SchemaRef, record_batch::RecordBatch,
-    util::pretty::pretty_format_batches_with_schema,
-};
+use arrow_array::RecordBatch;
+use arrow_schema::SchemaRef;
 
 use super::Format;
 use crate::cli::output;
 use crate::{
-    error::{Cause, IoError, Kind, Locate as _, Result},
-    files::StagedFile,
+    error::{Cause, Kind, Locate as _, Result},
+    products::{RowsFormat, RowsWriter},
+    sql::{as_table, as_text, as_text_schema},
 };
 
 /// Rows of a table that is printed.
@@ -55,7 +48,7 @@ impl Cause for NotWritten {
 
     fn advice(&self) -> String {
         match self {
-            Self::Refused(_) => "check the disk; a column of lists goes into Parquet, not into CSV",
+            Self::Refused(_) => "write the answer to a file (--out)",
             Self::Ending(_) => "give the file another ending",
         }
         .to_owned()
@@ -69,16 +62,16 @@ pub(super) enum Answer {
         schema: SchemaRef,
         batches: Vec<RecordBatch>,
     },
-    /// Comma-separated values on standard output, and whether its reader is gone.
-    Csv(csv::Writer<Reader>, Arc<AtomicBool>),
-    /// Comma-separated values in a file.
-    CsvFile(StagedFile, csv::Writer<BufWriter<File>>),
-    /// Parquet.
-    Parquet(StagedFile, Box<ArrowWriter<File>>),
+    /// Rows in a file or on standard output, and whether the reader of the latter is gone.
+    Rows {
+        writer: RowsWriter,
+        format: RowsFormat,
+        is_gone: Arc<AtomicBool>,
+    },
 }
 
 /// Whoever reads standard output: one who went away (`| head`) is no failure, a disk that refuses is one.
-pub(super) struct Reader {
+struct Reader {
     out: Stdout,
     is_gone: Arc<AtomicBool>,
 }
@@ -108,14 +101,6 @@ impl Write for Reader {
     }
 }
 
-/// A writer of comma-separated values that has written their names, also of an answer without rows.
-fn begun<W: Write>(out: W, schema: SchemaRef) -> std::result::Result<csv::Writer<W>, NotWritten> {
-    let mut writer = csv::Writer::new(out);
-    let names = writer.write(&RecordBatch::new_empty(schema));
-    names.map_err(NotWritten::refused)?;
-    Ok(writer)
-}
-
 impl Answer {
     /// An answer on standard output.
     pub(super) fn printed(format: Format, schema: SchemaRef) -> Result<Self> {
@@ -126,39 +111,36 @@ impl Answer {
             },
             Format::Csv => {
                 let is_gone = Arc::new(AtomicBool::new(false));
-                let reader = Reader {
+                let reader = Box::new(Reader {
                     out: io::stdout(),
                     is_gone: Arc::clone(&is_gone),
-                };
-                Self::Csv(begun(reader, schema)?, is_gone)
+                });
+                let format = RowsFormat::Csv;
+                Self::Rows {
+                    writer: RowsWriter::new(reader, format, as_text_schema(&schema))?,
+                    format,
+                    is_gone,
+                }
             }
         })
     }
 
     /// An answer in a file, which appears when it is whole.
-    pub(super) fn in_file(path: &Path, schema: SchemaRef) -> Result<Self> {
+    pub(super) fn in_file(path: &Path, schema: &SchemaRef) -> Result<Self> {
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
-        match ending.to_str() {
-            Some("csv") => {
-                let file = StagedFile::create(path)?;
-                let writer = begun(BufWriter::new(file.writer()?), schema).in_file(path)?;
-                Ok(Self::CsvFile(file, writer))
-            }
-            Some("parquet") => {
-                let file = StagedFile::create(path)?;
-                let properties = WriterProperties::builder()
-                    .set_created_by(concat!("areograph ", env!("CARGO_PKG_VERSION")).to_owned())
-                    .set_compression(Compression::ZSTD(ZstdLevel::default()))
-                    .build();
-                let writer = ArrowWriter::try_new(file.writer()?, schema, Some(properties));
-                let writer = writer.map_err(NotWritten::refused).in_file(path)?;
-                Ok(Self::Parquet(file, Box::new(writer)))
-            }
+        let (format, schema) = match ending.to_str() {
+            Some("csv") => (RowsFormat::Csv, as_text_schema(schema)),
+            Some("parquet") => (RowsFormat::Parquet, SchemaRef::clone(schema)),
             _ => {
                 let ending = ending.to_string_lossy().into_owned();
-                Err(NotWritten::Ending(ending)).in_file(path)
+                return Err(NotWritten::Ending(ending)).in_file(path);
             }
-        }
+        };
+        Ok(Self::Rows {
+            writer: RowsWriter::create(path, format, schema)?,
+            format,
+            is_gone: Arc::default(),
+        })
     }
 
     /// Takes rows, and says whether it wants more.
@@ -168,17 +150,19 @@ impl Answer {
                 batches.push(batch);
                 Ok(rows(batches) <= TABLE_ROWS_MAX)
             }
-            Self::Csv(writer, is_gone) => {
-                writer.write(&batch).map_err(NotWritten::refused)?;
+            Self::Rows {
+                writer,
+                format,
+                is_gone,
+            } => {
+                match format {
+                    RowsFormat::Csv => {
+                        let texts = as_text(&batch).map_err(NotWritten::refused)?;
+                        writer.write(&texts)?;
+                    }
+                    RowsFormat::Parquet | RowsFormat::GeoJson => writer.write(&batch)?,
+                }
                 Ok(!is_gone.load(Ordering::Relaxed))
-            }
-            Self::CsvFile(file, writer) => {
-                let written = writer.write(&batch).map_err(NotWritten::refused);
-                written.in_file(file.path()).map(|()| true)
-            }
-            Self::Parquet(file, writer) => {
-                let written = writer.write(&batch).map_err(NotWritten::refused);
-                written.in_file(file.path()).map(|()| true)
             }
         }
     }
@@ -187,20 +171,7 @@ impl Answer {
     pub(super) fn finish(self) -> Result<()> {
         match self {
             Self::Table { schema, batches } => print_table(schema, &batches),
-            Self::Csv(writer, _) => {
-                let flushed = writer.into_inner().flush();
-                Ok(flushed.map_err(IoError::on("write standard output"))?)
-            }
-            Self::CsvFile(file, writer) => {
-                let flushed = writer.into_inner().flush().map_err(IoError::on("write"));
-                flushed.in_file(file.path())?;
-                file.finish()
-            }
-            Self::Parquet(file, writer) => {
-                let closed = writer.close().map_err(NotWritten::refused);
-                closed.in_file(file.path())?;
-                file.finish()
-            }
+            Self::Rows { writer, .. } => writer.finish(Vec::new()).map(drop),
         }
     }
 }
@@ -220,7 +191,7 @@ fn print_table(schema: SchemaRef, batches: &[RecordBatch]) -> Result<()> {
             batch
         })
         .collect();
-    let table = pretty_format_batches_with_schema(schema, &shown);
+    let table = as_table(schema, &shown);
     output::line(table.map_err(NotWritten::refused)?);
     if rows(batches) > TABLE_ROWS_MAX {
         tracing::warn!(

@@ -8,11 +8,11 @@ use datafusion::{
     logical_expr::{Between, BinaryExpr, Expr, Operator, expr::InList},
 };
 
-use crate::{
-    geom::window::{Region, WindowShape},
+use areograph_base::{
     time::{Et, Interval},
     units::RADIANS_PER_DEGREE,
 };
+use areograph_geom::window::{Region, WindowShape};
 
 /// Alternatives that are told apart; more of them are taken together.
 const ALTERNATIVES_MAX: usize = 64;

@@ -2,6 +2,7 @@
 
 use std::{
     collections::BTreeMap,
+    fmt,
     path::PathBuf,
     sync::{
         Arc, Mutex, PoisonError,
@@ -26,23 +27,36 @@ use tokio::sync::mpsc::Sender;
 use tokio_stream::StreamExt as _;
 
 use super::conditions::Conditions;
-use crate::{
+use areograph_base::{
     error::{Cause, Error, Kind, Locate as _, Result, Stopped},
-    footprints::SourceFile,
-    geom::window::Region,
-    pds::{
-        archive::{Found, Judged, Query, Sink, Source, search},
-        pedr::Reason,
-    },
-    products::ShotColumns,
-    stages::convert_datum::convert_at_tags,
+    footprints::{AsRead, Footprints, SourceFile},
     time::Interval,
 };
+use areograph_geom::window::Region;
+use areograph_pds::{
+    archive::{Found, Judged, Query, Seen, Sink, Source, search},
+    pedr::Reason,
+};
 
-/// Half the time between two shots, seconds: shots of two files nearer to each other are one shot.
-const SAME_SHOT_S: f64 = 0.05;
 /// Pieces of an answer that wait for the query: a megabyte or so each.
 const PIECES_WAITING: usize = 2;
+
+/// The columns of the table, and how they are made of shots.
+pub trait Columns: fmt::Debug + Send + Sync {
+    /// Names and types; units and descriptions are the fields' metadata.
+    fn schema(&self) -> SchemaRef;
+
+    /// Those at these places alone, counted from 0, in this order.
+    fn pick(&self, places: &[usize]) -> Arc<dyn Columns>;
+
+    /// The values of these shots, in IAU 2000 at their time tags.
+    ///
+    /// * `files` – the files that the column `file` counts into
+    ///
+    /// # Errors
+    /// A number that is not finite.
+    fn batch(&self, shots: Footprints<AsRead>, files: &[SourceFile]) -> Result<RecordBatch>;
+}
 
 /// What queries met beside rows.
 #[derive(Debug, Default)]
@@ -59,10 +73,10 @@ pub struct Tally {
 
 /// Two files hold the same shots.
 #[derive(Debug, thiserror::Error)]
-#[error("record {record} is no later than what {before} ends with: its shots would count twice")]
+#[error("record {record} has a shot that {other} holds as well: it would count twice")]
 struct Overlap {
     record: u32,
-    before: String,
+    other: String,
 }
 
 impl Cause for Overlap {
@@ -85,7 +99,7 @@ impl Cause for Overlap {
 #[derive(Debug)]
 pub struct ShotsTable {
     sources: Arc<[Source]>,
-    columns: ShotColumns,
+    columns: Arc<dyn Columns>,
     schema: SchemaRef,
     tally: Arc<Mutex<Tally>>,
     stop: Arc<AtomicBool>,
@@ -94,8 +108,7 @@ pub struct ShotsTable {
 impl ShotsTable {
     /// The table of these files, at most 65,535; queries of it fail once `stop` is set.
     #[must_use]
-    pub fn new(sources: Vec<Source>, stop: Arc<AtomicBool>) -> Self {
-        let columns = ShotColumns::default();
+    pub fn new(sources: Vec<Source>, columns: Arc<dyn Columns>, stop: Arc<AtomicBool>) -> Self {
         Self {
             sources: sources.into(),
             schema: columns.schema(),
@@ -147,7 +160,7 @@ impl TableProvider for ShotsTable {
         let allowed = |source: &&Source| conditions.allow_file(&source.file().name);
         let columns = match projection {
             Some(places) => self.columns.pick(places),
-            None => self.columns.clone(),
+            None => Arc::clone(&self.columns),
         };
         let schema = columns.schema();
         let shots: Arc<dyn PartitionStream> = Arc::new(Shots {
@@ -170,7 +183,7 @@ struct Shots {
     sources: Arc<[Source]>,
     regions: Vec<Region>,
     time: Option<Interval>,
-    columns: ShotColumns,
+    columns: Arc<dyn Columns>,
     schema: SchemaRef,
     tally: Arc<Mutex<Tally>>,
     stop: Arc<AtomicBool>,
@@ -199,11 +212,11 @@ impl PartitionStream for Shots {
         let mut hand_on = HandOn {
             paths: self.sources.iter().map(|of| of.path().to_owned()).collect(),
             files: self.sources.iter().map(Source::file).collect(),
-            columns: self.columns.clone(),
+            columns: Arc::clone(&self.columns),
             tally: Arc::clone(&self.tally),
             stop: Arc::clone(&self.stop),
             rows: stream.tx(),
-            last: None,
+            seen: Seen::default(),
         };
         let (sources, regions, time) = (Arc::clone(&self.sources), self.regions.clone(), self.time);
         let is_over = Arc::new(AtomicBool::new(false));
@@ -230,12 +243,11 @@ impl PartitionStream for Shots {
 struct HandOn {
     paths: Vec<PathBuf>,
     files: Vec<SourceFile>,
-    columns: ShotColumns,
+    columns: Arc<dyn Columns>,
     tally: Arc<Mutex<Tally>>,
     stop: Arc<AtomicBool>,
     rows: Sender<Answer<RecordBatch>>,
-    /// The last file with rows, and the latest time tag so far, ET seconds.
-    last: Option<(usize, f64)>,
+    seen: Seen,
 }
 
 impl HandOn {
@@ -253,25 +265,16 @@ impl HandOn {
         let _ = self.rows.blocking_send(Err(told));
     }
 
-    /// Makes sure that the rows of a file follow those of the files before.
-    fn follow(&mut self, file: usize, found: &Found) -> Result<()> {
-        let shots = &found.footprints;
-        let (mut first_s, mut last_s) = (f64::INFINITY, f64::NEG_INFINITY);
-        for tag_s in &shots.et_tag_s {
-            (first_s, last_s) = (first_s.min(*tag_s), last_s.max(*tag_s));
-        }
-        if let Some((before, before_s)) = self.last {
-            if before != file && first_s < before_s + SAME_SHOT_S {
-                let overlap = Overlap {
-                    record: shots.record.first().copied().unwrap_or_default(),
-                    before: self.paths[before].display().to_string(),
-                };
-                return Err(overlap).in_file(&self.paths[file]);
-            }
-            last_s = last_s.max(before_s);
-        }
-        self.last = Some((file, last_s));
-        Ok(())
+    /// Makes sure that no file before holds one of these shots, which are in these records.
+    fn require_distinct(&mut self, file: usize, tags_s: &[f64], records: &[u32]) -> Result<()> {
+        let Some((row, other)) = self.seen.take_all(file, tags_s) else {
+            return Ok(());
+        };
+        let overlap = Overlap {
+            record: records[row],
+            other: self.paths[other].display().to_string(),
+        };
+        Err(overlap).in_file(&self.paths[file])
     }
 }
 
@@ -289,15 +292,77 @@ impl Sink for HandOn {
         if found.footprints.is_empty() {
             return Ok(());
         }
-        self.follow(file, &found)?;
-        let batch = self
-            .columns
-            .batch(&convert_at_tags(found.footprints, &self.files))?;
+        let shots = &found.footprints;
+        self.require_distinct(file, &shots.et_tag_s, &shots.record)?;
+        let batch = self.columns.batch(found.footprints, &self.files)?;
         let sent = self.rows.blocking_send(Ok(batch));
         sent.map_err(|_gone| Stopped.into())
     }
 
     fn failed(&mut self, _file: usize, failure: Error) -> Result<()> {
         Err(failure)
+    }
+}
+
+#[cfg(test)]
+#[path = "../../pds/src/archive/distinct/cases.rs"]
+mod cases;
+
+#[cfg(test)]
+mod tests {
+    use datafusion::arrow::datatypes::Schema;
+
+    use super::{cases::CASES, *};
+
+    #[derive(Debug)]
+    struct NoColumns;
+
+    impl Columns for NoColumns {
+        fn schema(&self) -> SchemaRef {
+            Arc::new(Schema::empty())
+        }
+
+        fn pick(&self, _places: &[usize]) -> Arc<dyn Columns> {
+            Arc::new(Self)
+        }
+
+        fn batch(&self, _shots: Footprints<AsRead>, _files: &[SourceFile]) -> Result<RecordBatch> {
+            Ok(RecordBatch::new_empty(self.schema()))
+        }
+    }
+
+    #[test]
+    fn shots_of_two_files_have_no_answer_together() {
+        for case in CASES {
+            let files = 0..case.files.len();
+            let paths: Vec<PathBuf> = files
+                .clone()
+                .map(|file| PathBuf::from(format!("file{file}.b")))
+                .collect();
+            let mut hand_on = HandOn {
+                paths: paths.clone(),
+                files: Vec::new(),
+                columns: Arc::new(NoColumns),
+                tally: Arc::default(),
+                stop: Arc::default(),
+                rows: tokio::sync::mpsc::channel(1).0,
+                seen: Seen::default(),
+            };
+            let mut checked = files.map(|file| {
+                let tags_s = case.tags_s(file);
+                hand_on.require_distinct(file, &tags_s, &vec![1; tags_s.len()])
+            });
+            let refused = checked.find_map(Result::err);
+            let named = refused.map(|error| (error.file.clone(), error.cause.to_string()));
+            match (named, case.shared) {
+                (None, None) => {}
+                (Some((path, why)), Some([other, file])) => {
+                    assert_eq!(path.as_ref(), Some(&paths[file]), "{}", case.name);
+                    let other = paths[other].display().to_string();
+                    assert!(why.contains(&other), "{}: {why}", case.name);
+                }
+                (found, _) => panic!("{}: {found:?}", case.name),
+            }
+        }
     }
 }

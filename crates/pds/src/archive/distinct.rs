@@ -1,0 +1,215 @@
+//! Every shot counts once: which files hold the same shots, and which are copies of others.
+//!
+//! This is the only place that knows when two shots of different files are one. Within a file, its chronology
+//! (`pedr/chronology.rs`) withholds records that repeat others.
+
+#[cfg(test)]
+mod cases;
+
+use std::collections::BTreeMap;
+
+use areograph_base::body::Datum;
+
+/// Shots of two files at most this far apart are one shot, seconds: half the 0.1 s between two shots of the laser, and half
+/// the microsecond in which PEDR states a time.
+///
+/// Half itself counts as the same. It is nearer to no other shot, and a user can answer a refusal, but does not see a shot
+/// that counts twice. The half microsecond keeps this independent of how the difference of two tags rounds. Successive
+/// shots of a file never meet the limit: frames of the archive lie 2 s apart to a microsecond, and the clock that parts
+/// their shots is right to 5e-4. A later version of a file may have moved a tag a little.
+pub const SAME_SHOT_S: f64 = 0.050_000_5;
+
+/// Longest pause inside a span, seconds: a whole missing frame of 2 s leaves 2.1 s between two shots. Shots that are missing
+/// within a frame had no return or were not asked for; another version of that frame may have them.
+const PAUSE_S: f64 = 2.05;
+
+/// Successive shots of a file without a missing frame between them; of a single shot both ends are its tag.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Span {
+    /// Number of the file.
+    pub file: usize,
+    /// Time tag of the first shot, ET seconds.
+    pub first_s: f64,
+    /// Time tag of the last shot, ET seconds.
+    pub last_s: f64,
+}
+
+impl Span {
+    /// A shot by itself.
+    ///
+    /// * `tag_s` – its time tag, ET seconds
+    #[must_use]
+    pub const fn of_shot(file: usize, tag_s: f64) -> Self {
+        Self {
+            file,
+            first_s: tag_s,
+            last_s: tag_s,
+        }
+    }
+
+    /// Takes the next shot of the file, unless a frame is missing before it.
+    ///
+    /// * `tag_s` – its time tag, ET seconds
+    fn extend(&mut self, tag_s: f64) -> bool {
+        let goes_on = (0.0..=PAUSE_S).contains(&(tag_s - self.last_s));
+        if goes_on {
+            self.last_s = tag_s;
+        }
+        goes_on
+    }
+}
+
+/// The spans of a file.
+///
+/// * `tags_s` – time tags of its shots in their order, ET seconds
+#[must_use]
+pub fn spans(file: usize, tags_s: impl IntoIterator<Item = f64>) -> Vec<Span> {
+    let mut spans: Vec<Span> = Vec::new();
+    for tag_s in tags_s {
+        if !spans.last_mut().is_some_and(|last| last.extend(tag_s)) {
+            spans.push(Span::of_shot(file, tag_s));
+        }
+    }
+    spans
+}
+
+/// The shots of the files so far, as spans: some per revolution, however many shots there are.
+#[derive(Debug, Clone, Default)]
+pub struct Seen {
+    /// In the order of time; those of different files hold no common shot.
+    spans: Vec<Span>,
+    /// The span of the last shot.
+    at: usize,
+}
+
+impl Seen {
+    /// The file that holds a shot of `span` as well; of several the one whose shots are the earliest.
+    #[must_use]
+    pub fn holder(&self, span: &Span) -> Option<usize> {
+        let end = (self.spans).partition_point(|of| of.first_s - span.last_s <= SAME_SHOT_S);
+        let near = self.spans[..end].iter().rev();
+        near.take_while(|of| span.first_s - of.last_s <= SAME_SHOT_S)
+            .filter(|of| of.file != span.file)
+            .last()
+            .map(|of| of.file)
+    }
+
+    /// Adds a span without a [`holder`](Self::holder).
+    pub fn add(&mut self, span: Span) {
+        self.at = (self.spans).partition_point(|of| of.first_s <= span.first_s);
+        self.spans.insert(self.at, span);
+    }
+
+    /// Takes the next shot, file by file, and gives the earlier file that holds it as well.
+    ///
+    /// * `tag_s` – its time tag, ET seconds
+    pub fn take(&mut self, file: usize, tag_s: f64) -> Option<usize> {
+        // Nearly every shot goes on where the one before ends.
+        let next_s = (self.spans.get(self.at + 1)).map_or(f64::INFINITY, |next| next.first_s);
+        if let Some(last) = self.spans.get_mut(self.at)
+            && last.file == file
+            && next_s - tag_s > SAME_SHOT_S
+            && last.extend(tag_s)
+        {
+            return None;
+        }
+        let shot = Span::of_shot(file, tag_s);
+        let holder = self.holder(&shot);
+        if holder.is_some() {
+            return holder;
+        }
+        let after = (self.spans).partition_point(|of| of.first_s <= tag_s);
+        let own = after.checked_sub(1).filter(|at| {
+            let before = &mut self.spans[*at];
+            // Files whose records are not in the order of time come back to earlier spans.
+            before.file == file && (tag_s <= before.last_s || before.extend(tag_s))
+        });
+        match own {
+            Some(at) => self.at = at,
+            None => self.add(shot),
+        }
+        None
+    }
+
+    /// Takes the next shots of a file until an earlier file holds one of them as well: its row, counted from 0, and that file.
+    ///
+    /// * `tags_s` – their time tags, ET seconds
+    pub fn take_all(&mut self, file: usize, tags_s: &[f64]) -> Option<(usize, usize)> {
+        let mut rows = tags_s.iter().enumerate();
+        rows.find_map(|(row, tag_s)| Some((row, self.take(file, *tag_s)?)))
+    }
+}
+
+/// The earliest file with the same bytes, understood alike.
+#[derive(Debug, Clone, Default)]
+pub struct Copies(BTreeMap<(String, Datum), usize>);
+
+impl Copies {
+    /// The earlier file that file `index` is a copy of.
+    ///
+    /// * `blake3` – hash of its bytes, hexadecimal
+    /// * `datum` – what its coordinates are understood as
+    pub fn original_of(&mut self, index: usize, blake3: &str, datum: Datum) -> Option<usize> {
+        let first = *(self.0.entry((blake3.to_owned(), datum))).or_insert(index);
+        (first != index).then_some(first)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{cases::CASES, *};
+
+    #[test]
+    fn shots_one_by_one_and_spans_give_the_same() {
+        for case in CASES {
+            let mut files = 0..case.files.len();
+            let mut seen = Seen::default();
+            let shared = files.find_map(|file| {
+                let (_, other) = seen.take_all(file, &case.tags_s(file))?;
+                Some([other, file])
+            });
+            assert_eq!(shared, case.shared, "{}: by shot", case.name);
+            let files = 0..case.files.len();
+            let mut seen = Seen::default();
+            let shared = files
+                .flat_map(|file| spans(file, case.tags_s(file)))
+                .find_map(|span| {
+                    let holder = seen.holder(&span);
+                    if holder.is_none() {
+                        seen.add(span);
+                    }
+                    Some([holder?, span.file])
+                });
+            assert_eq!(shared, case.shared, "{}: by span", case.name);
+        }
+    }
+
+    #[test]
+    fn an_archive_takes_few_spans() {
+        let mut seen = Seen::default();
+        for shot in 0..100_000_u32 {
+            let file = usize::from(shot >= 50_000);
+            assert_eq!(seen.take(file, f64::from(shot) * 0.1), None);
+        }
+        assert_eq!(seen.spans.len(), 2);
+    }
+
+    #[test]
+    fn a_copy_has_the_bytes_and_the_datum_of_an_earlier_file() {
+        let mut copies = Copies::default();
+        let files = [
+            ("aa", Datum::Iau1991, None),
+            ("aa", Datum::Iau2000, None),
+            ("bb", Datum::Iau2000, None),
+            ("aa", Datum::Iau2000, Some(1)),
+            ("aa", Datum::Iau1991, Some(0)),
+        ];
+        for (index, (blake3, datum, original)) in files.into_iter().enumerate() {
+            assert_eq!(
+                copies.original_of(index, blake3, datum),
+                original,
+                "{index}"
+            );
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! Files that hold the same shots or do not: the cases that every caller has to get right.
+
+/// Successive shots 0.1 s apart: microseconds from the start to the first one, and how many.
+type Run = (i64, u32);
+
+/// Some files, in the order in which they are searched.
+pub(crate) struct Case {
+    pub(crate) name: &'static str,
+    pub(crate) files: &'static [&'static [Run]],
+    /// The first two files with a common shot.
+    pub(crate) shared: Option<[usize; 2]>,
+}
+
+/// A time tag of the mission with all its digits, microseconds.
+const START_US: i64 = 38_593_125_159_870;
+
+impl Case {
+    /// Time tags of a file, ET seconds.
+    pub(crate) fn tags_s(&self, file: usize) -> Vec<f64> {
+        let tag_s = |first_us: i64, shot: u32| {
+            (START_US + first_us + 100_000 * i64::from(shot)) as f64 * 1e-6
+        };
+        let runs = self.files[file].iter();
+        runs.flat_map(|(first_us, shots)| (0..*shots).map(move |shot| tag_s(*first_us, shot)))
+            .collect()
+    }
+}
+
+pub(crate) const CASES: &[Case] = &[
+    Case {
+        name: "a copy",
+        files: &[&[(0, 40)], &[(0, 40)]],
+        shared: Some([0, 1]),
+    },
+    Case {
+        name: "files that follow each other, 0.1 s apart",
+        files: &[&[(0, 40)], &[(4_000_000, 40)]],
+        shared: None,
+    },
+    Case {
+        name: "files that overlap by one shot",
+        files: &[&[(0, 40)], &[(3_900_000, 40)]],
+        shared: Some([0, 1]),
+    },
+    Case {
+        name: "the later file first",
+        files: &[&[(4_000_000, 40)], &[(0, 40)]],
+        shared: None,
+    },
+    Case {
+        name: "the later file first, with a shot of the earlier one",
+        files: &[&[(4_000_000, 40)], &[(0, 41)]],
+        shared: Some([0, 1]),
+    },
+    Case {
+        name: "0.05 s apart, half the time between two shots",
+        files: &[&[(0, 40)], &[(3_950_000, 40)]],
+        shared: Some([0, 1]),
+    },
+    Case {
+        name: "a microsecond more than that",
+        files: &[&[(0, 40)], &[(3_950_001, 40)]],
+        shared: None,
+    },
+    Case {
+        name: "a later version with tags moved by 30 ms",
+        files: &[&[(0, 40)], &[(30_000, 40)]],
+        shared: Some([0, 1]),
+    },
+    Case {
+        name: "a short file within a long one",
+        files: &[&[(0, 1_000)], &[(30_000_000, 20)]],
+        shared: Some([0, 1]),
+    },
+    Case {
+        name: "a file with an orbit between the orbits of another one",
+        files: &[
+            &[(0, 40), (20_000_000_000, 40)],
+            &[(10_000_000_000, 40), (30_000_000_000, 40)],
+        ],
+        shared: None,
+    },
+    Case {
+        name: "the same, and one orbit in both",
+        files: &[
+            &[(0, 40), (20_000_000_000, 40)],
+            &[(10_000_000_000, 40), (20_001_000_000, 40)],
+        ],
+        shared: Some([0, 1]),
+    },
+    Case {
+        name: "a frame that the other file misses",
+        files: &[&[(0, 20), (4_000_000, 20)], &[(2_000_000, 20)]],
+        shared: None,
+    },
+    Case {
+        name: "shots of a frame that have no return in the other file",
+        files: &[&[(0, 5), (1_000_000, 10)], &[(600_000, 3)]],
+        shared: Some([0, 1]),
+    },
+    Case {
+        name: "the shot with which a profile begins after a pause",
+        files: &[&[(0, 20), (400_000_000, 20)], &[(400_000_000, 1)]],
+        shared: Some([0, 1]),
+    },
+    Case {
+        name: "the shot before that",
+        files: &[&[(0, 20), (400_000_000, 20)], &[(399_900_000, 1)]],
+        shared: None,
+    },
+    Case {
+        name: "the first and the third file",
+        files: &[&[(0, 40)], &[(4_000_000, 40)], &[(3_900_000, 1)]],
+        shared: Some([0, 2]),
+    },
+    Case {
+        name: "a file behind one that is earlier",
+        files: &[&[(100_000_000, 40)], &[(0, 40)], &[(103_900_000, 40)]],
+        shared: Some([0, 2]),
+    },
+    Case {
+        name: "a file without shots",
+        files: &[&[(0, 40)], &[], &[(4_000_000, 40)]],
+        shared: None,
+    },
+];

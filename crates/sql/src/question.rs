@@ -1,0 +1,64 @@
+//! A question in SQL about the shots of an archive.
+
+use std::sync::Arc;
+
+use areograph_base::error::{Cause, Kind};
+use datafusion::{
+    common::DataFusionError,
+    execution::{
+        SendableRecordBatchStream, memory_pool::FairSpillPool, runtime_env::RuntimeEnvBuilder,
+    },
+    prelude::{SQLOptions, SessionConfig, SessionContext},
+};
+
+use super::ShotsTable;
+
+/// Memory for sorting and grouping; more goes to temporary files.
+const MEMORY_BYTES: usize = 128 << 20;
+/// The name of the table.
+const TABLE: &str = "shots";
+
+/// A question that has no answer.
+#[derive(Debug, thiserror::Error)]
+#[error("{}", .0.strip_backtrace())]
+pub struct Question(#[from] DataFusionError);
+
+impl Cause for Question {
+    fn kind(&self) -> Kind {
+        match self.0.find_root() {
+            DataFusionError::IoError(_) => Kind::Io,
+            _ => Kind::Configuration,
+        }
+    }
+
+    fn advice(&self) -> String {
+        match self.0.find_root() {
+            DataFusionError::ResourcesExhausted(_) => {
+                "ask for fewer columns, or for less to be sorted and grouped at once"
+            }
+            DataFusionError::IoError(_) => "check the disk of temporary files, then ask again",
+            _ => "\"describe shots\" lists the columns; text stands in 'single quotes'",
+        }
+        .to_owned()
+    }
+}
+
+/// The rows of the answer, one thread after the search: their order is that of the search, or the one that was asked for.
+///
+/// # Errors
+/// A question that cannot be understood, or that would change a table.
+pub async fn ask(table: ShotsTable, question: &str) -> Result<SendableRecordBatchStream, Question> {
+    let memory =
+        RuntimeEnvBuilder::new().with_memory_pool(Arc::new(FairSpillPool::new(MEMORY_BYTES)));
+    let config = SessionConfig::new()
+        .with_target_partitions(1)
+        .with_information_schema(true);
+    let context = SessionContext::new_with_config_rt(config, memory.build_arc()?);
+    context.register_table(TABLE, Arc::new(table))?;
+    let read_only = SQLOptions::new()
+        .with_allow_ddl(false)
+        .with_allow_dml(false)
+        .with_allow_statements(false);
+    let frame = context.sql_with_options(question, read_only).await?;
+    Ok(frame.execute_stream().await?)
+}

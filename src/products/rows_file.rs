@@ -1,0 +1,307 @@
+//! Rows as they come, in the formats that people ask for: the one writer for searches, questions and the service.
+
+use std::{
+    fs::File,
+    io::{BufWriter, Write},
+    path::Path,
+};
+
+use ::parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use arrow_array::{Array, ArrayRef, RecordBatch, cast::AsArray as _, types};
+use arrow_schema::{DataType, FieldRef, SchemaRef};
+use rayon::prelude::*;
+
+use super::{
+    error::ProductError,
+    geojson,
+    geoparquet::point_of,
+    parquet,
+    parquet_file::ParquetFile,
+    table::{ROWS_OF_A_TASK, Values, pieces},
+    text_table,
+};
+use crate::{
+    body::Body,
+    error::{Cause, IoError, Kind, Locate, Result},
+    files::StagedFile,
+};
+
+/// The column of points in well-known binary.
+pub(super) const GEOMETRY: &str = "geometry";
+
+/// How rows are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RowsFormat {
+    /// Parquet; units and descriptions of columns are the metadata of its fields.
+    Parquet,
+    /// Comma-separated values, of all columns but those of bytes.
+    Csv,
+    /// GeoJSON points on Mars: those of the column `geometry` with all columns but those of bytes.
+    GeoJson,
+}
+
+/// Columns that cannot be written.
+#[derive(Debug, thiserror::Error)]
+enum RowsError {
+    #[error("the column {name} holds {holds}; expected a number, a flag or text in each row")]
+    Column { name: String, holds: String },
+    #[error("the column {GEOMETRY} is missing or holds no points")]
+    NoPoints,
+    #[error("rows have other columns than those before")]
+    Differ,
+}
+
+impl Cause for RowsError {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::Column { .. } => Kind::Configuration,
+            Self::NoPoints | Self::Differ => Kind::Input,
+        }
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::Column { .. } => {
+                "write Parquet, which holds lists and groups too; or ask for other columns"
+            }
+            Self::NoPoints | Self::Differ => {
+                "products of another version of areograph have to be made again by this one"
+            }
+        }
+        .to_owned()
+    }
+}
+
+/// Where rows go.
+pub type Out = Box<dyn Write + Send>;
+
+/// Rows that are being written; a file appears under its name when it is finished.
+pub struct RowsWriter {
+    staged: Option<StagedFile>,
+    form: Form,
+    schema: SchemaRef,
+    rows: u64,
+}
+
+enum Form {
+    Parquet(Box<ParquetFile<Out>>),
+    Csv(BufWriter<Out>),
+    GeoJson(BufWriter<Out>),
+}
+
+impl RowsWriter {
+    /// Begins the file `path` with rows of these columns.
+    ///
+    /// # Errors
+    /// What the disk refuses.
+    pub fn create(path: &Path, format: RowsFormat, schema: SchemaRef) -> Result<Self> {
+        let staged = StagedFile::create(path)?;
+        let writer = Self::new(Box::new(staged.writer()?), format, schema).in_file(path)?;
+        Ok(Self {
+            staged: Some(staged),
+            ..writer
+        })
+    }
+
+    /// Begins rows of these columns that go to `out`.
+    ///
+    /// # Errors
+    /// What `out` refuses.
+    pub fn new(out: Out, format: RowsFormat, schema: SchemaRef) -> Result<Self> {
+        let form = match format {
+            RowsFormat::Parquet => {
+                let writer = ParquetFile::new(out, SchemaRef::clone(&schema));
+                Form::Parquet(Box::new(writer.map_err(parquet::refused)?))
+            }
+            RowsFormat::Csv => {
+                let mut out = BufWriter::new(out);
+                text_table::write_names(&mut out, &names(&schema))?;
+                Form::Csv(out)
+            }
+            RowsFormat::GeoJson => {
+                let mut out = BufWriter::new(out);
+                put(&mut out, geojson::head_of("shots", Body::Mars, None)?)?;
+                Form::GeoJson(out)
+            }
+        };
+        Ok(Self {
+            staged: None,
+            form,
+            schema,
+            rows: 0,
+        })
+    }
+
+    /// Appends rows.
+    ///
+    /// # Errors
+    /// Other columns than before; those that text cannot hold; what the disk refuses.
+    pub fn write(&mut self, batch: &RecordBatch) -> Result<()> {
+        let written = self.append(batch);
+        match &self.staged {
+            Some(staged) => written.in_file(staged.path()),
+            None => written,
+        }
+    }
+
+    fn append(&mut self, batch: &RecordBatch) -> Result<()> {
+        let (fields, begun) = (batch.schema(), self.schema.fields().iter());
+        let begun = begun.map(|of| (of.name(), of.data_type()));
+        if !begun.eq(fields.fields().iter().map(|of| (of.name(), of.data_type()))) {
+            return Err(RowsError::Differ.into());
+        }
+        match &mut self.form {
+            Form::Parquet(writer) => writer.write(batch).map_err(parquet::refused)?,
+            Form::Csv(out) => {
+                for text in texts(batch, csv_rows) {
+                    put(out, text?)?;
+                }
+            }
+            Form::GeoJson(out) => {
+                for (index, text) in texts(batch, features).into_iter().enumerate() {
+                    if index > 0 || self.rows > 0 {
+                        put(out, geojson::SEPARATOR)?;
+                    }
+                    put(out, text?)?;
+                }
+            }
+        }
+        self.rows += batch.num_rows() as u64;
+        Ok(())
+    }
+
+    /// Ends the rows, and gives their number.
+    ///
+    /// * `notes` – metadata of Parquet, text by key; members of GeoJSON, whose text is JSON; CSV has no place for them
+    ///
+    /// # Errors
+    /// What the disk refuses; a Parquet file that comes back with another number of rows.
+    pub fn finish(self, notes: Vec<(&str, String)>) -> Result<u64> {
+        let (is_parquet, rows) = (matches!(self.form, Form::Parquet(_)), self.rows);
+        let ended = self.form.end(notes);
+        let Some(staged) = self.staged else {
+            return ended.map(|()| rows);
+        };
+        ended.in_file(staged.path())?;
+        if is_parquet {
+            require_rows(staged.reader()?, rows).in_file(staged.path())?;
+        }
+        staged.finish()?;
+        Ok(rows)
+    }
+}
+
+impl Form {
+    fn end(self, notes: Vec<(&str, String)>) -> Result<()> {
+        match self {
+            Self::Parquet(writer) => writer.finish(notes).map_err(parquet::refused),
+            Self::Csv(mut out) => Ok(out.flush().map_err(IoError::on("write"))?),
+            Self::GeoJson(mut out) => {
+                let notes = notes
+                    .iter()
+                    .map(|(key, json)| format!(",\n\"{key}\": {json}"));
+                put(&mut out, format!("\n]{}\n}}\n", notes.collect::<String>()))?;
+                Ok(out.flush().map_err(IoError::on("write"))?)
+            }
+        }
+    }
+}
+
+fn put(out: &mut impl Write, text: impl AsRef<[u8]>) -> Result<()> {
+    Ok(out.write_all(text.as_ref()).map_err(IoError::on("write"))?)
+}
+
+/// Calls `text_of` for parts of the batch with all threads.
+fn texts(
+    batch: &RecordBatch,
+    text_of: impl Fn(&RecordBatch) -> Result<Vec<u8>> + Sync,
+) -> Vec<Result<Vec<u8>>> {
+    let parts: Vec<_> = pieces(batch.num_rows(), ROWS_OF_A_TASK).collect();
+    let parts = parts.into_par_iter();
+    parts
+        .map(|rows| text_of(&batch.slice(rows.start, rows.len())))
+        .collect()
+}
+
+/// Whether text has a place for the column.
+fn is_text(field: &FieldRef) -> bool {
+    *field.data_type() != DataType::Binary
+}
+
+fn csv_rows(batch: &RecordBatch) -> Result<Vec<u8>> {
+    let values = attributes(batch)?;
+    let columns: Vec<_> = values.iter().map(|values| (None, values)).collect();
+    Ok(text_table::values_as_text(&columns, batch.num_rows()))
+}
+
+fn features(batch: &RecordBatch) -> Result<Vec<u8>> {
+    let points = batch
+        .column_by_name(GEOMETRY)
+        .and_then(|points| points.as_binary_opt::<i32>())
+        .and_then(|points| points.iter().map(|point| point_of(point?)).collect());
+    let points: Vec<[f64; 2]> = points.ok_or(RowsError::NoPoints)?;
+    let text = geojson::points_as_text(&names(&batch.schema()), &attributes(batch)?, &points);
+    Ok(text?)
+}
+
+/// Names of the columns that text has a place for.
+fn names(schema: &SchemaRef) -> Vec<&str> {
+    let fields = schema.fields().iter().filter(|field| is_text(field));
+    fields.map(|field| &**field.name()).collect()
+}
+
+/// What these columns hold.
+fn attributes(batch: &RecordBatch) -> Result<Vec<Values>> {
+    let fields = batch.schema();
+    let columns = fields.fields().iter().zip(batch.columns());
+    columns
+        .filter(|(field, _)| is_text(field))
+        .map(|(field, array)| values_of(field.name(), array))
+        .collect()
+}
+
+/// What a column holds, row by row. Only numbers with a fraction, and text, may be missing.
+fn values_of(name: &str, array: &ArrayRef) -> Result<Values> {
+    let is_whole = array.null_count() == 0;
+    Ok(match array.data_type() {
+        DataType::Float64 if is_whole => {
+            Values::Real(array.as_primitive::<types::Float64Type>().values().to_vec())
+        }
+        DataType::Float64 => {
+            Values::OptionalReal(array.as_primitive::<types::Float64Type>().iter().collect())
+        }
+        DataType::UInt32 if is_whole => {
+            Values::Natural(array.as_primitive::<types::UInt32Type>().values().to_vec())
+        }
+        DataType::Int32 if is_whole => {
+            Values::Integer(array.as_primitive::<types::Int32Type>().values().to_vec())
+        }
+        DataType::Boolean if is_whole => {
+            Values::Flag(array.as_boolean().iter().flatten().collect())
+        }
+        DataType::Utf8 => {
+            let texts = array.as_string::<i32>().iter();
+            Values::Text(
+                texts
+                    .map(|text| text.unwrap_or_default().to_owned())
+                    .collect(),
+            )
+        }
+        other => {
+            let (name, holds) = (name.to_owned(), other.to_string());
+            return Err(RowsError::Column { name, holds }.into());
+        }
+    })
+}
+
+/// Reads back how many rows the file has.
+fn require_rows(file: File, rows: u64) -> Result<()> {
+    let reader =
+        ParquetRecordBatchReaderBuilder::try_new(file).map_err(ProductError::unreadable)?;
+    let found = reader.metadata().file_metadata().num_rows();
+    if u64::try_from(found).is_ok_and(|found| found == rows) {
+        return Ok(());
+    }
+    let what = format!("{found} rows of {rows}");
+    Err(ProductError::ReadBack { what }.into())
+}
