@@ -43,7 +43,7 @@ use crate::{
     spice::{KernelSet, KernelView},
     stage::{Input as _, Inputs},
     stages::check_archive::{
-        ArchiveProfile, ArchiveRanges, ArchiveRules, ArchiveSource, CheckedFile, FileRanges,
+        ArchiveProfile, ArchiveRanges, ArchiveRules, ArchiveSource, CALLS, CheckedFile, FileRanges,
         KernelUsed, METHOD, NAME, TRAJECTORY_TOLERANCE_M, shots_of,
     },
     store::{
@@ -195,6 +195,7 @@ impl Archive<'_> {
     /// What every result depends on.
     fn inputs(&self) -> Inputs {
         let mut inputs = Inputs::new(METHOD);
+        inputs.calls(CALLS);
         (&self.view).add_to("kernels", &mut inputs);
         inputs.setting("mola_clock", &self.request.clock);
         inputs.setting("range_check", &self.limits);

@@ -19,19 +19,20 @@ use crate::{
     error::{IoError, Locate as _, Result},
     geom::ellipsoid::spherical_to_xyz_m,
     pds::pixel_file::Pyramid,
-    stage::{Input, Inputs, Stage},
+    stage::{Called, Input, Inputs, Stage, called},
     stages::{
         calibrate::{
-            Calibration, CalibrationFiles, CalibrationKeys, CalibrationRound, GivenPoints,
-            PointKind, Rounds, calibrate_given,
+            Calibrate, Calibration, CalibrationFiles, CalibrationKeys, CalibrationRound,
+            GivenPoints, PointKind, Rounds, calibrate_given,
         },
+        convert_datum::ConvertDatum,
         line_camera::LineCamera,
-        map_surface::{LinesToMap, Surface, map_lines},
+        map_surface::{LinesToMap, MapSurface, Surface, map_lines},
         match_laser::{
-            HeldBackGround, LaserMatch, MatchOptions, MatchedPoint, ModelRequest, UnitShots,
-            match_model, shots_within,
+            HeldBackGround, LaserMatch, MatchLaser, MatchOptions, MatchedPoint, ModelRequest,
+            UnitShots, match_model, shots_within,
         },
-        match_ties::{LinesToMatch, TiesOfLines, match_lines},
+        match_ties::{LinesToMatch, MatchTies, TiesOfLines, match_lines},
     },
     store::atomic,
     units::wrap_pi,
@@ -57,10 +58,19 @@ pub(super) struct CalibrationLoop<'a> {
 impl Stage for CalibrationLoop<'_> {
     const NAME: &'static str = "calibration_loop";
     const METHOD: u32 = 2;
+    const CALLS: &'static [Called] = &[
+        called::<MatchTies<'_>>(),
+        called::<MapSurface<'_>>(),
+        called::<MatchLaser<'_>>(),
+        called::<Calibrate<'_>>(),
+        // What the matching with the laser calls.
+        called::<ConvertDatum<'_>>(),
+    ];
     type Output = Calibration;
 
     fn inputs(&self) -> Inputs {
         let mut inputs = Inputs::new(Self::METHOD);
+        inputs.calls(Self::CALLS);
         self.calibration.add_to("calibration", &mut inputs);
         self.files.add_to("files", &mut inputs);
         inputs

@@ -6,7 +6,7 @@
     reason = "helpers of tests may fail loudly"
 )]
 
-mod uses;
+pub(crate) mod uses;
 
 use std::{
     collections::{BTreeMap, BTreeSet},

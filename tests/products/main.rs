@@ -9,6 +9,7 @@ mod config_valid;
 mod exchange_readers;
 mod fidelity;
 mod generated;
+mod methods;
 mod products_site;
 mod report_geometric;
 mod report_page;

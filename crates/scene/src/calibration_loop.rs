@@ -29,7 +29,8 @@ const LONGITUDE_DEG: f64 = -63.13;
 const LATITUDE_DEG: f64 = -33.0;
 /// Lines and samples of an image: 65 by 22 km.
 const SIZE: [u32; 2] = [2_400, 800];
-/// Laser passes: those of a direction lie 1.4 km apart, of both as dense as the 126 over a whole swath in Li et al. 2023.
+/// Laser passes over that ground: those of a direction lie 1.4 km apart, of both as dense as the 126 over a whole swath in
+/// Li et al. 2023.
 const PASSES: Passes = Passes {
     longitude_rad: LONGITUDE_DEG * RADIANS_PER_DEGREE,
     latitude_rad: LATITUDE_DEG * RADIANS_PER_DEGREE,
@@ -41,18 +42,59 @@ const PASSES: Passes = Passes {
 const CHECKED: [u32; 2] = [19, 7];
 const CHECKED_SHARE: [f64; 2] = [0.84, 0.9];
 
+/// How three lines and the ground that they see are invented.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LineScene {
+    /// Seed of the ground and of noise.
+    pub seed: u64,
+    /// Lines and samples of an image.
+    pub size: [u32; 2],
+    /// Whether support data are wrong by the mounting and the orbit; else they are what the lines truly do.
+    pub is_wrong: bool,
+}
+
+impl LineScene {
+    /// Images of 65 by 22 km, support data that are wrong.
+    #[must_use]
+    pub const fn of_seed(seed: u64) -> Self {
+        Self {
+            seed,
+            size: SIZE,
+            is_wrong: true,
+        }
+    }
+
+    /// Passes as dense over less ground.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "some passes"
+    )]
+    fn passes(&self) -> Passes {
+        let [along, across] = [0, 1].map(|axis| f64::from(self.size[axis]) / f64::from(SIZE[axis]));
+        Passes {
+            of_direction: (f64::from(PASSES.of_direction) * across).ceil() as u32,
+            half_width_m: PASSES.half_width_m * across,
+            half_s: PASSES.half_s * along,
+            ..PASSES
+        }
+    }
+}
+
 /// The lines as they truly are: offsets and errors of the paper's synthetic case, and a third line between them.
-fn lines() -> [StereoLine; 3] {
+fn lines(scene: &LineScene) -> [StereoLine; 3] {
+    let wrong = if scene.is_wrong { 1.0 } else { 0.0 };
     let offset = |angles_deg: [f64; 3]| {
-        let [phi_rad, omega_rad, kappa_rad] = angles_deg.map(f64::to_radians);
+        let [phi_rad, omega_rad, kappa_rad] = angles_deg.map(|of| (wrong * of).to_radians());
         Offset {
             phi_rad,
             omega_rad,
             kappa_rad,
         }
     };
-    let half = 0.5 * f64::from(SIZE[1]);
+    let half = 0.5 * f64::from(scene.size[1]);
     let errors = |sense: f64| {
+        let sense = wrong * sense;
         let [m1, n1, n2] = [2e-7 * half, 1e-7 * half, 1e-11 * half * half];
         [sense * m1, sense * n1, sense * n2]
     };
@@ -78,17 +120,18 @@ fn lines() -> [StereoLine; 3] {
     ]
 }
 
-fn orbit() -> Orbit {
+fn orbit(scene: &LineScene) -> Orbit {
+    let wrong = if scene.is_wrong { 1.0 } else { 0.0 };
     Orbit {
         name: "i864",
         start_et_s: 596_764_800.0,
         longitude_deg: LONGITUDE_DEG,
         latitude_deg: LATITUDE_DEG,
-        size: SIZE,
+        size: scene.size,
         is_steered: true,
         error: OrbitError {
-            bias_m: [350.0, 500.0, -420.0],
-            drift_m_per_line: [0.006, -0.006, 0.006],
+            bias_m: [350.0, 500.0, -420.0].map(|of| wrong * of),
+            drift_m_per_line: [0.006, -0.006, 0.006].map(|of| wrong * of),
         },
     }
 }
@@ -124,10 +167,19 @@ struct Checked {
 /// # Errors
 /// [`SceneError`](super::SceneError) when the folder holds something else; the system's refusal to write.
 pub fn write_calibration_loop_scene(directory: &Path, seed: u64) -> Result<String> {
+    write_line_scene(directory, &LineScene::of_seed(seed))
+}
+
+/// Writes such a scene of another size, or one whose support data are right.
+///
+/// # Errors
+/// As [`write_calibration_loop_scene`].
+pub fn write_line_scene(directory: &Path, scene: &LineScene) -> Result<String> {
+    let seed = scene.seed;
     let draft = Draft::begin(directory, README)?;
     let [isd, images, pedr] = ["isd", "images", "pedr"].map(|folder| draft.folder(folder));
     let (isd, images, pedr) = (isd?, images?, pedr?);
-    let (lines, orbit) = (lines(), orbit());
+    let (lines, orbit, passes) = (lines(scene), orbit(scene), scene.passes());
     let middle = orbit.ground(0.5, 0.0).normalize();
     let terrain = Terrain::new(seed, &[middle], Relief::SelfAffine(Roughness::Rough));
     let rendered = LineImages {
@@ -141,7 +193,7 @@ pub fn write_calibration_loop_scene(directory: &Path, seed: u64) -> Result<Strin
         let path = images.join(format!("{}.tif", line.name));
         rendered.write(&path, line).in_file(&path)?;
     }
-    PASSES.write(&pedr, &terrain, seed)?;
+    passes.write(&pedr, &terrain, seed)?;
     let truth = Truth {
         made_by: "areograph scene",
         synthetic: "not from mission data",
@@ -166,7 +218,7 @@ pub fn write_calibration_loop_scene(directory: &Path, seed: u64) -> Result<Strin
     Ok(format!(
         "{}: three lines with their pixels, {} laser passes over their ground; next: areograph calibrate {}",
         directory.display(),
-        PASSES.count(),
+        passes.count(),
         directory.join("calibration.toml").display()
     ))
 }

@@ -76,7 +76,7 @@ use areograph_geom::random;
 pub use along::write_scene_along;
 pub use archive::{ArchiveOptions, ArchiveSummary, write_archive};
 pub use calibration::write_calibration_scene;
-pub use calibration_loop::write_calibration_loop_scene;
+pub use calibration_loop::{LineScene, write_calibration_loop_scene, write_line_scene};
 pub use error::SceneError;
 pub use error_sources::{
     AltimeterErrors, AttitudeErrors, Jitter, Misregistration, PositionErrors, Relief, Roughness,

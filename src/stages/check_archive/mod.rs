@@ -31,7 +31,11 @@ use crate::{
         pedr::{Complaint, FieldGuard, Reader, Stretch, decide_datum},
     },
     spice::{Session, Trajectory},
-    stages::convert_datum::DatumTurn,
+    stage::{Called, called},
+    stages::{
+        check_ranges::CheckRanges,
+        convert_datum::{ConvertDatum, DatumTurn},
+    },
     time::{Et, Interval, Intervals},
 };
 
@@ -46,6 +50,8 @@ use rows::{Rows, Task};
 pub const NAME: &str = "check_archive";
 /// Raised when what the step computes changes.
 pub const METHOD: u32 = 4;
+/// Stages whose functions it calls.
+pub const CALLS: &[Called] = &[called::<ConvertDatum<'_>>(), called::<CheckRanges<'_>>()];
 
 /// Records of a load: 51 MB, more than any day of the mission takes.
 const LOAD_RECORDS: usize = 1 << 16;

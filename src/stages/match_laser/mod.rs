@@ -40,14 +40,14 @@ pub use self::{
     similarity::{Moments, Similarity},
     surface::SimilaritySurface,
 };
-use super::line_camera::LineCamera;
+use super::{convert_datum::ConvertDatum, line_camera::LineCamera};
 use crate::{
     altimetry::ShotFilter,
     error::{Result, Stopped},
     files::HashedFile,
     geom::{ellipsoid::spherical_to_xyz_m, height_grid::HeightGrid, statistics::Summary},
     pds::terrain_model::{HeightsAbove, read_terrain_model},
-    stage::{InOrder, Stage},
+    stage::{Called, InOrder, Stage, called},
     stage_inputs,
 };
 
@@ -64,6 +64,7 @@ stage_inputs! {
 impl Stage for MatchLaser<'_> {
     const NAME: &'static str = "match_laser";
     const METHOD: u32 = 4;
+    const CALLS: &'static [Called] = &[called::<ConvertDatum<'_>>()];
     type Output = LaserMatch;
     stage_inputs!(fingerprint);
 

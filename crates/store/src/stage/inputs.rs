@@ -8,6 +8,7 @@ use std::{
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::Called;
 use crate::files::{HashedFile, file_name};
 use areograph_base::error::{Cause, Kind};
 
@@ -19,6 +20,7 @@ const NOT_KNOWN_YET: &str = "not known yet";
 /// | input | value |
 /// |---|---|
 /// | `areograph` | version of the program, and of the stage's method |
+/// | `method of …` | number of the method of a stage whose functions this one calls |
 /// | `key …` | a value of the valid configuration, or one derived from it; tables by their fields |
 /// | `kernel …`, `label …`, `pedr …` | BLAKE3 of a file; where the order matters with its place |
 /// | `output of …` | BLAKE3 of an earlier stage's output |
@@ -108,6 +110,14 @@ impl Inputs {
             named: BTreeMap::from([("areograph".to_owned(), version)]),
             files: Vec::new(),
             pending: Vec::new(),
+        }
+    }
+
+    /// Adds the methods of stages whose functions the stage calls: when one of these computes something else, so does it.
+    pub fn calls(&mut self, called: &[Called]) {
+        for (stage, method) in called {
+            self.named
+                .insert(format!("method of {stage}"), method.to_string());
         }
     }
 
@@ -284,6 +294,16 @@ mod tests {
             Inputs::new(2).changed_since(&Inputs::new(1)),
             ["areograph changed"]
         );
+    }
+
+    #[test]
+    fn a_method_that_is_called_enters() {
+        let calls = |method| inputs(|inputs| inputs.calls(&[("match_ties", method)]));
+        assert_eq!(
+            calls(2).changed_since(&calls(1)),
+            ["method of match_ties changed"]
+        );
+        assert_ne!(calls(2).fingerprint(), calls(1).fingerprint());
     }
 
     #[test]

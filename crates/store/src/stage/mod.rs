@@ -67,12 +67,24 @@ impl Input for Round {
     fn add_to(&self, _field: &str, _inputs: &mut Inputs) {}
 }
 
+/// A stage whose functions another one calls, by its name and the number of its method; see [`called`].
+pub type Called = (&'static str, u32);
+
+/// What a stage lists in [`Stage::CALLS`] for each stage whose functions it calls.
+#[must_use]
+pub const fn called<S: Stage>() -> Called {
+    (S::NAME, S::METHOD)
+}
+
 /// A step of the flow: a function of its fields, and of nothing else.
 pub trait Stage {
     /// Name as logs, messages, the manifest and the command line write it.
     const NAME: &'static str;
-    /// Raised when the stage computes something else from the same inputs, or lays its output out anew.
+    /// Raised when the stage computes something else from the same inputs, or lays its output out anew; `docs/methods.csv` holds
+    /// what it computes, and `tests/products/methods.rs` fails where this is forgotten.
     const METHOD: u32 = 1;
+    /// Stages whose functions it calls: their methods are inputs of it.
+    const CALLS: &'static [Called] = &[];
     /// Whether `check` runs the stage; the others only look at their inputs, by [`Stage::examine`].
     const CHECKED: bool = false;
     /// What it makes; stored, and handed to later stages.
@@ -165,6 +177,7 @@ macro_rules! stage_inputs {
     (fingerprint) => {
         fn inputs(&self) -> $crate::stage::Inputs {
             let mut inputs = $crate::stage::Inputs::new(Self::METHOD);
+            inputs.calls(Self::CALLS);
             self.fingerprint(&mut inputs);
             inputs
         }
