@@ -25,6 +25,7 @@ use crate::{
             Calibrate, Calibration, CalibrationFiles, CalibrationKeys, CalibrationRound,
             GivenPoints, PointKind, Rounds, calibrate_given,
         },
+        convert_datum::ConvertDatum,
         line_camera::LineCamera,
         map_surface::{LinesToMap, MapSurface, Surface, map_lines},
         match_laser::{
@@ -62,6 +63,8 @@ impl Stage for CalibrationLoop<'_> {
         called::<MapSurface<'_>>(),
         called::<MatchLaser<'_>>(),
         called::<Calibrate<'_>>(),
+        // What the matching with the laser calls.
+        called::<ConvertDatum<'_>>(),
     ];
     type Output = Calibration;
 

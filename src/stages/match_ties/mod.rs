@@ -107,6 +107,7 @@ impl Cause for MatchError {
 
 impl Stage for MatchTies<'_> {
     const NAME: &'static str = "match_ties";
+    const METHOD: u32 = 2;
     type Output = Ties;
     stage_inputs!(fingerprint);
 

@@ -1,0 +1,260 @@
+//! The scenes: small inputs that are the same everywhere, and what runs on them.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+    sync::atomic::AtomicBool,
+};
+
+use areograph::{
+    altimetry::{BiasScope, MolaClock, TagSign},
+    body::Body,
+    config::{self, load_calibration, load_net},
+    flow::{
+        ArchiveRequest, PUBLISH, RunOptions, archive_filter, check_archive, run_calibration,
+        run_match, run_net, run_site,
+    },
+    scene::{
+        LineScene, SceneOptions, write_calibration_loop_scene, write_calibration_scene,
+        write_line_scene, write_plane_scene, write_scene, write_terrain_model_scene,
+    },
+    stages::match_laser::{MatchImage, MatchOptions, MatchRequest},
+    store::hashes::HashCache,
+};
+
+use super::common::mission::{areograph, succeed};
+
+/// Inputs and a flow over them.
+pub(crate) struct Scene {
+    /// Its name in the ledger.
+    pub(crate) name: &'static str,
+    /// Writes the inputs into a folder.
+    pub(crate) write: fn(&Path),
+    /// Runs the flow in a folder with inputs; where its outputs are stored.
+    pub(crate) run: fn(&Path) -> PathBuf,
+    /// Of stages that share a name, and of steps that are no stages, the type or the file that is behind a name here.
+    pub(crate) declared: &'static [(&'static str, &'static str)],
+}
+
+/// Scenes that take seconds. The last one, whose pixels are matched, takes most.
+pub(crate) static SHORT: [Scene; 6] = [
+    Scene {
+        name: "mission",
+        write: write_mission,
+        run: run_mission,
+        declared: &[
+            ("search_footprints", "SearchFootprints"),
+            ("check_ranges", "CheckRanges"),
+            (PUBLISH, "flow/publish.rs"),
+        ],
+    },
+    Scene {
+        name: "archive",
+        write: write_mission,
+        run: run_archive,
+        declared: &[
+            ("check_archive", "stages/check_archive/mod.rs"),
+            (PUBLISH, "flow/archive.rs"),
+        ],
+    },
+    Scene {
+        name: "net",
+        write: |folder| {
+            write_plane_scene(&folder.join("net"), 1).unwrap();
+        },
+        run: |folder| {
+            let net = load_net(&folder.join("net/net.toml")).unwrap().net;
+            run_net(&net, &folder.join("out"), false).unwrap().folder
+        },
+        declared: &[(PUBLISH, "flow/net.rs")],
+    },
+    Scene {
+        name: "tables",
+        write: |folder| {
+            write_calibration_scene(&folder.join("lines"), 1).unwrap();
+        },
+        run: calibrated,
+        declared: &[(PUBLISH, "flow/calibration.rs")],
+    },
+    Scene {
+        name: "model",
+        write: |folder| {
+            write_terrain_model_scene(&folder.join("scene"), 1).unwrap();
+        },
+        run: run_model,
+        declared: &[(PUBLISH, "flow/laser_match.rs")],
+    },
+    Scene {
+        name: "pair",
+        write: write_pair,
+        run: |folder| run_site_in(folder, "pair.toml"),
+        declared: &[
+            ("search_footprints", "ReadShots"),
+            ("check_ranges", "CheckTableRanges"),
+            (PUBLISH, "flow/publish.rs"),
+        ],
+    },
+];
+
+/// Scenes that take a minute and more.
+pub(crate) static LONG: [Scene; 1] = [Scene {
+    name: "loop",
+    write: write_loop,
+    run: calibrated,
+    declared: &[(PUBLISH, "flow/calibration.rs")],
+}];
+
+/// The site with most stages: wide-angle images, rival kernels, tie points; here also a window that is what an image sees.
+const MISSION_SITE: &str = "gusev_context";
+
+fn write_mission(folder: &Path) {
+    let options = SceneOptions {
+        day_s: 600.0,
+        ..SceneOptions::default()
+    };
+    write_scene(&folder.join("mission"), &options).unwrap();
+}
+
+fn run_mission(folder: &Path) -> PathBuf {
+    let sites = folder.join("mission/sites");
+    let mut text = fs::read_to_string(sites.join(format!("{MISSION_SITE}.toml"))).unwrap();
+    let (_, first) = text.split_once("[[images]]\nid = ").unwrap();
+    let image = first.lines().next().unwrap().to_owned();
+    text += &format!("\n[[windows]]\nid = \"outline\"\nimage = {image}\n");
+    fs::write(sites.join("site.toml"), text).unwrap();
+    run_site_in(&sites, "site.toml")
+}
+
+fn run_archive(folder: &Path) -> PathBuf {
+    let mission = folder.join("mission");
+    let out = folder.join("out");
+    let request = ArchiveRequest {
+        paths: &[mission.join("pedr")],
+        kernels: &mission.join("kernels/nav.tm"),
+        out: &out,
+        clock: MolaClock {
+            bias_s: 0.117,
+            sign: TagSign::Late,
+            scope: BiasScope::SpkLookup,
+            source: "the scene".to_owned(),
+        },
+        allow_uncovered: true,
+        force: false,
+        stop: &AtomicBool::new(false),
+    };
+    let outcome = check_archive(&request, &|_| ()).unwrap();
+    assert!(outcome.failures.is_empty(), "{:?}", outcome.failures);
+    out
+}
+
+/// Runs a site whose file lies in `folder`.
+fn run_site_in(folder: &Path, file: &str) -> PathBuf {
+    let config = config::load(&folder.join(file)).unwrap().site;
+    let out = folder.join("out");
+    let hashes = HashCache::in_folder(&out, false);
+    let options = RunOptions {
+        out,
+        until: PUBLISH,
+        force: false,
+        stop: &AtomicBool::new(false),
+        hashes: &hashes,
+        roots: &[],
+        observer: &(),
+    };
+    run_site(&config, &options).unwrap().folder
+}
+
+fn calibrated(folder: &Path) -> PathBuf {
+    let config = load_calibration(&folder.join("lines/calibration.toml"));
+    let config = config.unwrap().calibration;
+    let outcome = run_calibration(&config, &folder.join("out"), false);
+    outcome.unwrap().folder
+}
+
+/// Smaller ground has too few places for shots that judge; two rounds call all that more of them call.
+fn write_loop(folder: &Path) {
+    write_calibration_loop_scene(&folder.join("lines"), 1).unwrap();
+    let path = folder.join("lines/calibration.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    let (was, is) = ("search_cells = 30", "search_cells = 30\nrounds_max = 2");
+    assert!(text.contains(was));
+    fs::write(path, text.replace(was, is)).unwrap();
+}
+
+fn run_model(folder: &Path) -> PathBuf {
+    let scene = folder.join("scene");
+    let image = |name: &str| MatchImage {
+        name: name.to_owned(),
+        isd: scene.join(format!("isd/{name}.json")),
+    };
+    let request = MatchRequest {
+        options: MatchOptions {
+            segment_points: 15,
+            least_variance_m2: 1_000.0,
+            similarity: None,
+            search_cells: 15,
+            least_score: 0.9,
+            least_contrast: 1.0,
+            limit_m: 60.0,
+            seed: 1,
+            filter: archive_filter(),
+        },
+        body: Body::Mars,
+        radius_m: None,
+        heights_apart: false,
+        model: scene.join("model.tif"),
+        pedr: vec![scene.join("pedr")],
+        images: vec![image("s1"), image("s2")],
+    };
+    let outcome = run_match(&request, &folder.join("out"), false);
+    outcome.unwrap().folder
+}
+
+const LEAP_SECONDS: &str = include_str!("../../kernels.example/leapseconds.tls");
+
+/// Two images by support data with their pixels, and the shots of passes over them in a table.
+const PAIR: &str = r#"site = "pair"
+kernels.files = ["leapseconds.tls"]
+[[shots]]
+files = ["shots.csv"]
+layout = "areograph"
+[[windows]]
+id = "pair"
+longitude_deg = [296.0, 298.0]
+latitude_deg = [-34.0, -32.0]
+[[images]]
+id = "s1"
+isd = "first/isd/s1.json"
+pixels = "first/images/s1.tif"
+[[images]]
+id = "nd"
+isd = "second/isd/nd.json"
+pixels = "second/images/nd.tif"
+[ties]
+match = true
+[surface]
+cell_m = 200.0
+images = ["s1", "nd"]
+[registration]
+model = "samples"
+"#;
+
+fn write_pair(folder: &Path) {
+    // Files of pixels without labels differ by their sizes; the ground is the same.
+    for (name, lines) in [("first", 400), ("second", 390)] {
+        let scene = LineScene {
+            seed: 1,
+            size: [lines, 240],
+            is_wrong: false,
+        };
+        write_line_scene(&folder.join(name), &scene).unwrap();
+    }
+    let mut search: Command = areograph();
+    search.args(["--quiet", "pedr", "search"]);
+    search.arg(folder.join("first/pedr"));
+    search.args(["--box=-64.0,-62.0,-34.0,-32.0", "--out"]);
+    succeed(search.arg(folder.join("shots.csv")));
+    fs::write(folder.join("leapseconds.tls"), LEAP_SECONDS).unwrap();
+    fs::write(folder.join("pair.toml"), PAIR).unwrap();
+}
