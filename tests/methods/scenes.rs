@@ -118,10 +118,10 @@ fn write_mission(folder: &Path) {
 
 fn run_mission(folder: &Path) -> PathBuf {
     let sites = folder.join("mission/sites");
-    let mut text = fs::read_to_string(sites.join(format!("{MISSION_SITE}.toml"))).unwrap();
+    let text = fs::read_to_string(sites.join(format!("{MISSION_SITE}.toml"))).unwrap();
     let (_, first) = text.split_once("[[images]]\nid = ").unwrap();
     let image = first.lines().next().unwrap().to_owned();
-    text += &format!("\n[[windows]]\nid = \"outline\"\nimage = {image}\n");
+    let text = format!("{text}\n[[windows]]\nid = \"outline\"\nimage = {image}\n");
     fs::write(sites.join("site.toml"), text).unwrap();
     run_site_in(&sites, "site.toml")
 }
