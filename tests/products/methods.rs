@@ -46,7 +46,7 @@ use sources::Declared;
 use uses::Sources;
 
 const LEDGER: &str = "docs/methods.csv";
-const WRITE: &str = "SNAPSHOTS=overwrite cargo test --locked --test methods";
+const WRITE: &str = "SNAPSHOTS=overwrite cargo test --locked --test products methods";
 
 /// The short scenes, run once.
 static RUNS: LazyLock<Vec<Run>> = LazyLock::new(|| SHORT.iter().map(Run::of).collect());

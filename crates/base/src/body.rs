@@ -1,7 +1,7 @@
 //! The bodies whose ground is seen: rotation, shape and names, as their files under `config/bodies` say.
 //!
 //! ```
-//! use areograph::body::Body;
+//! use areograph_base::body::Body;
 //!
 //! assert_eq!(Body::default(), Body::Mars);
 //! assert_eq!(Body::Moon.model().equatorial_radius_m, 1_737_400.0);

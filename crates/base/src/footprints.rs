@@ -1,7 +1,7 @@
 //! Laser footprints as columns, from the PEDR reader to the Parquet writer.
 //!
 //! ```
-//! use areograph::footprints::{AsRead, Footprints};
+//! use areograph_base::footprints::{AsRead, Footprints};
 //!
 //! let footprints = Footprints::<AsRead>::new(Vec::new());
 //! assert!(footprints.is_empty());
@@ -11,7 +11,7 @@
 //! Footprints as their files have them are not taken for footprints in the frame of the products:
 //!
 //! ```compile_fail,E0308
-//! use areograph::{
+//! use areograph_base::{
 //!     footprints::{AsRead, Footprints},
 //!     frames::BodyFixed,
 //! };

@@ -4,12 +4,12 @@
 //! of different instants do not combine.
 //!
 //! ```
-//! use areograph::{
+//! use areograph_base::{
 //!     body::Body,
 //!     frames::{BodyFixed, J2000, Position, Rotation},
-//!     geom::body_rotation::body_rotation,
 //!     time::Et,
 //! };
+//! use areograph_geom::body_rotation::body_rotation;
 //! use nalgebra::Vector3;
 //!
 //! // A place of the ground a second later, seen from the stars: Mars turns to the east.
@@ -25,7 +25,7 @@
 //! Two frames do not mix, neither in a distance
 //!
 //! ```compile_fail,E0308
-//! use areograph::frames::{BodyFixed, J2000, Position};
+//! use areograph_base::frames::{BodyFixed, J2000, Position};
 //! use nalgebra::Vector3;
 //!
 //! let ground: Position<BodyFixed> = Position::new(Vector3::zeros());
@@ -36,7 +36,8 @@
 //! nor in a product of rotations:
 //!
 //! ```compile_fail,E0277
-//! use areograph::{body::Body, geom::body_rotation::body_rotation, time::Et};
+//! use areograph_base::{body::Body, time::Et};
+//! use areograph_geom::body_rotation::body_rotation;
 //!
 //! let et = Et::from_seconds(0.0);
 //! let twice = body_rotation(Body::Mars, et) * body_rotation(Body::Mars, et);

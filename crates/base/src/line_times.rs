@@ -7,7 +7,7 @@
 //! smooth over it as they are over time.
 //!
 //! ```
-//! use areograph::{line_times::LineTimes, time::Et};
+//! use areograph_base::{line_times::LineTimes, time::Et};
 //!
 //! // 1000 lines of 1 ms, then 500 of 2 ms.
 //! let times = LineTimes::continuous(Et::from_seconds(0.0), &[(1000, 1e-3), (500, 2e-3)])?;
@@ -15,7 +15,7 @@
 //! assert!((times.line(Et::from_seconds(1.5)) - 1250.0).abs() < 1e-9);
 //! // The middle of the exposure is the end of the first piece, not the middle line.
 //! assert!(times.offset_of_line(1000.0).abs() < 1e-9);
-//! # Ok::<(), areograph::line_times::LineTimesError>(())
+//! # Ok::<(), areograph_base::line_times::LineTimesError>(())
 //! ```
 
 use serde::{Deserialize, Serialize};

@@ -4,7 +4,7 @@
 //! constants and writers divide by them; nothing else does.
 //!
 //! ```
-//! use areograph::units::{METRES_PER_KM, RADIANS_PER_DEGREE, wrap_two_pi};
+//! use areograph_base::units::{METRES_PER_KM, RADIANS_PER_DEGREE, wrap_two_pi};
 //!
 //! // A label says 178.2° W; inside, longitudes are radians east.
 //! let longitude_rad = wrap_two_pi(-178.2 * RADIANS_PER_DEGREE);

@@ -3,7 +3,7 @@
 //! Texts are written for MOLA at Mars; [`Wording`] says them for the site. Numbers that programs read keep their hyphen.
 //!
 //! ```
-//! use areograph::{body::Body, wording::{Wording, with_minus}};
+//! use areograph_base::{body::Body, wording::{Wording, with_minus}};
 //!
 //! let lunar = Wording { body: Body::Moon, altimeter: "LOLA", has_tables: true };
 //! assert_eq!(lunar.of("tie points above the MOLA surface"), "tie points above the LOLA surface");

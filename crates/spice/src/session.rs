@@ -67,10 +67,10 @@ pub struct Attitude {
 /// ```
 /// use std::path::Path;
 ///
-/// use areograph::spice::{KernelSet, Session};
+/// use areograph_spice::{KernelSet, Session};
 ///
-/// # fn main() -> areograph::error::Result<()> {
-/// let kernels = KernelSet::from_metakernel(Path::new("kernels.example/example.tm"))?;
+/// # fn main() -> areograph_base::error::Result<()> {
+/// let kernels = KernelSet::from_metakernel(Path::new("../../kernels.example/example.tm"))?;
 /// let session = Session::open(&kernels)?;
 /// let start = session.sclk_to_et("619971158:28")?;
 /// assert_eq!(session.et_to_utc(start)?, "1999-08-24T14:12:13.635");

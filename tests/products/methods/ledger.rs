@@ -39,7 +39,7 @@ pub(crate) struct Ledger {
     pub(crate) rows: Vec<Row>,
 }
 
-const HEAD: &str = "# What every stage computes of fixed scenes, under which METHOD; tests/methods.rs writes and explains it.\n";
+const HEAD: &str = "# What every stage computes of fixed scenes, under which METHOD; tests/products/methods.rs writes and explains it.\n";
 const ARITHMETIC: &str = "# arithmetic: ";
 const COLUMNS: &str = "stage,declared,scene,method,inputs,output\n";
 

@@ -19,7 +19,7 @@
 //! learns from many noisy lines to fly slowly: a bias of errors in variables.
 //!
 //! ```
-//! use areograph::geom::{
+//! use areograph_geom::{
 //!     bundle::{BundleImage, BundleOptions, BundlePoint, Network, View, solve},
 //!     collinearity::project,
 //!     pushbroom::{Distortion, EulerPolynomial, Sighting, VectorPolynomial},

@@ -6,7 +6,7 @@
 //! detector at `q2/q3`.
 //!
 //! ```
-//! use areograph::geom::pushbroom::{Distortion, EulerPolynomial, ExteriorOrientation, Sighting, VectorPolynomial};
+//! use areograph_geom::pushbroom::{Distortion, EulerPolynomial, ExteriorOrientation, Sighting, VectorPolynomial};
 //! use nalgebra::Vector3;
 //!
 //! // A camera that flies north over the equator, 4.4 m per line, and looks straight down.
@@ -22,7 +22,7 @@
 //! let below_m = camera.pose(250.0).position_m - Vector3::new(380e3, 0.0, 0.0);
 //! let seen = Sighting::near(&camera, &Distortion::NONE, 0.0, &below_m, 1e-2)?;
 //! assert!((seen.solution.x - 250.0).abs() < 1e-6); // lines; the last step is below 1e-2
-//! # Ok::<(), areograph::geom::pushbroom::Unseen>(())
+//! # Ok::<(), areograph_geom::pushbroom::Unseen>(())
 //! ```
 
 mod corrected;

@@ -8,12 +8,10 @@
 //! Ordinary kriging: Cressie 1993, Statistics for spatial data, section 3.2.
 //!
 //! ```
-//! use areograph::{
-//!     body::Body,
-//!     geom::{
-//!         ellipsoid::on_ellipsoid_m,
-//!         surface::{LaserSurface, SurfaceOptions, SurfaceShot},
-//!     },
+//! use areograph_base::body::Body;
+//! use areograph_geom::{
+//!     ellipsoid::on_ellipsoid_m,
+//!     surface::{LaserSurface, SurfaceOptions, SurfaceShot},
 //! };
 //! use nalgebra::Vector3;
 //!
@@ -31,7 +29,7 @@
 //! assert!((beside.heights_m[0] - 50.0).abs() < 1e-6); // metres; a constant comes back
 //! // Beside the profile the ground may be anything like what it is along it.
 //! assert!((4.0..4.5).contains(&beside.sigma_m(0)));
-//! # Ok::<(), areograph::geom::surface::SurfaceError>(())
+//! # Ok::<(), areograph_geom::surface::SurfaceError>(())
 //! ```
 
 mod kriging;

@@ -134,7 +134,7 @@ pub trait Stage {
 /// Declares what a stage may see. The fields are its fingerprint, each by its [`Input`].
 ///
 /// ```
-/// use areograph::{stage::{Output, Stage}, stage_inputs};
+/// use areograph_store::{stage::{Output, Stage}, stage_inputs};
 ///
 /// stage_inputs! {
 ///     /// Multiplies what was counted.
@@ -149,9 +149,9 @@ pub trait Stage {
 /// impl Stage for Multiply<'_> {
 ///     const NAME: &'static str = "multiply";
 ///     type Output = u32;
-///     areograph::stage_inputs!(fingerprint);
+///     areograph_store::stage_inputs!(fingerprint);
 ///
-///     fn run(&self, _stop: &std::sync::atomic::AtomicBool) -> areograph::error::Result<u32> {
+///     fn run(&self, _stop: &std::sync::atomic::AtomicBool) -> areograph_base::error::Result<u32> {
 ///         Ok(self.counted.value()? * *self.factor)
 ///     }
 /// }
