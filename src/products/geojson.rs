@@ -13,7 +13,7 @@ use serde::{Serialize, Serializer, ser::SerializeMap as _};
 use serde_json::{Map, Value, json};
 
 use super::{
-    coordinates::{bounding_box_deg, frame},
+    coordinates::bounding_box_deg,
     error::ProductError,
     files::{create, finish, open, to_value},
     gis::Features,
@@ -268,13 +268,14 @@ fn write_lines(path: &Path, head: &str, features: &Features) -> Result<()> {
 
 fn head(features: &Features) -> std::result::Result<String, ProductError> {
     let bounds_deg = bounding_box_deg(&features.points_deg());
-    head_of(features.name, features.body, bounds_deg)
+    head_of(features.name, features.body, features.frame, bounds_deg)
 }
 
-/// The lines before the first feature of points on `body`.
+/// The lines before the first feature of points on `body`, whose coordinates are in `frame`.
 pub(super) fn head_of(
     name: &str,
     body: Body,
+    frame: &str,
     bounds_deg: Option<[f64; 4]>,
 ) -> std::result::Result<String, ProductError> {
     let crs = json!({ "type": "name", "properties": { "name": crs_urn(body) } });
@@ -282,7 +283,7 @@ pub(super) fn head_of(
         ("type", json!("FeatureCollection")),
         ("name", json!(name)),
         ("crs", crs),
-        ("frame", json!(frame(body))),
+        ("frame", json!(frame)),
     ];
     if let Some(bounds_deg) = bounds_deg {
         members.push(("bbox", to_value(&bounds_deg)?));

@@ -12,6 +12,7 @@ use arrow_schema::{DataType, FieldRef, SchemaRef};
 use rayon::prelude::*;
 
 use super::{
+    coordinates::frame,
     error::ProductError,
     geojson,
     geoparquet::point_of,
@@ -120,7 +121,10 @@ impl RowsWriter {
             }
             RowsFormat::GeoJson => {
                 let mut out = BufWriter::new(out);
-                put(&mut out, geojson::head_of("shots", Body::Mars, None)?)?;
+                put(
+                    &mut out,
+                    geojson::head_of("shots", Body::Mars, frame(Body::Mars), None)?,
+                )?;
                 Form::GeoJson(out)
             }
         };

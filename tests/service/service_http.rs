@@ -715,7 +715,7 @@ fn plans_and_shots_come_from_workers() {
     );
     // The run has no footprints to search.
     for (media, beginning) in [
-        ("application/geo+json", "{\"type\":\"FeatureCollection\""),
+        ("application/geo+json", "{\n\"type\": \"FeatureCollection\""),
         ("text/csv", ""),
         ("application/vnd.apache.parquet", "PAR1"),
     ] {

@@ -1,14 +1,17 @@
 //! What times and geometry need from text kernels, and how its absence is told.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, path::PathBuf, sync::LazyLock};
 
 use super::{
     error::SpiceError,
     kernels::{Kernel, KernelSet, read_text},
     role::KernelRole,
-    text_kernel::{self, values_of},
+    text_kernel::{self, Assignment, values_of},
 };
-use areograph_base::{constants::Spacecraft, instruments::Instrument};
+use areograph_base::{
+    constants::{SPACECRAFT, Spacecraft},
+    instruments::Instrument,
+};
 
 /// Something that one text kernel of a set must define.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -103,4 +106,36 @@ pub(super) fn explain(set: &KernelSet, error: SpiceError, needs: &[Need]) -> Spi
             set: set.kernels().iter().map(Kernel::file_name).collect(),
         },
     }
+}
+
+/// What time tagging and geometry need from text kernels, but for the frame of the camera.
+static NEEDS: LazyLock<[Need; 4]> = LazyLock::new(|| {
+    [
+        LEAP_SECONDS,
+        clock(&SPACECRAFT),
+        MARS,
+        bus_frame(&SPACECRAFT),
+    ]
+});
+
+/// Whether a text kernel gives a variable a value.
+pub(super) fn defines(assignments: &[Assignment], variable: &str) -> bool {
+    !values_of(assignments, variable).is_empty()
+}
+
+/// What all images need, and the frames of those cameras that `texts` know: one at least.
+pub(super) fn needs(texts: &[(PathBuf, Vec<Assignment>)], cameras: &[Instrument]) -> Vec<Need> {
+    let cameras: Vec<Need> = cameras.iter().map(camera_frame).collect();
+    let known = |need: &&Need| {
+        texts
+            .iter()
+            .any(|(_, assignments)| defines(assignments, &need.variable))
+    };
+    let known_cameras: Vec<Need> = cameras.iter().filter(known).cloned().collect();
+    let cameras = if known_cameras.is_empty() {
+        cameras.into_iter().take(1).collect()
+    } else {
+        known_cameras
+    };
+    NEEDS.iter().cloned().chain(cameras).collect()
 }

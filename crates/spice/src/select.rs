@@ -3,7 +3,6 @@
 use std::{
     fs,
     path::{Path, PathBuf},
-    sync::LazyLock,
 };
 
 use super::{
@@ -11,7 +10,7 @@ use super::{
     daf::{self, Segment},
     error::SpiceError,
     kernels::{KernelSet, read_text, role_of},
-    needs::{LEAP_SECONDS, MARS, Need, bus_frame, camera_frame, clock},
+    needs::{MARS, Need, defines, needs},
     role::KernelRole,
     session::Session,
     text_kernel::{self, Assignment, values_of},
@@ -30,15 +29,6 @@ use areograph_store::files::{InputFiles, file_name};
 const DEPTH_MAX: usize = 16;
 /// Most files that are looked into.
 const FILES_MAX: usize = 100_000;
-/// What time tagging and geometry need from text kernels, but for the frame of the camera.
-static NEEDS: LazyLock<[Need; 4]> = LazyLock::new(|| {
-    [
-        LEAP_SECONDS,
-        clock(&SPACECRAFT),
-        MARS,
-        bus_frame(&SPACECRAFT),
-    ]
-});
 /// Orbit solutions that mark their files by name; a file without a mark is `nav`.
 const MARKED_FAMILIES: [&str; 2] = ["gsfc", "ipng"];
 
@@ -173,27 +163,6 @@ fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
     }
     files.sort();
     Ok(files)
-}
-
-fn defines(assignments: &[Assignment], variable: &str) -> bool {
-    !values_of(assignments, variable).is_empty()
-}
-
-/// What all images need, and the frames of those cameras that `texts` know: one at least.
-fn needs(texts: &[(PathBuf, Vec<Assignment>)], cameras: &[Instrument]) -> Vec<Need> {
-    let cameras: Vec<Need> = cameras.iter().map(camera_frame).collect();
-    let known = |need: &&Need| {
-        texts
-            .iter()
-            .any(|(_, assignments)| defines(assignments, &need.variable))
-    };
-    let known_cameras: Vec<Need> = cameras.iter().filter(known).cloned().collect();
-    let cameras = if known_cameras.is_empty() {
-        cameras.into_iter().take(1).collect()
-    } else {
-        known_cameras
-    };
-    NEEDS.iter().cloned().chain(cameras).collect()
 }
 
 /// For each need the pinned kernel that defines it, or the latest one.
