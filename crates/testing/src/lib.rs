@@ -11,6 +11,7 @@
     clippy::missing_panics_doc,
     clippy::must_use_candidate,
     clippy::return_self_not_must_use,
+    clippy::should_implement_trait,
     reason = "helpers of tests may fail loudly"
 )]
 
