@@ -26,7 +26,7 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Sentences and checks are two accounts of the same evidence: what either finds is told.
+    /// Sentences and checks are two accounts of the same evidence: what either finds is reported.
     #[must_use]
     pub fn of(mut reasons: Vec<String>, mut remarks: Vec<String>, mut checks: Vec<Check>) -> Self {
         let failed = in_words(&checks, CheckOutcome::Fail);
