@@ -108,7 +108,7 @@ impl Walk {
     }
 
     /// Runs into an empty folder, hands it to `compared` and removes it.
-    fn from_nothing<T>(
+    fn clean_from_nothing<T>(
         &mut self,
         until: &str,
         compared: impl FnOnce(&Self, &str, Result<Vec<StageReason>, String>) -> T,
@@ -150,7 +150,7 @@ impl Walk {
                 Ok(ran)
             }
             Err(again) => {
-                self.from_nothing(until, |walk, clean, first| {
+                self.clean_from_nothing(until, |walk, clean, first| {
                     let first = first.map_err(|first| first.replace(clean, "out"));
                     assert_eq!(Some(&again), first.as_ref().err(), "{what}");
                     assert_same(what, &before, &products(&walk.case.path("out")));
@@ -163,7 +163,7 @@ impl Walk {
     /// A run from nothing gives the outputs of stages that are there, and where it goes so far the products.
     fn compare_with_clean(&mut self, what: &str, until: &str) {
         let is_whole = until == PUBLISH;
-        self.from_nothing(until, |walk, clean, first| {
+        self.clean_from_nothing(until, |walk, clean, first| {
             let first = first.unwrap_or_else(|failure| panic!("{what}: from nothing {failure}"));
             let stages = first.iter().map(|of| &*of.stage);
             for stage in stages.filter(|stage| *stage != PUBLISH) {
