@@ -118,9 +118,6 @@ fn committed() -> Ledger {
 
 #[test]
 fn every_stage_computes_what_the_ledger_says() {
-    if !crate::common::long_test("every_stage_computes_what_the_ledger_says") {
-        return;
-    }
     let ledger = committed();
     if ledger.arithmetic != arithmetic::fingerprint() {
         let why = format!("{LEDGER} was made with another arithmetic (library or processor)");
@@ -168,9 +165,6 @@ fn every_stage_computes_what_the_ledger_says() {
 /// By the sources alone, and so also for what takes long and on every machine.
 #[test]
 fn every_method_of_the_sources_has_a_row() {
-    if !crate::common::long_test("every_method_of_the_sources_has_a_row") {
-        return;
-    }
     if is_on("SNAPSHOTS", "overwrite") {
         // The ledger is being written.
         return;
@@ -209,9 +203,6 @@ fn every_method_of_the_sources_has_a_row() {
 /// Hashes are of what was computed, not of where and when; the longest of the short scenes is run twice where time does not matter.
 #[test]
 fn folder_and_time_do_not_enter() {
-    if !crate::common::long_test("folder_and_time_do_not_enter") {
-        return;
-    }
     let declared = sources::declared();
     let runs = RUNS.len() - usize::from(!is_on("AREOGRAPH_LONG", "1"));
     for run in &RUNS[..runs] {
@@ -258,9 +249,6 @@ fn calls_function_of(text: &str, name: &str) -> bool {
 /// What calls functions of a stage lists that stage, whose method then is an input.
 #[test]
 fn what_calls_functions_of_stages_lists_them() {
-    if !crate::common::long_test("what_calls_functions_of_stages_lists_them") {
-        return;
-    }
     let (sources, declared) = (Sources::of_the_program(), sources::declared());
     let by_room = |room: &[String]| {
         let of_room = declared.iter().filter(|of| of.room() == room);
@@ -347,9 +335,6 @@ fn inputs_that_are_methods(run: &Run, declared: &[Declared]) -> usize {
 /// The calibration from pixels, which calls most, runs with the long scenes.
 #[test]
 fn methods_that_are_called_are_inputs() {
-    if !crate::common::long_test("methods_that_are_called_are_inputs") {
-        return;
-    }
     let declared = sources::declared();
     let counts = RUNS
         .iter()

@@ -5,7 +5,7 @@
 //! |---|---|
 //! | a PEDR file | [`pedr::File`] |
 //! | an archive of them, by windows | [`archive`] |
-//! | the label of an image | [`read_label`] |
+//! | the label of an image | [`read_label()`] |
 //! | the pixels of a MOC image; of any image | [`image_file::ImageFile`]; [`pixel_file::PixelFile`] |
 //! | image support data (ISD) | [`isd`] |
 //! | tables of shots, tie points, control points | [`shot_table`], [`ties`], [`calibration_tables`] |
@@ -18,15 +18,16 @@
 //! let name = Path::new("../../tests/pedr_table/AP00002L.B");
 //! let file = File::from_bytes(fs::read(name).unwrap(), name);
 //! let guard = FieldGuard::new(file.label().software_version);
-//! let frames = file.frames(file.rows(), guard);
-//! let shots: usize = frames
-//!     .filter_map(|(_, frame)| frame.ok())
-//!     .map(|frame| (1..=20).filter_map(|shot| frame.shot(shot)).count())
-//!     .sum();
-//! assert!(shots > 0);
+//! // The records of this invented file contradict themselves: each is refused with its reason, none is lost in silence.
+//! for (row, frame) in file.frames(file.rows(), guard) {
+//!     let error = frame.unwrap_err();
+//!     let complaint = file.record_complaint(row, &error).to_string();
+//!     assert!(complaint.starts_with("AP00002L.B record 1"));
+//!     assert!(complaint.contains("expected"));
+//! }
 //! ```
 //!
-//! `examples/shots.rs` prints the shots of a file, `examples/decode.rs` decodes an image.
+//! A sound frame has up to 20 shots: `examples/shots.rs` prints those of a file, `examples/decode.rs` decodes an image.
 
 pub mod archive;
 pub mod calibration_tables;

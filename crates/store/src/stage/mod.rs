@@ -1,6 +1,6 @@
 //! What a stage is: a name, everything that it may see, and a function of that.
 //!
-//! [`stage_inputs!`](areograph_store::stage_inputs) declares the struct of what a stage sees. Its fields are its fingerprint:
+//! [`stage_inputs!`](crate::stage_inputs) declares the struct of what a stage sees. Its fields are its fingerprint:
 //! what is no field cannot be used, and what is a field cannot be forgotten.
 
 mod inputs;
@@ -90,7 +90,7 @@ pub trait Stage {
     /// What it makes; stored, and handed to later stages.
     type Output: Serialize + DeserializeOwned;
 
-    /// Everything that the stage sees, by name; made by [`stage_inputs!`](areograph_store::stage_inputs).
+    /// Everything that the stage sees, by name; made by [`stage_inputs!`](crate::stage_inputs).
     fn inputs(&self) -> Inputs;
 
     /// What the stage is run for when it is run several times in a site: an image, or the second round.
