@@ -3,6 +3,8 @@
 //!
 //! [`flow::run_site`] runs a site; `flow/site.rs` shows how, read top to bottom; `ARCHITECTURE.md` is the map. What
 //! lies below the stages are crates of their own, under their names here.
+//!
+//! The root names these crates by their rooms: `crate::geom` is `areograph_geom`.
 
 pub mod cli;
 pub mod difference;

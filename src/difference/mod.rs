@@ -3,6 +3,9 @@
 //! `A` is the earlier run and `B` the later one, by the order in which they are named; a movement is
 //! `B − A`. What is in both is compared by identity: shots by file, orbit, record and shot number,
 //! samples of an image by their line, profiles, images, kernels, stages and products by name.
+//!
+//! Products are compared, not the cache: the result holds for the files in use, also for products from elsewhere. The
+//! manifest therefore repeats the keys of the configuration.
 
 mod answer;
 mod changes;

@@ -5,6 +5,15 @@
 //!                                    one thread, with CSPICE      all threads
 //!  results in order of time, every shot once ─► shots of the worst profiles ─► verdict ─► products, manifest last
 //! ```
+//!
+//! Two loads, a wave of tasks and one or two profiles are in memory, whatever the size of the archive. One thread reads
+//! a load of records and tabulates the trajectory over it, the only part that asks CSPICE; meanwhile all threads check
+//! the load before it.
+//!
+//! The result of a file is stored with the identity of the file, the hashes of the kernels and the rules, once the
+//! kernels are confirmed unchanged. The BLAKE3 of a file is computed from the checked bytes. `archive/gather.rs` counts
+//! every shot once: copies are recognised by hash, and files whose profiles overlap in time are a failure. Products,
+//! journal and manifest are those of a net.
 
 mod checker;
 mod gather;

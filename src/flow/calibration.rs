@@ -1,4 +1,7 @@
 //! A calibration of the lines of a camera, from support data and tables to its products.
+//!
+//! `flow/single.rs` contains what this flow shares with that of a net; `flow/calibration_loop.rs` is the calibration
+//! from pixels.
 
 use std::path::Path;
 

@@ -1,6 +1,12 @@
 //! A calibration from pixels, round by round: tie points, a consistent camera, a terrain model, laser control, the calibrated camera,
 //! with which the next round begins.
 //!
+//! A round calls plain functions of four stages: `match_ties::match_lines`, `calibrate` by ties alone,
+//! `map_surface::map_lines`, `match_laser::match_model`, and `calibrate` by ties and control. It hands calibrated
+//! support data to the next round, as a user would. Every calibration by control begins at the given support data, so
+//! that no error accumulates. Ground is withheld in rectangles of a lattice that no model moves, so that a shot is on
+//! one side in all rounds.
+//!
 //! # Source
 //! Li et al. 2023, figure 4. The paper ends "until accuracy converges"; when that is, `Rounds::is_converged` says.
 

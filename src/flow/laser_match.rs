@@ -1,4 +1,7 @@
 //! Laser profiles matched with a terrain model, from files to products.
+//!
+//! This flow has one stage, `stages/match_laser`. `pds/terrain_model` reads a `GeoTIFF` into a grid
+//! (`geom/height_grid`, at most 134 million cells).
 
 use std::{collections::BTreeMap, path::Path};
 

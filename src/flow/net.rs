@@ -1,4 +1,8 @@
 //! A net from its tables to its products.
+//!
+//! A net of pictures is not a site: it has no images with times, no kernels and no `[plane]` table in a site file. One
+//! stage leads from its tables to the result. Declarations, store and journal are those of a site; since its folder has
+//! a manifest like that of a site, the page over all sites and the checks of published products apply to it too.
 
 use std::path::Path;
 

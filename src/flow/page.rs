@@ -1,4 +1,7 @@
 //! The page of a published site, made again from its products.
+//!
+//! The content of the page is a product of its own, unrounded (`products/page_data.rs`), and the page follows from it
+//! alone (decision 0023). New content of `SiteProducts` for a page belongs there too.
 
 use std::path::{Path, PathBuf};
 

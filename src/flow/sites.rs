@@ -1,4 +1,6 @@
 //! The page over all sites of an output folder, made again after every run.
+//!
+//! `fidelity.html` beside it is `docs/fidelity.html`, which the program contains.
 
 use std::{
     collections::BTreeMap,

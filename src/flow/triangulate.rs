@@ -1,4 +1,6 @@
 //! What tie points make of a site: those of files, those that are matched, their ground points, and the adjustment.
+//!
+//! A site whose adjustment fails publishes all earlier products, marked invalid.
 
 use super::{
     driver::{Driver, Flow},

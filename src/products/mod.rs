@@ -4,6 +4,16 @@
 //! files, the manifest's entries, the STAC item, `exchange/README.txt` and `docs/products.md` follow from it.
 //!
 //! The same site gives the same bytes; nothing here looks at a clock.
+//!
+//! A `Declaration` has the path, the content, the readers, the sites it applies to, its columns or schema, the function
+//! that writes it, and the commands that read it. A table is a list of `column(name, unit, meaning, value of a row)`
+//! (`table.rs`): Parquet, CSV and their sidecars, `GeoJSON`, `GeoPackage`, dBASE and the PDS4 label take the column
+//! from there, a piece of the rows at a time, and read it back the same way. `.in_gis()` and `.in_dbase(…)` select the
+//! columns of those formats. JSON documents are types: the document and its schema in `config/schema` come from one
+//! `struct` (`schema.rs`). `tests/products/generated.rs` fails when `docs/products.md` is stale.
+//!
+//! The same input gives the same bytes, whatever the number of threads; `finished_utc` in the manifest is the
+//! exception. Formats that hold a date (`GeoPackage`, dBASE) carry that of the newest shot.
 
 mod adjusted_footprints;
 mod adjusted_kernels;

@@ -1,4 +1,6 @@
 //! Footprints of one orbit inside one window become a profile, marked where an image was taken with it.
+//!
+//! This is a stage of its own, because profiles need footprints and image times, and two stages need profiles.
 
 use std::sync::atomic::AtomicBool;
 

@@ -1,4 +1,7 @@
 //! The verdict on a site: the one place where it is made.
+//!
+//! Reasons, remarks and `checks` come from the same evidence and limits; of every limit the largest use is listed. The
+//! manifest holds them, and pages, messages and differences of runs show them; none of these judges by itself.
 
 mod adjustment;
 mod checks;

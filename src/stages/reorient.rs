@@ -1,4 +1,8 @@
 //! An orientation after a correction: samples and camera tables moved together, and the lines' times with them.
+//!
+//! From these and the original kernels, `stages/tabulate_kernels` computes the states and attitudes of an SPK and a CK
+//! per image. Loaded last, they give the same orientation through the same pipeline; the flow reads them back before
+//! they get their final names.
 
 use std::sync::atomic::AtomicBool;
 

@@ -1,5 +1,10 @@
 //! The bodies whose ground is seen: rotation, shape and names, as their files under `config/bodies` say.
 //!
+//! Frame, ellipsoid, maps, names and numbers of products are those of the body of the site. Footprints, image times and
+//! orientations carry it through the stages; `Body::Mars` is written where something belongs to Mars Global Surveyor.
+//! Mars is in IAU 2000 of our own constants, not of whichever PCK is loaded (one that differs is noted); the Moon turns
+//! as its support data state, which its formula checks.
+//!
 //! ```
 //! use areograph_base::body::Body;
 //!

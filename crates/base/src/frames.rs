@@ -3,6 +3,10 @@
 //! Types do not see time, so a [`Rotation`] carries the instant at which it holds, and two rotations
 //! of different instants do not combine.
 //!
+//! `Position<F>` and `Rotation<A, B>` carry their frames, and `Footprints<D>` their datum: only `convert_datum` turns
+//! `AsRead` into `BodyFixed`, so that a second conversion does not compile. The body of a `BodyFixed` place is data
+//! beside it (decision 0024). Stage outputs keep these types; plain numbers begin where a file is written.
+//!
 //! ```
 //! use areograph_base::{
 //!     body::Body,

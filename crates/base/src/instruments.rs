@@ -1,4 +1,15 @@
 //! Instruments as data: what a camera or an altimeter is, as its file under `config/` says.
+//!
+//! `config/instruments` holds cameras, the pointing bias included; an image carries its camera through all stages
+//! (`ImageTimes::instrument`). `config/altimeters` has the clock of the altimeter, `config/spacecraft` the identifiers
+//! of spacecraft: that of the laser (`constants::SPACECRAFT`), and others that carry cameras. An instrument names its
+//! spacecraft, and a stage asks `Session::of` it for clock, orbit and attitude of an image; shots belong to that of the
+//! laser.
+//!
+//! In code, only readers of labels and files, the synthetic mission and examples of keys name any of them: a test reads
+//! the sources. The look direction of a sample is `geom::pushbroom::Detector`: a straight line in an ideal focal plane,
+//! or a curve (`Distortion`), which ground to image, intersection and adjustment use through the tangents of look
+//! directions.
 
 use std::fmt;
 

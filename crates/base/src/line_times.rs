@@ -6,6 +6,9 @@
 //! the number of lines; where the exposure changes inside an image it is not, but positions and attitudes are as
 //! smooth over it as they are over time.
 //!
+//! A file whose rows have times (`ImageLabel::lines`) gives the pieces itself. Only `OrientedCamera` and `register`
+//! convert a line coordinate into an offset and back.
+//!
 //! ```
 //! use areograph_base::{line_times::LineTimes, time::Et};
 //!

@@ -2,6 +2,9 @@
 //!
 //! Every instant is ephemeris time (TDB seconds past J2000). UTC and spacecraft clock strings exist
 //! only in labels, configuration and reports; `spice::Session` converts them.
+//!
+//! Only `PointingBias::lookup` makes a `CkLookup`, and only `Session::attitude` takes one, so that the −1.15 s of MOC
+//! moves attitude alone, once.
 
 use std::fmt;
 

@@ -3,6 +3,9 @@
 //! Inside areograph lengths are metres, angles radians and times seconds. Parsers multiply by these
 //! constants and writers divide by them; nothing else does.
 //!
+//! Kilometres exist in `spice`, in camera models and exchange files, degrees in configuration, tables and the report,
+//! milliseconds in labels. A key or column ends in its unit.
+//!
 //! ```
 //! use areograph_base::units::{METRES_PER_KM, RADIANS_PER_DEGREE, wrap_two_pi};
 //!

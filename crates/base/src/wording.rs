@@ -2,6 +2,9 @@
 //!
 //! Texts are written for MOLA at Mars; [`Wording`] says them for the site. Numbers that programs read keep their hyphen.
 //!
+//! `judge` adapts reasons, remarks and checks, `Table::in_words` the descriptions of columns, and the page its
+//! sections. Text from a user or a file stays as it is.
+//!
 //! ```
 //! use areograph_base::{body::Body, wording::{Wording, with_minus}};
 //!

@@ -5,6 +5,8 @@
 //! Each table has a file here, in which its keys are declared; `config/sites/example.toml`, which
 //! documents every key, and `config/schema/site.schema.json` are made from the declarations.
 //!
+//! The crate uses the vocabulary of `base` and `geom` alone.
+//!
 //! ```
 //! use std::path::Path;
 //!

@@ -10,6 +10,10 @@
 //! | say which shots lie in a window | [`window`] |
 //! | match patches of pixels | [`imaging`] |
 //!
+//! It also has attitude, polynomials, Chebyshev pieces, interpolation, statistics, random numbers, heights on a grid,
+//! the ground between shots, and the uncertainty budget. `imaging` covers texture, correlation and least-squares
+//! matching.
+//!
 //! ```
 //! use areograph_geom::ellipsoid::{Spherical, spherical_to_xyz_m};
 //!

@@ -6,6 +6,10 @@
 //!
 //! The service does not know the pipeline: worker processes speak with it in lines of JSON ([`worker::protocol`]).
 //!
+//! `engine` finds changes, affected sites, jobs, nights and what is kept; `database` is its memory; `worker` sees
+//! worker processes from outside; `http` has pages and interface. Only this crate uses axum, the network of tokio, and
+//! SQLite for the service.
+//!
 //! ```
 //! use areograph_service::worker::protocol::{Line, PROTOCOL};
 //!

@@ -1,6 +1,9 @@
 //! Segments of binary kernels, checked before CSPICE sees the file: it believes what a file says of itself, and reads
 //! beyond its arrays where a count is wrong.
 //!
+//! It checks only that the segments are as long, ordered and finite as they state, and is no reader of kernels: CSPICE
+//! is the reference.
+//!
 //! Source: NAIF, DAF Required Reading: file record, summary records, addresses of 8-byte words.
 
 mod contents;

@@ -11,6 +11,8 @@
 //!
 //! Kilometres become metres here, and nowhere else.
 //!
+//! No other crate links CSPICE.
+//!
 //! ```
 //! use std::path::PathBuf;
 //!

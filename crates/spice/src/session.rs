@@ -1,4 +1,10 @@
 //! A session with CSPICE: times, states and attitudes from one set of kernels.
+//!
+//! CSPICE keeps global state. A session holds the process-wide lock, furnishes one kernel set, turns errors into
+//! `SpiceError` with the short and long text of NAIF, and unloads on drop. All of its `unsafe` code is in `ffi.rs`. No
+//! writer of products opens one: a stage tabulates the content of kernels, and `write` puts it into a file with the
+//! writers of CSPICE, which need no loaded kernel. Parallel work uses the trajectory (Chebyshev pieces with a measured
+//! error) and the closed formula of the rotation of Mars, neither of which needs a session.
 
 use std::{cell::OnceCell, ffi::CString, rc::Rc};
 

@@ -2,6 +2,8 @@
 //! blocks of records that an index, or the records' mid-points, say may have them.
 //!
 //! The program hands in the [`Columns`] of its products; nothing else of it is known here.
+//!
+//! The crate is built with the feature `sql` alone (decision 0022).
 
 mod conditions;
 mod question;

@@ -1,4 +1,7 @@
 //! Files appear under their final name whole or not at all.
+//!
+//! Files are written under another name, read back, flushed and renamed. Half-written files of a killed run are removed
+//! under the lock of the next.
 
 use std::{fs::File, io::Write as _, path::Path};
 

@@ -1,4 +1,7 @@
 //! Stage outputs on disk, each with the inputs it was made from.
+//!
+//! Outputs are in `<site>/.cache` (postcard) and are not read back from products: products serve external tools and
+//! round where their formats do.
 
 use std::{
     collections::BTreeSet,

@@ -2,6 +2,11 @@
 //!
 //! What is kept saves time and nothing else. A file of hashes that is damaged, foreign or cannot be written is as good as
 //! none.
+//!
+//! Kernels, labels, PEDR and tie point files are hashed once in a run (`files.rs`), and again in later runs only when
+//! the file system reports a change; `--rehash` reads all of them. Their identity (device, inode, size, times) is
+//! compared after each stage that read them and before publishing. A changed file ends the run, and everything made
+//! from it is discarded.
 
 use std::{
     ffi::OsString,

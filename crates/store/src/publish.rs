@@ -3,6 +3,8 @@
 //! Renaming many files is not one step for the file system, so a journal says that it has begun and
 //! which files may be concerned. While it lasts there is no manifest: a reader without a manifest has
 //! no products. Whoever finds a journal finishes the work by publishing again.
+//!
+//! The manifest comes last, and the next run checks every product against it.
 
 use std::{
     collections::BTreeSet,

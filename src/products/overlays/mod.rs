@@ -1,4 +1,7 @@
 //! Images with footprints on them: pictures for people, and the marks as points for programs.
+//!
+//! Marks are drawn into a palette of greys and colours, and the report embeds the same pictures. Bounds on pixels and
+//! places keep `report/overlays.html` below 5 MB.
 
 mod canvas;
 mod marks;

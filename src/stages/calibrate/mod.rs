@@ -1,4 +1,8 @@
 //! Calibration of the lines of a camera: ties alone, then with laser control, judged by control that was held back.
+//!
+//! This stage knows support data, names and withheld points. The axes across, along and down are those of the
+//! spacecraft that are nearest to them in the first image. Calibrated support data are the given ones with a straight
+//! line of equal samples (`pds/isd/rewrite`), and the remaining difference is stated.
 
 mod demands;
 mod elsewhere;

@@ -1,5 +1,8 @@
 //! The range check of shots of tables, whose spacecraft no kernels have: measured range against the table's own spacecraft,
 //! and against that of images with its laser, where one was exposed meanwhile.
+//!
+//! `ImageTimes::has_laser` marks such images. No other stage after `search_footprints` distinguishes tables from PEDR
+//! files.
 
 use std::sync::atomic::AtomicBool;
 

@@ -3,6 +3,9 @@
 //!
 //! Pieces of all images have the same ground in the same place: north up, one scale. They are cut around where an orientation
 //! sees a point, so that two images agree where the orientation is right.
+//!
+//! Each file of pixels is read once, strip by strip, for a quick look of bounded size and for the parts that pieces
+//! need. Overlaid pieces show the quality of an orientation.
 
 mod chips;
 mod pixels;

@@ -4,6 +4,12 @@
 //! Since each cell is looked at straight below and above its place, what is compared follows the epipolar curves of any camera.
 //! Heights are searched by correlation, then settled by least squares with either image as the template; a height that does not
 //! correlate, differs in the two directions or is contradicted by those around it is a hole. The altimeter judges the result.
+//!
+//! Both images are resampled at every halving of the cells, so that the epipolar curves of the camera need not be
+//! known; their difference is height along the parallax, and orientation across it. A thread holds tiles of at most 240
+//! samples and the margin of the comparison; cells are held whole, at most 2²⁴. Every tile sees the whole result of the
+//! step before, so that there are no seams and the number of threads changes no byte. Standard deviations are those of
+//! the matching; the common part of all heights is stated apart, by the adjustment.
 
 mod common;
 mod compare;

@@ -1,6 +1,21 @@
 //! Laser profiles against a terrain model: units of shots with relief, each searched for where the model has its heights, judged by
 //! shots that were held out; a control point of every unit that is kept.
 //!
+//! | file | content |
+//! |---|---|
+//! | `shots` | shots over the model, each once; tracks, segments, relief |
+//! | `clusters` | k-means with seeds of its own, sums in the order of the points |
+//! | `search` | similarity of all shifts by whole cells; the weights of each shot are computed once |
+//! | `settle` | the place between cells by a quadratic and least squares |
+//! | `units` | the result of the withheld shots |
+//! | `scatter` | scatter of units about a plane, which widens standard deviations |
+//! | `judge` | the verdict |
+//! | `images` | lines and samples in the images |
+//! | `surface` | similarities for the page: a byte per shift, at most 141 by 141; rounds of a calibration compute none |
+//!
+//! The bias found by correlation selects the measure. Disagreement reveals shifts by chance: units far from the median
+//! of all are rejected, and where fewer than half agree, all of it is.
+//!
 //! # Source
 //! Li et al. 2023, section 3.2: segments, relief filter, clusters, similarity (eq. 16–18). What the paper leaves open, and where we
 //! depart from it, stands at the constants.

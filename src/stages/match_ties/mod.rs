@@ -5,6 +5,10 @@
 //! what they are stated to be uncertain by, which is long along the epipolar curve where the height is uncertain. Correlation
 //! goes from coarse to fine, least squares ends it, and the same is done from the other image. What is ambiguous, flat or
 //! different in the two directions is counted and left out; blunders are left to the adjustment.
+//!
+//! Tie points belong to one pass: places, margins and standard deviations follow from one orientation. The second pass
+//! sees only the adjusted orientation of the first and matches all cells anew. The pixels of an image are in a
+//! temporary file with their halvings (`pds/pixel_file/pyramid`), so that memory does not grow with the image.
 
 mod cells;
 mod lines;

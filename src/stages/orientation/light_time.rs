@@ -1,5 +1,8 @@
 //! The one place where light time enters: which position of the spacecraft and which rotation of Mars belong to an
 //! exposure, so that rays from there to the ground are straight.
+//!
+//! `[orientation] light_time` selects the position and the rotation. All cameras behind this module see along straight
+//! rays, in every stage and product; ranges are geometric.
 
 use nalgebra::Vector3;
 use schemars::JsonSchema;

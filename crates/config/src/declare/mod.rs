@@ -14,6 +14,10 @@
 //! messages, `config/sites/example.toml`, `config/schema/site.schema.json` and [`keys`](super::keys).
 //! Reading and describing are the same text: [`Table::read`] declares key after key to [`Keys`], which
 //! takes each from the file, or where there is no file notes what was declared.
+//!
+//! The field of the valid configuration, the reading of a file with its messages, `example.toml`, `site.schema.json`
+//! and `config::keys()` follow from the declaration. A former name is accepted with a warning and changes no
+//! fingerprint.
 
 mod described;
 mod example;

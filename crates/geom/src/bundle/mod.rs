@@ -10,6 +10,15 @@
 //! A view is compared with where the unknowns project its point: the line that sees it, and the place in
 //! that line. Lines count as focal-plane pixels, as many as they are initially.
 //!
+//! This module uses indices and numbers; `stages/adjust` adds identifiers and statistics. Corrections apply to an
+//! orientation of any form, so that the sampled orientation itself can be adjusted. Unknowns with a standard deviation
+//! of 0 have no column.
+//!
+//! An orthogonal transformation of its rows eliminates the coordinates of each point (`reduce`). Points with the same
+//! images are summed as one small dense matrix, in groups of fixed size, so that the number of threads does not change
+//! the sums. The reduced equations are kept in blocks of images that share points (`block_equations`), so that memory
+//! grows with the number of images. `quasi_newton` supplies the curvature that Gauss–Newton omits.
+//!
 //! # Source
 //! Yoon & Shan 2004. They adjust the coefficients of ω, φ and κ, which near the equator cannot be
 //! separated; here a rotation about the camera's own axes is added to them. They state one standard deviation

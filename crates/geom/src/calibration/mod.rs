@@ -8,6 +8,10 @@
 //!
 //! Ground points are eliminated one by one by reflections of their rows, so that what the points cannot see stays to be seen:
 //! normal equations lose it in their rounding.
+//!
+//! Free parameters are a matrix of combinations in units of their a priori standard deviations (`freedom`). Ties alone
+//! can therefore free the two differences that they determine and no others (decision 0025). Of the orbit, the drift is
+//! unknown together with the camera; offsets absorb the constant part of its error.
 
 mod camera;
 mod elimination;

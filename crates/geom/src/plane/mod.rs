@@ -13,6 +13,12 @@
 //! | SCALE | [`scale`]: one figure on all controls, its shape kept |
 //! | LOCAL | [`local`]: the pictures of each brick on the means of its seams |
 //!
+//! The images of every point become orthonormal contrasts, which have the rank that the symmetric equations of the
+//! paper lack. Pictures are eliminated in the order of least degree (`eliminate`): there are no normal equations, and
+//! the triangular factor gives the covariances of neighbours by the recursion of Takahashi (`inverse`), which libraries
+//! of sparse decompositions do not expose. Blunders are detected within bricks, since a single adjustment spreads them.
+//! The standard deviations of points are those of the one adjustment, regardless of how the block was georeferenced.
+//!
 //! # Source
 //! Arthur & McMacken 1977; equations by their numbers there.
 

@@ -2,6 +2,9 @@
 //!
 //! This is the only place that knows when two shots of different files are one. Within a file, its chronology
 //! (`pedr/chronology.rs`) withholds records that repeat others.
+//!
+//! Two files with the same shots are refused unless one is a copy of the other; `pedr search` marks rows out of order.
+//! Within a file, the longest chain of frames without a shot in common is kept.
 
 #[cfg(test)]
 mod cases;

@@ -3,6 +3,12 @@
 //!
 //! An image is read strip by strip; what is damaged or lost is marked by line, with a complaint that names fragment and byte.
 //! Memory is bounded by a strip, whatever a file says of itself.
+//!
+//! Fragments are found first, without decoding (`fragment.rs`), and form one stream of which a window is in memory
+//! (`stream.rs`). A header is trusted only as far as its data reach. In a damaged predictive image a first pass finds
+//! where lines are missing (`placed.rs`); lines that cannot be placed are marked. The tables of the coders are text
+//! files beside the code. Rows of HRSC (`hrsc`: label, prefixes, line times), cubes, TIFF and PNG pass through the same
+//! strips (`pixel_file`), at most 16 million numbers at a time.
 
 mod bits;
 mod codes;

@@ -4,6 +4,11 @@
 //! Numbers mean what usgscsm makes of them. The first line and the first sample have their centres at 0.5; a row
 //! `[line, time, period]` of `line_scan_rate` holds from that line coordinate on, and there
 //! `t = centre + time + period · (coordinate − line + 0.5)`.
+//!
+//! Support data replace label and kernels of an image, and no later stage distinguishes them. They become the camera
+//! (turned about its boresight until the line lies along Y), line times and tables. `ImageTimes::support` carries
+//! these, and `sample_orientation` puts them on the uniform grid of `CameraTables`, as usgscsm does. Nothing is applied
+//! to them (`LightTime::Support`), and no SPICE kernels follow from them.
 
 mod camera;
 mod document;

@@ -1,4 +1,8 @@
 //! The records of a file judged: by themselves, by the file's chronology, by their neighbours.
+//!
+//! A record is judged here and nowhere else: by itself (`check`), by the chronology of the file, and by its neighbours;
+//! `spoiled_shots` marks single shots of a good frame. A bad record is a complaint with file and record, counted in the
+//! manifest, and good records are kept. `docs/records.md` has the bounds, and the errors that they cannot detect.
 
 use std::ops::Range;
 

@@ -2,6 +2,19 @@
 //!
 //! [`Engine::turn`] does all that is due at an instant and leaves what takes long to tasks; [`Engine::run`] takes one turn
 //! after the other.
+//!
+//! `turn.rs` takes one turn after the other and begins what is due. Each file is one step of this picture:
+//!
+//! ```text
+//!  round: list folders ─► sweep: changed files ─► settle: quiet, read, opened by CSPICE ─► sites affected
+//!                                                                                              │
+//!  retention ◄─ diffs ◄─ runs: checked, current, noted ◄─ ending ◄─ attempt ◄─ job ◄─ plans: what would run, and why
+//! ```
+//!
+//! A night is a round at an instant of the schedule; it ends when its jobs end. `adopt.rs` reconciles the database with
+//! the disk at every start. Time and random numbers come from `clock.rs` and `random.rs`, and workers from the trait in
+//! `workers.rs`, so that tests substitute all three. Alerts fire on state changes (`alerts.rs`) and are queued for
+//! hooks.
 
 pub mod adopt;
 mod agenda;

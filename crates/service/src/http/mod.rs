@@ -1,4 +1,18 @@
 //! The service over HTTP: an interface for programs, pages for people, figures for monitors.
+//!
+//! Handlers read the tables of the database (`database/shown`) and ask the engine by rows and a wake-up. Workers start
+//! only for plans and searches of shots. A request passes, from the outside:
+//!
+//! | layer | task |
+//! |---|---|
+//! | `accept` | connections, times, sizes |
+//! | `frame` | identifier, headers, the form of a refusal |
+//! | `guard` | host, no token in the address, identity of the caller, rate |
+//! | forged forms | refused |
+//! | handler | a document, or a `Problem` |
+//!
+//! `Hidden` removes the folders of the machine from every answer. Files are opened below the folder where they belong,
+//! by names that a manifest holds (`files`). `docs/http.md` describes the use.
 
 mod accept;
 mod api;

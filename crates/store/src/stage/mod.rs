@@ -2,6 +2,16 @@
 //!
 //! [`stage_inputs!`](crate::stage_inputs) declares the struct of what a stage sees. Its fields are its fingerprint:
 //! what is no field cannot be used, and what is a field cannot be forgotten.
+//!
+//! A rerun names the field that changed. Of the kernels a stage sees a `KernelView`: what does not enter its
+//! fingerprint is not loaded. A stage calls no other stage, prints nothing and does not know the files of another
+//! stage; long ones count their steps (`base/watch`).
+//!
+//! Outputs enter fingerprints by content: an early stage that gives the same bytes again ends the chain of reruns. A
+//! change of the computation raises the `METHOD` of the stage. `docs/methods.csv` holds the output of every stage for
+//! fixed scenes with its number, and `tests/products/methods.rs` fails on another output under the same number. The
+//! numbers of the functions of other stages that a caller lists in `CALLS` are among its inputs. Products repeat the
+//! fingerprint of every stage, so they are made again when any of them changes.
 
 mod inputs;
 mod output;
