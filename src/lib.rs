@@ -16,7 +16,7 @@ pub mod worker;
 
 pub use areograph_base::{
     altimetry, body, constants, error, footprints, frames, image, instruments, kernel_source,
-    line_times, schema, ties, time, units, verdict, watch, wording,
+    line_times, schema, stored, ties, time, units, verdict, watch, wording,
 };
 pub use areograph_config as config;
 pub use areograph_geom::{self as geom, imaging};

@@ -44,6 +44,7 @@ use crate::{
         sample_orientation::Orientation,
         tag_times::ImageTimes,
     },
+    stored::whole,
 };
 
 /// Where it lies below a site's folder.
@@ -280,7 +281,7 @@ fn write(path: &Path, site: &SiteProducts) -> Result<()> {
 /// Writes what is encoded as it comes: a site with a million shots has half a gigabyte of it.
 fn encode(site: &SiteProducts, to: &mut Hashed<impl Write>) -> Result<()> {
     let data = PageData::of(site)?;
-    let encoded = postcard::to_io(&data, &mut *to).map(|_| ());
+    let encoded = whole(|| postcard::to_io(&data, &mut *to).map(|_| ()));
     match to.refusal.take() {
         Some(refusal) => Err(IoError::on("write")(refusal).into()),
         None => Ok(encoded.map_err(ProductError::refused("encode postcard"))?),

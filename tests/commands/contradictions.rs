@@ -373,7 +373,7 @@ fn check(case: &Case) -> (Option<i32>, Value) {
 #[test]
 fn no_mistake_passes_as_valid() {
     let mut golden = Golden::folder("contradictions");
-    for (mistake, make, end, part) in MISTAKES {
+    for (number, (mistake, make, end, part)) in MISTAKES.iter().enumerate() {
         let case = Case::pair();
         make(&case);
         let said = case.outcome(case.run());
@@ -391,6 +391,13 @@ fn no_mistake_passes_as_valid() {
             said.contains(part),
             "{mistake} does not say {part:?}: {said}"
         );
+        // A check runs the same stages: of every third mistake, and of all in the long run.
+        if number % 3 != 0 && !common::long() {
+            if let End::Error(_) = end {
+                golden.compare(mistake, &said);
+            }
+            continue;
+        }
         let checked = check(&case);
         if let End::Error(code) = end {
             assert_eq!(checked.0, Some(*code), "{mistake}: check and run differ");

@@ -8,6 +8,7 @@ mod contradictions;
 mod damaged_kernels;
 mod example_kernels;
 mod geometric;
+mod guide;
 mod hash_cache;
 mod image_commands;
 mod init;

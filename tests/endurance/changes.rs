@@ -655,7 +655,7 @@ fn accepted(walk: &Walk, site: &Table, key: &DeclaredKey) -> Vec<Table> {
 }
 
 /// Of so many keys one is tried in every run.
-const SHORT_RUN: usize = 8;
+const SHORT_RUN: usize = 24;
 
 #[test]
 fn after_a_change_of_any_key_a_run_gives_what_a_clean_run_gives() {

@@ -31,8 +31,12 @@ const STEREO: [&str; 2] = ["s1", "s2"];
 /// The scene, rendered once.
 static SCENE: LazyLock<tempfile::TempDir> = LazyLock::new(|| scene(1));
 
-/// Its calibration, run once.
-static RUN: LazyLock<SingleOutcome> = LazyLock::new(|| run("whole", &[]).unwrap());
+/// Its calibration, run once: to the end in the long run, and otherwise its first round, which takes a third of the time.
+static RUN: LazyLock<SingleOutcome> = LazyLock::new(|| {
+    let first = ("search_cells = 30", "search_cells = 30\nrounds_max = 1");
+    let replaced: &[_] = if long() { &[] } else { &[first] };
+    run("whole", replaced).unwrap()
+});
 
 fn scene(seed: u64) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -110,20 +114,21 @@ fn plane_and_height_m(errors_m: &[Vector3<f64>]) -> [f64; 2] {
 #[test]
 fn rounds_converge_and_their_numbers_are_kept() {
     let verdict = &RUN.manifest.verdict;
-    assert!(verdict.valid, "{:?}", verdict.reasons);
     let document = json(&RUN.folder.join("calibration.json"));
     assert_keeps_schema(&document, "calibration_result");
     let rounds = document["rounds"]["rounds"].as_array().unwrap();
     for round in rounds {
         println!("{round}");
     }
-    assert_eq!(document["rounds"]["converged"], true);
+    assert_eq!(verdict.valid, long(), "{:?}", verdict.reasons);
+    assert_eq!(document["rounds"]["converged"], long());
     // The bound.
-    assert!((2..=4).contains(&rounds.len()), "{}", rounds.len());
+    let expected = if long() { 2..=4 } else { 1..=1 };
+    assert!(expected.contains(&rounds.len()), "{}", rounds.len());
     // The orbit is 740 m off and the mounting 300 m: many cells of 100 m at first, in the end less than one (the bound).
     let shift = |of: &Value| number(&of["shift_cells"]);
     assert!(shift(&rounds[0]) > 3.0, "{}", shift(&rounds[0]));
-    assert!(shift(rounds.last().unwrap()) < 1.0);
+    assert!(!long() || shift(rounds.last().unwrap()) < 1.0);
     for round in rounds {
         // As many as a calibration needs, on either side.
         assert!(number(&round["units_kept"]) >= 10.0);
@@ -146,7 +151,7 @@ fn places_are_as_near_as_stated_to_where_they_truly_are() {
     let other = other.as_ref().map(|(folder, run)| (folder.path(), run));
     for (folder, run) in [(SCENE.path(), &*RUN)].into_iter().chain(other) {
         let verdict = &run.manifest.verdict;
-        assert!(verdict.valid, "{:?}", verdict.reasons);
+        assert_eq!(verdict.valid, long(), "{:?}", verdict.reasons);
         let given = errors_m(folder, |line| folder.join(format!("lines/isd/{line}.json")));
         let errors_m = errors_m(folder, |line| {
             run.folder.join(format!("cameras/{line}/isd.json"))
@@ -159,6 +164,12 @@ fn places_are_as_near_as_stated_to_where_they_truly_are() {
         );
         assert!(errors_m.len() >= 100);
         assert!(before_m[0] > 500.0 && before_m[1] > 300.0, "{before_m:?}");
+        if !long() {
+            // The terrain model of the first round is as far off as the orbit: what is left is some per cent of it.
+            assert!(plane_m < 0.1 * before_m[0], "{plane_m}");
+            assert!(height_m < 0.1 * before_m[1], "{height_m}");
+            continue;
+        }
         // The bounds: half a pixel of the stereo lines, and 20 m.
         assert!(plane_m < 0.5 * PIXEL_M, "{plane_m}");
         assert!(height_m < 20.0, "{height_m}");
@@ -184,10 +195,12 @@ fn places_are_as_near_as_stated_to_where_they_truly_are() {
 
 #[test]
 fn a_second_run_has_nothing_to_do() {
-    let verdict = &RUN.manifest.verdict;
-    let again = run("whole", &[]).unwrap();
+    let finished = RUN.manifest.finished_utc.clone();
+    let config = load_calibration(&SCENE.path().join("lines/whole.toml")).unwrap();
+    let again = run_calibration(&config.calibration, &SCENE.path().join("whole"), false).unwrap();
     assert!(again.unchanged);
-    assert_eq!(&again.manifest.verdict, verdict);
+    assert_eq!(again.manifest.finished_utc, finished);
+    assert_eq!(again.manifest.verdict, RUN.manifest.verdict);
 }
 
 #[test]

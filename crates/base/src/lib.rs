@@ -25,6 +25,7 @@ pub mod kernel_source;
 pub mod line_times;
 #[cfg(feature = "schema")]
 pub mod schema;
+pub mod stored;
 pub mod style;
 pub mod ties;
 pub mod time;

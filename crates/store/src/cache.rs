@@ -13,7 +13,10 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use super::atomic;
 use crate::stage::{Inputs, Output, Provenance, Reason};
-use areograph_base::error::{Cause, Kind, Locate, Result};
+use areograph_base::{
+    error::{Cause, Kind, Locate, Result},
+    stored::whole,
+};
 
 /// Outputs of a site's stages, in `<out>/<site>/.cache`.
 #[derive(Debug)]
@@ -94,12 +97,22 @@ impl StageCache {
     ///
     /// # Errors
     /// The output cannot be written.
-    pub fn store<T: Serialize>(&self, label: &str, inputs: Inputs, value: T) -> Result<Output<T>> {
+    pub fn store<T: Serialize + DeserializeOwned>(
+        &self,
+        label: &str,
+        inputs: Inputs,
+        value: T,
+    ) -> Result<Output<T>> {
         let unstorable = |source| Unstorable {
             stage: label.to_owned(),
             source,
         };
-        let payload = postcard::to_stdvec(&value).map_err(unstorable)?;
+        let payload = whole(|| postcard::to_stdvec(&value)).map_err(unstorable)?;
+        // A field that is skipped when written cannot be read back, and the stage would run again for ever.
+        debug_assert!(
+            postcard::from_bytes::<T>(&payload).is_ok(),
+            "the output of {label} cannot be read back"
+        );
         let provenance = Provenance {
             blake3: blake3::hash(&payload).to_hex().to_string(),
             fingerprint: inputs.fingerprint(),
@@ -141,6 +154,25 @@ impl StageCache {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_field_that_documents_leave_out_comes_back() {
+        #[derive(Debug, PartialEq, Serialize, Deserialize)]
+        struct Figure {
+            #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
+            value: Option<f64>,
+            unit: String,
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let cache = StageCache::new(folder.path(), false);
+        let figure = || Figure {
+            value: None,
+            unit: "m".to_owned(),
+        };
+        cache.store("judge", Inputs::new(1), figure()).unwrap();
+        let loaded = cache.load::<Figure>("judge", &Inputs::new(1)).unwrap();
+        assert_eq!(loaded.value().unwrap(), &figure());
+    }
 
     #[test]
     fn an_output_is_kept_until_an_input_changes_or_the_file_is_damaged() {

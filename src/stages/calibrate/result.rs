@@ -137,7 +137,7 @@ pub struct ControlFigures {
     /// Points in two cameras or more.
     pub heights: u64,
     /// Root mean square of their intersected height minus the laser's, metres; none where there is no such point.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub height_m: Option<f64>,
 }
 
@@ -145,10 +145,10 @@ pub struct ControlFigures {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PixelsAndMetres {
     /// Root mean square distance, pixels.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub plane_px: Option<f64>,
     /// Root mean square distance of the ray at the laser's radius from the laser's place, metres.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub plane_m: Option<f64>,
 }
 
@@ -163,20 +163,20 @@ pub struct HeldBack {
     pub intersected: u64,
     /// Root mean square of intersected minus laser's place, horizontally, metres: errors of the laser and of the measurement
     /// are in it. None where nothing is intersected, as of the next two.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub plane_m: Option<f64>,
     /// Likewise of the height, metres.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub height_m: Option<f64>,
     /// Mean of the same east, north and up, metres.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub mean_m: Option<[f64; 3]>,
     /// Stated accuracy of a tie point in the plane, metres: root mean square of the standard deviations, so many times larger as
     /// control scatters, used or held back, beyond what is expected of it in the plane.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub accuracy_plane_m: Option<f64>,
     /// Likewise of its height, metres.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub accuracy_height_m: Option<f64>,
 }
 
@@ -185,10 +185,10 @@ pub struct HeldBack {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Scatter {
     /// East and north; none where the calibration follows the points.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub plane: Option<Scattered>,
     /// Up, of points in two cameras or more; none without such a point.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub height: Option<Scattered>,
 }
 

@@ -154,7 +154,7 @@ pub struct BrickResult {
     /// Measurements that were left out.
     pub removed: u32,
     /// What its two rough guesses shrank, before that was put back.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub shrinkage: Option<ShrinkageResult>,
 }
 
@@ -177,10 +177,10 @@ pub struct Seams {
     /// Root mean square of δX and δY, metres.
     pub rms_m: [f64; 2],
     /// The same after LOCAL, where it ran.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub local_rms_m: Option<[f64; 2]>,
     /// What the two controls of EXTEND shrank, before that was put back.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub shrinkage: Option<ShrinkageResult>,
 }
 
@@ -196,12 +196,12 @@ pub struct Totals {
     /// Equations beyond the unknowns.
     pub redundancy: u64,
     /// Standard deviation of a coordinate of an image of a tie, as used, metres; absent when nothing tells it.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub tie_sigma_m: Option<f64>,
     /// Whether it was given, not estimated.
     pub tie_sigma_given: bool,
     /// Standard deviation of a coordinate of a control by SCALE, metres; absent for two controls.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub scale_sigma_m: Option<f64>,
     /// Root mean square of the residuals of kept controls, X and Y, metres.
     pub control_rms_m: [f64; 2],
@@ -214,7 +214,7 @@ pub struct Totals {
     /// Controls that were left out.
     pub rejected_controls: u64,
     /// Largest standard deviation of a coordinate of a point, metres; absent when none is known.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub largest_sigma_m: Option<f64>,
     /// Largest floor of the projection under the deviations of a picture, metres.
     pub projection_floor_m: f64,

@@ -41,10 +41,10 @@ pub struct Check {
     /// Profile, image or pair that is told; empty where the whole site is.
     pub subject: String,
     /// What was found, in `unit`; nothing where it is no finite number.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "crate::stored::is_left_out")]
     pub value: Option<f64>,
     /// The largest magnitude that is allowed, for counts of what is wanted the least.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "crate::stored::is_left_out")]
     pub limit: Option<f64>,
     /// Unit of both.
     pub unit: String,

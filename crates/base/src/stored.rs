@@ -1,0 +1,41 @@
+//! Fields that a document leaves out where they have no value.
+//!
+//! Outputs of stages are stored without names of fields, so that each must be there. A field with
+//! `#[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]` has no key in a JSON document, and is written by
+//! [`whole`].
+
+use std::cell::Cell;
+
+thread_local! {
+    static WHOLE: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Whether a field is left out: one without a value, in a document.
+#[must_use]
+pub fn is_left_out<T>(value: &Option<T>) -> bool {
+    value.is_none() && !WHOLE.get()
+}
+
+/// What `write` gives when it serializes all fields, on this thread.
+pub fn whole<T>(write: impl FnOnce() -> T) -> T {
+    struct Reset(bool);
+    impl Drop for Reset {
+        fn drop(&mut self) {
+            WHOLE.set(self.0);
+        }
+    }
+    let _reset = Reset(WHOLE.replace(true));
+    write()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_field_without_a_value_is_left_out_of_documents_alone() {
+        assert!(is_left_out::<f64>(&None) && !is_left_out(&Some(1.0)));
+        assert!(whole(|| !is_left_out::<f64>(&None)));
+        assert!(is_left_out::<f64>(&None));
+    }
+}

@@ -1,0 +1,190 @@
+//! The front pages: command blocks of README and guide are run as they stand, links lead to files and headings that exist, and the
+//! pages keep their length.
+#![allow(
+    clippy::disallowed_methods,
+    clippy::unwrap_used,
+    reason = "tests work in temporary folders and may fail loudly"
+)]
+
+use std::{
+    collections::BTreeSet,
+    fs,
+    os::unix::fs::symlink,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use areograph_testing::checkout;
+
+use crate::common::mission::{areograph, mission};
+
+/// Most words of a page, so that a newcomer reads it to its end.
+const WORDS: [(&str, usize); 4] = [
+    ("README.md", 1_200),
+    ("ARCHITECTURE.md", 1_700),
+    ("CHANGELOG.md", 250),
+    ("docs/house_style.md", 450),
+];
+
+/// Starts of commands that other tests run, with what runs them.
+const ELSEWHERE: [(&str, &str); 10] = [
+    ("scripts/", "continuous integration"),
+    ("cargo run", "compiled as an example with the tests"),
+    (
+        "areograph scene mission ",
+        "every test that uses the mission",
+    ),
+    ("areograph serve --init demo ", "tests/service"),
+    ("areograph serve demo/areograph.toml ", "tests/service"),
+    ("areograph pedr sql", "tests/sql, with its feature"),
+    ("areograph scene pixels", "tests/stages/calibration_loop.rs"),
+    (
+        "areograph calibrate pixels",
+        "tests/stages/calibration_loop.rs",
+    ),
+    ("areograph scene mission-images", "crates/scene: matching"),
+    ("areograph image", "tests/commands/image_commands.rs"),
+];
+
+/// Commands that end with another code than 0, as the guide states.
+const ENDS: [(&str, i32); 1] = [("areograph pedr qa", 5)];
+
+/// The pages for users: README, then the chapters in the order of the guide.
+fn pages() -> Vec<PathBuf> {
+    let guide = checkout().join("docs/guide/src");
+    let summary = fs::read_to_string(guide.join("SUMMARY.md")).unwrap();
+    let chapters = links(&summary).map(|(file, _)| guide.join(file));
+    [checkout().join("README.md")]
+        .into_iter()
+        .chain(chapters)
+        .collect()
+}
+
+/// Targets of the links of a page outside fenced blocks: file and anchor, either of which may be empty.
+fn links(text: &str) -> impl Iterator<Item = (&str, &str)> {
+    let prose = text.split("```").step_by(2);
+    let targets = prose.flat_map(|part| part.split("](").skip(1));
+    targets
+        .filter_map(|after| after.split_once(')'))
+        .map(|(target, _)| target.split_once('#').unwrap_or((target, "")))
+}
+
+/// The anchor of a heading as forges and mdBook make it.
+fn anchor(heading: &str) -> String {
+    let kept = |of: char| of.is_alphanumeric() || matches!(of, '-' | '_' | ' ');
+    let heading = heading.trim().to_lowercase();
+    heading
+        .chars()
+        .filter(|of| kept(*of))
+        .map(|of| if of == ' ' { '-' } else { of })
+        .collect()
+}
+
+/// Commands of the blocks marked `sh`, without their comments; one may go over several lines.
+fn commands(page: &Path) -> Vec<String> {
+    let text = fs::read_to_string(page).unwrap();
+    let blocks = text.split("```sh\n").skip(1);
+    let mut commands: Vec<String> = Vec::new();
+    for line in blocks.flat_map(|block| block.split("```").next().unwrap().lines()) {
+        let line = line.split(" # ").next().unwrap().trim_end();
+        match commands.last_mut() {
+            Some(last) if line.starts_with(' ') => *last += line,
+            _ => commands.push(line.to_owned()),
+        }
+    }
+    commands
+}
+
+#[test]
+fn commands_of_the_front_pages_work_as_they_stand() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = PathBuf::from(areograph().get_program());
+    let path = format!(
+        "{}:{}",
+        program.parent().unwrap().display(),
+        std::env::var("PATH").unwrap()
+    );
+    symlink(mission(), folder.path().join("mission")).unwrap();
+    // A window of many, which the chapter on the archive names.
+    let windows =
+        "[[windows]]\nid = \"gale\"\nlongitude_deg = [137.0, 138.0]\nlatitude_deg = [-5.5, -4.0]\n";
+    fs::write(folder.path().join("many.toml"), windows).unwrap();
+    let (mut run, mut left) = (0, BTreeSet::new());
+    for page in pages() {
+        for command in commands(&page) {
+            let whole = format!("{command} ");
+            let of = |(start, _): &&(&str, &str)| whole.starts_with(start);
+            if let Some((start, _)) = ELSEWHERE.iter().find(of) {
+                left.insert(*start);
+                continue;
+            }
+            let ends = ENDS.iter().find(|(start, _)| command.starts_with(start));
+            let output = Command::new("sh")
+                .args(["-c", &command])
+                .current_dir(folder.path())
+                .env("PATH", &path)
+                .output()
+                .unwrap();
+            assert_eq!(
+                output.status.code(),
+                Some(ends.map_or(0, |(_, code)| *code)),
+                "{}: {command}\n{}",
+                page.display(),
+                String::from_utf8_lossy(&output.stderr)
+            );
+            run += 1;
+        }
+    }
+    assert!(run >= 20, "only {run} commands were found");
+    assert_eq!(left.len(), ELSEWHERE.len(), "of ELSEWHERE only {left:?}");
+}
+
+#[test]
+fn links_lead_somewhere() {
+    let root = checkout();
+    let others = [
+        "ARCHITECTURE.md",
+        "CONTRIBUTING.md",
+        "docs/house_style.md",
+        "docs/glossary.md",
+    ];
+    let others = others.map(|page| root.join(page));
+    let mut dead = Vec::new();
+    let mut count = 0;
+    for page in pages().into_iter().chain(others) {
+        let text = fs::read_to_string(&page).unwrap();
+        for (file, heading) in links(&text) {
+            if file.contains("://") {
+                continue;
+            }
+            count += 1;
+            let target = match file {
+                "" => page.clone(),
+                file => page.parent().unwrap().join(file),
+            };
+            let leads = heading.is_empty() && target.exists()
+                || fs::read_to_string(&target).is_ok_and(|text| {
+                    let headings = text.lines().filter(|line| line.starts_with('#'));
+                    let mut anchors = headings.map(|line| anchor(line.trim_start_matches('#')));
+                    anchors.any(|of| of == heading)
+                });
+            if !leads {
+                dead.push(format!("{}: {file}#{heading}", page.display()));
+            }
+        }
+    }
+    assert!(dead.is_empty(), "{}", dead.join("\n"));
+    assert!(count >= 100, "only {count} links were found");
+}
+
+#[test]
+fn front_pages_keep_their_length() {
+    for (page, most) in WORDS {
+        let text = fs::read_to_string(checkout().join(page)).unwrap();
+        let words = text.split_whitespace().count();
+        assert!(
+            words <= most,
+            "{page}: {words} words; expected at most {most}"
+        );
+    }
+}
