@@ -85,7 +85,7 @@ impl StageCache {
         if !is_whole || *blake3::hash(payload).to_hex() != *stored.blake3 {
             return Err(Reason::Damaged);
         }
-        let value = postcard::from_bytes(payload).map_err(|_| Reason::Damaged)?;
+        let value = read(payload).ok_or(Reason::Damaged)?;
         let provenance = Provenance {
             blake3: stored.blake3,
             fingerprint: inputs.fingerprint(),
@@ -110,7 +110,7 @@ impl StageCache {
         let payload = whole(|| postcard::to_stdvec(&value)).map_err(unstorable)?;
         // A field that is skipped when written cannot be read back, and the stage would run again for ever.
         debug_assert!(
-            postcard::from_bytes::<T>(&payload).is_ok(),
+            read::<T>(&payload).is_some(),
             "the output of {label} cannot be read back"
         );
         let provenance = Provenance {
@@ -130,7 +130,7 @@ impl StageCache {
 
     /// Forgets the output of `stage`, so that it runs again.
     pub fn forget(&self, stage: &str) {
-        // Nothing to forget is as good as forgotten.
+        // A missing file is already forgotten.
         let _ = fs::remove_file(self.path(stage));
     }
 
@@ -140,7 +140,7 @@ impl StageCache {
         let entries = fs::read_dir(&self.folder).into_iter().flatten().flatten();
         for path in entries.map(|entry| entry.path()) {
             if !kept.contains(&path) {
-                // What cannot be removed costs room and nothing else: nobody asks for it.
+                // A file that cannot be removed only occupies space.
                 let _ = fs::remove_file(path);
             }
         }
@@ -149,6 +149,12 @@ impl StageCache {
     fn path(&self, stage: &str) -> PathBuf {
         self.folder.join(stage.replace('/', "+"))
     }
+}
+
+/// An output that is stored in these bytes and in no others.
+fn read<T: DeserializeOwned>(payload: &[u8]) -> Option<T> {
+    let (value, rest) = postcard::take_from_bytes(payload).ok()?;
+    rest.is_empty().then_some(value)
 }
 
 #[cfg(test)]
