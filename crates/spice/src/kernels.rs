@@ -218,7 +218,7 @@ fn first_bytes(path: &Path) -> Result<Vec<u8>> {
         .map_err(IoError::on("open kernel"))
         .in_file(path)?;
     if !metadata.is_file() {
-        return not_a_kernel(path, "no regular file");
+        return not_a_kernel(path, "not a regular file");
     }
     let mut start = Vec::new();
     File::open(path)

@@ -107,7 +107,7 @@ fn manifest_bytes(products: &Path, run: &Run) -> Result<Vec<u8>, Problem> {
         .map_err(Problem::internal)?;
     if blake3::hash(&bytes).to_hex().as_str() != run.manifest_blake3 {
         return Err(Problem::conflict(
-            "The manifest of this run is not the one that was published; its products are not given out.",
+            "The manifest of this run is not the one that was published; its products are withheld.",
         ));
     }
     Ok(bytes)

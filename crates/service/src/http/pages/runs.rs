@@ -111,10 +111,10 @@ fn pin_button(run: &Run, caller: &Caller) -> Markup {
             form method="post" action={ "/runs/" (run.id) "/pin" } class="actions" {
                 (form_token(&session.form_token))
                 button type="submit" name="pinned" value=(!run.pinned) {
-                    @if run.pinned { "Do not keep for good" } @else { "Keep for good" }
+                    @if run.pinned { "Do not keep permanently" } @else { "Keep permanently" }
                 }
             }
-        } @else if run.pinned { p { "Kept for good." } }
+        } @else if run.pinned { p { "Kept permanently." } }
     }
 }
 
@@ -222,7 +222,7 @@ fn stage_table(run: &Run) -> Markup {
 
 fn file_table(run: &Run, manifest: &Manifest) -> Markup {
     html! {
-        p { a href={ "/api/v1/runs/" (run.id) "/files/" (MANIFEST) } { (MANIFEST) } ": everything that these were made from." }
+        p { a href={ "/api/v1/runs/" (run.id) "/files/" (MANIFEST) } { (MANIFEST) } ": all inputs of these products." }
         (table("Products", &["File", "Size", "Rows", "BLAKE3"], &html! {
             @for product in &manifest.products {
                 tr {
