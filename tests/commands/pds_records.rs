@@ -481,7 +481,8 @@ fn counts_add_up_and_ranges_are_those_of_the_file_itself() {
     assert_eq!(complaints.len(), 2, "{complaints:?}");
     let text = complaints[0].to_string();
     assert!(
-        text.contains("record 211: range of shot") && text.contains("m apart; expected equal to"),
+        text.contains("record 211: range of shot")
+            && text.contains("m apart; expected agreement within"),
         "{text}"
     );
     assert_eq!(

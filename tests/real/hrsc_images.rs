@@ -487,7 +487,7 @@ fn labels_that_contradict_the_file_are_refused() {
         (
             "MSB_INTEGER",
             "LSB_INTEGER",
-            "SAMPLE_TYPE is \"LSB_INTEGER\", but samples lie from 29 to 136",
+            "SAMPLE_TYPE is \"LSB_INTEGER\", but only the other byte order gives samples from 29 to 136",
         ),
         (
             "12:08:53.843Z",

@@ -79,8 +79,8 @@ fn what_is_at(path: &Path) -> &'static str {
     match path.metadata() {
         Ok(found) if found.is_dir() => "a folder",
         Ok(found) if found.is_file() => "a file",
-        Ok(_) => "neither file nor folder",
-        Err(error) if error.kind() == std::io::ErrorKind::PermissionDenied => "not to be read",
+        Ok(_) => "neither a file nor a folder",
+        Err(error) if error.kind() == std::io::ErrorKind::PermissionDenied => "not readable",
         Err(_) => "not there",
     }
 }

@@ -120,11 +120,11 @@ impl Cause for LabelError {
                 "correct the label, or write the key in the image's table of the configuration"
             }
             Self::Instrument { .. } => {
-                "name the camera that took it with `instrument` in the image's table: one of those that areograph knows, or an \
-                 instrument file"
+                "set `instrument` in the image's table to the camera that took it: a camera known to areograph, or an instrument \
+                 file"
             }
             Self::Contradiction { .. } => {
-                "check that files and labels are not exchanged or renamed; one of the two is of another image"
+                "check that files and labels are not exchanged or renamed; one of them belongs to another image"
             }
         }
         .to_owned()

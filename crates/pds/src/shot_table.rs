@@ -81,7 +81,7 @@ impl Cause for ShotTableError {
     fn advice(&self) -> String {
         match self {
             Self::Column { .. } => "write the name of the column as in the table, or its number, from 1",
-            Self::Table(_) | Self::Empty => "give a text table with commas, one row a shot",
+            Self::Table(_) | Self::Empty => "give a comma-separated text table with one shot per row",
             Self::Unreadable { .. } => {
                 "compare shots.columns (or shots.layout) with the table: the column and the unit of each quantity; also check \
                  body"

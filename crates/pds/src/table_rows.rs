@@ -21,7 +21,7 @@ pub(super) enum TableError {
         column: &'static str,
         expected: &'static str,
     },
-    #[error("the unit of column {column} is not known; expected the columns {expected}")]
+    #[error("the unit of column {column} is unknown; expected the columns {expected}")]
     Unit {
         column: String,
         expected: &'static str,

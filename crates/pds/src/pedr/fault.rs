@@ -157,8 +157,8 @@ pub enum RecordError {
     },
     /// Range against the record's own positions.
     #[error(
-        "range of shot {shot} is {range_m:.2} m, but spacecraft and footprint are {distance_m:.2} m apart; expected \
-         equal to {limit_m:.1} m{}", and_more(*.shots)
+        "range of shot {shot} is {range_m:.2} m, but spacecraft and footprint are {distance_m:.2} m apart; expected agreement \
+         within {limit_m:.1} m{}", and_more(*.shots)
     )]
     Distance {
         /// The first shot, 1 to 20.
@@ -175,7 +175,7 @@ pub enum RecordError {
     /// Parallax against the direction of the beam.
     #[error(
         "parallax in {whose} is {found:.4} m on the ground per metre of radius; expected {expected:.4} along the beam, \
-         to {limit:.4}"
+         within {limit:.4}"
     )]
     Parallax {
         /// "latitude" or "longitude".

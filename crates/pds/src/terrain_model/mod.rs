@@ -107,7 +107,7 @@ impl Cause for TerrainModelError {
         match self {
             Self::Tiff(_) | Self::TooLarge { .. } => {
                 "give a whole GeoTIFF of one band without compression, with LZW or with deflate (gdal_translate -co COMPRESS=DEFLATE), \
-                 cut to what is needed (-projwin)"
+                 cut to the area needed (-projwin)"
             }
             Self::Georeference { .. } => {
                 "give heights over longitude and latitude or in an equirectangular map about a sphere, in degrees or metres: \

@@ -135,7 +135,7 @@ pub(super) fn product(products: &Path, run: &Run, path: &str) -> Result<Product,
     let file = open_below(products, &run_folder(run).join(&entry.path))?;
     let contradicts = || {
         Problem::conflict(
-            "This product is not the one that its manifest names; it is not given out. Run the site again.",
+            "This product does not match its manifest; it is withheld. Run the site again.",
         )
     };
     let file = file.ok_or_else(contradicts)?;
