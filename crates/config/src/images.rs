@@ -213,7 +213,7 @@ fn of_spacecraft(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
     let of = &spacecraft.full_name;
     if !spacecraft.labels_tell_clock {
         let expected = format!(
-            "utc_start or exposures instead: the clock in labels of {of} lies seconds from its clock kernels"
+            "utc_start or exposures instead: the clock in labels of {of} differs by seconds from its clock kernels"
         );
         keys.refuse("sclk_start", expected);
     }

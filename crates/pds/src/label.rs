@@ -60,7 +60,7 @@ pub enum LabelError {
         /// What it should be.
         expected: &'static str,
     },
-    /// Nothing says that the label is whole.
+    /// No statement marks the end of the label.
     #[error("the label has no END; expected that statement after its last line")]
     NoEnd,
     /// Two values under one keyword.

@@ -118,7 +118,7 @@ impl KernelSet {
         if kernel.role == KernelRole::Meta {
             let error = SpiceError::NotAKernel {
                 found: "a metakernel".to_owned(),
-                expected: "a kernel; a metakernel stands alone and lists no other",
+                expected: "a kernel; a metakernel is given alone and lists no other",
             };
             return Err(error).in_file(path);
         }

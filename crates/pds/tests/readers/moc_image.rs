@@ -165,7 +165,7 @@ fn what_is_no_image_is_refused_with_what_was_expected() {
         (
             format!("{head}{image}"),
             10,
-            "the label describes no image in this file: ^IMAGE is not there",
+            "the label describes no image in this file: ^IMAGE is missing",
         ),
         (
             format!("{head}^IMAGE = 3\n{image}"),
