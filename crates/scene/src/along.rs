@@ -135,7 +135,7 @@ pub fn write_scene_along(
     })
 }
 
-/// Stretches of true time with both orbit and attitude.
+/// Stretches of true time in which both orbit and attitude are known.
 fn stretches(session: &Session) -> Result<Vec<Interval>> {
     /// Kernel ends are met to less than this by the times that are asked for, seconds.
     const ROUNDING_S: f64 = 0.01;

@@ -54,7 +54,7 @@ impl PagePath {
     /// Checks the place, before the work whose result the page will show.
     ///
     /// # Errors
-    /// [`PageError`] for what is not a regular file and for products; [`IoError`] when its folder cannot be found.
+    /// [`PageError`] for what is no regular file and for products; [`IoError`] when its folder cannot be found.
     pub fn new(path: &Path) -> Result<Self> {
         check(path).in_file(path)?;
         Ok(Self(path.to_owned()))
