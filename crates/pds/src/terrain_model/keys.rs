@@ -240,7 +240,7 @@ mod tests {
             directory[at] = value;
             GeoKeys::of(&directory, &DOUBLES)
         };
-        // Mercator; a model in three dimensions; an existing number none of.
+        // Mercator; a model in three dimensions; a number that there is none of.
         assert!(with(23, 7).is_ok_and(|keys| keys.map(3e6).is_err()));
         assert!(with(7, 3).is_ok_and(|keys| keys.map(3e6).is_err()));
         assert!(with(15, 9).is_err());
