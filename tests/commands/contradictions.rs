@@ -239,7 +239,7 @@ const MISTAKES: &[Mistake] = &[
         "lines_twice",
         |case| label(case, "LINES = 8064", "LINES = 8064\nLINES = 7680"),
         End::Error(3),
-        "LINES stands in the label as \"8064\" and as \"7680\"",
+        "LINES appears in the label as \"8064\" and as \"7680\"",
     ),
     (
         "label_cut_off",
@@ -342,7 +342,7 @@ const MISTAKES: &[Mistake] = &[
             site(case, "datum = \"auto\"", "datum = \"iau1994\"");
         },
         End::Error(3),
-        "the label means iau1991, but pedr.datum in the configuration means iau1994",
+        "the label implies iau1991, but pedr.datum in the configuration implies iau1994",
     ),
     (
         "datum_that_no_label_tells",

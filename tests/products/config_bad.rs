@@ -105,7 +105,7 @@ fn a_folder_of_the_service_is_one_or_is_away() {
     assert_eq!(told("away"), None);
     for (sites, expected) in [
         ("there.txt", "there.txt is a file"),
-        ("", "a folder; an empty text names none"),
+        ("", "a folder; an empty string is not a path"),
     ] {
         let message = told(sites).unwrap();
         assert!(message.contains(expected), "{message}");

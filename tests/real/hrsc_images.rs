@@ -487,7 +487,7 @@ fn labels_that_contradict_the_file_are_refused() {
         (
             "MSB_INTEGER",
             "LSB_INTEGER",
-            "SAMPLE_TYPE is \"LSB_INTEGER\", but samples lie from 29 to 136",
+            "SAMPLE_TYPE is \"LSB_INTEGER\", but only the other byte order gives samples from 29 to 136",
         ),
         (
             "12:08:53.843Z",
@@ -578,7 +578,7 @@ fn damaged_and_exchanged_files_are_told() {
             case.write("h5270_0000_ir2.img", bytes);
         })
     };
-    let size = "as FILE_RECORDS and RECORD_BYTES of its label say";
+    let size = "as FILE_RECORDS and RECORD_BYTES of its label state";
     for (change, expected) in [
         (&|bytes: &mut Vec<u8>| bytes.truncate(row(399)) as _, size),
         (&|bytes: &mut Vec<u8>| bytes.truncate(row(399) + 7), size),
@@ -623,7 +623,7 @@ fn damaged_and_exchanged_files_are_told() {
         (
             "pixels = 'h5270_0000_ir2.img'",
             "pixels = 'alone.lbl'",
-            "the label stands alone",
+            "the file holds a label only",
         ),
         (
             "label = 'h5270_0000_ir2.img'",

@@ -630,7 +630,7 @@ fn what_is_wrong_with_camera_and_line_times_is_said() {
         (
             utc,
             "sclk_start = '1/0150552525.072'\n",
-            "the clock in labels of Mars Express lies seconds from its clock kernels",
+            "the clock in labels of Mars Express differs by seconds from its clock kernels",
         ),
         (
             utc,

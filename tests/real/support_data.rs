@@ -274,15 +274,15 @@ fn damaged_support_data_are_refused_with_file_key_and_value() {
     refused(
         "cut off",
         &text.as_bytes()[..text.len() / 2],
-        "no image support data: EOF",
+        "not image support data: EOF",
     );
     refused("a list", b"[1, 2]", "it holds no object");
-    refused("no text", &[0xff, 0xfe, 0x00], "no image support data: ");
+    refused("no text", &[0xff, 0xfe, 0x00], "not image support data: ");
     let infinite = text.replacen("\"image_lines\":", "\"image_lines\":1e999,\"other\":", 1);
     refused(
         "no number",
         infinite.as_bytes(),
-        "no image support data: number out of range",
+        "not image support data: number out of range",
     );
 }
 

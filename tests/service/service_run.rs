@@ -229,7 +229,7 @@ fn changes_of_files_run_the_sites_that_they_touch() {
     let refusal = String::from_utf8(second.stderr).unwrap();
     assert_eq!(second.status.code(), Some(6));
     assert!(
-        refusal.contains(&format!("look at http://{address}")),
+        refusal.contains(&format!("open http://{address}")),
         "{refusal}"
     );
 

@@ -479,7 +479,7 @@ fn kernels_are_opened_and_damaged_ones_are_told() {
         (0, ""),
         (1, "its number of states is 1e300"),
         (2, ""),
-        (3, "bytes long; its file record says"),
+        (3, "bytes long; its file record states"),
         (4, ""),
         (5, ""),
         (6, "a web page"),
@@ -796,9 +796,9 @@ fn what_is_no_worker_is_ended() {
     let (foreign, ..) = ended(&format!("{foreign}\nsleep 60"), LIMITS, None);
     assert_eq!(foreign.how, How::ForeignVersion("9.9.9".to_owned()));
     for (said, why) in [
-        ("echo Toolkit version N0067", "no line of a worker"),
+        ("echo Toolkit version N0067", "not a line of a worker"),
         ("head -c 100000 /dev/zero", "a line of more than"),
-        ("echo '{\"line\":\"beat\",\"rss_kib\":1}'", "no hello"),
+        ("echo '{\"line\":\"beat\",\"rss_kib\":1}'", "not a hello"),
     ] {
         let (garbled, ..) = ended(&format!("{said}\nsleep 60"), LIMITS, None);
         let How::Garbled(text) = garbled.how else {

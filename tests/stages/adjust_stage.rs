@@ -540,7 +540,7 @@ fn what_does_not_fit_together_is_refused() {
     shots.shots[3].range.as_mut().unwrap().image = 7;
     let message = run(&site.images, &shots, &site.ties, &plain);
     assert!(
-        message.contains("range 3 belongs to image 7, which the network does not have"),
+        message.contains("range 3 belongs to image 7, which is not in the network"),
         "{message}"
     );
     shots.clone_from(&site.shots);

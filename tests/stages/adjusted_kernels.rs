@@ -391,7 +391,7 @@ fn orientations_that_are_none_and_kernels_that_end_are_refused() {
     assert!(
         refused(&image.orientation)
             .to_string()
-            .contains("session is open")
+            .contains("session is already open")
     );
     drop(session);
 }

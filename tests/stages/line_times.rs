@@ -163,7 +163,7 @@ fn tables_that_are_none_are_refused() {
     let early = refused(20, &[piece(0, 0.0, 0.01), piece(10, 0.05, 0.01)]).to_string();
     assert!(
         early.contains("piece 2")
-            && early.contains("before the last line of the one before it ends"),
+            && early.contains("before the last line of the preceding piece ends"),
         "{early}"
     );
     let nowhere = refused(20, &[piece(0, 0.0, 0.01), piece(10, f64::NAN, 0.01)]);

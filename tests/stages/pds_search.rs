@@ -265,7 +265,7 @@ fn damaged_records_are_complained_of_and_the_others_kept() {
         [
             "clock frequency is 7 Hz; expected within 1 % of 1e8",
             "time is inf; expected seconds past J2000",
-            "time is 10000000 s, out of the order of the neighbouring records",
+            "time is 10000000 s, out of order with the neighbouring records",
             "radius of shot 5 is 2147483647 cm; expected 330000000 to 345000000 for a return",
         ]
     );
@@ -320,7 +320,7 @@ fn a_file_without_a_datum_stops_the_search() {
         .to_string();
     assert!(
         failure.starts_with("search_footprints: ")
-            && failure.contains("renamed.dat: the datum is not known"),
+            && failure.contains("renamed.dat: the datum is unknown"),
         "{failure}"
     );
 }
@@ -338,10 +338,10 @@ fn a_file_without_a_good_record_stops_the_search_before_its_datum_is_asked_for()
     };
     for (bytes, why) in [
         (&[][..], "the file has 0 bytes; expected at least the 7760"),
-        (&random, "no good record: "),
+        (&random, "no valid record: "),
         (
             &good[..7_760 + 700],
-            "nothing of 776 bytes follows the label",
+            "no record of 776 bytes follows the label",
         ),
     ] {
         overwrite(&path, bytes);

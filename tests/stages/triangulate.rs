@@ -554,7 +554,7 @@ fn rows_that_cannot_be_read_are_told_and_the_others_are_used() {
     let lines = text.lines().count();
     assert_eq!(
         net.complaints[0],
-        format!("measurements.csv line {}: \"x\" is no number", lines + 1)
+        format!("measurements.csv line {}: \"x\" is not a number", lines + 1)
     );
     assert!(
         net.verdict
@@ -613,7 +613,10 @@ fn products_of_something_else_are_left_alone() {
     fs::write(&path, text.replace("\"triangulate\"", "\"convert_datum\"")).unwrap();
     let before = fs::read_to_string(&path).unwrap();
     let refused = run(folder.path(), true).unwrap_err().to_string();
-    assert!(refused.contains("products of something else"), "{refused}");
+    assert!(
+        refused.contains("the folder holds other products"),
+        "{refused}"
+    );
     assert!(refused.contains("made by convert_datum"), "{refused}");
     assert_eq!(fs::read_to_string(&path).unwrap(), before);
     assert!(outcome.folder.join("report/index.html").is_file());

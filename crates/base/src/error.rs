@@ -201,7 +201,7 @@ impl Cause for IoError {
                 "free some space or choose another --out, then run again: finished stages are kept"
             }
             ErrorKind::IsADirectory | ErrorKind::NotADirectory => {
-                "check the path: a file and a folder are mixed up"
+                "check the path: a file is in place of a folder, or a folder in place of a file"
             }
             _ => "check the file and the disk, then run again",
         }

@@ -68,7 +68,7 @@ struct Piece {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum LineTimesError {
     /// No pieces.
-    #[error("a table of line times without pieces; expected one or more")]
+    #[error("the table of line times has no pieces; expected one or more")]
     NoPieces,
     /// The first piece does not begin with line 0.
     #[error("the first piece of the line times begins with line {first_line}; expected line 0")]
@@ -101,8 +101,8 @@ pub enum LineTimesError {
     },
     /// A piece begins before the one before it has ended, or at no instant at all.
     #[error(
-        "piece {piece} of the line times begins {overlap_s} s before the last line of the one before it ends; expected \
-             pieces one after the other"
+        "piece {piece} of the line times begins {overlap_s} s before the last line of the preceding piece ends; expected pieces \
+         that do not overlap"
     )]
     Overlap {
         /// The piece, counted from 1.

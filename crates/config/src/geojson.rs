@@ -20,7 +20,7 @@ pub(super) enum GeoJsonError {
     Io(#[from] std::io::Error),
     #[error("is longer than {} MiB", BYTES_MAX >> 20)]
     TooLong,
-    #[error("{0}; objects taken are Polygon, MultiPolygon, Feature and FeatureCollection")]
+    #[error("{0}; expected Polygon, MultiPolygon, Feature or FeatureCollection")]
     Shape(#[from] serde_json::Error),
     #[error("holds no polygon")]
     Empty,

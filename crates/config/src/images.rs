@@ -182,7 +182,7 @@ fn is_complete(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
     if keys.span_of("isd").is_some() {
         let of_label = ["label", "instrument"].into_iter();
         for key in of_label.chain(OF_FIELDS) {
-            keys.unused(key, "the support data of images.isd say it all");
+            keys.unused(key, "the support data of images.isd give all of these");
         }
         return;
     }
@@ -213,7 +213,7 @@ fn of_spacecraft(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
     let of = &spacecraft.full_name;
     if !spacecraft.labels_tell_clock {
         let expected = format!(
-            "utc_start or exposures instead: the clock in labels of {of} lies seconds from its clock kernels"
+            "utc_start or exposures instead: the clock in labels of {of} differs by seconds from its clock kernels"
         );
         keys.refuse("sclk_start", expected);
     }
@@ -227,7 +227,7 @@ fn of_pieces(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
     for key in ["exposure_ms", "line_period_ms"] {
         keys.refuse(
             key,
-            "no such key beside images.exposures, which say it for every piece",
+            "no such key beside images.exposures, which state it for every piece",
         );
     }
     // Those of a label are held against them when it is read.

@@ -146,7 +146,7 @@ fn read(path: &Path) -> Result<String, Error> {
     let size = path.metadata().map_err(IoError::on("read")).in_file(path)?;
     // Devices and pipes could be read for ever.
     if !size.is_file() {
-        return Err(Problems::of_file(path, "is no regular file; expected a TOML file").into());
+        return Err(Problems::of_file(path, "is not a regular file; expected a TOML file").into());
     }
     let mut bytes = Vec::new();
     File::open(path)

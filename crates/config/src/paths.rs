@@ -55,7 +55,10 @@ impl Form for Place {
         };
         let path = review.resolve(written);
         if written.is_empty() {
-            found.refuse(review, format!("{}; an empty text names none", self.kind));
+            found.refuse(
+                review,
+                format!("{}; an empty string is not a path", self.kind),
+            );
         } else if !(self.suits)(&path) {
             let (kind, shown) = (&self.kind, path.display());
             found.refuse(review, format!("{kind}; {shown} is {}", what_is_at(&path)));
@@ -76,8 +79,8 @@ fn what_is_at(path: &Path) -> &'static str {
     match path.metadata() {
         Ok(found) if found.is_dir() => "a folder",
         Ok(found) if found.is_file() => "a file",
-        Ok(_) => "neither file nor folder",
-        Err(error) if error.kind() == std::io::ErrorKind::PermissionDenied => "not to be read",
+        Ok(_) => "neither a file nor a folder",
+        Err(error) if error.kind() == std::io::ErrorKind::PermissionDenied => "not readable",
         Err(_) => "not there",
     }
 }
@@ -191,7 +194,7 @@ fn matches(folder: &Path, glob: &str) -> Result<Vec<PathBuf>, String> {
             // A file that is passed over would be missed by nobody.
             Err(error) => {
                 return Err(format!(
-                    "files that are there: {} leads nowhere: {error}",
+                    "existing files: {} cannot be accessed: {error}",
                     path.display()
                 ));
             }

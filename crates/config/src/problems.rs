@@ -44,7 +44,7 @@ impl fmt::Display for Problems {
         formatter.write_str(&self.lines.join("\n"))?;
         match self.unlisted {
             0 => Ok(()),
-            more => write!(formatter, "\n… and {more} problems more"),
+            more => write!(formatter, "\n… and {more} more problems"),
         }
     }
 }
@@ -278,6 +278,6 @@ mod tests {
         }
         let found = review.finish(Some(())).unwrap_err().to_string();
         assert_eq!(found.lines().count(), LISTED_MAX + 1);
-        assert!(found.ends_with("… and 7 problems more"));
+        assert!(found.ends_with("… and 7 more problems"));
     }
 }

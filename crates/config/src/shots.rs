@@ -168,7 +168,7 @@ fn has_columns(_: &ShotTableConfig, keys: &mut Keys<'_, '_>) {
         (None, None) => {
             keys.missing(
                 "layout",
-                "a layout, or a table columns that says which column holds what",
+                "a layout, or a table columns with the column of each quantity",
             );
             return;
         }

@@ -53,7 +53,7 @@ enum WindowError {
     #[error("{0}")]
     Polygon(String),
     #[error(
-        "window {0} is what an image sees; expected longitude_deg and latitude_deg, or polygon"
+        "window {0} is the outline of an image; expected longitude_deg and latitude_deg, or polygon"
     )]
     Image(String),
 }
@@ -68,7 +68,7 @@ impl Cause for WindowError {
             Self::Box { .. } => {
                 "write west,east,south,north in degrees, such as 137.0,138.0,-5.5,-4.0"
             }
-            Self::Image(_) => "write a box or polygon: only a run knows what an image sees",
+            Self::Image(_) => "write a box or polygon: only a run computes the outline of an image",
             Self::Polygon(_) => {
                 "correct the file: GeoJSON polygons of east longitude and areocentric latitude"
             }

@@ -11,7 +11,7 @@ use areograph_base::error::{Cause, Kind};
 /// A point that the camera cannot see because it lies behind the plane of the perspective centre.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
-    "the ground point lies {depth_m:.1} m along the boresight, expected in front of the camera"
+    "the ground point lies {depth_m:.1} m along the boresight; expected a point in front of the camera"
 )]
 pub struct BehindCamera {
     /// Component of the point along the boresight, metres; not positive, or not a number.

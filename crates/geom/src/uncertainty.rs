@@ -102,7 +102,7 @@ pub struct UncertaintyBudget {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BudgetError {
     /// No site at all.
-    #[error("no residuals of any stereo pair, expected at least one")]
+    #[error("no stereo pair has residuals; expected at least one")]
     NoSites,
     /// A number that cannot be.
     #[error("{what} is {value}, expected {expected}")]

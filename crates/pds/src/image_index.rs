@@ -107,7 +107,7 @@ pub struct ImageIndex {
 enum NoIndex {
     #[error("the label has no column {0}")]
     Column(&'static str),
-    #[error("not one row is an image; line {line}: {text}")]
+    #[error("no row describes an image; line {line}: {text}")]
     Rows { line: u64, text: String },
     #[error("the table is empty")]
     Empty,

@@ -60,11 +60,11 @@ pub enum LabelError {
         /// What it should be.
         expected: &'static str,
     },
-    /// Nothing says that the label is whole.
-    #[error("the label has no END; expected that statement behind its last line")]
+    /// No statement marks the end of the label.
+    #[error("the label has no END; expected that statement after its last line")]
     NoEnd,
     /// Two values under one keyword.
-    #[error("{key} stands in the label as {first:?} and as {second:?}; expected one value")]
+    #[error("{key} appears in the label as {first:?} and as {second:?}; expected one value")]
     Twice {
         /// The keyword.
         key: String,
@@ -84,7 +84,7 @@ pub enum LabelError {
         expected: &'static str,
     },
     /// Two values that are those of two images.
-    #[error("{} is {:?}, but {} is {:?}; expected those of one image", .keys[0], .values[0], .keys[1], .values[1])]
+    #[error("{} is {:?}, but {} is {:?}; expected values of one image", .keys[0], .values[0], .keys[1], .values[1])]
     Contradiction {
         /// Their keywords.
         keys: [String; 2],
@@ -109,9 +109,9 @@ impl Cause for LabelError {
     fn advice(&self) -> String {
         match self {
             Self::NoLabel => "give a PDS3 label (.lbl, .imq) or an ISIS label (.lbl, .cub)",
-            Self::NoEnd => "fetch the file again: its label is cut off or damaged",
+            Self::NoEnd => "fetch the file again: its label is truncated or damaged",
             Self::Twice { .. } => {
-                "find out which of the two holds, and leave only that in the label"
+                "determine which of the two values is correct, and keep only that one in the label"
             }
             Self::OtherImage { .. } => {
                 "give the label of an image that the camera's spacecraft took of Mars, as the camera took it"
@@ -120,11 +120,11 @@ impl Cause for LabelError {
                 "correct the label, or write the key in the image's table of the configuration"
             }
             Self::Instrument { .. } => {
-                "name the camera that took it with `instrument` in the image's table: one of those that areograph knows, or an \
-                 instrument file"
+                "set `instrument` in the image's table to the camera that took it: a camera known to areograph, or an instrument \
+                 file"
             }
             Self::Contradiction { .. } => {
-                "check that files and labels are not exchanged or renamed; one of the two is of another image"
+                "check that files and labels are not exchanged or renamed; one of them belongs to another image"
             }
         }
         .to_owned()
@@ -388,7 +388,7 @@ mod tests {
         assert_eq!(label.only("C"), Ok(None));
         assert_eq!(
             label.only("B").unwrap_err().to_string(),
-            "B stands in the label as \"2\" and as \"3 <km>\"; expected one value"
+            "B appears in the label as \"2\" and as \"3 <km>\"; expected one value"
         );
     }
 

@@ -141,7 +141,7 @@ mod tests {
             ),
             (
                 "LINE_EXPOSURE_DURATION = 0.4821\nLINE_EXPOSURE_DURATION = 0.4821 <S>",
-                "LINE_EXPOSURE_DURATION stands in the label as \"0.4821\" and as \"0.4821 <s>\"; expected one value",
+                "LINE_EXPOSURE_DURATION appears in the label as \"0.4821\" and as \"0.4821 <s>\"; expected one value",
             ),
             (
                 "SPACECRAFT_NAME = MARS_OBSERVER",

@@ -72,7 +72,7 @@ pub enum PixelFileError {
         expected: &'static str,
     },
     /// A cube whose pixels end before their last line.
-    #[error("the file has {found} bytes; expected {expected} by its label")]
+    #[error("the file has {found} bytes; expected {expected}, as its label states")]
     Short {
         /// Bytes of the file.
         found: u64,
@@ -99,7 +99,7 @@ impl Cause for PixelFileError {
             Self::Value { .. } => {
                 "give a cube of one band as ISIS writes it, with the pixels in the file"
             }
-            Self::Short { .. } => "fetch or write the cube again: it is cut off",
+            Self::Short { .. } => "fetch or write the cube again: it is truncated",
             Self::Picture { .. } => {
                 "give a whole picture of one band of grey with 8, 16 or 32 bits a pixel, a TIFF without compression, with LZW or with deflate"
             }

@@ -67,9 +67,9 @@ enum ShotTableError {
     },
     #[error("the table cannot be read: {0}")]
     Table(String),
-    #[error("not one of its {rows} rows is a shot; line {}: {}", first.line, first.text)]
+    #[error("none of its {rows} rows is a shot; line {}: {}", first.line, first.text)]
     Unreadable { rows: u64, first: RowComplaint },
-    #[error("it holds no row")]
+    #[error("it has no rows")]
     Empty,
 }
 
@@ -80,10 +80,11 @@ impl Cause for ShotTableError {
 
     fn advice(&self) -> String {
         match self {
-            Self::Column { .. } => "write the name of the column as the table has it, or its number, from 1",
-            Self::Table(_) | Self::Empty => "give a text table with commas, one row a shot",
+            Self::Column { .. } => "write the name of the column as in the table, or its number, from 1",
+            Self::Table(_) | Self::Empty => "give a comma-separated text table with one shot per row",
             Self::Unreadable { .. } => {
-                "compare shots.columns (or shots.layout) with the table: which column holds what, in which unit; and body"
+                "compare shots.columns (or shots.layout) with the table: the column and the unit of each quantity; also check \
+                 body"
             }
         }
         .to_owned()

@@ -21,14 +21,14 @@ pub(super) enum TableError {
         column: &'static str,
         expected: &'static str,
     },
-    #[error("the unit of column {column} is not known; expected the columns {expected}")]
+    #[error("the unit of column {column} is unknown; expected the columns {expected}")]
     Unit {
         column: String,
         expected: &'static str,
     },
     #[error("the table cannot be read: {0}")]
     Table(String),
-    #[error("not one of its rows can be read ({rows} in all); line {line}: {text}")]
+    #[error("none of its rows can be read ({rows} in all); line {line}: {text}")]
     Unreadable {
         rows: usize,
         line: u64,
@@ -52,11 +52,11 @@ impl Cause for Refused {
     fn advice(&self) -> String {
         match self.error {
             TableError::Unit { .. } => {
-                "give the coordinates in one of these units, which the names of the columns tell"
+                "give the coordinates in one of these units, which the column name states"
                     .to_owned()
             }
             _ => format!(
-                "give a comma-separated table with a header line; {} tells its columns",
+                "give a comma-separated table with a header line; {} describes its columns",
                 self.example
             ),
         }
@@ -153,7 +153,7 @@ pub(super) fn numbers(
     let number = |column: &usize| {
         let text = row.get(*column).unwrap_or_default();
         let number = text.parse().ok().filter(|number: &f64| number.is_finite());
-        number.ok_or_else(|| format!("{text:?} is no number"))
+        number.ok_or_else(|| format!("{text:?} is not a number"))
     };
     columns.iter().map(number).collect()
 }

@@ -51,7 +51,7 @@ enum TieError {
     Sigma(&'static str),
     #[error("the table cannot be read: {0}")]
     Table(String),
-    #[error("not one of its records can be read ({records} in all); record {record}: {text}")]
+    #[error("none of its records can be read ({records} in all); record {record}: {text}")]
     Unreadable {
         records: usize,
         record: u64,
@@ -352,12 +352,12 @@ mod tests {
         };
         assert_eq!(
             refused("1,A,,2\n1,B,3,x\n"),
-            "not one of its records can be read (2 in all); record 2: point_id \"1\", serial_number \"A\", sample \"\", line \
+            "none of its records can be read (2 in all); record 2: point_id \"1\", serial_number \"A\", sample \"\", line \
              \"2\": expected two names and two numbers"
         );
         assert_eq!(
             refused("1,A,1\n"),
-            "not one of its records can be read (1 in all); record 2: 3 fields; expected 4, as in the header"
+            "none of its records can be read (1 in all); record 2: 3 fields; expected 4, as in the header"
         );
         assert!(refused(",A,1,2\n").contains("point_id \"\""));
         assert!(readable(parse_table(b"point_id,serial_number,sample,line\n").unwrap()).is_ok());

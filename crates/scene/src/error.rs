@@ -79,9 +79,7 @@ pub enum SceneError {
         most: f64,
     },
     /// The kernels to fly along do not cover a single stretch of 20 s.
-    #[error(
-        "the kernels have no stretch of {least_s} s or more in which both orbit and attitude are known"
-    )]
+    #[error("the kernels have no interval of {least_s} s or more with both orbit and attitude")]
     NothingToFly {
         /// Shortest stretch that is flown, seconds.
         least_s: f64,

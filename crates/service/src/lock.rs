@@ -48,7 +48,7 @@ enum LockError {
     Taken(Owner),
     #[error("another service is using this folder")]
     TakenByUnknown,
-    #[error("the folder is on a network file system ({0}), where the database cannot be trusted")]
+    #[error("the folder is on a network file system ({0}), where the database is not safe")]
     Network(&'static str),
 }
 
@@ -63,10 +63,7 @@ impl Cause for LockError {
     fn advice(&self) -> String {
         match self {
             Self::Taken(owner) if !owner.address.is_empty() => {
-                format!(
-                    "look at http://{}, or end that process first",
-                    owner.address
-                )
+                format!("open http://{}, or end that process first", owner.address)
             }
             Self::Taken(_) | Self::TakenByUnknown => "end that process first".to_owned(),
             Self::Network(_) => "give outputs.state a folder on a local disk".to_owned(),

@@ -30,11 +30,11 @@ pub struct Started {
 /// An address, or a change, that a service does not take.
 #[derive(Debug, thiserror::Error)]
 enum Refused {
-    #[error("{0} is no address of this machine alone")]
+    #[error("{0} is not a loopback address")]
     Public(SocketAddr),
     #[error("{0} changed")]
     NeedsRestart(&'static str),
-    #[error("inputs.{0}: {1} is no folder that is there, and this service has never seen it")]
+    #[error("inputs.{0}: {1} is not an existing folder, and this service has never seen it")]
     NeverSeen(&'static str, String),
 }
 
@@ -50,7 +50,7 @@ impl Cause for Refused {
             }
             Self::NeedsRestart(_) => "restart the service, or put the former value back",
             Self::NeverSeen(..) => {
-                "correct the path, or mount the folder; one that was seen may be away later"
+                "correct the path, or mount the folder; a folder that was seen once may be unavailable later"
             }
         }
         .to_owned()

@@ -121,7 +121,7 @@ impl fmt::Display for JobState {
 
 /// A word that names no state.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0} is no state of a job")]
+#[error("unknown job state {0}")]
 pub struct UnknownState(String);
 
 impl FromStr for JobState {

@@ -44,7 +44,7 @@ impl fmt::Display for Role {
 
 /// A word that names no role.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0} is no role: read or operate")]
+#[error("unknown role {0}; expected read or operate")]
 pub struct UnknownRole(String);
 
 impl FromStr for Role {

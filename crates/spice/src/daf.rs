@@ -212,7 +212,7 @@ impl Reader {
         let bytes_needed = (first_free_word - 1) * 8;
         if !u64::try_from(bytes_needed).is_ok_and(|needed| needed <= self.size) {
             return Err(damaged(format!(
-                "{} bytes long; its file record says {bytes_needed}",
+                "{} bytes long; its file record states {bytes_needed}",
                 self.size
             )));
         }
@@ -231,11 +231,11 @@ impl Reader {
         while next.abs() > 0.0 || next.is_nan() {
             if !(next >= 1.0 && next.fract().abs() < f64::EPSILON) {
                 return Err(damaged(format!(
-                    "its summary records go on at record {next}; expected a whole number"
+                    "its summary records continue at record {next}; expected a whole number"
                 )));
             }
             if records_left == 0 {
-                return Err(damaged("its summary records form a circle".to_owned()));
+                return Err(damaged("its summary records form a cycle".to_owned()));
             }
             records_left -= 1;
             #[allow(

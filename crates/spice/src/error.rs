@@ -19,7 +19,7 @@ pub enum SpiceError {
         long: String,
     },
     /// A session is open on this thread already; waiting for it would never end.
-    #[error("a SPICE session is open on this thread already")]
+    #[error("a SPICE session is already open on this thread")]
     SessionOpen,
     /// The file is something else than a kernel that can be loaded.
     #[error("is {found}; expected {expected}")]
@@ -44,7 +44,7 @@ pub enum SpiceError {
         problem: String,
     },
     /// A metakernel names a file that is not there.
-    #[error("names {name}, which is not there{candidates}")]
+    #[error("names {name}, which does not exist{candidates}")]
     MissingKernel {
         /// Name after the path symbols were replaced.
         name: String,
@@ -196,7 +196,7 @@ impl Cause for SpiceError {
     fn advice(&self) -> String {
         match self {
             Self::Spice { .. } if self.kind() == Kind::Coverage => {
-                "add kernels that cover this time; `areograph kernels coverage` shows what is held"
+                "add kernels that cover this time; `areograph kernels coverage` shows the coverage"
             }
             Self::Spice { .. } => "check the value and the kernels that NAIF's message names",
             Self::MissingText { example, .. } => {
@@ -214,7 +214,7 @@ impl Cause for SpiceError {
             Self::NothingToSelect { .. } => {
                 "put the missing kernel under kernels.root, or name the kernels one by one"
             }
-            Self::KernelChanged { .. } => "run again once nothing writes to the kernel folder",
+            Self::KernelChanged { .. } => "run again when no program is writing to the kernel folder",
             Self::Unusable { .. } => "use shorter paths without control characters, for example by a link",
             Self::CoverageGap { .. } | Self::NoAttitude { .. } => {
                 "add kernels that fill the gap, or leave out the image or profile that needs it"

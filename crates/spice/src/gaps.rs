@@ -142,7 +142,7 @@ impl Session {
             let without = self.coverage()?.without_rates.iter();
             sentences.extend(without.map(|index| {
                 format!(
-                    "{} holds attitude without angular rates, which is not read",
+                    "{} holds attitude without angular rates, which areograph does not read",
                     name(*index)
                 )
             }));

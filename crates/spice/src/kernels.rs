@@ -118,7 +118,7 @@ impl KernelSet {
         if kernel.role == KernelRole::Meta {
             let error = SpiceError::NotAKernel {
                 found: "a metakernel".to_owned(),
-                expected: "a kernel; a metakernel stands alone and lists no other",
+                expected: "a kernel; a metakernel is given alone and lists no other",
             };
             return Err(error).in_file(path);
         }
@@ -218,7 +218,7 @@ fn first_bytes(path: &Path) -> Result<Vec<u8>> {
         .map_err(IoError::on("open kernel"))
         .in_file(path)?;
     if !metadata.is_file() {
-        return not_a_kernel(path, "no regular file");
+        return not_a_kernel(path, "not a regular file");
     }
     let mut start = Vec::new();
     File::open(path)

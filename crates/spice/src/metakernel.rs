@@ -136,7 +136,7 @@ fn listed_names(assignments: &[Assignment]) -> std::result::Result<Vec<String>, 
     let names = strings(assignments, "KERNELS_TO_LOAD")?;
     if names.is_empty() {
         return Err(SpiceError::NotAKernel {
-            found: "a metakernel that lists nothing".to_owned(),
+            found: "a metakernel that lists no kernels".to_owned(),
             expected: "names in KERNELS_TO_LOAD",
         });
     }
@@ -180,7 +180,7 @@ fn strings(
     if !begun.is_empty() {
         return Err(SpiceError::NotAKernel {
             found: format!("a metakernel whose {variable} ends with '+'"),
-            expected: "another string behind it",
+            expected: "another string after it",
         });
     }
     Ok(joined)

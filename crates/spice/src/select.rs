@@ -156,7 +156,7 @@ fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
                 files.push(entry.path());
             }
             if files.len() > FILES_MAX {
-                let what = format!("could be found among more than {FILES_MAX} files");
+                let what = format!("can be selected from more than {FILES_MAX} files");
                 return Err(SpiceError::NothingToSelect { what }).in_file(root);
             }
         }

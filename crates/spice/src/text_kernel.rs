@@ -56,12 +56,12 @@ pub(super) fn assignments(text: &str) -> Result<Vec<Assignment>, SpiceError> {
     let mut found = Vec::new();
     while let Some((line, token)) = tokens.next() {
         let Token::Word(name) = token else {
-            return Err(fault(line, format!("{token:?} where a name is due")));
+            return Err(fault(line, format!("{token:?} where a name is expected")));
         };
         let append = match tokens.next() {
             Some((_, Token::Equals)) => false,
             Some((_, Token::PlusEquals)) => true,
-            _ => return Err(fault(line, format!("no '=' or '+=' behind {name}"))),
+            _ => return Err(fault(line, format!("no '=' or '+=' after {name}"))),
         };
         let mut values = Vec::new();
         match tokens.next() {
@@ -203,7 +203,7 @@ mod tests {
                 "\\begindata\n\nA = ( 1",
                 "line 3: list of A is not closed by ')'",
             ),
-            ("\\begindata\nA 1", "line 2: no '=' or '+=' behind A"),
+            ("\\begindata\nA 1", "line 2: no '=' or '+=' after A"),
             ("\\begindata\nA =", "line 2: no value for A"),
         ] {
             assert_eq!(assignments(text).unwrap_err().to_string(), expected);

@@ -73,7 +73,7 @@ impl Cause for ChangedFile {
     }
 
     fn advice(&self) -> String {
-        "run again when nobody is writing to the input files".to_owned()
+        "run again when no other program is writing to the input files".to_owned()
     }
 }
 

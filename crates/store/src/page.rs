@@ -19,7 +19,7 @@ pub const SITES_PAGE: &str = "index.html";
 #[derive(Debug, thiserror::Error)]
 pub enum PageError {
     /// Replacing it would take away something else than a file.
-    #[error("is {found}; a page replaces a regular file, or nothing")]
+    #[error("is {found}; a page can replace a regular file only")]
     NotAFile {
         /// What is there.
         found: &'static str,
@@ -130,6 +130,6 @@ fn kind_of(found: FileType) -> &'static str {
     if found.is_dir() {
         "a folder"
     } else {
-        "no regular file"
+        "not a regular file"
     }
 }

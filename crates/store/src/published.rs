@@ -19,13 +19,13 @@ pub enum PublishedError {
     #[error("the publication of products into this folder was not finished")]
     Unfinished,
     /// The manifest is damaged, or of a version with other entries.
-    #[error("this is no manifest of areograph {}: {reason}", env!("CARGO_PKG_VERSION"))]
+    #[error("this is not a manifest of areograph {}: {reason}", env!("CARGO_PKG_VERSION"))]
     Unreadable {
         /// The parser's reason, with line and column.
         reason: String,
     },
     /// Products of a version that may have computed or kept other things.
-    #[error("these are products of areograph {found}; expected {}, which this is", env!("CARGO_PKG_VERSION"))]
+    #[error("these are products of areograph {found}; expected {}, the running version", env!("CARGO_PKG_VERSION"))]
     OtherVersion {
         /// That version.
         found: String,
@@ -43,7 +43,7 @@ pub enum PublishedError {
         expected: String,
     },
     /// Another run published meanwhile.
-    #[error("products were published again while they were read")]
+    #[error("the products were published again while they were being read")]
     Replaced,
 }
 
@@ -60,9 +60,11 @@ impl Cause for PublishedError {
             Self::NoManifest => "name a site's folder of products, and run the site to the end",
             Self::Unfinished => "wait for the run in progress, or run the site again to repair it",
             Self::Unreadable { .. } | Self::Contradicts { .. } => {
-                "run the site again, which writes damaged products again"
+                "run the site again: damaged products are written anew"
             }
-            Self::OtherVersion { .. } => "run the site again with this version, or use that one",
+            Self::OtherVersion { .. } => {
+                "run the site again with this version, or use the other version"
+            }
             Self::Replaced => "try again when the run has finished",
         }
         .to_owned()

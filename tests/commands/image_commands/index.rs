@@ -464,7 +464,7 @@ fn what_is_no_index_is_refused_with_its_line() {
         (
             "a,b,c\r\n",
             3,
-            "not one row is an image; line 1: 3 fields; expected 53",
+            "no row describes an image; line 1: 3 fields; expected 53",
         ),
         (
             &CYDONIA.replace("12160", "many"),

@@ -151,7 +151,7 @@ fn what_stands_in_for_an_image_is_refused_with_its_reason() {
     let cases = [
         (
             whole[..whole.len() - 1].to_vec(),
-            "the file has 102399 bytes; expected 102400 by its label",
+            "the file has 102399 bytes; expected 102400, as its label states",
         ),
         (
             replaced("Bands = 1", "Bands = 3"),

@@ -21,7 +21,7 @@ pub enum BundleError {
         expected: &'static str,
     },
     /// An index of a point, image or profile that the network does not have.
-    #[error("{part} belongs to {missing}, which the network does not have")]
+    #[error("{part} belongs to {missing}, which is not in the network")]
     Unmatched {
         /// View or range.
         part: Part,

@@ -432,13 +432,13 @@ fn what_the_network_does_not_have_is_told() {
     let error = solve(&lost, &BundleOptions::default()).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "view 3 belongs to point 99, which the network does not have"
+        "view 3 belongs to point 99, which is not in the network"
     );
     let mut lost = network();
     lost.ranges[1].profile = 7;
     let error = solve(&lost, &BundleOptions::default()).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "range 1 belongs to profile 7, which the network does not have"
+        "range 1 belongs to profile 7, which is not in the network"
     );
 }

@@ -29,7 +29,7 @@ pub enum CalibrationError {
     #[error("the adjustment does not converge in {STEPS_MAX} steps")]
     NotConverged,
     /// A free combination has no standard deviation beforehand and is seen by nothing.
-    #[error("the points do not determine what is free")]
+    #[error("the points do not determine the free parameters")]
     Singular,
 }
 

@@ -58,7 +58,7 @@ struct CurvePoint {
 /// A line of which two samples look into one direction, or one looks back.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
-    "pixel {pixel:.1} of the detector looks no farther across the track than its neighbour nearer to the boresight"
+    "pixel {pixel:.1} of the detector does not look farther across the track than its neighbour nearer to the boresight"
 )]
 pub struct FoldedLine {
     /// Pixel, from the outer edge of the first one.

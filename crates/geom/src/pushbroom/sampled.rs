@@ -47,7 +47,7 @@ pub enum SamplesError {
         before: f64,
     },
     /// A position that is not finite, or a matrix that is no rotation.
-    #[error("sample {row} is no position with a rotation (determinant {determinant})")]
+    #[error("sample {row} is not a position with a valid rotation (determinant {determinant})")]
     NotAPose {
         /// Sample, counted from 0.
         row: usize,

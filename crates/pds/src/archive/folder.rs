@@ -34,7 +34,7 @@ impl Cause for Compressed {
     }
 
     fn advice(&self) -> String {
-        "decompress it (gunzip, unzip) where it lies, or move it out of the archive".to_owned()
+        "decompress it (gunzip, unzip) in place, or move it out of the archive".to_owned()
     }
 }
 

@@ -46,7 +46,7 @@ impl Cause for Damaged {
     }
 
     fn advice(&self) -> String {
-        "the file was damaged on its way: fetch it again, or leave it out".to_owned()
+        "the file was damaged in transfer: fetch it again, or leave it out".to_owned()
     }
 }
 

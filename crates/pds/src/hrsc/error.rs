@@ -5,7 +5,7 @@ use areograph_base::error::{Cause, Kind};
 /// A file whose rows cannot be read, or are not those of its label.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum HrscError {
-    #[error("the label stands alone; expected the rows of the image behind it")]
+    #[error("the file holds a label only; expected the rows of the image after it")]
     NoRows,
     #[error("the label has no {key}; expected {expected}")]
     Lacking {
@@ -19,7 +19,7 @@ pub(crate) enum HrscError {
         expected: String,
     },
     #[error(
-        "the file has {found} bytes; expected {expected}, as FILE_RECORDS and RECORD_BYTES of its label say"
+        "the file has {found} bytes; expected {expected}, as FILE_RECORDS and RECORD_BYTES of its label state"
     )]
     Size { found: u64, expected: u64 },
     #[error(
@@ -32,27 +32,25 @@ pub(crate) enum HrscError {
         end: u64,
         bytes: u64,
     },
-    #[error("{key} of the VICAR label is {vicar}; expected {expected}, as the PDS label says")]
+    #[error("{key} of the VICAR label is {vicar}; expected {expected}, as the PDS label states")]
     Vicar {
         key: &'static str,
         vicar: u64,
         expected: u64,
     },
-    #[error(
-        "SAMPLE_TYPE is {stated:?}, but {because}; expected samples in the order that it tells"
-    )]
+    #[error("SAMPLE_TYPE is {stated:?}, but {because}; expected samples in the stated byte order")]
     ByteOrder { stated: String, because: String },
     #[error(
-        "{known} of {lines} rows have a time and an exposure in their prefixes; expected all of them, or nearly so"
+        "{known} of {lines} rows have a time and an exposure in their prefixes; expected all of them, or nearly all"
     )]
     NoTimes { known: usize, lines: usize },
     #[error(
-        "rows {first} to {last} have no time in their prefixes, and those beside them do not tell it"
+        "rows {first} to {last} have no time in their prefixes, and adjacent rows do not determine it"
     )]
     TimeGap { first: usize, last: usize },
     #[error(
-        "row {row} begins {early_s:.6} s before the exposure of the row before it ends, and rows beside them do not tell \
-         which time is wrong"
+        "row {row} begins {early_s:.6} s before the exposure of the preceding row ends, and adjacent rows do not determine which \
+         time is wrong"
     )]
     Overlap { row: usize, early_s: f64 },
 }
@@ -69,10 +67,10 @@ impl Cause for HrscError {
                 "give a level-2 file of the archive (h…2.IMG) as it was delivered"
             }
             Self::Size { .. } | Self::Rows { .. } => {
-                "fetch the file again: it is cut off, prolonged, or not as the archive delivers it"
+                "fetch the file again: it is truncated, extended, or differs from the archive"
             }
             Self::Vicar { .. } => {
-                "fetch the file again: its labels are those of two images, or one of them was edited"
+                "fetch the file again: its labels belong to two images, or one of them was edited"
             }
             Self::ByteOrder { .. } => {
                 "fetch the file again: its samples were swapped after the label was written, or its label was edited"

@@ -37,8 +37,7 @@ pub(super) fn image_label(label: &Label, cameras: &[Instrument]) -> Result<Image
     if let Some(entry) = either(label, DETECTOR[0], DETECTOR[1])?
         && entry.value.eq_ignore_ascii_case(FRAME_CAMERA)
     {
-        let expected =
-            "one of the nine lines; this is the frame camera beside them, which is not modelled";
+        let expected = "one of the nine lines; the frame camera beside them is not modelled";
         return Err(other_image(&entry.key, &entry.value, expected));
     }
     let instrument = camera(label, cameras, DETECTOR)?;

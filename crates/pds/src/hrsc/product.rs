@@ -106,7 +106,7 @@ mod tests {
         let product = "PRODUCT_ID = H5270_0000_IR2.IMG\n";
         assert_eq!(
             refused(&format!("{product}DETECTOR_ID = MEX_HRSC_S1\n"), "a.img"),
-            "PRODUCT_ID is \"H5270_0000_IR2.IMG\", but DETECTOR_ID is \"MEX_HRSC_S1\"; expected those of one image"
+            "PRODUCT_ID is \"H5270_0000_IR2.IMG\", but DETECTOR_ID is \"MEX_HRSC_S1\"; expected values of one image"
         );
         assert!(
             refused(&format!("{product}FILE_NAME = H5270_0000_S12.IMG\n"), "a")

@@ -92,7 +92,7 @@ impl Raster {
         let prefix = [PREFIX_BYTES_MIN as u64, PREFIX_BYTES_MAX];
         let raster = Self {
             start: start(pointer, record_bytes, bytes)?,
-            prefix_bytes: whole(label, "LINE_PREFIX_BYTES", prefix, "68, or 12 at least")?,
+            prefix_bytes: whole(label, "LINE_PREFIX_BYTES", prefix, "68, or at least 12")?,
             lines: short(whole(label, "LINES", [1, LINES_MAX], "a number of lines")?),
             samples: short(whole(
                 label,
@@ -204,12 +204,12 @@ impl Raster {
         let because = match ends {
             [Some(low), Some(high)] if stated.outside == 0 || other.outside == 0 => {
                 (stated.outside > 0).then(|| {
-                    format!("samples lie from {low} to {high} (MINIMUM, MAXIMUM) in the other order of bytes alone")
+                    format!("only the other byte order gives samples from {low} to {high} (MINIMUM, MAXIMUM)")
                 })
             }
             _ => (stated.rough > ROUGHER * other.rough).then(|| {
                 let times = stated.rough / other.rough.max(f64::MIN_POSITIVE);
-                format!("neighbouring samples are {times:.0} times more alike in the other order of bytes")
+                format!("neighbouring samples are {times:.0} times more alike in the other byte order")
             }),
         };
         match because {

@@ -124,7 +124,7 @@ impl fmt::Display for Fault {
             Self::Lost { fragments } => {
                 write!(formatter, "the {fragments} fragments before it are lost")
             }
-            Self::Repeated => formatter.write_str("this fragment was there before; it is ignored"),
+            Self::Repeated => formatter.write_str("this fragment is a duplicate; it is ignored"),
             Self::CutOff { lacking } => write!(
                 formatter,
                 "the file ends within the fragment; {lacking} bytes are lacking"
@@ -134,14 +134,15 @@ impl fmt::Display for Fault {
             }
             Self::LostSync { next: Some(next) } => write!(
                 formatter,
-                "no uncompressed line where one is due; the next one is at byte {next}"
+                "no uncompressed line where one is expected; the next one is at byte {next}"
             ),
-            Self::LostSync { next: None } => formatter
-                .write_str("no uncompressed line where one is due, nor later; the image ends here"),
+            Self::LostSync { next: None } => formatter.write_str(
+                "no uncompressed line where one is expected, nor later; the image ends here",
+            ),
             Self::TooMany => formatter.write_str("more than 65536 fragments; the rest is ignored"),
             Self::TooManyLines { header, possible } => write!(
                 formatter,
-                "{header} lines in the header, of which the data can be no part; {possible} are believed"
+                "{header} lines in the header, more than the data can hold; {possible} are used"
             ),
             Self::TooLarge => {
                 formatter.write_str("more pixels than the data can hold; the fragment is ignored")

@@ -57,7 +57,9 @@ pub enum EncodeError {
         pixels: usize,
     },
     /// A coding that is only read.
-    #[error("{0:?} is only read; expected raw, prediction with a table from 0 to 6, or cosines")]
+    #[error(
+        "{0:?} can only be read; expected raw, prediction with a table from 0 to 6, or cosines"
+    )]
     Coding(Coding),
 }
 

@@ -28,7 +28,7 @@ use areograph_base::{
 #[non_exhaustive]
 pub enum ImageFileError {
     /// A label alone, or of something else.
-    #[error("the label describes no image in this file: {lacking} is not there")]
+    #[error("the label describes no image in this file: {lacking} is missing")]
     NoImage {
         /// What an image has.
         lacking: &'static str,
@@ -73,7 +73,7 @@ impl Cause for ImageFileError {
             }
             Self::Raster { .. } => "give an .imq or .img file of the archive, with 8 bits a pixel",
             Self::Pointer { .. } | Self::NoFragment { .. } => {
-                "fetch the file again: it is cut off or damaged"
+                "fetch the file again: it is truncated or damaged"
             }
         }
         .to_owned()

@@ -109,7 +109,7 @@ pub(super) fn of_label(label: &Label) -> Vec<Column> {
 /// The fields of a row by the names of its columns, without quotes and blanks around them; a doubled quote within quotes is
 /// one.
 pub(super) fn fields<'a>(row: &'a [u8], columns: &'a [Column]) -> Result<Fields<'a>, String> {
-    let row = std::str::from_utf8(row).map_err(|_| "no text of ASCII".to_owned())?;
+    let row = std::str::from_utf8(row).map_err(|_| "not ASCII text".to_owned())?;
     let separated = separated(row);
     if separated.len() == columns.len() && separated.iter().all(|field| is_whole(field)) {
         let separated = separated.into_iter().map(unquoted);

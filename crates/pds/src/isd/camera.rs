@@ -147,7 +147,7 @@ pub(super) fn camera(
         Ok(()) => Ok((instrument, turn)),
         Err(folded) => Err(document.refused(
             "optical_distortion",
-            format!("coefficients with which samples follow each other; with these {folded}"),
+            format!("coefficients that keep the samples in order; with these {folded}"),
         )),
     }
 }
@@ -220,8 +220,7 @@ fn identifier(name: &str) -> String {
 /// The law of distortion, by the name that usgscsm knows it under.
 fn distortion(document: &Object<'_>, turned_rad: f64) -> Result<DistortionModel, IsdError> {
     const KEY: &str = "optical_distortion";
-    const KNOWN: &str =
-        "one of the distortions radial, lrolrocnac, of which the others are not known to areograph";
+    const KNOWN: &str = "one of the distortions radial, lrolrocnac; areograph supports no others";
     let table = document.object(KEY)?;
     let [name] = table.keys()[..] else {
         return Err(document.refused(KEY, KNOWN));

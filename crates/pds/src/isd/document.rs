@@ -12,7 +12,7 @@ const SHOWN: usize = 60;
 /// Support data that are not what they should be.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(super) enum IsdError {
-    #[error("no image support data: {0}; expected a JSON document of one object")]
+    #[error("not image support data: {0}; expected a JSON document of one object")]
     NotJson(String),
     #[error("{bytes} bytes; expected image support data of at most {max} bytes")]
     TooLarge { bytes: u64, max: u64 },
@@ -32,8 +32,8 @@ impl Cause for IsdError {
     }
 
     fn advice(&self) -> String {
-        "write the support data anew with the program that made them (ALE's isd_generate), or take the image by label \
-         and kernels"
+        "regenerate the support data with the program that made them (ALE's isd_generate), or configure the image by label and \
+         kernels"
             .to_owned()
     }
 }

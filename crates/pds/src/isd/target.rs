@@ -56,7 +56,7 @@ impl Cause for ForeignBody {
     fn advice(&self) -> String {
         let (Self::Code { body, .. } | Self::Radii { body, .. }) = self;
         format!(
-            "leave the image out, or write the body that its support data are of: expected is {body} (body = \"{}\")",
+            "leave the image out, or set body to that of its support data; the configuration expects {body} (body = \"{}\")",
             body.word()
         )
     }

@@ -244,7 +244,7 @@ mod tests {
             (
                 |record| record.time_fraction_us.set(250_003),
                 Reason::Time,
-                "the times of the record are 38000000.25 s and 38000000.250003 s; expected equal to 1e-6 s",
+                "the times of the record are 38000000.25 s and 38000000.250003 s; expected agreement within 1e-6 s",
             ),
             (
                 |record| {

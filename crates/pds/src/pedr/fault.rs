@@ -67,7 +67,7 @@ pub enum RecordError {
     )]
     OutsideMission(f64),
     /// The double and the two integers disagree.
-    #[error("the times of the record are {} s and {integers_s} s; expected equal to 1e-6 s", legible(*.time_s))]
+    #[error("the times of the record are {} s and {integers_s} s; expected agreement within 1e-6 s", legible(*.time_s))]
     TwoTimes {
         /// From the double, ET seconds.
         time_s: f64,
@@ -75,11 +75,11 @@ pub enum RecordError {
         integers_s: f64,
     },
     /// The record is not between its neighbours.
-    #[error("time is {} s, out of the order of the neighbouring records", legible(*.0))]
+    #[error("time is {} s, out of order with the neighbouring records", legible(*.0))]
     Order(f64),
     /// The same shots stand in another record of the file.
     #[error(
-        "time is {time_s} s, the shots of record {record} once more; expected every shot once, frames {} s or more apart",
+        "time is {time_s} s, which repeats the shots of record {record}; expected every shot once, frames {} s or more apart",
         bounds::APART_S
     )]
     Repeated {
@@ -157,8 +157,8 @@ pub enum RecordError {
     },
     /// Range against the record's own positions.
     #[error(
-        "range of shot {shot} is {range_m:.2} m, but spacecraft and footprint are {distance_m:.2} m apart; expected \
-         equal to {limit_m:.1} m{}", and_more(*.shots)
+        "range of shot {shot} is {range_m:.2} m, but spacecraft and footprint are {distance_m:.2} m apart; expected agreement \
+         within {limit_m:.1} m{}", and_more(*.shots)
     )]
     Distance {
         /// The first shot, 1 to 20.
@@ -175,7 +175,7 @@ pub enum RecordError {
     /// Parallax against the direction of the beam.
     #[error(
         "parallax in {whose} is {found:.4} m on the ground per metre of radius; expected {expected:.4} along the beam, \
-         to {limit:.4}"
+         within {limit:.4}"
     )]
     Parallax {
         /// "latitude" or "longitude".
@@ -218,7 +218,7 @@ pub enum RecordError {
     },
     /// A value that does not continue that of a neighbour.
     #[error(
-        "{} is {value} {}, {apart:.1} {} from where record {record} leads; expected at most {limit:.1} {}",
+        "{} is {value} {}, {apart:.1} {} from the extrapolation of record {record}; expected at most {limit:.1} {}",
         .quantity.name(), .quantity.unit(), .quantity.step_unit(), .quantity.step_unit()
     )]
     Neighbours {
@@ -291,7 +291,7 @@ mod tests {
         };
         assert_eq!(
             told(-1.25e300),
-            "the times of the record are -1.25e300 s and 4.5 s; expected equal to 1e-6 s"
+            "the times of the record are -1.25e300 s and 4.5 s; expected agreement within 1e-6 s"
         );
         assert!(told(-1.5e-308).contains("are -1.5e-308 s and"));
         let order = RecordError::Order(-1.5e-308).to_string();

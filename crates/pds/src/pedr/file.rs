@@ -67,7 +67,7 @@ impl Cause for NotAFile {
 
 /// A file without a single good record.
 #[derive(Debug, thiserror::Error)]
-#[error("no good record: {why}")]
+#[error("no valid record: {why}")]
 struct NoGoodRecord {
     why: String,
     foreign: Option<Foreign>,
@@ -325,7 +325,7 @@ impl File {
             (None, None, Some(bad)) => {
                 format!("record {}: {}", self.record_number(bad.row), bad.error)
             }
-            (None, None, None) => format!("nothing of {RECORD_BYTES} bytes follows the label"),
+            (None, None, None) => format!("no record of {RECORD_BYTES} bytes follows the label"),
         };
         Error::from(NoGoodRecord { why, foreign }).in_file(&self.path)
     }

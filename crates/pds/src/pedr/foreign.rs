@@ -33,7 +33,7 @@ impl Foreign {
     /// What to do with it.
     pub(super) const fn advice(self) -> &'static str {
         match self {
-            Self::Gzip => "decompress it (gunzip), and name the file that comes of it",
+            Self::Gzip => "decompress it (gunzip), and name the resulting file",
             Self::LittleEndian => {
                 "fetch the archive's file: PEDR records are big-endian, and a program has swapped these"
             }

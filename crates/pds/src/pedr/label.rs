@@ -127,7 +127,7 @@ impl PedrLabel {
         let data_set = self.data_set_id.as_deref().unwrap_or("not given");
         if !data_set.starts_with(DATA_SET) {
             found.push(format!(
-                "DATA_SET_ID of the label is {data_set}; expected {DATA_SET}-..., as every PEDR has it"
+                "DATA_SET_ID of the label is {data_set}; expected {DATA_SET}-..., as in every PEDR"
             ));
         }
         found
@@ -185,11 +185,11 @@ fn datums_in(text: &str) -> Vec<Datum> {
 pub enum DatumError {
     /// Neither name nor label tell.
     #[error(
-        "the datum is not known: the name has no version letter A to L and the label names no datum"
+        "the datum is unknown: the file name has no version letter A to L and the label names no datum"
     )]
     Undecided,
     /// Two sources disagree.
-    #[error("{first} means {first_datum}, but {second} means {second_datum}")]
+    #[error("{first} implies {first_datum}, but {second} implies {second_datum}")]
     Contradiction {
         /// One source.
         first: DatumSource,
@@ -231,7 +231,7 @@ impl Cause for DatumError {
     fn advice(&self) -> String {
         match self {
             Self::Undecided => {
-                "state pedr.datum in the configuration (iau1991, iau1994 or iau2000), or restore the archive's file name"
+                "set pedr.datum in the configuration (iau1991, iau1994 or iau2000), or restore the archive's file name"
             }
             Self::Contradiction { .. } => {
                 "check whether the file was renamed or converted; version L is iau2000, earlier versions iau1991"
@@ -326,7 +326,7 @@ mod tests {
                 None,
                 None,
                 Err(
-                    "the datum is not known: the name has no version letter A to L and the label names no datum",
+                    "the datum is unknown: the file name has no version letter A to L and the label names no datum",
                 ),
             ),
             (
@@ -334,21 +334,21 @@ mod tests {
                 Some('M'),
                 None,
                 Err(
-                    "the datum is not known: the name has no version letter A to L and the label names no datum",
+                    "the datum is unknown: the file name has no version letter A to L and the label names no datum",
                 ),
             ),
             (
                 auto,
                 Some('L'),
                 Some(Iau1991),
-                Err("version letter L means iau2000, but the label means iau1991"),
+                Err("version letter L implies iau2000, but the label implies iau1991"),
             ),
             (
                 stated(Iau1991),
                 Some('L'),
                 None,
                 Err(
-                    "version letter L means iau2000, but pedr.datum in the configuration means iau1991",
+                    "version letter L implies iau2000, but pedr.datum in the configuration implies iau1991",
                 ),
             ),
             (
@@ -356,14 +356,16 @@ mod tests {
                 Some('A'),
                 None,
                 Err(
-                    "version letter A means iau1991, but pedr.datum in the configuration means iau2000",
+                    "version letter A implies iau1991, but pedr.datum in the configuration implies iau2000",
                 ),
             ),
             (
                 stated(Iau1994),
                 None,
                 Some(Iau1991),
-                Err("the label means iau1991, but pedr.datum in the configuration means iau1994"),
+                Err(
+                    "the label implies iau1991, but pedr.datum in the configuration implies iau1994",
+                ),
             ),
         ];
         for (choice, letter, label, expected) in cases {

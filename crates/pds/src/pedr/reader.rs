@@ -74,7 +74,7 @@ impl Cause for Changed {
     }
 
     fn advice(&self) -> String {
-        "run again when nobody is writing to the PEDR files".to_owned()
+        "run again when no other program is writing to the PEDR files".to_owned()
     }
 }
 

@@ -141,7 +141,7 @@ impl TiffRows {
             DecodingResult::F64(numbers) => numbers,
             _ => {
                 return Err(Picture::Tiff
-                    .refused("numbers of another kind; expected 8 bits without a sign, 16 or 32"));
+                    .refused("pixels of another type; expected 8 unsigned bits, 16 or 32 bits"));
             }
         })
     }
@@ -213,7 +213,7 @@ impl PngRows {
         let info = reader.info();
         let size = Picture::Png.check_size(info.height, info.width)?;
         if info.interlaced {
-            return Err(Picture::Png.refused("interlaced; expected lines in their order"));
+            return Err(Picture::Png.refused("interlaced; expected lines in sequence"));
         }
         let (colour, depth) = reader.output_color_type();
         let numbers = match colour {

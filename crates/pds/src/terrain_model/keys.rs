@@ -75,7 +75,7 @@ impl GeoKeys {
                     refused(
                         "GeoKeyDirectory",
                         format!("key {key} is number {value} of {}", doubles.len()),
-                        "a number that there is",
+                        "an existing number",
                     )
                 })?),
                 _ => None,

@@ -57,10 +57,12 @@ pub enum TerrainModelError {
         columns: u32,
     },
     /// No radius is known.
-    #[error("no key tells the sphere that its heights count from")]
+    #[error("no key defines the reference sphere of its heights")]
     NoRadius,
     /// Two radii.
-    #[error("the sphere of its map has {of_file} m, and heights are said to count from {given} m")]
+    #[error(
+        "the sphere of its map has a radius of {of_file} m; the stated radius of the heights is {given} m"
+    )]
     TwoRadii {
         /// By the file.
         of_file: f64,
@@ -92,7 +94,7 @@ pub enum TerrainModelError {
         value: f64,
     },
     /// No cell has a height.
-    #[error("not one of its cells has a height")]
+    #[error("none of its cells has a height")]
     Empty,
 }
 
@@ -105,7 +107,7 @@ impl Cause for TerrainModelError {
         match self {
             Self::Tiff(_) | Self::TooLarge { .. } => {
                 "give a whole GeoTIFF of one band without compression, with LZW or with deflate (gdal_translate -co COMPRESS=DEFLATE), \
-                 cut to what is needed (-projwin)"
+                 cut to the area needed (-projwin)"
             }
             Self::Georeference { .. } => {
                 "give heights over longitude and latitude or in an equirectangular map about a sphere, in degrees or metres: \
@@ -115,13 +117,13 @@ impl Cause for TerrainModelError {
                 "state it with --radius-m; Mars has models above 3396000 m and above 3396190 m"
             }
             Self::TwoRadii { .. } => {
-                "leave --radius-m out, or add --heights-apart if heights truly count from another sphere than the map is of"
+                "leave --radius-m out, or add --heights-apart if heights refer to another sphere than the map"
             }
             Self::OtherBody { .. } => "give a model of this body, its radius in metres",
             Self::NoHeight { .. } => {
-                "name the number that stands for no height in the file (gdal_edit.py -a_nodata), and give heights in metres"
+                "set the no-data value of the file (gdal_edit.py -a_nodata), and give heights in metres"
             }
-            Self::Empty => "look at the file, and at the number that it says stands for no height",
+            Self::Empty => "check the file and its no-data value",
         }
         .to_owned()
     }

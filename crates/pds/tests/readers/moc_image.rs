@@ -165,7 +165,7 @@ fn what_is_no_image_is_refused_with_what_was_expected() {
         (
             format!("{head}{image}"),
             10,
-            "the label describes no image in this file: ^IMAGE is not there",
+            "the label describes no image in this file: ^IMAGE is missing",
         ),
         (
             format!("{head}^IMAGE = 3\n{image}"),
@@ -185,7 +185,7 @@ fn what_is_no_image_is_refused_with_what_was_expected() {
         (
             format!("{head}^IMAGE = 2\n"),
             0,
-            "the label has no END; expected that statement behind its last line",
+            "the label has no END; expected that statement after its last line",
         ),
     ] {
         assert_eq!(refused(&label, pixels), message);

@@ -57,7 +57,7 @@ pub enum DatabaseError {
     #[error("the database is damaged: {0}")]
     Damaged(String),
     /// A newer areograph wrote it.
-    #[error("the database has layout {found}, this areograph knows layouts up to {VERSION}")]
+    #[error("the database has layout {found}; this areograph supports layouts up to {VERSION}")]
     Newer {
         /// Its layout.
         found: i64,
@@ -66,7 +66,7 @@ pub enum DatabaseError {
     #[error("the path {} is not UTF-8", .0.display())]
     Path(PathBuf),
     /// The system has no random numbers.
-    #[error("no random numbers: {0}")]
+    #[error("random numbers are not available: {0}")]
     NoRandom(String),
     /// A job cannot go where it was sent.
     #[error(transparent)]

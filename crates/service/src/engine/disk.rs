@@ -46,7 +46,7 @@ pub fn has_room<W: Workers>(core: &Core<W>) -> Stored<bool> {
         (products, in_products)
     };
     let text = format!(
-        "{} has {left} MiB left, less than workers.min_free_mib = {least_mib}: no job begins",
+        "{} has {left} MiB left, less than workers.min_free_mib = {least_mib}: no job starts",
         folder.display()
     );
     let alert = Alert {
@@ -83,7 +83,7 @@ pub fn reserve(state: &Path, free_mib: u64, least_mib: u64) {
 pub fn give_up_reserve(state: &Path) {
     if fs::remove_file(state.join(RESERVE)).is_ok() {
         tracing::warn!(
-            "the disk of {} is full: the reserve is given up",
+            "the disk of {} is full: the reserve is released",
             state.display()
         );
     }

@@ -52,7 +52,7 @@ pub fn read_list(
     if whole {
         return Ok(files);
     }
-    Err("the list of its files has no end".to_owned())
+    Err("the list of its files is incomplete".to_owned())
 }
 
 /// Whether a file is an input: site files lie directly in their folder, and rsync and others name unfinished files so that

@@ -307,10 +307,9 @@ impl Context<'_> {
         let pending = pending_job(connection, &site.name)?.is_some();
         Ok(match &site.current_run {
             None if site.round == 0 && !pending => (CauseKind::First, "the site is new"),
-            _ if self.night.is_some() => (
-                CauseKind::Scheduled,
-                "its products are not those of its inputs",
-            ),
+            _ if self.night.is_some() => {
+                (CauseKind::Scheduled, "its products do not match its inputs")
+            }
             _ => (
                 CauseKind::RetryOf,
                 "an earlier job ended without products of its inputs",

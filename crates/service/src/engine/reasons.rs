@@ -23,7 +23,7 @@ pub fn decision(causes: &[CauseRow], answer: &PlanAnswer) -> String {
     let runs = stages(&answer.stages);
     match (changed.is_empty(), runs.is_empty()) {
         (true, true) => "checked, nothing changed".to_owned(),
-        (false, true) => format!("{}; no stage reads what changed", several(&changed)),
+        (false, true) => format!("{}; no stage reads the changed inputs", several(&changed)),
         (true, false) => format!("{} run", listed("stage", &runs)),
         (false, false) => format!("{}; {} run", several(&changed), listed("stage", &runs)),
     }

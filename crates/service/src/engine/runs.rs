@@ -41,7 +41,7 @@ pub struct Published {
 /// The folder holds another run than it should.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "this is the run of job {job}, attempt {attempt}, named {run}; expected that of its folder"
+    "this run belongs to job {job}, attempt {attempt}, and is named {run}; expected the run of its folder"
 )]
 struct Foreign {
     job: i64,

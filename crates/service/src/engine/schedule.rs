@@ -36,7 +36,7 @@ impl Cause for BadSchedule {
     }
 
     fn advice(&self) -> String {
-        "give five fields as in `30 2 * * *` that name an instant which comes".to_owned()
+        "give five fields as in `30 2 * * *` that match a future instant".to_owned()
     }
 }
 
@@ -73,7 +73,7 @@ impl Schedule {
         };
         match schedule.next_after(now_ms) {
             Some(_) => Ok(schedule),
-            None => Err(bad("it names no instant that ever comes".to_owned())),
+            None => Err(bad("it matches no future instant".to_owned())),
         }
     }
 

@@ -70,9 +70,17 @@ pub async fn scrub_files<W: Workers>(core: &Arc<Core<W>>) -> Stored<()> {
             };
             if !same {
                 let name = file_name(Path::new(&old.path));
-                let text = format!("`{name}` has another content, though the file system says that it did not change");
+                let text = format!(
+                    "`{name}` has different content, although the file system reports no change"
+                );
                 tracing::warn!("{text}");
-                append(transaction, now_ms, "file", About::default(), &json!({ "path": name, "text": text }))?;
+                append(
+                    transaction,
+                    now_ms,
+                    "file",
+                    About::default(),
+                    &json!({ "path": name, "text": text }),
+                )?;
             }
             put_file(transaction, &checked)?;
         }

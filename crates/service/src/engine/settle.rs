@@ -219,7 +219,7 @@ async fn probe<W: Workers>(
         return Ok(Err(words(&ended)));
     };
     if kernels.len() != count {
-        return Ok(Err("the worker did not tell of every kernel".to_owned()));
+        return Ok(Err("the worker did not report every kernel".to_owned()));
     }
     core.shared.write(|transaction| {
         for Probed {

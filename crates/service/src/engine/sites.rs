@@ -160,7 +160,7 @@ pub fn bring_in_line(
     let mut named: BTreeMap<&str, &str> = BTreeMap::new();
     for (path, (_, file)) in &book.read {
         if let Some(first) = named.get(&*file.name) {
-            tracing::warn!("{path}: the site {} is already that of {first}", file.name);
+            tracing::warn!("{path}: site {} is already defined by {first}", file.name);
             continue;
         }
         named.insert(&file.name, path);

@@ -97,8 +97,8 @@ fn unavailable<'a>(sweep: &Sweep<'a>) -> Result<&'a BTreeMap<String, Identity>, 
     let lost = sweep.known.values().filter(is_lost).count();
     if lost as f64 > sweep.max_loss * known as f64 {
         return Err(format!(
-            "{lost} of {known} files are gone, more than changes.max_loss = {} allows; if that is meant, raise it until \
-             the next sweep",
+            "{lost} of {known} files are gone, more than changes.max_loss = {} allows; if this is intended, raise it until the \
+             next sweep",
             sweep.max_loss
         ));
     }

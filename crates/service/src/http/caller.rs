@@ -184,7 +184,7 @@ fn caller(parts: &Parts) -> Result<Caller, Problem> {
 fn unknown() -> Problem {
     Problem::new(
         StatusCode::UNAUTHORIZED,
-        "This needs a token: send the header Authorization: Bearer areo_…",
+        "This request needs a token: send the header Authorization: Bearer areo_…",
     )
 }
 

@@ -118,7 +118,7 @@ pub(super) async fn retry(app: &Arc<App>, caller: Caller, id: i64) -> Result<Job
                 JobState::Waiting | JobState::Blocked => CauseKind::Asked,
                 JobState::Failed | JobState::Invalid | JobState::Cancelled => CauseKind::RetryOf,
                 state => {
-                    let text = format!("Job {id} is {state}: there is nothing to try again.");
+                    let text = format!("Job {id} is {state}: there is nothing to retry.");
                     return Ok(Err(Problem::conflict(text)));
                 }
             };

@@ -96,7 +96,7 @@ pub(super) async fn body_of(request: Request, media: &str, max: usize) -> Result
         Ok(Ok(bytes)) => Ok(bytes.to_vec()),
         Ok(Err(_)) => Err(Problem::new(
             StatusCode::PAYLOAD_TOO_LARGE,
-            format!("The body broke off, or is longer than {max} bytes."),
+            format!("The body was cut short, or is longer than {max} bytes."),
         )),
         Err(_) => Err(Problem::new(
             StatusCode::REQUEST_TIMEOUT,

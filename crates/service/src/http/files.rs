@@ -107,7 +107,7 @@ fn manifest_bytes(products: &Path, run: &Run) -> Result<Vec<u8>, Problem> {
         .map_err(Problem::internal)?;
     if blake3::hash(&bytes).to_hex().as_str() != run.manifest_blake3 {
         return Err(Problem::conflict(
-            "The manifest of this run is not the one that was published; its products are not given out.",
+            "The manifest of this run is not the one that was published; its products are withheld.",
         ));
     }
     Ok(bytes)
@@ -135,7 +135,7 @@ pub(super) fn product(products: &Path, run: &Run, path: &str) -> Result<Product,
     let file = open_below(products, &run_folder(run).join(&entry.path))?;
     let contradicts = || {
         Problem::conflict(
-            "This product is not the one that its manifest names; it is not given out. Run the site again.",
+            "This product does not match its manifest; it is withheld. Run the site again.",
         )
     };
     let file = file.ok_or_else(contradicts)?;

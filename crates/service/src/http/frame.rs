@@ -154,7 +154,7 @@ fn usual_detail(status: StatusCode) -> &'static str {
     match status {
         StatusCode::NOT_FOUND => "There is nothing at this address.",
         StatusCode::METHOD_NOT_ALLOWED => {
-            "This address does not take this method; the header Allow says which."
+            "This address does not accept this method; the header Allow lists those accepted."
         }
         StatusCode::FORBIDDEN => "This request came from a page of another site.",
         _ => "The request was refused.",

@@ -110,7 +110,7 @@ fn is_local_name(host: &str, local: SocketAddr) -> bool {
 fn refuse_token_in(uri: &Uri) -> Result<(), Problem> {
     let refused = || {
         Problem::bad_request(
-            "A token does not belong into an address, where logs and histories keep it: send the header Authorization: \
+            "A token must not appear in an address, where logs and histories keep it: send the header Authorization: \
              Bearer … instead. If this was a real token, revoke it.",
         )
     };

@@ -56,7 +56,7 @@ impl Problem {
             cause: Some(cause.to_string()),
             ..Self::new(
                 StatusCode::INTERNAL_SERVER_ERROR,
-                "The service failed at this request. Its log says more, under the identifier of the request.",
+                "The service failed to answer this request. Its log holds details under the identifier of the request.",
             )
         }
     }

@@ -22,7 +22,7 @@ pub(super) fn place(app: &App) -> Result<OwnedSemaphorePermit, Problem> {
             retry_after_s: Some(5),
             ..Problem::new(
                 StatusCode::TOO_MANY_REQUESTS,
-                "Other plans and searches are under way.",
+                "Other plans and searches are in progress.",
             )
         })
 }

@@ -56,7 +56,7 @@ pub(super) async fn fork(program: &Path) -> io::Result<Child> {
         program: program.to_owned(),
         started,
     };
-    let gone = |()| io::Error::other("the thread that starts workers is gone");
+    let gone = |()| io::Error::other("the thread that starts workers has ended");
     orders.send(order).map_err(|_| gone(()))?;
     child.await.map_err(|_| gone(()))?
 }

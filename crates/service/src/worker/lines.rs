@@ -14,7 +14,7 @@ pub(super) enum Garbled {
     #[error("an answer of more than {ANSWER_MAX} bytes")]
     LongAnswer,
     /// Not one of the lines.
-    #[error("no line of a worker: {0}")]
+    #[error("not a line of a worker: {0}")]
     NoLine(serde_json::Error),
     /// The pipe broke.
     #[error("its lines cannot be read: {0}")]
@@ -114,7 +114,7 @@ mod tests {
         // The last line has no end.
         assert_eq!(all(&text).await, (vec![expected.clone(), expected], None));
         let refused = all("CSPICE says hello\n").await.1.unwrap();
-        assert!(refused.starts_with("no line of a worker"), "{refused}");
+        assert!(refused.starts_with("not a line of a worker"), "{refused}");
         let long = "x".repeat(LINE_MAX + 1);
         assert!(
             all(&long)

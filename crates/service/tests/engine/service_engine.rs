@@ -117,7 +117,10 @@ fn a_file_that_no_site_reads_is_looked_at_and_noted_as_such() {
     // The played plan counts a remark as another configuration: nothing has to run for it.
     assert_eq!(later_jobs(&life), []);
     let note = life.ask("SELECT last_note FROM site WHERE name = 'a'");
-    assert_eq!(note, ["`a.toml` changed; no stage reads what changed"]);
+    assert_eq!(
+        note,
+        ["`a.toml` changed; no stage reads the changed inputs"]
+    );
 }
 
 #[test]

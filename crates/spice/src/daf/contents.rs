@@ -39,7 +39,7 @@ pub(super) fn check(
     };
     if layout.words() != words {
         return Err(format!(
-            "{words} words, of which its counts explain {}",
+            "{words} words, of which its counts account for {}",
             layout.words()
         )
         .into());

@@ -247,7 +247,7 @@ fn arcs_of_constant_rate(words: usize) -> Result<Option<Layout>, String> {
     let near = words * 100 / 1_001;
     let records = (near.saturating_sub(1)..=near + 1)
         .find(|records| of(*records) == words)
-        .ok_or_else(|| format!("{words} words, which no number of records fills"))?;
+        .ok_or_else(|| format!("{words} words, which is not a whole number of records"))?;
     Ok(Some(Layout {
         packets: records,
         packet: Packet::Quaternion(8),

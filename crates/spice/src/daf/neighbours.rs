@@ -159,9 +159,9 @@ fn contradiction(states: &[State]) -> Option<String> {
         let spoils = |index: usize| (of(index) - PARTS[part] * own).norm() <= PART_TOLERANCE * size;
         let stands_out = size > STANDS_OUT * usual && size > rounding;
         (stands_out && spoils(1) && spoils(3)).then(|| {
-            let what = ["lies {} km beside", "has a velocity {} km/s off"][part];
+            let what = ["lies {} km from", "has a velocity {} km/s from"][part];
             let what = what.replace("{}", &format!("{size:.6}"));
-            format!("{what} what its neighbours say, who agree to {usual:.1e}")
+            format!("{what} the interpolation of its neighbours, which agree to {usual:.1e}")
         })
     })
 }

@@ -104,7 +104,7 @@ fn sessions_follow_one_another_and_threads_wait() {
     let second = Session::open(&set).unwrap_err();
     assert_eq!(second.kind(), Kind::Bug);
     let text = second.cause.to_string();
-    assert_eq!(text, "a SPICE session is open on this thread already");
+    assert_eq!(text, "a SPICE session is already open on this thread");
 }
 
 #[test]
@@ -202,9 +202,9 @@ fn what_is_no_kernel_is_refused_with_its_name() {
         (
             "short.bsp",
             &spk[..spk.len() - 1_024],
-            "its file record says",
+            "its file record states",
         ),
-        ("circle.bsp", &circle, "its summary records form a circle"),
+        ("circle.bsp", &circle, "its summary records form a cycle"),
     ];
     for (name, content, expected) in cases {
         let failure = one(&write(at, name, content));
@@ -244,7 +244,7 @@ fn a_chain_of_segments_ends_with_zero_only() {
         let failure = one(&write(temporary.path(), "chain.bsp", &bytes));
         let text = failure.to_string();
         assert!(
-            text.contains(&format!("its summary records go on at record {next}")),
+            text.contains(&format!("its summary records continue at record {next}")),
             "{text}"
         );
         assert_eq!(failure.kind(), Kind::Input);
@@ -252,7 +252,7 @@ fn a_chain_of_segments_ends_with_zero_only() {
     let mut bytes = spk;
     bytes[76..80].copy_from_slice(&(-3_i32).to_le_bytes());
     let text = one(&write(temporary.path(), "first.bsp", &bytes)).to_string();
-    assert!(text.contains("go on at record -3"), "{text}");
+    assert!(text.contains("continue at record -3"), "{text}");
 }
 
 #[test]
@@ -387,7 +387,7 @@ fn metakernels_are_read_and_written() {
     for (list, expected) in [
         (
             "KERNELS_TO_LOAD = ( 'gone.tls' )",
-            "names gone.tls, which is not there (looked in",
+            "names gone.tls, which does not exist (looked in",
         ),
         ("KERNELS_TO_LOAD = ( 3 )", "with the number"),
         ("KERNELS_TO_LOAD = ( 'a+' )", "ends with '+'"),
@@ -403,7 +403,7 @@ fn metakernels_are_read_and_written() {
             "KERNELS_TO_LOAD = (",
             "line 3: list of KERNELS_TO_LOAD is not closed",
         ),
-        ("A = 1", "lists nothing"),
+        ("A = 1", "lists no kernels"),
     ] {
         let bad = write(
             at,

@@ -186,7 +186,7 @@ fn columns_that_do_not_fit_are_refused() {
     let even = SpkSegment { degree: 4, ..spk };
     assert!(text("even.bsp", even).starts_with("spkw13_c: SPICE(INVALIDDEGREE)"));
     let session = Session::open(&KernelSet::from_files(&files).unwrap()).unwrap();
-    assert!(text("session.bsp", spk).contains("session is open on this thread"));
+    assert!(text("session.bsp", spk).contains("session is already open on this thread"));
     let ck = CkSegment {
         name: "turning",
         instants: &instants,

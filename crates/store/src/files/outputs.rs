@@ -34,9 +34,9 @@ impl Place {
 /// A file that would be lost.
 #[derive(Debug, thiserror::Error)]
 enum Overwritten {
-    #[error("would be written over {0}, which is read; expected a file of its own")]
+    #[error("would be written over the input {0}; expected a different file")]
     Input(PathBuf),
-    #[error("would be written twice: as {0} too; expected a file of its own for each")]
+    #[error("would be written twice, also as {0}; expected a different file for each output")]
     Output(PathBuf),
 }
 
@@ -80,7 +80,7 @@ pub fn require_apart<'a>(
 
 /// Something that a file would take the place of.
 #[derive(Debug, thiserror::Error)]
-#[error("is {0}; expected a file, or nothing yet")]
+#[error("is {0}; expected a file or a new path")]
 struct NotAFile(&'static str);
 
 impl Cause for NotAFile {
@@ -89,8 +89,8 @@ impl Cause for NotAFile {
     }
 
     fn advice(&self) -> String {
-        "name a file in a folder: a file is written beside its place and then takes it, which would put an end to what is \
-         there"
+        "name a file in a folder: a file is written under a temporary name and then renamed, which would replace the existing \
+         entry"
             .to_owned()
     }
 }

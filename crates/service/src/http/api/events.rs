@@ -74,7 +74,9 @@ pub(super) async fn follow(
         Some(given) => {
             let given = given.to_str().ok().and_then(|text| text.parse().ok());
             let given = given.filter(|number| *number >= 0);
-            given.ok_or_else(|| Problem::bad_request("Last-Event-ID is no number of an event."))?
+            given.ok_or_else(|| {
+                Problem::bad_request("Last-Event-ID is not the number of an event.")
+            })?
         }
     };
     let permit = Arc::clone(&app.streams)

@@ -88,7 +88,7 @@ fn ended(
                 ..plan
             };
         }
-        Ok(Ok(_)) => "The worker answered something else.".to_owned(),
+        Ok(Ok(_)) => "The worker sent an unexpected answer.".to_owned(),
         Ok(Err(failure)) => failure.text,
         Err(problem) => {
             tracing::error!("a plan: {}", problem.cause.unwrap_or_default());

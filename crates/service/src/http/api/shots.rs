@@ -144,7 +144,7 @@ fn corners_of_polygon(polygon: Polygon) -> Result<Vec<[f64; 2]>, Problem> {
         return wrong("type is Polygon.".to_owned());
     }
     let Ok([mut ring]) = <[_; 1]>::try_from(polygon.coordinates) else {
-        return wrong("coordinates hold one ring; holes are not understood.".to_owned());
+        return wrong("coordinates hold one ring; holes are not supported.".to_owned());
     };
     // GeoJSON repeats the first corner at the end.
     if ring.len() > 1 && ring.first() == ring.last() {
@@ -161,7 +161,7 @@ fn corners_of_polygon(polygon: Polygon) -> Result<Vec<[f64; 2]>, Problem> {
     };
     if let Some(corner) = ring.iter().find(|corner| !on_globe(corner)) {
         return wrong(format!(
-            "{corner:?} is no corner; expected longitude from -180 to 360 and latitude from -90 to 90 degrees."
+            "{corner:?} is not a valid corner; expected longitude from -180 to 360 and latitude from -90 to 90 degrees."
         ));
     }
     Ok(ring)
@@ -195,7 +195,7 @@ async fn search(
     };
     let (rows, complete) = match ask(app, what, DEADLINE_S).await? {
         Ok(Answer::Shots { rows, complete }) => (rows, complete),
-        Ok(_) => return Err(Problem::internal("the worker answered something else")),
+        Ok(_) => return Err(Problem::internal("the worker sent an unexpected answer")),
         Err(failure) if failure.code == 2 => {
             return Err(Problem::bad_request(
                 "This region has no inside: its sides must not cross.",

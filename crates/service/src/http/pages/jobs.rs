@@ -100,7 +100,7 @@ pub(super) async fn list(
 pub(super) fn job_table(caption: &str, jobs: &[Job], times: &Times) -> Markup {
     html! {
         @if jobs.is_empty() { p { "None." } } @else {
-            (table(caption, &["Job", "Site", "State", "Attempt", "Since", "Asked for by", "What came of it"], &html! {
+            (table(caption, &["Job", "Site", "State", "Attempt", "Since", "Requested by", "Outcome"], &html! {
                 @for job in jobs {
                     tr {
                         th scope="row" { a href={ "/jobs/" (job.id) } { (job.id) } }
@@ -203,7 +203,7 @@ fn job_lead(job: &Job, newest: Option<&Attempt>, times: &Times) -> Markup {
                 "Made " (times.at(Instant(job.created_ms))) " by " (asker(job)) "; "
                 (job.state) " since " (times.at(Instant(job.changed_ms))) "."
                 @if job.force { " Every stage runs." }
-                @if job.cancel_asked && !job.state.is_final() { " It was asked to stop." }
+                @if job.cancel_asked && !job.state.is_final() { " Cancellation was requested." }
                 @if job.state == JobState::Waiting { " Tried again " (times.age(Instant(job.not_before_ms))) "." }
             }
             @if let Some(text) = outcome_text(job) { p { (prose(text)) } }
@@ -211,7 +211,7 @@ fn job_lead(job: &Job, newest: Option<&Attempt>, times: &Times) -> Markup {
                 p {
                     "Attempt " (attempt.n) ", stage " (attempt.stage.as_deref().unwrap_or("not yet known"))
                     @if let Some(rss_kib) = attempt.rss_kib { ", " (rss_kib / 1024) " MiB" }
-                    ", last sign of life " (times.age(attempt.beat_utc)) "."
+                    ", last heartbeat " (times.age(attempt.beat_utc)) "."
                 }
                 @if let (Some(done), Some(of)) = (attempt.done, attempt.of) {
                     p { label { "Stages " progress max=(of) value=(done) {} " " (done) " of " (of) " " (attempt.unit.as_deref().unwrap_or_default()) } }
@@ -251,7 +251,7 @@ fn buttons(job: &Job, caller: &Caller) -> Markup {
 
 fn why(causes: &[CauseRow], times: &Times) -> Markup {
     html! {
-        @if causes.is_empty() { p { "Nothing is noted." } }
+        @if causes.is_empty() { p { "No reason is recorded." } }
         ul {
             @for cause in causes {
                 li {

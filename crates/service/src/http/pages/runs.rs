@@ -111,10 +111,10 @@ fn pin_button(run: &Run, caller: &Caller) -> Markup {
             form method="post" action={ "/runs/" (run.id) "/pin" } class="actions" {
                 (form_token(&session.form_token))
                 button type="submit" name="pinned" value=(!run.pinned) {
-                    @if run.pinned { "Do not keep for good" } @else { "Keep for good" }
+                    @if run.pinned { "Do not keep permanently" } @else { "Keep permanently" }
                 }
             }
-        } @else if run.pinned { p { "Kept for good." } }
+        } @else if run.pinned { p { "Kept permanently." } }
     }
 }
 
@@ -132,7 +132,7 @@ fn moved(run: &Run) -> Markup {
             @if run.moved.get("beyond_limit").and_then(Value::as_bool) == Some(true) { p class="word invalid" { "Beyond a limit." } }
             (said(&more))
             @if run.moved.get("page").and_then(Value::as_bool) == Some(true) {
-                p { a href={ "/api/v1/runs/" (run.id) "/difference" } { "Difference to the run before" } }
+                p { a href={ "/api/v1/runs/" (run.id) "/difference" } { "Difference from the previous run" } }
             }
             @if let Some(problem) = run.moved.get("problem").and_then(Value::as_str) { p { "The comparison failed: " (problem) } }
         }
@@ -144,7 +144,7 @@ fn figure_table(run: &Run, before: Option<&Run>) -> Markup {
     let names: BTreeSet<&String> = now.keys().chain(then.keys()).collect();
     html! {
         @if names.is_empty() { p { "None." } } @else {
-            (table("Figures, and those of the run before", &["Figure", "This run", "Before", "Difference"], &html! {
+            (table("Figures of this run and the previous one", &["Figure", "This run", "Before", "Difference"], &html! {
                 @for name in names {
                     @let (new, old) = (now.get(name), then.get(name));
                     tr {
@@ -183,8 +183,8 @@ fn kernel_table(run: &Run, before: Option<&Run>) -> Markup {
         _ => "",
     };
     html! {
-        @if let Some(words) = change.as_ref().and_then(KernelChange::words) { p { "Since the run before: " (words) "." } }
-        (table("Kernels in load order", &["Kernel", "Role", "BLAKE3", "Since the run before"], &html! {
+        @if let Some(words) = change.as_ref().and_then(KernelChange::words) { p { "Since the previous run: " (words) "." } }
+        (table("Kernels in load order", &["Kernel", "Role", "BLAKE3", "Since the previous run"], &html! {
             @for kernel in kernels {
                 @let name = text(kernel, "name");
                 tr {
@@ -222,7 +222,7 @@ fn stage_table(run: &Run) -> Markup {
 
 fn file_table(run: &Run, manifest: &Manifest) -> Markup {
     html! {
-        p { a href={ "/api/v1/runs/" (run.id) "/files/" (MANIFEST) } { (MANIFEST) } ": everything that these were made from." }
+        p { a href={ "/api/v1/runs/" (run.id) "/files/" (MANIFEST) } { (MANIFEST) } ": all inputs of these products." }
         (table("Products", &["File", "Size", "Rows", "BLAKE3"], &html! {
             @for product in &manifest.products {
                 tr {

@@ -98,7 +98,7 @@ pub(super) async fn home(
         }
         section {
             h2 { "Work" }
-            div id="work" data-live="" { (super::jobs::job_table("Jobs at work and queued", &work, &times)) }
+            div id="work" data-live="" { (super::jobs::job_table("Running and queued jobs", &work, &times)) }
         }
     };
     Ok(Page {
@@ -192,7 +192,7 @@ fn site_table(sites: &[Site], times: &Times) -> Markup {
 /// Fresh, or stale since when and why.
 fn freshness(site: &Site, times: &Times) -> Markup {
     html! {
-        @if !site.enabled { "Not run: its site file is gone, or says so." }
+        @if !site.enabled { "Not run: its site file is gone or disables it." }
         @else if let Some(problem) = &site.problem { "Not run: " (problem) }
         @else if let Some(since) = site.stale_since_utc {
             "Stale since " (times.at(since)) ": " (prose(site.stale_because.as_deref().unwrap_or("its inputs changed")))

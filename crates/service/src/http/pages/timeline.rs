@@ -46,7 +46,7 @@ pub(super) fn timeline(rows: &[Row]) -> Markup {
         .map(|span| span.stop_et_s)
         .fold(f64::NEG_INFINITY, f64::max);
     if !(start < stop) {
-        return html! { p { "Nothing is known yet of what the kernels cover." } };
+        return html! { p { "The coverage of the kernels is not known yet." } };
     }
     let x = |et_s: f64| (et_s - start) / (stop - start) * WIDTH;
     let height = rows.len() as f64 * LINE + FOOT;
@@ -64,7 +64,7 @@ pub(super) fn timeline(rows: &[Row]) -> Markup {
             }
             ul class="keys" { li { i class="k0" {} "positions" } li { i class="k1" {} "attitude" } }
             figcaption {
-                "Times are TDB, a minute ahead of UTC. What is empty is a gap; gaps too narrow to be seen are in the "
+                "Times are TDB, a minute ahead of UTC. Empty intervals are gaps; gaps too narrow to be seen are in the "
                 a href="/api/v1/kernels" { "interface for programs" } "."
             }
         }
