@@ -58,9 +58,9 @@ pub(super) struct Arguments {
 /// Why there is no new site file.
 #[derive(Debug, thiserror::Error)]
 enum Refused {
-    #[error("is there already")]
+    #[error("already exists")]
     Exists,
-    #[error("nothing says {0}")]
+    #[error("missing: {0}")]
     Missing(&'static str),
 }
 
@@ -154,7 +154,8 @@ impl Asked {
             }
         }
         while asked.edges_deg.is_none() && !asked.pedr.is_empty() {
-            let answer = answer("Window west,east,south,north in degrees [what the images see]")?;
+            let answer =
+                answer("Window west,east,south,north in degrees [the area that the images cover]")?;
             if answer.is_empty() {
                 break;
             }
@@ -169,16 +170,16 @@ impl Asked {
     /// Whether there is enough for a site.
     fn complete(&self) -> Result<(), Refused> {
         if self.kernels.is_empty() {
-            return Err(Refused::Missing("where kernels are (--kernels)"));
+            return Err(Refused::Missing("kernels (--kernels)"));
         }
         if self.pedr.is_empty() && self.labels.is_empty() {
             return Err(Refused::Missing(
-                "what the site is made of (--pedr, --label)",
+                "shots or images of the site (--pedr, --label)",
             ));
         }
         if !self.pedr.is_empty() && self.edges_deg.is_none() && self.labels.is_empty() {
             return Err(Refused::Missing(
-                "where the site is (--box, or images by --label)",
+                "the window of the site (--box, or images by --label)",
             ));
         }
         Ok(())

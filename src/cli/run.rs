@@ -189,7 +189,7 @@ fn flatten(joined: Result<Outcome, tokio::task::JoinError>) -> Outcome {
 }
 
 #[derive(Debug, thiserror::Error)]
-#[error("areograph itself failed: {0}")]
+#[error("internal error of areograph: {0}")]
 struct Panicked(String);
 
 impl crate::error::Cause for Panicked {
@@ -198,7 +198,7 @@ impl crate::error::Cause for Panicked {
     }
 
     fn advice(&self) -> String {
-        "please report it with the configuration; running again finds and repairs what was left"
+        "please report it with the configuration; the next run detects and repairs incomplete products"
             .to_owned()
     }
 }

@@ -72,7 +72,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
 
 /// The folder has a configuration.
 #[derive(Debug, thiserror::Error)]
-#[error("there is a configuration already")]
+#[error("a configuration already exists")]
 struct Exists;
 
 impl Cause for Exists {
@@ -81,7 +81,7 @@ impl Cause for Exists {
     }
 
     fn advice(&self) -> String {
-        "serve that one, or name another folder".to_owned()
+        "serve this configuration, or name another folder".to_owned()
     }
 }
 
@@ -164,7 +164,7 @@ async fn obey(shared: Arc<Shared>, listen: Option<SocketAddr>) {
         signal(SignalKind::hangup()),
     ];
     let [Ok(mut terminate), Ok(mut interrupt), Ok(mut hangup)] = signals else {
-        tracing::error!("signals cannot be heard");
+        tracing::error!("signals cannot be received");
         return;
     };
     loop {

@@ -96,9 +96,9 @@ enum RoleName {
 
 #[derive(Debug, thiserror::Error)]
 enum Unfit {
-    #[error("there is no token {0}")]
+    #[error("unknown token {0}")]
     NoToken(String),
-    #[error("there is something already")]
+    #[error("already exists")]
     FileExists,
 }
 
@@ -109,8 +109,8 @@ impl Cause for Unfit {
 
     fn advice(&self) -> String {
         match self {
-            Self::NoToken(_) => "look at areograph service token list",
-            Self::FileExists => "name a file that is not there",
+            Self::NoToken(_) => "list the tokens with `areograph service token list`",
+            Self::FileExists => "name a file that does not exist",
         }
         .to_owned()
     }

@@ -43,7 +43,7 @@ pub(super) struct Arguments {
 
 /// An ending of another format.
 #[derive(Debug, thiserror::Error)]
-#[error("{}; expected an ending .png, .tif or .tiff", .0.display())]
+#[error("{}; expected the extension .png, .tif or .tiff", .0.display())]
 struct Ending(PathBuf);
 
 impl Cause for Ending {
@@ -52,13 +52,13 @@ impl Cause for Ending {
     }
 
     fn advice(&self) -> String {
-        "give the file another ending".to_owned()
+        "name the file with one of these extensions".to_owned()
     }
 }
 
 /// An image of which not a line can be read.
 #[derive(Debug, thiserror::Error)]
-#[error("not one line of the image can be read")]
+#[error("no line of the image can be read")]
 struct NoLines;
 
 impl Cause for NoLines {
@@ -67,13 +67,13 @@ impl Cause for NoLines {
     }
 
     fn advice(&self) -> String {
-        "fetch the file again; `areograph image info` says what is wrong with it".to_owned()
+        "fetch the file again; `areograph image info` lists its errors".to_owned()
     }
 }
 
 /// A radiometric correction of what has no label with gain and offset.
 #[derive(Debug, thiserror::Error)]
-#[error("--calibrate needs an image as the archive has it, whose label tells gain and offset")]
+#[error("--calibrate requires an image file of the archive, whose label states gain and offset")]
 struct NotOfTheArchive;
 
 impl Cause for NotOfTheArchive {
@@ -153,7 +153,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     }
     if complaints > 0 {
         tracing::warn!(
-            "{complaints} complaints of {}; `areograph image info` has them",
+            "{complaints} complaints of {}; `areograph image info` lists them",
             arguments.file.display()
         );
     }

@@ -34,9 +34,7 @@ pub(super) struct Arguments {
 
 /// A file that changed without a trace in the file system.
 #[derive(Debug, thiserror::Error)]
-#[error(
-    "its bytes are not those that were indexed, though size and times are: hash {was}, now {is}"
-)]
+#[error("its content differs from the index, although size and times match: hash {was}, now {is}")]
 struct Altered {
     was: String,
     is: String,
@@ -48,7 +46,7 @@ impl Cause for Altered {
     }
 
     fn advice(&self) -> String {
-        "fetch the file again: the disk may be failing; the index now says what the file holds"
+        "fetch the file again: the disk may be failing; the index now describes the present content"
             .to_owned()
     }
 }

@@ -91,7 +91,7 @@ enum Measure {
 
 /// One image is given.
 #[derive(Debug, thiserror::Error)]
-#[error("--isd names the images {0:?}; expected two or more, each with a name of its own")]
+#[error("--isd names the images {0:?}; expected two or more with distinct names")]
 struct Images(Vec<String>);
 
 impl Cause for Images {

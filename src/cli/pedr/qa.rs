@@ -75,7 +75,7 @@ impl Cause for ClockBias {
 /// Profiles that break limits, or that could not be checked.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "the archive is invalid against these kernels, or was not checked as a whole; products were written"
+    "the archive is invalid against these kernels, or was checked only in part; products were written"
 )]
 struct Invalid;
 
@@ -85,7 +85,7 @@ impl Cause for Invalid {
     }
 
     fn advice(&self) -> String {
-        "look at the page: reasons stand on top, then come the worst profiles".to_owned()
+        "see the page: it lists the reasons first, then the worst profiles".to_owned()
     }
 }
 

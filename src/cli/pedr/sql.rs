@@ -105,7 +105,7 @@ fn tell(tally: &Tally) {
     });
     let each: Vec<String> = each.collect();
     tracing::warn!(
-        "records that were complained of, whose bad shots are no rows: {}; pedr info tells of each",
+        "records with errors, whose invalid shots are omitted: {}; pedr info lists them",
         each.join(", ")
     );
 }

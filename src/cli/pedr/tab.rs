@@ -81,7 +81,7 @@ impl Cause for NoMarker {
     }
 
     fn advice(&self) -> String {
-        "name a PEDR file, or a list of them whose name has no .b; in a list, or with --per-shot, the marker is not asked for"
+        "name a PEDR file, or a list of them whose name has no .b; the marker is not required in a list or with --per-shot"
             .to_owned()
     }
 }
@@ -181,7 +181,7 @@ fn read_preferences(named: Option<&Path>) -> Result<Preferences> {
         Ok(bytes) => bytes,
         Err(error) if named.is_none() && error.kind() == std::io::ErrorKind::NotFound => {
             output::line(format_args!(
-                "{}: not there; the preferences of pedr2tab hold",
+                "{}: not found; the default preferences of pedr2tab apply",
                 path.display()
             ));
             return Ok(Preferences::default());
@@ -191,7 +191,7 @@ fn read_preferences(named: Option<&Path>) -> Result<Preferences> {
     let preferences = Preferences::parse(&String::from_utf8_lossy(&bytes));
     if let Some(ended) = &preferences.ended {
         output::line(format_args!(
-            "{}: {ended}; from there on the preferences of pedr2tab hold",
+            "{}: {ended}; from there on the default preferences of pedr2tab apply",
             path.display()
         ));
     }

@@ -64,7 +64,7 @@ pub(in crate::cli::image) struct Arguments {
 
 /// A camera that is none.
 #[derive(Debug, thiserror::Error)]
-#[error("{0:?} is no camera; expected {known}", known = known_cameras())]
+#[error("unknown camera {0:?}; expected {known}", known = known_cameras())]
 struct NoCamera(String);
 
 impl Cause for NoCamera {

@@ -74,15 +74,15 @@ impl Format {
 /// What is wrong with the command line.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum Usage {
-    #[error("{0:?} is no interval of time")]
+    #[error("{0:?} is not a time interval")]
     Time(String),
-    #[error("{0}; expected an ending .parquet, .csv or .geojson")]
+    #[error("{0}; expected the extension .parquet, .csv or .geojson")]
     Ending(String),
-    #[error("{out}: the ending is of another format than --format {format}")]
+    #[error("{out}: the extension does not match --format {format}")]
     OtherEnding { out: String, format: String },
-    #[error("{0}: shots that are only counted (--format count) are not written")]
+    #[error("{0}: --format count only counts shots and writes no file")]
     Count(String),
-    #[error("{0:?} is no file; expected values of a filter in one list")]
+    #[error("{0:?} is not a file; expected the values of a filter in one list")]
     Value(String),
 }
 
@@ -96,14 +96,14 @@ impl Cause for Usage {
             Self::Time(_) => {
                 "write A..B with seconds past J2000 (-25000000..-24990000), or with UTC (1999-03-16T00:00:00..1999-03-17T00:00:00) and --leap-seconds"
             }
-            Self::Ending(_) => "say --format, or give the file another ending",
+            Self::Ending(_) => "give --format, or name the file with one of these extensions",
             Self::OtherEnding { .. } => {
-                "leave out --format, or give the file an ending of the format"
+                "leave out --format, or name the file with the extension of this format"
             }
             Self::Count(_) => {
-                "leave out --out, counts are printed; or leave out --format, and shots are written"
+                "leave out --out to print counts, or leave out --format to write shots"
             }
-            Self::Value(_) => "separate values by commas (--classes 0,1), or say the filter once for each",
+            Self::Value(_) => "separate values by commas (--classes 0,1), or repeat the filter for each value",
         }
         .to_owned()
     }
