@@ -19,8 +19,8 @@ use crate::{
 
 /// Writes a commented site file for a window and images.
 ///
-/// On a terminal, what no option gives is asked for. The file is DIR/SITE.toml; paths are given as seen from here, and
-/// written as seen from there. Without --box the window is what the images see, and 5 km around it.
+/// On a terminal the command asks for missing options. The file is DIR/SITE.toml; paths are given relative to the current
+/// folder and written relative to DIR. Without --box the window is the area that the images cover, and 5 km around it.
 ///
 /// Examples:
 ///   areograph init gale
@@ -29,10 +29,10 @@ use crate::{
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
-    /// Folder of the site file, made if need be.
+    /// Folder of the site file; it is created if necessary.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
-    /// Identifier of the site; without it the name of the folder.
+    /// Identifier of the site; by default the name of the folder.
     #[arg(long, value_name = "NAME")]
     site: Option<String>,
     /// Free text for the report.

@@ -38,7 +38,7 @@ const FILE: &str = "areograph.toml";
 /// Longest time that a graceful end may take.
 const END_WITHIN: Duration = Duration::from_secs(25);
 
-/// Runs sites again when what they read changes, every night at the latest; pages and an interface for programs.
+/// Runs sites again when their inputs change, every night at the latest; serves pages and an interface for programs.
 ///
 /// Example: `areograph serve --init demo && areograph serve demo/areograph.toml`
 #[derive(Debug, Args)]
@@ -47,13 +47,13 @@ pub(super) struct Arguments {
     /// Configuration of the service (TOML).
     #[arg(required_unless_present = "init", conflicts_with = "init")]
     config: Option<PathBuf>,
-    /// Write a synthetic mission and a configuration for it into this folder, and end.
+    /// Write a synthetic mission and a configuration for it into this folder, and exit.
     #[arg(long, value_name = "DIR")]
     init: Option<PathBuf>,
     /// Listen here instead of the address of the configuration; port 0 takes a free one.
     #[arg(long, value_name = "ADDRESS:PORT", conflicts_with = "init")]
     listen: Option<SocketAddr>,
-    /// Log as JSON, one object a line.
+    /// Log as JSON, one object per line.
     #[arg(long)]
     pub(super) log_json: bool,
 }

@@ -18,8 +18,8 @@ use crate::{
 
 /// Writes the pixels of an image as PNG, or as TIFF with tiles and overviews.
 ///
-/// Pixels are those of the file, line 0 first and at the top: on the day side south is up and east left. Lines that are
-/// missing are black; --mask tells them from dark ones.
+/// Pixels are those of the file, line 0 first and at the top: on the day side south is up and east left. Missing lines
+/// are black; --mask distinguishes them from dark ones.
 ///
 /// Example: areograph image extract m0100115.imq --out m0100115.png
 #[derive(Debug, Args)]
@@ -28,15 +28,15 @@ pub(super) struct Arguments {
     /// Image file of the archive (.imq, .img), ISIS cube, TIFF or PNG of one band of grey.
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// File to write; its ending (.png, .tif, .tiff) is its format.
+    /// File to write; its extension (.png, .tif, .tiff) determines the format.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// 16 bits: relative radiance by gain, offset and exposure, and the offset between odd and even detectors removed
-    /// (narrow angle without summing). Not for geometry, and no reflectance: its constants are not public. Images whose gain
+    /// (narrow angle without summing). Not for geometry, and not reflectance: its constants are not public. Images whose gain
     /// changes from line to line are refused.
     #[arg(long)]
     calibrate: bool,
-    /// Also write which lines are good (255), suspect (128) or missing (0), in one of the same formats.
+    /// Also write a mask of good (255), suspect (128) and missing (0) lines, in one of the same formats.
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
 }

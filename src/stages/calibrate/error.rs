@@ -184,7 +184,8 @@ impl Cause for CalibrateError {
             Self::UnknownCamera { .. } => "use the camera identifiers of the configuration in the table",
             Self::TooFewTies { .. } => "measure more points that are visible in several lines",
             Self::TooFewControls { .. } => {
-                "give more laser points, or leave out the table control: without control only differential parameters are estimated"
+                "give more laser points, or leave out the table control: without control only differential parameters are \
+                 estimated"
             }
             Self::Misfit { .. } => {
                 "check that every camera has the support data of its own image and is not exchanged with another, that samples \

@@ -17,9 +17,9 @@ use crate::{
 
 /// Finds the shots of an archive that lie in windows, each by its own position in IAU 2000.
 ///
-/// Rows come in the order of time, each with its PEDR file and record; times are the tags of the files. What was asked for
-/// and how complete the answer is stands in the file (key `areograph_search` of Parquet and GeoJSON; beside CSV in a file
-/// .json). The exit code is not 0 when a file could not be searched, or rows are not in order of time.
+/// Rows are in time order, each with its PEDR file and record; times are the tags of the files. The file also states the
+/// request and the completeness of the answer (key `areograph_search` of Parquet and GeoJSON; for CSV in a .json file
+/// beside it). The exit code is not 0 if a file could not be searched, or if rows are not in time order.
 ///
 /// Example: areograph pedr search archive --box 137.0,138.0,-5.5,-4.0 --out gale.parquet
 #[derive(Debug, Args)]
@@ -31,7 +31,7 @@ pub(in crate::cli::pedr) struct Arguments {
     pub(super) paths: Vec<PathBuf>,
     #[command(flatten)]
     pub(super) windows: WindowArguments,
-    /// Time tags, both included: TDB seconds past J2000, or UTC with --leap-seconds; either end may be left out.
+    /// Interval of time tags, both ends included: TDB seconds past J2000, or UTC with --leap-seconds; either end may be left out.
     #[arg(long, value_name = "A..B", allow_hyphen_values = true)]
     pub(super) time: Option<String>,
     /// Leap seconds (LSK, such as naif0012.tls), for times in UTC.
@@ -39,10 +39,10 @@ pub(in crate::cli::pedr) struct Arguments {
     pub(super) leap_seconds: Option<PathBuf>,
     #[command(flatten)]
     pub(super) shots: FilterArguments,
-    /// Complain of every bad record of the files, not only of those near the windows.
+    /// Report every bad record of the files, not only those near the windows.
     #[arg(long)]
     pub(super) check_all: bool,
-    /// How shots are written; without it, by the ending of --out, or only counted.
+    /// Format of the shots; by default that of the extension of --out; without --out shots are only counted.
     #[arg(long, value_enum)]
     pub(super) format: Option<Format>,
     /// File to write.
