@@ -264,7 +264,7 @@ fn what_cannot_be_asked_is_refused_with_a_way_out() {
     assert!(refused(&["--box=1,2,3"]).contains("four numbers"));
     assert!(refused(&["--box=1,2,4,3"]).contains("south below north"));
     assert!(refused(&[BOX, "--time", "yesterday"]).contains("write A..B"));
-    assert!(refused(&[BOX, "--time", "5..1"]).contains("no interval"));
+    assert!(refused(&[BOX, "--time", "5..1"]).contains("not a time interval"));
     assert!(refused(&[BOX, "--out", "found.xyz"]).contains("--format"));
     assert!(refused(&[BOX, "--format", "csv"]).contains("--out"));
     let empty = folder.path().join("empty");

@@ -62,7 +62,7 @@ pub(in crate::cli::image) struct Arguments {
     pub(super) format: Format,
 }
 
-/// A camera that is none.
+/// An unknown camera.
 #[derive(Debug, thiserror::Error)]
 #[error("unknown camera {0:?}; expected {known}", known = known_cameras())]
 struct NoCamera(String);
