@@ -13,12 +13,12 @@ use crate::{
     flow::run_calibration,
 };
 
-/// Calibrates the lines of a camera in orbit: ties between them, then laser points, part of which only judges.
+/// Calibrates the lines of a camera in orbit: ties between them, then laser points, part of which are held back for validation.
 ///
-/// Points are read from tables; with `ties.match` and `[laser]` they are measured in pixels, round by round until nothing changes.
+/// Points are read from tables; with `ties.match` and `[laser]` they are measured in pixels, in rounds until convergence.
 ///
-/// Products go to `<out>/<calibration>`, with calibrated support data (ISD) of every line. Which angles ties cannot see is
-/// found and told.
+/// Products go to `<out>/<calibration>`, with calibrated support data (ISD) of every line. Angles that ties cannot determine
+/// are detected and reported.
 ///
 /// Example: `areograph scene hrsc --calibration --images && areograph calibrate hrsc/calibration.toml --out products`
 #[derive(Debug, Args)]
@@ -30,7 +30,7 @@ pub(super) struct Arguments {
     /// Folder of the products; the calibration gets a folder of its own in it.
     #[arg(long, default_value = "out")]
     out: PathBuf,
-    /// Calibrate again, whatever is stored.
+    /// Calibrate again, even if stored results are up to date.
     #[arg(long)]
     force: bool,
     /// Print JSON.

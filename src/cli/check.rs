@@ -12,7 +12,7 @@ use crate::{
     store::hashes::HashCache,
 };
 
-/// Checks configuration, files and kernel coverage; reports everything that a run would stumble over, and what would make its
+/// Checks configuration, files and kernel coverage; reports all errors that would stop a run, and all causes that would make its
 /// products invalid.
 ///
 /// Examples:
@@ -24,10 +24,10 @@ pub(super) struct Arguments {
     /// Site files (TOML).
     #[arg(required = true, value_name = "SITE.toml")]
     sites: Vec<PathBuf>,
-    /// Folder of products; kernels that a run into it has read are not read again when they did not change.
+    /// Folder of products; kernels that a run into it has read are not read again if they did not change.
     #[arg(long, default_value = "out")]
     out: PathBuf,
-    /// Read every input file again, whatever is known of files that did not change.
+    /// Read every input file again, even if it did not change.
     #[arg(long)]
     rehash: bool,
     /// Print JSON.

@@ -8,7 +8,7 @@ use clap::{Args, Subcommand};
 
 use crate::error::Error;
 
-/// Looks into images of the camera, and finds them in the mission's index.
+/// Inspects images of the camera, and finds them in the mission's index.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     #[command(subcommand)]

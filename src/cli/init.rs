@@ -19,8 +19,8 @@ use crate::{
 
 /// Writes a commented site file for a window and images.
 ///
-/// On a terminal, what no option gives is asked for. The file is DIR/SITE.toml; paths are given as seen from here, and
-/// written as seen from there. Without --box the window is what the images see, and 5 km around it.
+/// On a terminal the command asks for missing options. The file is DIR/SITE.toml; paths are given relative to the current
+/// folder and written relative to DIR. Without --box the window is the area that the images cover, and 5 km around it.
 ///
 /// Examples:
 ///   areograph init gale
@@ -29,10 +29,10 @@ use crate::{
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
-    /// Folder of the site file, made if need be.
+    /// Folder of the site file; it is created if necessary.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
-    /// Identifier of the site; without it the name of the folder.
+    /// Identifier of the site; by default the name of the folder.
     #[arg(long, value_name = "NAME")]
     site: Option<String>,
     /// Free text for the report.
@@ -58,9 +58,9 @@ pub(super) struct Arguments {
 /// Why there is no new site file.
 #[derive(Debug, thiserror::Error)]
 enum Refused {
-    #[error("is there already")]
+    #[error("already exists")]
     Exists,
-    #[error("nothing says {0}")]
+    #[error("missing: {0}")]
     Missing(&'static str),
 }
 
@@ -154,7 +154,8 @@ impl Asked {
             }
         }
         while asked.edges_deg.is_none() && !asked.pedr.is_empty() {
-            let answer = answer("Window west,east,south,north in degrees [what the images see]")?;
+            let answer =
+                answer("Window west,east,south,north in degrees [the area that the images cover]")?;
             if answer.is_empty() {
                 break;
             }
@@ -169,16 +170,16 @@ impl Asked {
     /// Whether there is enough for a site.
     fn complete(&self) -> Result<(), Refused> {
         if self.kernels.is_empty() {
-            return Err(Refused::Missing("where kernels are (--kernels)"));
+            return Err(Refused::Missing("kernels (--kernels)"));
         }
         if self.pedr.is_empty() && self.labels.is_empty() {
             return Err(Refused::Missing(
-                "what the site is made of (--pedr, --label)",
+                "shots or images of the site (--pedr, --label)",
             ));
         }
         if !self.pedr.is_empty() && self.edges_deg.is_none() && self.labels.is_empty() {
             return Err(Refused::Missing(
-                "where the site is (--box, or images by --label)",
+                "the window of the site (--box, or images by --label)",
             ));
         }
         Ok(())

@@ -15,7 +15,7 @@ use crate::{
     time::Intervals,
 };
 
-/// Looks at kernels.
+/// Inspects kernels.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     #[command(subcommand)]
@@ -27,7 +27,7 @@ enum Command {
     /// Lists kernels in load order: role by content, size, hash, and why each is there.
     #[command(after_help = "Example: areograph kernels list kernels/nav.tm")]
     List(Files),
-    /// Shows position and attitude coverage of Mars Global Surveyor, with the gaps inside; of other spacecraft what is held.
+    /// Shows position and attitude coverage of Mars Global Surveyor with its gaps, and the coverage of other spacecraft.
     #[command(after_help = "Example: areograph kernels coverage kernels/nav.tm")]
     Coverage(Files),
     Compare(compare::Arguments),

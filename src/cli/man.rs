@@ -7,7 +7,7 @@ use clap::{Args, CommandFactory};
 use super::Cli;
 use crate::error::{IoError, Locate, Result};
 
-/// Writes the manual pages, one for each command, as `man` reads them.
+/// Writes the manual pages, one for each command, in the format of `man`.
 ///
 /// Example: `areograph man ~/.local/share/man/man1`
 #[derive(Debug, Args)]

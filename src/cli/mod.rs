@@ -65,7 +65,7 @@ struct Cli {
 enum LogForm {
     /// Lines of text.
     Text,
-    /// A JSON object a line.
+    /// One JSON object per line.
     Json,
 }
 
@@ -75,7 +75,7 @@ enum Command {
     Run(run::Arguments),
     Check(check::Arguments),
     Plan(plan::Arguments),
-    /// Inspect kernels: what is loaded, where the gaps are, how alternative sets differ.
+    /// Inspect kernels: load order, gaps in coverage, differences between alternative sets.
     #[command(after_help = "Example: areograph kernels coverage kernels/nav.tm")]
     Kernels(kernels::Arguments),
     /// Read images of the camera, find them in the mission's index.
@@ -90,7 +90,7 @@ enum Command {
     Scene(scene::Arguments),
     Serve(serve::Arguments),
     Nightly(nightly::Arguments),
-    /// Keep a service: copies of its database, its tokens.
+    /// Maintain a service: copies of its database, its tokens.
     #[command(after_help = "Example: areograph service token list areograph.toml")]
     Service(service::Arguments),
     Completions(completions::Arguments),

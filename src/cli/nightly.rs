@@ -24,15 +24,15 @@ const TICK: Duration = Duration::from_millis(200);
 /// Jobs of one night whose endings are looked at.
 const JOBS_MAX: u32 = 100_000;
 
-/// Does one night without a service, for a timer: compares all sites, runs those that a change touches, ends.
+/// Performs one nightly run without a service, for a timer: compares all sites, runs those affected by a change, and exits.
 ///
-/// Refused while a service runs on the same folder of state. Exit codes as for run.
+/// Refused while a service uses the same state folder. Exit codes are those of `run`.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: areograph nightly areograph.toml")]
 pub(super) struct Arguments {
     /// Configuration of the service (TOML).
     config: PathBuf,
-    /// Log as JSON, one object a line.
+    /// Log as JSON, one object per line.
     #[arg(long)]
     pub(super) log_json: bool,
 }

@@ -16,7 +16,7 @@ use clap::{Args, Subcommand};
 
 use super::finish;
 
-/// Looks into PEDR files.
+/// Inspects PEDR files.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     #[command(subcommand)]

@@ -13,7 +13,7 @@ use crate::{
     store::hashes::HashCache,
 };
 
-/// Says which stages would run, and why.
+/// Lists the stages that would run, with the reasons.
 ///
 /// Examples:
 ///   areograph plan sites/gusev.toml --out products
@@ -27,7 +27,7 @@ pub(super) struct Arguments {
     /// Folder of the products.
     #[arg(long, default_value = "out")]
     out: PathBuf,
-    /// Read every input file again, whatever is known of files that did not change.
+    /// Read every input file again, even if it did not change.
     #[arg(long)]
     rehash: bool,
     /// Print JSON.

@@ -18,7 +18,7 @@ use crate::{
     store::page::PagePath,
 };
 
-/// Makes the report of a site again, from its products alone, or says what differs between two runs.
+/// Makes the report of a site again from its products alone, or compares two runs.
 ///
 /// No site file, kernel or stored stage is read; the page is byte for byte the one that `areograph run` wrote.
 /// Products that are missing, damaged or of another version are refused.
@@ -54,11 +54,11 @@ enum Command {
     Diff(DiffArguments),
 }
 
-/// Says what differs between two runs: inputs, verdicts, statistics, and how far everything moved.
+/// Compares two runs: inputs, verdicts, statistics, and movements of all results.
 ///
-/// Products alone are read, and checked against their manifests.
+/// Only products are read, and they are checked against their manifests.
 /// A and B are folders of one site, or output folders of which every common site is compared.
-/// A movement is B − A. Exit code 5 when something moved beyond a limit.
+/// A movement is B − A. The exit code is 5 if a movement exceeds a limit.
 ///
 /// Example: `areograph report diff out.yesterday out --limit-m 5 --page diff.html`
 #[derive(Debug, Args)]
@@ -76,10 +76,10 @@ struct DiffArguments {
     /// Write a page to this file as well; its folder must exist, and products are not overwritten.
     #[arg(long, value_name = "FILE.html")]
     page: Option<PathBuf>,
-    /// How far a footprint, a camera or a boresight on the ground may move, metres.
+    /// Largest permitted movement of a footprint, a camera or a boresight on the ground, metres.
     #[arg(long, value_name = "METRES", value_parser = limit)]
     limit_m: Option<f64>,
-    /// How far a camera may turn, arcseconds.
+    /// Largest permitted rotation of a camera, arcseconds.
     #[arg(long, value_name = "ARCSECONDS", value_parser = limit)]
     limit_arcsec: Option<f64>,
 }

@@ -24,7 +24,7 @@ use crate::{
 
 /// Runs sites from kernels to validated products in `<out>/<site>`.
 ///
-/// A stage runs only when something that it depends on has changed; the log (-v) says what.
+/// A stage runs only if one of its inputs has changed; the log (-v) states which.
 ///
 /// Examples:
 ///   areograph run sites/*.toml --out products
@@ -55,19 +55,19 @@ pub(super) struct Arguments {
         value_parser = PossibleValuesParser::new(stages())
     )]
     until: String,
-    /// Run every stage, whatever is stored.
+    /// Run every stage, even if its stored output is up to date.
     #[arg(long)]
     force: bool,
-    /// Read every input file again, whatever is known of files that did not change.
+    /// Read every input file again, even if it did not change.
     #[arg(long)]
     rehash: bool,
-    /// Show which stages would run, and why; write no products.
+    /// Show the stages that would run, with the reasons; write no products.
     #[arg(long)]
     dry_run: bool,
     /// Print JSON.
     #[arg(long)]
     json: bool,
-    /// Open the page in the browser: of one site its report, of several the one over all.
+    /// Open the page in the browser: the report of a single site, or the overview of several.
     #[arg(long)]
     open: bool,
 }
@@ -189,7 +189,7 @@ fn flatten(joined: Result<Outcome, tokio::task::JoinError>) -> Outcome {
 }
 
 #[derive(Debug, thiserror::Error)]
-#[error("areograph itself failed: {0}")]
+#[error("internal error of areograph: {0}")]
 struct Panicked(String);
 
 impl crate::error::Cause for Panicked {
@@ -198,7 +198,7 @@ impl crate::error::Cause for Panicked {
     }
 
     fn advice(&self) -> String {
-        "please report it with the configuration; running again finds and repairs what was left"
+        "please report it with the configuration; the next run detects and repairs incomplete products"
             .to_owned()
     }
 }

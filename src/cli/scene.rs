@@ -25,7 +25,7 @@ use crate::{
 )]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
-    /// Folder to write; an earlier scene in it is replaced, if nothing was added or changed.
+    /// Folder to write; an earlier scene in it is replaced if nothing was added or changed.
     directory: PathBuf,
     /// Seed of terrain and noise; the same seed gives the same bytes.
     #[arg(long, default_value_t = 1)]
@@ -33,11 +33,11 @@ pub(super) struct Arguments {
     /// Seconds of shots in the files of whole days, 600 to 90000; images and windows fit into 600.
     #[arg(long, value_name = "SECONDS", default_value_t = SECONDS_PER_DAY, conflicts_with = "along")]
     day_s: f64,
-    /// Draw what the real mission may have been wrong by, instead of the errors of the worked example: line times,
-    /// attitude and jitter, orbit, the laser's boresight, MOLA profiles that are shifted, noisy shots over rough ground.
+    /// Draw errors of the size that the real mission may have had, instead of those of the worked example: line times,
+    /// attitude and jitter, orbit, boresight of the laser, shifted MOLA profiles, noisy shots over rough ground.
     #[arg(long, conflicts_with = "along")]
     realistic: bool,
-    /// With --realistic: how rough the ground is (heights 300 m apart differ by 5, 10 or 25 m).
+    /// With --realistic: roughness of the ground (heights 300 m apart differ by 5, 10 or 25 m).
     #[arg(long, value_enum, default_value_t = Ground::Plains, requires = "realistic")]
     roughness: Ground,
     /// With --realistic: noise of tie points, lines and samples, 0 to 5; stereo matching reaches 0.22.
@@ -54,7 +54,7 @@ pub(super) struct Arguments {
     /// Also render the narrow-angle images, `images/*.imq`, which takes minutes; with --calibration `images/*.tif`.
     #[arg(long, conflicts_with_all = ["along", "plane"])]
     images: bool,
-    /// With --images: the code of the images; that by a transform loses something, as it did on board.
+    /// With --images: coding of the images; the transform coding is lossy, as it was on board.
     #[arg(long, value_enum, default_value_t = Code::Predictive, requires = "images", conflicts_with = "calibration")]
     coder: Code,
     /// Fly these kernels instead of the invented orbit.
@@ -70,11 +70,11 @@ pub(super) struct Arguments {
     /// A terrain model and laser passes over it for `areograph pedr match` instead of a mission.
     #[arg(long, conflicts_with_all = ["along", "realistic", "day_s", "images", "plane", "calibration"])]
     terrain_model: bool,
-    /// An archive of so many PEDR files, about a day each, with its kernels, instead of a mission: what
-    /// `areograph pedr` reads.
+    /// An archive of this number of PEDR files, about a day each, with its kernels, instead of a mission: input of
+    /// `areograph pedr`.
     #[arg(long, value_name = "FILES", conflicts_with_all = ["along", "realistic", "day_s", "plane", "calibration", "terrain_model"])]
     days: Option<u32>,
-    /// The same, of about so many gigabytes.
+    /// The same, with a size of about this many gigabytes.
     #[arg(long, value_name = "GB", conflicts_with_all = ["along", "realistic", "day_s", "plane", "calibration", "terrain_model", "days"])]
     gb: Option<f64>,
     /// With --along: labels of images to put into the site file.

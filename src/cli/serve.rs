@@ -38,7 +38,7 @@ const FILE: &str = "areograph.toml";
 /// Longest time that a graceful end may take.
 const END_WITHIN: Duration = Duration::from_secs(25);
 
-/// Runs sites again when what they read changes, every night at the latest; pages and an interface for programs.
+/// Runs sites again when their inputs change, every night at the latest; serves pages and an interface for programs.
 ///
 /// Example: `areograph serve --init demo && areograph serve demo/areograph.toml`
 #[derive(Debug, Args)]
@@ -47,13 +47,13 @@ pub(super) struct Arguments {
     /// Configuration of the service (TOML).
     #[arg(required_unless_present = "init", conflicts_with = "init")]
     config: Option<PathBuf>,
-    /// Write a synthetic mission and a configuration for it into this folder, and end.
+    /// Write a synthetic mission and a configuration for it into this folder, and exit.
     #[arg(long, value_name = "DIR")]
     init: Option<PathBuf>,
     /// Listen here instead of the address of the configuration; port 0 takes a free one.
     #[arg(long, value_name = "ADDRESS:PORT", conflicts_with = "init")]
     listen: Option<SocketAddr>,
-    /// Log as JSON, one object a line.
+    /// Log as JSON, one object per line.
     #[arg(long)]
     pub(super) log_json: bool,
 }
@@ -72,7 +72,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
 
 /// The folder has a configuration.
 #[derive(Debug, thiserror::Error)]
-#[error("there is a configuration already")]
+#[error("a configuration already exists")]
 struct Exists;
 
 impl Cause for Exists {
@@ -81,7 +81,7 @@ impl Cause for Exists {
     }
 
     fn advice(&self) -> String {
-        "serve that one, or name another folder".to_owned()
+        "serve this configuration, or name another folder".to_owned()
     }
 }
 
@@ -164,7 +164,7 @@ async fn obey(shared: Arc<Shared>, listen: Option<SocketAddr>) {
         signal(SignalKind::hangup()),
     ];
     let [Ok(mut terminate), Ok(mut interrupt), Ok(mut hangup)] = signals else {
-        tracing::error!("signals cannot be heard");
+        tracing::error!("signals cannot be received");
         return;
     };
     loop {

@@ -19,7 +19,7 @@ use crate::{
 
 const DAY_MS: i64 = 86_400_000;
 
-/// Keeps a service: copies of its database, its tokens.
+/// Maintains a service: copies of its database, its tokens.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     #[command(subcommand)]
@@ -33,7 +33,7 @@ enum Command {
     Backup {
         /// Configuration of the service (TOML).
         config: PathBuf,
-        /// File to write; nothing may be there.
+        /// File to write; it must not exist.
         file: PathBuf,
     },
     /// Make a new database from the products; jobs, events and tokens are lost.
@@ -42,7 +42,7 @@ enum Command {
         /// Configuration of the service (TOML).
         config: PathBuf,
     },
-    /// Tokens, with which people and programs may use the service.
+    /// Tokens that let people and programs use the service.
     #[command(
         subcommand,
         after_help = "Example: areograph service token list areograph.toml"
@@ -52,20 +52,20 @@ enum Command {
 
 #[derive(Debug, Subcommand)]
 enum TokenCommand {
-    /// Make a token and print it, for the only time.
+    /// Make a token and print it once.
     #[command(
         after_help = "Example: areograph service token add areograph.toml --role read --days 30"
     )]
     Add {
         /// Configuration of the service (TOML).
         config: PathBuf,
-        /// What its bearer may do.
+        /// Role of its bearer.
         #[arg(long, value_enum)]
         role: RoleName,
-        /// What it is for.
+        /// Purpose of the token.
         #[arg(long, default_value = "")]
         note: String,
-        /// Days until it ends; without, it does not end.
+        /// Days until the token expires; by default it does not expire.
         #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
         days: Option<u16>,
     },
@@ -75,12 +75,12 @@ enum TokenCommand {
         /// Configuration of the service (TOML).
         config: PathBuf,
     },
-    /// End a token, and the sessions that were begun with it.
+    /// Revoke a token, and the sessions that were started with it.
     #[command(after_help = "Example: areograph service token revoke areograph.toml 01234567")]
     Revoke {
         /// Configuration of the service (TOML).
         config: PathBuf,
-        /// The eight digits behind `areo_`.
+        /// The eight digits after `areo_`.
         id: String,
     },
 }
@@ -88,17 +88,17 @@ enum TokenCommand {
 /// What the bearer of a token may do, as typed.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum RoleName {
-    /// Look.
+    /// View only.
     Read,
-    /// Look, start and cancel jobs, pin runs.
+    /// View, start and cancel jobs, pin runs.
     Operate,
 }
 
 #[derive(Debug, thiserror::Error)]
 enum Unfit {
-    #[error("there is no token {0}")]
+    #[error("unknown token {0}")]
     NoToken(String),
-    #[error("there is something already")]
+    #[error("already exists")]
     FileExists,
 }
 
@@ -109,8 +109,8 @@ impl Cause for Unfit {
 
     fn advice(&self) -> String {
         match self {
-            Self::NoToken(_) => "look at areograph service token list",
-            Self::FileExists => "name a file that is not there",
+            Self::NoToken(_) => "list the tokens with `areograph service token list`",
+            Self::FileExists => "name a file that does not exist",
         }
         .to_owned()
     }

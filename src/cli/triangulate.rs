@@ -13,9 +13,9 @@ use crate::{
     flow::run_net,
 };
 
-/// Triangulates a net of rectified pictures in the plane: four unknowns a picture, no kernels.
+/// Triangulates a net of rectified pictures in the plane: four unknowns per picture, no kernels.
 ///
-/// Products go to `<out>/<net>`. Blunders and gross controls are found and told.
+/// Products go to `<out>/<net>`. Blunders and gross errors of controls are detected and reported.
 ///
 /// Example: `areograph scene net --plane && areograph triangulate net/net.toml --out products`
 #[derive(Debug, Args)]
@@ -27,7 +27,7 @@ pub(super) struct Arguments {
     /// Folder of the products; the net gets a folder of its own in it.
     #[arg(long, default_value = "out")]
     out: PathBuf,
-    /// Triangulate again, whatever is stored.
+    /// Triangulate again, even if stored results are up to date.
     #[arg(long)]
     force: bool,
     /// Print JSON.

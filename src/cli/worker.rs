@@ -6,7 +6,7 @@ use clap::Args;
 
 use crate::worker;
 
-/// Does one task of the service, which talks to it over standard input and output.
+/// Performs one task of the service, which communicates over standard input and output.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// The process of the service; the worker ends when its parent is another one.

@@ -5,12 +5,10 @@ use crate::error::{Cause, Kind};
 #[derive(Debug, thiserror::Error)]
 pub(super) enum DifferenceError {
     /// Neither a site's folder nor a folder of such.
-    #[error(
-        "there is no manifest.json in it or in a folder below; expected products of `areograph run`"
-    )]
+    #[error("no manifest.json in this folder or below it; expected products of `areograph run`")]
     NoProducts,
     /// Two names of one folder.
-    #[error("A and B are one folder; expected the products of two runs")]
+    #[error("A and B are the same folder; expected the products of two runs")]
     SameFolder,
     /// A site's folder beside a folder of sites.
     #[error("it holds the products of one site, the other folder those of several")]
@@ -19,7 +17,7 @@ pub(super) enum DifferenceError {
     #[error("these are products of site \"{b}\", the others of site \"{a}\"; expected one site")]
     DifferentSites { a: String, b: String },
     /// Two roots without a common site.
-    #[error("no site is in both: A has {a}; B has {b}")]
+    #[error("A and B have no site in common: A has {a}; B has {b}")]
     NoneInBoth { a: String, b: String },
 }
 
@@ -35,7 +33,7 @@ impl Cause for DifferenceError {
         match self {
             Self::NoProducts => "name the folder given to --out, or a site's folder in it",
             Self::SameFolder => {
-                "copy the first products aside before running again, or run into another --out"
+                "copy the first products elsewhere before running again, or run into another --out"
             }
             Self::OneAndSeveral => "name two folders of one site, or two output folders with sites",
             Self::DifferentSites { .. } | Self::NoneInBoth { .. } => {

@@ -89,8 +89,7 @@ impl Cause for WouldBeInvalid {
     }
 
     fn advice(&self) -> String {
-        "a run makes the products none the less, marks them, and its report has the numbers"
-            .to_owned()
+        "a run still writes the products, marks them as invalid, and reports the numbers".to_owned()
     }
 }
 

@@ -81,7 +81,7 @@ impl Compared {
 enum CompareError {
     #[error("kernel set {other} holds the same kernels as {first}")]
     Same { first: String, other: String },
-    #[error("no time at which all kernel sets hold the position of {}; {held}", SPACECRAFT.name)]
+    #[error("the kernel sets have no common coverage of the position of {}; {held}", SPACECRAFT.name)]
     NothingInCommon { held: String },
     #[error(
         "the clocks of the kernel sets {first} and {other} differ: {reading} is {apart_s} s later in {other}"
@@ -107,10 +107,10 @@ impl Cause for CompareError {
         match self {
             Self::Same { .. } => "name each set once",
             Self::NothingInCommon { .. } => {
-                "see `areograph kernels coverage` for each set, and leave out the set that does not reach there"
+                "see `areograph kernels coverage` for each set, and leave out the set that does not cover this time"
             }
             Self::Clocks { .. } => {
-                "give all sets the same leap-second (.tls) and spacecraft clock (.tsc) kernels: times of images rest on them"
+                "give all sets the same leap-second (.tls) and spacecraft clock (.tsc) kernels: times of images depend on them"
             }
         }
         .to_owned()

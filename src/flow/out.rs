@@ -25,7 +25,9 @@ pub enum OutError {
         holds: &'static str,
     },
     /// No file system holds it.
-    #[error("--out has a part of {bytes} bytes, {part:.20}…; expected at most {PART_LENGTH_MAX}")]
+    #[error(
+        "--out has a path component of {bytes} bytes, {part:.20}…; expected at most {PART_LENGTH_MAX}"
+    )]
     LongPart {
         /// The part.
         part: String,
@@ -34,7 +36,7 @@ pub enum OutError {
     },
     /// A kernel of an adjusted image has a path that CSPICE does not take.
     #[error(
-        "--out makes the path of a product, {}, {} bytes long while it is made; CSPICE takes at most {PATH_LENGTH_MAX}",
+        "with --out the path of a product, {}, is {} bytes long while it is written; CSPICE accepts at most {PATH_LENGTH_MAX}",
         .product.display(), .product.as_os_str().len()
     )]
     LongPath {

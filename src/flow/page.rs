@@ -19,7 +19,7 @@ use crate::{
 
 /// The page is not the one that was published, although everything that it shows is.
 #[derive(Debug, thiserror::Error)]
-#[error("the page made from these products is not the one that was published")]
+#[error("the page made from these products differs from the published one")]
 struct OtherPage;
 
 impl Cause for OtherPage {
@@ -28,7 +28,7 @@ impl Cause for OtherPage {
     }
 
     fn advice(&self) -> String {
-        "another build of this version made it: run the site again, or write the page elsewhere with --page".to_owned()
+        "it was made by another build of this version: run the site again, or write the page elsewhere with --page".to_owned()
     }
 }
 

@@ -51,7 +51,7 @@ impl Cause for ProductError {
     fn advice(&self) -> String {
         match self {
             Self::ReadBack { .. } => {
-                "check the disk and run again; if it happens twice, report it with the site's configuration"
+                "check the disk and run again; if it happens again, report it with the site's configuration"
             }
             _ => "report this with the site's configuration and the log",
         }

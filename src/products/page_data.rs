@@ -332,5 +332,5 @@ impl<W: Write> Write for Hashed<W> {
 }
 
 fn decoded<T: DeserializeOwned>(bytes: &[u8]) -> std::result::Result<T, ReadError> {
-    postcard::from_bytes(bytes).map_err(ReadError::unreadable("what a report is made from"))
+    postcard::from_bytes(bytes).map_err(ReadError::unreadable("the data of a report"))
 }

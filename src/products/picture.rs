@@ -73,7 +73,7 @@ impl Cause for TooLarge {
     }
 
     fn advice(&self) -> String {
-        "write a PNG; if the image is not so large, `areograph image info` says what is wrong with it"
+        "write a PNG; if the image is not so large, `areograph image info` lists its errors"
             .to_owned()
     }
 }

@@ -48,7 +48,7 @@ enum RowsError {
     Column { name: String, holds: String },
     #[error("the column {GEOMETRY} is missing or holds no points")]
     NoPoints,
-    #[error("rows have other columns than those before")]
+    #[error("columns of these rows differ from those of earlier rows")]
     Differ,
 }
 
@@ -63,10 +63,10 @@ impl Cause for RowsError {
     fn advice(&self) -> String {
         match self {
             Self::Column { .. } => {
-                "write Parquet, which holds lists and groups too; or ask for other columns"
+                "write Parquet, which also holds lists and groups, or select other columns"
             }
             Self::NoPoints | Self::Differ => {
-                "products of another version of areograph have to be made again by this one"
+                "products of another version of areograph must be made again by this version"
             }
         }
         .to_owned()

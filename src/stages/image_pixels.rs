@@ -107,7 +107,7 @@ enum PixelsError {
         expected: String,
     },
     #[error(
-        "image {image}: its pixels were exposed from clock {clock} on; expected {expected}, as the image itself is"
+        "image {image}: the exposure of its pixels begins at clock {clock}; expected {expected}, the clock of the image"
     )]
     Clock {
         image: String,
@@ -115,7 +115,7 @@ enum PixelsError {
         expected: String,
     },
     #[error(
-        "image {image}: its pixels are those of camera {found}; expected {expected}, as the image itself is"
+        "image {image}: its pixels are those of camera {found}; expected {expected}, the camera of the image"
     )]
     Camera {
         image: String,
@@ -123,21 +123,19 @@ enum PixelsError {
         expected: String,
     },
     #[error(
-        "image {image}: the rows of its pixels were exposed from ET {found_s:.3} s on; expected {expected_s:.3} s, as the image \
-         itself is"
+        "image {image}: the exposure of its pixels begins at ET {found_s:.3} s; expected {expected_s:.3} s, the start \
+         of the image"
     )]
     Start {
         image: String,
         found_s: f64,
         expected_s: f64,
     },
-    #[error(
-        "image {image}: its pixels are those of a map; expected the image as its camera took it"
-    )]
+    #[error("image {image}: its pixels are map-projected; expected the unprojected image")]
     Map { image: String },
     #[error(
-        "images {} and {}: their pixels are both {} lines of {} samples, without a label that says whose they are; expected a label in \
-         one of them",
+        "images {} and {}: the pixels of both are {} lines of {} samples, without a label that identifies the image; \
+         expected a label in one of them",
         images[0], images[1], size[0], size[1]
     )]
     Alike { images: [String; 2], size: [u32; 2] },
@@ -172,11 +170,11 @@ impl Cause for PixelsError {
                 "fetch the file again, label and pixels in one: either may be of another image"
             }
             Self::Map { .. } => {
-                "give the cube before its projection, or the file of the archive (.imq, .img)"
+                "give the unprojected cube, or the file of the archive (.imq, .img)"
             }
             Self::Alike { .. } => {
-                "give the file of the archive (.imq, .img) or the cube of ISIS for one of the images: exchanged pictures could not be \
-                 told from orientations that err"
+                "give the file of the archive (.imq, .img) or the cube of ISIS for one of the images: otherwise \
+                 exchanged pictures cannot be distinguished from orientation errors"
             }
             Self::Camera { .. } | Self::Start { .. } => {
                 "check that images.pixels are not exchanged, and the label or the exposures of the image"

@@ -29,7 +29,7 @@ impl Cause for NoGround {
     }
 
     fn advice(&self) -> String {
-        "give this window edges or a polygon of its own".to_owned()
+        "give this window its own edges or polygon".to_owned()
     }
 }
 

@@ -75,10 +75,10 @@ impl Cause for TiesError {
                 "measure tie points in at least two images, or leave out the table ties"
             }
             Self::NoImage { .. } => {
-                "give each image the name that the file has for it as images.serial_number"
+                "set images.serial_number of each image to its name in the file"
             }
             Self::SharedPlaces(_) => {
-                "a place of an image is one tie point: check how the table was made"
+                "each image position belongs to one tie point: check how the table was made"
             }
         }
         .to_owned()

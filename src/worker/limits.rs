@@ -43,7 +43,7 @@ pub(super) fn keep_to(task: &Task) {
         }
     }
     if let Err(error) = nice(NICENESS) {
-        tracing::warn!("the worker is as urgent as the service: {error}");
+        tracing::warn!("the worker runs at the priority of the service: {error}");
     }
     let score = File::options()
         .write(true)

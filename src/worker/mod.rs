@@ -116,7 +116,7 @@ fn read_task() -> Option<std::result::Result<Task, String>> {
         return None;
     }
     let task =
-        serde_json::from_slice::<Task>(&line).map_err(|error| format!("this is no task: {error}"));
+        serde_json::from_slice::<Task>(&line).map_err(|error| format!("malformed task: {error}"));
     Some(task.and_then(|task| {
         if task.v == PROTOCOL {
             Ok(task)
@@ -140,7 +140,7 @@ fn listen(stop: &Arc<AtomicBool>) -> std::io::Result<()> {
                     tracing::info!(?cancel, "the service asks to stop");
                     stop.store(true, Ordering::Relaxed);
                 }
-                Err(error) => tracing::warn!("the service said what no service says: {error}"),
+                Err(error) => tracing::warn!("malformed message from the service: {error}"),
             }
         }
         tracing::warn!("the service is gone");
@@ -241,7 +241,7 @@ fn panicked(panic: &(dyn Any + Send)) -> Failure {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     let text = text.or(panic.downcast_ref::<&str>().copied());
     bug(format!(
-        "areograph itself failed: {}",
+        "internal error of areograph: {}",
         text.unwrap_or("for no stated reason")
     ))
 }

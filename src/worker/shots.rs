@@ -31,7 +31,7 @@ const SITE: &str = "site";
 #[derive(Debug, thiserror::Error)]
 enum ShotsError {
     /// No such format.
-    #[error("the format {0} is none; expected csv, geojson or parquet")]
+    #[error("unknown format {0}; expected csv, geojson or parquet")]
     Format(String),
     /// A region without an inside.
     #[error(
@@ -56,10 +56,10 @@ impl Cause for ShotsError {
 
     fn advice(&self) -> String {
         match self {
-            Self::Format(_) | Self::Polygon(_) => "ask otherwise",
+            Self::Format(_) | Self::Polygon(_) => "correct the format or the polygon",
             Self::NoRun => "run the site",
             Self::Parquet(_) => {
-                "products of another version of areograph have to be made again by this one"
+                "products of another version of areograph must be made again by this version"
             }
         }
         .to_owned()
@@ -163,7 +163,7 @@ fn inside(batch: &RecordBatch, region: &Region) -> Result<RecordBatch> {
         column.and_then(|column| column.as_any().downcast_ref::<Float64Array>())
     });
     let (Some(longitude), Some(latitude)) = (longitude, latitude) else {
-        let what = format!("searched: no columns {} of numbers", PLACE.join(" and "));
+        let what = format!("searched: no numeric columns {}", PLACE.join(" and "));
         return Err(ShotsError::Parquet(what).into());
     };
     let radians = |degrees: f64| degrees * RADIANS_PER_DEGREE;

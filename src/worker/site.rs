@@ -18,9 +18,7 @@ use crate::{
 
 /// A site file with other keys than those that the service has seen.
 #[derive(Debug, thiserror::Error)]
-#[error(
-    "its keys have the hash {is}; expected {seen}, that of the keys which the service has seen"
-)]
+#[error("its keys have the hash {is}; expected {seen}, the hash that the service recorded")]
 struct OtherKeys {
     is: String,
     seen: String,
@@ -32,7 +30,7 @@ impl Cause for OtherKeys {
     }
 
     fn advice(&self) -> String {
-        "run again when the service has seen the change".to_owned()
+        "run again after the service has detected the change".to_owned()
     }
 }
 

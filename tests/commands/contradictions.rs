@@ -170,7 +170,7 @@ const MISTAKES: &[Mistake] = &[
             site(case, "id = \"E02-02016\"", "id = \"right\"");
         },
         End::Error(3),
-        "holds another clock",
+        "the clock of serial number",
     ),
     (
         "one_label_for_both_images",

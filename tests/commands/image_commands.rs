@@ -252,7 +252,7 @@ fn pictures_of_other_formats_are_refused_before_anything_is_read() {
     let told = String::from_utf8_lossy(&output.stderr);
     assert_eq!(
         told,
-        "error: image.jpg; expected an ending .png, .tif or .tiff\n  what to do: give the file another ending\n"
+        "error: image.jpg; expected the extension .png, .tif or .tiff\n  what to do: name the file with one of these extensions\n"
     );
 }
 

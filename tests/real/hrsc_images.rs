@@ -613,12 +613,12 @@ fn damaged_and_exchanged_files_are_told() {
         (
             "pixels = 'h5270_0000_ir2.img'",
             "pixels = 'other.img'",
-            "were exposed from ET",
+            "the exposure of its pixels begins at ET",
         ),
         (
             "label = 'h5270_0000_ir2.img'",
             "label = 'alone.lbl'",
-            "its label tells no times of lines",
+            "its label states no line times",
         ),
         (
             "pixels = 'h5270_0000_ir2.img'",

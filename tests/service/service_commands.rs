@@ -160,7 +160,7 @@ fn a_configuration_stands_and_an_address_is_refused() {
         .output()
         .unwrap();
     assert_eq!(again.status.code(), Some(2));
-    assert!(said(&again).contains("there is a configuration already"));
+    assert!(said(&again).contains("a configuration already exists"));
     let mut serve = areograph();
     serve.arg("serve").arg(keeper.file("areograph.toml"));
     let public = serve.args(["--listen", "0.0.0.0:0"]).output().unwrap();

@@ -386,9 +386,7 @@ fn other_keys_and_a_busy_site_are_told_apart() {
     let changed = failed(&run_task(&case, "0001", &"0".repeat(64)));
     assert_eq!((changed.code, changed.busy), (3, false));
     assert!(
-        changed
-            .text
-            .contains("that of the keys which the service has seen"),
+        changed.text.contains("the hash that the service recorded"),
         "{}",
         changed.text
     );

@@ -18,8 +18,8 @@ use crate::{
 
 /// Writes the pixels of an image as PNG, or as TIFF with tiles and overviews.
 ///
-/// Pixels are those of the file, line 0 first and at the top: on the day side south is up and east left. Lines that are
-/// missing are black; --mask tells them from dark ones.
+/// Pixels are those of the file, line 0 first and at the top: on the day side south is up and east left. Missing lines
+/// are black; --mask distinguishes them from dark ones.
 ///
 /// Example: areograph image extract m0100115.imq --out m0100115.png
 #[derive(Debug, Args)]
@@ -28,22 +28,22 @@ pub(super) struct Arguments {
     /// Image file of the archive (.imq, .img), ISIS cube, TIFF or PNG of one band of grey.
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// File to write; its ending (.png, .tif, .tiff) is its format.
+    /// File to write; its extension (.png, .tif, .tiff) determines the format.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// 16 bits: relative radiance by gain, offset and exposure, and the offset between odd and even detectors removed
-    /// (narrow angle without summing). Not for geometry, and no reflectance: its constants are not public. Images whose gain
+    /// (narrow angle without summing). Not for geometry, and not reflectance: its constants are not public. Images whose gain
     /// changes from line to line are refused.
     #[arg(long)]
     calibrate: bool,
-    /// Also write which lines are good (255), suspect (128) or missing (0), in one of the same formats.
+    /// Also write a mask of good (255), suspect (128) and missing (0) lines, in one of the same formats.
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
 }
 
 /// An ending of another format.
 #[derive(Debug, thiserror::Error)]
-#[error("{}; expected an ending .png, .tif or .tiff", .0.display())]
+#[error("{}; expected the extension .png, .tif or .tiff", .0.display())]
 struct Ending(PathBuf);
 
 impl Cause for Ending {
@@ -52,13 +52,13 @@ impl Cause for Ending {
     }
 
     fn advice(&self) -> String {
-        "give the file another ending".to_owned()
+        "name the file with one of these extensions".to_owned()
     }
 }
 
 /// An image of which not a line can be read.
 #[derive(Debug, thiserror::Error)]
-#[error("not one line of the image can be read")]
+#[error("no line of the image can be read")]
 struct NoLines;
 
 impl Cause for NoLines {
@@ -67,13 +67,13 @@ impl Cause for NoLines {
     }
 
     fn advice(&self) -> String {
-        "fetch the file again; `areograph image info` says what is wrong with it".to_owned()
+        "fetch the file again; `areograph image info` lists its errors".to_owned()
     }
 }
 
 /// A radiometric correction of what has no label with gain and offset.
 #[derive(Debug, thiserror::Error)]
-#[error("--calibrate needs an image as the archive has it, whose label tells gain and offset")]
+#[error("--calibrate requires an image file of the archive, whose label states gain and offset")]
 struct NotOfTheArchive;
 
 impl Cause for NotOfTheArchive {
@@ -153,7 +153,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     }
     if complaints > 0 {
         tracing::warn!(
-            "{complaints} complaints of {}; `areograph image info` has them",
+            "{complaints} complaints of {}; `areograph image info` lists them",
             arguments.file.display()
         );
     }

@@ -16,15 +16,15 @@ use crate::{
     units::SECONDS_PER_MS,
 };
 
-/// Shows label, size, coding, statistics, and everything that is wrong with each image file.
+/// Shows label, size, coding, statistics, and all errors of each image file.
 ///
-/// Cubes and pictures may stand in for images of the archive. Where their numbers are not bytes, the least is shown as 1 and the
-/// largest as 255, and statistics are those of what is shown.
+/// Cubes and pictures may replace images of the archive. If their values are not bytes, the least is scaled to 1 and the
+/// largest to 255, and statistics refer to the scaled values.
 ///
-/// Statistics and the hash are those of the decoded 8-bit pixels in the order of the file; lines that are missing do not
-/// count. A line is suspect when it comes from damaged data, or when its place in the image is not known. A damaged
-/// file is no failure as long as some of it can be read. `exposures` are the times of lines that a file of HRSC holds, as
-/// `images.exposures` has them: first line, its start in ET seconds, line period in milliseconds.
+/// Statistics and the hash are those of the decoded 8-bit pixels in the order of the file; missing lines are excluded.
+/// A line is suspect if it comes from damaged data, or if its place in the image is unknown. A damaged file is not a
+/// failure as long as part of it can be read. `exposures` are the line times in a file of HRSC, in the form of
+/// `images.exposures`: first line, its start in ET seconds, line period in milliseconds.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: areograph image info e0202855.imq --json")]
 pub(super) struct Arguments {

@@ -77,7 +77,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
 fn tell_index(path: &Path, index: &ImageIndex) {
     if !index.has_label {
         tracing::warn!(
-            "{}: no .lbl beside it; its columns are taken to be those of the mapping mission",
+            "{}: no .lbl beside it; its columns are assumed to be those of the mapping mission",
             path.display()
         );
     }
@@ -120,12 +120,12 @@ fn found_in(
     }
     if without_target > 0 {
         tracing::warn!(
-            "{}: {without_target} images have no TARGET_NAME; they are taken to show {MARS_NAME}",
+            "{}: {without_target} images have no TARGET_NAME; they are assumed to show {MARS_NAME}",
             path.display()
         );
     }
     for (left_out, what) in [
-        (of_no_camera, "are of no camera that is known; left out"),
+        (of_no_camera, "are of an unknown camera; left out"),
         (
             without_place,
             "could not be tested: no centre, or neither corners nor size on the ground",

@@ -25,8 +25,8 @@ use crate::{
 ///
 /// Orbits are positions of MGS from Mars (geometric, J2000) along the radial, along-track and cross-track
 /// axes of the mean orbit. The set with the least root mean square distance from the mean is closest: the
-/// rule by which Shan et al. 2005 chose. Instants are equally spaced over the time that all sets hold,
-/// 1 s apart or, beyond 10000 of them, as far as keeps that number; what a set does not hold is listed.
+/// rule by which Shan et al. 2005 chose. Epochs are equally spaced over the time that all sets cover, 1 s
+/// apart or, beyond 10000 epochs, far enough apart to keep that number; gaps of each set are listed.
 ///
 /// Example: `areograph kernels compare nav.tm gsfc.tm ipng.tm --site gusev_crater.toml`
 #[derive(Debug, Args)]

@@ -17,26 +17,24 @@ use crate::{
     store::atomic,
 };
 
-/// Makes the index of the PEDR files in and below a folder, or brings it up to date: only new and changed files are read.
+/// Creates or updates the index of the PEDR files in and below a folder; only new and changed files are read.
 ///
-/// `run` and `pedr search` use it by themselves, and give the same with it, without it, and when it is out of date.
-/// It is the file areograph-pedr.index in the folder. A command that is killed leaves the index as it was.
+/// `run` and `pedr search` use the index automatically; their results are the same with it, without it, and if it is out of
+/// date. It is the file areograph-pedr.index in the folder. If the command is killed, the index remains unchanged.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: areograph pedr index /data/mola")]
 pub(super) struct Arguments {
     /// Folder of the archive.
     #[arg(value_name = "FOLDER")]
     folder: PathBuf,
-    /// Read every file again, and name those whose bytes are not those that were indexed.
+    /// Read every file again, and list the files whose content differs from the index.
     #[arg(long)]
     verify: bool,
 }
 
 /// A file that changed without a trace in the file system.
 #[derive(Debug, thiserror::Error)]
-#[error(
-    "its bytes are not those that were indexed, though size and times are: hash {was}, now {is}"
-)]
+#[error("its content differs from the index, although size and times match: hash {was}, now {is}")]
 struct Altered {
     was: String,
     is: String,
@@ -48,7 +46,7 @@ impl Cause for Altered {
     }
 
     fn advice(&self) -> String {
-        "fetch the file again: the disk may be failing; the index now says what the file holds"
+        "fetch the file again: the disk may be failing; the index now describes the present content"
             .to_owned()
     }
 }
@@ -68,7 +66,7 @@ impl Cause for NotEncoded {
     }
 }
 
-/// Nobody stops an index but by killing it, which is harmless.
+/// Indexing cannot be interrupted gracefully; killing it is harmless.
 static RUN_ON: AtomicBool = AtomicBool::new(false);
 
 /// What becomes of the files.

@@ -18,11 +18,11 @@ use crate::{
     time::Et,
 };
 
-/// Shows label, orbits, time span, what the shots are, and everything that is wrong with each file.
+/// Shows label, orbits, time span, statistics of the shots, and all errors of each file.
 ///
-/// Shots are counted by class, trigger channel, attitude flag and orbit model, without those that did not come back or
-/// contradict themselves. Ranges are held against the distance from the file's own spacecraft to the footprint: both
-/// come from one orbit, so that their difference tests the file and its reading, and needs no kernel.
+/// Shots are counted by class, trigger channel, attitude flag and orbit model, excluding shots without a return and
+/// contradictory shots. Ranges are compared with the distance from the spacecraft position in the file to the footprint:
+/// both come from one orbit, so that their difference tests the file and its reader, and requires no kernel.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: areograph pedr info pedr/*.b")]
 pub(super) struct Arguments {

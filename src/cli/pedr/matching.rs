@@ -18,10 +18,10 @@ use crate::{
 
 /// Finds laser control points: shots of PEDR files over a stereo terrain model, shifted until their heights fit.
 ///
-/// Shots become segments with relief, these units of several passes, and each unit is searched for the shift at which the model
-/// has its heights (Li et al. 2023). Every fourth shot of a unit takes no part and judges. Products go to --out: units with
-/// shift and reason, a control point of every unit that is kept, a page; with --isd also control.csv for `areograph calibrate`.
-/// The exit code is 5 when too few units are kept, or shots that were held out do not bear them out.
+/// Shots are grouped into segments with relief, and these into units of several passes; for each unit the command finds the
+/// shift at which its heights fit the model (Li et al. 2023). Every fourth shot of a unit is held out for validation. Products go
+/// to --out: units with shift and reason, a control point of every unit that is kept, a page; with --isd also control.csv for
+/// `areograph calibrate`. The exit code is 5 if too few units are kept, or if held-out shots do not confirm them.
 ///
 /// Example: areograph scene demo --terrain-model && areograph pedr match demo/model.tif demo/pedr --isd s1=demo/isd/s1.json --isd s2=demo/isd/s2.json --out control
 #[derive(Debug, Args)]
@@ -39,31 +39,31 @@ pub(super) struct Arguments {
     /// An image that the model was made from, by its support data; two or more, named as the cameras of the calibration.
     #[arg(long, value_name = "NAME=FILE", value_parser = image)]
     isd: Vec<(String, PathBuf)>,
-    /// Radius of the sphere that heights of the model count from; the default is that of the file's map.
+    /// Radius of the sphere to which heights of the model refer; the default is that of the map in the file.
     #[arg(long, value_name = "METRES")]
     radius_m: Option<f64>,
-    /// Heights count from another sphere than the file's map is of: that of --radius-m.
+    /// Heights refer to the sphere of --radius-m, not to that of the map in the file.
     #[arg(long, requires = "radius_m")]
     heights_apart: bool,
-    /// Most shots of a segment.
+    /// Maximum number of shots in a segment.
     #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u16).range(3..=1_000))]
     segment_points: u16,
     /// Variance of heights that a segment must exceed, square metres.
     #[arg(long, value_name = "M2", default_value_t = 1_000.0, value_parser = above_zero)]
     least_variance: f64,
-    /// How alike heights are; auto takes pearson while the model lies off by more than a tenth of the relief, or 100 m, else ccc.
+    /// Similarity of heights; auto takes pearson while the model lies off by more than a tenth of the relief, or 100 m, else ccc.
     #[arg(long, value_enum, default_value_t = Measure::Auto)]
     similarity: Measure,
-    /// Shifts are tried within so many cells to all sides.
+    /// Search radius of the shifts in each direction, cells.
     #[arg(long, value_name = "CELLS", default_value_t = 70, value_parser = clap::value_parser!(u16).range(1..=500))]
     search: u16,
     /// Similarity that a unit must exceed, below 1.
     #[arg(long, default_value_t = 0.9, value_parser = share)]
     least_score: f64,
-    /// What the best similarity over the mean of those above 0 must exceed.
+    /// Ratio of the best similarity to the mean of those above 0 that a unit must exceed.
     #[arg(long, default_value_t = 1.0, value_parser = above_zero)]
     least_contrast: f64,
-    /// Largest root mean square of model minus laser at all shots that were held out, bias removed, metres.
+    /// Largest root mean square of model minus laser at all held-out shots, bias removed, metres.
     #[arg(long, value_name = "METRES", default_value_t = 60.0, value_parser = above_zero)]
     limit_m: f64,
     /// Seed of the clusters.
@@ -71,7 +71,7 @@ pub(super) struct Arguments {
     seed: u64,
     #[command(flatten)]
     shots: FilterArguments,
-    /// Match again, whatever is stored.
+    /// Match again, even if stored results are up to date.
     #[arg(long)]
     force: bool,
     /// Print JSON.
@@ -91,7 +91,7 @@ enum Measure {
 
 /// One image is given.
 #[derive(Debug, thiserror::Error)]
-#[error("--isd names the images {0:?}; expected two or more, each with a name of its own")]
+#[error("--isd names the images {0:?}; expected two or more with distinct names")]
 struct Images(Vec<String>);
 
 impl Cause for Images {

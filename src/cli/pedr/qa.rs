@@ -23,9 +23,9 @@ const TOLD_EVERY: Duration = Duration::from_secs(10);
 
 /// Checks every shot of an archive against kernels: measured range minus distance, profile by profile.
 ///
-/// Products go to --out: a row of statistics for every profile, shots of the worst ones, a page. A profile is what one file has
-/// of one revolution. A check that was interrupted or killed goes on where it was, with the same result. The exit code is 5
-/// when a profile breaks a limit, a file could not be checked, or kernels do not cover a profile (--allow-uncovered).
+/// Products go to --out: a row of statistics for every profile, shots of the worst ones, a page. A profile is the part of one
+/// revolution in one file. A check that was interrupted or killed resumes where it stopped, with the same result. The exit code
+/// is 5 if a profile exceeds a limit, a file could not be checked, or kernels do not cover a profile (--allow-uncovered).
 ///
 /// Example: `areograph scene demo --days 5 && areograph pedr qa demo/pedr --kernels demo/kernels/archive.tm --out qa`
 #[derive(Debug, Args)]
@@ -40,16 +40,16 @@ pub(super) struct Arguments {
     /// Folder of the products.
     #[arg(long, default_value = "qa")]
     out: PathBuf,
-    /// By how much time tags are late; 0 takes them as they are. The default is the bias of MOLA's clock.
+    /// Delay of the time tags; 0 leaves them unchanged. The default is the bias of MOLA's clock.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, default_value_t = usual_altimeter().clock_bias_s)]
     clock_bias_s: f64,
     /// Threads; the default is one for every processor.
     #[arg(long)]
     threads: Option<std::num::NonZeroU16>,
-    /// Do not count against the archive that the kernels have no position for some of its shots.
+    /// Do not report the archive as invalid if the kernels have no position for some of its shots.
     #[arg(long)]
     allow_uncovered: bool,
-    /// Check every file again, whatever is stored.
+    /// Check every file again, even if stored results are up to date.
     #[arg(long)]
     force: bool,
     /// Print JSON.
@@ -75,7 +75,7 @@ impl Cause for ClockBias {
 /// Profiles that break limits, or that could not be checked.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "the archive is invalid against these kernels, or was not checked as a whole; products were written"
+    "the archive is invalid against these kernels, or was checked only in part; products were written"
 )]
 struct Invalid;
 
@@ -85,7 +85,7 @@ impl Cause for Invalid {
     }
 
     fn advice(&self) -> String {
-        "look at the page: reasons stand on top, then come the worst profiles".to_owned()
+        "see the page: it lists the reasons first, then the worst profiles".to_owned()
     }
 }
 

@@ -22,7 +22,7 @@ use crate::{
 /// Rows that are not in the order of time, or stand in an earlier file as well.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "{rows} rows are not in the order of time, the first in record {record}, after a shot of {before}"
+    "{rows} rows are not in time order, the first in record {record}, after a shot of {before}"
 )]
 struct NotInOrder {
     rows: u64,
@@ -36,7 +36,7 @@ impl Cause for NotInOrder {
     }
 
     fn advice(&self) -> String {
-        "if both files hold the same orbits, name only one of them: their shots stand in the answer twice"
+        "if both files hold the same orbits, name only one of them: otherwise the answer contains their shots twice"
             .to_owned()
     }
 }

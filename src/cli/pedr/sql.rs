@@ -19,12 +19,12 @@ use crate::{
     sql::{Question, ShotsTable, Tally, ask},
 };
 
-/// Answers a question in SQL about the shots of an archive, the table `shots`.
+/// Answers an SQL query on the shots of an archive, the table `shots`.
 ///
-/// It has the columns of `footprints.parquet` but `windows` ("describe shots" lists them) in IAU 2000, with a row for every shot
-/// with a return, whatever its class; times are the tags of the files, TDB seconds past J2000. Conditions on `longitude_deg`,
-/// `latitude_deg`, `et_s` and `source_file` spare reading most of the archive, an index of it (`pedr index`) even more. An answer is
-/// complete, or the command fails. Tables are only read.
+/// The table has the columns of `footprints.parquet` except `windows` ("describe shots" lists them) in IAU 2000, and one row for
+/// every shot with a return, of any class; times are the tags of the files, TDB seconds past J2000. With conditions on
+/// `longitude_deg`, `latitude_deg`, `et_s` and `source_file` most of the archive is not read; an index (`pedr index`) saves even
+/// more. The answer is complete, or the command fails. Tables are read-only.
 ///
 /// Example: `areograph pedr sql archive "select orbit, count(*), avg(topography_m) from shots where latitude_deg between
 /// -5.5 and -4 and longitude_deg between 137 and 138 and class = 1 group by orbit order by orbit"`
@@ -34,13 +34,13 @@ pub(super) struct Arguments {
     /// PEDR files, and folders with .b files in and below them.
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
-    /// The question.
+    /// The SQL query.
     #[arg(required = true, value_name = "SQL")]
     question: String,
-    /// How it is printed.
+    /// Format of the printed answer.
     #[arg(long, value_enum, default_value_t = Format::Table, conflicts_with = "out")]
     format: Format,
-    /// File to write instead, .parquet or .csv.
+    /// Write the answer to this file instead, .parquet or .csv.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -105,7 +105,7 @@ fn tell(tally: &Tally) {
     });
     let each: Vec<String> = each.collect();
     tracing::warn!(
-        "records that were complained of, whose bad shots are no rows: {}; pedr info tells of each",
+        "records with errors, whose invalid shots are omitted: {}; pedr info lists them",
         each.join(", ")
     );
 }

@@ -19,9 +19,9 @@ use crate::{
     },
 };
 
-/// Prints shots as text tables: pedr2tab's, to the byte, from the same PEDR2TAB.PRM and the same list of files.
+/// Prints shots as the text tables of pedr2tab, byte for byte, from the same PEDR2TAB.PRM and the same list of files.
 ///
-/// What pedr2tab does wrong is done as well, unless --per-shot is given. These are its slips, and our rules:
+/// Known errors of pedr2tab are reproduced, unless --per-shot is given. Its errors, and the rules of --per-shot:
 ///
 ///   window          tests the mid-point of a frame, between two longitudes  |  tests every shot, across 0° too
 ///   gate            a frame without parallax and crossover residual keeps those of the last one in the window, even of
@@ -31,29 +31,29 @@ use crate::{
 ///   slope           of the residual counts from the last frame in the window, however far back
 ///                                                                           |  from the adjoining frame, else constant
 ///   first frames    a file with a single frame, if it has a residual, gives no line  |  gives its lines
-///   bad records     are printed                                             |  are left out and told
+///   bad records     are printed                                             |  are left out and reported
 ///   pulse width     counts above 127 are printed as negative                |  as they are
 ///   lists           end at the first file that cannot be opened             |  go on to the next; both end as an error
 ///
-/// Not copied: names are not cut at 64 characters and may hold points and folders, more than 99,999 frames are read, and
-/// a trigger channel that is none does not read beyond its table.
+/// Not reproduced: names are not cut at 64 characters and may hold points and folders, more than 99,999 frames are read, and
+/// an invalid trigger channel does not read beyond its table.
 #[derive(Debug, Args)]
 #[command(
     verbatim_doc_comment,
     after_help = "Example: areograph pedr tab ap19019l.b --per-shot"
 )]
 pub(super) struct Arguments {
-    /// A PEDR file (its name holds .b or .B), or a text file with the name of one in each line.
+    /// A PEDR file (its name holds .b or .B), or a text file with one file name per line.
     #[arg(default_value = "FILELIST")]
     input: PathBuf,
-    /// Preferences. Without it PEDR2TAB.PRM; where that is not there, those of pedr2tab hold: ground returns, group 0,
-    /// headings, one table a file.
+    /// Preferences; by default PEDR2TAB.PRM. If that file is missing, the defaults of pedr2tab apply: ground returns, group 0,
+    /// headings, one table per file.
     #[arg(long, value_name = "FILE")]
     preferences: Option<PathBuf>,
-    /// Whose program the table is like: column widths, and the order of sums.
+    /// Program whose column widths and order of sums the table follows.
     #[arg(long, default_value = "team")]
     variant: Program,
-    /// Our rules in place of every slip.
+    /// Apply the rules above instead of the errors of pedr2tab.
     #[arg(long)]
     per_shot: bool,
     /// Folder of the tables.
@@ -64,9 +64,9 @@ pub(super) struct Arguments {
 /// Whose program.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Program {
-    /// The MOLA team's: off-nadir angle in 7 columns, packet and orbit in 6.
+    /// Program of the MOLA team: off-nadir angle in 7 columns, packet and orbit in 6.
     Team,
-    /// The port of the USGS: 8, and 7 and 8 columns.
+    /// Port of the USGS: off-nadir angle in 8 columns, packet in 7 and orbit in 8.
     Usgs,
 }
 
@@ -81,7 +81,7 @@ impl Cause for NoMarker {
     }
 
     fn advice(&self) -> String {
-        "name a PEDR file, or a list of them whose name has no .b; in a list, or with --per-shot, the marker is not asked for"
+        "name a PEDR file, or a list of them whose name has no .b; the marker is not required in a list or with --per-shot"
             .to_owned()
     }
 }
@@ -181,7 +181,7 @@ fn read_preferences(named: Option<&Path>) -> Result<Preferences> {
         Ok(bytes) => bytes,
         Err(error) if named.is_none() && error.kind() == std::io::ErrorKind::NotFound => {
             output::line(format_args!(
-                "{}: not there; the preferences of pedr2tab hold",
+                "{}: not found; the default preferences of pedr2tab apply",
                 path.display()
             ));
             return Ok(Preferences::default());
@@ -191,7 +191,7 @@ fn read_preferences(named: Option<&Path>) -> Result<Preferences> {
     let preferences = Preferences::parse(&String::from_utf8_lossy(&bytes));
     if let Some(ended) = &preferences.ended {
         output::line(format_args!(
-            "{}: {ended}; from there on the preferences of pedr2tab hold",
+            "{}: {ended}; from there on the default preferences of pedr2tab apply",
             path.display()
         ));
     }

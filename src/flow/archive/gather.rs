@@ -37,8 +37,8 @@ impl Cause for SharedShots {
     }
 
     fn advice(&self) -> String {
-        "name only one of the two, or move the other one away: every shot counts once, and only you can say which version of \
-         an orbit is meant"
+        "name only one of the two, or move the other one away: every shot counts once, and areograph cannot decide \
+         which version of an orbit is meant"
             .to_owned()
     }
 }

@@ -10,15 +10,13 @@ use crate::{
 /// Pixels of another image.
 #[derive(Debug, thiserror::Error)]
 enum PixelsError {
-    #[error("camera {camera}: its pixels have {} lines of {} samples; expected {} of {}, as its support data say", found[0], found[1], expected[0], expected[1])]
+    #[error("camera {camera}: its pixels have {} lines of {} samples; expected {} of {}, as its support data state", found[0], found[1], expected[0], expected[1])]
     Size {
         camera: String,
         found: [u32; 2],
         expected: [u32; 2],
     },
-    #[error(
-        "camera {camera}: its pixels are those of a map; expected the image as its camera took it"
-    )]
+    #[error("camera {camera}: its pixels are map-projected; expected the unprojected image")]
     Map { camera: String },
     #[error("camera {camera} has no pixels")]
     Missing { camera: String },

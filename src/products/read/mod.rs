@@ -52,6 +52,6 @@ impl Cause for ReadError {
     }
 
     fn advice(&self) -> String {
-        "products of another version of areograph have to be made again by this one".to_owned()
+        "products of another version of areograph must be made again by this version".to_owned()
     }
 }

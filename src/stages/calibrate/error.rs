@@ -7,8 +7,8 @@ use crate::error::{Cause, Kind};
 pub enum CalibrateError {
     /// Two images hang on different frames.
     #[error(
-        "camera {camera} hangs on frame {found} (instrument_pointing.time_dependent_frames), camera {first} on {expected}; \
-         expected one frame, that of the spacecraft"
+        "camera {camera} is mounted on frame {found} (instrument_pointing.time_dependent_frames), camera {first} on \
+         {expected}; expected one frame, that of the spacecraft"
     )]
     OtherFrame {
         /// The camera.
@@ -42,7 +42,7 @@ pub enum CalibrateError {
     },
     /// A camera does not look down.
     #[error(
-        "camera {camera} looks up or across: its look directions are no tangents of the axis that looks down"
+        "camera {camera} looks up or across: its look directions are not tangents about the axis that looks down"
     )]
     LooksUp {
         /// The camera.
@@ -60,7 +60,7 @@ pub enum CalibrateError {
     },
     /// Too few tie points.
     #[error(
-        "{found} tie points that fit are in camera {camera} and another; expected at least {expected} of every camera"
+        "{found} usable tie points link camera {camera} to another; expected at least {expected} for every camera"
     )]
     TooFewTies {
         /// The camera that has fewest.
@@ -72,7 +72,7 @@ pub enum CalibrateError {
     },
     /// Too few control points.
     #[error(
-        "{found} control points can be used, {held_back} are held back; expected at least {expected} of each"
+        "{found} control points are usable, {held_back} are held back; expected at least {expected} of each"
     )]
     TooFewControls {
         /// How many there are.
@@ -105,7 +105,7 @@ pub enum CalibrateError {
         point: String,
     },
     /// An orbit of the validation has another number of files, or another sensor.
-    #[error("validation {orbit}: no support data of sensor {sensor}, that of camera {camera}")]
+    #[error("validation {orbit}: no support data of {sensor}, the sensor of camera {camera}")]
     NoSupport {
         /// The orbit.
         orbit: String,
@@ -115,7 +115,7 @@ pub enum CalibrateError {
         camera: String,
     },
     /// The calibrated cameras cannot see a control point.
-    #[error("control point {point} cannot judge the calibration: {problem}")]
+    #[error("control point {point} cannot validate the calibration: {problem}")]
     Unseen {
         /// The point.
         point: String,
@@ -123,7 +123,7 @@ pub enum CalibrateError {
         problem: String,
     },
     /// Another orbit has too little laser control.
-    #[error("validation {orbit}: {found} control points can be used; expected at least {expected}")]
+    #[error("validation {orbit}: {found} control points are usable; expected at least {expected}")]
     ThinValidation {
         /// The orbit.
         orbit: String,
@@ -144,8 +144,8 @@ pub enum CalibrateError {
     },
     /// The camera of another orbit is mounted in another way.
     #[error(
-        "validation {orbit}: camera {camera} looks {off_px:.2} px off where it does in the orbit of the calibration; expected \
-         one mounting and one focal plane within {limit_px} px"
+        "validation {orbit}: camera {camera} looks {off_px:.2} px away from its direction in the orbit of the \
+         calibration; expected one mounting and one focal plane within {limit_px} px"
     )]
     OtherMounting {
         /// The orbit.
@@ -179,12 +179,13 @@ impl Cause for CalibrateError {
                  from there to the camera"
             }
             Self::SameSensor { .. } | Self::NoSupport { .. } => {
-                "name_sensor tells the lines of the camera apart: check the files behind cameras.isd and validation.isd"
+                "name_sensor distinguishes the lines of the camera: check the files of cameras.isd and validation.isd"
             }
-            Self::UnknownCamera { .. } => "write the cameras' identifiers of the configuration into the table",
-            Self::TooFewTies { .. } => "measure more points that several lines see",
+            Self::UnknownCamera { .. } => "use the camera identifiers of the configuration in the table",
+            Self::TooFewTies { .. } => "measure more points that are visible in several lines",
             Self::TooFewControls { .. } => {
-                "give more laser points, or leave the table control out: without it only what the cameras differ by is told"
+                "give more laser points, or leave out the table control: without control only differential parameters are \
+                 estimated"
             }
             Self::Misfit { .. } => {
                 "check that every camera has the support data of its own image and is not exchanged with another, that samples \
@@ -194,14 +195,14 @@ impl Cause for CalibrateError {
                 "give this orbit more laser points, or leave it out of [[validation]]"
             }
             Self::SameFile { .. } => {
-                "what a calibration was made from cannot judge it: give files of another orbit, or leave this one out"
+                "data used in a calibration cannot validate it: give files of another orbit, or leave this one out"
             }
-            Self::TwoPlaces { .. } => "give every laser point a name of its own",
-            Self::Unseen { .. } => "look at the place of this point and at its lines and samples",
+            Self::TwoPlaces { .. } => "give every laser point a unique name",
+            Self::Unseen { .. } => "check the position of this point and its lines and samples",
             Self::OtherMounting { .. } => {
                 "give support data that have the same mounting, focal length and focal plane: the calibration is an offset from them"
             }
-            Self::Adjustment { .. } => "check that ties and laser points were measured in these images, that they are spread over them, and their standard deviations",
+            Self::Adjustment { .. } => "check that ties and laser points were measured in these images and cover them, and check their standard deviations",
         }
         .to_owned()
     }

@@ -27,7 +27,7 @@ const CONVERGENCE_MIN_RAD: f64 = 0.01;
 /// A pair that no surface can be made of.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum PairError {
-    #[error("images {} and {} show no common ground by their orientation", images[0], images[1])]
+    #[error("images {} and {} do not overlap according to their orientation", images[0], images[1])]
     NothingInCommon { images: [String; 2] },
     #[error(
         "images {} and {} look from nearly the same direction: their rays converge by {degrees:.2} degrees, expected at least 0.57",
@@ -54,7 +54,7 @@ impl Cause for PairError {
             Self::NothingInCommon { .. } | Self::Parallel { .. } => {
                 "name two images of a stereo pair in surface.images, and check their kernels and times"
             }
-            Self::Fine { .. } => "three pixels are usual: nothing smaller than what is compared is resolved",
+            Self::Fine { .. } => "use about three pixels: details smaller than the compared areas are not resolved",
             Self::TooLarge { .. } => "give larger cells",
         }
         .to_owned()

@@ -7,7 +7,7 @@ use crate::error::{Cause, Kind};
 pub enum MatchError {
     /// Two files hold the same shots.
     #[error(
-        "holds shots that {other} holds as well; every shot counts once, or held-out shots would be shots that took part"
+        "holds shots that {other} also holds; every shot counts once, otherwise held-out shots would take part in the match"
     )]
     SharedShots {
         /// The other file.
@@ -40,7 +40,7 @@ impl Cause for MatchError {
         match self {
             Self::SharedShots { .. } => "name only one of the two files",
             Self::NoShots { .. } => {
-                "name PEDR files of passes over it, and look at its place: longitudes are east, latitudes areocentric"
+                "name PEDR files of passes over it, and check its position: longitudes are east, latitudes areocentric"
             }
         }
         .to_owned()

@@ -97,12 +97,12 @@ impl Cause for MatchError {
     fn advice(&self) -> String {
         match self {
             Self::Unseen { .. } | Self::NothingInCommon => {
-                "check that the site's images show the same ground, and their kernels and times"
+                "check that the site's images overlap, and check their kernels and times"
             }
             Self::NothingMatched(_) => {
-                "look at the images: are images.pixels those of these images, and is the same ground to be seen in both? If the \
-                 orientations are farther off than the margin, check start times, or give larger standard deviations in \
-                 [adjustment]"
+                "check that images.pixels belong to these images, and that both show the same ground; if the \
+                 orientations are farther off than the margin, check start times, or give larger standard deviations \
+                 in [adjustment]"
             }
         }
         .to_owned()

@@ -30,8 +30,8 @@ impl Cause for SharedShots {
     }
 
     fn advice(&self) -> String {
-        "name only one of the two in pedr.files: every shot counts once, and only you can say which \
-         version of an orbit is meant"
+        "name only one of the two in pedr.files: every shot counts once, and areograph cannot decide which version of \
+         an orbit is meant"
             .to_owned()
     }
 }

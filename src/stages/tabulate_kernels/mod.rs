@@ -118,7 +118,7 @@ impl Cause for TabulateError {
         match self {
             Self::Samples { .. } => "report this with the site's configuration and the log",
             Self::ReadBack { .. } => {
-                "check the disk and run again; if it happens twice, report it with the site's configuration"
+                "check the disk and run again; if it happens again, report it with the site's configuration"
             }
         }
         .to_owned()

@@ -43,7 +43,7 @@ pub(super) enum Contradiction {
         expected: String,
     },
     #[error(
-        "image {image}: serial number {serial} holds another clock than {sclk}; expected them within {TOLERANCE_S} s"
+        "image {image}: the clock of serial number {serial} differs from {sclk}; expected agreement within {TOLERANCE_S} s"
     )]
     Serial {
         image: String,
@@ -88,20 +88,20 @@ impl Cause for Contradiction {
     fn advice(&self) -> String {
         match self {
             Self::Product { .. } => {
-                "check that labels are not exchanged; an identifier that names no product goes with any label"
+                "check that labels are not exchanged; an identifier that names no product is valid with any label"
             }
             Self::Serial { .. } => {
                 "check that labels or serial numbers are not exchanged; ISIS writes the clock of the label into the latter"
             }
             Self::Start { .. } => {
-                "check which of the two belongs to this image, and that no leap second before it is missing in the kernels; the \
-                 clock is what would be used"
+                "check which of the two belongs to this image, and that no leap second before it is missing in the \
+                 kernels; the run would use the clock"
             }
             Self::Exposures { .. } => {
-                "check which of the two belongs to this image: the exposures are what would be used"
+                "check which of the two belongs to this image: the run would use the exposures"
             }
             Self::Stop { .. } => {
-                "check start and stop time, lines, exposure and downtrack summing; one of them is not of this image"
+                "check start and stop time, lines, exposure and downtrack summing; one of them belongs to another image"
             }
         }
         .to_owned()

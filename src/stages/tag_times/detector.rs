@@ -39,8 +39,8 @@ enum DetectorError {
         pixels: u32,
     },
     #[error(
-        "image {image}: its {samples} samples of {crosstrack} pixels are a part of the {pixels} pixels of {instrument}, and \
-         nothing says where it begins; expected first_detector"
+        "image {image}: its {samples} samples of {crosstrack} pixels are a part of the {pixels} pixels of \
+         {instrument}, and its first pixel is unknown; expected first_detector"
     )]
     FirstPixel {
         image: String,
@@ -59,7 +59,7 @@ impl Cause for DetectorError {
     fn advice(&self) -> String {
         match self {
             Self::Summing { .. } | Self::Detector { .. } => {
-                "check summing, samples and first detector, and that the image is of this camera"
+                "check summing, samples and first detector, and check that the image is of this camera"
                     .to_owned()
             }
             Self::FirstPixel { .. } => {

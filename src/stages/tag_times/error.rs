@@ -11,7 +11,7 @@ pub(super) enum ImageError {
     #[error("image {image}: no {key}, neither in the label nor in the configuration")]
     Missing { image: String, key: &'static str },
     #[error(
-        "image {0}: its label tells no times of lines, which its file has beside each of them; expected these"
+        "image {0}: its label states no line times, which its file holds beside each line; expected line times"
     )]
     NoLineTimes(String),
     #[error(
@@ -75,7 +75,7 @@ impl Cause for ImageError {
                 "give the exposure of one detector line, or the period of summed lines, not a mixture".to_owned()
             }
             Self::Lines { .. } => {
-                "lines_header is what the camera exposed, lines_delivered what the file holds".to_owned()
+                "lines_header counts the lines that the camera exposed, lines_delivered the lines in the file".to_owned()
             }
             Self::Duration { .. } => "check lines_header, the exposure (milliseconds) and the summing".to_owned(),
         }

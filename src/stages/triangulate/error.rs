@@ -12,15 +12,15 @@ pub enum NetError {
     #[error("no table holds a measurement")]
     NoMeasurement,
     /// Fewer than two controls that a picture shows.
-    #[error("controls that a picture shows: {found}; expected two or more")]
+    #[error("controls measured in a picture: {found}; expected two or more")]
     TooFewControls {
         /// How many there are.
         found: usize,
     },
     /// A picture, or a brick, and what hangs on it can turn, shrink or move.
     #[error(
-        "UnderconnectedPicture: {what} {name} has ties and controls: {ties}; expected two or more that lie apart, on a \
-         part of the net that has two controls"
+        "UnderconnectedPicture: {what} {name} has ties and controls: {ties}; expected two or more at different places, \
+         in a part of the net with two controls"
     )]
     Underconnected {
         /// `picture` or `brick`.
@@ -49,7 +49,7 @@ pub enum NetError {
         second: String,
     },
     /// A picture is a mirror image.
-    #[error("picture {picture} is a mirror image of what its neighbours show")]
+    #[error("picture {picture} is a mirror image compared with its neighbours")]
     MirroredPicture {
         /// The picture.
         picture: String,
@@ -84,7 +84,7 @@ pub enum NetError {
         limit_m: f64,
     },
     /// A control at a place that the projection does not have.
-    #[error("control {point} is at a place that the projection does not show")]
+    #[error("control {point} lies outside the area of the projection")]
     NotOnTheMap {
         /// The point.
         point: String,
@@ -108,27 +108,27 @@ impl Cause for NetError {
         match self {
             Self::NoMeasurement => "give tables with measurements in measurements.files",
             Self::TooFewControls { .. } => {
-                "give two controls at least, under the names that the measurements have for the points"
+                "give at least two controls, named as the points of the measurements"
             }
             Self::Underconnected { .. } => {
                 "measure more points that it shares with its neighbours, or leave its measurements out"
             }
             Self::EqualPoints { .. } | Self::EqualControls { .. } => {
-                "one place is one point: give both the same name, or correct one of them"
+                "points at the same place are one point: give both the same name, or correct one of them"
             }
             Self::MirroredPicture { .. } => {
                 "change the sign of one coordinate of this picture, which may have been measured from the back of the film"
             }
-            Self::MirroredFigure => "set measurements.y_axis to the way in which y counts in the pictures",
+            Self::MirroredFigure => "set measurements.y_axis to the direction of y in the pictures",
             Self::WrongUnits { .. } => {
                 "check metres_per_unit of the picture, and the units in which controls and measurements are given"
             }
             Self::BeyondTheMap { .. } => {
-                "check the unit that the column names, x_m or x_km, and the map of the configuration"
+                "check the unit in the column name, x_m or x_km, and the map of the configuration"
             }
             Self::NotOnTheMap { .. } => "choose another projection in the table map",
             Self::Film { .. } => {
-                "give the four corner ticks of the picture, and none or all four of the mid-edge ticks"
+                "give the four corner ticks of the picture, and either no or all four mid-edge ticks"
             }
         }
         .to_owned()

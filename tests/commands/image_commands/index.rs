@@ -403,7 +403,7 @@ fn what_the_index_does_not_say_loses_no_image() {
     );
     warning(
         &whole.replace("MOC-NA", "CTX"),
-        "1 images (the first is M01/00001) are of no camera",
+        "1 images (the first is M01/00001) are of an unknown camera",
     );
     let nowhere = whole
         .replace(",49.70,9.50,", ",,,")
@@ -492,7 +492,7 @@ fn what_is_no_index_is_refused_with_its_line() {
     assert_eq!(output.status.code(), Some(2));
     let told = String::from_utf8_lossy(&output.stderr);
     assert!(
-        told.contains("\"hrsc\" is no camera; expected moc_na, moc_wa_red, moc_wa_blue"),
+        told.contains("unknown camera \"hrsc\"; expected moc_na, moc_wa_red, moc_wa_blue"),
         "{told}"
     );
 }

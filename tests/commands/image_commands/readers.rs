@@ -194,6 +194,6 @@ fn what_stands_in_for_an_image_is_refused_with_its_reason() {
     assert!(
         String::from_utf8(output.stderr)
             .unwrap()
-            .contains("--calibrate needs an image as the archive has it")
+            .contains("--calibrate requires an image file of the archive")
     );
 }

@@ -20,9 +20,9 @@ const PIXEL_MAX_M: f64 = 1e7;
 
 /// Finds the images of the mission's cumulative index that may show ground of a window, and pairs of them.
 ///
-/// An image counts when its outline meets a window after both are allowed to be off by what the index leaves open: 0.35
-/// degrees of latitude (areographic or areocentric), 0.3 degrees of longitude over cos(latitude) (prime meridian). So
-/// nothing is lost, and images just beside a window are found too; `areograph run` tells what an image shows.
+/// An image is listed if its outline meets a window within the uncertainty of the index: 0.35 degrees of latitude
+/// (areographic or areocentric), 0.3 degrees of longitude over cos(latitude) (prime meridian). So no image is lost, and
+/// images just beside a window are found too; `areograph run` determines the ground that an image shows.
 ///
 /// Pairs are images of different orbits (by the index, else by times more than 30 minutes apart) with common ground. Best
 /// first: overlap × min(convergence / 20°, 1) × cos²(difference of the Sun / 2) / ratio of the pixels. Convergence is the
@@ -41,7 +41,7 @@ pub(in crate::cli::image) struct Arguments {
     /// Site file: its windows.
     #[arg(long = "site", value_name = "SITE")]
     sites: Vec<PathBuf>,
-    /// Identifiers of cameras, as `images.instrument` of a site file has them; without it, all.
+    /// Identifiers of cameras, as in `images.instrument` of a site file; by default all.
     #[arg(long = "camera", value_name = "ID", value_delimiter = ',')]
     cameras: Vec<String>,
     /// Largest emission angle, degrees.
@@ -53,18 +53,18 @@ pub(in crate::cli::image) struct Arguments {
     /// Largest width of a pixel on the ground, metres.
     #[arg(long, value_name = "METRES", value_parser = above_to(0.0, PIXEL_MAX_M), allow_negative_numbers = true)]
     pixel_max_m: Option<f64>,
-    /// Metakernel: holds the corners of the images that were found against those by these kernels, where they cover them, and warns
-    /// of images whose corners are off by more than the search allows.
+    /// Metakernel: compares the corners of the images with those computed from these kernels, where they cover the images,
+    /// and warns of images whose corners are off by more than the search allows.
     #[arg(long, value_name = "FILE")]
     pub(super) kernels: Option<PathBuf>,
-    /// How the answer is printed.
+    /// Format of the printed answer.
     #[arg(long, value_enum, default_value = "table")]
     pub(super) format: Format,
 }
 
-/// A camera that is none.
+/// An unknown camera.
 #[derive(Debug, thiserror::Error)]
-#[error("{0:?} is no camera; expected {known}", known = known_cameras())]
+#[error("unknown camera {0:?}; expected {known}", known = known_cameras())]
 struct NoCamera(String);
 
 impl Cause for NoCamera {
@@ -104,13 +104,13 @@ pub(super) fn camera_of(image: &IndexedImage) -> Option<&'static Instrument> {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Format {
-    /// Images and the best pairs, to be read.
+    /// Images and the best pairs, as text.
     Table,
     /// A line for each image.
     Csv,
     /// A line for each pair.
     Pairs,
-    /// Outlines with all that is known of them.
+    /// Outlines with all attributes of the images.
     Geojson,
     /// Tables `images` of a site file.
     Toml,

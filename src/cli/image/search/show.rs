@@ -214,7 +214,7 @@ pub(super) fn toml(found: &[Found]) {
         output::line(format_args!("id = {:?}", id(found)));
         match camera_of(image) {
             Some(camera) => output::line(format_args!("instrument = {:?}", camera.id)),
-            None => output::line("# instrument: the index does not say which camera this is of"),
+            None => output::line("# instrument: the index does not identify the camera"),
         }
         match &image.sclk_start {
             Some(clock) => output::line(format_args!("sclk_start = {clock:?}")),

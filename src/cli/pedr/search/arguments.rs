@@ -17,9 +17,9 @@ use crate::{
 
 /// Finds the shots of an archive that lie in windows, each by its own position in IAU 2000.
 ///
-/// Rows come in the order of time, each with its PEDR file and record; times are the tags of the files. What was asked for
-/// and how complete the answer is stands in the file (key `areograph_search` of Parquet and GeoJSON; beside CSV in a file
-/// .json). The exit code is not 0 when a file could not be searched, or rows are not in order of time.
+/// Rows are in time order, each with its PEDR file and record; times are the tags of the files. The file also states the
+/// request and the completeness of the answer (key `areograph_search` of Parquet and GeoJSON; for CSV in a .json file
+/// beside it). The exit code is not 0 if a file could not be searched, or if rows are not in time order.
 ///
 /// Example: areograph pedr search archive --box 137.0,138.0,-5.5,-4.0 --out gale.parquet
 #[derive(Debug, Args)]
@@ -31,7 +31,7 @@ pub(in crate::cli::pedr) struct Arguments {
     pub(super) paths: Vec<PathBuf>,
     #[command(flatten)]
     pub(super) windows: WindowArguments,
-    /// Time tags, both included: TDB seconds past J2000, or UTC with --leap-seconds; either end may be left out.
+    /// Interval of time tags, both ends included: TDB seconds past J2000, or UTC with --leap-seconds; either end may be left out.
     #[arg(long, value_name = "A..B", allow_hyphen_values = true)]
     pub(super) time: Option<String>,
     /// Leap seconds (LSK, such as naif0012.tls), for times in UTC.
@@ -39,10 +39,10 @@ pub(in crate::cli::pedr) struct Arguments {
     pub(super) leap_seconds: Option<PathBuf>,
     #[command(flatten)]
     pub(super) shots: FilterArguments,
-    /// Complain of every bad record of the files, not only of those near the windows.
+    /// Report every bad record of the files, not only those near the windows.
     #[arg(long)]
     pub(super) check_all: bool,
-    /// How shots are written; without it, by the ending of --out, or only counted.
+    /// Format of the shots; by default that of the extension of --out; without --out shots are only counted.
     #[arg(long, value_enum)]
     pub(super) format: Option<Format>,
     /// File to write.
@@ -74,15 +74,15 @@ impl Format {
 /// What is wrong with the command line.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum Usage {
-    #[error("{0:?} is no interval of time")]
+    #[error("{0:?} is not a time interval")]
     Time(String),
-    #[error("{0}; expected an ending .parquet, .csv or .geojson")]
+    #[error("{0}; expected the extension .parquet, .csv or .geojson")]
     Ending(String),
-    #[error("{out}: the ending is of another format than --format {format}")]
+    #[error("{out}: the extension does not match --format {format}")]
     OtherEnding { out: String, format: String },
-    #[error("{0}: shots that are only counted (--format count) are not written")]
+    #[error("{0}: --format count only counts shots and writes no file")]
     Count(String),
-    #[error("{0:?} is no file; expected values of a filter in one list")]
+    #[error("{0:?} is not a file; expected the values of a filter in one list")]
     Value(String),
 }
 
@@ -96,14 +96,14 @@ impl Cause for Usage {
             Self::Time(_) => {
                 "write A..B with seconds past J2000 (-25000000..-24990000), or with UTC (1999-03-16T00:00:00..1999-03-17T00:00:00) and --leap-seconds"
             }
-            Self::Ending(_) => "say --format, or give the file another ending",
+            Self::Ending(_) => "give --format, or name the file with one of these extensions",
             Self::OtherEnding { .. } => {
-                "leave out --format, or give the file an ending of the format"
+                "leave out --format, or name the file with the extension of this format"
             }
             Self::Count(_) => {
-                "leave out --out, counts are printed; or leave out --format, and shots are written"
+                "leave out --out to print counts, or leave out --format to write shots"
             }
-            Self::Value(_) => "separate values by commas (--classes 0,1), or say the filter once for each",
+            Self::Value(_) => "separate values by commas (--classes 0,1), or repeat the filter for each value",
         }
         .to_owned()
     }

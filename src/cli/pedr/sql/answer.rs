@@ -28,7 +28,7 @@ const TABLE_ROWS_MAX: usize = 1_000;
 enum NotWritten {
     #[error("the answer cannot be written: {0}")]
     Refused(String),
-    #[error("has the ending {0:?}; expected parquet or csv")]
+    #[error("has the extension {0:?}; expected parquet or csv")]
     Ending(String),
 }
 
@@ -49,7 +49,7 @@ impl Cause for NotWritten {
     fn advice(&self) -> String {
         match self {
             Self::Refused(_) => "write the answer to a file (--out)",
-            Self::Ending(_) => "give the file another ending",
+            Self::Ending(_) => "name the file with one of these extensions",
         }
         .to_owned()
     }
@@ -195,7 +195,7 @@ fn print_table(schema: SchemaRef, batches: &[RecordBatch]) -> Result<()> {
     output::line(table.map_err(NotWritten::refused)?);
     if rows(batches) > TABLE_ROWS_MAX {
         tracing::warn!(
-            "these are the first {TABLE_ROWS_MAX} rows; all of them: --format csv, or --out"
+            "only the first {TABLE_ROWS_MAX} rows are shown; for all rows give --format csv or --out"
         );
     }
     Ok(())
