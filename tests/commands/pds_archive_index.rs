@@ -294,7 +294,7 @@ fn files_that_hold_no_records_are_not_indexed() {
     let path = folder.path().join("empty.b");
     overwrite(&path, b"");
     let failure = IndexedFile::of(&path, Path::new("empty.b"), &RUN_ON).unwrap_err();
-    assert!(failure.to_string().contains("no good record"), "{failure}");
+    assert!(failure.to_string().contains("no valid record"), "{failure}");
 }
 
 #[test]

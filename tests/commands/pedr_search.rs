@@ -193,7 +193,7 @@ fn an_index_changes_no_byte_and_is_brought_up_to_date() {
         code == Some(3) && said.contains("2 files of ") && said.contains("1 gone"),
         "{said}"
     );
-    assert!(said.contains("empty.b: no good record"), "{said}");
+    assert!(said.contains("empty.b: no valid record"), "{said}");
 }
 
 #[test]
@@ -214,7 +214,7 @@ fn an_answer_that_is_not_whole_says_so_in_the_file_and_by_the_exit_code() {
     assert!(matches!(output.status.code(), Some(3 | 6)));
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(
-        said.contains("gone.b") && said.contains("ap00001l.b: no good record"),
+        said.contains("gone.b") && said.contains("ap00001l.b: no valid record"),
         "{said}"
     );
     let (rows, told) = batch(&out);

@@ -350,7 +350,7 @@ fn a_file_without_a_good_record_stops_the_search_before_its_datum_is_asked_for()
         assert_eq!(failure.kind().exit_code(), 3);
         let message = failure.to_string();
         assert!(
-            message.contains("renamed.dat: no good record") && message.contains(why),
+            message.contains("renamed.dat: no valid record") && message.contains(why),
             "{message}"
         );
     }

@@ -384,8 +384,8 @@ fn files_of_another_kind_are_refused_before_the_search() {
         failure
     };
     assert!(refused("empty.b", b"").contains("the file has 0 bytes"));
-    assert!(refused("text.b", &vec![b'x'; 20_000]).contains("no good record"));
-    assert!(refused("zeros.b", &vec![0; 900_000]).contains("no good record"));
+    assert!(refused("text.b", &vec![b'x'; 20_000]).contains("no valid record"));
+    assert!(refused("zeros.b", &vec![0; 900_000]).contains("no valid record"));
     let failure = Source::open(folder.path(), DatumChoice::Auto, &Indexes::default()).unwrap_err();
     assert!(failure.to_string().contains("not a regular file"));
 }
