@@ -374,7 +374,12 @@ fn check(case: &Case) -> (Option<i32>, Value) {
 fn no_mistake_passes_as_valid() {
     let mut golden = Golden::folder("contradictions");
     for (number, (mistake, make, end, part)) in MISTAKES.iter().enumerate() {
-        let case = Case::pair();
+        // In the short run a run of the sound pair comes first: what it stored must not hide the mistake.
+        let case = if common::long() {
+            Case::pair()
+        } else {
+            Case::pair_after_a_run()
+        };
         make(&case);
         let said = case.outcome(case.run());
         let starts = |start: &str| said.starts_with(start);

@@ -40,9 +40,9 @@ const DAMAGE: [Damage; 7] = [
     ("one more", |value| value + 1.0),
 ];
 
-/// How many damaged kernels are checked, and with how many a site is run; in the short run every damage in both places of
-/// each kernel, and every change of each state and attitude once.
-const DAMAGED: [usize; 2] = [42, 300];
+/// How many damaged kernels are checked, and with how many a site is run; in the short run every damage of each
+/// kernel, the places by turns, and every change of each state and attitude once.
+const DAMAGED: [usize; 2] = [21, 300];
 const RUN: [usize; 2] = [16, 24];
 
 /// Numbers that look drawn, the same in every run (Knuth's multiplicative hashing).

@@ -14,6 +14,7 @@ use std::{
     process::Command,
 };
 
+use areograph::config;
 use areograph_testing::checkout;
 
 use crate::common::mission::{areograph, mission};
@@ -119,13 +120,16 @@ fn commands_of_the_front_pages_work_as_they_stand() {
         program.parent().unwrap().display(),
         std::env::var("PATH").unwrap()
     );
-    symlink(mission(), folder.path().join("mission")).unwrap();
     // A window of many, which the chapter on the archive names.
     let windows =
         "[[windows]]\nid = \"gale\"\nlongitude_deg = [137.0, 138.0]\nlatitude_deg = [-5.5, -4.0]\n";
-    fs::write(folder.path().join("many.toml"), windows).unwrap();
     let (mut run, mut left) = (0, BTreeSet::new());
     for page in pages() {
+        // No page needs what the commands of another one wrote.
+        let folder = folder.path().join(page.file_stem().unwrap());
+        fs::create_dir(&folder).unwrap();
+        symlink(mission(), folder.join("mission")).unwrap();
+        fs::write(folder.join("many.toml"), windows).unwrap();
         for command in commands(&page) {
             let whole = format!("{command} ");
             let of = |(start, _): &&(&str, &str)| whole.starts_with(start);
@@ -139,7 +143,7 @@ fn commands_of_the_front_pages_work_as_they_stand() {
             let ends = ENDS.iter().find(|(start, _)| command.starts_with(start));
             let output = Command::new("sh")
                 .args(["-c", &command])
-                .current_dir(folder.path())
+                .current_dir(&folder)
                 .env("PATH", &path)
                 .output()
                 .unwrap();
@@ -155,6 +159,29 @@ fn commands_of_the_front_pages_work_as_they_stand() {
     }
     assert!(run >= 20, "only {run} commands were found");
     assert_eq!(left.len(), ELSEWHERE.len(), "of ELSEWHERE only {left:?}");
+}
+
+#[test]
+fn site_files_of_the_front_pages_are_valid() {
+    let text: Vec<String> = pages()
+        .iter()
+        .map(|page| fs::read_to_string(page).unwrap())
+        .collect();
+    let blocks = text.iter().flat_map(|text| text.split("```toml").skip(1));
+    let blocks: Vec<&str> = blocks
+        .map(|block| block.split("```").next().unwrap())
+        .collect();
+    let is_whole = |block: &&&str| block.trim().starts_with("site = ");
+    let whole = blocks.iter().find(is_whole).unwrap();
+    for block in &blocks {
+        let site = match is_whole(&block) {
+            true => (*block).to_owned(),
+            false => format!("{whole}\n{block}"),
+        };
+        let parsed = config::parse(&site, &checkout().join("sites/site.toml"));
+        assert!(parsed.is_ok(), "{block}{}", parsed.unwrap_err());
+    }
+    assert!(blocks.len() >= 4, "only {} blocks", blocks.len());
 }
 
 #[test]

@@ -1,8 +1,12 @@
 //! A small site of a test's own: kernels, one PEDR file, one label, and a site file over them.
 
-use std::{fs, path::PathBuf, process::Command};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
 
-use super::mission::{areograph, mission, succeed};
+use super::mission::{areograph, mission, once, succeed};
 
 const SITE: &str = r#"site = "case"
 [kernels]
@@ -17,6 +21,15 @@ latitude_deg = [4.0, 5.0]
 id = "image"
 label = "image.lbl"
 "#;
+
+/// Copies the files of a folder.
+fn copy_folder(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for entry in fs::read_dir(from).unwrap() {
+        let path = entry.unwrap().path();
+        fs::copy(&path, to.join(path.file_name().unwrap())).unwrap();
+    }
+}
 
 /// The site, in a folder that goes with it.
 pub(crate) struct Case {
@@ -62,6 +75,18 @@ impl Case {
         }
         let site = fs::read_to_string(mission.join("sites/isidis.toml")).unwrap();
         case.write("site.toml", site.replace("../", ""));
+        case
+    }
+
+    /// The pair with the stage outputs of a run of it, which a change must not let pass for its own.
+    pub(crate) fn pair_after_a_run() -> Self {
+        let stored = once("stages-of-pair", |folder| {
+            let case = Self::pair();
+            succeed(&mut case.run());
+            copy_folder(&case.path("out/isidis/.cache"), folder);
+        });
+        let case = Self::pair();
+        copy_folder(&stored, &case.path("out/isidis/.cache"));
         case
     }
 

@@ -1,9 +1,10 @@
-//! The built-in synthetic mission, written once for all tests of one build of the program.
+//! The built-in synthetic mission and runs of its sites, written once for all tests of one build of the program.
 
 use std::{
     fs::{self, File},
     path::{Path, PathBuf},
     process::{Command, Output},
+    sync::{LazyLock, OnceLock},
 };
 
 /// The program under test.
@@ -11,29 +12,55 @@ pub(crate) fn areograph() -> Command {
     Command::new(env!("CARGO_BIN_EXE_areograph"))
 }
 
-/// Folder of the default mission. Test programs run side by side: the first one writes it.
+/// Folder of the default mission.
 pub(crate) fn mission() -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
-    let program = fs::read(env!("CARGO_BIN_EXE_areograph")).unwrap();
-    let name = format!("mission-{}", &blake3::hash(&program).to_hex()[..16]);
-    let lock = File::create(folder.join("mission.lock")).unwrap();
+    static MISSION: OnceLock<PathBuf> = OnceLock::new();
+    let write = |folder: &Path| {
+        succeed(areograph().arg("--quiet").arg("scene").arg(folder));
+    };
+    MISSION.get_or_init(|| once("mission", write)).clone()
+}
+
+/// A run of a site of the default mission, to read only: its products and stage outputs.
+pub(crate) fn site_run(site: &str) -> PathBuf {
+    let file = mission().join(format!("sites/{site}.toml"));
+    let run = |folder: &Path| {
+        let mut run = areograph();
+        run.args(["--quiet", "run"]).arg(&file);
+        succeed(run.arg("--out").arg(folder));
+    };
+    once(&format!("run-{site}"), run).join(site)
+}
+
+/// The folder of a fixture that this build of the program makes once. Test programs run side by side: the first one
+/// makes it.
+pub(crate) fn once(name: &str, make: impl FnOnce(&Path)) -> PathBuf {
+    static BUILD: LazyLock<String> = LazyLock::new(|| {
+        let program = fs::read(env!("CARGO_BIN_EXE_areograph")).unwrap();
+        blake3::hash(&program).to_hex()[..16].to_owned()
+    });
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fixtures");
+    let build = folder.join(&*BUILD);
+    fs::create_dir_all(&folder).unwrap();
+    let lock = File::create(folder.join(format!("{name}.lock"))).unwrap();
     lock.lock().unwrap();
-    let mission = folder.join(&name);
-    if !mission.join("truth.json").exists() {
-        for entry in fs::read_dir(folder).unwrap() {
+    if !build.exists() {
+        for entry in fs::read_dir(&folder).unwrap() {
             let path = entry.unwrap().path();
-            let old = path
-                .file_name()
-                .unwrap()
-                .to_string_lossy()
-                .starts_with("mission-");
-            if old && path.is_dir() {
-                fs::remove_dir_all(path).unwrap();
+            if path.is_dir() && path != build {
+                // Another fixture may be removing it.
+                let _ = fs::remove_dir_all(path);
             }
         }
-        succeed(areograph().arg("--quiet").arg("scene").arg(&mission));
     }
-    mission
+    let fixture = build.join(name);
+    if !fixture.exists() {
+        let part = build.join(format!("{name}.part"));
+        let _ = fs::remove_dir_all(&part);
+        make(&part);
+        fs::rename(part, &fixture).unwrap();
+    }
+    fixture
 }
 
 /// Runs a command that must succeed.

@@ -28,7 +28,7 @@ use traced::{Call, Then, traced};
 /// Kills of first runs: half of them at any change of a file, half where files get their names; 20 in the long run. Each
 /// is followed by a whole run.
 fn kills() -> usize {
-    if long() { 20 } else { 6 }
+    if long() { 20 } else { 4 }
 }
 
 /// Kills of each part of a run over a published site; 12 in the long run. Four are one of each kind: images come or go, and the

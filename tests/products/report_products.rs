@@ -19,29 +19,17 @@ use std::{
     os::unix::fs::PermissionsExt,
     path::{Path, PathBuf},
     process::Command,
-    sync::LazyLock,
 };
 
 use common::{
     golden::assert_messages,
-    mission::{areograph, mission, succeed},
+    mission::{areograph, mission, site_run, succeed},
 };
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Products of Gusev crater, run once for all tests of this file.
-static GUSEV: LazyLock<PathBuf> = LazyLock::new(|| {
-    let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report_products");
-    let _ = fs::remove_dir_all(&out);
-    let mut run = areograph();
-    run.args(["--quiet", "run"])
-        .arg(mission().join("sites/gusev_crater.toml"));
-    succeed(run.arg("--out").arg(&out));
-    out
-});
-
 fn gusev() -> PathBuf {
-    GUSEV.join("gusev_crater")
+    site_run("gusev_crater")
 }
 
 /// A copy of the products alone, without stage outputs, in a folder of another name.

@@ -9,7 +9,13 @@
 
 use crate::common;
 
-use std::{fs, path::Path, sync::LazyLock};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    sync::LazyLock,
+    time::SystemTime,
+};
 
 use areograph::{
     body::Body,
@@ -19,6 +25,7 @@ use areograph::{
     geom::ellipsoid::local_axes,
     scene::{write_calibration_loop_scene, write_terrain_model_scene},
     stages::line_camera::LineCamera,
+    store::publish::CACHE,
 };
 use common::{assert_keeps_schema, json, long, number};
 use nalgebra::{Matrix3, Vector3};
@@ -197,10 +204,28 @@ fn places_are_as_near_as_stated_to_where_they_truly_are() {
 fn a_second_run_has_nothing_to_do() {
     let finished = RUN.manifest.finished_utc.clone();
     let config = load_calibration(&SCENE.path().join("lines/whole.toml")).unwrap();
+    let stored = stored_at(&RUN.folder);
+    assert!(!stored.is_empty());
     let again = run_calibration(&config.calibration, &SCENE.path().join("whole"), false).unwrap();
     assert!(again.unchanged);
     assert_eq!(again.manifest.finished_utc, finished);
     assert_eq!(again.manifest.verdict, RUN.manifest.verdict);
+    assert_eq!(
+        stored_at(&RUN.folder),
+        stored,
+        "a stage ran and stored its output again"
+    );
+}
+
+/// When each stage output of a folder was stored.
+fn stored_at(folder: &Path) -> BTreeMap<PathBuf, SystemTime> {
+    let entries = fs::read_dir(folder.join(CACHE)).unwrap();
+    let outputs = entries.map(|entry| {
+        let path = entry.unwrap().path();
+        let modified = path.metadata().unwrap().modified().unwrap();
+        (path, modified)
+    });
+    outputs.collect()
 }
 
 #[test]

@@ -24,7 +24,7 @@ use areograph::{
         tag_times::{ImageTimes, tag_times},
     },
 };
-use common::mission::{areograph, mission, succeed};
+use common::mission::{mission, site_run};
 use nalgebra::Vector3;
 use serde_json::Value;
 
@@ -121,7 +121,7 @@ fn camera_model_looks_there(isd: &Value, image: &ImageTimes) {
 
 /// Ground points of the shots of `file`, by record and shot.
 fn ground_m(products: &Path, file: &str) -> BTreeMap<(u64, u64), Vector3<f64>> {
-    let table = fs::read_to_string(products.join("gusev_context/footprints.csv")).unwrap();
+    let table = fs::read_to_string(products.join("footprints.csv")).unwrap();
     let mut lines = table.lines().filter(|line| !line.starts_with('#'));
     let header: Vec<&str> = lines.next().unwrap().split(',').collect();
     let at = |name: &str| header.iter().position(|column| *column == name).unwrap();
@@ -172,13 +172,9 @@ fn chooses_among_rivals(products: &Path) {
 
 #[test]
 fn shots_lie_where_the_instrument_kernel_sees_them() {
-    let out = tempfile::tempdir().unwrap();
-    let mut run = areograph();
-    run.args(["--quiet", "run"]);
-    run.arg(mission().join("sites/gusev_context.toml"));
-    succeed(run.arg("--out").arg(out.path()));
+    let run = site_run("gusev_context");
     let (site, truth) = (site(), truth());
-    chooses_among_rivals(&out.path().join("gusev_context"));
+    chooses_among_rivals(&run);
     for (image, orientation) in images(&site) {
         let model = fit_sensor_model(&orientation, &site.orientation).unwrap();
         let oriented = OrientedImage::of(&image, &orientation, &model).unwrap();
@@ -192,7 +188,7 @@ fn shots_lie_where_the_instrument_kernel_sees_them() {
         } else {
             "ap18933l.b"
         };
-        let ground_m = ground_m(out.path(), file);
+        let ground_m = ground_m(&run, file);
         let mut compared = 0;
         for shot in told["shots"].as_array().unwrap() {
             let number = |key: &str| shot[key].as_f64().unwrap();
@@ -222,9 +218,7 @@ fn shots_lie_where_the_instrument_kernel_sees_them() {
             compared += 1;
         }
         assert!(compared > 100, "{}: {compared} shots", image.id);
-        let isd = out
-            .path()
-            .join(format!("gusev_context/images/{}/isd.json", image.id));
+        let isd = run.join(format!("images/{}/isd.json", image.id));
         camera_model_looks_there(
             &serde_json::from_slice(&fs::read(isd).unwrap()).unwrap(),
             &image,

@@ -35,7 +35,7 @@ use arrow_array::types::Float64Type;
 use arrow_array::{Array as _, RecordBatch};
 use common::{
     json,
-    mission::{areograph, mission, succeed},
+    mission::{areograph, mission, once, succeed},
 };
 use nalgebra::{Matrix3, Vector3};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
@@ -249,9 +249,9 @@ fn run(mission: &Path, out: &Path) -> Command {
 /// Products of the default mission's sites, run once for all tests.
 fn default_run() -> &'static Path {
     static OUT: LazyLock<PathBuf> = LazyLock::new(|| {
-        let out = mission().join("truth");
-        succeed(&mut run(&mission(), &out));
-        out
+        once("sites", |folder| {
+            succeed(&mut run(&mission(), folder));
+        })
     });
     &OUT
 }

@@ -64,7 +64,7 @@ pub(super) fn image_name(id: &str) -> String {
 /// An image that sees no ground, or cannot be coded; the system's refusal to write.
 pub(super) fn write_images(
     folder: &Path,
-    days: &[Flown],
+    days: &[&Flown],
     terrain: &Terrain,
     (seed, coder): (u64, Coder),
     session: &Session,

@@ -15,7 +15,7 @@ use super::{
     },
     laser::{LaserErrors, Shot},
     pedr::{PedrRequest, frame_tags, write_pedr},
-    plan::{IMAGES, LOST_IMAGE, SITES},
+    plan::{IMAGES, LOST_IMAGE, SITES, Site},
     sites::{README, planned_label, planned_site},
     terrain::Terrain,
     ties::{ties_name, write_ties},
@@ -57,10 +57,15 @@ pub fn write_scene_with_images(
     options: &SceneOptions,
     coder: Coder,
 ) -> Result<SceneSummary> {
-    write(directory, options, Some(coder))
+    write(directory, options, Some((coder, &SITES[..])))
 }
 
-fn write(directory: &Path, options: &SceneOptions, images: Option<Coder>) -> Result<SceneSummary> {
+/// Writes the mission; with the pixels of the narrow-angle images of some sites.
+pub(super) fn write(
+    directory: &Path,
+    options: &SceneOptions,
+    images: Option<(Coder, &[&Site])>,
+) -> Result<SceneSummary> {
     check(options)?;
     let draft = Draft::begin(directory, README)?;
     let fly = |arc: Arc| {
@@ -99,21 +104,28 @@ fn write(directory: &Path, options: &SceneOptions, images: Option<Coder>) -> Res
             let noise_px = options.errors.tie_noise_px;
             let pair = write_ties(&ties, [first, second], &terrain, noise_px, options.seed)?;
             let arcs = [&first.arc, &second.arc];
-            let file = planned_site(site, arcs, &options.errors, &pair, images.is_some());
+            let has_pixels = images.is_some_and(|(_, sites)| is_of(site, sites));
+            let file = planned_site(site, arcs, &options.errors, &pair, has_pixels);
             put(&sites.join(format!("{}.toml", site.id)), &file.to_toml())?;
             truth.ties.push(pair);
         }
     }
     truth.wide_angle = write_context(&draft, &days, &kept, &terrain, options)?;
-    if let Some(coder) = images {
+    if let Some((coder, sites)) = images {
         let session = clock_session(&draft.folder("kernels")?)?;
         let folder = draft.folder("images")?;
         let how = (options.seed, coder);
+        let shown = |flown: &&Flown| is_of(flown.arc.image.site, sites);
+        let days: Vec<&Flown> = days.iter().filter(shown).collect();
         truth.rendered = write_images(&folder, &days, &terrain, how, &session)?;
     }
     write_truth(&draft, &truth)?;
     draft.finish()?;
     Ok(SceneSummary::of(directory, &truth, SITES.len() + 1))
+}
+
+fn is_of(site: &Site, sites: &[&Site]) -> bool {
+    sites.iter().any(|of| of.id == site.id)
 }
 
 /// Refuses options that no mission can be made with.

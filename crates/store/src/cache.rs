@@ -6,6 +6,7 @@
 use std::{
     collections::BTreeSet,
     fs,
+    io::ErrorKind,
     path::{Path, PathBuf},
 };
 
@@ -73,7 +74,10 @@ impl StageCache {
         if self.forced {
             return Err(Reason::Forced);
         }
-        let bytes = fs::read(self.path(label)).map_err(|_| Reason::First)?;
+        let bytes = fs::read(self.path(label)).map_err(|error| match error.kind() {
+            ErrorKind::NotFound => Reason::First,
+            _ => Reason::Damaged,
+        })?;
         let (stored, payload): (Head, &[u8]) =
             postcard::take_from_bytes(&bytes).map_err(|_| Reason::Damaged)?;
         let changes = inputs.changed_since(&stored.inputs);
@@ -207,5 +211,8 @@ mod tests {
         assert_eq!(why(&forced, 1), Some(Reason::Forced));
         cache.forget("search");
         assert_eq!(why(&cache, 1), Some(Reason::First));
+        // What exists and cannot be read.
+        fs::create_dir(&path).unwrap();
+        assert_eq!(why(&cache, 1), Some(Reason::Damaged));
     }
 }

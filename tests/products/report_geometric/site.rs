@@ -25,7 +25,7 @@ use areograph::{
 };
 use serde::de::DeserializeOwned;
 
-use super::common::mission::{areograph, mission, succeed};
+use super::common::mission::{mission, site_run};
 
 /// Outputs of the stages, and the page that was published.
 pub(crate) struct Site {
@@ -66,15 +66,12 @@ fn each<T: DeserializeOwned>(folder: &Path, ids: &[&str], stage: &str, round: &s
 }
 
 impl Site {
-    /// Gusev crater, run just now.
+    /// Gusev crater.
     pub(crate) fn gusev() -> Self {
-        let out = tempfile::tempdir().unwrap();
-        let site = mission().join("sites/gusev_crater.toml");
-        let mut run = areograph();
-        run.args(["--quiet", "run"]).arg(&site);
-        succeed(run.arg("--out").arg(out.path()));
-        let folder = out.path().join("gusev_crater");
-        let config = load(&site).unwrap().site;
+        let folder = site_run("gusev_crater");
+        let config = load(&mission().join("sites/gusev_crater.toml"))
+            .unwrap()
+            .site;
         let ids: Vec<&str> = config.images.iter().map(|image| &*image.id).collect();
         let orientations: Vec<Orientation> = each(&folder, &ids, "reorient", "");
         let models: Vec<SensorModel> = each(&folder, &ids, "fit_sensor_model", "+adjusted");
