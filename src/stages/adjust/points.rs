@@ -46,7 +46,7 @@ pub enum RejectionReason {
         /// Its largest standardised residual, without sign.
         standardised: f64,
     },
-    /// No ground explains its height.
+    /// Its height is implausible.
     #[error("{} m from the MOLA surface, standardised {standardised:.1}", signed(*above_m, 0))]
     Height {
         /// Height above the surface beyond what tie points share, metres.
