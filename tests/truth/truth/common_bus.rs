@@ -296,7 +296,7 @@ fn mistakes_of_laser_and_bus_are_told() {
         })
     };
     assert!(
-        told.contains("adjustment.common_bus did nothing: the file of the altimeter does not tell"),
+        told.contains("adjustment.common_bus did nothing: the altimeter file does not state"),
         "{told}"
     );
     // Every frame is recorded 59 m to either side in turn: together they say nothing wrong of laser and profile, and every
