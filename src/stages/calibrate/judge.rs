@@ -273,7 +273,7 @@ fn remarks(of: &Evidence<'_>) -> Vec<String> {
             let both = [plane, height].into_iter().flatten();
             both.clone().next().is_some() && both.into_iter().all(|of| of.sigmas < SCATTER_MIN)
         }),
-        "withheld control fits better than its standard deviations predict: they may be too large".to_owned(),
+        "withheld control fits better than its standard deviations predict: they may be larger than needed".to_owned(),
     );
     for camera in of.cameras {
         say(

@@ -1,4 +1,4 @@
-//! Where the heights of a unit fit those of the model best: all shifts by whole cells, then the place between them.
+//! The shift at which the heights of a unit fit the model best: all shifts by whole cells, then between them.
 
 use super::{
     shots::Shot,
@@ -9,13 +9,13 @@ use crate::geom::height_grid::HeightGrid;
 
 /// Share of a unit's points that must have a height in the model, at every shift that counts.
 const COVERED: f64 = 0.9;
-/// Heights of the model vary by this factor more or less than the laser's at most: in kilometres they vary by a thousandth.
+/// Largest ratio of the relief of model and laser, either way: heights in kilometres have a thousandth of the relief.
 const RELIEF: f64 = 2.0;
 
 /// The best shift of a unit, of all within some cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Best {
-    /// How far the model lies from the laser, rows (southwards) and columns (eastwards), between whole cells.
+    /// Shift of the model against the laser, rows (southwards) and columns (eastwards), between whole cells.
     pub(super) shift: [f64; 2],
     /// Similarity at the nearest whole cells.
     pub(super) score: f64,
@@ -84,8 +84,9 @@ impl Surface {
     }
 }
 
-/// Where the quadratic through a value and its neighbours is largest, rows and columns from the middle, at most 1; the middle
-/// itself where it has no such place. Peaks are ridges where shots lie on parallel passes: rows and columns go together.
+/// Maximum of the quadratic through a value and its neighbours, rows and columns from the middle, at most 1; the middle
+/// itself where it has no maximum. Where shots lie on parallel passes, peaks are ridges: rows and columns are
+/// correlated.
 fn vertex(around: &[[Option<f64>; 3]; 3]) -> Option<[f64; 2]> {
     let [
         [north_west, north, north_east],
@@ -112,7 +113,7 @@ fn vertex(around: &[[Option<f64>; 3]; 3]) -> Option<[f64; 2]> {
     })
 }
 
-/// Shots with their heights from near the mean.
+/// Shots with heights relative to their mean.
 struct Moved<'a> {
     shots: &'a [&'a Shot],
     mean_m: f64,
@@ -129,7 +130,7 @@ impl<'a> Moved<'a> {
         }
     }
 
-    /// Moments at a shift by whole cells, where the model has heights enough.
+    /// Moments at a shift by whole cells, where the model has enough heights.
     fn moments(&self, grid: &HeightGrid, shift: [i64; 2]) -> Option<Moments> {
         self.taken(|shot| grid.probed_m(&shot.probe, shift))
     }
@@ -191,7 +192,7 @@ pub(super) fn rms_m(
     is_covered.then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
 }
 
-/// Whether the relief of model and laser is of one size.
+/// Whether model and laser have relief of similar size.
 pub(super) fn is_one_relief(moments: &Moments) -> bool {
     let [model, laser] = moments.variances();
     let ratio = (model / laser).sqrt();

@@ -1,8 +1,8 @@
-//! How alike the heights of a unit are at all shifts, as pictures need it.
+//! Similarity of the heights of a unit at all shifts, for display.
 
 use serde::{Deserialize, Serialize};
 
-/// Most values from side to side: all shifts of a search within 70 cells one by one.
+/// Maximum number of values from side to side: every shift of a search within 70 cells.
 const SIDE_MAX: i64 = 141;
 /// Levels above that of similarity 0.
 const STEPS: f64 = 254.0;
@@ -10,7 +10,7 @@ const STEPS: f64 = 254.0;
 /// Similarity over the shifts of a search, in levels of a byte.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SimilaritySurface {
-    /// A value stands for so many by so many shifts, and is their best; odd, so that one value has no shift in its middle.
+    /// Edge of the square of shifts of which a value is the best; odd, so that one value is centred on the zero shift.
     pub step_cells: u32,
     /// Values from that one to each side.
     pub reach: u32,
@@ -42,7 +42,7 @@ impl SimilaritySurface {
         }
     }
 
-    /// Place of a level between similarity 0 and 1; none where nothing is known.
+    /// Place of a level between similarity 0 and 1; `None` where the similarity is not known.
     #[must_use]
     pub fn share(level: u8) -> Option<f64> {
         let above = level.checked_sub(1)?;

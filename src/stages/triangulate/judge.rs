@@ -30,7 +30,7 @@ pub(super) fn judge(of: &Evidence) -> Verdict {
     let mut reasons = Vec::new();
     if totals.redundancy == 0 {
         reasons.push(
-            "the net has no redundancy: blunders cannot be identified"
+            "the net has no redundancy: wrong measurements cannot be distinguished from right ones"
                 .to_owned(),
         );
     }
@@ -144,7 +144,7 @@ fn remarks(of: &Evidence) -> Vec<String> {
     );
     say(
         kept == 2 && of.controls.iter().all(|control| control.sigma_m.is_none()),
-        "two controls without standard deviations: those of the points are relative to them".to_owned(),
+        "two controls without standard deviations: those of points are relative to them".to_owned(),
     );
     say(
         of.complaints > 0,
