@@ -56,7 +56,7 @@ pub struct Adjusted {
     pub weighted_squares: Vec<f64>,
 }
 
-/// An image and what the adjustment adds to its orientation.
+/// An image with the correction of its orientation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CorrectedImage {
     /// Identifier.

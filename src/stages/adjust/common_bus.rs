@@ -65,7 +65,7 @@ pub struct SpotsOfImage {
     pub footprints_off: [Summary; 2],
 }
 
-/// Adds the spots of all shots with a range to the network, or returns the reason why there are none.
+/// Adds the spots of all shots with a range to the network, or returns the reason if none exist.
 pub(super) fn add_spots<M: ExteriorOrientation>(
     assembled: &mut Assembled<&M>,
     images: &[AdjustImage<M>],

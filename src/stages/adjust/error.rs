@@ -16,7 +16,7 @@ pub enum AdjustError {
     NoTies {
         /// Tie points.
         ties: usize,
-        /// The first of them, and why it has none.
+        /// The first of them, and why it has no ground point.
         first: String,
     },
     /// The network as a whole.
@@ -41,7 +41,7 @@ pub enum AdjustError {
         what: String,
         /// The value.
         value: f64,
-        /// What it should be.
+        /// The expected value.
         expected: &'static str,
     },
     /// The observations do not separate unknowns.

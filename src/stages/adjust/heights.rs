@@ -30,7 +30,7 @@ pub const HEIGHTS_MIN: usize = 10;
 pub(super) struct HeightBlunder {
     /// Index in the network.
     pub(super) point: usize,
-    /// Height above the surface beyond what tie points share, metres.
+    /// Height above the surface without the part that tie points share, metres.
     pub(super) above_m: f64,
     /// The same in its standard deviations.
     pub(super) standardised: f64,

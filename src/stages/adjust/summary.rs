@@ -45,7 +45,7 @@ pub enum ObservationType {
     Orientation,
     /// Initial coordinates of footprints.
     MolaGround,
-    /// Coordinates of tie points that are known beforehand.
+    /// Given coordinates of tie points.
     TieGround,
     /// Time and range biases, the offset of the attitude clock, and the boresight angles, profile shifts and line times
     /// of a laser on the same bus; initially 0.

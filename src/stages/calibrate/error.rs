@@ -72,7 +72,7 @@ pub enum CalibrateError {
     },
     /// Too few control points.
     #[error(
-        "{found} control points are usable, {held_back} are held back; expected at least {expected} of each"
+        "{found} control points are usable, {held_back} are withheld; expected at least {expected} of each"
     )]
     TooFewControls {
         /// How many there are.
@@ -162,7 +162,7 @@ pub enum CalibrateError {
     Adjustment {
         /// Which step.
         step: &'static str,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
 }

@@ -173,7 +173,7 @@ pub(super) fn ties(
     Ok(points.points)
 }
 
-/// Standard deviations for rows that state none.
+/// Standard deviations for rows that state no values.
 #[derive(Clone, Copy)]
 pub(super) struct ControlSigma {
     pub(super) image_px: f64,

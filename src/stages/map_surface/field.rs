@@ -170,7 +170,7 @@ mod tests {
         let filled = holed.clone().filled();
         for (at, value) in filled.values.iter().enumerate() {
             if holed.values[at].is_nan() {
-                // Within what the plane changes over the hole and a cell around it.
+                // Within the change of the plane over the hole and a cell around it.
                 assert!((value - whole.values[at]).abs() < 15.0, "{value}");
             } else {
                 assert_eq!(value.to_bits(), whole.values[at].to_bits());

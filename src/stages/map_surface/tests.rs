@@ -64,7 +64,7 @@ fn errors(surface: &Surface) -> Vec<[f64; 2]> {
         .map(|(at, (height_m, sigma_m))| {
             let [longitude_rad, latitude_rad] =
                 grid.place_rad([(at / columns) as f64, (at % columns) as f64]);
-            // Hills change by less than a millimetre over what their own height moves a place.
+            // Hills change by less than a millimetre over the displacement that their height causes.
             let place_m = spherical_to_xyz_m(longitude_rad, latitude_rad, RADIUS_M);
             let truth_m = RADIUS_M + hill_m(&place_m) - grid.radius_m;
             let error_m = f64::from(*height_m) - truth_m;
@@ -120,7 +120,7 @@ fn heights_are_within_what_they_state_and_their_bytes_are_those_of_any_thread() 
     // Cells that both images show whole have heights; near an edge the compared square is incomplete.
     assert!(account.filled * 100 >= account.searched() * 99);
     assert!(account.filled > 5_000);
-    // A twentieth of a pixel, and the hills that are smaller than what is compared.
+    // A twentieth of a pixel, and the hills that are smaller than the compared square.
     assert!(rms_m <= 0.05 * account.height_of_pixel_m + 0.4, "{rms_m}");
     // Ground as smooth as this is matched better than 0.06 pixels, the least stated uncertainty of a tie point.
     assert!((0.35..1.2).contains(&over), "{over}");

@@ -4,7 +4,7 @@
 //! | file | content |
 //! |---|---|
 //! | `shots` | shots over the model, each once; tracks, segments, relief |
-//! | `clusters` | k-means with seeds of its own, sums in the order of the points |
+//! | `clusters` | k-means with its own seeds, sums in the order of the points |
 //! | `search` | similarity of all shifts by whole cells; the weights of each shot are computed once |
 //! | `settle` | the place between cells by a quadratic and least squares |
 //! | `units` | the result of the withheld shots |

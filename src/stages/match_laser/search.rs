@@ -279,7 +279,7 @@ mod tests {
             let best = find(&model, &shots, measure, 20);
             assert!(
                 best.is_some_and(|best| {
-                    // A quadratic stands for the peak, heights between cells for the ground: tenths of a cell.
+                    // A quadratic approximates the peak, interpolated heights the ground: tenths of a cell.
                     (best.shift[0] - 7.0).hypot(best.shift[1] - 12.0) < 0.25
                         && best.score > 0.99
                         && !best.at_border
@@ -295,7 +295,7 @@ mod tests {
         let shots = shots();
         let shots: Vec<&Shot> = shots.iter().collect();
         let best = find(&model, &shots, Similarity::Ccc, 20);
-        // A quadratic stands for the peak, a ridge as the passes are nearly parallel: tenths of a cell.
+        // A quadratic approximates the peak, a ridge as the passes are nearly parallel: tenths of a cell.
         assert!(
             best.is_some_and(|best| (best.shift[0] + 3.4).hypot(best.shift[1] - 5.7) < 0.2),
             "{best:?}"

@@ -80,7 +80,7 @@ fn level(similarity: Option<f64>) -> u8 {
 mod tests {
     use super::*;
 
-    /// A peak of 0.9 at row 3, column −5, and nothing known of column 7.
+    /// A peak of 0.9 at row 3, column −5, and no value in column 7.
     fn peak([row, column]: [i64; 2]) -> Option<f64> {
         let far = ((row - 3) as f64).hypot((column + 5) as f64);
         (column != 7).then_some(0.9 - 0.1 * far)
@@ -117,7 +117,7 @@ mod tests {
             let of = SimilaritySurface::of(reach, peak);
             let step = i64::from(of.step_cells);
             assert!(of.side() <= 141 && step % 2 == 1);
-            // All shifts are in it, and no row is of shifts beyond the search alone.
+            // It holds all shifts, and no row is entirely beyond the search.
             let edge = i64::from(of.reach) * step;
             assert!(edge + step / 2 >= reach && edge - step / 2 <= reach);
             assert_eq!(of.levels.iter().max(), Some(&175));

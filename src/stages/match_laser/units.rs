@@ -137,7 +137,7 @@ impl<'a> Unit<'a> {
         let wrong = [
             (
                 best.at_border,
-                "its best shift lies at the border of the search, or of the model".to_owned(),
+                "its best shift is at the border of the search, or of the model".to_owned(),
             ),
             (
                 !(best.score > options.least_score),
@@ -269,7 +269,7 @@ pub(super) fn refuse_lonely(units: &mut [UnitResult], search_cells: u32) -> usiz
         let [east, north] = [0, 1].map(|axis| found.shift_cells[axis] - median[axis]);
         if !(east.hypot(north) < most) {
             unit.refused_because = format!(
-                "its shift lies {:.0} cells from the median of all units; expected less than {most:.1}",
+                "its shift is {:.0} cells from the median of all units; expected less than {most:.1}",
                 east.hypot(north)
             );
         }

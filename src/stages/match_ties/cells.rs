@@ -30,7 +30,7 @@ pub(super) struct Cell {
     samples: Range<usize>,
 }
 
-/// A place of a cell, or why it has none.
+/// A place of a cell, or why it has no place.
 pub(super) type Place = std::result::Result<Vector2<f64>, Unmatched>;
 
 /// The overlap of two images, in pixels of the first.

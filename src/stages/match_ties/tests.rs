@@ -76,7 +76,7 @@ fn matched_places_are_within_what_they_state_and_other_images_give_none() {
     let good = matched([&one, &two], [110.0, -70.0], 250.0);
     let errors = errors_px(&good);
     println!("{:?}", good.account);
-    // Of what both images show whole, nearly all.
+    // Nearly all cells that both images show whole.
     let edge = good.account.unmatched[&Unmatched::Edge];
     assert!(
         good.account.ties * 5 >= (good.account.cells - edge) * 4,
@@ -103,7 +103,7 @@ fn matched_places_are_within_what_they_state_and_other_images_give_none() {
             errors.len()
         );
     }
-    // The same bytes whatever the number of threads.
+    // The same bytes with any number of threads.
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build()

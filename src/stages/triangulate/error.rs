@@ -94,7 +94,7 @@ pub enum NetError {
     Film {
         /// The picture.
         picture: String,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
 }

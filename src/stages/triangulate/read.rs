@@ -31,7 +31,7 @@ pub struct NetData {
     pub pictures: Vec<String>,
     /// Names of the points likewise.
     pub points: Vec<String>,
-    /// Name of the brick of every picture, empty where the table has none.
+    /// Name of the brick of every picture, empty where the table has no name.
     pub bricks: Vec<String>,
     /// Size of a unit of every picture on the ground, where it is known.
     pub metres_per_unit: Vec<Option<f64>>,
