@@ -38,7 +38,7 @@ pub(super) struct Assembled<M> {
     /// Profiles with a range.
     pub(super) profiles: Vec<Named>,
     pub(super) rejected: Vec<RejectedPoint>,
-    /// Where the initial orientations put the footprints.
+    /// Image coordinates of the footprints by the initial orientations.
     pub(super) mola: Vec<View>,
     /// Why the laser's position in images is not an observation although it was requested.
     pub(super) no_spots: Option<String>,
@@ -109,7 +109,7 @@ pub(super) fn projector<'a, M, O: ExteriorOrientation>(
     Ok(projector.through(image.oriented_camera.detector.distortion))
 }
 
-/// Where the initial orientations put the footprints, in and around each image.
+/// Image coordinates of the footprints by the initial orientations, in and around each image.
 fn footprints_in_images<M: ExteriorOrientation>(
     images: &[AdjustImage<M>],
     shots: &LaserShots,

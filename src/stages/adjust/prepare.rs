@@ -209,7 +209,7 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
     (weighed.collect(), shots)
 }
 
-/// The range of a shot from every image that was exposed meanwhile; see [`exposed`].
+/// The range of a shot from every image that was exposed at its instant; see [`exposed`].
 fn ranges_of(
     footprints: &Footprints<BodyFixed>,
     row: u32,

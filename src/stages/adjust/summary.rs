@@ -1,4 +1,4 @@
-//! Statistics of an adjustment, as its report and its tables need them.
+//! Statistics of an adjustment, for its report and tables.
 
 use nalgebra::Vector3;
 use schemars::JsonSchema;

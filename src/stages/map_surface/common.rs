@@ -136,7 +136,7 @@ impl Common {
         self.ground.cell_m / self.per_cell as f64
     }
 
-    /// Metres of height for a sample of parallax at full size, about.
+    /// Approximate metres of height for a sample of parallax at full size.
     pub(super) fn height_of_sample_m(&self) -> f64 {
         self.sample_m() / self.convergence_rad.tan()
     }

@@ -1,4 +1,4 @@
-//! The cells of a terrain model on the ground, at full size and halved again and again.
+//! The cells of a terrain model on the ground, at full size and repeatedly halved.
 
 use nalgebra::Vector3;
 
@@ -19,7 +19,7 @@ const PARALLEL_MAX_DEG: f64 = 80.0;
 /// Cells with even longitudes and latitudes, square at the parallel of the map.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Ground {
-    /// The sphere of the body's maps, metres; heights count from it.
+    /// The sphere of the body's maps, metres; heights refer to it.
     pub(super) radius_m: f64,
     /// Latitude at which cells are as wide as high.
     pub(super) parallel_rad: f64,

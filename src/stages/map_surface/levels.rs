@@ -1,4 +1,4 @@
-//! From coarse to fine: at every level heights are searched about those of the coarser one, then settled by least squares.
+//! From coarse to fine: at every level heights are searched about those of the coarser one, then refined by least squares.
 
 use rayon::prelude::*;
 

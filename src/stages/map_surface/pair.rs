@@ -1,4 +1,4 @@
-//! Both images of a tile as they look when they are laid on a surface.
+//! Both images of a tile, laid on a surface.
 
 use nalgebra::{Matrix2, Vector2};
 

@@ -160,7 +160,7 @@ fn a_metre_of_height_is_what_rays_that_meet_say() {
     let pixel_m = root_mean_square(common.pixels_m.into_iter());
     let of_pixel_m = common.height_of_sample_m() * pixel_m / common.sample_m();
     println!("{sigma_m:.2} m by intersection, {of_pixel_m:.2} m");
-    // Lines are as high as samples are wide to a third, which the intersection knows and the edge of a pixel does not.
+    // Line and sample spacings agree to a third, which the intersection takes into account and the edge of a pixel does not.
     assert!((sigma_m / of_pixel_m - 1.0).abs() < 0.3);
 }
 
@@ -189,7 +189,7 @@ fn other_pixels_and_other_orientations_give_no_surface_that_is_believed() {
         assert!(account.is_refused, "{what}: {account:?}");
         assert!(account.look.heights.heights_m.iter().all(|of| of.is_nan()));
     }
-    // Exchanged pixels are like orientations that err: relief comes out turned, where anything is found at all.
+    // Exchanged pixels resemble orientation errors: relief comes out inverted, where anything is found at all.
     let exchanged = mapped([&two, &one], [0.0; 2], COARSE_M).unwrap();
     println!(
         "exchanged: {} of {}",

@@ -21,7 +21,7 @@ const ROUNDS: usize = 20;
 /// A unit farther from the plane than this many widened standard deviations and this many cells was matched by chance.
 const OFF_SIGMAS: f64 = 5.0;
 const OFF_CELLS: f64 = 1.0;
-/// Standard deviations are not smaller than steps of least squares, cells and metres.
+/// Lower bounds of standard deviations: the steps of least squares, cells and metres.
 const FLOOR: [f64; 3] = [1e-3, 1e-3, 1e-3];
 
 /// A unit's position, relative to the mean in units of their spread, and its values.
@@ -159,7 +159,7 @@ mod tests {
 
     const CELL_M: [f64; 2] = [100.0, 100.0];
 
-    /// Units on a slanting plane, each off it by `times` its standard deviation.
+    /// Units on a slanting plane, each deviating by `times` its standard deviation.
     fn units(count: usize, times: f64) -> Vec<UnitResult> {
         let mut random = Random::new(7, "units about a plane");
         let of = |unit: usize| {
@@ -215,7 +215,7 @@ mod tests {
             for (before, after) in before.iter().zip(&after) {
                 let sigma = |of: &UnitResult| of.found.and_then(|of| of.sigma).map(|of| of.bias_m);
                 let ratio = sigma(after).zip(sigma(before)).map(|(a, b)| a / b);
-                // Judging units with the others.
+                // Withheld units are widened too.
                 assert_eq!(
                     ratio.map(|of| (1e9 * of).round()),
                     widened.map(|of| (1e9 * of.bias).round())

@@ -172,7 +172,7 @@ pub(super) fn moments(grid: &HeightGrid, shots: &[&Shot], shift: [f64; 2]) -> Op
     Moved::of(shots).taken(|shot| shifted_m(grid, shot, shift))
 }
 
-/// Height of the model where a shot lies with a shift.
+/// Height of the model at a shifted shot.
 pub(super) fn shifted_m(grid: &HeightGrid, shot: &Shot, shift: [f64; 2]) -> Option<f64> {
     grid.height_m([shot.cell[0] + shift[0], shot.cell[1] + shift[1]])
 }
@@ -206,7 +206,7 @@ mod tests {
 
     const SIZE: usize = 120;
 
-    /// Ground that repeats nowhere near: waves of incommensurable lengths, in cells.
+    /// Ground without nearby repetition: waves of incommensurable lengths, in cells.
     fn ground_m(row: f64, column: f64) -> f64 {
         let waves = [
             [0.11, 0.05, 300.0],

@@ -237,7 +237,7 @@ fn around(at_level: &Affine, template: &Patch, reach: &Vector2<f64>) -> ([i64; 2
     )
 }
 
-/// How many pixels around the template may be searched before and behind it on each axis, at most `steps`, so that
+/// Number of pixels before and behind the template that may be searched on each axis, at most `steps`, so that
 /// `window` of the other image holds all of it; `None` where it does not even hold the template.
 fn margins(
     at_level: &Affine,

@@ -21,7 +21,7 @@ use crate::{
     units::RADIANS_PER_DEGREE,
 };
 
-/// Complaints kept with their text; all are counted.
+/// Maximum number of complaints that are kept with their text; all are counted.
 const COMPLAINTS_MAX: usize = 1_000;
 
 /// A net as read from its tables.

@@ -23,7 +23,7 @@ pub(super) fn rms_of_both(of: &[Place]) -> f64 {
     (0.5 * (x * x + y * y)).sqrt()
 }
 
-/// Half of the longer side of the box round places.
+/// Half of the longer side of the bounding box of places.
 pub(super) fn half_side(places: &[Place]) -> f64 {
     let side = |part: fn(&Place) -> f64| {
         let low = places.iter().map(part).fold(f64::INFINITY, f64::min);
