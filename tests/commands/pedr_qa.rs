@@ -556,7 +556,7 @@ fn every_shot_counts_once() {
     let (code, answer, told) = ended(&mut command);
     assert_eq!(code, 0, "{answer} {told}");
     assert!(
-        answer.contains("copies of other files, whose shots count once: 1"),
+        answer.contains("copies of other files, counted once: 1"),
         "{answer}"
     );
     let document = json(&out.join("archive.json"));

@@ -550,7 +550,7 @@ fn keys_that_contradict_the_file_are_refused() {
         (
             "first_detector = 0\n",
             "",
-            "1288 samples of 4 pixels are a part of the 5184 pixels of HRSC infrared line",
+            "1288 samples of 4 pixels cover only part of the 5184 pixels of HRSC infrared line",
         ),
         (
             "first_detector = 0\n",

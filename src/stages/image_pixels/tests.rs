@@ -16,7 +16,7 @@ use crate::{
 };
 
 const SAMPLES: u32 = 64;
-/// Lines that came down, and lines that were exposed.
+/// Lines that were received, and lines that were exposed.
 const LINES: [u32; 2] = [160, 176];
 
 fn times(id: &str) -> ImageTimes {
@@ -121,7 +121,7 @@ impl Folder {
         path
     }
 
-    /// What is said of a file as the pixels of an image.
+    /// The error for a file as the pixels of an image.
     fn refusal(&self, bytes: &[u8], times: &ImageTimes) -> String {
         let opened = open_pixels(&self.write("pixels", bytes), times);
         opened.map(|_| ()).unwrap_err().to_string()
@@ -270,17 +270,17 @@ fn lines_beyond_those_delivered_are_refused() {
         lines_delivered: 144,
         ..times("M01-00123")
     };
-    // Between what came down and what was exposed: neither.
+    // Between the received and the exposed lines: neither.
     for file in [archive(&pixels()), cube(&pixels(), &of_the_camera())] {
         let told = folder.refusal(&file, &less);
         assert!(
             told.contains(
-                "160 lines; expected at most 144, which lines_delivered says came down of 176"
+                "160 lines; expected at most 144, the lines received of 176 (lines_delivered)"
             ),
             "{told}"
         );
     }
-    // Every line that was exposed: in a complete file all came down; else some may be empty.
+    // Every line that was exposed: in a complete file all were received; else some may be empty.
     let all = vec![80; (LINES[1] * SAMPLES) as usize];
     let told = folder.refusal(&archive(&all), &times("M01-00123"));
     assert!(told.contains("176 lines; expected at most 160"), "{told}");
