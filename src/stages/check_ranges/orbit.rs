@@ -1,7 +1,7 @@
 //! The file's own spacecraft and that of the kernels: whether both are of one orbit, one clock and one datum.
 //!
-//! Both hold for the same shots, so their difference is not noise. Independent orbits differ by tens of metres. A
-//! different clock correction is a shift along the track at the speed of the spacecraft, a different datum one of
+//! Both hold for the same shots, so their difference is not noise. Independent orbits differ by tens of metres, another
+//! clock correction shifts the spacecraft along the track by its speed times the change, and another datum shifts it by
 //! kilometres.
 
 use crate::{

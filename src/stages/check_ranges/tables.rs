@@ -1,5 +1,5 @@
 //! The range check of shots of tables, for whose spacecraft there are no kernels: measured range against the table's
-//! own spacecraft, and against that of images that carries the laser, where one was exposed at that time.
+//! own spacecraft, and against the spacecraft of images with its laser, where one was exposed at that time.
 //!
 //! `ImageTimes::has_laser` marks such images. No other stage after `search_footprints` distinguishes tables from PEDR
 //! files.
