@@ -113,7 +113,7 @@ impl ProfilesApart {
         self.mean_m.abs() / self.sigma_m
     }
 
-    /// The limit that the worst of so many pairs exceeds by chance as often as one pair exceeds `one_pair`, both in
+    /// The limit that the worst of all pairs exceeds by chance as often as one pair exceeds `one_pair`, both in
     /// standard deviations: the tail of the normal distribution falls like exp(−z²/2).
     #[must_use]
     pub fn limit(&self, one_pair: f64) -> f64 {

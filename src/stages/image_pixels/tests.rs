@@ -155,7 +155,7 @@ fn every_kind_of_file_gives_the_same_pixels_to_be_matched() {
                 "{kind} {level} {line}"
             );
         }
-        // A dark pixel of the camera is one; in other files 0 stands for none.
+        // A dark pixel of the camera is valid; in other files 0 denotes a missing pixel.
         for (level, line) in [(0, 15), (1, 5)] {
             let level_samples = 20 >> level;
             let at = [line, level_samples];
@@ -205,7 +205,7 @@ fn pixels_of_another_image_are_refused() {
     );
     let told = folder.refusal(&cube(&pixels, &map), &own);
     assert!(told.contains("map-projected"), "{told}");
-    // With a label the last lines may be missing; without one nothing says which.
+    // With a label the last lines may be missing; without one it is unknown which are.
     let less = &pixels[..144 * SAMPLES as usize];
     for file in [archive(less), cube(less, &of_the_camera())] {
         assert!(open_pixels(&folder.write("pixels", &file), &own).is_ok());
@@ -244,7 +244,7 @@ fn pictures_that_may_be_exchanged_are_not_matched() {
         ),
         "{told}"
     );
-    // For pictures they will do, and one label tells them apart.
+    // Pictures need no label, and one label distinguishes the two.
     assert!(PixelFiles(&files).opened(&[&one, &two]).is_ok());
     let files = [hashed("one.imq", &archive(&pixels)), files[1].clone()];
     assert!(PixelFiles(&files).told_apart(&[&one, &two]).is_ok());
