@@ -403,8 +403,7 @@ mod tests {
         );
         // One place of A, two of B.
         let text = format!("{HEADER}{}", rows.replace("3,A,5,5", "3,A,1,1"));
-        let shared = "2 are measured at the position of another point, for example 1 and 3 at line 1.00, sample 1.00 \
-        of image A";
+        let shared = "2 are measured at the position of another point, for example 1 and 3 at line 1.00, sample 1.00 of image A";
         let failure = read(&text, &images).unwrap_err();
         assert!(
             failure.cause.to_string().contains(shared),

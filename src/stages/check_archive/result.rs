@@ -169,9 +169,7 @@ impl ArchiveRanges {
         }
         if !self.copies.is_empty() {
             let count = self.copies.len();
-            remarks.push(format!(
-                "copies of other files, counted once: {count}"
-            ));
+            remarks.push(format!("copies of other files, counted once: {count}"));
         }
         reasons.extend(self.damaged());
         let complaints = self.sum(|file| file.complaint_count);

@@ -158,7 +158,7 @@ impl Stage for LayOverlays<'_> {
     fn examine(&self) -> Vec<Result<String>> {
         let opened = self.pixels.examined(self.images.0);
         let opened = opened
-            .map(|(times, file)| file.map(|_| format!("image {}: its pixels are available", times.id)));
+            .map(|(times, file)| file.map(|_| format!("image {}: pixels available", times.id)));
         opened.collect()
     }
 
