@@ -399,7 +399,7 @@ mod tests {
         assert_eq!(again.points, ties.points);
         assert_eq!(
             again.remarks,
-            ["3 repeat the measurements of another point and are left out, for example 1 those of 1"]
+            ["3 repeat the measurements of another point and are omitted, for example 1 those of 1"]
         );
         // One place of A, two of B.
         let text = format!("{HEADER}{}", rows.replace("3,A,5,5", "3,A,1,1"));

@@ -401,7 +401,7 @@ fn start_time(
     };
     let Some(sclk) = fields.sclk_start.as_deref() else {
         if from_utc.is_some() && session.spacecraft().labels_tell_clock {
-            notes.push("start from UTC, which labels truncate to 10 ms; no clock string".to_owned());
+            notes.push("start from UTC, truncated to 10 ms in labels; no clock string".to_owned());
         }
         return Ok(from_utc.map(|(_, start)| (start, StartFrom::Utc)));
     };

@@ -266,7 +266,7 @@ const MISTAKES: &[Mistake] = &[
             all_tables(case);
         },
         End::Remark,
-        "tie points: 154 repeat the measurements of another point and are left out",
+        "tie points: 154 repeat the measurements of another point and are omitted",
     ),
     (
         "all_ties_on_one_pixel",

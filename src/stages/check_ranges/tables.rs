@@ -91,7 +91,7 @@ pub fn check_table_ranges(
         shots.outlier.extend(flags);
         let mut ranges = statistics(profile, &shots, first, None, footprints);
         by_own_spacecraft(&mut ranges, footprints, profile, limits);
-        let explain = || "the support data hold a different orbit from that of the table".to_owned();
+        let explain = || "the support data hold a different orbit from the table's".to_owned();
         ranges.invalid_because = ranges.figures().broken_limits(limits, explain);
         checked.push(ranges);
     }

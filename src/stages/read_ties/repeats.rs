@@ -46,7 +46,7 @@ pub(super) fn leave_out(points: &mut Vec<TiePoint>) -> Option<String> {
     });
     example.map(|example| {
         format!(
-            "{repeated} repeat the measurements of another point and are left out, for example {example}"
+            "{repeated} repeat the measurements of another point and are omitted, for example {example}"
         )
     })
 }
