@@ -52,8 +52,7 @@ pub struct PairComparison {
     pub pixel_size_m: [f64; 2],
     /// Reprojection residuals of the tie points in each image.
     pub residuals: [ResidualMoments; 2],
-    /// How far apart along the flight the images place a tie point, metres, mean: what their reprojection
-    /// residuals add up to.
+    /// Along-track parallax of the tie points, metres, mean, from their reprojection residuals in both images.
     pub along_track_parallax_m: f64,
     /// Footprints against tie points; `None` where tie points determine no transformation.
     pub footprints: Option<FootprintsByTies>,
@@ -76,8 +75,8 @@ pub struct FootprintsByTies {
     pub tie_lines: Summary,
     /// Residuals of the tie points in samples.
     pub tie_samples: Summary,
-    /// How far apart along the flight the images place their footprints, metres: the size of `along_m`, averaged over the
-    /// footprints of all profiles. `None` without any.
+    /// Along-track misregistration of the footprints, metres: the size of `along_m`, averaged over the footprints of
+    /// all profiles. `None` without any.
     pub apart_m: Option<f64>,
     /// Its standard deviation by the scatter of the tie points, metres; that of all profiles is one error.
     pub apart_sigma_m: Option<f64>,
@@ -369,7 +368,7 @@ fn footprints_by_ties<M: ExteriorOrientation>(
     })
 }
 
-/// Mean of a number of each profile, its footprints as weights; `None` without any.
+/// Mean of a value of each profile, weighted by its footprints; `None` without any.
 fn over_footprints(profiles: &[ProfileByTies], of: fn(&ProfileByTies) -> f64) -> Option<f64> {
     let (mut footprints, mut sum) = (0.0, 0.0);
     for profile in profiles {

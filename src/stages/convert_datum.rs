@@ -228,7 +228,7 @@ pub fn convert_at_tags(
     turned(footprints, &at_tags)
 }
 
-/// How far the shots of each file moved from longitudes and latitudes `before`.
+/// Shifts of the shots of each file from longitudes and latitudes `before`.
 fn shifts(after: &Footprints<BodyFixed>, before: &[Vec<f64>; 2]) -> Vec<FileConversion> {
     let mut moved = vec![(Vec::new(), Vec::new()); after.files.len()];
     let [longitude_rad, latitude_rad] = before;

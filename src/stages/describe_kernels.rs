@@ -36,7 +36,7 @@ pub struct KernelDescription {
 pub struct KernelLine {
     /// File name.
     pub name: String,
-    /// What it holds: `LSK`, `SCLK`, `PCK`, `FK`, `IK`, `SPK`, `CK`.
+    /// Role by its content: `LSK`, `SCLK`, `PCK`, `FK`, `IK`, `SPK`, `CK`.
     pub role: String,
     /// Size.
     pub bytes: u64,

@@ -44,7 +44,7 @@ pub struct Ties {
     pub copies: Vec<String>,
     /// Disagreements that must be weighed, one sentence each.
     pub remarks: Vec<String>,
-    /// How many of the points are those of files.
+    /// Number of points that come from files.
     pub read: usize,
     /// Pairs of images in which areograph measured tie points itself; these follow those of files.
     pub matched: Vec<MatchedPair>,
@@ -236,7 +236,7 @@ impl Ties {
         }
     }
 
-    /// What was skipped, one sentence each.
+    /// Skipped input, one sentence each.
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
         let elsewhere: u64 = self.elsewhere.values().sum();

@@ -132,7 +132,7 @@ impl Stage for Reorient<'_> {
 ///
 /// * `orientation` – as sampled from the kernels
 /// * `time_shift_lines` – `s`, by how many lines later than its tag a line was exposed
-/// * `correction` – what is added at a line offset `x`, lines from the middle of the header image
+/// * `correction` – the correction at a line offset `x`, lines from the middle of the header image
 ///
 /// The line with the tag `x` gets the camera of `x + s`: `C(x) = C₀(x + s) + Δ(x)` and `M(x) = exp([θ(x)]×) M₀(x + s)`,
 /// all relative to Mars, as [`CorrectedOrientation`](crate::geom::pushbroom::CorrectedOrientation) has it. Samples keep

@@ -35,7 +35,7 @@ use crate::{
 const COMPLAINTS_MAX: usize = 1_000;
 const STAGE: &str = "search_footprints";
 
-/// What the search found.
+/// Results of the search.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SearchResult {
     /// Shots in the windows, ordered by file, record and shot, in the coordinates of their files.
@@ -70,7 +70,7 @@ impl Cause for TooManyFiles {
 }
 
 stage_inputs! {
-    /// PEDR files, what to keep of them, and the windows.
+    /// PEDR files, the filter of their shots, and the windows.
     pub struct SearchFootprints<'a> {
         /// Datum, filter, and the paths of the files.
         pub pedr: &'a PedrConfig,

@@ -52,7 +52,7 @@ use rows::{Rows, Task};
 
 /// Name of the step in messages, and of its outputs.
 pub const NAME: &str = "check_archive";
-/// Raised when what the step computes changes.
+/// Raised when the results of the step change.
 pub const METHOD: u32 = 4;
 /// Stages whose functions it calls.
 pub const CALLS: &[Called] = &[called::<ConvertDatum<'_>>(), called::<CheckRanges<'_>>()];
@@ -84,7 +84,7 @@ pub struct ArchiveRules<'a> {
     pub filter: &'a ShotFilter,
 }
 
-/// What the check found in a file.
+/// Results of the check of a file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct FileRanges {
     /// File name without folders.

@@ -1,4 +1,4 @@
-//! What the check of an archive found, and the verdict on it.
+//! Results of the check of an archive, and the verdict on it.
 
 use std::path::PathBuf;
 
@@ -24,7 +24,7 @@ pub struct CheckedFile {
     pub path: PathBuf,
     /// Its identity in the file system.
     pub identity: Identity,
-    /// What was found.
+    /// Results of its check.
     pub found: FileRanges,
 }
 
@@ -59,12 +59,12 @@ pub struct KernelUsed {
     pub blake3: String,
 }
 
-/// What the check of an archive found.
+/// Results of the check of an archive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArchiveRanges {
     /// The files, in the order of their first shots.
     pub files: Vec<CheckedFile>,
-    /// Copies of them, which do not count.
+    /// Copies of them, which are not counted.
     pub copies: Vec<FileCopy>,
     /// Files that could not be checked, by name.
     pub failures: Vec<FileFailure>,

@@ -9,7 +9,7 @@ use crate::{config::RangeCheckConfig, geom::statistics::largest, wording::signed
 pub struct RangeFigures {
     /// Shots.
     pub n: u32,
-    /// Of them, outliers.
+    /// Outliers among them.
     pub outliers: u32,
     /// Mean of range − distance with and without outliers, metres.
     pub mean_m: [f64; 2],

@@ -114,7 +114,7 @@ impl Stage for CheckRanges<'_> {
     }
 }
 
-/// Seconds of trajectory beyond what the scan of the clock bias reaches.
+/// Seconds of trajectory beyond the reach of the scan of the clock bias.
 const TRAJECTORY_MARGIN_S: f64 = 0.5;
 /// The tabulated trajectory stays this close to the kernels, metres: a tenth of a PEDR centimetre.
 const TRAJECTORY_TOLERANCE_M: f64 = 0.001;
@@ -220,7 +220,7 @@ impl Cause for OutsideTrajectory {
 /// # Errors
 /// A shot whose time the trajectory does not cover; [`Stopped`](crate::error::Stopped).
 /// # Source
-/// Shan et al. 2005, Table 3; the limits are ours, the paper has none.
+/// Shan et al. 2005, Table 3; the limits are ours, as the paper states none.
 pub fn check_ranges<'a>(
     footprints: &Footprints<BodyFixed>,
     profiles: &[Profile],

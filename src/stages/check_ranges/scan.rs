@@ -73,7 +73,7 @@ pub struct BiasScan {
     /// `None` when the least spread lies at an end of the scan.
     pub best_s: Option<f64>,
     /// Standard uncertainty of `best_s`, seconds: from the remaining residuals with the correlation of
-    /// neighbours, and from how well the orbit is known.
+    /// neighbours, and from the uncertainty of the orbit.
     pub uncertainty_s: Option<f64>,
 }
 

@@ -36,8 +36,8 @@ impl FootprintHeight {
     }
 }
 
-/// Heights of the footprints of `rows` that the first image shows at `places`; those beyond the tie points, and those whose
-/// rays do not meet, have none.
+/// Heights of the footprints of `rows` that the first image shows at `places`; without those beyond the tie points, and
+/// those whose rays do not intersect.
 ///
 /// The transformation represents the ground between tie points as a surface of second order at most: relief makes
 /// single heights uncertain, but their median only little.

@@ -40,7 +40,7 @@ fn times(id: &str) -> ImageTimes {
     }
 }
 
-/// Numbers of which none is 0, but one.
+/// Pixel values of which exactly one is 0.
 fn pixels() -> Vec<u8> {
     let number = |place: u32| u8::try_from((place / 7 + place % SAMPLES * 3) % 251 + 1).unwrap();
     let mut pixels: Vec<u8> = (0..LINES[0] * SAMPLES).map(number).collect();

@@ -31,7 +31,7 @@ pub use chips::{CHIP_EDGE, Chip, Mark};
 pub use pixels::QuickLook;
 pub use places::Subject;
 
-/// What the images of a site show.
+/// Quick looks of the images of a site, and places in them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Overlays {
     /// Images with pixels, in the order of the site's.
@@ -77,7 +77,7 @@ impl ShownImage {
 /// A place on the ground in one image or two.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Place {
-    /// What is there.
+    /// The subject of the place.
     pub subject: Subject,
     /// Edge of a pixel of its pieces on the ground, metres.
     pub pixel_m: f64,
@@ -108,7 +108,7 @@ impl Overlays {
 }
 
 stage_inputs! {
-    /// Images with pixels, and what is shown in them.
+    /// Images with pixels, and the places shown in them.
     pub struct LayOverlays<'a> {
         /// Images with the orientation of the kernels.
         pub images: SiteImages<'a>,

@@ -29,7 +29,7 @@ const FOOTPRINTS_MAX: usize = 8;
 /// Tie points with the largest residuals, and rejected ones.
 const TIES_MAX: usize = 6;
 
-/// What lies at a place.
+/// The subject of a place.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Subject {
     /// A footprint.

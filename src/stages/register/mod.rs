@@ -47,7 +47,7 @@ pub struct ImageRegistration {
     pub model: CameraModel,
     /// Points that have a line, ordered by profile, then by shot.
     pub points: RegisteredPoints,
-    /// Points that have none, by reason.
+    /// Points without a line, by reason.
     pub rejected: BTreeMap<String, u64>,
     /// One entry per profile, in the order of the profiles.
     pub profiles: Vec<ProfileOnImage>,

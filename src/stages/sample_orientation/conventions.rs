@@ -74,7 +74,7 @@ impl CameraReader<'_> {
     }
 }
 
-/// How far off the boresight a camera sees a point, along its x and y, in focal lengths.
+/// Offset of a point from the boresight of a camera, along its x and y, in focal lengths.
 fn off_boresight(camera: &Camera, point: &Position<BodyFixed>) -> Vector2<f64> {
     let away_m = point.xyz_m - camera.position.xyz_m;
     let seen_m = camera.to_mars.matrix().tr_mul(&away_m);
