@@ -1,7 +1,7 @@
 //! Heights of tie points against the ground between MOLA's shots.
 //!
-//! Tie points measure the parallax along the flight; what the images err across it becomes an error of height that
-//! they do not show. The altimeter does.
+//! Tie points measure the along-track parallax; across-track errors of the images become height errors that tie points
+//! do not reveal. The altimeter does.
 
 use std::sync::atomic::AtomicBool;
 
@@ -34,24 +34,24 @@ use crate::{
 const NEAR_SHOT_M: f64 = 1_000.0;
 /// Tie points whose surface is predicted together.
 const TOGETHER: usize = 64;
-/// Of more tie points than this some are taken evenly for what all have in common: its covariance is full.
+/// Of more tie points than this, an even selection is used for their common error: its covariance matrix is full.
 const IN_COMMON_MAX: usize = 1_000;
 
 /// Heights of the tie points of a site with one orientation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct HeightCheck {
-    /// What the surface is; or why there is none.
+    /// Figures of the surface, or why there is none.
     pub surface: std::result::Result<SurfaceFigures, String>,
     /// Every tie point that is compared, in the order of the tie points.
     pub ties: Vec<TieHeight>,
     /// Heights above the surface, metres.
     pub above_m: Summary,
-    /// Standard deviation of their mean by the surface alone, metres: neighbours share its errors.
+    /// Standard deviation of their mean due to the surface only, metres: neighbours share its errors.
     pub mean_sigma_m: f64,
     /// Tie points within a kilometre of a shot.
     pub near_shots: usize,
-    /// What two profiles say of the same tie points, each alone: those that contradict each other most; `None` for a
-    /// single profile.
+    /// The two profiles whose separate surfaces at the tie points contradict each other most; `None` for a single
+    /// profile.
     pub apart: Option<ProfilesApart>,
 }
 
@@ -113,7 +113,7 @@ impl ProfilesApart {
         self.mean_m.abs() / self.sigma_m
     }
 
-    /// The limit that the worst of so many pairs exceeds by chance as often as one pair exceeds `one_pair`, both in
+    /// The limit that the worst of all pairs exceeds by chance as often as one pair exceeds `one_pair`, both in
     /// standard deviations: the tail of the normal distribution falls like exp(−z²/2).
     #[must_use]
     pub fn limit(&self, one_pair: f64) -> f64 {
@@ -168,7 +168,7 @@ stage_inputs! {
         pub converted: &'a Output<Converted>,
         /// Profiles.
         pub profiles: &'a Output<Vec<Profile>>,
-        /// What is uncertain about the surface.
+        /// Uncertainties of the surface.
         pub mola_surface: &'a MolaSurfaceConfig,
     }
 }
@@ -235,7 +235,7 @@ pub fn check_heights(
     }
 }
 
-/// Each of `points` beside the surface.
+/// Each of `points` compared with the surface.
 fn heights(surface: &LaserSurface, points: &[(usize, Position<BodyFixed>)]) -> Vec<TieHeight> {
     let places_m: Vec<Vector3<f64>> = points.iter().map(|(_, ground)| ground.xyz_m).collect();
     let found = surface.predict(&places_m);
@@ -281,7 +281,7 @@ struct OneProfile<'a> {
     variance_m2: f64,
 }
 
-/// Of the surfaces of all profiles, each alone, the two that contradict each other most.
+/// Of the separate surfaces of all profiles, the two that contradict each other most.
 fn apart(
     shots: &MolaShots,
     places_m: &[Vector3<f64>],
@@ -311,7 +311,7 @@ fn apart(
             pairs: count,
         })
     });
-    // The first of equals: profiles with most shots.
+    // Of equal ones the first: profiles with most shots.
     pairs.reduce(|worst, pair| {
         if pair.sigmas().total_cmp(&worst.sigmas()).is_gt() {
             pair

@@ -1,4 +1,4 @@
-//! Rival kernels: how far the orbit and the attitude of each set are from the mean of all.
+//! Alternative kernels: the distance of the orbit and the attitude of each set from the mean of all.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -19,14 +19,14 @@ use crate::{
 
 /// Sets whose distances from the mean differ by less than this share of the least are equally close.
 ///
-/// Two sets are equally far from their mean by definition: what tells them apart is rounding.
+/// Two sets are equally far from their mean by definition: only rounding distinguishes them.
 const TIE_SHARE: f64 = 1e-6;
 
 /// Deviations of several sets from the mean of all, epoch by epoch: metres for orbits, radians for
 /// attitudes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
-    /// Instants at which all sets were asked.
+    /// Instants at which all sets were read.
     pub epochs: Vec<Et>,
     /// One entry per set, in the order given.
     pub deviations: Vec<Deviation>,
@@ -36,10 +36,10 @@ pub struct Comparison {
     pub tied: Vec<usize>,
 }
 
-/// Root mean square distances of two sets within this ratio do not tell which is better: they change as much with the
+/// Root mean square distances of two sets within this ratio do not show which is better: they change as much with the
 /// epochs that are compared.
 const TOO_CLOSE: f64 = 1.1;
-/// A set this many times as far from the mean as any other is what moves the mean.
+/// A set this many times as far from the mean as any other dominates the mean.
 const FAR_BEYOND: f64 = 1.5;
 
 /// Set minus mean.
@@ -54,7 +54,7 @@ pub struct Deviation {
     pub size: Size,
 }
 
-/// How large some vectors are, each component and all together.
+/// Size of some vectors, by component and in all.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Size {
     /// Statistics of the radial, the along-track and the cross-track component.
@@ -65,7 +65,7 @@ pub struct Size {
     pub max: f64,
 }
 
-/// How attitudes differ, and what that is on the ground.
+/// Differences of attitudes, also on the ground.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AttitudeComparison {
     /// Turns from the mean attitude to that of each set, radians.
@@ -78,7 +78,7 @@ pub struct AttitudeComparison {
 }
 
 impl AttitudeComparison {
-    /// Root mean square and largest distance on the ground, metres; nothing when no boresight meets Mars.
+    /// Root mean square and largest distance on the ground, metres; `None` when no boresight meets Mars.
     #[must_use]
     pub fn ground_size_m(&self, set: usize) -> Option<[f64; 2]> {
         let ground_m = &self.ground_m[set];
@@ -87,7 +87,7 @@ impl AttitudeComparison {
     }
 }
 
-/// Attitude of the bus at an exposure, and where the spacecraft is then.
+/// Attitude of the bus at an exposure, and the state of the spacecraft.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AttitudeSample {
     /// State relative to the centre of Mars.
@@ -128,7 +128,7 @@ impl Comparison {
         &self.deviations[self.closest]
     }
 
-    /// Sets so little farther from the mean than the closest that the rule cannot tell them apart.
+    /// Sets so little farther from the mean than the closest that the rule cannot distinguish them.
     pub fn nearly_as_close(&self) -> impl Iterator<Item = &Deviation> {
         let limit = TOO_CLOSE * self.closest().size.rms;
         let others = self.deviations.iter().enumerate();
@@ -150,7 +150,8 @@ impl Comparison {
         }
     }
 
-    /// The set that decides which is closest by pulling the mean: without it another is, or nothing tells.
+    /// The set that decides which is closest by pulling the mean: without it another set is closest, or the choice is
+    /// undetermined.
     #[must_use]
     pub fn decided_by(&self) -> Option<&Deviation> {
         let far = self.pulls_the_mean()?;
@@ -171,8 +172,8 @@ impl Comparison {
         (closest != Some(&self.closest)).then_some(far)
     }
 
-    /// The set that is closest to the mean within a part of the time, with its root mean square distance and that of the
-    /// set that is closest over all; nothing where that is the same one.
+    /// The set that is closest to the mean within a part of the time, with its root mean square distance and that of
+    /// the set that is closest over all; `None` where they are the same.
     #[must_use]
     pub fn closer_within(&self, span: Interval) -> Option<(&Deviation, [f64; 2])> {
         let within = |of: &Deviation| {
@@ -235,7 +236,7 @@ impl Size {
 ///   one set
 ///
 /// # Source
-/// Shan et al. 2005, data preparation: of the orbit solutions that of the navigation team was taken, which lies
+/// Shan et al. 2005, data preparation: of the orbit solutions, that of the navigation team was chosen, which lies
 /// closest to the mean of all.
 #[must_use]
 pub fn compare_orbits(epochs: &[Et], orbits: &[(String, Vec<State>)]) -> Comparison {
@@ -254,8 +255,8 @@ pub fn compare_orbits(epochs: &[Et], orbits: &[(String, Vec<State>)]) -> Compari
 
 /// Compares attitudes: turns about the axes of the mean orbit, and metres on the ground.
 ///
-/// The boresight is the bus's +Z, which the narrow-angle camera follows to a quarter of a degree: where
-/// the ray meets the ground, and hence its length, hardly depends on that.
+/// The boresight is the bus's +Z, which the narrow-angle camera follows to a quarter of a degree: the range to the
+/// ground hardly depends on that.
 ///
 /// * `attitudes` – name and samples of every set, one sample per epoch; at least one set
 #[must_use]

@@ -1,5 +1,5 @@
-//! What every pair of images says of itself: how it sees, how far footprints and tie points disagree in it, and
-//! how uncertain that makes ground points.
+//! Every pair of images: its geometry, the disagreement of footprints and tie points in it, and the resulting
+//! uncertainty of ground points.
 
 mod footprint_heights;
 
@@ -44,16 +44,15 @@ pub struct PairComparison {
     pub ties: u32,
     /// Median angle between the rays of a tie point, radians.
     pub convergence_rad: f64,
-    /// Height of the cameras over their distance from each other, median.
+    /// Ratio of the height of the cameras to their base, median.
     pub height_over_base: f64,
-    /// How far apart lines lie on the ground, metres, median over the tie points.
+    /// Distance of successive lines on the ground, metres, median over the tie points.
     pub line_spacing_m: [f64; 2],
-    /// How wide a pixel is at the range of the ground, metres, median over the tie points.
+    /// Width of a pixel at the range of the ground, metres, median over the tie points.
     pub pixel_size_m: [f64; 2],
     /// Reprojection residuals of the tie points in each image.
     pub residuals: [ResidualMoments; 2],
-    /// How far apart along the flight the images place a tie point, metres, mean: what their reprojection
-    /// residuals add up to.
+    /// Along-track parallax of the tie points, metres, mean, from their reprojection residuals in both images.
     pub along_track_parallax_m: f64,
     /// Footprints against tie points; `None` where tie points determine no transformation.
     pub footprints: Option<FootprintsByTies>,
@@ -68,22 +67,22 @@ pub struct PairComparison {
 pub struct FootprintsByTies {
     /// Order of the transformation from the first image to the second.
     pub order: u8,
-    /// Tie points that it rests on.
+    /// Tie points that determine it.
     pub ties: u32,
     /// Tie points rejected as outliers.
     pub ties_rejected: u32,
-    /// What it leaves of the tie points' lines.
+    /// Residuals of the tie points in lines.
     pub tie_lines: Summary,
-    /// What it leaves of the tie points' samples.
+    /// Residuals of the tie points in samples.
     pub tie_samples: Summary,
-    /// How far apart along the flight the images place their footprints, metres: the size of `along_m`, averaged over the
-    /// footprints of all profiles. `None` without any.
+    /// Along-track misregistration of the footprints, metres: the size of `along_m`, averaged over the footprints of
+    /// all profiles. `None` without any.
     pub apart_m: Option<f64>,
     /// Its standard deviation by the scatter of the tie points, metres; that of all profiles is one error.
     pub apart_sigma_m: Option<f64>,
     /// Profiles with footprints that both images show.
     pub profiles: Vec<ProfileByTies>,
-    /// Footprints within the lines of both images that one of them does not show: they do not count.
+    /// Footprints within the lines of both images that one of them does not show; they are not counted.
     pub outside: u32,
 }
 
@@ -100,11 +99,11 @@ pub struct ProfileByTies {
     pub along_m: f64,
     /// Its standard deviation by the scatter of the tie points, metres.
     pub along_sigma_m: f64,
-    /// The same in distances of successive footprints of the profile; `None` for a single one.
+    /// The same in units of the distance of successive footprints of the profile; `None` for a single one.
     pub along_spacings: Option<f64>,
     /// Footprints beyond the tie points.
     pub beyond_ties: u32,
-    /// Heights of the others by the rays that tie points say to be theirs.
+    /// Heights of the others by the rays that the transformation through tie points assigns to them.
     pub heights: Vec<FootprintHeight>,
     /// These above the altimeter's, metres.
     pub above_m: Summary,
@@ -163,10 +162,10 @@ impl Stage for ComparePairs<'_> {
 
 /// Compares all pairs of `images` that share tie points.
 ///
-/// `registrations` go with `images`. Blunders among the tie points do not count.
+/// `registrations` go with `images`. Blunders among the tie points are excluded.
 ///
 /// # Source
-/// Shan et al. 2005, p. 104 and eq. 5 to 9; their eye is replaced by a transformation through tie points.
+/// Shan et al. 2005, p. 104 and eq. 5 to 9; visual comparison is replaced by a transformation through tie points.
 #[must_use]
 pub fn compare_pairs<M: ExteriorOrientation>(
     images: &[OrientedCamera<M>],
@@ -262,7 +261,7 @@ impl<'a> Shared<'a> {
             uncertainty_budget(&BudgetInput {
                 sites: vec![residuals],
                 mola_spacing_m,
-                // A pixel is what both images see on average along the flight.
+                // A pixel is the mean line spacing of both images along the flight.
                 pixel_size_m: 0.5 * (line_spacing_m[0] + line_spacing_m[1]),
                 height_over_base,
             })
@@ -369,7 +368,7 @@ fn footprints_by_ties<M: ExteriorOrientation>(
     })
 }
 
-/// Mean of a number of each profile, its footprints as weights; `None` without any.
+/// Mean of a value of each profile, weighted by its footprints; `None` without any.
 fn over_footprints(profiles: &[ProfileByTies], of: fn(&ProfileByTies) -> f64) -> Option<f64> {
     let (mut footprints, mut sum) = (0.0, 0.0);
     for profile in profiles {
@@ -391,7 +390,7 @@ fn tie_pair(tie: &TiePoint, pair: [usize; 2]) -> Option<Pair> {
     })
 }
 
-/// Where an image has a footprint that lies within its lines.
+/// A footprint within the lines of an image.
 struct Place {
     /// Line and sample.
     at: [f64; 2],

@@ -23,23 +23,23 @@ use crate::{
     units::{RADIANS_PER_DEGREE, wrap_pi},
 };
 
-/// Footprints in IAU 2000, and what was done to each file's coordinates.
+/// Footprints in IAU 2000, and the conversion of each file's coordinates.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Converted {
     /// The footprints.
     pub footprints: Footprints<BodyFixed>,
-    /// What was done to each file, in the order of [`Footprints::files`].
+    /// The conversion of each file, in the order of [`Footprints::files`].
     pub files: Vec<FileConversion>,
     /// One sentence per file, for log, manifest and report.
     pub notes: Vec<String>,
 }
 
-/// What the conversion did to the shots of one file.
+/// The conversion of the shots of one file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct FileConversion {
     /// Shots of the file in the windows.
     pub shots: u32,
-    /// How far they moved on the ground, metres; all 0 for a file that was left alone.
+    /// How far they moved on the ground, metres; all 0 for a file that was not converted.
     pub shift_m: Summary,
     /// Change of east longitude, degrees.
     pub longitude_shift_deg: Summary,
@@ -48,7 +48,7 @@ pub struct FileConversion {
 stage_inputs! {
     /// Footprints as read, and whether the clock correction turns Mars.
     pub struct ConvertDatum<'a> {
-        /// What the search found.
+        /// Results of the search.
         pub found: &'a Output<SearchResult>,
         /// The clock of MOLA.
         pub mola_clock: &'a MolaClock,
@@ -69,10 +69,10 @@ impl Stage for ConvertDatum<'_> {
 
 /// Rotates every shot out of its file's datum and into IAU 2000, through J2000.
 ///
-/// Both rotations hold at the shot's tag, unless the clock correction is configured to reach the
-/// rotation (`scope` `rotation` or `both`): then Mars is taken into IAU 2000 at the corrected time,
-/// which moves longitudes by 4.752e-4° for 117 ms. Radii stay as they are. Files that are in IAU 2000
-/// already are left alone, bit for bit, in the first case.
+/// Both rotations hold at the shot's tag, unless the clock correction is configured to reach the rotation (`scope`
+/// `rotation` or `both`): then Mars is taken into IAU 2000 at the corrected time, which moves longitudes by 4.752e-4°
+/// for 117 ms. Radii stay as they are. In the first case, files that are already in IAU 2000 are not altered, bit for
+/// bit.
 ///
 /// # Source
 /// Shan et al. 2005, p. 99 (conversion through J2000 after T. Duxbury); constants in
@@ -135,7 +135,7 @@ fn turned(footprints: Footprints<AsRead>, clock: &MolaClock) -> Footprints<BodyF
     converted
 }
 
-/// How the coordinates of a file go into IAU 2000.
+/// The conversion of the coordinates of a file into IAU 2000.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DatumTurn {
     body: Body,
@@ -190,7 +190,7 @@ impl DatumTurn {
         }
     }
 
-    /// Longitude and latitude of footprint and spacecraft in IAU 2000; nothing where they are that already.
+    /// Longitude and latitude of footprint and spacecraft in IAU 2000; `None` where they need no conversion.
     fn moved(&self, shot: &Footprint) -> Option<[(f64, f64); 2]> {
         if self.is_none() {
             return None;
@@ -212,7 +212,7 @@ impl DatumTurn {
 
 /// The same for shots of an archive that is searched: turned at their time tags, without a clock correction.
 ///
-/// * `files` – the files that the column `file` counts into
+/// * `files` – the files that the column `file` indexes
 #[must_use]
 pub fn convert_at_tags(
     mut footprints: Footprints<AsRead>,
@@ -228,7 +228,7 @@ pub fn convert_at_tags(
     turned(footprints, &at_tags)
 }
 
-/// How far the shots of each file moved from longitudes and latitudes `before`.
+/// Shifts of the shots of each file from longitudes and latitudes `before`.
 fn shifts(after: &Footprints<BodyFixed>, before: &[Vec<f64>; 2]) -> Vec<FileConversion> {
     let mut moved = vec![(Vec::new(), Vec::new()); after.files.len()];
     let [longitude_rad, latitude_rad] = before;

@@ -1,4 +1,4 @@
-//! What each kernel holds and what the site uses of it, for the manifest and the report.
+//! The coverage of each kernel and its use by the site, for the manifest and the report.
 
 use std::{collections::BTreeSet, sync::atomic::AtomicBool};
 
@@ -20,7 +20,7 @@ use crate::{
 /// (1e-7 rad is 0.3 m on the ground; the models differ by 4e-3 rad).
 const PCK_TOLERANCE_RAD: f64 = 1e-7;
 
-/// Kernels in load order, and what a reader must know of them.
+/// Kernels in load order, with notes on them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct KernelDescription {
     /// One entry per kernel, in load order.
@@ -36,14 +36,13 @@ pub struct KernelDescription {
 pub struct KernelLine {
     /// File name.
     pub name: String,
-    /// What it holds: `LSK`, `SCLK`, `PCK`, `FK`, `IK`, `SPK`, `CK`.
+    /// Role by its content: `LSK`, `SCLK`, `PCK`, `FK`, `IK`, `SPK`, `CK`.
     pub role: String,
     /// Size.
     pub bytes: u64,
     /// BLAKE3 of its bytes, hexadecimal.
     pub blake3: String,
-    /// When it holds a spacecraft of the site itself, its position in an SPK, its attitude in a CK; `None` for other
-    /// kernels.
+    /// When it covers a spacecraft of the site: its position in an SPK, its attitude in a CK; `None` for other kernels.
     pub held: Option<Intervals>,
     /// Which of the required intervals are read from this kernel: where several hold an instant, the last one is.
     pub used: Vec<Interval>,
@@ -58,12 +57,12 @@ stage_inputs! {
         pub kernels: &'a KernelView,
         /// Times at which they are read.
         pub required: Required<'a>,
-        /// How far outside its intervals a C-kernel may be asked, seconds.
+        /// How far outside its intervals a C-kernel may be read, seconds.
         pub ck_tolerance_s: &'a f64,
     }
 }
 
-/// The times at which a site reads kernels; `None` while they are not known.
+/// The times at which a site reads kernels; `None` while they are unknown.
 #[derive(Debug, Clone, Copy)]
 pub struct Required<'a>(pub Option<&'a RequiredCoverage>);
 
@@ -100,7 +99,7 @@ impl Stage for DescribeKernels<'_> {
 
 /// Describes the kernels of `session`.
 ///
-/// * `ck_tolerance_s` – how far outside its intervals a C-kernel may be asked, seconds
+/// * `ck_tolerance_s` – how far outside its intervals a C-kernel may be read, seconds
 ///
 /// # Errors
 /// As [`Session::coverage`].
@@ -140,7 +139,7 @@ pub fn describe_kernels(
     })
 }
 
-/// CSPICE passes over attitudes without rates as if they were not there; whoever loads them should know.
+/// CSPICE silently ignores attitudes without rates; users of such kernels should know.
 fn rates_note(session: &Session, without: &BTreeSet<usize>) -> Option<String> {
     let kernels = session.kernels().kernels();
     let names: Vec<String> = without
@@ -149,14 +148,14 @@ fn rates_note(session: &Session, without: &BTreeSet<usize>) -> Option<String> {
         .collect();
     (!names.is_empty()).then(|| {
         format!(
-            "{}: attitudes without angular rates, which are not read; where another C-kernel reaches, its attitude is \
-             taken",
+            "{}: attitudes without angular rates, which are not read; where another C-kernel covers the time, its \
+             attitude is used",
             names.join(", ")
         )
     })
 }
 
-/// What the site reads of each spacecraft; that of the laser comes first, whether it is read or not.
+/// The times that the site reads for each spacecraft; that of the laser comes first, even if it is not read.
 fn by_spacecraft(
     required: &RequiredCoverage,
 ) -> impl Iterator<Item = (&'static Spacecraft, &RequiredCoverage)> {
@@ -165,14 +164,14 @@ fn by_spacecraft(
     std::iter::once((*SPACECRAFT, required)).chain(others)
 }
 
-/// Products use their own formula whatever the PCK says; whoever loads `kernels.tm` should know.
+/// Products use their own formula instead of the PCK; users of `kernels.tm` should know.
 fn pck_note(body: Body, session: &Session, positions: &Intervals) -> Option<String> {
     let at = positions
         .as_slice()
         .first()
         .map_or(Et::from_seconds(0.0), |interval| interval.start);
     let ours = *body_rotation(body, at).matrix();
-    // Without a PCK there is nothing to compare, and nothing that could mislead.
+    // Without a PCK there is nothing to compare.
     let theirs = session.body_matrix(body, at).ok()?;
     let turn_rad = rotation_vector(&(theirs * ours.transpose())).norm();
     (turn_rad > PCK_TOLERANCE_RAD).then(|| {

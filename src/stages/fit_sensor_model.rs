@@ -21,7 +21,7 @@ use crate::{
     units::RADIANS_PER_ARCSECOND,
 };
 
-/// Below this |cos φ| the angles ω and κ lose their meaning and the rotation-vector form should be used.
+/// Below this |cos φ| the angles ω and κ are badly determined, and the rotation-vector form should be used.
 const GIMBAL_LOCK_COS_PHI: f64 = 0.1;
 
 /// Polynomial sensor models of one image, abscissa in lines from the middle of the header image.
@@ -53,12 +53,12 @@ pub struct EulerModel {
     pub position_m: [Fit; 3],
     /// ω, φ, κ, radians, continuous over the image.
     pub angles_rad: [Fit; 3],
-    /// How far the angles alone move the boresight on the ellipsoid at each sample, metres; `None` when
-    /// a boresight meets no ground.
+    /// Shift of the boresight on the ellipsoid by the residuals of the angles at each sample, metres; `None` when a
+    /// boresight misses the ground.
     pub pointing_ground_m: Option<Vec<f64>>,
 }
 
-/// Position polynomials stand in [`EulerModel`]; this is the rotation without angles.
+/// Rotation without angles; the position polynomials are those of [`EulerModel`].
 ///
 /// `M(x) = exp([r(x)]×) · M_ref`, `M` from Mars-fixed to camera components.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -101,7 +101,7 @@ impl EulerModel {
         Vector3::from_iterator(self.position_m.iter().map(|fit| fit.rmse)).norm()
     }
 
-    /// Root mean square over the samples of what the residuals of the angles do on the ground, metres.
+    /// Root mean square over the samples of the residuals of the angles on the ground, metres.
     #[must_use]
     pub fn pointing_ground_rmse_m(&self) -> Option<f64> {
         self.pointing_ground_m.as_deref().map(root_mean_square)
@@ -244,7 +244,7 @@ fn euler_model(orientation: &Orientation, order: usize) -> Result<EulerModel> {
     })
 }
 
-/// Distance on the ellipsoid between where each sample looks and where the polynomials look from there.
+/// Distance on the ellipsoid between the boresight of each sample and that of the polynomials from the same position.
 fn pointing_ground_m(orientation: &Orientation, angles_rad: &[Fit; 3]) -> Option<Vec<f64>> {
     let distance_m = |sample: &OrientationSample| {
         let [omega_rad, phi_rad, kappa_rad] =
@@ -285,11 +285,11 @@ fn rotation_vector_model(orientation: &Orientation) -> Result<RotationVectorMode
     })
 }
 
-/// Longer images break the usual limit by the curvature of the orbit alone, seconds: its error grows with the third power of
+/// Longer images break the usual limit by the shape of the orbit only, seconds: its error grows with the third power of
 /// the time, to 5 m in 74 s.
 const LONG_S: f64 = 60.0;
 
-/// A limit as it was written, without the rounding of its conversion; limits of any size keep their digits.
+/// A limit as it was written, without the rounding of its conversion, to four digits.
 fn four_digits(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }
@@ -312,8 +312,8 @@ fn broken_limits(
         };
         let advice = if exposed_s > LONG_S {
             format!(
-                "; in {exposed_s:.0} s an orbit leaves any polynomial of second order: set registration.model = \"samples\", which \
-                 follows it, and orientation.position_rmse_max_m above this"
+                "; over {exposed_s:.0} s an orbit departs from any polynomial of second order: set \
+                 registration.model = \"samples\", which follows it, and orientation.position_rmse_max_m above this"
             )
         } else {
             String::new()

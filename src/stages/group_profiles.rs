@@ -1,6 +1,6 @@
-//! Footprints of one orbit inside one window become a profile, marked where an image was taken with it.
+//! Footprints of one orbit inside one window become a profile, marked where an image was exposed at the same time.
 //!
-//! This is a stage of its own, because profiles need footprints and image times, and two stages need profiles.
+//! This is a separate stage, because profiles need footprints and image times, and two stages need profiles.
 
 use std::sync::atomic::AtomicBool;
 
@@ -24,7 +24,7 @@ pub struct Profile {
     pub id: String,
     /// Window identifier.
     pub window: String,
-    /// Orbit number as the PEDR has it.
+    /// Orbit number in the PEDR.
     pub orbit: u32,
     /// Rows of the footprints, counted from 0.
     pub rows: Vec<u32>,
@@ -46,8 +46,8 @@ pub struct SimultaneousImage {
 impl Profile {
     /// A pause longer than this starts another profile of the same orbit, seconds.
     ///
-    /// An orbit crosses a wide window twice, on its day and its night side; between the two lie tens of
-    /// minutes, while clouds and lost packets make pauses of seconds.
+    /// An orbit crosses a wide window twice, on its day and its night side, tens of minutes apart; clouds and lost
+    /// packets cause gaps of seconds.
     pub const PAUSE_S: f64 = 300.0;
 }
 
@@ -80,7 +80,7 @@ impl Stage for GroupProfiles<'_> {
 
 /// Groups footprints by window, orbit and pause.
 ///
-/// Profiles come in the order of the windows and, within one, of time.
+/// Profiles are in the order of the windows and, within one, of time.
 #[must_use]
 pub fn group_profiles(
     footprints: &Footprints<BodyFixed>,
@@ -131,7 +131,7 @@ fn profile(
     let simultaneous = images
         .iter()
         .enumerate()
-        // The laser is not where the kernels of another spacecraft are.
+        // Images by the kernels of another spacecraft have no laser.
         .filter(|(_, image)| image.support.is_some() || image.has_laser())
         .filter_map(|(index, image)| {
             let exposures = image.exposures();

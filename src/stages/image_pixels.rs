@@ -1,4 +1,4 @@
-//! The pixels of the images: files that must be those of the images they are given for.
+//! The pixels of the images, with a check that each file belongs to its image.
 
 use std::path::Path;
 
@@ -19,7 +19,7 @@ use crate::{
     stage::{Input, Inputs},
 };
 
-/// Clocks of an image and of its pixels that lie farther apart are those of two images, seconds; labels round them.
+/// With a larger difference, the clocks of an image and of its pixels belong to two images, seconds; labels round them.
 const CLOCKS_APART_MAX_S: u32 = 1;
 
 /// For every image of the site the file with its pixels, where there is one.
@@ -40,7 +40,7 @@ impl PixelFiles<'_> {
     /// The files, opened, of the images with these times.
     ///
     /// # Errors
-    /// The system's refusal to read; a file whose pixels cannot be read, or are those of another image.
+    /// Read errors; a file whose pixels cannot be read, or are those of another image.
     pub fn opened(&self, times: &[&ImageTimes]) -> Result<Vec<Option<PixelFile>>> {
         let files = self.0.iter().zip(times);
         let opened = files.map(|(file, times)| {
@@ -50,7 +50,7 @@ impl PixelFiles<'_> {
         opened.collect()
     }
 
-    /// The same where exchanged files would not be noticed otherwise: two without a label must not be of one size.
+    /// The same where exchanged files would otherwise go unnoticed: two files without a label must differ in size.
     ///
     /// # Errors
     /// Those of [`Self::opened`]; two such files.
@@ -74,17 +74,17 @@ impl PixelFiles<'_> {
         Ok(opened)
     }
 
-    /// The pixels of all images that have some, as windows are read of them.
+    /// The decoded pixels of all images that have some, from which windows are read.
     ///
     /// # Errors
-    /// Those of [`Self::told_apart`]; the system's refusal to write temporary files.
+    /// Those of [`Self::told_apart`]; errors in writing temporary files.
     pub fn decoded(&self, times: &[&ImageTimes]) -> Result<Vec<Option<Pyramid>>> {
         let opened = self.told_apart(times)?;
         let decode = |file: &Option<PixelFile>| file.as_ref().map(Pyramid::of).transpose();
         opened.par_iter().map(decode).collect()
     }
 
-    /// Every file whose image has its times, and what opening it gives.
+    /// Every file whose image has its times, and the result of opening it.
     pub fn examined<'i>(
         &self,
         images: &'i [SiteImage],
@@ -198,8 +198,8 @@ fn open_pixels(path: &Path, times: &ImageTimes) -> Result<PixelFile> {
     Ok(file)
 }
 
-/// Whether what a file says of its image agrees with what is known of it. The lines of an image that came down in part may be
-/// fewer; without a label, nothing says which ones.
+/// Whether a file agrees with its image. An image that was received in part may have fewer lines; without a label, it
+/// is unknown which ones.
 fn belongs(file: &PixelFile, times: &ImageTimes) -> std::result::Result<(), PixelsError> {
     let image = || times.id.clone();
     if file.is_projected() {
@@ -240,13 +240,14 @@ fn belongs(file: &PixelFile, times: &ImageTimes) -> std::result::Result<(), Pixe
     if lines > header {
         return Err(size("lines", lines, format!("at most {header}")));
     }
-    // All lines that were exposed are in a file, some of them empty, or those that came down; of a complete one, all came down.
+    // A file holds all exposed lines, some of them empty, or those that were received; of a complete file, all were
+    // received.
     let may_lack = file.archive().is_none_or(|archive| !archive.is_complete());
     if lines > delivered && !(lines == header && may_lack) {
         return Err(size(
             "lines",
             lines,
-            format!("at most {delivered}, which lines_delivered says came down of {header}"),
+            format!("at most {delivered}, the lines received of {header} (lines_delivered)"),
         ));
     }
     Ok(())
@@ -294,7 +295,7 @@ fn of_the_image(label: &ImageLabel, times: &ImageTimes) -> std::result::Result<(
     Ok(())
 }
 
-/// Whether rows with times of their own are those of the image: of its camera, and from the same instant on.
+/// Whether rows with times belong to the image: to its camera, and from the same instant on.
 fn of_its_rows(
     label: &ImageLabel,
     rows: &RowTimes,

@@ -13,21 +13,21 @@ use crate::{
     stages::oriented::OrientedImage,
 };
 
-/// Half the distance over which the distortion between two images is taken, pixels: the size of a template.
+/// Half the distance over which the distortion between two images is measured, pixels: the size of a template.
 const SPAN_PX: f64 = 16.0;
-/// Steps in which the height below a ray is found: the ground changes little over what they move.
+/// Steps of the search for the height on a ray: the ground changes little over their shifts.
 const HEIGHT_STEPS: u32 = 4;
-/// Change of height that shows which way parallax goes, metres.
+/// Change of height for the direction of parallax, metres.
 const HEIGHT_CHANGE_M: f64 = 100.0;
 
-/// An image as it looks at the ground.
+/// An image with its camera and pixels.
 pub(in crate::stages) struct View<'a> {
     pub(in crate::stages) camera: OrientedCamera<&'a (dyn ExteriorOrientation + 'static)>,
     projector: Projector<'a, dyn ExteriorOrientation>,
     pub(in crate::stages) pixels: &'a Pyramid,
 }
 
-/// Where another image is expected to show a place.
+/// The predicted position of a place in another image.
 pub(in crate::stages) struct Prediction {
     /// From the image to the other.
     pub(in crate::stages) affine: Affine,
@@ -60,7 +60,7 @@ impl<'a> View<'a> {
         })
     }
 
-    /// Lines and samples of the pixels that are there.
+    /// Lines and samples of the available pixels.
     pub(in crate::stages) fn size_px(&self) -> Vector2<f64> {
         let [lines, samples] = self.pixels.size(0);
         Vector2::new(lines as f64, samples as f64)
@@ -72,7 +72,7 @@ impl<'a> View<'a> {
         (0.0..size.x).contains(&place.x) && (0.0..size.y).contains(&place.y)
     }
 
-    /// Where the ray of a place meets a sphere, metres; `None` where it passes it.
+    /// Where the ray of a place meets a sphere, metres; `None` where it misses it.
     fn on_sphere_m(&self, place: &Vector2<f64>, radius_m: f64) -> Option<Vector3<f64>> {
         let (x_lines, _) = self.camera.focal_plane_coordinates(place.x, place.y);
         let pose = self.camera.orientation.pose(x_lines);
@@ -84,7 +84,7 @@ impl<'a> View<'a> {
             .then(|| pose.position_m + (along_m - square_m2.sqrt()) * direction)
     }
 
-    /// The ground of a place by what is known of heights, and the standard deviation of its height, metres.
+    /// The ground of a place by a priori heights, and the standard deviation of its height, metres.
     fn ground_m(&self, place: &Vector2<f64>, heights: &Heights) -> Option<(Vector3<f64>, f64)> {
         let start_m = self.camera.orientation.pose(0.0).position_m;
         let mut height = heights.near(&start_m);
@@ -106,7 +106,7 @@ impl<'a> View<'a> {
         ))
     }
 
-    /// Where `other` is expected to show `place`.
+    /// The predicted position of `place` in `other`.
     pub(in crate::stages) fn predict(
         &self,
         other: &View<'_>,

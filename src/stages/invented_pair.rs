@@ -1,4 +1,4 @@
-//! Two invented cameras over invented ground, for tests of stages that compare pixels.
+//! Two synthetic cameras over synthetic ground, for tests of stages that compare pixels.
 
 #![allow(
     clippy::cast_possible_truncation,
@@ -28,7 +28,7 @@ pub(in crate::stages) const LINES: u32 = 1_280;
 pub(in crate::stages) const SAMPLES: u32 = 256;
 /// Of the first camera and of the second, metres.
 pub(in crate::stages) const LINE_SPACING_M: [f64; 2] = [4.4, 4.0];
-/// How far east of the ground they fly, metres.
+/// Distance of their tracks east of the ground, metres.
 pub(in crate::stages) const EAST_M: [f64; 2] = [0.0, 120_000.0];
 
 /// Height of the ground above the sphere at a place, metres.
@@ -43,7 +43,7 @@ fn brightness(place_m: &Vector3<f64>, waves: &[[f64; 5]]) -> f64 {
     waves.iter().map(of_wave).sum()
 }
 
-/// Numbers that look random and are always the same.
+/// Pseudorandom numbers with a fixed seed.
 pub(in crate::stages) struct Random(pub(in crate::stages) u64);
 
 impl Random {
@@ -56,7 +56,7 @@ impl Random {
     }
 }
 
-/// The cameras, what they see, and how it becomes pixels.
+/// The cameras, their ground, and its rendering.
 pub(in crate::stages) struct Invented;
 
 impl Invented {

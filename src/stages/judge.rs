@@ -1,7 +1,7 @@
 //! The verdict on a site: the one place where it is made.
 //!
-//! Reasons, remarks and `checks` come from the same evidence and limits; of every limit the largest use is listed. The
-//! manifest holds them, and pages, messages and differences of runs show them; none of these judges by itself.
+//! Reasons, remarks and `checks` come from the same evidence and limits; for every limit the largest use is listed. The
+//! manifest stores them; pages, messages and run comparisons show them and judge nothing.
 
 mod adjustment;
 mod checks;
@@ -24,7 +24,7 @@ use crate::{
     wording::{Wording, signed, with_minus},
 };
 
-/// What is known of a site when it is judged.
+/// The evidence on which a site is judged.
 #[derive(Debug, Clone, Copy)]
 pub struct Evidence<'a> {
     /// The words of sentences and checks.
@@ -33,9 +33,9 @@ pub struct Evidence<'a> {
     pub footprints: Option<usize>,
     /// The limits of the configuration.
     pub limits: &'a LimitsConfig,
-    /// Those on ranges.
+    /// Limits on ranges.
     pub range_limits: &'a RangeCheckConfig,
-    /// Those on sensor models.
+    /// Limits on sensor models.
     pub orientation_limits: &'a OrientationConfig,
     /// Ranges of every profile.
     pub ranges: &'a RangeCheck,
@@ -43,13 +43,13 @@ pub struct Evidence<'a> {
     pub clock_correction_s: f64,
     /// The images with the orientation of the kernels.
     pub images: &'a [JudgedImage<'a>],
-    /// What is wrong with the kernels, one sentence each.
+    /// Faults of the kernels, one sentence each.
     pub warnings: &'a [String],
-    /// What was wrong with skipped records, one sentence each.
+    /// Faults of skipped records, one sentence each.
     pub complaints: &'a [String],
-    /// The adjustment; nothing for a site without tie points.
+    /// The adjustment; `None` for a site without tie points.
     pub adjustment: Option<AdjustmentEvidence<'a>>,
-    /// The terrain model of a pair; nothing for a site that asks for none.
+    /// The terrain model of a pair; `None` where it is not requested.
     pub surface: Option<&'a SurfaceAccount>,
     /// Why there is no adjustment although there are tie points.
     pub adjustment_failure: Option<&'a str>,
@@ -66,7 +66,7 @@ pub struct JudgedImage<'a> {
     pub model: &'a SensorModel,
 }
 
-/// What is known of an adjustment.
+/// The evidence on an adjustment.
 #[derive(Debug, Clone, Copy)]
 pub struct AdjustmentEvidence<'a> {
     /// The tie points.
@@ -85,7 +85,7 @@ pub struct AdjustmentEvidence<'a> {
     pub adjusted_heights: &'a HeightCheck,
 }
 
-/// Judges a site by its limits and by what contradicts itself.
+/// Judges a site by its limits and by contradictions in its data.
 #[must_use]
 pub fn judge(evidence: &Evidence<'_>) -> Verdict {
     let mut checks = checks::checks(evidence);
@@ -107,7 +107,8 @@ impl Evidence<'_> {
         let mut reasons = Vec::new();
         if self.footprints == Some(0) {
             reasons.push(
-                "no footprint in any window: look at windows and pedr.filter, and whether pedr.files are of the site's orbits"
+                "no footprint in any window: check windows and pedr.filter, and that pedr.files are those of the \
+                 site's orbits"
                     .to_owned(),
             );
         }
@@ -133,7 +134,7 @@ impl Evidence<'_> {
         reasons
     }
 
-    /// What a reader must weigh although no limit is broken, one sentence each.
+    /// Points that the reader must weigh although no limit is broken, one sentence each.
     fn remarks(&self) -> Vec<String> {
         let mut remarks = self.warnings.to_vec();
         match self.complaints {
@@ -166,10 +167,10 @@ impl Evidence<'_> {
     }
 }
 
-/// Differences from the configured clock correction below this are not remarked on, seconds: rival orbits
-/// differ by tens of metres along the track, which the spacecraft flies in this time.
+/// Differences from the configured clock correction below this get no remark, seconds: independent orbits differ by
+/// tens of metres along the track, which the spacecraft covers in this time.
 const CLOCK_DOUBT_S: f64 = 0.02;
-/// Nor are those below so many standard uncertainties.
+/// The same limit in standard uncertainties; the larger of the two applies.
 const CLOCK_DOUBT_SIGMA: f64 = 5.0;
 
 /// How far a scan with this uncertainty may be from the configured correction, seconds.
@@ -177,7 +178,7 @@ const fn clock_limit_s(uncertainty_s: f64) -> f64 {
     CLOCK_DOUBT_S.max(CLOCK_DOUBT_SIGMA * uncertainty_s)
 }
 
-/// What a scan says against the configured correction.
+/// The contradiction between a scan and the configured correction, if any.
 fn doubt(scan: &BiasScan, configured_s: f64) -> Option<String> {
     let (best_s, uncertainty_s) = (scan.best_s?, scan.uncertainty_s?);
     let apart_s = (best_s - configured_s).abs();

@@ -16,12 +16,12 @@ use crate::{
     pds::isd::{ImageSupport, read_isd},
 };
 
-/// Between two samples of the orientation lie at most so many seconds: over them the tables of a low orbit are cubics within 1e-4
-/// pixels. There are never fewer samples than this, nor more.
+/// Longest time between two samples of the orientation, seconds: over it the tables of a low orbit are cubics within
+/// 1e-4 pixels. `SAMPLES` bounds their number.
 const STEP_S: f64 = 1.0;
 const SAMPLES: [f64; 2] = [64.0, 20_000.0];
 
-/// An image as its support data have it.
+/// An image by its support data.
 #[derive(Debug)]
 pub struct LineCamera {
     /// Orientation, detector and line times.
@@ -30,7 +30,7 @@ pub struct LineCamera {
     pub samples: u32,
 }
 
-/// Support data that are no orientation.
+/// Support data that do not form an orientation.
 #[derive(Debug, thiserror::Error)]
 #[error("image {image}: {problem}")]
 pub(in crate::stages) struct NoSight {
@@ -49,7 +49,7 @@ impl Cause for NoSight {
 }
 
 impl LineCamera {
-    /// Where the middle of the image looks, unit vector, body-fixed.
+    /// Viewing direction of the middle of the image, unit vector, body-fixed.
     #[must_use]
     pub fn looks(&self) -> Vector3<f64> {
         self.ray([0.5, 0.5]).direction()
@@ -99,10 +99,10 @@ impl LineCamera {
         }
     }
 
-    /// The image `name` by the support data at `path`, which see `body`.
+    /// The image `name` of `body` by the support data at `path`.
     ///
     /// # Errors
-    /// Files that cannot be read; support data of another body, or that are no orientation.
+    /// Files that cannot be read; support data of another body, or that do not form an orientation.
     pub fn read(path: &Path, name: &str, body: Body) -> Result<Self> {
         let support = read_isd(path)?;
         support.sees(body, name).in_file(path)?;

@@ -1,5 +1,4 @@
-//! The shots of a site as samples of the ground: what the adjustment is controlled by, and what heights are compared
-//! with.
+//! The shots of a site as samples of the ground: control of the adjustment, and reference for heights.
 
 use std::collections::BTreeSet;
 
@@ -20,7 +19,7 @@ use crate::{
 pub struct MolaShots(Vec<SurfaceShot>);
 
 impl MolaShots {
-    /// The shots of `profiles`; one in two windows counts for the first.
+    /// The shots of `profiles`; a shot in two windows belongs to the first.
     #[must_use]
     pub fn of(footprints: &Footprints<BodyFixed>, profiles: &[Profile]) -> Self {
         let mut used = BTreeSet::new();
@@ -53,7 +52,7 @@ impl MolaShots {
         LaserSurface::new(&self.0, around, options)
     }
 
-    /// Every profile alone, by its index, those with most shots first.
+    /// Every profile separately, with its index, those with most shots first.
     #[must_use]
     pub fn by_profile(&self) -> Vec<(usize, Self)> {
         let mut profiles: Vec<(usize, Self)> = Vec::new();

@@ -1,4 +1,4 @@
-//! An image with its orientation in every form: what the geometric stages see through.
+//! An image with its orientation in every form, for the geometric stages.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -29,7 +29,7 @@ pub struct OrientedImage<'a> {
     samples: SampledOrientation,
 }
 
-/// Samples that are no orientation.
+/// Samples that do not form an orientation.
 #[derive(Debug, thiserror::Error)]
 #[error("image {image}: {error}")]
 struct NoOrientation {
@@ -48,10 +48,10 @@ impl Cause for NoOrientation {
 }
 
 impl<'a> OrientedImage<'a> {
-    /// The image as its orientation and model have it.
+    /// The image with its orientation and model.
     ///
     /// # Errors
-    /// Samples that are no orientation.
+    /// Samples that do not form an orientation.
     pub fn of(
         image: &'a ImageTimes,
         orientation: &Orientation,
@@ -95,7 +95,7 @@ impl<'a> OrientedImage<'a> {
     /// Finds lines for points with the form `required`.
     ///
     /// # Errors
-    /// An orientation that sees nothing.
+    /// An orientation that sees no ground.
     pub fn projector(
         &self,
         required: CameraModel,

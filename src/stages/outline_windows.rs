@@ -1,4 +1,5 @@
-//! Windows that are what an image sees: their outlines by the image's times and the kernels, before shots are searched.
+//! Windows defined by the view of an image: their outlines by the image's times and the kernels, before shots are
+//! searched.
 
 use std::sync::atomic::AtomicBool;
 
@@ -34,7 +35,7 @@ impl Cause for NoGround {
 }
 
 stage_inputs! {
-    /// The windows, and what tells where the images look.
+    /// The windows, and the sources of the orientation of the images.
     pub struct OutlineWindows<'a> {
         /// Windows as they are written.
         pub windows: &'a [WindowConfig],
@@ -71,7 +72,7 @@ impl Stage for OutlineWindows<'_> {
 }
 
 impl OutlineWindows<'_> {
-    /// Outline of what an image sees, by its support data or by the kernels.
+    /// Outline of the view of an image, by its support data or by the kernels.
     fn seen(&self, times: &ImageTimes) -> Result<Option<Vec<GroundPoint>>> {
         if let Some(support) = &times.support {
             let nodes = Nodes::new(&CameraTables::of_support(&support.tables));
@@ -100,7 +101,7 @@ impl OutlineWindows<'_> {
         let places = seen.iter();
         let ring = places.map(|point| [point.longitude_rad, point.latitude_rad]);
         let ring: Vec<[f64; 2]> = ring.collect();
-        // At the poles a metre is the largest angle.
+        // A metre is the largest angle at the poles.
         let margin_rad = margin_m / times.body.model().polar_radius_m;
         Ok(widened(&ring, margin_rad, margin_rad))
     }
@@ -111,7 +112,7 @@ impl OutlineWindows<'_> {
 pub struct Windows<'a> {
     /// As they are written.
     pub written: &'a [WindowConfig],
-    /// With outlines; none where no window is what an image sees.
+    /// With outlines; `None` where no window is the view of an image.
     pub outlined: Option<&'a Output<Vec<WindowConfig>>>,
 }
 
@@ -119,7 +120,7 @@ impl<'a> Windows<'a> {
     /// The windows in their order.
     ///
     /// # Errors
-    /// A bug in areograph that no stage meets; see [`Output::value`].
+    /// A bug in areograph that no stage triggers; see [`Output::value`].
     pub fn value(&self) -> Result<&'a [WindowConfig]> {
         match self.outlined {
             Some(outlined) => Ok(outlined.value()?),

@@ -1,4 +1,5 @@
-//! Reads tables of laser shots for those in a site's windows: what the search of PEDR files gives, from other altimeters.
+//! Reads tables of laser shots for those in a site's windows: the counterpart of the search of PEDR files for other
+//! altimeters.
 
 use std::{
     collections::{BTreeMap, HashSet},
@@ -31,7 +32,7 @@ use crate::{
 
 /// Complaints kept with their text; all are counted.
 const COMPLAINTS_MAX: usize = 1_000;
-/// Classification of ground returns, as the PEDR has it: a table holds nothing else.
+/// Classification of ground returns, as in the PEDR: a table holds no others.
 const GROUND: i16 = 1;
 
 stage_inputs! {
@@ -90,12 +91,12 @@ impl Stage for ReadShots<'_> {
         let said = result.complaint_counts.values().sum::<u64>();
         let first = result.complaints.first();
         let first = first
-            .map(|complaint| format!("rows that are no shots: {said}, the first: {complaint}"));
+            .map(|complaint| format!("rows without a valid shot: {said}, the first: {complaint}"));
         first.into_iter().collect()
     }
 }
 
-/// More tables than footprints can count.
+/// More tables than footprints can index.
 #[derive(Debug, thiserror::Error)]
 #[error("{0} tables of shots; expected at most {max}", max = u16::MAX)]
 struct TooManyTables(usize);
@@ -110,14 +111,13 @@ impl Cause for TooManyTables {
     }
 }
 
-/// Reads `tables`, each with what its columns are, for shots of `body` in any of `windows`.
+/// Reads `tables`, each with its columns, for shots of `body` in any of `windows`.
 ///
 /// Every shot is judged by its own position, in the frame of the products at its time. `correction_s` is added to times to
-/// give `et_s`. Rows that say the same of the same instant, in one table or in several, count once.
+/// give `et_s`. Duplicate rows, in one table or in several, are counted once.
 ///
 /// # Errors
-/// A table that cannot be read, has not the columns, or holds no shot; [`Stopped`]. Any other row that is no shot is a
-/// complaint.
+/// A table that cannot be read, lacks columns, or holds no shot; [`Stopped`]. Any other malformed row is a complaint.
 pub fn read_shots(
     body: Body,
     tables: &[(&ShotTableConfig, &HashedFile)],
@@ -156,7 +156,7 @@ pub fn read_shots(
     Ok(gathered.finish(tables.len()))
 }
 
-/// The columns of the configuration, as the reader of tables takes them.
+/// The columns of the configuration, in the type of the reader of tables.
 fn columns_of(columns: ShotColumns) -> shot_table::ShotColumns {
     shot_table::ShotColumns {
         utc: columns.utc,
@@ -188,14 +188,14 @@ fn empty(body: Body) -> SearchResult {
     }
 }
 
-/// What reading of all tables gives.
+/// Results of reading all tables.
 struct Gathered<'a> {
     body: Body,
     regions: &'a [Region],
     correction_s: f64,
     /// Instant and place of every shot in a window.
     seen: HashSet<[u64; 4]>,
-    /// Rows that repeat one.
+    /// Rows that repeat another one.
     repeated: u64,
     result: SearchResult,
 }
@@ -259,7 +259,7 @@ impl Gathered<'_> {
         holding.fold(0, |windows, (bit, _)| windows | 1 << bit)
     }
 
-    /// The columns of a shot; what a table does not say is that of a ground return of one laser.
+    /// The columns of a shot; values that a table lacks are those of a ground return of one laser.
     fn footprint(&self, file: u16, windows: u64, row: &ShotRow) -> Footprint {
         let direction = spherical_to_xyz_m(row.longitude_rad, row.latitude_rad, 1.0);
         let [
@@ -283,7 +283,7 @@ impl Gathered<'_> {
             longitude_rad: wrap_two_pi(row.longitude_rad),
             latitude_rad: row.latitude_rad,
             radius_m: row.radius_m,
-            // No table says what crossovers corrected.
+            // No table holds crossover corrections.
             radius_crossover_m: row.radius_m,
             areoid_radius_m: on_ellipsoid_m(self.body.model(), &direction).norm(),
             range_m: row.range_m,
@@ -303,13 +303,13 @@ impl Gathered<'_> {
         let mut result = self.result;
         let plural = if tables == 1 { "" } else { "s" };
         let mut notes = vec![format!(
-            "{tables} table{plural} of laser shots: {} rows; heights above the ellipsoid stand for topography, and radii are \
-             not corrected by crossovers",
+            "{tables} table{plural} of laser shots: {} rows; heights above the ellipsoid are used as topography, and \
+             radii are not corrected by crossovers",
             result.frames_read
         )];
         if self.repeated > 0 {
             notes.push(format!(
-                "{} rows in the windows repeat another one: counted once",
+                "{} rows in the windows repeat another one and are counted once",
                 self.repeated
             ));
         }

@@ -34,19 +34,19 @@ pub struct Ties {
     pub points: Vec<TiePoint>,
     /// Measurements in images that the site does not have, by the name in the file.
     pub elsewhere: BTreeMap<String, u64>,
-    /// Measurements and points that their network itself says to ignore.
+    /// Measurements and points that their network marks as ignored.
     pub ignored: u64,
-    /// Records that are not what they should be; at most 1000 are kept.
+    /// Complaints about malformed records; at most 1000 are kept.
     pub complaints: Vec<String>,
-    /// All of them.
+    /// Number of all complaints.
     pub complaint_count: u64,
     /// Files that are copies of another one, one sentence each.
     pub copies: Vec<String>,
-    /// What does not agree, and must be weighed, one sentence each.
+    /// Disagreements that must be weighed, one sentence each.
     pub remarks: Vec<String>,
-    /// How many of the points are those of files.
+    /// Number of points that come from files.
     pub read: usize,
-    /// Pairs of images in which areograph measured tie points itself; these stand behind those of files.
+    /// Pairs of images in which areograph measured tie points itself; these follow those of files.
     pub matched: Vec<MatchedPair>,
 }
 
@@ -59,7 +59,7 @@ enum TiesError {
     NoneJoins { points: usize },
     #[error("tie points are measured in {found}; expected images of the site: {expected}")]
     NoImage { found: String, expected: String },
-    #[error("tie points: {0}; expected at most half of the points at such places")]
+    #[error("tie points: {0}; expected at most half of the points at such positions")]
     SharedPlaces(SharedPlaces),
 }
 
@@ -107,7 +107,7 @@ impl Input for TieFiles<'_> {
     }
 }
 
-/// The images of a site, of which tie points see the names.
+/// The images of a site, by their names in tie points.
 #[derive(Debug)]
 pub struct ImageNames<'a>(pub &'a [ImageConfig]);
 
@@ -136,7 +136,7 @@ impl Stage for ReadTies<'_> {
         let (points, multi_image) = (ties.points.len(), ties.multi_image());
         let bad = match ties.complaint_count {
             0 => String::new(),
-            count => format!("; {count} records that cannot be read"),
+            count => format!("; {count} unreadable records"),
         };
         let found =
             format!("{points} tie points, {multi_image} of them in two or more images{bad}");
@@ -146,12 +146,12 @@ impl Stage for ReadTies<'_> {
     }
 }
 
-/// Reads all files of `ties`. A point that two files know by the same identifier is one when they measured it
-/// in different images; otherwise it stays two, of which an intersection takes the first. A copy of a file is not
-/// read again, and a point that repeats the measurements of another one is left out, whatever it is called.
+/// Reads all files of `ties`. Points with the same identifier in two files are one if they were measured in different
+/// images; otherwise they stay two, of which an intersection uses the first. A copy of a file is not read again, and a
+/// point that repeats the measurements of another one is left out, whatever its name.
 ///
 /// # Errors
-/// A file that is no table and no network, or has no readable record; no measurement at all; none in an image of
+/// A file that is neither a table nor a network, or has no readable record; no measurement at all; none in an image of
 /// the site; none that joins two of them; most points measured at places of other points.
 pub fn read_ties(ties: &TiesConfig, images: &[ImageConfig]) -> Result<Ties> {
     let names: BTreeMap<&str, usize> = images
@@ -206,7 +206,7 @@ pub fn read_ties(ties: &TiesConfig, images: &[ImageConfig]) -> Result<Ties> {
 }
 
 impl Ties {
-    /// Takes a point over; `first` knows where the first point of each identifier stands.
+    /// Adds a point; `first` holds the index of the first point of each identifier.
     fn take(
         &mut self,
         tie: TiePoint<String>,
@@ -236,7 +236,7 @@ impl Ties {
         }
     }
 
-    /// What was skipped, one sentence each.
+    /// Skipped input, one sentence each.
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
         let elsewhere: u64 = self.elsewhere.values().sum();
@@ -262,14 +262,14 @@ impl Ties {
         }
         if self.ignored > 0 {
             notes.push(format!(
-                "tie points: {} points and measurements that their network says to ignore",
+                "tie points: {} points and measurements that their network marks as ignored",
                 self.ignored
             ));
         }
         notes
     }
 
-    /// How many of the points, the last ones, areograph measured itself.
+    /// Number of points, the last ones, that areograph measured itself.
     #[must_use]
     pub const fn matched_points(&self) -> usize {
         self.points.len() - self.read
@@ -399,11 +399,11 @@ mod tests {
         assert_eq!(again.points, ties.points);
         assert_eq!(
             again.remarks,
-            ["3 repeat the measurements of another one and are left out, for example 1 those of 1"]
+            ["3 repeat the measurements of another point and are omitted, for example 1 those of 1"]
         );
         // One place of A, two of B.
         let text = format!("{HEADER}{}", rows.replace("3,A,5,5", "3,A,1,1"));
-        let shared = "2 are measured at a place of another one, for example 1 and 3 at line 1.00, sample 1.00 of image A";
+        let shared = "2 are measured at the position of another point, for example 1 and 3 at line 1.00, sample 1.00 of image A";
         let failure = read(&text, &images).unwrap_err();
         assert!(
             failure.cause.to_string().contains(shared),

@@ -1,4 +1,4 @@
-//! An orientation after a correction: samples and camera tables moved together, and the lines' times with them.
+//! An orientation after a correction: samples, camera tables and line times corrected together.
 //!
 //! From these and the original kernels, `stages/tabulate_kernels` computes the states and attitudes of an SPK and a CK
 //! per image. Loaded last, they give the same orientation through the same pipeline; the flow reads them back before
@@ -30,10 +30,10 @@ use crate::{
     time::{Et, Interval},
 };
 
-/// Nodes by which a table may be overstepped: the rounding of epochs.
+/// Nodes by which a table may be exceeded: the rounding of epochs.
 const NODE_TOLERANCE: f64 = 1e-6;
 
-/// What an adjustment adds to the orientation of a line.
+/// The correction that an adjustment adds to the orientation of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LineCorrection {
     /// Added to the perspective centre, IAU 2000, metres.
@@ -89,9 +89,9 @@ impl Cause for ReorientError {
 }
 
 stage_inputs! {
-    /// The orientation of one image, and what the adjustment adds to it.
+    /// The orientation of one image, and the adjustment that corrects it.
     pub struct Reorient<'a> {
-        /// What the adjustment is for.
+        /// The round of the adjustment.
         pub round: Round,
         /// Identifier of the image.
         pub image: &'a str,
@@ -131,15 +131,14 @@ impl Stage for Reorient<'_> {
 /// The orientation of `image` after a correction.
 ///
 /// * `orientation` – as sampled from the kernels
-/// * `time_shift_lines` – `s`, by how many lines later than its tag says a line was exposed
-/// * `correction` – what is added at a line offset `x`, lines from the middle of the header image
+/// * `time_shift_lines` – `s`, by how many lines later than its tag a line was exposed
+/// * `correction` – the correction at a line offset `x`, lines from the middle of the header image
 ///
-/// The line with the tag `x` gets the camera of `x + s`: `C(x) = C₀(x + s) + Δ(x)` and
-/// `M(x) = exp([θ(x)]×) M₀(x + s)`, all relative to Mars, as
-/// [`CorrectedOrientation`](crate::geom::pushbroom::CorrectedOrientation) has it. Samples keep their epochs. Tables keep their
-/// nodes but those that the shift takes beyond what is known. Positions are corrected as they are, whatever the
-/// convention for light time: light time and aberration are those of the kernels' positions, which a correction of
-/// 100 m would change by 1 mm of `surface` and 1 cm of `centre`.
+/// The line with the tag `x` gets the camera of `x + s`: `C(x) = C₀(x + s) + Δ(x)` and `M(x) = exp([θ(x)]×) M₀(x + s)`,
+/// all relative to Mars, as [`CorrectedOrientation`](crate::geom::pushbroom::CorrectedOrientation) has it. Samples keep
+/// their epochs. Tables keep their nodes, except those that the shift moves beyond the known span. Positions are
+/// corrected in the same way in every convention for light time: light time and aberration remain those of the kernels'
+/// positions, which a correction of 100 m would change by 1 mm for `surface` and 1 cm for `centre`.
 ///
 /// # Errors
 /// [`Kind::Input`] for a shift beyond the camera tables; [`Kind::Bug`] for a correction that is not finite.
@@ -190,7 +189,7 @@ fn nodes(orientation: &Orientation) -> Result<Nodes> {
     Ok(Nodes::new(&orientation.tables))
 }
 
-/// Samples relative to the interpolated tables, over ET: what interpolation misses.
+/// Samples relative to the interpolated tables, over ET: the interpolation error.
 fn residual(orientation: &Orientation) -> Result<SampledOrientation> {
     let nodes = nodes(orientation)?;
     let relative = |sample: &OrientationSample| {
@@ -225,7 +224,7 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
         self.shift_lines * self.image.line_times.mean_period_s()
     }
 
-    /// Whether the tables reach as far as the shifted image.
+    /// Checks that the tables cover the shifted image.
     fn require_known(&self, tables: &CameraTables) -> Result<()> {
         let ends = [tables.et_s[0], tables.et_s[tables.et_s.len() - 1]].map(Et::from_seconds);
         let known = Interval::new(ends[0], ends[1]);
@@ -269,13 +268,13 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
         self.corrected(tag, camera.position.xyz_m + missed.position_m, to_mars)
     }
 
-    /// The same as the tables have it.
+    /// The same by the tables.
     fn tabulated(&self, tag: Et) -> Result<Camera> {
         let camera = self.nodes.camera(tag.plus(self.shift_s()));
         self.corrected(tag, camera.position.xyz_m, *camera.to_mars.matrix())
     }
 
-    /// A position and a rotation to Mars with what the correction adds at the line with the tag `tag`.
+    /// A position and a rotation to Mars with the correction at the line with the tag `tag`.
     fn corrected(
         &self,
         tag: Et,
@@ -357,7 +356,7 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
         let position_m = to_mars.transpose() * camera.position.xyz_m;
         let velocity_m_s =
             to_mars.transpose() * (over_ground_m_s + drift_m_s) + spin.cross(&position_m);
-        // To first order in θ, which leaves 1e-3 of a rate that is small itself.
+        // To first order in θ, which neglects 1e-3 of a rate that is small itself.
         let bus_rad_s = to_mars.transpose() * (to_mars_then * old_turn_rad_s)
             - to_camera.transpose() * turn_rad_s;
         tables.position_m.push(position_m);
@@ -367,7 +366,7 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
         Ok(())
     }
 
-    /// How fast the correction changes, metres and radians per second, from a line before to a line behind.
+    /// Rates of the correction, metres and radians per second, between the line before and the line after.
     fn rates(&self, line_offset: f64) -> Result<(Vector3<f64>, Vector3<f64>)> {
         let (before, behind) = (
             self.correction(line_offset - 1.0)?,

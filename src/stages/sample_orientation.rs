@@ -24,8 +24,8 @@ pub use super::orientation::{
     OrientationSample, OtherConvention,
 };
 
-/// Time between the attitude samples of the mission's C-kernels, seconds: an attitude that is held for
-/// longer is not explained by their spacing, and the bus turns by 0.2° meanwhile.
+/// Time between the attitude samples of the mission's C-kernels, seconds: their spacing does not explain an attitude
+/// that is held for longer, and the bus turns by 0.2° in that time.
 const ATTITUDE_SPACING_S: f64 = 4.0;
 
 stage_inputs! {
@@ -71,9 +71,9 @@ impl Stage for SampleOrientation<'_> {
         )
     }
 
-    /// Whether position and attitude can be read throughout the image, and are to be trusted.
+    /// Whether position and attitude can be read throughout the image, and are valid.
     fn examine(&self) -> Vec<Result<String>> {
-        // What failed to give times or kernels has been told.
+        // Failures of times or kernels have been reported.
         let (Some(times), Some(_)) = (self.times.get(), self.kernels.kernels()) else {
             return Vec::new();
         };
@@ -96,7 +96,7 @@ impl Stage for SampleOrientation<'_> {
     }
 }
 
-/// What is told of an image whose orientation can be read, and why it would not be trusted.
+/// The finding on an image whose orientation can be read, with the reasons why it would be invalid.
 fn finding(times: &ImageTimes, invalid_because: &[String]) -> String {
     let invalid = invalid_because.iter();
     let invalid = invalid.map(|reason| format!("; products would be invalid: {reason}"));
@@ -112,8 +112,8 @@ fn finding(times: &ImageTimes, invalid_because: &[String]) -> String {
 
 /// Samples the orientation of `image`.
 ///
-/// Position and Mars rotation are those of the exposure, or of the instant that the convention for light time asks
-/// for; attitude is read where the pointing bias says.
+/// Position and Mars rotation are those of the exposure, or of the instant that the convention for light time requires;
+/// attitude is read at the exposure plus the pointing bias.
 /// `R(camera → Mars) = R(J2000 → Mars) · R(J2000 → bus)ᵀ · R(bus → camera)ᵀ`.
 ///
 /// # Errors
@@ -157,12 +157,12 @@ pub fn sample_orientation(
     })
 }
 
-/// Makes sure that [`sample_orientation`] succeeds, by as few readings as tell it; gives why its orientation would
-/// not be trusted.
+/// Makes sure, with as few readings as possible, that [`sample_orientation`] succeeds; returns why its orientation
+/// would be invalid.
 ///
 /// Positions and attitudes are read at the samples, more often where the samples are farther apart than those of the
 /// C-kernels, and at the ends of the camera tables. How far attitudes are extrapolated depends on every reading: where
-/// the tolerance lets them be extrapolated too far, all are made.
+/// the tolerance permits them to be extrapolated too far, all are made.
 fn require_orientation(
     session: &Session,
     image: &ImageTimes,
@@ -201,7 +201,7 @@ fn epochs(image: &ImageTimes, intervals: u32) -> Vec<Et> {
     epochs.collect()
 }
 
-/// Attitudes that were read outside the C-kernels' intervals, where their last or next one is held.
+/// Attitudes that were read outside the C-kernels' intervals, where the last or next one is held constant.
 struct HeldAttitudes {
     lookups: usize,
     of: usize,
@@ -228,7 +228,7 @@ impl fmt::Display for HeldAttitudes {
         write!(
             formatter,
             "{} of {} attitudes lie outside the C-kernels' intervals, up to {:.3} s; within \
-             kernels.ck_tolerance_s the nearest one is taken, though the bus turns",
+             kernels.ck_tolerance_s the nearest one is used, although the bus rotates",
             self.lookups, self.of, self.distance_max_s
         )
     }

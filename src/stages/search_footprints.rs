@@ -35,26 +35,26 @@ use crate::{
 const COMPLAINTS_MAX: usize = 1_000;
 const STAGE: &str = "search_footprints";
 
-/// What the search found.
+/// Results of the search.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SearchResult {
     /// Shots in the windows, ordered by file, record and shot, in the coordinates of their files.
     pub footprints: Footprints<AsRead>,
-    /// What is wrong with the files, ordered by file and record; at most 1000 are kept.
+    /// Complaints about the files, ordered by file and record; at most 1000 are kept.
     pub complaints: Vec<Complaint>,
     /// All complaints by reason.
     pub complaint_counts: BTreeMap<Reason, u64>,
     /// Rejected shots inside a window, by reason.
     pub rejected: BTreeMap<ShotRejection, u64>,
-    /// Records looked at.
+    /// Records read.
     pub frames_read: u64,
     /// Shots whose own position was tested, those of frames near a window.
     pub shots_read: u64,
-    /// How files were understood, one sentence for each way, and which were copies of others.
+    /// How files were interpreted, one sentence for each way, and which were copies of others.
     pub notes: Vec<String>,
 }
 
-/// More files than footprints can count.
+/// More files than footprints can index.
 #[derive(Debug, thiserror::Error)]
 #[error("{0} PEDR files; expected at most {max}", max = u16::MAX)]
 struct TooManyFiles(usize);
@@ -70,13 +70,13 @@ impl Cause for TooManyFiles {
 }
 
 stage_inputs! {
-    /// PEDR files, what to keep of them, and the windows.
+    /// PEDR files, the filter of their shots, and the windows.
     pub struct SearchFootprints<'a> {
         /// Datum, filter, and the paths of the files.
         pub pedr: &'a PedrConfig,
         /// The same files with their hashes.
         pub files: PedrFiles<'a>,
-        /// What is known of where their records are.
+        /// Indexes of their records.
         pub index: KnownPlaces<'a>,
         /// Windows on the ground.
         pub windows: Windows<'a>,
@@ -95,7 +95,7 @@ impl Input for PedrFiles<'_> {
     }
 }
 
-/// Indexes beside the files: they make the search shorter, and change nothing that it finds.
+/// Indexes beside the files: they shorten the search without changing its result.
 #[derive(Debug)]
 pub struct KnownPlaces<'a>(pub &'a Indexes);
 
@@ -140,7 +140,7 @@ impl Stage for SearchFootprints<'_> {
     }
 }
 
-/// What can be said of a PEDR file without searching it.
+/// A summary of a PEDR file, without a search.
 fn examine_file(path: &Path, choice: DatumChoice) -> Result<String> {
     let file = Source::open(path, choice, &Indexes::default())?;
     let complaints = file.label_complaints().iter();
@@ -154,15 +154,14 @@ fn examine_file(path: &Path, choice: DatumChoice) -> Result<String> {
     ))
 }
 
-/// Searches `files`, understood as `pedr` says, for shots in any of `windows`.
+/// Searches `files`, interpreted as `pedr` configures, for shots in any of `windows`.
 ///
-/// Every shot is judged by its own position, in IAU 2000 at its time tag. `correction_s` is added to
-/// tags to give `et_s`. The result depends neither on the number of threads nor on `indexes`. A file with the bytes of
-/// an earlier one is not read again; a note says so. `watch` is looked at before every piece of a file, and counts
-/// records.
+/// Every shot is judged by its own position, in IAU 2000 at its time tag. `correction_s` is added to tags to give
+/// `et_s`. The result depends neither on the number of threads nor on `indexes`. A file with the bytes of an earlier
+/// one is not read again; a note says so. `watch` is checked before every piece of a file, and counts records.
 ///
 /// # Errors
-/// A file that cannot be opened, holds no good record, changes while it is read, or whose datum cannot be told;
+/// A file that cannot be opened, holds no valid record, changes while it is read, or whose datum cannot be determined;
 /// two files that hold the same shot in a window; [`Stopped`](crate::error::Stopped). Anything else wrong inside a file is a complaint; its
 /// good records are kept.
 pub fn search_footprints<'a>(
@@ -186,7 +185,7 @@ pub fn search_footprints<'a>(
         .collect();
     let mut gathered = Gathered::new(watch);
     let mut sources = Vec::with_capacity(files.len());
-    // In the order of the files, so that of several failures it is always the same one that is told.
+    // In the order of the files, so that of several failures always the same one is reported.
     for (opened, file) in opened.into_iter().zip(files) {
         let source = opened.in_stage(STAGE)?;
         if gathered.enlist(&source, file) {
@@ -202,7 +201,7 @@ pub fn search_footprints<'a>(
     Ok(gathered.finish())
 }
 
-/// What the search of all files gives.
+/// Results of the search of all files.
 struct Gathered<'a> {
     watch: Watch<'a>,
     result: SearchResult,
@@ -237,7 +236,7 @@ impl<'a> Gathered<'a> {
 }
 
 impl Gathered<'_> {
-    /// Notes the next file; whether it is to be searched, being no copy of an earlier one.
+    /// Registers the next file; returns whether it is to be searched, not being a copy of an earlier one.
     fn enlist(&mut self, source: &Source, file: &HashedFile) -> bool {
         let index = self.files.len();
         let enlisted = SourceFile {
@@ -303,10 +302,10 @@ impl Sink for Gathered<'_> {
     }
 }
 
-/// How a file was understood.
+/// How a file was interpreted.
 fn understood(source: &Source) -> String {
     let software = source.software_version().map_or_else(
-        || "unknown, taken as new".to_owned(),
+        || "unknown, treated as new".to_owned(),
         |version| version.to_string(),
     );
     let letter = source.version();

@@ -1,4 +1,4 @@
-//! The cases of shots in two files, as callers get them.
+//! The cases of shots in two files, as callers receive them.
 
 #[path = "../../crates/pds/src/archive/distinct/cases.rs"]
 mod cases;
@@ -12,7 +12,7 @@ use crate::{
     footprints::{AsRead, Footprint, Footprints, SourceFile},
 };
 
-/// File `file`, by a name of its own.
+/// File `file`, with its own name.
 pub(crate) fn source(file: usize) -> SourceFile {
     SourceFile {
         name: format!("file{file}.b"),
@@ -22,7 +22,7 @@ pub(crate) fn source(file: usize) -> SourceFile {
     }
 }
 
-/// Where it lies.
+/// Its path.
 pub(crate) fn path(file: usize) -> PathBuf {
     PathBuf::from(source(file).name)
 }

@@ -1,4 +1,4 @@
-//! How high the ground is where an image looks, before anything is matched: the altimeter's shots near by.
+//! Height of the ground in the view of an image before matching, from nearby shots of the altimeter.
 
 use nalgebra::Vector3;
 
@@ -7,17 +7,16 @@ use crate::{
     stages::group_profiles::Profile,
 };
 
-/// Shots that tell a height.
+/// Shots that determine a height.
 const SHOTS: usize = 8;
-/// How much the ground may rise or fall away from a shot, metres per metre, one standard deviation: the slopes of MOLA's ground
-/// over kilometres.
+/// Standard deviation of the slope of the ground away from a shot, metres per metre: MOLA slopes over kilometres.
 const SLOPE: f64 = 0.05;
 /// Least standard deviation of a height, metres.
 const SIGMA_MIN_M: f64 = 10.0;
 /// Standard deviation where there is no shot, metres: the relief of the planet about its ellipsoid.
 const SIGMA_WITHOUT_SHOTS_M: f64 = 2_000.0;
 
-/// What is known of the ground's height.
+/// A priori heights of the ground.
 pub(in crate::stages) struct Heights {
     body: Body,
     shots_m: Vec<Vector3<f64>>,
@@ -45,8 +44,8 @@ impl Heights {
         Self::at(footprints.body, shots.collect())
     }
 
-    /// The height at a place, metres body-fixed, whose own radius does not count: the mean of the nearest shots, the nearer
-    /// the more. Farther away it is less certain.
+    /// The height at a place, metres body-fixed, of which only the direction is used: the mean of the nearest shots,
+    /// weighted by proximity. Its standard deviation grows with the distance from them.
     pub(in crate::stages) fn near(&self, place_m: &Vector3<f64>) -> Height {
         let direction = place_m.normalize();
         let mut nearest: Vec<(f64, f64)> = Vec::with_capacity(SHOTS + 1);

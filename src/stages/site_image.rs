@@ -1,4 +1,4 @@
-//! An image of the site with the outputs of its stages: what the stages behind the registration see.
+//! An image of the site with the outputs of its stages: the input of the stages after the registration.
 
 use super::{
     fit_sensor_model::SensorModel, orientation::Orientation, oriented::OrientedImage,
@@ -9,7 +9,7 @@ use crate::{
     stage::{Input, Inputs, Output},
 };
 
-/// What the stages made of one image, with the orientation of the kernels or the adjusted one.
+/// Stage outputs of one image, with the orientation of the kernels or the adjusted one.
 #[derive(Debug, Clone)]
 pub struct SiteImage {
     /// Line times.
@@ -18,7 +18,7 @@ pub struct SiteImage {
     pub orientation: Output<Orientation>,
     /// Sensor models.
     pub model: Output<SensorModel>,
-    /// Where the image has the footprints.
+    /// Image coordinates of the footprints.
     pub registration: Output<ImageRegistration>,
 }
 
@@ -43,7 +43,7 @@ impl<'a> SiteImages<'a> {
     /// The images with their orientation in every form.
     ///
     /// # Errors
-    /// Samples that are no orientation.
+    /// Samples that do not form an orientation.
     pub fn oriented(self) -> Result<Vec<OrientedImage<'a>>> {
         let oriented = self.0.iter().map(|image| {
             let (times, orientation) = (image.times.value()?, image.orientation.value()?);

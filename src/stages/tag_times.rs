@@ -1,5 +1,5 @@
 //! Image labels become line times: spacecraft clock or UTC to ET, line period, header and delivered lines; or support
-//! data, which have them.
+//! data, which contain them.
 
 mod agreement;
 mod detector;
@@ -40,7 +40,7 @@ use crate::{
 pub struct ImageTimes {
     /// Image identifier.
     pub id: String,
-    /// The body that it sees.
+    /// The body that it shows.
     pub body: Body,
     /// The camera.
     pub instrument: Instrument,
@@ -66,9 +66,9 @@ pub struct ImageTimes {
     pub first_detector: u32,
     /// What the reader should know, one sentence each.
     pub notes: Vec<String>,
-    /// What does not agree, and must be weighed, one sentence each.
+    /// Disagreements that must be weighed, one sentence each.
     pub remarks: Vec<String>,
-    /// Support data that its orientation comes from; none of an image that kernels orient.
+    /// Support data that its orientation comes from; `None` for an image that kernels orient.
     pub support: Option<SupportFile>,
 }
 
@@ -84,7 +84,7 @@ pub enum StartFrom {
     Support,
     /// Ephemeris time of the configuration.
     Exposures,
-    /// Ephemeris time that the file holds beside every line.
+    /// Ephemeris time that the file states beside every line.
     Lines,
 }
 
@@ -98,7 +98,7 @@ impl ImageTimes {
         }
     }
 
-    /// Where the samples of a line look.
+    /// Viewing directions of the samples of a line.
     #[must_use]
     pub fn detector(&self) -> Detector {
         Detector::new(
@@ -140,8 +140,8 @@ impl ImageTimes {
     }
 }
 
-/// The pointing biases with which kernels are read for `images`: for no image that of the usual camera, for images of
-/// support data alone none.
+/// The pointing biases with which kernels are read for `images`: without images that of the usual camera, and none for
+/// images of support data only.
 pub fn used_biases<'a>(
     pointing: &'a PointingConfig,
     images: impl IntoIterator<Item = &'a ImageTimes>,
@@ -274,13 +274,13 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
     let (line_times, exposure_s, start_from) =
         pieces.line_times(of_file, tells_lines, told, &mut remarks)?;
     let start = line_times.start();
-    // Without the camera's frame its orientation says what is missing.
+    // Without the camera's frame, the orientation stage reports what is missing.
     if let Ok(mounting) = session.mounting(&instrument, start) {
         remarks.extend(mounting_agrees(&instrument, mounting.matrix()));
     }
     if let Some(utc) = &utc_stop {
         let stop = (&**utc, session.utc_to_et(utc)?);
-        // Both are UTC of the label: whether the clock agrees with it is another question.
+        // Both are UTC of the label; the clock is compared with it elsewhere.
         let start = fields
             .utc_start
             .as_deref()
@@ -334,8 +334,7 @@ fn lines_delivered(
     Ok(delivered)
 }
 
-/// The camera that the configuration names, else that of the label, else the first one that is known; and what
-/// the label says.
+/// The camera that the configuration names, else that of the label, else the first known one; and the label.
 fn labelled(image: &ImageConfig) -> Result<(Instrument, Option<ImageLabel>)> {
     let Some(path) = &image.label else {
         let named = image.instrument.as_ref();
@@ -387,7 +386,7 @@ fn merged(written: &ImageFields, label: ImageFields, notes: &mut Vec<String>) ->
     )
 }
 
-/// The clock where there is one, else UTC; both together must agree.
+/// The clock where it is given, else UTC; where both are given, they must agree.
 fn start_time(
     image: &ImageConfig,
     fields: &ImageFields,
@@ -402,7 +401,7 @@ fn start_time(
     };
     let Some(sclk) = fields.sclk_start.as_deref() else {
         if from_utc.is_some() && session.spacecraft().labels_tell_clock {
-            notes.push("start from UTC, which labels cut to 10 ms; no clock string".to_owned());
+            notes.push("start from UTC, truncated to 10 ms in labels; no clock string".to_owned());
         }
         return Ok(from_utc.map(|(_, start)| (start, StartFrom::Utc)));
     };

@@ -1,4 +1,4 @@
-//! UTC of every shot, as products for GIS and catalogues have it.
+//! UTC of every shot, for the products for GIS and catalogues.
 
 use std::sync::atomic::AtomicBool;
 
@@ -11,7 +11,7 @@ use crate::{
     time::Et,
 };
 
-/// Digits of a second in the UTC of shots: programs take the time from it, and MGS flies 3 m in a millisecond.
+/// Digits of a second in the UTC of shots: programs read the time from it, and MGS flies 3 m in a millisecond.
 const SHOT_UTC_DECIMALS: u8 = 6;
 
 stage_inputs! {

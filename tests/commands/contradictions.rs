@@ -87,7 +87,7 @@ const MISTAKES: &[Mistake] = &[
         "leap_second_missing",
         |case| case.replace("kernels/leapseconds.tls", "32,   @1999-JAN-1", ""),
         End::Remark,
-        "a leap second that the kernels lack may be the cause",
+        "a difference of a whole second may be a leap second that the kernels lack",
     ),
     (
         "mounting_of_a_withdrawn_kernel",
@@ -96,7 +96,7 @@ const MISTAKES: &[Mistake] = &[
             case.replace("kernels/moc.ti", flight, withdrawn);
         },
         End::Remark,
-        "the kernels mount MOC narrow angle 0.2000° from where its instrument file has it, 1.3 km on the ground",
+        "the mounting of MOC narrow angle in the kernels differs by 0.2000° from its instrument file, 1.3 km on the ground",
     ),
     (
         "clock_2_s_off",
@@ -191,7 +191,7 @@ const MISTAKES: &[Mistake] = &[
             label(case, "LINE_SAMPLES = 1024", "LINE_SAMPLES = 1008");
         },
         End::Remark,
-        "nothing says where on the 2048 pixels its 1008 samples begin",
+        "the first pixel of its 1008 samples on the 2048 pixels of the detector is not stated",
     ),
     (
         "first_pixel_beyond_the_detector",
@@ -256,7 +256,7 @@ const MISTAKES: &[Mistake] = &[
             });
         },
         End::Remark,
-        "repeat the measurements of another one",
+        "repeat the measurements of another point",
     ),
     (
         "ties_saved_again_under_other_names",
@@ -266,7 +266,7 @@ const MISTAKES: &[Mistake] = &[
             all_tables(case);
         },
         End::Remark,
-        "tie points: 154 repeat the measurements of another one and are left out",
+        "tie points: 154 repeat the measurements of another point and are omitted",
     ),
     (
         "all_ties_on_one_pixel",
@@ -277,7 +277,7 @@ const MISTAKES: &[Mistake] = &[
             });
         },
         End::Error(3),
-        "are measured at a place of another one",
+        "are measured at the position of another point",
     ),
     (
         "ties_without_numbers",
@@ -321,19 +321,19 @@ const MISTAKES: &[Mistake] = &[
         "orbit_300_m_ahead",
         |case| move_orbit(case, [300.0, 0.0, 0.0]),
         End::Invalid,
-        "or the kernels hold another orbit",
+        "or the kernels hold a different orbit",
     ),
     (
         "orbit_300_m_up",
         |case| move_orbit(case, [0.0, 300.0, 0.0]),
         End::Invalid,
-        "the kernels hold another orbit than the file",
+        "the kernels hold a different orbit from that of the file",
     ),
     (
         "orbit_300_m_aside",
         |case| move_orbit(case, [0.0, 0.0, 300.0]),
         End::Invalid,
-        "the kernels hold another orbit than the file",
+        "the kernels hold a different orbit from that of the file",
     ),
     (
         "datum_against_the_label",

@@ -334,7 +334,7 @@ fn a_site_of_one_file_runs_and_a_long_image_says_what_it_needs() {
     };
     let case = case(&folder, LINES[0]);
     let told = case.outcome(case.run());
-    let advice = "in 197 s an orbit leaves any polynomial of second order: set registration.model = \"samples\"";
+    let advice = "over 197 s an orbit departs from any polynomial of second order: set registration.model = \"samples\"";
     assert!(
         !told.starts_with("exit 0") && told.contains(advice),
         "{told}"
@@ -550,7 +550,7 @@ fn keys_that_contradict_the_file_are_refused() {
         (
             "first_detector = 0\n",
             "",
-            "1288 samples of 4 pixels are a part of the 5184 pixels of HRSC infrared line",
+            "1288 samples of 4 pixels cover only part of the 5184 pixels of HRSC infrared line",
         ),
         (
             "first_detector = 0\n",

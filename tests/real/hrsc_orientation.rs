@@ -676,7 +676,7 @@ fn what_is_wrong_with_camera_and_line_times_is_said() {
     case.replace("site.toml", "[6665,", "[6655,");
     let told = case.outcome(case.check());
     assert!(
-        told.contains("nothing is exposed for 0.1280 s, 10.0 lines, before line 6654"),
+        told.contains("no line is exposed for 0.1280 s, 10.0 lines, before line 6654"),
         "{told}"
     );
 }
@@ -709,7 +709,7 @@ fn a_camera_that_kernels_mount_otherwise_is_remarked_on() {
         case.replace("site.toml", "'hrsc_ir'", "'camera.toml'");
         let told = case.outcome(case.check());
         assert_eq!(
-            told.contains("the kernels mount HRSC"),
+            told.contains("the mounting of HRSC"),
             remarked,
             "{to}: {told}"
         );

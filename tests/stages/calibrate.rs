@@ -326,8 +326,8 @@ fn errors_in_the_plane_do_not_hide_behind_those_in_height() {
         assert!(!found.verdict.valid, "{vertical_m}: {plane} {height}");
         let reasons = found.verdict.reasons.concat();
         assert!(
-            reasons.contains("held back is off in the plane")
-                && reasons.contains("used is off in the plane"),
+            reasons.contains("withheld control in the plane")
+                && reasons.contains("used control in the plane"),
             "{reasons}"
         );
         assert!(!reasons.contains("in height"), "{reasons}");

@@ -29,17 +29,18 @@ use crate::{
 pub struct Adjusted {
     /// Statistics.
     pub summary: AdjustmentSummary,
-    /// Heights of tie points by the MOLA surface; `None` where they are no observations.
+    /// Heights of tie points above the MOLA surface; `None` where they are not observations.
     pub heights: Option<HeightSummary>,
-    /// What relief says of the place; `None` where no surface has slopes.
+    /// Horizontal position from relief; `None` where no surface has slopes.
     pub relief: Option<ReliefSummary>,
-    /// Offset of the attitude's clock with its standard deviation, seconds, where it is unknown: the attitudes are those
-    /// that the images had so much later.
+    /// Offset of the attitude clock with its standard deviation, seconds, where it is an unknown: the attitudes are
+    /// those at a time later by this offset.
     pub attitude_clock_s: Option<(f64, f64)>,
-    /// What a laser on the bus of the cameras says, or why nothing; `None` where it is not asked.
+    /// Boresight of a laser on the bus of the cameras, or the reason why it is not determined; `None` where it is not
+    /// requested.
     pub boresight: Option<std::result::Result<BoresightSummary, String>>,
-    /// Where the tie points lie by the other reading of what images disagree by along the flight, or why that is not
-    /// known; `None` where they hardly disagree.
+    /// Position of the tie points by the other reading of the along-track disagreement, or the reason why it is not
+    /// determined; `None` where the disagreement is small.
     pub other_reading: Option<std::result::Result<OtherReading, String>>,
     /// One entry for each image, in their order.
     pub images: Vec<CorrectedImage>,
@@ -55,7 +56,7 @@ pub struct Adjusted {
     pub weighted_squares: Vec<f64>,
 }
 
-/// An image and what the adjustment adds to its orientation.
+/// An image with the correction of its orientation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CorrectedImage {
     /// Identifier.
@@ -67,11 +68,11 @@ pub struct CorrectedImage {
     pub sigmas: [f64; ORIENTATION_UNKNOWNS],
     /// Their covariance; rows and columns of unknowns that are held fixed are 0.
     pub covariance: DMatrix<f64>,
-    /// What they were expected to be.
+    /// Their a priori values.
     pub expected: [f64; ORIENTATION_UNKNOWNS],
-    /// What they were expected to be within of that, standard deviations; 0 where held fixed, infinite where free.
+    /// Their a priori standard deviations; 0 where held fixed, infinite where free.
     pub prior_sigmas: [f64; ORIENTATION_UNKNOWNS],
-    /// Bias of the line times with its standard deviation, seconds, where it is unknown.
+    /// Bias of the line times with its standard deviation, seconds, where it is an unknown.
     pub time_bias_s: Option<(f64, f64)>,
     /// Time from line to line, seconds.
     pub line_period_s: f64,
@@ -88,12 +89,12 @@ pub struct CorrectedPoint {
     pub index: usize,
     /// Identifier.
     pub id: String,
-    /// Where it was initially.
+    /// Initial position.
     pub initial: Position<BodyFixed>,
-    /// Where it is adjusted.
+    /// Adjusted position.
     pub ground: Position<BodyFixed>,
-    /// Covariance of the adjusted coordinates, m²: a priori variances times the summary's variance factor; of a tie point
-    /// that fails the test against the surface and yet was kept, its distance from that too.
+    /// Covariance of the adjusted coordinates, m²: a priori variances times the summary's variance factor. For a tie
+    /// point that fails the test against the surface but was kept, it includes the distance from the surface.
     pub covariance_m2: Matrix3<f64>,
 }
 
@@ -104,7 +105,7 @@ pub struct ScalarResidual {
     pub value: f64,
     /// Redundancy number, `0..=1`.
     pub redundancy: f64,
-    /// Residual over its own a priori standard deviation; none where no other observation controls it.
+    /// Residual over its own a priori standard deviation; `None` where no other observation controls it.
     pub standardised: Option<f64>,
 }
 
@@ -147,7 +148,7 @@ pub struct RangeResidual {
 }
 
 impl Adjusted {
-    /// What is to be added to the orientation of the image at index `image`.
+    /// Correction to the orientation of the image at index `image`.
     #[must_use]
     pub fn correction(&self, image: usize) -> OrientationCorrection {
         let entry = &self.images[image];
@@ -161,7 +162,8 @@ impl Adjusted {
 }
 
 impl CorrectedImage {
-    /// Where the PEDR file has the spacecraft against the kernels, X, Y and Z, metres, where that was expected of the image.
+    /// Offset of the spacecraft in the PEDR file from the kernels, X, Y and Z, metres, where it is the image's a priori
+    /// value.
     #[must_use]
     pub fn pedr_orbit_m(&self) -> Option<[f64; 3]> {
         let position_m = [0, 3, 6].map(|constant| self.expected[constant]);
@@ -182,7 +184,7 @@ impl From<Residual> for ScalarResidual {
     }
 }
 
-/// Puts the result together; points without adjusted coordinates are left to `rejected`.
+/// Assembles the result; points without adjusted coordinates are only in `rejected`.
 pub(super) fn collect<M: ExteriorOrientation>(
     images: &[AdjustImage<M>],
     assembled: Assembled<&M>,
@@ -286,10 +288,10 @@ fn in_image_px<M: ExteriorOrientation>(
     ])
 }
 
-/// What the heights of points that fail the test against the surface are uncertain by besides, m².
+/// Additional height variance of points that fail the test against the surface, m².
 ///
-/// These are points that stand out, but not enough for blunders, or for which a neighbour vouches: ground between the
-/// profiles, or measurements that err alike. Nothing tells which of image and altimeter is right of them.
+/// Such points stand out, but not enough for a blunder, or a neighbour confirms them: ground between the profiles, or
+/// measurements with a common error. The data do not show whether image or altimeter is right.
 fn contradicted_m2(adjustment: &Adjustment) -> Vec<Matrix3<f64>> {
     let mut added_m2 = vec![Matrix3::zeros(); adjustment.points.len()];
     for height in &adjustment.compared {
@@ -305,7 +307,7 @@ fn contradicted_m2(adjustment: &Adjustment) -> Vec<Matrix3<f64>> {
 /// A step below this many lines finds the line of a view to 1e-7 lines.
 const LAST_STEP_LINES: f64 = 1e-3;
 
-/// Coefficients of an orientation that is off by this, metres.
+/// Coefficients of an orientation with this offset, metres.
 fn expected(position_m: &Vector3<f64>) -> [f64; ORIENTATION_UNKNOWNS] {
     let mut coefficients = [0.0; ORIENTATION_UNKNOWNS];
     for (constant, metres) in coefficients.iter_mut().step_by(3).zip(position_m) {

@@ -1,4 +1,4 @@
-//! An offset of the attitude's clock in a network, or none.
+//! The attitude clock of a network, as an unknown or not.
 
 use super::input::AdjustImage;
 use crate::{
@@ -6,7 +6,7 @@ use crate::{
     geom::bundle::{AttitudeClock, Network, ORIENTATION_UNKNOWNS},
 };
 
-/// Puts down what images disagree by to the clock of the attitude.
+/// Attributes the disagreement of images to the attitude clock.
 pub(super) fn by_attitude_clock<M>(
     network: &mut Network<M>,
     images: &[AdjustImage<impl Sized>],
@@ -37,8 +37,8 @@ fn constant_rotations() -> impl Iterator<Item = usize> {
     (ORIENTATION_UNKNOWNS / 2..ORIENTATION_UNKNOWNS).step_by(3)
 }
 
-/// What corrections of an image's orientation were expected to be within: its own standard deviations, and what the
-/// attitude's clock adds.
+/// A priori standard deviations of the corrections of an image's orientation: its own, and the contribution of the
+/// attitude clock.
 pub(super) fn prior_sigmas<M>(network: &Network<M>, image: usize) -> [f64; ORIENTATION_UNKNOWNS] {
     let mut sigmas = network.images[image].sigmas;
     if let Some(clock) = &network.attitude_clock {

@@ -1,4 +1,4 @@
-//! Tie points that are no ties: found by their residuals and heights, rejected, and adjusted again.
+//! Mismatched tie points: identified by their residuals and heights, and rejected before the adjustment is repeated.
 
 use super::{
     heights::height_blunders,
@@ -17,18 +17,18 @@ use crate::{
 
 /// Rounds after which no more tie points are rejected.
 const ROUNDS_MAX: u32 = 20;
-/// In each round only points whose residual reaches this share of the largest are left out: a blunder
-/// pulls at its neighbours, and they come right when it is gone.
+/// Each round rejects only points whose residual reaches this share of the largest: a blunder distorts its neighbours,
+/// which recover once it is removed.
 const SHARE_OF_LARGEST: f64 = 0.5;
-/// Weights with which very many blunders are found.
+/// Weights for networks with very many blunders.
 const WHERE_MANY: RobustWeight = RobustWeight::Cauchy {
     limit: RobustWeight::CAUCHY_LIMIT,
 };
 
-/// Adjusts without the tie points that are none.
+/// Adjusts without mismatched tie points.
 ///
-/// First by what images say of each other, heights being only compared; then, where there is a surface, by heights;
-/// then with heights as observations.
+/// Rejects first by image residuals, with heights only compared; then, where a surface exists, by heights; then with
+/// heights as observations.
 pub(super) fn solve_without_blunders<M: ExteriorOrientation>(
     assembled: &mut Assembled<M>,
     bundle_options: &BundleOptions,
@@ -43,11 +43,11 @@ pub(super) fn solve_without_blunders<M: ExteriorOrientation>(
     by_heights(assembled, bundle_options, config, adjustment, watch)?;
     assembled.observe_heights();
     let adjustment = solved(assembled, bundle_options, watch)?;
-    // Once the heights bend as the ground does, others stand out.
+    // Once the heights bend as the ground does, other blunders stand out.
     by_heights(assembled, bundle_options, config, adjustment, watch)
 }
 
-/// One solution of the network, counted.
+/// Solves the network once and counts the solution.
 fn solved<M: ExteriorOrientation>(
     assembled: &Assembled<M>,
     bundle_options: &BundleOptions,
@@ -58,8 +58,8 @@ fn solved<M: ExteriorOrientation>(
     adjustment
 }
 
-/// Adjusts, rejects the worst tie points and repeats until no standardised residual exceeds `limit`; without one all
-/// stay.
+/// Adjusts, rejects the worst tie points and repeats until no standardised residual exceeds `limit`; without a limit
+/// all stay.
 fn by_residuals<M: ExteriorOrientation>(
     assembled: &mut Assembled<M>,
     bundle_options: &BundleOptions,
@@ -71,7 +71,7 @@ fn by_residuals<M: ExteriorOrientation>(
         return adjustment;
     };
     let adjustment = match adjustment {
-        // So many blunders, or so large, that they leave no common solution: they show where they weigh little.
+        // Too many or too large blunders leave no common solution; low weights reveal them.
         Err(BundleError::NotConverged { .. }) if bundle_options.robust.is_none() => {
             let robust = BundleOptions {
                 robust: Some(WHERE_MANY),
@@ -113,7 +113,7 @@ fn reject_worst<M: ExteriorOrientation>(
     Ok(adjustment)
 }
 
-/// Rejects tie points that no ground explains until none is left; the adjustment without them.
+/// Rejects tie points with implausible heights until none is left; returns the adjustment without them.
 fn by_heights<M: ExteriorOrientation>(
     assembled: &mut Assembled<M>,
     bundle_options: &BundleOptions,
@@ -143,7 +143,7 @@ fn by_heights<M: ExteriorOrientation>(
 }
 
 impl<M> Assembled<M> {
-    /// Takes tie points out of the network, by their indices.
+    /// Removes tie points from the network, by index.
     fn reject(&mut self, rejected: Vec<(usize, RejectionReason)>) {
         let mut is_rejected = vec![false; self.points.len()];
         for (point, reason) in rejected {

@@ -1,4 +1,4 @@
-//! Where a laser on the bus of the cameras points in simultaneous images.
+//! Pointing of a laser on the bus of the cameras in simultaneous images.
 
 use std::collections::BTreeMap;
 
@@ -25,29 +25,29 @@ use crate::{
     },
 };
 
-/// What places a single spot in its image is uncertain by, beside all that spots share, focal-plane pixels: jitter and the
-/// interpolation of attitudes. Where its footprint is recorded has an error of its own.
+/// Standard deviation of a single spot in its image beyond the errors that all spots share, focal-plane pixels: jitter
+/// and interpolation of attitudes. The recorded footprint has a separate error.
 const SPOT_SIGMA_PX: f64 = 0.5;
-/// What lines may be late by against the shots without wonder, seconds: 45 ms, half of what the images of a pair disagree by
-/// (Shan et al. 2005, Table 5).
+/// Plausible delay of lines against the shots, seconds: 45 ms, half the disagreement of the images of a pair (Shan et
+/// al. 2005, Table 5).
 const LINE_TIME_S: f64 = 0.045;
 
-/// What a laser on the bus of the cameras says.
+/// Boresight of a laser on the bus of the cameras.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BoresightSummary {
-    /// The two angles by which the laser points elsewhere than its file and the frame kernels say, the beam's ends towards X
-    /// of the bus and what completes the two to the right, radians.
+    /// Two angles by which the boresight differs from the laser's file and the frame kernels, radians: towards X of the
+    /// bus, and towards the axis that completes the right-handed set.
     pub angles_rad: [f64; 2],
     /// Standard deviations of these, radians.
     pub sigma_rad: [f64; 2],
     /// Images with spots.
     pub images: Vec<SpotsOfImage>,
-    /// How far each of their profiles is recorded from where it lies.
+    /// Offset of each of their profiles as recorded.
     pub profile_shifts: Vec<ProfileOffset>,
-    /// Images that were exposed during no profile.
+    /// Images without a simultaneous profile.
     pub without: Vec<String>,
-    /// The unknown of laser, profiles and line times that is farthest from what was known of it, and how far, in standard
-    /// deviations of the contradiction; none where nothing tests them.
+    /// The unknown of laser, profiles and line times that is farthest from its a priori value, and its distance in
+    /// standard deviations of the contradiction; `None` where nothing tests them.
     pub farthest: Option<(String, f64)>,
 }
 
@@ -58,14 +58,14 @@ pub struct SpotsOfImage {
     pub image: String,
     /// Spots.
     pub spots: usize,
-    /// What its lines are late by against the shots, with its standard deviation, seconds, where that is unknown.
+    /// Delay of its lines against the shots with its standard deviation, seconds, where it is an unknown.
     pub line_time_s: Option<(f64, f64)>,
-    /// Where the initial orientation sees the footprints minus where the mounting has the laser: along the track in lines,
+    /// Footprints in the initial orientation minus the laser's position from the mounting: along the track in lines,
     /// across it in focal-plane pixels.
     pub footprints_off: [Summary; 2],
 }
 
-/// Puts the spots of all shots with a range into the network, or says why there are none.
+/// Adds the spots of all shots with a range to the network, or returns the reason if none exist.
 pub(super) fn add_spots<M: ExteriorOrientation>(
     assembled: &mut Assembled<&M>,
     images: &[AdjustImage<M>],
@@ -74,7 +74,7 @@ pub(super) fn add_spots<M: ExteriorOrientation>(
 ) -> Result<Result<(), String>, AdjustError> {
     if images.iter().any(|image| image.laser_axes.is_none()) {
         return Ok(Err(
-            "the file of the altimeter does not tell where its beam points (beam.bus)".to_owned(),
+            "the altimeter file does not state where the beam points (beam.bus)".to_owned(),
         ));
     }
     let profile_of: BTreeMap<usize, usize> = assembled
@@ -103,7 +103,7 @@ pub(super) fn add_spots<M: ExteriorOrientation>(
     }
     if spots.is_empty() {
         return Ok(Err(
-            "no image was exposed during a profile, so nothing was flown on the bus with it"
+            "no image was exposed during a profile, so the laser mounting gives no observations"
                 .to_owned(),
         ));
     }
@@ -123,7 +123,7 @@ pub(super) fn add_spots<M: ExteriorOrientation>(
     Ok(Ok(()))
 }
 
-/// The spot of a shot in an image; none where the laser looks beyond it, as near an end of the image.
+/// The spot of a shot in an image; `None` where it falls outside the image, as it may near an end.
 fn spot_of<M: ExteriorOrientation>(
     image: &AdjustImage<M>,
     projector: &Projector<'_, M>,
@@ -149,7 +149,7 @@ fn spot_of<M: ExteriorOrientation>(
     })
 }
 
-/// Where the laser meets the ground by the initial orientation of `image`, and how that moves with the angles of its boresight.
+/// Ground position of the laser beam by the initial orientation of `image`, and its change with the boresight angles.
 fn met<M: ExteriorOrientation>(
     image: &AdjustImage<M>,
     range: &ShotRange,
@@ -162,7 +162,7 @@ fn met<M: ExteriorOrientation>(
     Some((laser_m + beam_m, [first_m, second_m]))
 }
 
-/// What the adjustment found of laser and profiles.
+/// Adjusted unknowns of laser and profiles.
 pub(super) fn summarise<M: ExteriorOrientation>(
     images: &[AdjustImage<M>],
     assembled: &Assembled<&M>,
@@ -201,7 +201,7 @@ pub(super) fn summarise<M: ExteriorOrientation>(
     })
 }
 
-/// Where the initial orientation of an image sees the footprints of its spots, minus these.
+/// Footprints of an image's spots in its initial orientation, minus the spots.
 fn footprints_off<M: ExteriorOrientation>(
     image: &AdjustImage<M>,
     index: usize,
@@ -225,10 +225,10 @@ fn footprints_off<M: ExteriorOrientation>(
     off.collect()
 }
 
-/// The unknown that is farthest from what was known of it.
+/// The unknown that is farthest from its a priori value.
 ///
-/// The residual of an expected value over its own standard deviation is that of the contradiction: all that contradict each
-/// other in one direction show the same.
+/// The standardised residual of an a priori value measures the contradiction: all unknowns that contradict each other
+/// in one direction show the same value.
 fn farthest<M>(
     images: &[AdjustImage<M>],
     assembled: &Assembled<&M>,
@@ -244,7 +244,7 @@ fn farthest<M>(
             (Unknown::ProfileShift { profile, axis }, standardised(found))
         })
     });
-    // What is free contradicts nothing, but lines are not late by just anything.
+    // A free unknown contradicts nothing, but the delay of lines is bounded.
     let late = |found: &Estimate| match found.prior {
         None => Some(found.value / found.root_cofactor.hypot(LINE_TIME_S)),
         Some(_) => standardised(found),

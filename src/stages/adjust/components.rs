@@ -1,4 +1,4 @@
-//! Whether tie points agree as their standard deviations say.
+//! Agreement of tie points with their standard deviations.
 
 use super::{network::Assembled, points::PointKind};
 use crate::geom::bundle::{Adjustment, Residual};
@@ -29,12 +29,13 @@ pub(super) fn tie_components<M>(assembled: &Assembled<M>, adjustment: &Adjustmen
     tie_sums(assembled, adjustment).map(|(squares, redundancy)| component(squares, redundancy))
 }
 
-/// A standard deviation of unit weight up to this is what chance gives some hundred tie points.
+/// Largest standard deviation of unit weight that chance explains for some hundred tie points.
 pub const WORSE_THAN_CONFIGURED: f64 = 1.12;
-/// How many of its own standard deviations, `1/√(2r)`, a standard deviation of unit weight may exceed 1 by chance.
+/// Number of its own standard deviations, `1/√(2r)`, by which a standard deviation of unit weight may exceed 1 by
+/// chance.
 const BY_CHANCE: f64 = 2.0;
 
-/// What a priori variances are multiplied with in covariances.
+/// Factor by which covariances scale the a priori variances.
 pub(super) fn variance_factor<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> f64 {
     let factors = tie_sums(assembled, adjustment).map(|(squares, redundancy)| {
         let found = component(squares, redundancy);

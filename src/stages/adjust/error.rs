@@ -5,7 +5,7 @@ use crate::{
     geom::{bundle::BundleError, pushbroom::Unseen},
 };
 
-/// An initial value so far from its adjusted one is a contradiction, in its standard deviations.
+/// Distance between initial and adjusted value that is a contradiction, in standard deviations of the initial value.
 pub(super) const CONTRADICTION: f64 = 10.0;
 
 /// Why a site cannot be adjusted.
@@ -16,7 +16,7 @@ pub enum AdjustError {
     NoTies {
         /// Tie points.
         ties: usize,
-        /// The first of them, and why it has none.
+        /// The first of them, and why it has no ground point.
         first: String,
     },
     /// The network as a whole.
@@ -29,28 +29,28 @@ pub enum AdjustError {
     NotConverged {
         /// Steps taken.
         steps: usize,
-        /// The sum where it was given up.
+        /// The sum when the iteration stopped.
         weighted_squares: f64,
         /// The keys that hold the orientations, with their values.
         held_by: String,
     },
-    /// A standard deviation, coordinate or number that is none.
+    /// An invalid standard deviation, coordinate or number.
     #[error("{what} is {value}, expected {expected}")]
     Value {
-        /// What it is, of which image, point or profile.
+        /// The quantity, with its image, point or profile.
         what: String,
         /// The value.
         value: f64,
-        /// What it should be.
+        /// The expected value.
         expected: &'static str,
     },
-    /// Nothing tells unknowns apart.
+    /// The observations do not separate unknowns.
     #[error("the network is singular: the observations do not separate {0}")]
     Singular(String),
     /// A shot occurs twice.
     #[error("two shots have the identifier {0}")]
     DuplicateShot(String),
-    /// An orientation that sees nothing.
+    /// An orientation that sees no ground.
     #[error("image {image}: its orientation sees no ground: {unseen}")]
     Blind {
         /// Identifier of the image.
@@ -58,7 +58,7 @@ pub enum AdjustError {
         /// Why.
         unseen: Unseen,
     },
-    /// Initial values that the observations refute.
+    /// Initial values that the observations contradict.
     #[error(
         "{what} contradicts the rest of the network: standardised residual {standardised:.1}, expected at most {CONTRADICTION}"
     )]
@@ -77,10 +77,10 @@ impl Cause for AdjustError {
 
     fn advice(&self) -> String {
         match self {
-            Self::NoTies { .. } => "check that the images overlap and that the tie points are theirs",
-            Self::NotConverged { .. } => "lower these standard deviations where they leave an orientation freer than its kernels are uncertain; otherwise check the tie points and the images' times and kernels: so far apart the observations have no common solution",
+            Self::NoTies { .. } => "check that the images overlap and that the tie points belong to them",
+            Self::NotConverged { .. } => "lower these standard deviations where they exceed the uncertainty of the kernels; otherwise check the tie points and the images' times and kernels: the observations have no common solution",
             Self::Network(_) => "check the input of the adjustment, and give orientations and footprints finite standard deviations",
-            Self::Value { .. } => "correct this value, or leave out what it belongs to",
+            Self::Value { .. } => "correct this value, or leave out the item that it belongs to",
             Self::Singular(_) => "give these unknowns finite standard deviations in [adjustment], or smaller ones, or hold them fixed with 0",
             Self::DuplicateShot(_) => "leave out the second file, or renumber the shots",
             Self::Blind { .. } => "check the orientation samples of the image",

@@ -18,7 +18,7 @@ use crate::{
     schema::none_negative,
 };
 
-/// So many tie points beyond the limit are chance, kept alone and together with the rejected ones.
+/// Numbers of tie points beyond the limit that chance explains: kept ones only, and together with the rejected ones.
 const CHANCE_KEPT: usize = 1;
 const CHANCE_ALL: usize = 2;
 
@@ -34,27 +34,28 @@ pub struct HeightSummary {
     /// Root mean square difference of heights 300 m apart, metres.
     #[schemars(range(min = 0.0))]
     pub roughness_m: f64,
-    /// Whether the surface under these tie points and the weights of their heights had come to rest; if not, both
-    /// still changed in the last of 15 rounds.
+    /// Whether the surface under these tie points and the weights of their heights converged; if not, both still
+    /// changed in the last of 15 rounds.
     pub settled: bool,
     /// Adjusted heights above the surface, metres.
     pub above_m: Summary,
-    /// Tie points that are compared with the surface, and those of them that lie farther from it than 3.29 of their own
-    /// standard deviations: craters between the profiles are some, more are measurements that err across the track.
+    /// Tie points that are compared with the surface, and those of them farther from it than 3.29 of their own standard
+    /// deviations: a few are craters between the profiles, more are measurement errors across the track.
     pub compared: usize,
     /// See `compared`.
     pub beyond_limit: usize,
     /// Tie points that were rejected for their height; they are not among the compared ones.
     pub rejected: usize,
-    /// Standard deviations of the mean of these points towards east, north and up, metres: what they have in common,
-    /// and upwards what those beyond the limit move it by, for some of them may err.
+    /// Standard deviations of the mean of these points towards east, north and up, metres: their common errors and,
+    /// upwards, the shift of the mean by those beyond the limit, some of which may err.
     #[schemars(transform = none_negative)]
     pub mean_sigma_m: [f64; 3],
 }
 
 impl HeightSummary {
-    /// Share of the tie points that lie beyond the limit, those rejected for it included: who errs across the track is
-    /// found only where no neighbour errs alike. One that was kept, or two with those that were rejected, are no share.
+    /// Share of the tie points beyond the limit, including those rejected for it: an error across the track is
+    /// identified only where no neighbour has a similar one. One kept point, or two including rejected ones, count as
+    /// 0.
     #[must_use]
     pub fn beyond_share(&self) -> f64 {
         let share = |beyond: usize, of: usize, chance: usize| {
@@ -74,7 +75,7 @@ impl HeightSummary {
     }
 }
 
-/// Heights as observations, where they are.
+/// Summary of the heights, where they are observations.
 pub(super) fn heights<M>(
     assembled: &Assembled<M>,
     adjustment: &Adjustment,

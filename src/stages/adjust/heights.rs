@@ -1,8 +1,7 @@
-//! Tie points whose height no ground explains.
+//! Tie points with implausible heights.
 //!
-//! An error of a measurement across the track changes nothing but the height of its tie point, which no other image
-//! controls. Against the surface of MOLA it shows, when the height errors that all tie points share, a slow bend along
-//! the flight, are taken off first.
+//! A measurement error across the track changes only the height of its tie point, which no other image controls. The
+//! MOLA surface reveals it once the height error that all tie points share, a slow bend along the flight, is removed.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -12,11 +11,11 @@ use crate::geom::{
     robust::RobustWeight,
 };
 
-/// Neighbours within this share the ground, metres.
+/// Neighbours within this distance share the ground, metres.
 const NEIGHBOUR_M: f64 = 700.0;
-/// A neighbour that lies off to the same side by this share of a tie point's own residual vouches for it.
+/// A neighbour confirms a tie point if its residual has the same sign and more than this share of the size.
 const NEIGHBOUR_SHARE: f64 = 0.4;
-/// Ground that strays farther than this from between the shots is no crater, metres.
+/// Largest departure of a crater from the surface between the shots, metres.
 const CRATER_MAX_M: f64 = 150.0;
 /// Weights of heights in the bend.
 const WEIGHT: RobustWeight = RobustWeight::Cauchy {
@@ -24,20 +23,20 @@ const WEIGHT: RobustWeight = RobustWeight::Cauchy {
 };
 /// Rounds of the robust fit of the bend.
 const BEND_ROUNDS: u32 = 30;
-/// Fewer heights than this show no bend and no blunder.
+/// Fewer heights than this determine neither a bend nor a blunder.
 pub const HEIGHTS_MIN: usize = 10;
 
 /// A tie point whose height is a blunder.
 pub(super) struct HeightBlunder {
     /// Index in the network.
     pub(super) point: usize,
-    /// Height above the surface beyond what tie points share, metres.
+    /// Height above the surface without the part that tie points share, metres.
     pub(super) above_m: f64,
     /// The same in its standard deviations.
     pub(super) standardised: f64,
 }
 
-/// Tie points farther from the surface than `limit` standard deviations, unless a neighbour is so too.
+/// Tie points farther from the surface than `limit` standard deviations, unless a neighbour confirms them.
 pub(super) fn height_blunders<M>(
     assembled: &Assembled<M>,
     adjustment: &Adjustment,
@@ -88,7 +87,7 @@ pub(super) fn height_blunders<M>(
         .collect()
 }
 
-/// Where each point lies along the flight, half its first image being 1; 0 for one without a view.
+/// Position of each point along the flight, in units of half its first image; 0 for a point without a view.
 fn places<M>(assembled: &Assembled<M>) -> Vec<f64> {
     let mut places = vec![0.0; assembled.points.len()];
     for view in assembled.network.views.iter().rev() {
@@ -97,7 +96,7 @@ fn places<M>(assembled: &Assembled<M>) -> Vec<f64> {
     places
 }
 
-/// Heights without a robust parabola along the flight.
+/// Heights minus a robust parabola along the flight.
 fn beyond_bend(heights: &[HeightResidual], along: &[f64], sigmas_m: &[f64]) -> Vec<f64> {
     let powers = |t: f64| Vector3::new(1.0, t, t * t);
     let mut sorted_m: Vec<f64> = heights.iter().map(|height| height.above_m).collect();
@@ -120,7 +119,7 @@ fn beyond_bend(heights: &[HeightResidual], along: &[f64], sigmas_m: &[f64]) -> V
             normal += weight * powers(*t) * powers(*t).transpose();
             right += weight * height.above_m * powers(*t);
         }
-        // Heights in one place show no bend: what they share is left as it is.
+        // Heights in one place do not determine a bend: the previous one is kept.
         let Some(solution) = normal.cholesky().map(|factor| factor.solve(&right)) else {
             break;
         };

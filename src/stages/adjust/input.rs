@@ -1,4 +1,4 @@
-//! What an adjustment takes: images with what is known of them beforehand, and laser shots.
+//! Input of an adjustment: images with their a priori values, and laser shots.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -8,7 +8,7 @@ use crate::{
     geom::{bundle::ORIENTATION_UNKNOWNS, oriented_camera::OrientedCamera, surface::LaserSurface},
 };
 
-/// An image with what is known of its orientation beforehand.
+/// An image with the a priori values of its orientation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AdjustImage<M> {
     /// Initial orientation and detector.
@@ -20,18 +20,18 @@ pub struct AdjustImage<M> {
     pub sigmas: [f64; ORIENTATION_UNKNOWNS],
     /// Standard deviation of a bias of the line times, seconds; 0 for no such unknown.
     pub time_bias_sigma_s: f64,
-    /// Where it is expected against its initial orientation, Mars-fixed, metres.
+    /// Expected offset from its initial position, Mars-fixed, metres.
     pub expected_m: Vector3<f64>,
-    /// How it turns against the stars, camera components, radians per second.
+    /// Rotation rate relative to inertial space, camera components, radians per second.
     pub turn_rad_s: Vector3<f64>,
-    /// Where a laser on the same bus points, camera components: as columns the two directions of the angles of its boresight,
-    /// and its beam; where the laser's file tells it.
+    /// Axes of a laser on the same bus, camera components, where the laser's file states them: as columns the
+    /// directions of the two boresight angles, and the beam.
     pub laser_axes: Option<Matrix3<f64>>,
 }
 
 /// Standard deviations of an image's unknowns from one for positions and one for rotations.
 ///
-/// All powers of `t`, half the image being its unit, get the same.
+/// All powers of `t`, in units of half the image, get the same.
 #[must_use]
 pub fn orientation_sigmas(position_m: f64, angle_rad: f64) -> [f64; ORIENTATION_UNKNOWNS] {
     std::array::from_fn(|index| if index < 9 { position_m } else { angle_rad })
@@ -49,7 +49,7 @@ pub(super) fn sigmas_of_powers(
     })
 }
 
-/// Holds fixed what is not unknown of an image's position and rotation.
+/// Holds fixed the coefficients of an image's position and rotation that are not unknowns.
 pub(super) fn hold_powers(
     sigmas: &mut [f64; ORIENTATION_UNKNOWNS],
     position: PositionUnknowns,
@@ -72,7 +72,7 @@ pub(super) fn hold_powers(
 pub struct LaserShots {
     /// Identifiers of the site's profiles, in their order.
     pub profiles: Vec<String>,
-    /// Standard deviations of how far a profile may be recorded from where it lies, towards east, north and up, metres.
+    /// Standard deviations of the offset of a profile as recorded, towards east, north and up, metres.
     pub profile_sigma_m: Vector3<f64>,
     /// Shots, each row once.
     pub shots: Vec<LaserShot>,
@@ -89,7 +89,7 @@ pub struct LaserShot {
     pub row: u32,
     /// Footprint.
     pub ground: Position<BodyFixed>,
-    /// Its range, when an image was exposed from the same orbit meanwhile.
+    /// Its range, where an image was exposed from the same orbit at that instant.
     pub range: Option<ShotRange>,
     /// The same range from other images that were exposed at that instant: it is observed once, but seen in all of them.
     pub also: Vec<ShotRange>,
@@ -102,7 +102,7 @@ pub struct ShotRange {
     pub image: usize,
     /// Instant of the shot as a line from the middle of that image.
     pub x_lines: f64,
-    /// From where the image's rays start at that instant to the spacecraft: ranges are geometric, IAU 2000, metres.
+    /// From the perspective centre at that instant to the spacecraft, IAU 2000, metres: ranges are geometric.
     pub to_laser_m: Vector3<f64>,
     /// Distance, metres.
     pub range_m: f64,

@@ -5,18 +5,19 @@
 //! published residual, ten thousand ties in a pair and noise of a whole line biased the estimated along-track velocity
 //! by several of its a priori standard deviations.
 //!
-//! Image coordinates of footprints follow from the orientation under adjustment and are observations in the published
-//! model alone. A pair of images controls its ties along track only; across track, height absorbs the error. Heights of
-//! tie points above the surface of all MOLA shots are therefore observations (`geom/bundle/reduced_heights`). They
-//! enter the factor of the reduced equations (`geom/bundle/factor`) without giving up the elimination of points or the
-//! blocks. Covariances come from a priori variances; a good fit never reduces them.
+//! Image coordinates of footprints follow from the orientation under adjustment and are observations only in the
+//! published model. A pair of images controls its ties along track only; across track, height absorbs the error.
+//! Heights of tie points above the surface of all MOLA shots are therefore observations
+//! (`geom/bundle/reduced_heights`). They enter the factor of the reduced equations (`geom/bundle/factor`) without
+//! giving up the elimination of points or the blocks. Covariances come from a priori variances; a good fit never
+//! reduces them.
 //!
 //! Horizontal position is determined by the a priori orbit and attitude only. Three options constrain it further:
 //! - `geom/bundle/spots`: the mounting places the laser in simultaneous images (decision 0021). Boresight and profile
 //!   shifts are unknowns, also those of heights on relief.
-//! - `geom/bundle/relief`: heights depend on the horizontal position and on the position of each profile. It also
-//!   states how well, in either case.
-//! - the attitude clock, one unknown of all images. It is a decision and no estimate; `split` reports both readings
+//! - `geom/bundle/relief`: heights depend on the horizontal position and on the position of each profile. Its accuracy
+//!   is reported whether or not it is used.
+//! - the attitude clock, one unknown of all images. It is a decision, not an estimate; `split` reports both readings
 //!   (decision 0019).
 //!
 //! # Source

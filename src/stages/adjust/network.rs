@@ -38,9 +38,9 @@ pub(super) struct Assembled<M> {
     /// Profiles with a range.
     pub(super) profiles: Vec<Named>,
     pub(super) rejected: Vec<RejectedPoint>,
-    /// Where the initial orientations put the footprints.
+    /// Image coordinates of the footprints by the initial orientations.
     pub(super) mola: Vec<View>,
-    /// Why the laser's place in images is no observation, where it was to be one.
+    /// Why the laser's position in images is not an observation although it was requested.
     pub(super) no_spots: Option<String>,
 }
 
@@ -109,7 +109,7 @@ pub(super) fn projector<'a, M, O: ExteriorOrientation>(
     Ok(projector.through(image.oriented_camera.detector.distortion))
 }
 
-/// Where the initial orientations put the footprints, in and around each image.
+/// Image coordinates of the footprints by the initial orientations, in and around each image.
 fn footprints_in_images<M: ExteriorOrientation>(
     images: &[AdjustImage<M>],
     shots: &LaserShots,
@@ -121,7 +121,7 @@ fn footprints_in_images<M: ExteriorOrientation>(
         let detector = &image.oriented_camera.detector;
         let samples = -config.footprint_margin_px..=detector.samples + config.footprint_margin_px;
         for (point, shot) in shots.shots.iter().enumerate() {
-            // What a camera does not see is not in its image.
+            // Points that the camera does not see are skipped.
             let Ok(seen) = projector.project(&shot.ground.xyz_m) else {
                 continue;
             };
@@ -144,11 +144,11 @@ fn footprints_in_images<M: ExteriorOrientation>(
     Ok(views)
 }
 
-/// Standard deviation of coordinates that are held fixed, metres: far below all that measurements resolve, and far enough
-/// above rounding.
+/// Standard deviation of coordinates that are held fixed, metres: far below the resolution of measurements, well above
+/// rounding.
 const FIXED_M: f64 = 1e-3;
 
-/// How well the coordinates of a tie point are known.
+/// Accuracy of the known coordinates of a tie point.
 fn known_coordinates(
     id: &str,
     known: &KnownGround,
@@ -163,7 +163,8 @@ fn known_coordinates(
     })
 }
 
-/// Tie points whose height is observed at most: errors of the surface at neighbours are alike, so more tell nothing new.
+/// Maximum number of tie points with an observed height: surface errors at neighbours are alike, so more points add no
+/// information.
 const CONTROLLED_MAX: usize = 400;
 
 /// At most `most` of the entries, evenly spread.
@@ -175,7 +176,7 @@ fn evenly(entries: &[usize], most: usize) -> Vec<usize> {
 }
 
 impl<M> Assembled<M> {
-    /// Makes heights observations.
+    /// Adds heights as observations.
     pub(super) fn observe_heights(&mut self) {
         let measured: BTreeSet<usize> = self.network.views.iter().map(|view| view.point).collect();
         let places_m = |point: &usize| self.network.points[*point].ground_m;
@@ -184,7 +185,7 @@ impl<M> Assembled<M> {
         };
         control.compared.retain(|point| measured.contains(point));
         let mut points = control.compared.clone();
-        // By where they lie, so that which of very many are taken does not depend on their order in files.
+        // Sorted by position, so that the selection does not depend on the order in files.
         let by_place = |one: &usize, other: &usize| {
             let (one, other) = (places_m(one), places_m(other));
             let axes = [2, 1, 0].map(|axis| one[axis].total_cmp(&other[axis]));

@@ -46,10 +46,10 @@ pub enum RejectionReason {
         /// Its largest standardised residual, without sign.
         standardised: f64,
     },
-    /// No ground explains its height.
+    /// Its height is implausible.
     #[error("{} m from the MOLA surface, standardised {standardised:.1}", signed(*above_m, 0))]
     Height {
-        /// Height above the surface beyond what tie points share, metres.
+        /// Height above the surface without the part that tie points share, metres.
         above_m: f64,
         /// The same in its standard deviations, without sign.
         standardised: f64,

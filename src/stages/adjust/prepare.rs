@@ -1,4 +1,4 @@
-//! What enters the combined adjustment: images with what is known of them beforehand, and shots.
+//! Input of the combined adjustment: images with their a priori values, and shots.
 
 use std::collections::BTreeSet;
 
@@ -26,8 +26,8 @@ use crate::{
     units::RADIANS_PER_DEGREE,
 };
 
-/// Images that look within this of nadir are nadir images, radians: MOC looks straight down to about a
-/// degree, and off nadir by ten and more.
+/// Images that look within this angle of nadir are nadir images, radians: MOC looks straight down to about a degree, or
+/// off nadir by ten degrees and more.
 const NADIR_RAD: f64 = 5.0 * RADIANS_PER_DEGREE;
 
 /// An image before the adjustment.
@@ -39,15 +39,15 @@ pub struct Candidate<'a, M> {
     pub orientation: &'a Orientation,
     /// The form of the orientation that is adjusted.
     pub oriented_camera: OrientedCamera<M>,
-    /// Where the image has the footprints.
+    /// Image coordinates of the footprints.
     pub registration: &'a ImageRegistration,
-    /// Radial, along the track and across it: how far the PEDR file has the spacecraft from the kernels, metres, where a
+    /// Offset of the spacecraft in the PEDR file from the kernels, radial, along and across the track, metres, where a
     /// profile was flown with the image.
     pub pedr_orbit_m: Option<Vector3<f64>>,
 }
 
 impl<M: ExteriorOrientation> Candidate<'_, M> {
-    /// The image with its standard deviations: those of the model, or what `config` says of this image.
+    /// The image with its standard deviations: those of the model, or those that `config` gives for this image.
     fn weighed(self, laser: &Altimeter, config: &AdjustmentConfig) -> AdjustImage<M> {
         let mut sigmas = match config.model {
             AdjustmentModel::MolaSurface => {
@@ -89,8 +89,8 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
         }
     }
 
-    /// Whether position and bus are those of the spacecraft with the laser: support data do not tell whether theirs are
-    /// geometric, and apparent ones lie up to 330 m off.
+    /// Whether position and bus are those of the spacecraft with the laser: support data do not state whether their
+    /// positions are geometric, and apparent positions differ by up to 330 m.
     const fn knows_bus(&self) -> bool {
         self.times.support.is_none()
     }
@@ -104,7 +104,7 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
         radial_along_cross(&pose.position_m, &velocity_m_s)
     }
 
-    /// How the camera turns against the stars over the image, its own components, radians per second.
+    /// Rotation rate of the camera relative to inertial space over the image, camera components, radians per second.
     fn turn_rad_s(&self) -> Vector3<f64> {
         let half_lines = 0.5 * self.oriented_camera.lines();
         let orientation = &self.oriented_camera.orientation;
@@ -115,7 +115,7 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
         against_mars - middle * spin_rad_s(self.times.body.model())
     }
 
-    /// All position unknowns get the standard deviation of nadir or of other images, and rotations what moves the
+    /// Position unknowns get the standard deviation of nadir or of other images; rotations get the angle that moves the
     /// ground as far: `σ/range` (Yoon & Shan 2004).
     fn published_sigmas(&self, config: &AdjustmentConfig) -> [f64; ORIENTATION_UNKNOWNS] {
         let pose = self.oriented_camera.orientation.pose(0.0);
@@ -144,11 +144,10 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
     }
 }
 
-/// Images and shots as the adjustment takes them.
+/// Images and shots for the adjustment.
 ///
-/// Of the shots those take part that fall within an image's lines and not farther beside it than `config`
-/// says, and those that were fired while an image was exposed: these with their range. A shot in two windows
-/// counts once.
+/// A shot enters if it falls within an image's lines and within the margin of `config` beside it, or if it was fired
+/// while an image was exposed; only then with its range. A shot in two windows counts once.
 ///
 /// # Source
 /// Yoon & Shan 2004: ranges only in the simultaneous image.
@@ -210,7 +209,7 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
     (weighed.collect(), shots)
 }
 
-/// The range of a shot from every image that was exposed meanwhile; see [`exposed`].
+/// The range of a shot from every image that was exposed at its instant; see [`exposed`].
 fn ranges_of(
     footprints: &Footprints<BodyFixed>,
     row: u32,
@@ -231,8 +230,8 @@ fn ranges_of(
     ranges.collect()
 }
 
-/// The images that were exposed at an instant, the one with the shortest lines first, whatever their order in the site file:
-/// it places a shot most finely.
+/// The images that were exposed at an instant, sorted by line period whatever their order in the site file: the image
+/// with the shortest lines places a shot most finely.
 fn exposed(images: &[&ImageTimes], instant: Et) -> Vec<usize> {
     let meanwhile = images.iter().enumerate();
     let meanwhile =
@@ -298,7 +297,7 @@ mod tests {
             assert_eq!(ids(&images, 5.0), ["context"]);
             assert!(ids(&images, 50.0).is_empty());
         }
-        // From another spacecraft, whatever its times.
+        // An image from another spacecraft never counts.
         let mut elsewhere = image("elsewhere", 0.0, 400, 0.1);
         let mut cameras = all_instruments().iter();
         let other = cameras.find(|camera| !camera.spacecraft.has_laser());

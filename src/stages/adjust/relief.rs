@@ -1,4 +1,4 @@
-//! What the relief of a site says of the place.
+//! Horizontal position from the relief of a site.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,20 +6,20 @@ use serde::{Deserialize, Serialize};
 use super::network::Assembled;
 use crate::{geom::bundle::Adjustment, schema::none_negative};
 
-/// What relief says of the place, whether it is used for it or not.
+/// Horizontal position from relief, whether or not the adjustment uses it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ReliefSummary {
-    /// Whether heights on slopes were used for the place.
+    /// Whether heights on slopes were used for the horizontal position.
     pub used: bool,
-    /// Standard deviations towards east and north to which relief alone tells where the images lie against the MOLA
-    /// surface, metres.
+    /// Standard deviations towards east and north of the images' position against the MOLA surface from relief only,
+    /// metres.
     #[schemars(transform = none_negative)]
     pub sigma_m: [f64; 2],
-    /// Where it is used: how far each profile of the surface is recorded from where it lies.
+    /// Where it is used: offset of each profile of the surface as recorded.
     pub profile_shifts: Vec<ProfileOffset>,
 }
 
-/// How far a profile is recorded from where it lies.
+/// Offset of a profile as recorded.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ProfileOffset {
     /// Identifier of the profile.

@@ -26,12 +26,13 @@ use crate::{
 
 /// Adjusts images, shots and tie points together.
 ///
-/// Tie points start from their intersection; those without one are rejected and listed. Where the images disagree by
-/// `disagreement_m` along the flight, and that is much, both readings of it are told. `watch` counts solutions: nobody knows
-/// how many it takes until no blunder is left.
+/// Tie points start from their intersection; those without one are rejected and listed. Where the along-track
+/// disagreement `disagreement_m` of the images is large, the result holds both readings of it. `watch` counts
+/// solutions: how many it takes until no blunder is left is not known in advance.
 ///
 /// # Errors
-/// No tie point with a ground point, identifiers that do not match, a singular network, initial values that the rest refutes.
+/// No tie point with a ground point, identifiers that do not match, a singular network, initial values that contradict
+/// the rest.
 pub fn adjust<'a, M: ExteriorOrientation>(
     images: &[AdjustImage<M>],
     shots: &LaserShots,
@@ -47,7 +48,7 @@ pub fn adjust<'a, M: ExteriorOrientation>(
         return Err(AdjustError::NoTies {
             ties: ties.len(),
             first: first.map_or_else(
-                || "there are none".to_owned(),
+                || "no tie points are given".to_owned(),
                 |tie| format!("{}: {}", tie.id, tie.reason),
             ),
         }

@@ -1,13 +1,13 @@
-//! Two readings of what images disagree by along the flight.
+//! Two readings of the along-track disagreement of images.
 //!
-//! Tie points say how far two images are apart, not which of them is where it should be. Either all are as likely to be
-//! wrong, and the distance is split evenly; or attitudes were read at a time that is off by the same amount for all
-//! images: then those that follow nadir are wrong and those that are held towards a star are right. The standard
-//! deviations of either reading hold only if that reading does.
+//! Tie points determine the distance between two images, not which of them is right. Either all images are equally
+//! likely to be wrong, and the distance is split evenly; or attitudes were read at a time with the same offset for all
+//! images: then nadir-tracking images are wrong and inertially held images are right. The standard deviations of either
+//! reading hold only if that reading does.
 //!
 //! # Source
-//! A choice. Shan et al. 2005, Table 5, has the nadir images of three sites off to the same side, which one offset of
-//! the attitude's clock would explain; the paper does not say so.
+//! A choice. In Shan et al. 2005, Table 5, the nadir images of three sites are displaced to the same side, which one
+//! offset of the attitude clock would explain; the paper does not state this.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -29,28 +29,28 @@ use crate::{
     },
 };
 
-/// Images that disagree by less than this along the flight need no other reading, metres: both place the tie points
-/// within half of it, below what is stated of the place.
+/// Images with a smaller along-track disagreement need no other reading, metres: both place the tie points within half
+/// of it, below the stated accuracy of the position.
 const TOLD_ABOVE_M: f64 = 100.0;
 
-/// Where the tie points lie by the other reading.
+/// Position of the tie points by the other reading.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OtherReading {
-    /// Offset of the attitude's clock with its standard deviation, seconds, where this is the reading by it; else
-    /// all images are taken as equally likely to be wrong.
+    /// Offset of the attitude clock with its standard deviation, seconds, where this reading uses it; otherwise all
+    /// images are taken as equally likely to be wrong.
     pub attitude_clock_s: Option<(f64, f64)>,
     /// Mean of the tie points by this reading minus that of the adjustment, towards east, north and up, metres.
     pub moved_m: [f64; 3],
-    /// Standard deviations of their mean by this reading, likewise; none where no surface controls heights.
+    /// Standard deviations of their mean by this reading, likewise; `None` where no surface controls heights.
     pub mean_sigma_m: Option<[f64; 3]>,
 }
 
-/// Whether images that disagree by so much along the flight need both readings.
+/// Whether images with this along-track disagreement need both readings.
 pub(super) fn is_told(disagreement_m: f64, config: &AdjustmentConfig) -> bool {
     config.model == AdjustmentModel::MolaSurface && disagreement_m > TOLD_ABOVE_M
 }
 
-/// Adjusts the tie points that are left by the other reading.
+/// Adjusts the remaining tie points by the other reading.
 pub(super) fn other_reading<M: ExteriorOrientation>(
     images: &[AdjustImage<M>],
     assembled: &Assembled<&M>,

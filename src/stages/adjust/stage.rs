@@ -24,7 +24,7 @@ use crate::{
 stage_inputs! {
     /// Images, footprints, tie points with their ground points, and the standard deviations.
     pub struct Adjust<'a> {
-        /// What the adjustment is for.
+        /// Purpose of the adjustment.
         pub round: Round,
         /// The images with the orientation of the kernels.
         pub images: SiteImages<'a>,
@@ -38,13 +38,13 @@ stage_inputs! {
         pub ties: &'a Output<Ties>,
         /// Their ground points.
         pub intersected: &'a Output<IntersectedTies>,
-        /// What lies between the orbits of the PEDR files and the kernels.
+        /// Differences between the orbits of the PEDR files and of the kernels.
         pub ranges: &'a Output<RangeCheck>,
         /// The pairs of images.
         pub pairs: &'a Output<Vec<PairComparison>>,
         /// The altimeter.
         pub altimeter: &'a Altimeter,
-        /// What is uncertain about the MOLA surface.
+        /// Uncertainties of the MOLA surface.
         pub mola_surface: &'a MolaSurfaceConfig,
         /// Standard deviations and options.
         pub adjustment: &'a AdjustmentConfig,
@@ -82,7 +82,7 @@ impl Stage for Adjust<'_> {
         let (ties, starts) = (&self.ties.value()?.points, self.intersected.value()?);
         let relief_for_plan = self.adjustment.relief_for_plan;
         let surface = match self.adjustment.model {
-            // Without enough shots heights are what the orientations say.
+            // Without enough shots, heights follow from the orientations.
             AdjustmentModel::MolaSurface => {
                 let around = starts.points.iter().map(|point| point.ground.xyz_m);
                 let around: Vec<_> = around.collect();
@@ -122,8 +122,8 @@ impl Stage for Adjust<'_> {
 }
 
 impl Adjust<'_> {
-    /// How far the PEDR files have the spacecraft from the kernels, radial, along the track and across it, metres, by the
-    /// image that was exposed meanwhile; of several profiles the first.
+    /// Offsets of the spacecraft in the PEDR files from the kernels, radial, along and across the track, metres, by
+    /// simultaneous image; of several profiles the first.
     fn pedr_orbits_m(&self) -> Result<BTreeMap<usize, Vector3<f64>>> {
         let checked = self.ranges.value()?.profiles.iter();
         let mut orbits_m = BTreeMap::new();

@@ -1,4 +1,4 @@
-//! Statistics of an adjustment, as its report and its tables need them.
+//! Statistics of an adjustment, for its report and tables.
 
 use nalgebra::Vector3;
 use schemars::JsonSchema;
@@ -33,7 +33,7 @@ use crate::{
 pub enum ObservationType {
     /// Image coordinates of tie points along the track.
     TieAlong,
-    /// The same across it, which without heights by the MOLA surface nothing controls.
+    /// The same across the track; uncontrolled without heights above the MOLA surface.
     TieAcross,
     /// Heights of tie points above the MOLA surface.
     MolaHeight,
@@ -45,15 +45,16 @@ pub enum ObservationType {
     Orientation,
     /// Initial coordinates of footprints.
     MolaGround,
-    /// Coordinates of tie points that are known beforehand.
+    /// Given coordinates of tie points.
     TieGround,
-    /// Time and range biases, the offset of the attitude's clock, and what a laser on the same bus may be wrong by, initially 0.
+    /// Time and range biases, the offset of the attitude clock, and the boresight angles, profile shifts and line times
+    /// of a laser on the same bus; initially 0.
     Bias,
-    /// Where the mounting has the laser in simultaneous images.
+    /// Positions of the laser in simultaneous images, from the mounting.
     LaserSpot,
 }
 
-/// What the residuals of one kind of observation say.
+/// Residual statistics of one kind of observation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TypeSummary {
     /// The kind.
@@ -70,8 +71,8 @@ pub struct TypeSummary {
     /// redundancy.
     #[schemars(range(min = 0.0))]
     pub variance_component: f64,
-    /// Where 99 % of such values lie when the standard deviations are right, by the χ² distribution; 0 where the
-    /// redundancy is below 1. Robust weights and roughness that is taken for larger than it is leave heights below it.
+    /// Interval that holds 99 % of such values when the standard deviations are right, from the χ² distribution; 0
+    /// where the redundancy is below 1. With robust weights or overestimated roughness, heights fall below it.
     #[schemars(transform = none_negative)]
     pub variance_component_limits: [f64; 2],
     /// Observations whose standardised residual exceeds 3.29.
@@ -87,7 +88,7 @@ pub struct GroundSummary {
     pub sigmas_m: [Summary; 3],
 }
 
-/// What one image shows.
+/// Residuals of one image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ImageSummary {
     /// Identifier.
@@ -105,17 +106,17 @@ pub struct AdjustmentSummary {
     pub steps: usize,
     /// Degrees of freedom.
     pub degrees_of_freedom: usize,
-    /// A posteriori standard deviation of unit weight over all observations. It mixes what has little to do with each
-    /// other; `along` is what tests the tie points.
+    /// A posteriori standard deviation of unit weight over all observations. It mixes unrelated kinds of observation;
+    /// `along` tests the tie points.
     #[schemars(range(min = 0.0))]
     pub sigma0: f64,
-    /// What controls the adjustment.
+    /// Model of the adjustment.
     pub model: AdjustmentModel,
     /// Standard deviation of unit weight of tie points along and across the track; 0 where nothing controls them.
     #[schemars(transform = none_negative)]
     pub tie_components: [f64; 2],
-    /// What the a priori variances are multiplied with in covariances: 1, or the square of the larger of these where it
-    /// says that measurements are worse than configured. A good fit makes nothing more certain.
+    /// Factor by which covariances scale the a priori variances: 1, or the square of the larger of these where it shows
+    /// that measurements are worse than configured. A good fit never reduces covariances.
     #[schemars(range(min = 1.0))]
     pub variance_factor: f64,
     /// One entry for each kind of observation that occurs.
@@ -126,11 +127,11 @@ pub struct AdjustmentSummary {
     pub ties: GroundSummary,
     /// One entry for each image, in their order.
     pub images: Vec<ImageSummary>,
-    /// Range bias of each profile with its standard deviation, metres, where they are unknown.
+    /// Range bias of each profile with its standard deviation, metres, where they are unknowns.
     #[schemars(transform = at("/items/prefixItems/2", "minimum", 0))]
     pub range_biases_m: Vec<(String, f64, f64)>,
-    /// Unknowns of one image, or of images that share points, with a correlation above 0.95: single values of them must
-    /// not be interpreted.
+    /// Unknowns of one image, or of images that share points, with a correlation above 0.95: their values must not be
+    /// interpreted individually.
     #[schemars(transform = at("/items/prefixItems/2", "minimum", -1.000_001))]
     #[schemars(transform = at("/items/prefixItems/2", "maximum", 1.000_001))]
     pub correlated: Vec<(String, String, f64)>,
@@ -235,7 +236,7 @@ fn types<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> Vec<TypeSummar
     plain.chain(of_heights(adjustment)).collect()
 }
 
-/// Heights, whose weighted sum of squares has no parts: their errors are correlated.
+/// Heights, whose weighted sum of squares cannot be split: their errors are correlated.
 fn of_heights(adjustment: &Adjustment) -> Option<TypeSummary> {
     let redundancy = adjustment
         .heights
@@ -259,8 +260,8 @@ fn spots(adjustment: &Adjustment) -> Vec<Residual> {
     spots.flatten().flatten().copied().collect()
 }
 
-/// Residuals of time and range biases, of the attitude's clock, and of what a laser on the same bus may be wrong by, whose
-/// initial value is 0.
+/// Residuals of time and range biases, of the attitude clock, and of the unknowns of a laser on the same bus; the
+/// initial values are 0.
 fn biases<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> Vec<Residual> {
     let images = assembled.network.images.iter().zip(&adjustment.images);
     let times = images.map(|(image, adjusted)| (image.time_bias_sigma_s, adjusted.time_bias_s));
@@ -340,7 +341,7 @@ fn tie_residuals<M>(
     by_axis(&residuals)
 }
 
-/// Adjusted footprints seen with the adjusted orientation, minus where the initial ones put them.
+/// Adjusted footprints in the adjusted orientation, minus their initial image coordinates.
 fn mola_corrections<M: ExteriorOrientation>(
     image: &AdjustImage<M>,
     assembled: &Assembled<&M>,

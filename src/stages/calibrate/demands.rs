@@ -1,13 +1,13 @@
-//! What must be there for a calibration.
+//! Requirements of a calibration.
 
 use super::{error::CalibrateError, geometry::CameraImage, read::OrbitPoint, result::PointKind};
 
-/// Fewest ties that a calibration makes sense with.
+/// Minimum number of ties of a camera.
 const TIES_MIN: usize = 10;
-/// Fewest control points of each kind that a calibration makes sense with.
+/// Minimum number of control points of each kind.
 pub const CONTROLS_MIN: usize = 5;
 
-/// Whether the images are of different lines on one spacecraft.
+/// Checks that the images are of different lines on one spacecraft.
 pub(super) fn belong_together(
     images: &[CameraImage],
     names: &[String],
@@ -34,7 +34,7 @@ pub(super) fn belong_together(
     Ok(())
 }
 
-/// Whether every camera has ties.
+/// Checks that every camera has enough ties.
 pub(super) fn enough_ties(
     points: &[OrbitPoint],
     names: &[String],
@@ -54,7 +54,7 @@ pub(super) fn enough_ties(
     Ok(())
 }
 
-/// Whether there are enough points for a calibration.
+/// Checks that there are enough points for a calibration.
 pub(super) fn enough(
     points: &[OrbitPoint],
     names: &[String],

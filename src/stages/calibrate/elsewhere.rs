@@ -1,25 +1,25 @@
-//! What other orbits have against a calibration that they took no part in.
+//! Tests of a calibration by other orbits, which are independent of it.
 
 use super::result::{CameraResult, PointKind, ValidationResult};
 use crate::stages::judge::{Check, CheckKind, CheckOutcome};
 
-/// A figure of control may become worse by so many standard deviations of measurement and laser.
+/// A figure of control may worsen by this many standard deviations of measurement and laser.
 const WORSE_MAX: f64 = 3.0;
-/// Ties that grow by so much are told.
+/// Growth of tie residuals above which a remark states it.
 const TIES_WORSE: f64 = 1.05;
-/// Control that keeps so much of its error is told.
+/// Remaining share of an error of control above which a remark states it.
 const CONTROL_KEPT: f64 = 0.9;
 
-/// What measurement and laser alone make of the figures of control in another orbit, metres: root mean squares.
+/// Figures of control in another orbit from the noise of measurement and laser only, metres: root mean squares.
 #[derive(Clone, Copy)]
 pub(super) struct Noise {
     /// In the plane.
     pub(super) plane_m: Option<f64>,
-    /// In height; none where no point is in two cameras.
+    /// In height; `None` where no point is in two cameras.
     pub(super) height_m: Option<f64>,
 }
 
-/// A figure of control without and with the calibration, and what measurement and laser make of it, metres.
+/// A figure of control without and with the calibration, and its noise from measurement and laser, metres.
 struct Compared {
     what: String,
     before_m: f64,
@@ -27,7 +27,7 @@ struct Compared {
     noise_m: f64,
 }
 
-/// What other orbits say.
+/// Results of other orbits.
 #[derive(Default)]
 pub(super) struct Elsewhere {
     pub(super) reasons: Vec<String>,
@@ -54,7 +54,7 @@ pub(super) fn elsewhere(
                     .reasons
                     .push(format!("orbit {}: {reason}", orbit.orbit)),
                 None if compared.is_kept() => found.remarks.push(format!(
-                    "orbit {}: {}, which is hardly better",
+                    "orbit {}: {}, hardly an improvement",
                     orbit.orbit,
                     compared.words()
                 )),
@@ -75,7 +75,7 @@ fn ties(orbit: &ValidationResult, cameras: &[CameraResult]) -> Vec<String> {
                 && after > TIES_WORSE * before
             {
                 worse.push(format!(
-                    "orbit {}: tie points miss each other {what} the flight in camera {} by {before:.2} px without the calibration \
+                    "orbit {}: tie-point residuals {what} the flight in camera {} are {before:.2} px without the calibration \
                      and {after:.2} px with it",
                     orbit.orbit, camera.camera
                 ));
@@ -85,7 +85,7 @@ fn ties(orbit: &ValidationResult, cameras: &[CameraResult]) -> Vec<String> {
     worse
 }
 
-/// The figures of control; what has none is a remark.
+/// The figures of control; missing ones become remarks.
 fn control(
     orbit: &ValidationResult,
     noise: Noise,
@@ -94,7 +94,7 @@ fn control(
 ) -> Vec<Compared> {
     let [before, after] = [&orbit.before, &orbit.after].map(|of| of.of(PointKind::Control));
     let Some((before, after)) = before.zip(after) else {
-        remarks.push(format!("orbit {}: no control judges it", orbit.orbit));
+        remarks.push(format!("orbit {}: no control validates it", orbit.orbit));
         return Vec::new();
     };
     let mut all = Vec::new();
@@ -107,7 +107,7 @@ fn control(
     let height = ("control in height".to_owned(), height);
     for (what, [before_m, after_m, noise_m]) in figures.chain([height]) {
         let (Some(before_m), Some(after_m), Some(noise_m)) = (before_m, after_m, noise_m) else {
-            remarks.push(format!("orbit {}: nothing judges {what}", orbit.orbit));
+            remarks.push(format!("orbit {}: no figures for {what}", orbit.orbit));
             continue;
         };
         all.push(Compared {
@@ -132,7 +132,7 @@ impl Compared {
         self.after_m > CONTROL_KEPT * self.before_m && self.after_m > WORSE_MAX * self.noise_m
     }
 
-    /// By how much it is worse with the calibration, in standard deviations of measurement and laser.
+    /// Deterioration by the calibration, in standard deviations of measurement and laser.
     fn worse_sigmas(&self) -> f64 {
         let squares = self.after_m * self.after_m - self.before_m * self.before_m;
         squares.max(0.0).sqrt() / self.noise_m
@@ -154,7 +154,7 @@ impl Compared {
         (!(self.worse_sigmas() <= WORSE_MAX)).then(|| {
             format!(
                 "{}, worse by more than {WORSE_MAX} standard deviations of measurement and laser: check datum, epoch, lines and \
-                 samples of the laser points of both orbits, and that the orbits are known as well as [a_priori] says",
+                 samples of the laser points of both orbits, and that the orbits are as accurate as [a_priori] states",
                 self.words()
             )
         })

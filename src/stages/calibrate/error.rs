@@ -1,11 +1,11 @@
-//! Why there is no calibration, with the names of cameras and points.
+//! Why a calibration fails, with the names of cameras and points.
 
 use crate::error::{Cause, Kind};
 
-/// No calibration.
+/// A failed calibration.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CalibrateError {
-    /// Two images hang on different frames.
+    /// Two images are mounted on different frames.
     #[error(
         "camera {camera} is mounted on frame {found} (instrument_pointing.time_dependent_frames), camera {first} on \
          {expected}; expected one frame, that of the spacecraft"
@@ -32,12 +32,12 @@ pub enum CalibrateError {
         /// The sensor of both.
         sensor: String,
     },
-    /// No axis of the spacecraft looks down, or none flies.
+    /// No axis of the spacecraft is near nadir, or near the direction of flight.
     #[error("no axis of the spacecraft lies within {limit_deg} degrees of {what}")]
     NoAxis {
-        /// What it was looked for.
+        /// The direction.
         what: &'static str,
-        /// How near it should be, degrees.
+        /// Largest allowed angle, degrees.
         limit_deg: f64,
     },
     /// A camera does not look down.
@@ -48,12 +48,12 @@ pub enum CalibrateError {
         /// The camera.
         camera: String,
     },
-    /// A table names a camera that there is none of.
+    /// A table names an unknown camera.
     #[error("point {point} is in camera {camera:?}; expected one of {expected}")]
     UnknownCamera {
         /// The point.
         point: String,
-        /// What it names.
+        /// The name in the table.
         camera: String,
         /// The cameras.
         expected: String,
@@ -72,7 +72,7 @@ pub enum CalibrateError {
     },
     /// Too few control points.
     #[error(
-        "{found} control points are usable, {held_back} are held back; expected at least {expected} of each"
+        "{found} control points are usable, {held_back} are withheld; expected at least {expected} of each"
     )]
     TooFewControls {
         /// How many there are.
@@ -142,7 +142,7 @@ pub enum CalibrateError {
         /// The file.
         file: String,
     },
-    /// The camera of another orbit is mounted in another way.
+    /// The camera of another orbit is mounted differently.
     #[error(
         "validation {orbit}: camera {camera} looks {off_px:.2} px away from its direction in the orbit of the \
          calibration; expected one mounting and one focal plane within {limit_px} px"
@@ -152,9 +152,9 @@ pub enum CalibrateError {
         orbit: String,
         /// The camera.
         camera: String,
-        /// By how much.
+        /// The difference, pixels.
         off_px: f64,
-        /// What may be.
+        /// Largest allowed difference, pixels.
         limit_px: f64,
     },
     /// The adjustment fails.
@@ -162,7 +162,7 @@ pub enum CalibrateError {
     Adjustment {
         /// Which step.
         step: &'static str,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
 }

@@ -18,7 +18,8 @@ use crate::{
     time::Et,
 };
 
-/// An axis of the spacecraft lies within this of what it stands for, degrees: pictures are taken looking down.
+/// Largest angle between an axis of the spacecraft and the direction that it represents, degrees: images are taken
+/// looking down.
 const AXIS_DEG: f64 = 40.0;
 /// Places at which polynomials are fitted to the laboratory's look directions.
 const FITTED_AT: u32 = 65;
@@ -56,12 +57,12 @@ impl CameraImage {
         ]
     }
 
-    /// A sample as look angles take it.
+    /// A sample as the argument of the look angles.
     pub(super) fn s(&self, sample: f64) -> f64 {
         2.0 * sample / self.detector.samples - 1.0
     }
 
-    /// What does not agree with the frame of `body`, in which places of laser points are taken to be.
+    /// Remark where the support data disagree with the frame of `body`, in which laser points are assumed to be.
     pub(super) fn frame_remark(&self, body: Body, name: &str) -> Option<String> {
         self.support.tables.frame_remark(body, name, self.middle())
     }
@@ -78,7 +79,7 @@ pub(super) struct Orbit {
     pub(super) radius_m: f64,
     /// From the spacecraft's own axes to those across the flight, along it and down.
     pub(super) axes: Matrix3<f64>,
-    /// What an orbit's drift counts from, ET seconds, and in, seconds.
+    /// Origin of the orbit's drift, ET seconds, and its unit, seconds.
     middle_s: f64,
     period_s: f64,
 }
@@ -86,12 +87,12 @@ pub(super) struct Orbit {
 /// The laboratory's geometry as polynomials.
 pub(super) struct Laboratory {
     pub(super) state: CalibrationState,
-    /// What the polynomials leave at most, of every camera, pixels.
+    /// Largest residual of the polynomials of every camera, pixels.
     pub(super) left_px: Vec<f64>,
 }
 
 impl Orbit {
-    /// The orbit of these images, in axes that are known already or found here.
+    /// The orbit of these images, in the given axes or in those of the first image.
     pub(super) fn of(
         images: Vec<CameraImage>,
         body: Body,
@@ -110,7 +111,7 @@ impl Orbit {
         })
     }
 
-    /// Where the spacecraft was when a line was exposed.
+    /// Pose of the spacecraft when a line was exposed.
     pub(super) fn pose(&self, camera: usize, line: f64) -> LinePose {
         let support = &self.images[camera].support;
         let et_s = support.line_times.et(line).seconds();
@@ -125,11 +126,11 @@ impl Orbit {
         }
     }
 
-    /// Standard deviations along the body's axes of the drift that a constant error of the orbit, of `sigma_m` along each axis
-    /// of the spacecraft, is taken for, metres per line.
+    /// Standard deviations along the body's axes of the apparent drift from a constant orbit error of `sigma_m` along
+    /// each axis of the spacecraft, metres per line.
     ///
-    /// Offset angles turn with the spacecraft, and absorb what is constant in its axes: an orbit's error that is constant in
-    /// the body's axes is not, and leaves as much drift as these axes turn from line to line.
+    /// Offset angles turn with the spacecraft and absorb errors that are constant in its axes. An orbit error that is
+    /// constant in the body's axes is not, and leaves as much drift as these axes turn from line to line.
     pub(super) fn turned_m_per_line(&self, sigma_m: f64) -> Vector3<f64> {
         let [lines, _] = self.images[0].size();
         let [first, last] = [0.25, 0.75].map(|share| self.pose(0, share * lines));
@@ -139,7 +140,7 @@ impl Orbit {
         Vector3::from_fn(|axis, _| sigma_m * turn.row(axis).norm())
     }
 
-    /// What an orbit is wrong by at an instant, J2000 metres.
+    /// Shift of the orbit at an instant, J2000, metres.
     pub(super) fn shift_m(
         &self,
         camera: usize,
@@ -166,7 +167,7 @@ impl Orbit {
             s: image.s(sample),
             sigma: [1.0, 1.0],
         };
-        // A line moves the ground in the focal plane by about a pixel; how much exactly, two lines tell.
+        // A line moves the ground in the focal plane by about a pixel; two lines give the exact amount.
         let sights = [at(line - 0.5), at(line + 0.5)].to_vec();
         let per_line = sights[0]
             .at_radius(laboratory, self.radius_m)
@@ -231,7 +232,7 @@ impl Orbit {
     }
 }
 
-/// Of the spacecraft's axes, forwards or backwards, those nearest to what lies across the flight, along it and down.
+/// The axes of the spacecraft, forwards or backwards, that are nearest to across the flight, along it and down.
 fn axes_of(image: &CameraImage) -> std::result::Result<Matrix3<f64>, CalibrateError> {
     let et_s = image.middle().seconds();
     let tables = &image.support.tables;

@@ -1,4 +1,4 @@
-//! Points that were measured in pixels just now, instead of read from tables.
+//! Points that were measured from pixels in this run, not read from tables.
 
 use crate::{
     geom::{calibration::KnownPlace, ellipsoid::spherical_to_xyz_m},
@@ -8,18 +8,18 @@ use crate::{
 
 use super::tables::{ControlSigma, Measured, MeasuredPoint, known_place};
 
-/// Tie points, control, and control that is held back; images by the index of their camera.
+/// Tie points, control, and withheld control; images by the index of their camera.
 #[derive(Debug, Clone, Default)]
 pub struct GivenPoints {
     /// Tie points.
     pub ties: Vec<TiePoint>,
     /// Laser points that are used.
     pub control: Vec<MatchedPoint>,
-    /// Laser points that judge.
+    /// Withheld laser points.
     pub held_back: Vec<MatchedPoint>,
 }
 
-/// Tie points, with standard deviations of their own where they have some.
+/// Tie points, with their own standard deviations where available.
 pub(super) fn ties(given: &[TiePoint], sigma_px: f64) -> Vec<MeasuredPoint> {
     let measured = |point: &TiePoint| {
         let measures = point.measures.iter().map(|of| Measured {
@@ -51,7 +51,7 @@ pub(super) fn control(given: &[MatchedPoint], sigma: ControlSigma) -> Vec<Measur
         });
         let [longitude_rad, latitude_rad, radius_m] = point.laser;
         let place_m = spherical_to_xyz_m(longitude_rad, latitude_rad, radius_m);
-        // What the laser errs by, and the matching.
+        // Errors of laser and matching.
         let horizontal_m = sigma.horizontal_m.hypot(point.sigma_horizontal_m());
         let vertical_m = sigma.vertical_m.hypot(point.sigma_m[2]);
         let known: KnownPlace = known_place(place_m, [horizontal_m, vertical_m]);

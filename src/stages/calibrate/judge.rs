@@ -12,20 +12,20 @@ use crate::{
     stages::judge::{Check, CheckKind, CheckOutcome::Fail, Verdict},
 };
 
-/// What control misses over what is expected: beyond, standard deviations are not true.
+/// Largest acceptable scatter of control; beyond it, standard deviations are too small.
 const SCATTER_MAX: f64 = 1.5;
-/// Below, they are larger than they need be.
+/// Below this scatter, standard deviations are too large.
 const SCATTER_MIN: f64 = 0.6;
-/// Residuals of ties, pixels, beyond which the lines do not see one ground.
+/// Largest acceptable residual of ties, pixels; beyond it, the lines do not agree.
 const TIES_MAX_PX: f64 = 1.0;
 /// Share of points that may be left out.
 const LEFT_OUT_MAX: f64 = 0.1;
-/// A calibration moves the image by at most so many standard deviations of what was known beforehand.
+/// A calibration moves the image by at most this many a priori standard deviations.
 const MOVED_MAX: f64 = 3.0;
-/// What the support data may leave of the look directions, pixels, without a word.
+/// Residual of the support data against the look directions, pixels, above which a remark states it.
 const ISD_LEFT_PX: f64 = 0.5;
 
-/// What is known of a calibration when it is judged.
+/// The evidence on which a calibration is judged.
 pub(super) struct Evidence<'a> {
     pub(super) mode: CalibrationMode,
     pub(super) steps: &'a [CalibrationStep],
@@ -34,18 +34,18 @@ pub(super) struct Evidence<'a> {
     pub(super) cameras: &'a [CameraResult],
     pub(super) sight: &'a TieSight,
     pub(super) validation: &'a [ValidationResult],
-    /// What measurement and laser alone make of each.
+    /// Noise of measurement and laser in each.
     pub(super) validation_noise: &'a [Noise],
     /// Points, and those that were left out: ties, then control.
     pub(super) left_out: [[usize; 2]; 2],
-    /// What was known beforehand.
+    /// A priori knowledge.
     pub(super) known: Known,
-    /// What support data say of the body's frame.
+    /// Remarks on the body's frame in the support data.
     pub(super) of_frames: Vec<String>,
     pub(super) complaints: u64,
 }
 
-/// By how much orbit and attitude as known beforehand let things move, one standard deviation.
+/// Movements that the a priori orbit and attitude allow, one standard deviation.
 #[derive(Clone, Copy)]
 pub(super) struct Known {
     /// The image, pixels.
@@ -58,7 +58,7 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
     let mut reasons = Vec::new();
     match of.held_back {
         None => reasons.push(format!(
-            "no laser control: nothing tells where the camera looks, nor how well ties tell the rest; not seen by ties: {}",
+            "no laser control: absolute pointing is not determined, and results from ties are not validated; not determined by ties: {}",
             of.sight.unseen_words()
         )),
         Some(held_back) => {
@@ -74,23 +74,23 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
         match last.figures.ties.worst_px() {
             Some(worst_px) if worst_px <= TIES_MAX_PX => {}
             Some(worst_px) => reasons.push(format!(
-                "tie points miss each other by {worst_px:.2} px (root mean square); expected at most {TIES_MAX_PX} px"
+                "tie points have residuals of {worst_px:.2} px (root mean square); expected at most {TIES_MAX_PX} px"
             )),
-            None => reasons.push("no tie point is left in a camera".to_owned()),
+            None => reasons.push("a camera has no usable tie point left".to_owned()),
         }
     }
     for (what, [all, left_out]) in ["tie", "control"].iter().zip(of.left_out) {
         if left_out as f64 > LEFT_OUT_MAX * all as f64 {
             reasons.push(format!(
-                "{left_out} of {all} {what} points were left out; expected a tenth at most"
+                "{left_out} of {all} {what} points were left out; expected at most a tenth"
             ));
         }
     }
     for camera in of.cameras {
         if !(camera.moved_px <= MOVED_MAX * of.known.image_px) {
             reasons.push(format!(
-                "camera {} is moved by {:.0} px; expected at most {:.0} px, {MOVED_MAX} standard deviations of orbit and \
-                 attitude beforehand",
+                "the calibration moves camera {} by {:.0} px; expected at most {:.0} px, {MOVED_MAX} standard deviations of the a priori orbit and \
+                 attitude",
                 camera.camera,
                 camera.moved_px,
                 MOVED_MAX * of.known.image_px
@@ -106,7 +106,7 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
     Verdict::of(reasons, remarks, checks)
 }
 
-/// What control misses in the plane or in height, used or held back, and what it may.
+/// Scatter of used or withheld control in the plane or in height, and its limit.
 struct Judged {
     kind: CheckKind,
     /// In words.
@@ -116,7 +116,7 @@ struct Judged {
 }
 
 impl Judged {
-    /// Why standard deviations are not true, if they are not.
+    /// Why the scatter is too large, if it is.
     fn reason(&self) -> Option<String> {
         let Self {
             what, found, limit, ..
@@ -124,8 +124,8 @@ impl Judged {
         // Written so that NaN is a reason.
         (!(found.sigmas <= *limit)).then(|| {
             format!(
-                "{what} {:.2} times as far as expected (root mean square); expected at most {limit:.2} times: standard deviations are too \
-                 small, or something else than the camera is wrong",
+                "{what} are {:.2} times as large as expected (root mean square); expected at most {limit:.2} times: standard deviations are too \
+                 small, or an error has another source than the camera",
                 found.sigmas
             )
         })
@@ -135,7 +135,7 @@ impl Judged {
 fn scatters(of: &Evidence<'_>) -> Vec<Judged> {
     let judged = |kind, what, found: Option<Scattered>| {
         let found = found?;
-        // Few coordinates scatter more by chance. Hundredths are what is printed.
+        // Few coordinates scatter more by chance. The limit is rounded up to the printed hundredths.
         let [_, by_chance] = unit_weight_limits(found.coordinates)?;
         Some(Judged {
             kind,
@@ -150,22 +150,22 @@ fn scatters(of: &Evidence<'_>) -> Vec<Judged> {
     [
         judged(
             CheckKind::HeldBackPlane,
-            "control that was held back is off in the plane",
+            "residuals of withheld control in the plane",
             held_plane,
         ),
         judged(
             CheckKind::HeldBackHeight,
-            "control that was held back is off in height",
+            "residuals of withheld control in height",
             held_height,
         ),
         judged(
             CheckKind::ControlPlane,
-            "control that was used is off in the plane",
+            "residuals of used control in the plane",
             plane,
         ),
         judged(
             CheckKind::ControlHeight,
-            "control that was used is off in height",
+            "residuals of used control in height",
             height,
         ),
     ]
@@ -221,15 +221,15 @@ fn checks(of: &Evidence<'_>) -> Vec<Check> {
     checks
 }
 
-/// Why the ground is not known better than beforehand, if it is not.
+/// Why the accuracy on the ground does not exceed the a priori one, if it does not.
 fn coarse(held_back: &HeldBack, known: Known) -> Option<String> {
     let Some((plane_m, height_m)) = held_back.accuracy_plane_m.zip(held_back.accuracy_height_m)
     else {
-        return Some("no tie point has a place with a standard deviation".to_owned());
+        return Some("no tie point has a position with a standard deviation".to_owned());
     };
     if held_back.intersected == 0 {
         return Some(
-            "no laser point that was held back is in two cameras: nothing judges places and heights; expected laser points in \
+            "no withheld laser point is in two cameras: positions and heights are not validated; expected laser points in \
              two cameras or more"
                 .to_owned(),
         );
@@ -237,9 +237,9 @@ fn coarse(held_back: &HeldBack, known: Known) -> Option<String> {
     let better = plane_m < std::f64::consts::SQRT_2 * known.ground_m && height_m < known.ground_m;
     (!better).then(|| {
         format!(
-            "a tie point is known to {plane_m:.0} m in the plane and {height_m:.0} m in height, where orbit and attitude \
-             beforehand leave {:.0} m an axis: the laser control is too coarse, too little or too far away to tell where the \
-             camera looks",
+            "the accuracy of a tie point is {plane_m:.0} m in the plane and {height_m:.0} m in height, against \
+             {:.0} m per axis from the a priori orbit and attitude: the laser control is too coarse, too sparse or too far away \
+             to determine the pointing",
             known.ground_m
         )
     })
@@ -255,8 +255,8 @@ fn remarks(of: &Evidence<'_>) -> Vec<String> {
     say(
         of.mode == CalibrationMode::AsPublished,
         format!(
-            "all angles were freed by ties alone, as published: {} combinations of them are not seen ({}), and a difference \
-             of scale is taken for a common pitch; the step after the ties may lie far off",
+            "all angles are free in the step of ties, as published: {} combinations of them are not determined ({}), and a difference \
+             of scale is taken for a common pitch; the figures after this step may be far off",
             of.sight.unseen,
             of.sight.unseen_words()
         ),
@@ -273,14 +273,14 @@ fn remarks(of: &Evidence<'_>) -> Vec<String> {
             let both = [plane, height].into_iter().flatten();
             both.clone().next().is_some() && both.into_iter().all(|of| of.sigmas < SCATTER_MIN)
         }),
-        "control that was held back fits better than its standard deviations say: they may be smaller".to_owned(),
+        "withheld control fits better than its standard deviations predict: they may be larger than needed".to_owned(),
     );
     for camera in of.cameras {
         say(
             camera.isd_left_px > ISD_LEFT_PX,
             format!(
-                "the calibrated support data of camera {} leave {:.2} px of its look directions, which bend: a straight line \
-                 of equal samples is all that they hold",
+                "the calibrated support data of camera {} deviate by up to {:.2} px from its look directions, which bend: they hold only a straight line \
+                 of equal samples",
                 camera.camera, camera.isd_left_px
             ),
         );
@@ -294,7 +294,7 @@ fn remarks(of: &Evidence<'_>) -> Vec<String> {
             say(
                 figures.plane_px.is_none(),
                 format!(
-                    "no laser point that was held back is in camera {}: tie points alone judge where it looks",
+                    "no withheld laser point is in camera {}: only tie points validate its pointing",
                     camera.camera
                 ),
             );

@@ -30,7 +30,7 @@ impl Squares {
         self.count += 1;
     }
 
-    /// The root of their mean; `None` of none.
+    /// The root of their mean; `None` without values.
     pub(super) fn rms(self) -> Option<f64> {
         (self.count > 0).then(|| (self.sum / self.count as f64).sqrt())
     }

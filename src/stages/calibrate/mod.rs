@@ -1,4 +1,4 @@
-//! Calibration of the lines of a camera: ties alone, then with laser control, judged by control that was held back.
+//! Calibration of the lines of a camera: by ties only, then with laser control, validated by withheld control.
 //!
 //! This stage knows support data, names and withheld points. The axes across, along and down are those of the
 //! spacecraft that are nearest to them in the first image. Calibrated support data are the given ones with a straight
@@ -50,7 +50,7 @@ stage_inputs! {
     }
 }
 
-/// What of a calibration's configuration enters the result.
+/// The keys of a calibration's configuration that enter the result.
 #[derive(Debug)]
 pub struct CalibrationKeys<'a>(pub &'a CalibrationConfig);
 
@@ -64,7 +64,7 @@ impl Input for CalibrationKeys<'_> {
         inputs.setting("a_priori", &self.0.a_priori);
         inputs.setting("solution", &self.0.solution);
         inputs.setting("validation", &self.0.validation);
-        // Which key a file belongs to: hashes alone do not tell.
+        // Number of files of each key: hashes do not identify the key.
         let counts: Vec<usize> = kinds(self.0).iter().map(Vec::len).collect();
         inputs.setting("files", &counts);
     }

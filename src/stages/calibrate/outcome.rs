@@ -1,4 +1,4 @@
-//! The result of a calibration, put together for those who read it.
+//! Assembles the result of a calibration.
 
 use nalgebra::{DMatrix, Vector3};
 
@@ -23,10 +23,10 @@ use crate::{
 
 /// Places at which look directions are compared, `s′`.
 const COMPARED_AT: [f64; 3] = [-1.0, 0.0, 1.0];
-/// Fewer coordinates that are free to differ say nothing.
+/// Minimum number of coordinates that are free to differ.
 const FREE_MIN: f64 = 1.0;
 
-/// A calibration that is done.
+/// A completed calibration.
 pub(super) struct Outcome<'a> {
     pub(super) config: &'a CalibrationConfig,
     pub(super) names: &'a [String],
@@ -38,7 +38,7 @@ pub(super) struct Outcome<'a> {
     pub(super) covariance: &'a DMatrix<f64>,
 }
 
-/// The drift of the orbit with standard deviations, to which its constant error of `orbit_bias_m` adds.
+/// The drift of the orbit with standard deviations, including the effect of its constant error of `orbit_bias_m`.
 pub(super) fn drift(
     state: &CalibrationState,
     covariance: &DMatrix<f64>,
@@ -56,7 +56,7 @@ pub(super) fn drift(
     })
 }
 
-/// None where the calibration follows the points.
+/// `None` where the points have no redundancy.
 fn scattered(of: Missed) -> Option<Scattered> {
     (of.free >= FREE_MIN).then(|| Scattered {
         sigmas: (of.square / of.expected).sqrt(),
@@ -102,7 +102,7 @@ impl Outcome<'_> {
         Ok(cameras)
     }
 
-    /// What control of a kind misses over what is expected; none without such points.
+    /// Scatter of control of this kind; `None` without such points.
     ///
     /// # Errors
     /// A point that the calibrated cameras cannot see.
@@ -132,7 +132,7 @@ impl Outcome<'_> {
         }))
     }
 
-    /// What the control that was held back says; none without such points.
+    /// Statistics of withheld control; `None` without such points.
     ///
     /// # Errors
     /// A point that the calibrated cameras cannot see.
@@ -152,7 +152,7 @@ impl Outcome<'_> {
             return Ok(None);
         };
         let used = self.scatter(PointKind::Control)?;
-        // What scatters says that standard deviations are too small, whichever side it is on.
+        // Scatter above 1 shows that standard deviations are too small, in used or in withheld control.
         let wider = |of: fn(&Scatter) -> Option<Scattered>| {
             let both = [Some(scatter), used].into_iter().flatten();
             let sigmas = both.filter_map(|both| Some(of(&both)?.sigmas));
@@ -178,7 +178,7 @@ impl Outcome<'_> {
         }))
     }
 
-    /// A point's place by its images alone, and its standard deviations east, north and up, metres.
+    /// A point's position from its images only, and its standard deviations east, north and up, metres.
     fn placed(&self, of: &OrbitPoint) -> Option<(Vector3<f64>, Option<[f64; 3]>)> {
         let unaided: GroundPoint = of.point.unaided();
         let place_m = unaided.place(self.state).ok()?;
@@ -238,7 +238,7 @@ impl Outcome<'_> {
         self.points.iter().flat_map(of_point).collect()
     }
 
-    /// Residuals of a point's images: at the laser's place where there is one, else where they intersect.
+    /// Residuals of a point's images: at the laser's position where available, otherwise at the intersection.
     fn residuals_px(&self, of: &OrbitPoint, state: &CalibrationState) -> Option<Vec<[f64; 2]>> {
         let place_m = match &of.point.known {
             Some(known) => known.place_m,

@@ -15,9 +15,10 @@ use crate::{
     geom::calibration::{CalibrationState, GroundPoint},
 };
 
-/// Share of points that may not fit before the whole is refused.
+/// Share of points that do not fit above which the input is rejected.
 const MISFITS_MAX: f64 = 0.5;
-/// Heights of the ground about the equatorial radius, metres: the poles lie 20 km lower, mountains 22 km higher.
+/// Largest height of the ground above or below the equatorial radius, metres: the poles lie 20 km lower, mountains 22
+/// km higher.
 const HEIGHT_MAX_M: f64 = 50_000.0;
 
 /// A point of an orbit.
@@ -31,22 +32,22 @@ pub(super) struct OrbitPoint {
 }
 
 impl OrbitPoint {
-    /// Whether it takes part.
+    /// Whether it is of this kind and in use.
     pub(super) fn is(&self, kind: PointKind) -> bool {
         self.kind == kind && !self.left_out
     }
 }
 
-/// Where the points of an orbit come from.
+/// Source of the points of an orbit.
 pub(super) enum PointSource<'a> {
     /// Tables.
     Tables {
         ties: &'a [PathBuf],
         control: &'a [PathBuf],
-        /// Every so manieth control point is held back; none in other orbits.
+        /// Every *n*-th control point is withheld; `None` in other orbits.
         held_back_every: Option<u32>,
     },
-    /// They were measured just now.
+    /// Points that were measured in this run.
     Given(&'a GivenPoints),
 }
 
@@ -133,7 +134,7 @@ pub(super) fn points_of(
     Ok(tied)
 }
 
-/// Holds back every so manieth point along the flight.
+/// Withholds every *n*-th point along the flight.
 fn hold_back(points: &mut [OrbitPoint], every: usize) {
     let mut order: Vec<usize> = (0..points.len())
         .filter(|index| !points[*index].left_out)
@@ -145,7 +146,7 @@ fn hold_back(points: &mut [OrbitPoint], every: usize) {
     }
 }
 
-/// What points are held against before there is a calibration.
+/// The expectation against which points are checked before the calibration.
 struct Expected<'a> {
     state: &'a CalibrationState,
     /// Tangent of a pixel of every camera.
@@ -155,7 +156,7 @@ struct Expected<'a> {
     limit_px: f64,
 }
 
-/// Marks points that do not fit; when most of them do not, it is not the points.
+/// Marks points that do not fit; if most do not, the input is wrong, not the points.
 fn leave_out(
     points: &mut [OrbitPoint],
     what: &'static str,
@@ -213,7 +214,7 @@ fn fits(point: &GroundPoint, expected: &Expected<'_>) -> std::result::Result<(),
         let off_px = residual.norm() / pixels[sight.camera];
         if !(off_px <= limit_px) {
             return Err(format!(
-                "it is {off_px:.0} px from where the support data see it, beyond {limit_px} px"
+                "it is {off_px:.0} px from its position by the support data; expected at most {limit_px} px"
             ));
         }
     }

@@ -1,4 +1,4 @@
-//! What a calibration gives, with names, in metres, radians and pixels.
+//! The result of a calibration, with names, in metres, radians and pixels.
 
 use std::collections::BTreeMap;
 
@@ -12,15 +12,15 @@ use crate::{geom::calibration::TieSight, stages::judge::Verdict};
 pub struct Calibration {
     /// The lines of the camera.
     pub cameras: Vec<CameraResult>,
-    /// Drift of the orbit from line to line, body-fixed, metres: the calibrated support data hold it.
+    /// Drift of the orbit from line to line, body-fixed, metres; the calibrated support data contain it.
     pub drift_m_per_line: [Value; 3],
-    /// What ties alone see of the offset angles.
+    /// Sensitivity of ties to the offset angles.
     pub tie_sight: TieSight,
-    /// The figures after every step, the first before any.
+    /// The figures before the first and after every step.
     pub steps: Vec<CalibrationStep>,
-    /// What the control that was used says; none without control.
+    /// Scatter of the control that was used; `None` without control.
     pub used: Option<Scatter>,
-    /// What the control that was held back says; none without control.
+    /// Statistics of withheld control; `None` without control.
     pub held_back: Option<HeldBack>,
     /// The rounds of a calibration from pixels, of which this is the last.
     pub rounds: Option<Rounds>,
@@ -34,7 +34,7 @@ pub struct Calibration {
     pub verdict: Verdict,
     /// Rows and points that were left out, one sentence each.
     pub complaints: Vec<String>,
-    /// All of them.
+    /// Number of all complaints.
     pub complaint_count: u64,
 }
 
@@ -61,7 +61,7 @@ pub struct CameraResult {
     pub n: Vec<Value>,
     /// The same of the laboratory.
     pub laboratory: [Vec<f64>; 2],
-    /// What those leave of the laboratory's look directions at most, pixels.
+    /// Their largest residual against the laboratory's look directions, pixels.
     pub laboratory_left_px: f64,
     /// Tangent of a pixel.
     pub pixel: f64,
@@ -71,7 +71,8 @@ pub struct CameraResult {
     pub moved_px: f64,
     /// The calibrated support data.
     pub isd: String,
-    /// What they leave of the calibrated look directions at most, pixels: support data hold a straight line of equal samples.
+    /// Their largest residual against the calibrated look directions, pixels: support data hold a straight line of
+    /// equal samples.
     pub isd_left_px: f64,
 }
 
@@ -80,7 +81,7 @@ pub struct CameraResult {
 pub struct CalibrationStep {
     /// `before`, `ties`, `external`, `internal` or `joint`.
     pub step: String,
-    /// What was free, in words.
+    /// The free parameters, in words.
     pub free: String,
     /// Steps of the adjustment; 0 before any.
     pub steps: u32,
@@ -88,18 +89,18 @@ pub struct CalibrationStep {
     pub figures: Figures,
 }
 
-/// Root mean squares, as tables 5 to 7 of Li et al. 2023 have them.
+/// Root mean squares, as in tables 5 to 7 of Li et al. 2023.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Figures {
     /// Tie points after intersection.
     pub ties: TieFigures,
-    /// Control points that the calibration uses, and those that were held back; none without control, and in other orbits
-    /// none that were held back.
+    /// Control points that the calibration uses, and withheld ones; empty without control. Other orbits have no
+    /// withheld points.
     pub control: Vec<ControlFigures>,
 }
 
 impl Figures {
-    /// Those of control points of a kind.
+    /// Figures of control points of this kind.
     #[must_use]
     pub fn of(&self, kind: PointKind) -> Option<&ControlFigures> {
         self.control.iter().find(|of| of.kind == kind)
@@ -111,12 +112,12 @@ impl Figures {
 pub struct TieFigures {
     /// Points.
     pub points: u64,
-    /// Of every camera: root mean square across and along the flight, pixels; none of a camera without tie points.
+    /// Root mean square of every camera across and along the flight, pixels; missing for a camera without tie points.
     pub cameras_px: Vec<[Option<f64>; 2]>,
 }
 
 impl TieFigures {
-    /// The largest of the cameras, across or along, pixels; none where a camera has none.
+    /// The largest of the cameras, across or along, pixels; `None` where a camera has no value.
     #[must_use]
     pub fn worst_px(&self) -> Option<f64> {
         let all = self.cameras_px.iter().flatten();
@@ -128,20 +129,20 @@ impl TieFigures {
 /// Control points.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ControlFigures {
-    /// What they are for.
+    /// Their use.
     pub kind: PointKind,
     /// Points.
     pub points: u64,
-    /// Of every camera: where it sees the laser's place against where the place is measured.
+    /// Of every camera: distance between projected and measured image position of the laser points.
     pub cameras: Vec<PixelsAndMetres>,
     /// Points in two cameras or more.
     pub heights: u64,
-    /// Root mean square of their intersected height minus the laser's, metres; none where there is no such point.
+    /// Root mean square of their intersected height minus the laser's, metres; missing without such a point.
     #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub height_m: Option<f64>,
 }
 
-/// In the focal plane, and on the ground; none of a camera without points.
+/// In the focal plane, and on the ground; missing for a camera without points.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PixelsAndMetres {
     /// Root mean square distance, pixels.
@@ -152,17 +153,17 @@ pub struct PixelsAndMetres {
     pub plane_m: Option<f64>,
 }
 
-/// What the control that was held back says of the result.
+/// Statistics of withheld control.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HeldBack {
     /// Points.
     pub points: u64,
-    /// What they miss over what is expected.
+    /// Ratio of their residuals to the expected ones.
     pub scatter: Scatter,
-    /// How many of them are in two cameras or more, whose places are intersected.
+    /// Number of them in two cameras or more, whose positions are intersected.
     pub intersected: u64,
-    /// Root mean square of intersected minus laser's place, horizontally, metres: errors of the laser and of the measurement
-    /// are in it. None where nothing is intersected, as of the next two.
+    /// Root mean square of intersected minus laser position, horizontally, metres, including errors of laser and
+    /// measurement. Missing where no point is intersected, as are the next two.
     #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub plane_m: Option<f64>,
     /// Likewise of the height, metres.
@@ -171,8 +172,8 @@ pub struct HeldBack {
     /// Mean of the same east, north and up, metres.
     #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub mean_m: Option<[f64; 3]>,
-    /// Stated accuracy of a tie point in the plane, metres: root mean square of the standard deviations, so many times larger as
-    /// control scatters, used or held back, beyond what is expected of it in the plane.
+    /// Stated accuracy of a tie point in the plane, metres: root mean square of the standard deviations, scaled by the
+    /// scatter in the plane of used or withheld control where that exceeds 1.
     #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub accuracy_plane_m: Option<f64>,
     /// Likewise of its height, metres.
@@ -180,25 +181,26 @@ pub struct HeldBack {
     pub accuracy_height_m: Option<f64>,
 }
 
-/// Root mean square of what control misses over what measurement, laser and calibration let expect: near 1 when standard deviations are
-/// true. In the plane and in height apart, as errors of the one hide behind too large standard deviations of the other.
+/// Root mean square of the residuals of control over those expected from measurement, laser and calibration: near 1
+/// when standard deviations are correct. Plane and height are separate, as too large standard deviations of the one
+/// hide errors of the other.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Scatter {
-    /// East and north; none where the calibration follows the points.
+    /// East and north; missing where the points have no redundancy.
     #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub plane: Option<Scattered>,
-    /// Up, of points in two cameras or more; none without such a point.
+    /// Up, of points in two cameras or more; missing without such a point.
     #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub height: Option<Scattered>,
 }
 
-/// A root mean square over what is expected.
+/// A root mean square over its expectation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Scattered {
-    /// Root mean square of what is missed over what is expected.
+    /// Root mean square of the residuals over the expected ones.
     #[schemars(range(min = 0.0))]
     pub sigmas: f64,
-    /// How many coordinates are free to differ; of points that were used fewer, as the calibration follows them.
+    /// Number of coordinates that are free to differ; smaller for used points, as the calibration follows them.
     #[schemars(range(min = 0.0))]
     pub coordinates: f64,
 }
@@ -208,13 +210,13 @@ pub struct Scattered {
 pub struct Rounds {
     /// The rounds in order.
     pub rounds: Vec<CalibrationRound>,
-    /// Most that were allowed.
+    /// Maximum number of rounds.
     pub rounds_max: u32,
     /// Edge of a cell of the terrain models, metres.
     pub cell_m: f64,
 }
 
-/// The numbers of a round: terrain model and units as the cameras of the round before see them, then the cameras.
+/// The numbers of a round: terrain model and units with the cameras of the previous round, then the cameras.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CalibrationRound {
     /// From 1.
@@ -227,9 +229,9 @@ pub struct CalibrationRound {
     pub tie_px: Option<f64>,
     /// Share of the cells of the terrain model with a height.
     pub filled: f64,
-    /// Units that calibrate: kept, and refused.
+    /// Units that calibrate: kept, and rejected.
     pub units: [u64; 2],
-    /// Units that judge: kept, and refused.
+    /// Withheld units: kept, and rejected.
     pub judging: [u64; 2],
     /// Median length of the shifts of kept units that calibrate, cells.
     pub shift_cells: f64,
@@ -237,11 +239,11 @@ pub struct CalibrationRound {
     pub bias_m: Option<f64>,
     /// Residuals of control, root mean square over all lines, pixels and metres on the ground.
     pub control: PixelsAndMetres,
-    /// The same of control that was held back.
+    /// The same of withheld control.
     pub held_back: PixelsAndMetres,
     /// Residuals of control in the lines that see it, root mean square, pixels, by the number of its unit.
     pub unit_px: BTreeMap<usize, f64>,
-    /// What control that was held back misses over what is expected.
+    /// Scatter of withheld control.
     pub held_back_scatter: Option<Scatter>,
     /// φ, ω and κ of every line, radians.
     pub angles_rad: Vec<[f64; 3]>,
@@ -260,20 +262,20 @@ pub struct ValidationResult {
     pub after: Figures,
 }
 
-/// What a point is for.
+/// Use of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PointKind {
-    /// Its place is unknown.
+    /// Its position is unknown.
     Tie,
-    /// The laser knows it.
+    /// The laser gives its position.
     Control,
-    /// Likewise, and it was not used.
+    /// Likewise, but withheld.
     HeldBack,
 }
 
 impl PointKind {
-    /// The word of tables.
+    /// Its name in tables.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -289,11 +291,12 @@ impl PointKind {
 pub struct PointResult {
     /// Its name.
     pub point: String,
-    /// What it is for.
+    /// Its use.
     pub kind: PointKind,
     /// Whether it was left out.
     pub left_out: bool,
-    /// East longitude, latitude, radians, and radius, metres, intersected from its images; none where they are too few.
+    /// East longitude, latitude, radians, and radius, metres, intersected from its images; `None` where they are too
+    /// few.
     pub place: Option<[f64; 3]>,
     /// Standard deviations east, north and up, metres.
     pub sigma_m: Option<[f64; 3]>,
@@ -306,7 +309,7 @@ pub struct PointResult {
 pub struct ImageResult {
     /// The point.
     pub point: String,
-    /// What it is for.
+    /// Its use.
     pub kind: PointKind,
     /// The camera.
     pub camera: String,
@@ -314,8 +317,8 @@ pub struct ImageResult {
     pub place: [f64; 2],
     /// Whether it was left out.
     pub left_out: bool,
-    /// Residual across and along the flight with the laboratory's geometry, pixels: at the intersected place, of a laser point
-    /// at the laser's.
+    /// Residual across and along the flight with the laboratory's geometry, pixels: at the intersected position, or at
+    /// the laser's for a laser point.
     pub before_px: Option<[f64; 2]>,
     /// The same with the calibration.
     pub after_px: Option<[f64; 2]>,

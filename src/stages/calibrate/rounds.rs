@@ -1,4 +1,4 @@
-//! Rounds of a calibration from pixels: the numbers of each, when they end, and what that says of the result.
+//! Rounds of a calibration from pixels: the numbers of each, the criterion of convergence, and the verdict.
 
 use std::collections::BTreeMap;
 
@@ -19,9 +19,9 @@ const CONTROL_SHARE: f64 = 0.02;
 impl CalibrationRound {
     /// The numbers of round `round`.
     ///
-    /// * `tied` – the calibration by ties alone, with whose cameras the terrain model was made
+    /// * `tied` – the calibration by ties only, with whose cameras the terrain model was made
     /// * `filled` – share of that model with heights
-    /// * `control` – what the laser found in it
+    /// * `control` – the match of the laser with it
     /// * `done` – the calibration by ties and control
     #[must_use]
     pub fn of(
@@ -112,8 +112,8 @@ fn shift_cells(units: &[UnitResult]) -> f64 {
 }
 
 impl Rounds {
-    /// By which share the residuals of control changed in the last round, root mean square over units that were used in it and in the
-    /// one before: units come and go about the limits of a match. Infinite in the first.
+    /// Share by which the residuals of control changed in the last round, root mean square over units that the last two
+    /// rounds used: units near the limits of a match come and go. Infinite in the first.
     fn control_share(&self) -> f64 {
         let [.., before, last] = &self.rounds[..] else {
             return f64::INFINITY;
@@ -139,7 +139,7 @@ impl Rounds {
             .map_or(f64::INFINITY, |of| of.shift_cells)
     }
 
-    /// Whether another round would change nothing that matters.
+    /// Whether another round would change nothing significant.
     #[must_use]
     pub fn is_converged(&self) -> bool {
         self.shift_cells() < SHIFT_CELLS && self.control_share() < CONTROL_SHARE
@@ -147,7 +147,7 @@ impl Rounds {
 }
 
 impl Calibration {
-    /// The result of the last of some rounds, with what they and the last match with the laser say.
+    /// The result of the last round, with the verdict on the rounds and on the last match with the laser.
     #[must_use]
     pub fn in_rounds(self, rounds: Rounds, last: &Verdict, pairs: &[MatchedPair]) -> Self {
         let Verdict {
@@ -178,7 +178,7 @@ impl Calibration {
         let refused = pairs.iter().filter(|pair| pair.is_refused).count();
         if refused > 0 {
             remarks.push(format!(
-                "pairs of lines in which too few tie points were found to believe them: {refused} of {}",
+                "pairs of lines with too few tie points to be significant: {refused} of {}",
                 pairs.len()
             ));
         }

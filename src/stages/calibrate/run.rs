@@ -1,4 +1,5 @@
-//! The steps of a calibration: ties alone; with control the angles, then the look angles, then all of it with the orbit.
+//! The steps of a calibration: ties only; with control the angles, then the look angles, then all parameters with the
+//! orbit.
 
 use nalgebra::DMatrix;
 
@@ -27,17 +28,17 @@ use crate::{
     },
 };
 
-/// A point is left out when it misses by so many robust standard deviations more than the middle one of its kind: of a million
-/// good ones not one does.
+/// A point is left out when its residual exceeds the median of its kind by this many robust standard deviations: of a
+/// million good points not one does.
 const LEFT_OUT: f64 = 8.0;
-/// Rounds of leaving out.
+/// Maximum rounds of leaving out points.
 const ROUNDS: usize = 3;
 
-/// What ties alone estimate, and what is estimated once there is control.
+/// Kinds of point in the step of ties, and in the steps with control.
 const TIES: &[PointKind] = &[PointKind::Tie];
 const ALL: &[PointKind] = &[PointKind::Tie, PointKind::Control];
 
-/// A calibration under way.
+/// A calibration in progress.
 struct Work<'a> {
     config: &'a CalibrationConfig,
     laboratory: &'a Laboratory,
@@ -58,7 +59,7 @@ pub(super) fn calibrate(config: &CalibrationConfig) -> Result<Calibration> {
     calibrate_by(config, &tables, !config.control.files.is_empty())
 }
 
-/// Calibrates the lines of a camera by points that were measured just now; without control by ties alone.
+/// Calibrates the lines of a camera by given points; without control by ties only.
 ///
 /// # Errors
 /// Support data that cannot be read or do not belong together; points that do not fit them, too few of them; other orbits likewise.
@@ -166,7 +167,7 @@ fn calibrate_by(
     })
 }
 
-/// Points in all and those that were left out, ties before control.
+/// Numbers of all points and of those that were left out, ties before control.
 fn left_out(points: &[OrbitPoint]) -> [[usize; 2]; 2] {
     [true, false].map(|tie| {
         let of = points
@@ -216,7 +217,7 @@ impl Work<'_> {
         CalibrateError::Adjustment { step, problem }
     }
 
-    /// Notes the figures after a step.
+    /// Records the figures after a step.
     fn tell(&mut self, step: &str, free: &str, steps: u32) {
         self.steps.push(CalibrationStep {
             step: step.to_owned(),
@@ -226,7 +227,7 @@ impl Work<'_> {
         });
     }
 
-    /// Standard deviations beforehand, with that of an angle.
+    /// A priori standard deviations, with that of an angle.
     fn sigma(&self, angle_rad: f64) -> impl Fn(Parameter) -> f64 {
         let known = &self.config.a_priori;
         move |parameter| match parameter {
@@ -261,18 +262,18 @@ impl Work<'_> {
         Ok(solved.steps)
     }
 
-    /// Ties alone.
+    /// The step of ties.
     fn ties(&mut self) -> std::result::Result<(), CalibrateError> {
         let layout = self.state.layout();
         let known = &self.config.a_priori;
         let (freedom, free) = match self.config.solution.mode {
             CalibrationMode::Differential => (
                 Freedom::differential(layout, self.sigma(known.control_angle_rad)),
-                "what roll and scale of the cameras differ by",
+                "differences of roll and scale between the cameras",
             ),
             CalibrationMode::AsPublished => (
                 Freedom::each(layout, self.sigma(known.angle_rad), is_angle),
-                "all offset angles, with their standard deviations beforehand",
+                "all offset angles, with a priori standard deviations",
             ),
         };
         let steps = self.adjust("ties", TIES, &freedom)?;
@@ -280,7 +281,7 @@ impl Work<'_> {
         Ok(())
     }
 
-    /// Ties and control: the angles, the look angles, then all of it; points that do not fit are left out.
+    /// Ties and control: the angles, the look angles, then all parameters; points that do not fit are left out.
     fn with_control(
         &mut self,
         names: &[String],
@@ -308,13 +309,13 @@ impl Work<'_> {
         }
         self.tell(
             "joint",
-            "offset angles, look angles and drift of the orbit together, with their standard deviations beforehand",
+            "offset angles, look angles and drift of the orbit together, with a priori standard deviations",
             steps,
         );
         Ok(())
     }
 
-    /// Leaves out points that miss by far more than others of their kind; whether there were any.
+    /// Leaves out points with residuals far above others of their kind; returns whether there were any.
     fn leave_out(&mut self, complaints: &mut Complaints) -> bool {
         let mut any = false;
         for kind in [PointKind::Tie, PointKind::Control] {
@@ -329,7 +330,7 @@ impl Work<'_> {
                     of.left_out = true;
                     any = true;
                     complaints.tell(format!(
-                        "{} misses by {missed:.1} standard deviations, far more than others; left out",
+                        "{}: residual of {missed:.1} standard deviations, far above the others; left out",
                         of.name
                     ));
                 }

@@ -16,7 +16,7 @@ const FITTED_AT: u32 = 129;
 /// Turns towards the fitted line; the second is of the size of the square of the first.
 const TURNS: usize = 3;
 
-/// Text of the calibrated support data of a camera, and what they leave of its look directions at most, pixels.
+/// Text of the calibrated support data of a camera, and their largest residual against its look directions, pixels.
 pub(super) fn calibrated(
     path: &Path,
     orbit: &Orbit,
@@ -40,7 +40,7 @@ pub(super) fn calibrated(
     Ok((text, left / image.pixel()))
 }
 
-/// The camera nearest to look directions of samples, and the largest tangent that it misses.
+/// The straight camera nearest to look directions of samples, and its largest residual, a tangent.
 fn nearest(samples: &[f64], looks: &[Vector3<f64>]) -> (StraightCamera, f64) {
     let mut axes = first_axes(looks);
     let mut line = StraightCamera {
@@ -73,7 +73,7 @@ fn nearest(samples: &[f64], looks: &[Vector3<f64>]) -> (StraightCamera, f64) {
             };
             break;
         }
-        // The boresight onto the line, and the samples along y.
+        // Turns the boresight onto the line, and the samples along y.
         let boresight = axes.tr_mul(&Vector3::new(along - start * skew / step, 0.0, 1.0));
         let samples_along = axes.tr_mul(&Vector3::new(skew, step, 0.0));
         axes = axes_along(&boresight, &samples_along);

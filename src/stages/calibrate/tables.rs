@@ -1,4 +1,4 @@
-//! Tables of points, put together by point and named cameras.
+//! Tables of points, assembled by point and camera.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -22,13 +22,13 @@ use crate::{
     units::RADIANS_PER_DEGREE,
 };
 
-/// Complaints kept with their text; all are counted.
+/// Maximum number of complaints that are kept with their text; all are counted.
 const COMPLAINTS_MAX: usize = 1_000;
 
-/// Shots of a laser are not nearer to each other, metres: they lie hundreds of metres apart.
+/// Minimum distance of different laser shots, metres: they are hundreds of metres apart.
 const SAME_PLACE_M: f64 = 1.0;
 
-/// What was left out, in words.
+/// Rows and points that were left out, in words.
 #[derive(Default)]
 pub(super) struct Complaints {
     pub(super) texts: Vec<String>,
@@ -77,7 +77,7 @@ pub(super) struct Cameras<'a> {
 }
 
 impl Cameras<'_> {
-    /// A row of a table; nothing for a place outside of the image.
+    /// The measurement in a row of a table, or why it is not inside the image.
     fn measured(
         &self,
         row: &ImageRow,
@@ -140,7 +140,7 @@ impl Points {
 
 fn twice(row: &ImageRow) -> String {
     format!(
-        "point {} is twice in camera {}; the first is used",
+        "point {} occurs twice in camera {}; the first is used",
         row.point, row.camera
     )
 }
@@ -173,7 +173,7 @@ pub(super) fn ties(
     Ok(points.points)
 }
 
-/// Standard deviations that a table leaves out.
+/// Standard deviations for rows that state no values.
 #[derive(Clone, Copy)]
 pub(super) struct ControlSigma {
     pub(super) image_px: f64,
@@ -218,7 +218,7 @@ pub(super) fn control(
     let repeated = repeated(&points);
     for (point, first) in &repeated {
         complaints.tell(format!(
-            "control point {} lies less than {SAME_PLACE_M} m from control point {}, of which it is another name; left out",
+            "control point {} is less than {SAME_PLACE_M} m from control point {} and duplicates it; left out",
             points[*point].name, points[*first].name
         ));
     }
@@ -231,7 +231,8 @@ pub(super) fn control(
     Ok(points)
 }
 
-/// Points that lie where an earlier one lies, with that one: held back, the one would judge what the other has made.
+/// Points at the position of an earlier one, with that one: if one were withheld, it would validate what the other
+/// determines.
 fn repeated(points: &[MeasuredPoint]) -> BTreeMap<usize, usize> {
     let places = points.iter().enumerate();
     let mut places: Vec<(usize, Vector3<f64>)> = places

@@ -1,4 +1,4 @@
-//! Other orbits, into which the calibration goes unchanged.
+//! Other orbits, to which the calibration is applied unchanged.
 
 use nalgebra::DMatrix;
 
@@ -20,12 +20,12 @@ use crate::{
     geom::calibration::CalibrationState,
 };
 
-/// By how much the laboratory's geometry of two orbits may differ, pixels: files are written with fifteen digits.
+/// Largest difference between the laboratory's geometry of two orbits, pixels: files are written with fifteen digits.
 const MOUNTING_PX: f64 = 0.01;
 /// Places at which it is compared, `s′`.
 const COMPARED_AT: [f64; 3] = [-1.0, 0.0, 1.0];
 
-/// The calibration orbit, for what other orbits must have in common with it.
+/// The calibration orbit, to which other orbits are compared.
 pub(super) struct Calibrated<'a> {
     pub(super) names: &'a [String],
     pub(super) orbit: &'a Orbit,
@@ -75,7 +75,7 @@ pub(super) fn validate(
     Ok((result, noise(&points, &unchanged)))
 }
 
-/// Whether an orbit has no file of the calibration, by their bytes.
+/// Checks that an orbit shares no file with the calibration, by content.
 fn of_its_own(config: &CalibrationConfig, of: &ValidationConfig) -> Result<()> {
     let cameras = config.cameras.iter().map(|camera| &camera.isd);
     let own = cameras
@@ -96,7 +96,7 @@ fn of_its_own(config: &CalibrationConfig, of: &ValidationConfig) -> Result<()> {
     Ok(())
 }
 
-/// What measurement and laser alone make of the figures of control.
+/// Figures of control from the noise of measurement and laser only.
 fn noise(points: &[OrbitPoint], state: &CalibrationState) -> Noise {
     let (mut plane, mut height) = (Squares::default(), Squares::default());
     let parameters = state.layout().len();
@@ -154,7 +154,7 @@ fn orbit(
     }
     for other in found {
         complaints.tell(format!(
-            "validation {}: support data of {} are of no camera of the calibration, or of one that has some already; not used",
+            "validation {}: support data of {} match no camera of the calibration, or one that already has some; not used",
             of.id, other.support.instrument.name
         ));
     }

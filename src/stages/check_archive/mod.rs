@@ -1,13 +1,13 @@
 //! Range check of a whole archive, file by file: every shot against the kernels, statistics of every profile.
 //!
-//! A profile is here what one file has of one revolution, in the order of time and without a pause of more than 300 s. Residuals, limits and the
-//! scan of clock biases are those of [`check_ranges`](super::check_ranges). What they cost is kept down: the trajectory
-//! of a load of records is tabulated once, the spacecraft of a frame is four states with cubics through them, and the
-//! scan takes some hundred shots of a profile.
+//! A profile here is the part of one revolution in one file, in time order and without a gap of more than 300 s.
+//! Residuals, limits and the scan of clock biases are those of [`check_ranges`](super::check_ranges). To limit the
+//! cost, the trajectory of a load of records is tabulated once, the spacecraft over a frame is interpolated by cubics
+//! through four states, and the scan uses some hundred shots of a profile.
 //!
 //! | step | where it runs |
 //! |---|---|
-//! | [`ArchiveSource::load`] reads records and tabulates the trajectory, the only part that asks CSPICE | one thread |
+//! | [`ArchiveSource::load`] reads records and tabulates the trajectory, the only part that calls CSPICE | one thread |
 //! | [`FileCheck::add`] judges records, makes residuals, then statistics | all threads |
 //!
 //! Residuals (`geom/range_residuals`), limits (`RangeFigures`) and scan (`BiasScan`) are shared with the range check of
@@ -52,14 +52,14 @@ use rows::{Rows, Task};
 
 /// Name of the step in messages, and of its outputs.
 pub const NAME: &str = "check_archive";
-/// Raised when what the step computes changes.
+/// Raised when the results of the step change.
 pub const METHOD: u32 = 4;
 /// Stages whose functions it calls.
 pub const CALLS: &[Called] = &[called::<ConvertDatum<'_>>(), called::<CheckRanges<'_>>()];
 
-/// Records of a load: 51 MB, more than any day of the mission takes.
+/// Records of a load: 51 MB, more than any day of the mission needs.
 const LOAD_RECORDS: usize = 1 << 16;
-/// Records of a task, and tasks of a wave: what they give stands in memory at once, 14 MB.
+/// Records of a task, and tasks of a wave, whose results are in memory at once: 14 MB.
 const TASK_RECORDS: usize = 256;
 const WAVE_TASKS: usize = 24;
 /// The tabulated trajectory stays this close to the kernels, metres: a tenth of a PEDR centimetre.
@@ -84,7 +84,7 @@ pub struct ArchiveRules<'a> {
     pub filter: &'a ShotFilter,
 }
 
-/// What the check found in a file.
+/// Results of the check of a file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct FileRanges {
     /// File name without folders.
@@ -103,7 +103,7 @@ pub struct FileRanges {
     pub not_covered: u64,
     /// Shots that were left out, by reason.
     pub rejected: BTreeMap<ShotRejection, u64>,
-    /// Complaints of records and label.
+    /// Complaints about records and label.
     pub complaint_count: u64,
     /// The first of them.
     pub complaints: Vec<String>,
@@ -130,10 +130,10 @@ pub struct Load {
 }
 
 impl ArchiveSource {
-    /// Opens a file and looks at its label, and for its first good record.
+    /// Opens a file, reads its label and finds its first valid record.
     ///
     /// # Errors
-    /// A file that cannot be read, is being written, holds no good record, or whose datum cannot be told.
+    /// A file that cannot be read, is being written, holds no valid record, or whose datum cannot be determined.
     pub fn open(path: &Path) -> Result<Self> {
         let reader = Reader::open(path)?;
         reader.require_steady()?;
@@ -144,17 +144,17 @@ impl ArchiveSource {
         Ok(Self { reader, datum })
     }
 
-    /// Opens the file that was looked at before.
+    /// Opens a file again.
     ///
     /// # Errors
-    /// As [`open`](Self::open); a file that has changed meanwhile, or another one in its place.
+    /// As [`open`](Self::open); a file that has changed since, or was replaced.
     pub fn reopen(path: &Path, identity: &Identity) -> Result<Self> {
         let source = Self::open(path)?;
         source.reader.require_identity(identity)?;
         Ok(source)
     }
 
-    /// What the file system said of the file when it was opened.
+    /// Identity of the file in the file system when it was opened.
     #[must_use]
     pub const fn identity(&self) -> Identity {
         self.reader.identity()
@@ -169,10 +169,10 @@ impl ArchiveSource {
         starts.map(load).collect()
     }
 
-    /// Reads some rows and tabulates the trajectory over them, as far as the kernels go.
+    /// Reads some rows and tabulates the trajectory over them, as far as the kernels reach.
     ///
     /// # Errors
-    /// What the disk refuses; a file that became shorter; kernels that cannot be tabulated.
+    /// Read errors; a file that became shorter; kernels that cannot be tabulated.
     pub fn load(
         &self,
         rows: Range<usize>,
@@ -246,7 +246,7 @@ impl<'a> FileCheck<'a> {
         check
     }
 
-    /// Checks the next load; gives what was found once it was the last one.
+    /// Checks the next load; returns the results after the last one.
     ///
     /// # Errors
     /// A file that changed while it was read.
@@ -280,7 +280,7 @@ impl<'a> FileCheck<'a> {
         let mut ended: Vec<Gathered> = Vec::new();
         for wave in starts.chunks(WAVE_TASKS) {
             let task = |start: &usize| rows.check(*start..load.rows.end.min(start + TASK_RECORDS));
-            // Statistics of a profile are much work for one thread: the others go on meanwhile.
+            // Statistics of a profile occupy one thread for long: the others continue meanwhile.
             let (tasks, finished) = rayon::join(
                 || wave.par_iter().map(task).collect::<Vec<Task>>(),
                 || statistics(&ended, &load.trajectory, &rules),
@@ -312,7 +312,7 @@ impl<'a> FileCheck<'a> {
         }
     }
 
-    /// Takes up profiles that have ended.
+    /// Adds profiles that have ended.
     fn take(&mut self, finished: Vec<Finished>) {
         for (mut profile, bins) in finished {
             let same = |earlier: &&ArchiveProfile| earlier.orbit == profile.orbit;
@@ -320,7 +320,7 @@ impl<'a> FileCheck<'a> {
             profile.part = u32::try_from(earlier + 1).unwrap_or(u32::MAX);
             profile.file.clone_from(&self.found.file);
             self.found.shots += u64::from(profile.shots);
-            // One bad orbit would decide the figures of all others.
+            // One bad orbit would dominate the statistics of all others.
             if profile.is_judged() && profile.invalid_because.is_empty() {
                 for (sum, bin) in self.found.off_nadir.iter_mut().zip(&bins) {
                     sum.add(bin);
@@ -353,7 +353,7 @@ fn statistics(
         .collect()
 }
 
-/// The shots of one profile with their residuals, for those who want to look at them.
+/// The shots of one profile with their residuals.
 ///
 /// * `identity` – of the file when it was checked
 ///

@@ -29,18 +29,18 @@ const PLACES: usize = 40;
 /// Upper ends of the bins of off-nadir angles, degrees; the last one has none.
 const OFF_NADIR_DEG: [f64; 8] = [0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, f64::INFINITY];
 
-/// Statistics of what one file has of one revolution.
+/// Statistics of the part of one revolution in one file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ArchiveProfile {
     /// File name without folders.
     pub file: String,
-    /// Orbit number as the file has it.
+    /// Orbit number as the file states it.
     pub orbit: u32,
     /// 1, and higher after pauses of more than 300 s.
     pub part: u32,
-    /// First and last record with a shot, counted from 1 with the label.
+    /// First record with a shot, counted from 1 with the label.
     pub first_record: u32,
-    /// The last one.
+    /// Last record with a shot.
     pub last_record: u32,
     /// Corrected time of the first shot, ET seconds.
     pub start_et_s: f64,
@@ -70,13 +70,13 @@ pub struct ArchiveProfile {
     pub decoding_without_outliers_m: f64,
     /// Mean of PEDR spacecraft − SPK spacecraft along radial, along-track and cross-track axes, metres.
     pub spacecraft_m: [f64; 3],
-    /// Correction of time tags by which ranges spread least, and its standard uncertainty, seconds.
+    /// Correction of time tags with which ranges spread least, seconds.
     pub best_correction_s: Option<f64>,
-    /// The uncertainty.
+    /// Its standard uncertainty, seconds.
     pub correction_uncertainty_s: Option<f64>,
     /// Radius of the footprints with which ranges spread least.
     pub correction_radius: ScannedRadius,
-    /// Largest of the judged figures as a share of its limit; nothing of a profile with too few shots to be judged.
+    /// Largest of the judged figures as a share of its limit; `None` for a profile with too few shots to be judged.
     pub share_of_limits: Option<f64>,
     /// Limits that are broken, in words.
     pub invalid_because: Vec<String>,
@@ -84,7 +84,7 @@ pub struct ArchiveProfile {
     pub places_deg: Vec<[f64; 2]>,
 }
 
-/// Shots within a range of off-nadir angles, outliers of their profiles left out.
+/// Shots within a range of off-nadir angles, without the outliers of their profiles.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OffNadirBin {
     /// From this angle, degrees.
@@ -116,7 +116,7 @@ impl OffNadirBin {
             .collect()
     }
 
-    /// Takes up the shots of another bin of the same angles.
+    /// Adds the shots of another bin of the same angles.
     pub fn add(&mut self, other: &Self) {
         self.shots += other.shots;
         self.sum_m += other.sum_m;
@@ -129,7 +129,7 @@ impl OffNadirBin {
         self.squares_m2 += residual_m * residual_m;
     }
 
-    /// Mean and standard deviation of range − distance, metres; nothing for fewer than two shots.
+    /// Mean and standard deviation of range − distance, metres; `None` for fewer than two shots.
     #[must_use]
     pub fn mean_and_deviation_m(&self) -> Option<[f64; 2]> {
         let n = self.shots as f64;
@@ -153,7 +153,7 @@ impl Gathered {
         self.shots.is_empty()
     }
 
-    /// Takes up shots that follow, and gives the profiles that have ended.
+    /// Appends shots, and returns the profiles that have ended.
     pub(super) fn append(&mut self, task: Task) -> Vec<Self> {
         let mut done = Vec::new();
         let mut samples = task.samples.into_iter().peekable();
@@ -172,7 +172,7 @@ impl Gathered {
         done
     }
 
-    /// Whether a shot is of another profile: also one that steps back in time, as those of a block at the wrong place do.
+    /// Whether a shot belongs to another profile: also one that steps back in time, as in a misplaced block.
     fn is_ended_by(&self, next: &CheckedShot) -> bool {
         let (Some(first), Some(last)) = (self.shots.first(), self.shots.last()) else {
             return false;
@@ -188,7 +188,7 @@ impl Gathered {
 #[derive(Default)]
 struct Sums {
     n: u32,
-    /// Those that are no outliers.
+    /// Those that are not outliers.
     kept: u32,
     crossover_m: f64,
     decoding_m: f64,
@@ -262,7 +262,8 @@ impl ArchiveProfile {
     }
 
     fn judge(&mut self, rules: &ArchiveRules<'_>) {
-        // What is left of a profile at the edge of a file or of the kernels says nothing; how many there are is said apart.
+        // A remnant of a profile at the edge of a file or of the kernels is not significant; remnants are counted
+        // separately.
         if self.shots < rules.limits.shots_min.max(1) {
             return;
         }
@@ -277,11 +278,11 @@ impl ArchiveProfile {
             spacecraft_m: self.spacecraft_m,
         };
         self.share_of_limits = Some(figures.share_of_limits(rules.limits));
-        let why = || "another orbit, clock or datum than that of the kernels".to_owned();
+        let why = || "orbit, clock or datum differs from that of the kernels".to_owned();
         self.invalid_because = figures.broken_limits(rules.limits, why);
     }
 
-    /// Whether it has enough shots to be held against the limits.
+    /// Whether it has enough shots to be compared with the limits.
     #[must_use]
     pub const fn is_judged(&self) -> bool {
         self.share_of_limits.is_some()
@@ -332,7 +333,7 @@ fn sums(
     (sums, bins, [mean, largest])
 }
 
-/// Scans some hundred shots that are no outliers, and for which the kernels have all positions that the scan asks for.
+/// Scans some hundred shots that are not outliers, and for which the kernels hold all positions that the scan needs.
 fn scan(
     gathered: &Gathered,
     is_outlier: impl Fn(&RangeResiduals) -> bool,

@@ -1,4 +1,4 @@
-//! What the check of an archive found, and the verdict on it.
+//! Results of the check of an archive, and the verdict on it.
 
 use std::path::PathBuf;
 
@@ -20,11 +20,11 @@ const NAMED: usize = 10;
 /// A file that was checked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CheckedFile {
-    /// Where it lies, as it was asked for.
+    /// Its path, as requested.
     pub path: PathBuf,
-    /// What the file system said of it.
+    /// Its identity in the file system.
     pub identity: Identity,
-    /// What was found.
+    /// Results of its check.
     pub found: FileRanges,
 }
 
@@ -33,16 +33,16 @@ pub struct CheckedFile {
 pub struct FileFailure {
     /// File name without folders.
     pub file: String,
-    /// Why.
+    /// The reason.
     pub why: String,
 }
 
 /// A file with the bytes of another one.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct FileCopy {
-    /// Its path, as it was asked for.
+    /// Its path, as requested.
     pub file: String,
-    /// That of the other file, which was taken.
+    /// That of the other file, which was used.
     pub of: String,
 }
 
@@ -59,12 +59,12 @@ pub struct KernelUsed {
     pub blake3: String,
 }
 
-/// What the check of an archive found.
+/// Results of the check of an archive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArchiveRanges {
     /// The files, in the order of their first shots.
     pub files: Vec<CheckedFile>,
-    /// Copies of them, which do not count.
+    /// Copies of them, which are not counted.
     pub copies: Vec<FileCopy>,
     /// Files that could not be checked, by name.
     pub failures: Vec<FileFailure>,
@@ -169,15 +169,13 @@ impl ArchiveRanges {
         }
         if !self.copies.is_empty() {
             let count = self.copies.len();
-            remarks.push(format!(
-                "copies of other files, whose shots count once: {count}"
-            ));
+            remarks.push(format!("copies of other files, counted once: {count}"));
         }
         reasons.extend(self.damaged());
         let complaints = self.sum(|file| file.complaint_count);
         if complaints > 0 {
             remarks.push(format!(
-                "{complaints} complaints of records and labels; what they name was left out"
+                "{complaints} complaints about records and labels; the data that they name were left out"
             ));
         }
         Verdict {
@@ -188,7 +186,7 @@ impl ArchiveRanges {
         }
     }
 
-    /// Which profiles break limits, or that there is none that could.
+    /// Profiles that break limits, or the statement that none could be judged.
     fn beyond_limits(&self) -> Vec<String> {
         if self.sum(|file| file.shots) == 0 {
             return vec!["no shot could be checked against the kernels".to_owned()];
@@ -201,14 +199,14 @@ impl ArchiveRanges {
             self.profiles().filter(is_beyond).count(),
             self.profiles().count(),
         );
-        let told = format!("{beyond} of {all} profiles break a limit, first of all these:");
+        let told = format!("{beyond} of {all} profiles break a limit, the worst of them:");
         let told = (beyond > 0).then_some(told).into_iter();
         let named = self.worst(beyond.min(NAMED)).into_iter();
         let named = named.map(|(_, of)| format!("{}: {}", of.id(), of.invalid_because.join("; ")));
         told.chain(named).collect()
     }
 
-    /// Files that lost more than some records, of which the other files' profiles say nothing.
+    /// Files with too many complaints, which profiles of other files do not reveal.
     fn damaged(&self) -> impl Iterator<Item = String> {
         let files = self.files.iter().map(|file| &file.found);
         let damaged = files.filter(|file| {
@@ -217,8 +215,8 @@ impl ArchiveRanges {
         });
         damaged.take(NAMED).map(|file| {
             format!(
-                "{}: {} complaints of {} records; expected at most {UNUSABLE_MAX} and one in a hundred: the file was damaged on \
-                 its way",
+                "{}: {} complaints about {} records; expected at most {UNUSABLE_MAX} plus one in a hundred: the file \
+                 was damaged in transfer",
                 file.file, file.complaint_count, file.records
             )
         })
@@ -248,7 +246,8 @@ impl ArchiveRanges {
         let (shots, all) = (self.sum(|file| file.not_covered), self.profiles().count());
         (without + partly > 0).then(|| {
             format!(
-                "the kernels have no position for {shots} shots: {without} of {all} profiles could not be checked, {partly} in part"
+                "the kernels have no position for {shots} shots: {without} of {all} profiles could not be checked, \
+                 {partly} only in part"
             )
         })
     }
@@ -332,7 +331,7 @@ mod tests {
         let reasons = bad.verdict().reasons;
         assert_eq!(
             reasons[0],
-            "2 of 4 profiles break a limit, first of all these:"
+            "2 of 4 profiles break a limit, the worst of them:"
         );
         assert_eq!(reasons[1..], ["a.b/5: a limit", "a.b/4: a limit"]);
     }

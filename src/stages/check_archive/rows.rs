@@ -1,4 +1,4 @@
-//! Some records of a file: their shots, and the residuals of those that are asked for.
+//! Shots and residuals of some records of a file.
 
 use std::{collections::BTreeMap, ops::Range};
 
@@ -18,7 +18,7 @@ use crate::{
     time::Et,
 };
 
-/// Every so many shots one is kept whole, for the scan of clock biases and for the map.
+/// Every *n*-th shot is kept whole, for the scan of clock biases and for the map.
 const SAMPLE_STEP: usize = 48;
 
 /// A shot in IAU 2000, and its residuals where the kernels have a position.
@@ -45,7 +45,7 @@ pub struct CheckedShot {
     pub residuals: Option<RangeResiduals>,
 }
 
-/// What some records gave.
+/// Results of some records.
 #[derive(Default)]
 pub(super) struct Task {
     pub(super) shots: Vec<CheckedShot>,
@@ -129,8 +129,8 @@ impl Rows<'_> {
         }
     }
 
-    /// The shots that contradict themselves. Where coordinates stay as they are, the distance to the file's own spacecraft is
-    /// a residual already.
+    /// The shots with contradictory values. Where coordinates are not converted, the residuals already hold the
+    /// distance to the file's own spacecraft.
     fn spoiled(&self, frame: &Frame<'_>, shots: &[Option<Shot>; SHOTS]) -> SpoiledShots {
         let is_known = shots
             .iter()

@@ -6,7 +6,7 @@ use crate::{
     frames::Position, geom::range_residuals::SpacecraftState, spice::Trajectory, time::Et,
 };
 
-/// Where the states lie, seconds from the middle of the frame; shots lie within 0.96 s.
+/// Times of the states, seconds from the middle of the frame; shots lie within 0.96 s.
 const NODES_S: [f64; 4] = [-1.0, -1.0 / 3.0, 1.0 / 3.0, 1.0];
 
 /// The spacecraft around the middle of a frame.
@@ -15,7 +15,7 @@ pub(super) struct FrameSpacecraft {
 }
 
 impl FrameSpacecraft {
-    /// Nothing where the trajectory does not cover the whole frame.
+    /// `None` where the trajectory does not cover the whole frame.
     pub(super) fn around(middle: Et, trajectory: &Trajectory) -> Option<Self> {
         let [a, b, c, d] = NODES_S.map(|late_s| state(middle.plus(late_s), trajectory));
         Some(Self {
@@ -23,11 +23,11 @@ impl FrameSpacecraft {
         })
     }
 
-    /// The state so many seconds after the middle.
+    /// The state `late_s` seconds after the middle.
     ///
     /// # Accuracy
-    /// 1e-6 m: of an orbit of 3,800 km in Mars' own turning frame, whose fourth derivative is 3e-6 m/s⁴, a cubic through
-    /// nodes 0.67 s apart leaves 3e-8 m.
+    /// 1e-6 m: of an orbit of 3,800 km in the rotating frame of Mars, whose fourth derivative is 3e-6 m/s⁴, a cubic
+    /// through nodes 0.67 s apart leaves 3e-8 m.
     pub(super) fn at(&self, late_s: f64) -> SpacecraftState {
         let (mut position_m, mut axes) = (Vector3::zeros(), Matrix3::zeros());
         for (state, weight) in self.states.iter().zip(weights(late_s)) {

@@ -1,15 +1,15 @@
-//! The figures by which the ranges of a profile are judged, whatever the profile is of.
+//! The statistics by which the ranges of a profile are judged, common to all range checks.
 
 use nalgebra::Vector3;
 
 use crate::{config::RangeCheckConfig, geom::statistics::largest, wording::signed};
 
-/// What is judged of the ranges of a profile.
+/// The judged statistics of the ranges of a profile.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RangeFigures {
     /// Shots.
     pub n: u32,
-    /// Of them, outliers.
+    /// Outliers among them.
     pub outliers: u32,
     /// Mean of range − distance with and without outliers, metres.
     pub mean_m: [f64; 2],
@@ -44,7 +44,7 @@ impl RangeFigures {
         largest(shares).unwrap_or(f64::NAN)
     }
 
-    /// Every limit that is broken, in words; `explain` says why two orbits may lie apart.
+    /// Every broken limit, in words; `explain` gives the likely cause of an orbit difference.
     #[must_use]
     pub fn broken_limits(
         &self,
@@ -88,7 +88,7 @@ impl RangeFigures {
         broken
     }
 
-    /// Says that the two orbits lie too far apart, and by `explain` why that may be; nothing within the limit.
+    /// States that the two orbits differ too much, with the likely cause by `explain`; `None` within the limit.
     fn orbits_apart(&self, limit_m: f64, explain: impl FnOnce() -> String) -> Option<String> {
         let apart_m = self.orbits_apart_m();
         let [radial, along, cross] = self.spacecraft_m;

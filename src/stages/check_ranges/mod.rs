@@ -43,7 +43,7 @@ pub use residuals::ShotResiduals;
 pub use scan::{BiasScan, ScannedRadius};
 pub use tables::{CheckTableRanges, check_table_ranges};
 
-/// Residuals of every shot, and what they say about every profile.
+/// Residuals of every shot, and statistics of every profile.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RangeCheck {
     /// Residuals, ordered by profile, then by time.
@@ -55,7 +55,7 @@ pub struct RangeCheck {
 }
 
 stage_inputs! {
-    /// Footprints, profiles, limits, the clock of MOLA, and what the trajectory comes from.
+    /// Footprints, profiles, limits, the clock of MOLA, and the kernels of the trajectory.
     pub struct CheckRanges<'a> {
         /// Footprints in the frame of the products.
         pub converted: &'a Output<Converted>,
@@ -93,7 +93,7 @@ impl Stage for CheckRanges<'_> {
         )
     }
 
-    /// Position at the shots of every profile; one finding for all that have it.
+    /// Checks the coverage of positions for every profile; one finding for all covered profiles.
     fn examine(&self) -> Vec<Result<String>> {
         let profiles = self.profiles.get().map_or(&[][..], Vec::as_slice);
         let (mut covered, mut shots, mut found) = (0, 0, Vec::new());
@@ -114,7 +114,7 @@ impl Stage for CheckRanges<'_> {
     }
 }
 
-/// Seconds of trajectory beyond what the scan of the clock bias reaches.
+/// Seconds of trajectory beyond the reach of the scan of the clock bias.
 const TRAJECTORY_MARGIN_S: f64 = 0.5;
 /// The tabulated trajectory stays this close to the kernels, metres: a tenth of a PEDR centimetre.
 const TRAJECTORY_TOLERANCE_M: f64 = 0.001;
@@ -142,7 +142,7 @@ fn trajectory(session: &Session, profiles: &[Profile], reach_s: f64) -> Result<T
 pub struct ProfileRanges {
     /// Profile identifier.
     pub profile: String,
-    /// Its shots: of those of tables not all have a spacecraft besides their own.
+    /// Its shots; for some shots of tables only the table's own spacecraft is known.
     pub shots: u32,
     /// Range − distance (SPK spacecraft, footprint with raw radius), metres.
     pub range_minus_distance_m: Summary,
@@ -215,12 +215,12 @@ impl Cause for OutsideTrajectory {
 
 /// Checks the ranges of every profile against `trajectory`.
 ///
-/// `watch` is looked at before every profile, and counts shots.
+/// `watch` is checked before every profile, and counts shots.
 ///
 /// # Errors
 /// A shot whose time the trajectory does not cover; [`Stopped`](crate::error::Stopped).
 /// # Source
-/// Shan et al. 2005, Table 3; the limits are ours, the paper has none.
+/// Shan et al. 2005, Table 3; the limits are ours, as the paper states none.
 pub fn check_ranges<'a>(
     footprints: &Footprints<BodyFixed>,
     profiles: &[Profile],
@@ -287,7 +287,7 @@ fn statistics(
         .collect();
     let outlier = &shots.outlier[first..];
     let outliers = outlier.iter().filter(|flag| **flag).count();
-    // A single wrong record must not decide the verdict on all others; how many there are has a limit of its own.
+    // A single wrong record must not decide the verdict on all others; their number has a separate limit.
     let mean_without = |column: &[f64]| {
         let kept = column[first..].iter().zip(outlier);
         let kept: Vec<f64> = kept.filter(|(_, is)| !**is).map(|(m, _)| *m).collect();

@@ -1,7 +1,8 @@
 //! The file's own spacecraft and that of the kernels: whether both are of one orbit, one clock and one datum.
 //!
-//! Both hold for the same shots, so what is between them is no noise: rival orbits lie tens of metres apart,
-//! another clock correction as far along the flight as the spacecraft flies in it, another datum kilometres.
+//! Both hold for the same shots, so their difference is not noise. Independent orbits differ by tens of metres, another
+//! clock correction shifts the spacecraft along the track by its speed times the change, and another datum shifts it by
+//! kilometres.
 
 use crate::{
     altimetry::MolaClock,
@@ -18,7 +19,8 @@ use crate::{
     wording::signed,
 };
 
-/// What would bring the two together in the middle of the profile: another datum, another clock correction, or neither.
+/// The likely cause of their difference in the middle of the profile: another datum, another clock correction, or
+/// neither.
 pub(super) fn cause(
     footprints: &Footprints<BodyFixed>,
     profile: &Profile,
@@ -27,7 +29,7 @@ pub(super) fn cause(
     limit_m: f64,
 ) -> String {
     together(footprints, profile, trajectory, clock, limit_m)
-        .unwrap_or_else(|| "the kernels hold another orbit than the file".to_owned())
+        .unwrap_or_else(|| "the kernels hold a different orbit from that of the file".to_owned())
 }
 
 fn together(
@@ -65,8 +67,7 @@ fn together(
         0.0
     };
     Some(format!(
-        "they agree when time tags are corrected by {} s, not by {} s (mola_clock), or the kernels hold \
-         another orbit",
+        "they agree when time tags are corrected by {} s, not by {} s (mola_clock), or the kernels hold a different orbit",
         signed(used_s + along / velocity_m_s.norm(), 3),
         signed(used_s, 3)
     ))

@@ -34,7 +34,7 @@ impl ShotResiduals {
         self.row.len()
     }
 
-    /// Whether there are none.
+    /// Whether no shot has residuals.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.row.is_empty()

@@ -1,12 +1,12 @@
-//! Which clock correction makes the range residuals of a profile spread least?
+//! The clock correction that minimises the spread of the range residuals of a profile.
 //!
-//! Shifting the spacecraft by a time `c` changes the residual of shot `k` by about `c` times the rate
-//! of its line of sight. A common change leaves the spread alone, so a profile tells the bias only
-//! when that rate varies along it: strongly when the spacecraft holds still in inertial space while
-//! it looks off nadir (about 3 m/s²), hardly at nadir (below 0.03 m/s²). The uncertainty says which.
+//! Shifting the spacecraft by a time `c` changes the residual of shot `k` by about `c` times the rate of its line of
+//! sight. A common change does not alter the spread, so a profile determines the bias only when that rate varies along
+//! it: well when the spacecraft holds an inertial attitude off nadir (about 3 m/s²), hardly at nadir (below 0.03 m/s²).
+//! The uncertainty reflects this.
 //!
-//! Over a revolution the error of the file's orbit is a wave in the residuals that hides a bias. Crossovers have found most
-//! of it: radii corrected by them are scanned as well, and taken where that calms the residuals.
+//! Over a revolution the error of the file's orbit is a wave in the residuals that masks a bias. Crossovers remove most
+//! of it: radii corrected by them are scanned as well, and used where they reduce the spread.
 
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
@@ -27,14 +27,14 @@ use crate::{
     time::Et,
 };
 
-/// Fewest shots that make a scan worth reading.
+/// Fewest shots for a meaningful scan.
 const SHOTS_MIN: usize = 10;
 
 /// Half the time over which the rate of a line of sight is measured, seconds.
 const RATE_STEP_S: f64 = 0.01;
 
-/// Corrected radii are taken when their least spread is below this share of that of raw ones: what is spared by chance, or
-/// where crossovers say nothing, is less.
+/// Corrected radii are used when their least spread is below this share of that of raw ones: reductions by chance, or
+/// where crossovers carry no information, are smaller.
 const CALMER: f64 = 0.98;
 
 /// Radius of footprints.
@@ -49,7 +49,7 @@ pub enum ScannedRadius {
 }
 
 impl ScannedRadius {
-    /// The word for it.
+    /// Its name.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -73,12 +73,12 @@ pub struct BiasScan {
     /// `None` when the least spread lies at an end of the scan.
     pub best_s: Option<f64>,
     /// Standard uncertainty of `best_s`, seconds: from the remaining residuals with the correlation of
-    /// neighbours, and from how well the orbit is known.
+    /// neighbours, and from the uncertainty of the orbit.
     pub uncertainty_s: Option<f64>,
 }
 
 impl BiasScan {
-    /// Scans a profile by its shots in IAU 2000, outliers left out, in the order of time; `None` for fewer than ten.
+    /// Scans a profile by its shots in IAU 2000, without outliers, in time order; `None` for fewer than ten.
     #[must_use]
     pub fn of(
         shots: &[Footprint],
@@ -106,7 +106,7 @@ impl BiasScan {
         let corrections: Vec<f64> = corrections(limits).collect();
         let spreads_m: Vec<Option<[f64; 2]>> = corrections.par_iter().map(spreads_m).collect();
         for (correction_s, spreads_m) in corrections.into_iter().zip(spreads_m) {
-            // Corrections that lead out of the kernels are left out.
+            // Corrections beyond the coverage of the kernels are omitted.
             for (scan, spread_m) in [&mut raw, &mut crossover]
                 .into_iter()
                 .zip(spreads_m.into_iter().flatten())
@@ -140,7 +140,7 @@ impl BiasScan {
     }
 }
 
-/// What of a shot stays the same for all corrections.
+/// The quantities of a shot that do not depend on the correction.
 struct Sighted {
     tag: Et,
     range_m: f64,
@@ -164,7 +164,8 @@ impl Sighted {
 
     /// Range − distance to both footprints.
     ///
-    /// * `turn` – of Mars in the time of the correction: in seconds its axis moves by less than 1e-6 m on the ground
+    /// * `turn` – rotation of Mars during the correction: within seconds its axis moves by less than 1e-6 m on the
+    ///   ground
     fn residuals_m(
         &self,
         trajectory: &Trajectory,
@@ -229,8 +230,8 @@ fn best_s(scan: &BiasScan) -> Option<f64> {
 
 /// Unit vectors as columns: along the velocity, across the orbit, and at right angles to both.
 ///
-/// The first is the flight itself and not, as elsewhere, at right angles to the radius: an orbit that
-/// is late by a constant time is moved along it, and must show as what it is.
+/// The first is the direction of flight itself and not, as elsewhere, perpendicular to the radius: an orbit with a
+/// constant time error is shifted along it, and must appear as such.
 fn track_axes(position: &Vector3<f64>, velocity: &Vector3<f64>) -> Matrix3<f64> {
     let along = velocity.normalize();
     let cross = position.cross(velocity).normalize();
@@ -239,12 +240,12 @@ fn track_axes(position: &Vector3<f64>, velocity: &Vector3<f64>) -> Matrix3<f64> 
 
 /// Standard uncertainty of the best correction.
 ///
-/// The best correction is the slope of the residuals over the rates of their lines of sight. It is
-/// uncertain by the scatter about that line, and by the orbit: moved by a constant vector it changes
-/// the residuals by the vector's part along each line of sight, and a metre along the track cannot be
-/// told from 0.3 ms. How well the orbit is known is taken from its difference to the orbit of the PEDR
-/// file across the flight, as likely in any direction: along it the two also lie apart by the very error of the correction,
-/// which would bound itself. An orbit whose error changes along the profile leaves a slope too: as much as that difference does.
+/// The best correction is the slope of the residuals over the rates of their lines of sight. It is uncertain by the
+/// scatter about that line, and by the orbit: moved by a constant vector it changes the residuals by the vector's
+/// component along each line of sight, and a metre along the track cannot be separated from 0.3 ms. The orbit
+/// uncertainty is taken from the across-track difference from the orbit of the PEDR file, assumed equal in all
+/// directions: along the track the two also differ by the error of the correction itself. An orbit error that changes
+/// along the profile leaves a slope too, estimated by the slope of that difference.
 fn uncertainty_s(
     shots: &[Footprint],
     radius: ScannedRadius,
@@ -287,7 +288,7 @@ fn uncertainty_s(
     let orbit_s = seconds_per_metre.norm() * across_m;
     let change_s = match radius {
         ScannedRadius::Raw => Trend::of(&rates_m_s, &sighted_differences_m)?.slope,
-        // Crossovers have taken it out.
+        // Crossovers have removed it.
         ScannedRadius::Crossover => 0.0,
     };
     Some(noise_s.hypot(orbit_s).hypot(change_s))

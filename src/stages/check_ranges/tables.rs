@@ -1,5 +1,5 @@
-//! The range check of shots of tables, whose spacecraft no kernels have: measured range against the table's own spacecraft,
-//! and against that of images with its laser, where one was exposed meanwhile.
+//! The range check of shots of tables, for whose spacecraft there are no kernels: measured range against the table's
+//! own spacecraft, and against the spacecraft of images with its laser, where one was exposed at that time.
 //!
 //! `ImageTimes::has_laser` marks such images. No other stage after `search_footprints` distinguishes tables from PEDR
 //! files.
@@ -63,7 +63,7 @@ impl Stage for CheckTableRanges<'_> {
 
 /// Checks the ranges of every profile against the spacecraft of the table, and against that of support data.
 ///
-/// Residuals are those of shots that both tell; the table's own spacecraft is judged by all shots.
+/// Residuals exist for shots that both cover; the table's own spacecraft is judged by all shots.
 ///
 /// # Errors
 /// [`Stopped`].
@@ -91,7 +91,7 @@ pub fn check_table_ranges(
         shots.outlier.extend(flags);
         let mut ranges = statistics(profile, &shots, first, None, footprints);
         by_own_spacecraft(&mut ranges, footprints, profile, limits);
-        let explain = || "the support data hold another orbit than the table".to_owned();
+        let explain = || "the support data hold a different orbit from the table's".to_owned();
         ranges.invalid_because = ranges.figures().broken_limits(limits, explain);
         checked.push(ranges);
     }
@@ -102,7 +102,7 @@ pub fn check_table_ranges(
     })
 }
 
-/// Where an image with the laser has its spacecraft at an instant, as far as its support data reach.
+/// The spacecraft of an image with the laser at an instant, within the time of its support data.
 fn spacecraft(image: &ImageTimes, at: Et) -> Option<SpacecraftState> {
     let support = image.support.as_ref().filter(|support| support.has_laser)?;
     let tables = &support.tables;
@@ -118,7 +118,7 @@ fn spacecraft(image: &ImageTimes, at: Et) -> Option<SpacecraftState> {
     })
 }
 
-/// Puts the table's own spacecraft into the statistics of a profile, by all of its shots.
+/// Adds the table's own spacecraft to the statistics of a profile, by all of its shots.
 fn by_own_spacecraft(
     ranges: &mut ProfileRanges,
     footprints: &Footprints<BodyFixed>,

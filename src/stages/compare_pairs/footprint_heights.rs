@@ -1,5 +1,5 @@
-//! Heights of footprints by a pair of images: where tie points say that both images show a footprint, their rays meet
-//! at a height, which the altimeter knows.
+//! Heights of footprints by a pair of images: rays to the places of a footprint, one transferred through tie points,
+//! intersect at a height that the altimeter tests.
 
 use serde::{Deserialize, Serialize};
 
@@ -36,11 +36,11 @@ impl FootprintHeight {
     }
 }
 
-/// Heights of the footprints of `rows` that the first image shows at `places`; those beyond the tie points, and those whose
-/// rays do not meet, have none.
+/// Heights of the footprints of `rows` that the first image shows at `places`; without those beyond the tie points, and
+/// those whose rays do not intersect.
 ///
-/// The transformation follows the ground between tie points as a surface of second order at most: relief makes single
-/// heights uncertain, and little of it stays in their median.
+/// The transformation represents the ground between tie points as a surface of second order at most: relief makes
+/// single heights uncertain, but their median only little.
 pub(super) fn footprint_heights<M: ExteriorOrientation>(
     images: [&OrientedCamera<M>; 2],
     fit: &ImageToImage,

@@ -16,7 +16,7 @@ use crate::{
 };
 
 const SAMPLES: u32 = 64;
-/// Lines that came down, and lines that were exposed.
+/// Lines that were received, and lines that were exposed.
 const LINES: [u32; 2] = [160, 176];
 
 fn times(id: &str) -> ImageTimes {
@@ -40,7 +40,7 @@ fn times(id: &str) -> ImageTimes {
     }
 }
 
-/// Numbers of which none is 0, but one.
+/// Pixel values of which exactly one is 0.
 fn pixels() -> Vec<u8> {
     let number = |place: u32| u8::try_from((place / 7 + place % SAMPLES * 3) % 251 + 1).unwrap();
     let mut pixels: Vec<u8> = (0..LINES[0] * SAMPLES).map(number).collect();
@@ -121,7 +121,7 @@ impl Folder {
         path
     }
 
-    /// What is said of a file as the pixels of an image.
+    /// The error for a file as the pixels of an image.
     fn refusal(&self, bytes: &[u8], times: &ImageTimes) -> String {
         let opened = open_pixels(&self.write("pixels", bytes), times);
         opened.map(|_| ()).unwrap_err().to_string()
@@ -155,7 +155,7 @@ fn every_kind_of_file_gives_the_same_pixels_to_be_matched() {
                 "{kind} {level} {line}"
             );
         }
-        // A dark pixel of the camera is one; in other files 0 stands for none.
+        // A dark pixel of the camera is valid; in other files 0 denotes a missing pixel.
         for (level, line) in [(0, 15), (1, 5)] {
             let level_samples = 20 >> level;
             let at = [line, level_samples];
@@ -205,7 +205,7 @@ fn pixels_of_another_image_are_refused() {
     );
     let told = folder.refusal(&cube(&pixels, &map), &own);
     assert!(told.contains("map-projected"), "{told}");
-    // With a label the last lines may be missing; without one nothing says which.
+    // With a label the last lines may be missing; without one it is unknown which are.
     let less = &pixels[..144 * SAMPLES as usize];
     for file in [archive(less), cube(less, &of_the_camera())] {
         assert!(open_pixels(&folder.write("pixels", &file), &own).is_ok());
@@ -244,7 +244,7 @@ fn pictures_that_may_be_exchanged_are_not_matched() {
         ),
         "{told}"
     );
-    // For pictures they will do, and one label tells them apart.
+    // Pictures need no label, and one label distinguishes the two.
     assert!(PixelFiles(&files).opened(&[&one, &two]).is_ok());
     let files = [hashed("one.imq", &archive(&pixels)), files[1].clone()];
     assert!(PixelFiles(&files).told_apart(&[&one, &two]).is_ok());
@@ -270,17 +270,17 @@ fn lines_beyond_those_delivered_are_refused() {
         lines_delivered: 144,
         ..times("M01-00123")
     };
-    // Between what came down and what was exposed: neither.
+    // Between the received and the exposed lines: neither.
     for file in [archive(&pixels()), cube(&pixels(), &of_the_camera())] {
         let told = folder.refusal(&file, &less);
         assert!(
             told.contains(
-                "160 lines; expected at most 144, which lines_delivered says came down of 176"
+                "160 lines; expected at most 144, the lines received of 176 (lines_delivered)"
             ),
             "{told}"
         );
     }
-    // Every line that was exposed: in a complete file all came down; else some may be empty.
+    // Every line that was exposed: in a complete file all were received; else some may be empty.
     let all = vec![80; (LINES[1] * SAMPLES) as usize];
     let told = folder.refusal(&archive(&all), &times("M01-00123"));
     assert!(told.contains("176 lines; expected at most 160"), "{told}");

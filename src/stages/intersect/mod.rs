@@ -1,8 +1,8 @@
 //! Ground points of tie points, from images whose orientation is held fixed.
 //!
-//! Two kinds of residual are distinguished. The *focal* residual is what is left in an image's focal plane,
-//! in pixels. The *reprojection* residual is the measured place minus the one where the image sees the
-//! intersected point, in lines and pixels; it is the one that Shan et al. 2005 print in their Table 5.
+//! Two kinds of residual are distinguished. The *focal* residual is that in an image's focal plane, in pixels. The
+//! *reprojection* residual is the measured place minus the one where the image sees the intersected point, in lines and
+//! pixels; it is the one that Shan et al. 2005 print in their Table 5.
 
 mod statistics;
 
@@ -37,7 +37,7 @@ pub use statistics::{ImageResiduals, Residuals2};
 pub struct IntersectOptions {
     /// Weights of the measurements.
     pub weighting: Weighting,
-    /// Which intersections are refused.
+    /// Limits beyond which intersections are rejected.
     pub limits: IntersectionLimits,
 }
 
@@ -61,14 +61,14 @@ impl Default for IntersectOptions {
     }
 }
 
-/// All points, with what they say about the images.
+/// All points, with the statistics of the images.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct IntersectedTies {
     /// Points, in the order of the tie points.
     pub points: Vec<IntersectedPoint>,
     /// Tie points without a ground point, in their order.
     pub rejected: Vec<RejectedTie>,
-    /// Standard deviation of unit weight over all points; 1 where nothing is redundant.
+    /// Standard deviation of unit weight over all points; 1 without redundancy.
     pub sigma0: f64,
     /// Statistics of each image, in the order of the images.
     pub images: Vec<ImageResiduals>,
@@ -89,8 +89,8 @@ pub struct IntersectedPoint {
     pub convergence_rad: f64,
     /// Residuals of its measurements.
     pub measures: Vec<MeasureResidual>,
-    /// Whether a reprojection residual is out of line with those of other points in its image. With two
-    /// images nothing says which of the two measurements is wrong.
+    /// Whether a reprojection residual is an outlier among those of other points in its image. With two images it is
+    /// undetermined which of the two measurements is wrong.
     pub outlier: bool,
 }
 
@@ -120,7 +120,7 @@ pub struct RejectedTie {
     pub tie: usize,
     /// Its identifier.
     pub id: String,
-    /// Why.
+    /// The reason.
     pub reason: TieRejection,
 }
 
@@ -148,7 +148,7 @@ pub enum TieRejection {
     NotFinite,
 }
 
-/// An orientation that sees nothing.
+/// An orientation that sees no ground.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("image {image}: its orientation sees no ground: {unseen}")]
 struct BlindImage {
@@ -219,8 +219,8 @@ impl Stage for Intersect<'_> {
 /// Intersects all tie points.
 ///
 /// # Errors
-/// Measurements in images that are not there; orientations that see nothing. Single points that cannot
-/// be intersected are listed instead.
+/// Measurements in unknown images; orientations that see no ground. Single points that cannot be intersected are listed
+/// instead.
 pub fn intersect_ties<M: ExteriorOrientation>(
     images: &[OrientedCamera<M>],
     ties: &[TiePoint],
@@ -320,7 +320,7 @@ fn intersect_one<M: ExteriorOrientation>(
         .collect();
     let mut point = intersect(&rays, &options.limits).map_err(TieRejection::Rays)?;
     if let Weighting::Line { along_lines, .. } = options.weighting {
-        // A line is so many focal-plane pixels at the range of this point.
+        // The length of a line in focal-plane pixels depends on the range of this point.
         for (sight, place) in rays.iter_mut().zip(places) {
             let image = &images[place.image];
             let rate_px = image.focal_px_per_line(place.x_lines, &point.ground_m);

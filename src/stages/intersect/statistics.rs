@@ -1,4 +1,4 @@
-//! Residuals by image, and points whose residuals are out of line.
+//! Residuals by image, and points whose residuals are outliers.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use super::{IntersectedPoint, MeasureResidual};
 use crate::geom::statistics::Summary;
 
-/// Robust standard deviations beyond the median distance at which a point is marked: residuals lie nearly on
-/// a line, and of normal ones there this is 3.6 standard deviations, one point in three thousand.
+/// Robust standard deviations beyond the median distance at which a point is marked: residuals lie nearly on a line;
+/// for normal ones there, this is 3.6 standard deviations, one point in three thousand.
 const OUTLIER_SIGMA: f64 = 5.0;
 
 /// Statistics along and across the track.
@@ -56,11 +56,11 @@ impl ImageResiduals {
     }
 }
 
-/// Marks points with a reprojection residual farther from the median one of its image than other points' are,
-/// by five robust standard deviations. With identical residuals nothing is marked.
+/// Marks points with a reprojection residual whose distance from the median of its image exceeds the median distance by
+/// five robust standard deviations. With identical residuals nothing is marked.
 ///
-/// The distance from the median counts, not the length: all residuals of an image lean the same way when its
-/// clock is wrong, and a blunder across that way makes them hardly longer.
+/// The criterion is the distance from the median, not the length: a clock error shifts all residuals of an image in one
+/// direction, and a blunder at right angles to it hardly lengthens them.
 pub(super) fn mark_outliers(points: &mut [IntersectedPoint], images: usize) {
     let limits: Vec<Limit> = (0..images).map(|image| Limit::of(points, image)).collect();
     for point in points {
@@ -71,7 +71,7 @@ pub(super) fn mark_outliers(points: &mut [IntersectedPoint], images: usize) {
     }
 }
 
-/// Where the residuals of an image lie, and how far from there is too far.
+/// The median of the residuals of an image, and the largest accepted distance from it.
 struct Limit {
     median: [f64; 2],
     distance: f64,

@@ -1,4 +1,4 @@
-//! What is judged of an adjustment: by MOLA first, then by what images say of each other, then by what was known.
+//! How an adjustment is judged: by MOLA first, then by agreement between the images, then by a priori values.
 
 use std::collections::BTreeSet;
 
@@ -16,23 +16,23 @@ use crate::{
     wording::signed,
 };
 
-/// Mean heights that are stated worse than this, metres, are hardly controlled.
+/// Mean heights with a larger standard deviation than this, metres, are hardly controlled.
 pub(super) const HEIGHT_LOOSE_M: f64 = 20.0;
-/// Craters between the profiles make a smaller share than this of the tie points stand out.
+/// Craters between the profiles make outliers of a smaller share of the tie points than this.
 pub(super) const HEIGHT_OUTLIERS_FEW: f64 = 0.03;
-/// Among spots of the laser a larger share beyond their limit is no chance: it leaves one in a thousand there.
+/// A larger share of laser spots beyond their limit is not due to chance, which leaves one in a thousand there.
 const SPOTS_BEYOND_FEW: f64 = 0.05;
 /// A mean height within this many of its standard deviations is no contradiction.
 const HEIGHT_SIGMAS: f64 = 3.0;
 
 impl AdjustmentEvidence<'_> {
-    /// Why the adjusted orientation is invalid, one sentence per reason: what MOLA says first, then what images say of
-    /// each other, then what was known beforehand.
+    /// Why the adjusted orientation is invalid, one sentence per reason: MOLA first, then agreement between the images,
+    /// then a priori values.
     pub(super) fn invalid_because(&self, limits: &LimitsConfig) -> Vec<String> {
         let mut invalid = self.heights_off(limits);
         let reasons = |image: &JudgedImage| -> Vec<String> {
             let id = image.id;
-            // What is wrong with the orientation of the kernels is told with it.
+            // Faults of the orientation of the kernels are reported with it.
             let of_model = image.model.invalid_because.iter();
             of_model
                 .map(|reason| format!("adjusted image {id}: {reason}"))
@@ -42,7 +42,7 @@ impl AdjustmentEvidence<'_> {
         let (left_out, ties) = (self.left_out(), self.ties.multi_image());
         if 2 * left_out > ties {
             invalid.push(format!(
-                "adjustment: {left_out} of {ties} tie points were rejected; ties.parquet says why"
+                "adjustment: {left_out} of {ties} tie points were rejected; ties.parquet states why"
             ));
         }
         let rounds = [
@@ -52,7 +52,7 @@ impl AdjustmentEvidence<'_> {
         let parted = self.parted();
         if !parted.is_empty() {
             invalid.push(format!(
-                "no tie point of {} took part in the adjustment: look at their labels, and at the tie points in ties.parquet",
+                "no tie point of {} took part in the adjustment: check their labels, and the tie points in ties.parquet",
                 parted.join("; ")
             ));
         }
@@ -73,7 +73,7 @@ impl AdjustmentEvidence<'_> {
         invalid
     }
 
-    /// A laser that is not where its mounting and its profile have it.
+    /// A laser that contradicts its mounting or its profile.
     fn laser_elsewhere(&self, limits: &LimitsConfig) -> Option<String> {
         let boresight = self.adjusted.boresight.as_ref()?.as_ref().ok()?;
         let (unknown, sigmas) = boresight.farthest.as_ref()?;
@@ -88,19 +88,19 @@ impl AdjustmentEvidence<'_> {
         })
     }
 
-    /// Images that the laser says nothing of, where it was asked.
+    /// Images without laser control, where `adjustment.common_bus` is set.
     fn laser_missing(&self) -> Option<String> {
         match self.adjusted.boresight.as_ref()? {
             Err(reason) => Some(format!("adjustment.common_bus did nothing: {reason}")),
             Ok(boresight) if !boresight.without.is_empty() => Some(format!(
-                "adjustment.common_bus says nothing of {}: no shot of a profile falls into their exposure",
+                "adjustment.common_bus does not control {}: no shot of a profile falls within their exposure",
                 boresight.without.join(", ")
             )),
             Ok(_) => None,
         }
     }
 
-    /// Where the laser has spots in the images, if so many do not fit that some shots must be wrong.
+    /// The laser spots in the images, if so many do not fit that some shots must be wrong.
     pub(super) fn spots_beyond(&self) -> Option<&TypeSummary> {
         let mut types = self.adjusted.summary.types.iter();
         let spots = types.find(|of| of.kind == ObservationType::LaserSpot)?;
@@ -112,20 +112,20 @@ impl AdjustmentEvidence<'_> {
     fn spots_spoiled(&self) -> Option<String> {
         self.spots_beyond().map(|spots| {
             format!(
-                "{} of {} coordinates of the laser in the images lie beyond 3.29 of their standard deviations: some shots are \
-                 recorded elsewhere than they were, or profiles and line times are worse than configured",
+                "{} of {} image coordinates of laser spots exceed 3.29 of their standard deviations: some shots are \
+                 recorded at a wrong place, or profiles and line times are worse than configured",
                 spots.beyond_limit, spots.observations
             )
         })
     }
 
-    /// The limit on heights after the adjustment: within so many of its standard deviations nothing is contradicted.
+    /// The limit on heights after the adjustment, at least `HEIGHT_SIGMAS` standard deviations of their mean.
     pub(super) fn height_after_max_m(&self, limits: &LimitsConfig) -> f64 {
         let by_chance_m = HEIGHT_SIGMAS * self.adjusted_heights.mean_sigma_m;
         limits.height_after_max_m.max(by_chance_m)
     }
 
-    /// What MOLA says against the heights of tie points.
+    /// Contradictions between MOLA and the heights of tie points.
     fn heights_off(&self, limits: &LimitsConfig) -> Vec<String> {
         let after_max_m = self.height_after_max_m(limits);
         let rounds = [
@@ -159,7 +159,7 @@ impl AdjustmentEvidence<'_> {
         reasons
     }
 
-    /// What a reader must know of heights that MOLA controls, but not well.
+    /// Remarks on heights that MOLA controls, but not well.
     fn heights_loose(&self, limits: &LimitsConfig) -> Vec<String> {
         let Some(heights) = &self.adjusted.heights else {
             return Vec::new();
@@ -167,7 +167,7 @@ impl AdjustmentEvidence<'_> {
         let mut remarks = Vec::new();
         if !heights.settled {
             remarks.push(
-                "heights of tie points, and the MOLA surface under them, had not come to rest when the adjustment ended: \
+                "heights of tie points, and the MOLA surface under them, had not converged when the adjustment ended: \
                  they are less certain than stated"
                     .to_owned(),
             );
@@ -185,7 +185,7 @@ impl AdjustmentEvidence<'_> {
         }
         if heights.compared < HEIGHTS_MIN {
             remarks.push(format!(
-                "{} tie points are too few for a search of blunders by their heights",
+                "{} tie points are too few to search for blunders by their heights",
                 heights.compared
             ));
         }
@@ -212,7 +212,7 @@ impl AdjustmentEvidence<'_> {
         })
     }
 
-    /// Corrections of orientations that what was known of them does not allow.
+    /// Corrections of orientations beyond what their a priori standard deviations allow.
     fn corrected_too_far(&self, limits: &LimitsConfig) -> Vec<String> {
         let far = self
             .largest_corrections()
@@ -234,13 +234,13 @@ impl AdjustmentEvidence<'_> {
         points.filter(|point| point.kind == PointKind::Tie).count()
     }
 
-    /// Tie points that join images and yet took no part.
+    /// Tie points that join images, but took no part.
     pub(super) fn left_out(&self) -> usize {
         self.ties.multi_image().saturating_sub(self.taken())
     }
 
-    /// Standard deviation of unit weight of tie points along and across the track; nothing where they fit, but hardly any
-    /// is tested by another observation.
+    /// Standard deviation of unit weight of tie points along and across the track; `None` where they fit, but without
+    /// redundancy.
     pub(super) fn axes(&self) -> impl Iterator<Item = Option<f64>> {
         let summary = &self.adjusted.summary;
         let kinds = [ObservationType::TieAlong, ObservationType::TieAcross];
@@ -266,7 +266,7 @@ impl AdjustmentEvidence<'_> {
             .collect()
     }
 
-    /// Pairs of images none of whose tie points took part, though they have some.
+    /// Pairs of images with tie points of which none took part.
     pub(super) fn parted(&self) -> Vec<String> {
         let is_adjusted = |pair: &PairComparison| {
             self.adjusted_pairs
@@ -290,36 +290,36 @@ impl AdjustmentEvidence<'_> {
                 .all(|pair| is_together(pair, limit_m))
     }
 
-    /// What a reader must weigh, one sentence each.
+    /// Points that the reader must weigh, one sentence each.
     pub(super) fn remarks(&self, limits: &LimitsConfig) -> Vec<String> {
         let mut remarks = Vec::new();
         let both = self.heights.surface.as_ref();
         match both.and(self.adjusted_heights.surface.as_ref()) {
             Err(reason) => remarks.push(format!(
-                "heights of tie points are not controlled by MOLA ({reason}): they are known as well as orbit and attitude \
-                 beforehand"
+                "heights of tie points are not controlled by MOLA ({reason}): they are only as accurate as the a \
+                 priori orbit and attitude"
             )),
             Ok(_) => remarks.extend(self.heights_loose(limits)),
         }
         if self.adjusted.summary.model == AdjustmentModel::Published {
             remarks.push(
-                "the adjustment follows the published model (adjustment.model): its heights are not controlled, and its \
-                 standard deviations are those of agreement between the images"
+                "the adjustment follows the published model (adjustment.model): its heights are not controlled, and \
+                 its standard deviations state only the agreement between the images"
                     .to_owned(),
             );
         }
         if self.adjusted.attitude_clock_s.is_some() {
             remarks.push(
-                "the place rests on adjustment.attitude_clock, a reading of what the images disagree by that no measurement \
-                 tests; the report has the other one beside it"
+                "positions depend on adjustment.attitude_clock, an interpretation of the disagreement between the \
+                 images that no measurement tests; the report gives the other interpretation beside it"
                     .to_owned(),
             );
         }
         if matches!(self.adjusted.boresight, Some(Ok(_))) {
             remarks.push(
-                "the place across the flight rests on adjustment.common_bus, which takes it that footprints do not carry the \
-                 attitude error of these kernels: PEDR files made with the same attitude would agree with them whatever it \
-                 errs"
+                "across-track positions depend on adjustment.common_bus, which assumes that footprints do not carry \
+                 the attitude error of these kernels: PEDR files made with the same attitude would agree with them \
+                 whatever its error"
                     .to_owned(),
             );
         }
@@ -329,7 +329,7 @@ impl AdjustmentEvidence<'_> {
         let share = limits.rejected_share_max;
         if left_out as f64 > share * ties as f64 && 2 * left_out <= ties {
             remarks.push(format!(
-                "{left_out} of {ties} tie points were rejected by the adjustment; ties.parquet says why"
+                "{left_out} of {ties} tie points were rejected by the adjustment; ties.parquet states why"
             ));
         }
         let taken = self.taken();
@@ -348,13 +348,13 @@ impl AdjustmentEvidence<'_> {
                 )),
                 Some(_) => {}
                 None => remarks.push(format!(
-                    "nothing tests the tie points {axis} the track: blunders there go unnoticed"
+                    "tie points have no redundancy {axis} the track: blunders there go undetected"
                 )),
             }
         }
         for image in self.untied() {
             remarks.push(format!(
-                "image {image} has no tie point in the adjustment: no measurement of its own tests or corrects its orientation"
+                "image {image} has no tie point in the adjustment: no measurement in it tests or corrects its orientation"
             ));
         }
         remarks
@@ -369,11 +369,11 @@ fn is_together(pair: &PairComparison, limit_m: f64) -> bool {
 fn heights_beyond(heights: &HeightSummary) -> String {
     let rejected = match heights.rejected {
         0 => String::new(),
-        count => format!(", {count} more were rejected for it"),
+        count => format!(", {count} more were rejected for this reason"),
     };
     format!(
         "{} of {} tie points lie farther from the MOLA surface than their standard deviations allow{rejected}: \
-         measurements that err across the track move heights by more than is stated; height_check.parquet has them",
+         across-track measurement errors shift heights by more than stated; height_check.parquet lists them",
         heights.beyond_limit, heights.compared
     )
 }

@@ -1,4 +1,4 @@
-//! Every limit of a site with what uses most of it: what the verdict rests on, as a table.
+//! Every limit of a site with its largest use: the basis of the verdict, as a table.
 
 use super::{
     AdjustmentEvidence, Check, CheckKind,
@@ -19,10 +19,11 @@ use crate::{
 /// More than this share of rejected tie points makes a site invalid.
 const REJECTED_SHARE_FAIL: f64 = 0.5;
 
-/// Clocks of altimeters are off by a tenth of a second (MOLA: 0.117 s): a scan with a wider limit does not tell that from none.
+/// Altimeter clocks are off by a tenth of a second (MOLA: 0.117 s): a scan with a wider limit cannot distinguish that
+/// from zero.
 const CLOCK_BLIND_S: f64 = 0.1;
 
-/// What is checked of each profile or image, how it is found, and its limit.
+/// A quantity that is checked for each profile or image, with its function and its limit.
 type Quantity<T> = (CheckKind, fn(&T) -> f64, f64);
 
 /// All checks.
@@ -82,7 +83,7 @@ fn of_ranges(evidence: &Evidence<'_>) -> Vec<Check> {
             limits.decoding_max_m,
         ),
     ];
-    // Shots of tables may have no spacecraft but their own.
+    // Shots of tables may have no spacecraft position other than their own.
     let measured = |kind: CheckKind, of: &ProfileRanges| {
         let of_two = matches!(kind, CheckKind::RangeMean | CheckKind::OrbitsApart);
         !of_two || of.range_minus_distance_m.n > 0
@@ -106,7 +107,7 @@ fn of_ranges(evidence: &Evidence<'_>) -> Vec<Check> {
     checks.into_iter().flatten().collect()
 }
 
-/// What the ranges say against the configured clock correction.
+/// The clock correction by the ranges against the configured one.
 fn clock(evidence: &Evidence<'_>) -> Option<Check> {
     let kind = CheckKind::ClockCorrection;
     let profiles = || evidence.ranges.profiles.iter();
@@ -115,13 +116,13 @@ fn clock(evidence: &Evidence<'_>) -> Option<Check> {
         let (best_s, uncertainty_s) = (scan.best_s?, scan.uncertainty_s?);
         let limit_s = clock_limit_s(uncertainty_s);
         let apart_s = best_s - evidence.clock_correction_s;
-        // A limit as wide as the bias itself cannot be broken by leaving it out.
+        // A limit as wide as the bias cannot detect that the bias was omitted.
         let is_blind = limit_s > CLOCK_BLIND_S && apart_s.abs() <= limit_s;
         (!is_blind).then(|| Check::new(kind, &*of.profile, apart_s, limit_s, Warning))
     });
     let is_scanned = profiles().any(|of| of.scan.is_some());
-    // Shots of one direction of sight say little of the clock: that is told, and nothing to weigh.
-    let silent = is_scanned.then(|| Check::told(kind, "not told by these ranges", Pass));
+    // Shots of one viewing direction hardly determine the clock: this is stated, without a warning.
+    let silent = is_scanned.then(|| Check::told(kind, "not determined by these ranges", Pass));
     Check::worst(scans).or(silent)
 }
 
@@ -156,7 +157,7 @@ fn of_images<'a>(
     let mut checks: Vec<Check> = quantities
         .into_iter()
         .filter_map(|(kind, value, limit)| {
-            // Tables that are all that is known have nothing to depart from.
+            // Where the tables are the only source, their interpolation has no reference.
             let known = |image: &JudgedImage| {
                 kind != CheckKind::TableError || image.orientation.tables.interpolation.epochs > 0
             };
@@ -253,7 +254,7 @@ fn of_ties(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> {
     let axes = [CheckKind::TieResidualsAlong, CheckKind::TieResidualsAcross];
     checks.extend(of.axes().zip(axes).map(|(axis, kind)| match axis {
         Some(found) => Check::new(kind, "", found, limits.sigma0_max, Warning),
-        None => Check::told(kind, "nothing tests them", Warning),
+        None => Check::told(kind, "untested: no redundancy", Warning),
     }));
     checks.extend(joined(of));
     let share = of.left_out() as f64 / of.ties.multi_image().max(1) as f64;
@@ -284,7 +285,7 @@ fn of_ties(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> {
     checks
 }
 
-/// Images and pairs that the adjustment says nothing of.
+/// How many images and pairs the adjustment joins, and which it does not.
 fn joined(of: &AdjustmentEvidence<'_>) -> [Check; 2] {
     let check = |kind: CheckKind, all: usize, without: &[String], broken: CheckOutcome| {
         let subject = match without {
@@ -301,7 +302,7 @@ fn joined(of: &AdjustmentEvidence<'_>) -> [Check; 2] {
     ]
 }
 
-/// What the laser says, where it was asked.
+/// The boresight of the laser, where `adjustment.common_bus` is set.
 fn boresight(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Option<Check> {
     let Ok(found) = of.adjusted.boresight.as_ref()? else {
         return Some(Check::told(CheckKind::Boresight, "", Warning));
@@ -318,7 +319,7 @@ fn boresight(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Option<Check
     Some(check)
 }
 
-/// Rejected tie points: a share beyond the limit of a sound adjustment warns, more than half fails whatever that is.
+/// Rejected tie points: a share above the limit is a warning, more than half a failure, whatever the limit.
 fn rejected(share: f64, limit: f64, broken: CheckOutcome) -> Check {
     let mut check = Check::of_share(CheckKind::TiesRejected, "", share, limit, broken);
     if broken == Fail {

@@ -1,4 +1,4 @@
-//! What is judged of a terrain model: how much of the ground it has, and what the altimeter says of it.
+//! How a terrain model is judged: by the share of the ground that it covers, and by the altimeter.
 
 use super::{
     Check, CheckKind,
@@ -9,7 +9,7 @@ use crate::{stages::map_surface::SurfaceAccount, wording::signed};
 
 /// A mean height within this many of its standard deviations is no contradiction.
 const HEIGHT_SIGMAS: f64 = 3.0;
-/// Fewer shots on it say nothing of a model.
+/// Fewer shots do not validate a model.
 const SHOTS_MIN: u32 = 10;
 
 /// How far the median of the shots may lie from a model, metres.
@@ -17,7 +17,7 @@ fn height_max_m(evidence: &Evidence<'_>, surface: &SurfaceAccount) -> f64 {
     let limits = evidence.limits;
     match (surface.common_sigma_m, &evidence.adjustment) {
         (Some(common_m), _) => limits.height_after_max_m.max(HEIGHT_SIGMAS * common_m),
-        // Nothing has brought the images nearer to the shots than they were.
+        // No adjustment has brought the images closer to the shots.
         _ => limits.height_before_max_m,
     }
 }
@@ -85,8 +85,8 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
     let (filled, searched) = (surface.filled, surface.searched());
     if surface.is_refused {
         return vec![format!(
-            "terrain model: {filled} of {searched} cells that were searched are found, which may be by chance, so that none is \
-             taken; check that the pixels are those of these images, and their orientation"
+            "terrain model: {filled} of {searched} searched cells matched, too few to be significant, so that the \
+             model is withheld; check that the pixels are those of these images, and check their orientation"
         )];
     }
     let limits = evidence.limits;
@@ -114,19 +114,19 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
     let spread_max = limits.surface_spread_max_sigma;
     if !(shots.spread_sigmas <= spread_max) {
         reasons.push(format!(
-            "terrain model: MOLA scatters about it by {:.1} of the standard deviations, expected at most {spread_max:.1}",
+            "terrain model: MOLA scatters about it by {:.1} standard deviations, expected at most {spread_max:.1}",
             shots.spread_sigmas
         ));
     }
     reasons
 }
 
-/// What a reader must weigh of a terrain model.
+/// Remarks on a terrain model.
 pub(super) fn remarks(evidence: &Evidence<'_>) -> Option<String> {
     let surface = evidence.surface?;
     (!surface.is_refused && !has_shots(surface)).then(|| {
         format!(
-            "terrain model: {} of MOLA's shots lie on it, too few to say anything of its heights",
+            "terrain model: {} of MOLA's shots lie on it, too few to validate its heights",
             surface.shots.above_m.n
         )
     })

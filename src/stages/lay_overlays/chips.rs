@@ -1,4 +1,4 @@
-//! Pieces of images, all with the same ground: north up, so many metres a pixel.
+//! Pieces of images that show the same ground: north up, at one scale.
 
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,7 @@ use super::pixels::Patch;
 /// Pixels of an edge of a piece; odd, so that one is in the middle.
 pub const CHIP_EDGE: usize = 141;
 
-/// What a mark stands for.
+/// The meaning of a mark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Mark {
     /// Where the image sees the point with the orientation of the kernels.
@@ -33,7 +33,7 @@ pub struct Chip {
 pub(super) struct Lattice {
     /// Line and sample in the middle of the piece.
     pub(super) centre: Vector2<f64>,
-    /// Lines and samples a metre towards east and north.
+    /// Lines and samples per metre towards east and north.
     pub(super) per_m: Matrix2<f64>,
     /// Edge of a pixel of the piece, metres.
     pub(super) pixel_m: f64,

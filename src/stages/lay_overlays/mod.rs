@@ -1,8 +1,8 @@
-//! What images show where footprints and tie points are: a quick look of every image whose pixels are known, and pieces of
-//! the images around some footprints, around the tie points with the largest residuals and around rejected ones.
+//! What images show at footprints and tie points: a quick look of every image with pixels, and pieces of the images
+//! around some footprints, the tie points with the largest residuals and rejected ones.
 //!
-//! Pieces of all images have the same ground in the same place: north up, one scale. They are cut around where an orientation
-//! sees a point, so that two images agree where the orientation is right.
+//! Pieces of all images show the same ground in the same place: north up, one scale. They are centred where an
+//! orientation places a point, so that two images agree if the orientation is right.
 //!
 //! Each file of pixels is read once, strip by strip, for a quick look of bounded size and for the parts that pieces
 //! need. Overlaid pieces show the quality of an orientation.
@@ -31,7 +31,7 @@ pub use chips::{CHIP_EDGE, Chip, Mark};
 pub use pixels::QuickLook;
 pub use places::Subject;
 
-/// What the images of a site show.
+/// Quick looks of the images of a site, and places in them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Overlays {
     /// Images with pixels, in the order of the site's.
@@ -47,16 +47,16 @@ pub struct ShownImage {
     pub image: usize,
     /// The whole of it.
     pub quick_look: QuickLook,
-    /// Lines of its file, those that are missing among them.
+    /// Lines of its file, missing ones included.
     pub lines: u32,
-    /// What is wrong with its file; at most 1000 are kept.
+    /// Complaints about its file; at most 1000 are kept.
     pub complaints: Vec<String>,
-    /// All of them.
+    /// Number of all complaints.
     pub complaint_count: u64,
 }
 
 impl ShownImage {
-    /// What a reader must know of pixels that are not all as they were sent.
+    /// A sentence on missing or damaged pixels; `None` without any.
     #[must_use]
     pub fn damage(&self) -> Option<String> {
         let (missing, suspect) = (self.quick_look.lines_missing, self.quick_look.lines_suspect);
@@ -77,11 +77,11 @@ impl ShownImage {
 /// A place on the ground in one image or two.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Place {
-    /// What is there.
+    /// The subject of the place.
     pub subject: Subject,
     /// Edge of a pixel of its pieces on the ground, metres.
     pub pixel_m: f64,
-    /// What pieces are cut around, in the order of [`PlaceView::chips`].
+    /// The centres of the pieces, in the order of [`PlaceView::chips`].
     pub centres: Vec<Mark>,
     /// The images that show it.
     pub views: Vec<PlaceView>,
@@ -108,11 +108,11 @@ impl Overlays {
 }
 
 stage_inputs! {
-    /// Images with pixels, and what is shown in them.
+    /// Images with pixels, and the places shown in them.
     pub struct LayOverlays<'a> {
         /// Images with the orientation of the kernels.
         pub images: SiteImages<'a>,
-        /// The same with the adjusted one; none where there is no adjustment.
+        /// The same with the adjusted one; empty without an adjustment.
         pub adjusted_images: SiteImages<'a>,
         /// The form of the orientation.
         pub model: &'a CameraModel,
@@ -127,7 +127,7 @@ stage_inputs! {
     }
 }
 
-/// Tie points and what became of them.
+/// Tie points, their intersections and their adjustment.
 #[derive(Debug, Clone, Copy)]
 pub struct MeasuredTies<'a> {
     /// The tie points.
@@ -154,11 +154,11 @@ impl Stage for LayOverlays<'_> {
     type Output = Overlays;
     stage_inputs!(fingerprint);
 
-    /// Whether every file of pixels is of its image.
+    /// Whether every file of pixels belongs to its image.
     fn examine(&self) -> Vec<Result<String>> {
         let opened = self.pixels.examined(self.images.0);
         let opened = opened
-            .map(|(times, file)| file.map(|_| format!("image {}: its pixels are there", times.id)));
+            .map(|(times, file)| file.map(|_| format!("image {}: pixels available", times.id)));
         opened.collect()
     }
 

@@ -1,5 +1,5 @@
-//! The pixels of an image, read once from its first line to its last: a quick look of the whole and full resolution where it
-//! is asked for.
+//! The pixels of an image, read once from its first line to its last: a quick look of the whole, and full resolution
+//! where it is needed.
 
 use std::{ops::Range, sync::atomic::AtomicBool};
 
@@ -25,15 +25,15 @@ const CLIPPED: f64 = 0.005;
 /// An image in a size that fits a page.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct QuickLook {
-    /// Lines and samples of the image that are one here.
+    /// Lines and samples of the image per line and sample of the quick look.
     pub reduction: u32,
     /// Samples.
     pub width: u32,
     /// Lines.
     pub height: u32,
-    /// Means of the pixels of the image, line by line; 0 where there are none.
+    /// Means of the pixels of the image, line by line; 0 where no pixel is available.
     pub pixels: Vec<u8>,
-    /// Numbers to be shown as black and as white.
+    /// Pixel values to be shown as black and as white.
     pub range_dn: [u8; 2],
     /// Lines that are missing.
     pub lines_missing: u32,
@@ -42,7 +42,7 @@ pub struct QuickLook {
 }
 
 impl QuickLook {
-    /// The same with at most so many pixels.
+    /// The same with at most `pixels_max` pixels.
     #[must_use]
     pub fn within(&self, pixels_max: u64) -> Self {
         let factor = reduction(self.width, self.height, pixels_max);
@@ -60,12 +60,12 @@ impl QuickLook {
     }
 }
 
-/// A part of an image that is wanted in full resolution.
+/// A part of an image that is needed at full resolution.
 #[derive(Debug)]
 pub(super) struct Patch {
     lines: Range<u32>,
     samples: Range<u32>,
-    /// Line by line; 0 where there is none.
+    /// Line by line; 0 where no pixel is available.
     pixels: Vec<u8>,
 }
 
@@ -92,7 +92,7 @@ impl Patch {
         }
     }
 
-    /// The number at a place of the image, between its pixels; 0 where one of them is not there.
+    /// The value at a place of the image, interpolated between four pixels; 0 where one of them is missing.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -124,7 +124,7 @@ impl Patch {
 /// Reads all strips of an image.
 ///
 /// # Errors
-/// The system's refusal to read; [`Stopped`].
+/// Read errors; [`Stopped`].
 pub(super) fn read(
     file: &PixelFile,
     (image, times): (usize, &ImageTimes),
@@ -169,14 +169,14 @@ pub(super) fn read(
     })
 }
 
-/// Number, pixels and state of the lines of a strip that are there.
+/// Number, pixels and state of the available lines of a strip.
 fn lines_of(strip: &Strip) -> impl Iterator<Item = (u32, &[u8], LineState)> {
     let lines = (strip.first_line..).zip(strip.lines());
     let there = lines.filter(|(_, (_, state))| **state != LineState::Missing);
     there.map(|(line, (pixels, state))| (line, pixels, *state))
 }
 
-/// How many lines and samples must be one for at most so many pixels.
+/// The smallest reduction that leaves at most `pixels_max` pixels.
 fn reduction(width: u32, height: u32, pixels_max: u64) -> u32 {
     let pixels =
         |factor: u32| u64::from(width.div_ceil(factor)) * u64::from(height.div_ceil(factor));
@@ -184,7 +184,7 @@ fn reduction(width: u32, height: u32, pixels_max: u64) -> u32 {
     least.unwrap_or(width.max(height).max(1))
 }
 
-/// Numbers below and above which a small share of the pixels lies.
+/// Pixel values below and above which a small share of the pixels lies.
 fn range_dn(counts: &[u64; 256]) -> [u8; 2] {
     [
         beyond(counts, 0..=u8::MAX),
@@ -192,7 +192,7 @@ fn range_dn(counts: &[u64; 256]) -> [u8; 2] {
     ]
 }
 
-/// The first of these numbers with more pixels up to it than a small share of all.
+/// The first of these values up to which more than a small share of all pixels lies.
 fn beyond(counts: &[u64; 256], mut numbers: impl Iterator<Item = u8>) -> u8 {
     let share = CLIPPED * counts.iter().sum::<u64>() as f64;
     let mut pixels = 0;
@@ -203,13 +203,13 @@ fn beyond(counts: &[u64; 256], mut numbers: impl Iterator<Item = u8>) -> u8 {
     found.unwrap_or_default()
 }
 
-/// Means of squares of pixels, as lines come.
+/// Means of square blocks of pixels, accumulated line by line.
 struct Reduced {
     factor: u32,
     width: u32,
     height: u32,
     pixels: Vec<u8>,
-    /// Sum and number of the pixels of the row of squares at hand, and its line.
+    /// Sum and number of the pixels of each block in the current row of blocks.
     sums: Vec<(u32, u32)>,
     row: u32,
 }
@@ -227,7 +227,7 @@ impl Reduced {
         }
     }
 
-    /// Adds a line, of it the pixels of at least `least`.
+    /// Adds the pixels of a line that are at least `least`.
     fn add(&mut self, line: u32, pixels: &[u8], least: u8) {
         let row = line / self.factor;
         if row != self.row {

@@ -29,7 +29,7 @@ const FOOTPRINTS_MAX: usize = 8;
 /// Tie points with the largest residuals, and rejected ones.
 const TIES_MAX: usize = 6;
 
-/// What lies at a place.
+/// The subject of a place.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Subject {
     /// A footprint.
@@ -45,7 +45,7 @@ pub enum Subject {
     Tie {
         /// Its identifier.
         id: String,
-        /// What is to be said of it.
+        /// Its residual, or the reason of its rejection.
         why: String,
         /// Whether it was rejected.
         is_rejected: bool,
@@ -88,7 +88,7 @@ pub(super) fn wanted(site: &LayOverlays, has_pixels: &[bool]) -> Result<Vec<Want
     Ok(wanted)
 }
 
-/// Footprints that two images with pixels show; of an image without such a partner those that it shows alone.
+/// Footprints that two images with pixels show; for an image without such a partner, those that it shows itself.
 fn of_footprints(
     registrations: &[&ImageRegistration],
     profiles: &[Profile],

@@ -1,4 +1,4 @@
-//! Where images see the places, and which of their pixels that needs.
+//! Image coordinates of the places, and the pixels needed around them.
 
 use nalgebra::{Matrix2, Vector2, Vector3};
 
@@ -20,9 +20,9 @@ use crate::{
 
 /// Length on the ground over which lines and samples are counted, metres.
 const STEP_M: f64 = 100.0;
-/// Share of the half edge of a piece within which both orientations have the point, if that is possible.
+/// Share of the half edge of a piece within which both orientations place the point, if possible.
 const WITHIN: f64 = 0.8;
-/// How many pixels of the image a pixel of a piece may be.
+/// Most image pixels per pixel of a piece.
 const COARSER_MAX: f64 = 4.0;
 /// Lines and samples around a piece, for blending.
 const AROUND: f64 = 2.0;
@@ -36,7 +36,7 @@ pub(super) struct Camera<'a> {
 /// The images with the orientation of `model`.
 ///
 /// # Errors
-/// Samples that are no orientation.
+/// Samples that do not form an orientation.
 pub(super) fn cameras(images: &[SiteImage], model: CameraModel) -> Result<Vec<Camera<'_>>> {
     let oriented = SiteImages(images).oriented()?.into_iter();
     Ok(oriented
@@ -45,7 +45,8 @@ pub(super) fn cameras(images: &[SiteImage], model: CameraModel) -> Result<Vec<Ca
 }
 
 impl Camera<'_> {
-    /// Line and sample of a point, and how many of them are a metre towards east and north; `None` of what it cannot see.
+    /// Line and sample of a point, and their change per metre towards east and north; `None` for a point that it cannot
+    /// see.
     fn sees(&self, ground_m: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
         let projector = self.oriented.projector(self.model).ok()?;
         let at = |point_m: &Vector3<f64>| self.oriented.line_and_sample(&projector, point_m).ok();
@@ -77,7 +78,7 @@ struct PlannedView {
     chips: Vec<(Lattice, Patch)>,
 }
 
-/// A place as one image has it.
+/// A place in one image.
 struct Sight {
     image: usize,
     marks: Vec<(Mark, Vector2<f64>)>,
@@ -102,7 +103,7 @@ impl Sight {
     }
 }
 
-/// Where the images see a place, and what is to be read of them; `None` where one of them does not see it.
+/// Where the images see a place, and which pixels are to be read; `None` where one of them does not see it.
 pub(super) fn plan(
     wanted: Wanted,
     before: &[Camera],
@@ -203,8 +204,8 @@ impl PlannedPlace {
         views.flat_map(|view| view.chips.iter_mut().map(|(_, patch)| patch))
     }
 
-    /// The place with its pieces. A piece has the marks that belong to its centre: around the kernels' place there is only that
-    /// one, else all of them.
+    /// The place with its pieces. A piece has the marks that belong to its centre: around the place by the kernels only
+    /// that mark, else all marks.
     pub(super) fn cut(self) -> Place {
         let centres = &self.centres;
         let views = self.views.into_iter().map(|view| {

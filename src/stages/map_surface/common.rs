@@ -13,18 +13,18 @@ use crate::{
     },
 };
 
-/// Lines and samples of the first image at which it is asked whether the second shows them too.
+/// Numbers of lines and samples of the first image at which overlap with the second is tested.
 const ASKED: [u32; 2] = [257, 33];
 /// Samples of the ground along a cell: as many as a cell has pixels of the coarser image, and one of these.
 const PER_CELL: [usize; 3] = [1, 3, 5];
-/// A sample of the ground may be so much smaller than a pixel of the coarser image.
+/// Smallest sample of the ground, pixels of the coarser image.
 const SAMPLE_PX_MIN: f64 = 0.6;
-/// Most cells of a terrain model: some hundred bytes each while it is made.
+/// Maximum number of cells of a terrain model: some hundred bytes each while it is made.
 const CELLS_MAX: usize = 1 << 24;
-/// Rays that converge by less are not matched: a pixel would be more than a hundred of height.
+/// Minimum convergence of rays: below it, a pixel of parallax is more than a hundred of height.
 const CONVERGENCE_MIN_RAD: f64 = 0.01;
 
-/// A pair that no surface can be made of.
+/// A pair that gives no surface.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum PairError {
     #[error("images {} and {} do not overlap according to their orientation", images[0], images[1])]
@@ -39,7 +39,7 @@ pub(super) enum PairError {
     )]
     Fine { cell_m: f64, least_m: f64 },
     #[error(
-        "surface.cell_m is {cell_m}, of which the common ground of the images has {cells}; expected at most {CELLS_MAX} cells"
+        "surface.cell_m is {cell_m}: the common ground of the images has {cells} cells of this size; expected at most {CELLS_MAX}"
     )]
     TooLarge { cell_m: f64, cells: usize },
 }
@@ -61,7 +61,7 @@ impl Cause for PairError {
     }
 }
 
-/// What two images have in common.
+/// The overlap of two images.
 pub(super) struct Common {
     /// Cells of the terrain model.
     pub(super) ground: Ground,
@@ -136,12 +136,12 @@ impl Common {
         self.ground.cell_m / self.per_cell as f64
     }
 
-    /// Metres of height for a sample of parallax at full size, about.
+    /// Approximate metres of height for a sample of parallax at full size.
     pub(super) fn height_of_sample_m(&self) -> f64 {
         self.sample_m() / self.convergence_rad.tan()
     }
 
-    /// The level that is so many times halved.
+    /// The level after `times` halvings.
     pub(super) fn level<'a>(&self, views: [&'a View<'a>; 2], times: usize) -> Level<'a> {
         let ground = self.ground.halved(times);
         let sample_m = ground.cell_m / self.per_cell as f64;
@@ -161,8 +161,8 @@ impl Common {
         }
     }
 
-    /// How often cells are halved at the coarsest level: until `reach_m` of height is few samples, as long as the images have
-    /// such halvings and the ground is wider than what is compared.
+    /// Halvings of the cells at the coarsest level: until `reach_m` of height is few samples, as long as the images
+    /// have such halvings and the ground is wider than the compared square.
     pub(super) fn halvings(&self, views: [&View<'_>; 2], reach_m: f64) -> usize {
         /// Samples that the coarsest level may have to search to either side.
         const FEW: f64 = 5.0;

@@ -61,8 +61,8 @@ fn summary(shots: &[ShotOnSurface]) -> Summary {
     Summary::of(&above_m)
 }
 
-/// Height of a shot above the model and its standard deviation: the shot's, the model's, and what the distance in plan makes of
-/// its slope there.
+/// Height of a shot above the model and its standard deviation: of the shot, of the model, and of the horizontal
+/// position times the slope there.
 fn on_model(
     model: &SurfaceModel,
     [longitude_rad, latitude_rad]: [f64; 2],

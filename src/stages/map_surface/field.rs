@@ -17,8 +17,8 @@ impl Field {
         }
     }
 
-    /// The number between four cells, of those at the edge beyond it; rows and columns count from the middle of the first
-    /// cell.
+    /// The number between four cells, beyond the edge that of the cells at the edge; rows and columns count from the
+    /// middle of the first cell.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -54,8 +54,8 @@ impl Field {
         }
     }
 
-    /// The field with its holes (NaN) closed by what lies around them, from coarser and coarser means; 0 where there is no
-    /// number at all.
+    /// The field with its holes (NaN) filled from coarser and coarser means around them; 0 where there is no number at
+    /// all.
     pub(super) fn filled(mut self) -> Self {
         if self.values.iter().all(|value| !value.is_nan()) {
             return self;
@@ -102,7 +102,7 @@ impl Field {
     }
 }
 
-/// Means along `runs` rows (step 1) or columns (step of a row) of so many numbers each.
+/// Means along `runs` rows (step 1) or columns (step of a row) of `length` numbers each.
 #[allow(
     clippy::cast_possible_truncation,
     reason = "the digits of the field are kept"
@@ -170,7 +170,7 @@ mod tests {
         let filled = holed.clone().filled();
         for (at, value) in filled.values.iter().enumerate() {
             if holed.values[at].is_nan() {
-                // Within what the plane changes over the hole and a cell around it.
+                // Within the change of the plane over the hole and a cell around it.
                 assert!((value - whole.values[at]).abs() < 15.0, "{value}");
             } else {
                 assert_eq!(value.to_bits(), whole.values[at].to_bits());

@@ -1,4 +1,4 @@
-//! The cells of a terrain model on the ground, at full size and halved again and again.
+//! The cells of a terrain model on the ground, at full size and repeatedly halved.
 
 use nalgebra::Vector3;
 
@@ -11,15 +11,15 @@ use crate::{
     units::{RADIANS_PER_DEGREE, wrap_pi},
 };
 
-/// Cells beyond what both images are expected to show, on every side: heights shift it.
+/// Cells beyond the expected common ground, on every side: heights shift it.
 const BEYOND: f64 = 2.0;
-/// Farther from the equator a map with even longitudes is not made, degrees.
+/// Largest latitude of the parallel of the map, degrees.
 const PARALLEL_MAX_DEG: f64 = 80.0;
 
 /// Cells with even longitudes and latitudes, square at the parallel of the map.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Ground {
-    /// The sphere of the body's maps, metres; heights count from it.
+    /// The sphere of the body's maps, metres; heights refer to it.
     pub(super) radius_m: f64,
     /// Latitude at which cells are as wide as high.
     pub(super) parallel_rad: f64,
@@ -71,7 +71,7 @@ impl Ground {
         })
     }
 
-    /// The same ground in cells that are so many times halved.
+    /// The same ground after `times` halvings of its resolution.
     pub(super) fn halved(&self, times: usize) -> Self {
         let factor = 1_usize << times;
         Self {
@@ -88,7 +88,8 @@ impl Ground {
         self.size[0] * self.size[1]
     }
 
-    /// The place so high above the sphere at a row and column, 0 in the middle of the first cell; body-fixed, metres.
+    /// The place at this height above the sphere at a row and column, 0 in the middle of the first cell; body-fixed,
+    /// metres.
     pub(super) fn place_m(&self, [row, column]: [f64; 2], height_m: f64) -> Vector3<f64> {
         let cell_rad = self.cell_m / self.radius_m;
         let longitude_rad = (self.west + column + 0.5) * cell_rad / self.parallel_rad.cos();

@@ -1,9 +1,9 @@
-//! One size of cells and images, and what is known of the ground when it is matched.
+//! One size of cells and images, and the known ground when it is matched.
 
 use super::{field::Field, ground::Ground};
 use crate::stages::image_view::View;
 
-/// What is matched at one level: its cells, and the images at a like size.
+/// One level: its cells, and the images at a similar size.
 pub(super) struct Level<'a> {
     pub(super) ground: Ground,
     /// Samples of the ground along the edge of a cell, an odd number.
@@ -13,10 +13,10 @@ pub(super) struct Level<'a> {
     pub(super) halvings: [usize; 2],
 }
 
-/// What is known of the ground when a level is matched.
+/// The known ground when a level is matched.
 pub(super) struct Known {
     /// Heights above the sphere, metres.
     pub(super) heights_m: Field,
-    /// How far the second image shows the ground aside of where the first has it, across the parallax, samples of the ground.
+    /// Offset of the ground in the second image against the first, across the parallax, samples of the ground.
     pub(super) aside: Field,
 }

@@ -1,4 +1,4 @@
-//! From coarse to fine: at every level heights are searched about those of the coarser one, then settled by least squares.
+//! From coarse to fine: at every level heights are searched about those of the coarser one, then refined by least squares.
 
 use rayon::prelude::*;
 
@@ -18,22 +18,22 @@ use crate::{
     watch::Watch,
 };
 
-/// Samples of the ground along the edge of a tile: what one thread holds of both images, some megabytes.
+/// Samples of the ground along the edge of a tile: a thread holds some megabytes of both images.
 const TILE: usize = 240;
-/// Around a tile: half of what is compared, and a sample for slopes.
+/// Margin around a tile: half of the compared square, and a sample for slopes.
 const MARGIN: usize = search::HALF + 2;
-/// Samples that finer levels search about what the coarser one found.
+/// Reach of finer levels about the result of the coarser one, samples.
 const REACH: usize = 2;
-/// Most samples that the coarsest level searches.
+/// Largest reach of the coarsest level, samples.
 const REACH_MAX: f64 = 40.0;
 /// Steps of least squares at the finest level, and at the others.
 const STEPS: [usize; 2] = [3, 1];
-/// Cells to either side over which the surface is smoothed on which images are laid: after a search, and between steps of least
-/// squares, where what it smooths away comes back.
+/// Cells to either side over which the surface under the images is smoothed: after a search, and between steps of least
+/// squares, which restore the smoothed detail.
 const SMOOTH: [usize; 2] = [2, 1];
-/// The same of how far images are apart across the parallax, which changes little.
+/// The same for the offset across the parallax, which changes little.
 const SMOOTH_ASIDE: usize = 6;
-/// Standard deviations of the heights that are known beforehand that are searched.
+/// Standard deviations of the a priori heights that the search covers.
 const SIGMAS: f64 = 3.0;
 
 /// Every cell at the finest level.
@@ -119,7 +119,7 @@ fn every_tile(
     Ok(cells)
 }
 
-/// Heights above the sphere by the altimeter's shots near by, and their largest standard deviation, metres.
+/// Heights above the sphere by the altimeter's nearby shots, and their largest standard deviation, metres.
 #[allow(
     clippy::cast_possible_truncation,
     reason = "heights of a planet keep a millimetre"

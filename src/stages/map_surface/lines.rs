@@ -12,7 +12,7 @@ use crate::{
     stages::{image_view::View, line_camera::LineCamera, shot_heights::Heights},
 };
 
-/// Two lines with their pixels, and what is known of the ground.
+/// Two lines with their pixels, and known places of the ground.
 #[derive(Debug, Clone, Copy)]
 pub struct LinesToMap<'a> {
     /// The body.
@@ -21,7 +21,7 @@ pub struct LinesToMap<'a> {
     pub pair: [(&'a LineCamera, &'a Pyramid); 2],
     /// Places of the ground as these lines see it, body-fixed, metres.
     pub ground_m: &'a [Vector3<f64>],
-    /// How far heights may be off these as a whole, metres.
+    /// Largest common error of heights against these, metres.
     pub off_m: f64,
     /// Edge of a cell, metres.
     pub cell_m: f64,

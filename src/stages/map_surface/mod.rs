@@ -1,15 +1,16 @@
 //! A terrain model of a pair of images, cell by cell.
 //!
-//! Both images are laid on the ground as it is known so far, from coarse to fine: where they differ the ground is higher or lower.
-//! Since each cell is looked at straight below and above its place, what is compared follows the epipolar curves of any camera.
-//! Heights are searched by correlation, then settled by least squares with either image as the template; a height that does not
-//! correlate, differs in the two directions or is contradicted by those around it is a hole. The altimeter judges the result.
+//! Both images are laid on the ground as it is known so far, from coarse to fine: where they differ, the ground is
+//! higher or lower. Since each cell is compared along its vertical, the comparison follows the epipolar curves of any
+//! camera. Heights are searched by correlation, then refined by least squares with either image as the template; a
+//! height that does not correlate, differs in the two directions or is contradicted by its neighbours is a hole. The
+//! altimeter validates the result.
 //!
 //! Both images are resampled at every halving of the cells, so that the epipolar curves of the camera need not be
 //! known; their difference is height along the parallax, and orientation across it. A thread holds tiles of at most 240
 //! samples and the margin of the comparison; cells are held whole, at most 2²⁴. Every tile sees the whole result of the
 //! step before, so that there are no seams and the number of threads changes no byte. Standard deviations are those of
-//! the matching; the common part of all heights is stated apart, by the adjustment.
+//! the matching; the common part of all heights is stated separately, by the adjustment.
 
 mod common;
 mod compare;
@@ -52,14 +53,14 @@ pub use result::{
     SurfaceModel,
 };
 
-/// Of the cells that were searched, the share that must be found for any of them to be believed: chance finds one in some
+/// Smallest share of searched cells that must be found for the result to be significant: chance finds one in some
 /// hundred.
 const FOUND_SHARE_MIN: f64 = 0.1;
-/// Cells along the longer side of what a page shows.
+/// Cells along the longer side of the model on a page.
 const LOOK: usize = 480;
 
 stage_inputs! {
-    /// Images with their best orientation and their pixels, what is known of heights, and what is asked for.
+    /// Images with their best orientation and their pixels, known heights, and the configuration.
     pub struct MapSurface<'a> {
         /// The images.
         pub images: SiteImages<'a>,
@@ -71,13 +72,13 @@ stage_inputs! {
         pub converted: &'a Output<Converted>,
         /// Profiles.
         pub profiles: &'a Output<Vec<Profile>>,
-        /// What is asked for.
+        /// Configuration of the terrain model.
         pub surface: &'a SurfaceConfig,
-        /// What is uncertain about shots.
+        /// Uncertainties of shots.
         pub mola_surface: &'a MolaSurfaceConfig,
-        /// What gave the images their orientation.
+        /// The adjustment that gave the images their orientation.
         pub adjusted: AdjustmentOfImages<'a>,
-        /// How far heights by the images may be off as a whole, metres.
+        /// Largest common error of heights by the images, metres.
         pub off_m: &'a f64,
     }
 }
@@ -117,19 +118,19 @@ impl Cause for SurfaceError {
     }
 }
 
-/// What was found of a cell.
+/// Result of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Found {
     /// Above the sphere, metres.
     height_m: f64,
     /// Standard deviation of that, metres.
     sigma_m: f64,
-    /// How far the second image has it aside, across the parallax, samples of the ground.
+    /// Offset of the second image across the parallax, samples of the ground.
     aside: f64,
     correlation: f64,
 }
 
-/// A cell; nothing where not both images show it.
+/// A cell; `None` where not both images show it.
 type Cell = Option<std::result::Result<Found, Unmatched>>;
 
 impl Stage for MapSurface<'_> {
@@ -201,16 +202,16 @@ impl MapSurface<'_> {
     }
 }
 
-/// What is asked for.
+/// Options of a terrain model.
 struct Options {
     body: Body,
     /// Edge of a cell, metres.
     cell_m: f64,
-    /// How far heights by the images may be off as a whole, metres.
+    /// Largest common error of heights by the images, metres.
     off_m: f64,
 }
 
-/// The surface of a pair, without a word of shots or adjustment.
+/// The surface of a pair, without statistics of shots or adjustment.
 fn map_surface(
     views: [&View<'_>; 2],
     heights: &Heights,
@@ -222,7 +223,7 @@ fn map_surface(
     Ok(told(&common, &cells))
 }
 
-/// The model of all cells, and what is told of them.
+/// The model of all cells, and its statistics.
 fn told(common: &Common, cells: &[Cell]) -> Surface {
     let mut unfilled = BTreeMap::new();
     let (mut found, mut count) = (Vec::new(), 0);

@@ -1,4 +1,4 @@
-//! Both images of a tile as they look when they are laid on a surface.
+//! Both images of a tile, laid on a surface.
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -8,7 +8,8 @@ use super::{
 };
 use crate::{error::Result, imaging::Patch};
 
-/// Room around what is read of an image: interpolation, smoothing, and the shift across the flight, pixels.
+/// Margin around the pixels that are read of an image: interpolation, smoothing, and the shift across the flight,
+/// pixels.
 const ROOM_PX: f64 = 6.0;
 
 /// Both images over a tile of the ground.
@@ -18,13 +19,13 @@ pub(super) struct Pair {
     heights_m: Vec<f32>,
     aside: Vec<f32>,
     pub(super) tile: Tile,
-    /// By how much the second image moves against the first for a metre of height, samples of the ground along both axes.
+    /// Shift of the second image against the first for a metre of height, samples of the ground along both axes.
     parallax: Vector2<f64>,
 }
 
 impl Pair {
-    /// What both images show of a tile, up to `reach` samples of parallax above and below what is known; `None` where one of
-    /// them looks elsewhere.
+    /// Both images of a tile, up to `reach` samples of parallax above and below the known heights; `None` where one of
+    /// them does not show it.
     ///
     /// # Errors
     /// The system's refusal to read the images' temporary files.
@@ -75,7 +76,7 @@ impl Pair {
         Matrix2::from_columns(&[along, Vector2::new(-along.y, along.x)])
     }
 
-    /// What each image shows at the samples of the tile so far above what is known; NaN where it shows nothing.
+    /// Each image at the samples of the tile, `above_m` above the known heights; NaN where it shows nothing.
     pub(super) fn laid(&self, above_m: f64) -> [Vec<f32>; 2] {
         let across = self.axes().column(1).into_owned();
         [(0, -0.5), (1, 0.5)].map(|(image, share)| {
@@ -90,12 +91,12 @@ impl Pair {
         })
     }
 
-    /// The height that is known at a sample, metres.
+    /// The known height at a sample, metres.
     pub(super) fn height_m(&self, at: usize) -> f64 {
         f64::from(self.heights_m[at])
     }
 
-    /// How far aside the second image has a sample.
+    /// Offset of the second image across the parallax at a sample.
     pub(super) fn aside(&self, at: usize) -> f64 {
         f64::from(self.aside[at])
     }

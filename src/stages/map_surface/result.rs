@@ -1,4 +1,4 @@
-//! A terrain model of a pair of images, and what is told of it.
+//! A terrain model of a pair of images, and its statistics.
 
 use std::collections::BTreeMap;
 
@@ -10,10 +10,10 @@ use crate::{
     ties::Unmatched,
 };
 
-/// A terrain model, and what a page tells of it.
+/// A terrain model with its statistics.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Surface {
-    /// What is told.
+    /// Statistics.
     pub account: SurfaceAccount,
     /// The model itself.
     pub model: SurfaceModel,
@@ -30,14 +30,14 @@ pub struct SurfaceModel {
     pub sigmas_m: Vec<f32>,
 }
 
-/// What is told of a terrain model.
+/// Statistics of a terrain model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SurfaceAccount {
     /// Indices of the images.
     pub images: [usize; 2],
     /// Edge of a cell, and of the samples of the ground on which images were compared, metres.
     pub cell_m: f64,
-    /// See there.
+    /// See `cell_m`.
     pub sample_m: f64,
     /// Edge of the square that was compared for one height, metres.
     pub compared_m: f64,
@@ -47,7 +47,7 @@ pub struct SurfaceAccount {
     pub filled: u32,
     /// The others by reason.
     pub unfilled: BTreeMap<Unmatched, u32>,
-    /// Whether so few cells were found that none of them is believed.
+    /// Whether too few cells were found to be significant; no height is then used.
     pub is_refused: bool,
     /// Angle between the rays of both images in the middle, radians.
     pub convergence_rad: f64,
@@ -57,15 +57,15 @@ pub struct SurfaceAccount {
     pub sigma_m: f64,
     /// Median correlation.
     pub correlation: f64,
-    /// Median distance of the images across the parallax, metres on the ground: what their orientations leave.
+    /// Median distance of the images across the parallax, metres on the ground: residual orientation errors.
     pub aside_m: f64,
-    /// Standard deviation of what all heights have in common, by the adjustment, metres; none where nothing says it.
+    /// Standard deviation of the common error of all heights, by the adjustment, metres; `None` where it is not known.
     pub common_sigma_m: Option<f64>,
-    /// Whether the shots controlled heights of the adjustment, so that they are no independent judge.
+    /// Whether the shots controlled heights of the adjustment and are therefore not independent.
     pub shots_take_part: bool,
     /// The altimeter's shots on it.
     pub shots: ShotComparison,
-    /// The model, reduced, for people.
+    /// The model in larger cells, for display.
     pub look: SurfaceLook,
 }
 
@@ -76,7 +76,7 @@ pub struct ShotComparison {
     pub shots: Vec<ShotOnSurface>,
     /// Heights of shots minus those of the model, metres.
     pub above_m: Summary,
-    /// Root mean square of the standard deviations of these differences about what they have in common, metres.
+    /// Root mean square of the standard deviations of these differences about their common part, metres.
     pub sigma_m: f64,
     /// Robust spread of the differences about their median in these standard deviations.
     pub spread_sigmas: f64,
@@ -95,7 +95,7 @@ pub struct ShotOnSurface {
     pub place_rad: [f64; 2],
     /// Its height minus that of the model, metres.
     pub above_m: f64,
-    /// Standard deviation of that about what all differences have in common, metres.
+    /// Standard deviation of that about the common part of all differences, metres.
     pub sigma_m: f64,
 }
 
@@ -118,7 +118,7 @@ pub struct SurfaceLook {
 }
 
 impl SurfaceModel {
-    /// A model of no cells, for an account that is told without it.
+    /// A model without cells, for statistics without a model.
     #[must_use]
     pub const fn nothing() -> Self {
         Self {

@@ -8,18 +8,19 @@ use super::{
 };
 use crate::{error::Result, ties::Unmatched};
 
-/// Half the edge of what is compared, samples of the ground.
+/// Half the edge of the compared square, samples of the ground.
 pub(super) const HALF: usize = 8;
-/// Least correlation.
+/// Minimum correlation.
 const CORRELATION_MIN: f64 = 0.5;
-/// Of the best correlation, what another height may have.
+/// Largest share of the best correlation that another height may have.
 const SECOND_MAX: f64 = 0.85;
-/// Heights that are nearer than this are one, samples of parallax.
+/// Heights closer than this count as one, samples of parallax.
 const APART: usize = 3;
-/// A standard deviation of grey values below this is noise: of one grey value smoothing leaves 0.4.
+/// A standard deviation of grey values below this is noise: smoothing leaves 0.4 of one grey value.
 const FLAT_DN: f64 = 0.8;
 
-/// Of every cell of a tile the height within `reach` samples of parallax of what is known at which the images are most alike.
+/// The height of every cell of a tile at which the images are most alike, within `reach` samples of parallax of the
+/// known one.
 ///
 /// # Errors
 /// The system's refusal to read the images' temporary files.
@@ -68,7 +69,7 @@ pub(super) fn search(
 fn best(alike: &[Alike], edge_px: f64) -> std::result::Result<(f64, f64), Unmatched> {
     let whole = alike.iter().filter(|of| of.whole);
     if whole.clone().count() == 0 {
-        // Half of what is compared, and what smoothing and interpolation take.
+        // Half of the compared square, and the margin of smoothing and interpolation.
         let near = edge_px < (HALF + 4) as f64;
         return Err(if near {
             Unmatched::Edge
@@ -110,7 +111,7 @@ fn best(alike: &[Alike], edge_px: f64) -> std::result::Result<(f64, f64), Unmatc
     Ok((peak as f64 + between, correlation))
 }
 
-/// How alike two images are about a place.
+/// Similarity of two images about a place.
 #[derive(Debug, Clone, Copy)]
 struct Alike {
     /// Normalised cross-correlation; −1 where it is not known.
@@ -138,7 +139,7 @@ impl Sums {
                 if one.is_nan() || other.is_nan() {
                     row[0] += 1.0;
                 } else {
-                    // Bytes lie about their middle: fewer digits are lost.
+                    // Numbers relative to the middle of a byte lose fewer digits.
                     let [a, b] = [one, other].map(|of| f64::from(*of) - 128.0);
                     for (sum, term) in row[1..].iter_mut().zip([a, b, a * a, b * b, a * b]) {
                         *sum += term;

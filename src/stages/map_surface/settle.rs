@@ -1,7 +1,7 @@
-//! Least squares over the pixels of both images: how much higher or lower a place is than the surface that they are laid on.
+//! Least squares over the pixels of both images: height of a place above or below the surface that they are laid on.
 //!
-//! Images on the right surface have no distortion against each other: what is left is a shift along the parallax, one across it
-//! (what the orientations are off by), an offset and a gain of the light.
+//! Images on the right surface have no distortion against each other: the unknowns are a shift along the parallax, one
+//! across it (orientation errors), an offset and a gain of the light.
 
 use nalgebra::{Matrix2, Matrix4, Vector4};
 
@@ -14,26 +14,27 @@ use super::{
 };
 use crate::{error::Result, ties::Unmatched};
 
-/// A cell farther from the surface has found something else, samples of parallax.
+/// Largest distance of a cell from the surface, samples of parallax; beyond it, the match is false.
 const SHIFT_MAX: f64 = 1.5;
-/// How far apart the two directions may have a place, samples.
+/// Largest difference of a place between the two directions, samples.
 const ONE_WAY: f64 = 0.25;
 /// Largest standard deviation of a shift, samples.
 const SIGMA_MAX: f64 = 0.5;
-/// Least correlation of what is compared.
+/// Minimum correlation of the compared squares.
 const CORRELATION_MIN: f64 = 0.6;
-/// What shifts a place besides noise, pixels: as for tie points, interpolation, whole grey values, and relief that no surface of
-/// cells follows.
+/// Systematic error of a place, pixels: as for tie points, interpolation, whole grey values, and relief that no surface
+/// of cells follows.
 pub(super) const SYSTEMATIC_PX: f64 = 0.06;
-/// Samples within which residuals go together: smoothing joins two, interpolation and the light on slopes a few more.
+/// Samples within which residuals are correlated: two by smoothing, a few more by interpolation and the light on
+/// slopes.
 const JOINED: usize = 6;
 /// Gains of the light that two images of the same ground may have.
 const GAIN: std::ops::RangeInclusive<f64> = 0.1..=10.0;
-/// Edge of what is compared, and its samples.
+/// Edge of the compared square, and its samples.
 const EDGE: usize = 2 * HALF + 1;
 const COUNT: usize = EDGE * EDGE;
 
-/// Of every cell of a tile its height by least squares about what is known.
+/// The height of every cell of a tile by least squares about the known one.
 ///
 /// # Errors
 /// The system's refusal to read the images' temporary files.
@@ -64,16 +65,16 @@ pub(super) fn settle(level: &Level<'_>, tile: Tile, known: &Known) -> Result<Vec
     Ok(settled.collect())
 }
 
-/// What is missing near an edge is the edge.
+/// Missing pixels near an edge count as the edge.
 fn at_edge(why: Unmatched, edge_px: f64) -> Unmatched {
     match why {
-        // Half of what is compared, and what smoothing, slopes and interpolation take.
+        // Half of the compared square, and the margin of smoothing, slopes and interpolation.
         Unmatched::Missing if edge_px < (HALF + 5) as f64 => Unmatched::Edge,
         why => why,
     }
 }
 
-/// An image of a tile, and how it changes along the parallax and across it.
+/// An image of a tile, and its gradients along the parallax and across it.
 struct Slopes {
     numbers: Vec<f32>,
     along: Vec<f32>,
@@ -146,7 +147,7 @@ fn shift(
     Ok(found)
 }
 
-/// How far the other image has to move to be like the template.
+/// The shift of the other image that fits the template.
 fn one_way(
     [template, other]: [&Slopes; 2],
     middle: [usize; 2],
@@ -158,7 +159,7 @@ fn one_way(
             first..first + EDGE
         })
     };
-    // Bytes lie about their middle: fewer digits are lost.
+    // Numbers relative to the middle of a byte lose fewer digits.
     let row = |at: usize| {
         let numbers = [other.numbers[at] - 128.0, other.along[at], other.across[at]];
         let [number, along, across] = numbers.map(f64::from);
@@ -172,7 +173,7 @@ fn one_way(
         right.axpy(left, &row, 1.0);
         square += left * left;
     }
-    // NaN is no whole square.
+    // NaN where pixels of the square are missing.
     if !(normals.sum() + square).is_finite() {
         return Err(Unmatched::Missing);
     }
@@ -203,8 +204,8 @@ fn one_way(
     })
 }
 
-/// The variance of a sum of terms of which near ones go together: of all sums over small squares, which is what weights that fall
-/// evenly to zero give (Newey & West 1987, in two dimensions).
+/// The variance of a sum of terms with correlated neighbours: from all sums over small squares, equivalent to weights
+/// that fall evenly to zero (Newey & West 1987, in two dimensions).
 fn joined(moves: &[f64; COUNT]) -> f64 {
     const ACROSS: usize = EDGE + 1;
     let mut sums = [0.0; ACROSS * ACROSS];

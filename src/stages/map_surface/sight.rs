@@ -1,4 +1,4 @@
-//! Where an image has the samples of a tile: exactly at nodes, between them by what changes evenly.
+//! Image coordinates of the samples of a tile: exact at nodes, interpolated between them.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use crate::stages::image_view::View;
 
 /// Samples from node to node. Over as many pixels an orientation bends by less than a thousandth of one.
 const STEP: usize = 16;
-/// Least height to either side of the middle at which nodes are asked, metres.
+/// Least height to either side of the middle at which nodes are computed, metres.
 const HEIGHTS_MIN_M: f64 = 60.0;
 
 /// Some cells, and the samples of the ground that matching them needs.
@@ -23,7 +23,7 @@ pub(super) struct Tile {
 }
 
 impl Tile {
-    /// Tiles over `size` cells, each of at most so many along an edge, with `margin` samples around them.
+    /// Tiles over `size` cells, each of at most `edge` cells along an edge, with `margin` samples around them.
     pub(super) fn all(size: [usize; 2], edge: usize, per_cell: usize, margin: usize) -> Vec<Self> {
         let spans = size.map(|length| {
             let starts = (0..length).step_by(edge);
@@ -69,7 +69,7 @@ impl Tile {
         sampled
     }
 
-    /// Every cell with its row-by-row number among so many `columns`, and the sample in its middle.
+    /// Every cell with its row-by-row number in a grid of `columns`, and the sample in its middle.
     pub(super) fn middles(
         &self,
         per_cell: usize,
@@ -98,12 +98,12 @@ pub(super) struct Sight {
     size_px: Vector2<f64>,
     /// Of the image for a sample of the ground along each axis.
     pub(super) px_per_sample: Matrix2<f64>,
-    /// Samples of the ground that the image sees farther on for a metre of height.
+    /// Displacement in the image for a metre of height, samples of the ground.
     pub(super) shift_per_m: Vector2<f64>,
 }
 
 impl Sight {
-    /// `None` where the orientation has no place for the middle of the tile.
+    /// `None` where the orientation gives no place for the middle of the tile.
     pub(super) fn of(
         view: &View<'_>,
         scale: f64,
@@ -181,7 +181,7 @@ impl Sight {
         for (at, height_m) in heights_m.iter().enumerate() {
             for above_m in [-reach_m, reach_m] {
                 let place = self.place_px(at, f64::from(*height_m) + above_m);
-                // What is no number changes nothing.
+                // NaN changes nothing.
                 low = low.zip_map(&place, f64::min);
                 high = high.zip_map(&place, f64::max);
             }
@@ -204,7 +204,7 @@ impl Sight {
     }
 }
 
-/// Numbers of all samples between nodes.
+/// Values of all samples, interpolated between nodes.
 fn between(
     nodes: &[[Vector2<f64>; 3]],
     counts: [usize; 2],

@@ -1,4 +1,5 @@
-//! Two invented cameras over invented ground: every height is held against the ground that the images were made of.
+//! Two invented cameras over invented ground: every height is compared with the ground from which the images were
+//! rendered.
 
 #![allow(
     clippy::cast_possible_truncation,
@@ -19,10 +20,10 @@ use crate::{
 
 /// Edge of a cell, metres: three pixels.
 const CELL_M: f64 = 14.0;
-/// One that is compared in halved images, for what need not be fine.
+/// A cell for tests that need no fine ground, compared in halved images.
 const COARSE_M: f64 = 45.0;
 
-/// Hills that shots do not show, the smallest of them no larger than what is compared for a height.
+/// Hills that shots do not show, the smallest of them no larger than the square that is compared for a height.
 fn hill_m(place_m: &Vector3<f64>) -> f64 {
     let [east, north] = [place_m.y, place_m.z];
     15.0 * (north / 400.0).sin()
@@ -32,7 +33,7 @@ fn hill_m(place_m: &Vector3<f64>) -> f64 {
         + 0.4 * ((east - 0.2 * north) / 9.0).cos()
 }
 
-/// What becomes of two images with these pixels, the second of which is believed to look `off_m` farther north and east.
+/// Terrain model of two images with these pixels; the assumed pointing of the second is `off_m` too far north and east.
 fn mapped(pixels: [&[u8]; 2], off_m: [f64; 2], cell_m: f64) -> Result<Surface> {
     let folder = tempfile::tempdir().unwrap();
     let pyramids = pixels.map(|pixels| Invented::pyramid(folder.path(), pixels));
@@ -63,7 +64,7 @@ fn errors(surface: &Surface) -> Vec<[f64; 2]> {
         .map(|(at, (height_m, sigma_m))| {
             let [longitude_rad, latitude_rad] =
                 grid.place_rad([(at / columns) as f64, (at % columns) as f64]);
-            // Hills change by less than a millimetre over what their own height moves a place.
+            // Hills change by less than a millimetre over the displacement that their height causes.
             let place_m = spherical_to_xyz_m(longitude_rad, latitude_rad, RADIUS_M);
             let truth_m = RADIUS_M + hill_m(&place_m) - grid.radius_m;
             let error_m = f64::from(*height_m) - truth_m;
@@ -77,7 +78,7 @@ fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
     (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
-/// Lines that came down: enough of the ground.
+/// Rendered lines of an image: enough of the ground.
 const DOWN: u32 = 560;
 
 /// The first lines of an image.
@@ -116,12 +117,12 @@ fn heights_are_within_what_they_state_and_their_bytes_are_those_of_any_thread() 
         account.sigma_m,
         account.aside_m
     );
-    // What both images show whole has heights: a cell near an edge has not all that is compared.
+    // Cells that both images show whole have heights; near an edge the compared square is incomplete.
     assert!(account.filled * 100 >= account.searched() * 99);
     assert!(account.filled > 5_000);
-    // A twentieth of a pixel, and the hills that are smaller than what is compared.
+    // A twentieth of a pixel, and the hills that are smaller than the compared square.
     assert!(rms_m <= 0.05 * account.height_of_pixel_m + 0.4, "{rms_m}");
-    // Ground as smooth as this is matched better than 0.06 pixels, what a tie point is said to be uncertain by at least.
+    // Ground as smooth as this is matched better than 0.06 pixels, the least stated uncertainty of a tie point.
     assert!((0.35..1.2).contains(&over), "{over}");
     assert!(within * 100 >= errors.len() * 99, "{within}");
     assert!(mean_m.abs() <= 0.3 * account.sigma_m, "{mean_m}");
@@ -159,7 +160,7 @@ fn a_metre_of_height_is_what_rays_that_meet_say() {
     let pixel_m = root_mean_square(common.pixels_m.into_iter());
     let of_pixel_m = common.height_of_sample_m() * pixel_m / common.sample_m();
     println!("{sigma_m:.2} m by intersection, {of_pixel_m:.2} m");
-    // Lines are as high as samples are wide to a third, which the intersection knows and the edge of a pixel does not.
+    // Line and sample spacings agree to a third, which the intersection takes into account and the edge of a pixel does not.
     assert!((sigma_m / of_pixel_m - 1.0).abs() < 0.3);
 }
 
@@ -188,7 +189,7 @@ fn other_pixels_and_other_orientations_give_no_surface_that_is_believed() {
         assert!(account.is_refused, "{what}: {account:?}");
         assert!(account.look.heights.heights_m.iter().all(|of| of.is_nan()));
     }
-    // Exchanged pixels are like orientations that err: relief comes out turned, where anything is found at all.
+    // Exchanged pixels resemble orientation errors: relief comes out inverted, where anything is found at all.
     let exchanged = mapped([&two, &one], [0.0; 2], COARSE_M).unwrap();
     println!(
         "exchanged: {} of {}",
@@ -198,13 +199,13 @@ fn other_pixels_and_other_orientations_give_no_surface_that_is_believed() {
         let rms_m = root_mean_square(errors(&exchanged).iter().map(|of| of[0]));
         assert!(rms_m > 10.0 * exchanged.account.sigma_m, "{rms_m}");
     }
-    // What never came down is counted, and the rest has heights.
+    // Missing lines are counted, and the rest has heights.
     let lines = (DOWN * 6 / 10 * SAMPLES) as usize;
     let account = mapped([&one, &two[..lines]], [0.0; 2], COARSE_M)
         .unwrap()
         .account;
     assert!(account.filled > 200, "{account:?}");
-    // Cells finer than a pixel, and images that look the same way, are refused with what to do.
+    // Cells finer than a pixel, and images that look the same way, are rejected with advice.
     let fine = mapped([&one, &two], [0.0; 2], 1.0).unwrap_err();
     assert!(
         fine.to_string()

@@ -1,24 +1,24 @@
-//! What is believed of the cells of a level, and the surface through them.
+//! Rejection of stray cells of a level, and the surface through the others.
 
 use rayon::prelude::*;
 
 use super::{Cell, Found, field::Field};
 use crate::ties::Unmatched;
 
-/// Half the edge of the square of cells in which a cell must not be alone.
+/// Half the edge of the square of neighbours of a cell.
 const HALF: usize = 2;
-/// Of the neighbours that were found, the share that must be near.
+/// Smallest share of the found neighbours that must be near.
 ///
 /// # Source
 /// Square, share and distance as Ames Stereo Pipeline filters by (rm-half-kernel 5, rm-min-matches 60, rm-threshold 3), in a
 /// square as large on the ground.
 const NEAR_SHARE_MIN: f64 = 0.6;
-/// What is near, samples of parallax.
+/// Largest difference of near heights, samples of parallax.
 const NEAR: f64 = 3.0;
-/// Fewer neighbours that were found tell nothing.
+/// Minimum number of found neighbours.
 const NEIGHBOURS_MIN: usize = 4;
 
-/// Leaves out cells that most of their neighbours contradict; `near_m` is a height of one sample of parallax.
+/// Leaves out cells that most of their neighbours contradict; `sample_m` is the height of one sample of parallax.
 pub(super) fn without_strays(cells: &[Cell], size: [usize; 2], sample_m: f64) -> Vec<Cell> {
     let [rows, columns] = size;
     let judged = cells.par_iter().enumerate().map(|(at, cell)| {

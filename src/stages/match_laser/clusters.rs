@@ -4,20 +4,20 @@ use rayon::prelude::*;
 
 use crate::geom::random::Random;
 
-/// Points of a unit: there are units enough when each has so many, and never more than so few would make.
+/// Points of a unit: at the initial number of units, and at the largest.
 const POINTS: [f64; 2] = [100.0, 30.0];
-/// By how much the number of units grows until they are compact.
+/// Factor by which the number of units grows until they are compact.
 const GROWTH: f64 = 1.25;
 /// Units are compact when the largest radius is below this, metres, and below the smallest distance of two centres.
 const RADIUS_M: f64 = 15_000.0;
-/// Steps of an iteration that should have stopped long before.
+/// Limit of an iteration that normally stops long before.
 const STEPS_MAX: usize = 100;
 
 /// The unit of every point.
 ///
 /// # Source
-/// Li et al. 2023, section 3.2 (eq. 17): `R`, the largest radius over the smallest distance of two centres, tells how many units
-/// there are; the paper gives no limit, ours is 1.
+/// Li et al. 2023, section 3.2 (eq. 17): `R`, the largest radius over the smallest distance of two centres, determines
+/// the number of units; the paper gives no limit, ours is 1.
 pub(super) fn clusters(places_m: &[[f64; 2]], seed: u64) -> Vec<usize> {
     let count = places_m.len() as f64;
     let [mut units, most] = POINTS.map(|points| (count / points).round().max(1.0));

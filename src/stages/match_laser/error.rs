@@ -1,8 +1,8 @@
-//! Why there is no match at all.
+//! Why matching fails.
 
 use crate::error::{Cause, Kind};
 
-/// No match.
+/// A failed match.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MatchError {
     /// Two files hold the same shots.
@@ -18,7 +18,7 @@ pub enum MatchError {
         "no shot lies on {ground}, which reaches from {west:.3} to {east:.3} degrees east and from {south:.3} to {north:.3} degrees of latitude"
     )]
     NoShots {
-        /// What ground.
+        /// The ground.
         ground: &'static str,
         /// Its edges, degrees.
         west: f64,

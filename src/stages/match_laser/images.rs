@@ -1,4 +1,4 @@
-//! Where images that the model was made from show ground points, by the same support data.
+//! Image coordinates of ground points in the images of the model, by the same support data.
 
 use super::result::MatchedPoint;
 use crate::{
@@ -6,7 +6,7 @@ use crate::{
     stages::line_camera::{LineCamera, NoSight},
 };
 
-/// Enters lines and samples into `points`, where an image shows what the model has at a point.
+/// Enters lines and samples into `points`, where an image shows the model's position of a point.
 pub(super) fn enter(
     cameras: &[LineCamera],
     points: &mut [MatchedPoint],

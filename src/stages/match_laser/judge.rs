@@ -10,21 +10,22 @@ use crate::stages::judge::{
     Verdict,
 };
 
-/// Fewest units: so many control points a calibration needs, and as many to hold back.
+/// Minimum number of units: the control points that a calibration needs, and as many withheld ones.
 const UNITS_MIN: usize = 10;
-/// Share of the units that match by themselves which must agree with each other: of shifts by chance few do.
+/// Smallest share of the matching units that must agree with each other: few chance shifts do.
 const AGREE_MIN: f64 = 0.5;
-/// Concordance takes a bias for a misfit, and moves to where there is less of it: on synthetic ground a bias of 0.4 of the relief
-/// drives shifts off by more than a cell (median), where correlation is off by less than half (`tests/stages/match_laser.rs`). Up to this share of the relief
-/// a bias costs half a per cent of similarity; and never beyond so many metres (the fact sheet's limit).
+/// Concordance treats a bias as a misfit and moves to where there is less of it: on synthetic ground a bias of 0.4 of
+/// the relief displaces shifts by more than a cell (median), where correlation is off by less than half
+/// (`tests/stages/match_laser.rs`). Up to this share of the relief a bias costs half a per cent of similarity; the
+/// limit never exceeds this many metres (the fact sheet's limit).
 const BIAS_SHARE: f64 = 0.1;
 const BIAS_MAX_M: f64 = 100.0;
-/// Standard deviations are widened so many times without a word.
+/// Widening of standard deviations above which a remark states it.
 const WIDENED_MAX: f64 = 2.0;
-/// What the two spheres in use for Mars differ by, and how near a bias is to be taken for it, metres.
+/// Difference between the two spheres in use for Mars, and tolerance within which a bias is attributed to it, metres.
 const SPHERES_M: [f64; 2] = [190.0, 25.0];
 
-/// Of all kept units the shots that were held out.
+/// The held-out shots of all kept units.
 pub(super) fn pooled(units: &[UnitResult]) -> Option<HeldOut> {
     let held_out = units.iter().filter(|unit| unit.is_kept());
     let held_out: Vec<HeldOut> = held_out.filter_map(|unit| unit.held_out).collect();
@@ -42,19 +43,19 @@ pub(super) fn pooled(units: &[UnitResult]) -> Option<HeldOut> {
     })
 }
 
-/// The largest bias, median over units by correlation, at which concordance sees where the model lies, metres; for the median
-/// relief of these units.
+/// The largest bias, median over units by correlation, at which concordance is usable, metres; for the median relief of
+/// these units.
 pub(super) fn bias_limit_m(relief_m: f64) -> f64 {
     (BIAS_SHARE * relief_m).min(BIAS_MAX_M)
 }
 
-/// What is known of a match when it is judged.
+/// The evidence on which a match is judged.
 pub(super) struct Evidence<'a> {
     pub(super) units: &'a [UnitResult],
-    /// Units that match by themselves, before those were refused that do not agree with the others.
+    /// Units that match, before rejection of those that do not agree with the others.
     pub(super) matching: usize,
     pub(super) similarity: Similarity,
-    /// Median of model minus laser by correlation, and the largest at which concordance sees something, metres.
+    /// Median of model minus laser by correlation, and the largest bias at which concordance is usable, metres.
     pub(super) located_m: Option<[f64; 2]>,
     /// Whether the measure was chosen by it.
     pub(super) is_auto: bool,
@@ -62,7 +63,7 @@ pub(super) struct Evidence<'a> {
     pub(super) widened: Option<Widened>,
     /// Limit on held-out shots.
     pub(super) limit_m: f64,
-    /// Whether somebody said what heights of the model count from.
+    /// Whether the reference radius of the model's heights is stated.
     pub(super) radius_is_stated: bool,
     pub(super) complaints: u64,
 }
@@ -80,15 +81,15 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
     let matching = of.matching;
     if (kept as f64) < AGREE_MIN * matching as f64 {
         reasons.push(format!(
-            "of {matching} units that match {kept} agree with each other; expected half of them: the others match by chance, and so \
-             may these"
+            "{kept} of {matching} matching units agree with each other; expected at least half: the others match by chance, and \
+             these may too"
         ));
     }
     if let Some(held_out) = &of.held_out
         && !(held_out.after_m <= of.limit_m)
     {
         reasons.push(format!(
-            "{} shots that were held out differ from the model by {:.1} m (root mean square, bias removed); expected at most {} m",
+            "{} held-out shots differ from the model by {:.1} m (root mean square, bias removed); expected at most {} m",
             held_out.shots, held_out.after_m, of.limit_m
         ));
     }
@@ -101,7 +102,7 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
     let refused = of.units.len() - kept;
     if refused > 0 {
         remarks.push(format!(
-            "units that are not kept, with reasons: {refused} of {}",
+            "units rejected, with reasons: {refused} of {}",
             of.units.len()
         ));
     }
@@ -142,7 +143,7 @@ fn checks(of: &Evidence<'_>, kept: usize) -> Vec<Check> {
         )
     }));
     checks.extend(of.located_m.map(|[bias_m, limit_m]| {
-        // Correlation sees no bias.
+        // Correlation is insensitive to bias.
         let broken = match of.similarity {
             Similarity::Ccc => Fail,
             Similarity::Pearson if of.is_auto => Warning,
@@ -153,26 +154,26 @@ fn checks(of: &Evidence<'_>, kept: usize) -> Vec<Check> {
     checks
 }
 
-/// That units scatter far more than their shots say, if they do.
+/// The remark that units scatter far more than their shots predict, if they do.
 fn scattered(widened: Widened) -> Option<String> {
     let Widened { shift, bias } = widened;
     (shift.max(bias) > WIDENED_MAX).then(|| {
         format!(
-            "units scatter more than their shots say, shifts {shift:.1} times and biases {bias:.1} times: the model errs in common over \
-             the shots of a unit; standard deviations are so much wider"
+            "units scatter more than their shots predict, shifts {shift:.1} times and biases {bias:.1} times: the shots of a unit share \
+             an error of the model; standard deviations are widened by these factors"
         )
     })
 }
 
-/// What is wrong with a bias, and what is doubtful.
+/// Reason and remark on a bias.
 fn bias([bias_m, limit_m]: [f64; 2], of: &Evidence<'_>) -> (Option<String>, Option<String>) {
     let lies =
-        format!("the model lies {bias_m:.0} m off the laser (median of units, by correlation)");
+        format!("the bias of the model is {bias_m:.0} m (median over all units, by correlation)");
     let [apart_m, near_m] = SPHERES_M;
     if !of.radius_is_stated && (bias_m.abs() - apart_m).abs() <= near_m {
         let wrong = format!(
-            "{lies}: the spheres of 3396000 m and 3396190 m, above either of which heights of Mars are given, differ by as much; \
-             say with --radius-m which it is"
+            "{lies}: the spheres of 3396000 m and 3396190 m, both in use as references of heights of Mars, differ by as much; \
+             state the sphere with --radius-m"
         );
         return (Some(wrong), None);
     }
@@ -180,15 +181,15 @@ fn bias([bias_m, limit_m]: [f64; 2], of: &Evidence<'_>) -> (Option<String>, Opti
     match of.similarity {
         Similarity::Ccc if is_beyond => {
             let wrong = format!(
-                "{lies}, and concordance takes heights as they are: beyond {limit_m:.0} m it drives shifts aside; check what heights \
-                 count from, or take --similarity auto"
+                "{lies}, and concordance does not remove it: beyond {limit_m:.0} m it displaces shifts; check the reference sphere \
+                 of the heights, or use --similarity auto"
             );
             (Some(wrong), None)
         }
         Similarity::Pearson if of.is_auto => {
             let doubt = format!(
-                "{lies}, more than the {limit_m:.0} m up to which concordance can be asked: units were matched by correlation, which \
-                 sees no bias"
+                "{lies}, more than the {limit_m:.0} m up to which concordance is usable: units were matched by correlation, which \
+                 is insensitive to bias"
             );
             (None, Some(doubt))
         }

@@ -1,10 +1,10 @@
-//! Laser profiles against a terrain model: units of shots with relief, each searched for where the model has its heights, judged by
-//! shots that were held out; a control point of every unit that is kept.
+//! Laser profiles against a terrain model: units of shots with relief, each matched to the heights of the model and
+//! validated by held-out shots; a control point of every kept unit.
 //!
 //! | file | content |
 //! |---|---|
 //! | `shots` | shots over the model, each once; tracks, segments, relief |
-//! | `clusters` | k-means with seeds of its own, sums in the order of the points |
+//! | `clusters` | k-means with its own seeds, sums in the order of the points |
 //! | `search` | similarity of all shifts by whole cells; the weights of each shot are computed once |
 //! | `settle` | the place between cells by a quadratic and least squares |
 //! | `units` | the result of the withheld shots |
@@ -17,8 +17,8 @@
 //! of all are rejected, and where fewer than half agree, all of it is.
 //!
 //! # Source
-//! Li et al. 2023, section 3.2: segments, relief filter, clusters, similarity (eq. 16–18). What the paper leaves open, and where we
-//! depart from it, stands at the constants.
+//! Li et al. 2023, section 3.2: segments, relief filter, clusters, similarity (eq. 16–18). Points that the paper leaves
+//! open and departures from it are documented at the constants.
 
 mod clusters;
 mod error;
@@ -123,7 +123,7 @@ pub fn match_laser(request: &MatchRequest, stop: &AtomicBool) -> Result<LaserMat
     Ok(matched(&asked, None, stop)?.0)
 }
 
-/// Which shots make which units, by their names: units that one model gave can be matched with another one.
+/// The shots of each unit, by name: units from one model can be matched with another.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UnitShots(Vec<(bool, Vec<String>)>);
 
@@ -153,7 +153,8 @@ impl UnitShots {
     }
 }
 
-/// Matches laser profiles with a terrain model that was made just now, some of the ground held back; and which shots made the units.
+/// Matches laser profiles with a terrain model in memory, part of the ground withheld; returns the shots of each unit
+/// too.
 ///
 /// * `units` – those of an earlier model; without them segments and clusters are made anew
 ///
@@ -170,14 +171,14 @@ pub fn match_model(
         cameras: request.images,
         options: request.options,
         held_back: Some(request.held_back),
-        // Its heights count from where its cameras have them.
+        // Its cameras define the reference of its heights.
         radius_is_stated: true,
         has_surfaces: false,
     };
     matched(&asked, units, stop)
 }
 
-/// Body-fixed places, metres, of at most `most` shots, evenly taken from all between west, south, east and north.
+/// Body-fixed positions, metres, of at most `most` shots, evenly selected from all between west, south, east and north.
 ///
 /// # Errors
 /// Files that cannot be read; no shot there; shots that two files hold; [`Stopped`].
@@ -218,14 +219,14 @@ fn no_shots(ground: &'static str, edges_rad: [f64; 4]) -> MatchError {
     }
 }
 
-/// What is matched.
+/// Input of a match.
 struct Asked<'a> {
     grid: &'a HeightGrid,
     pedr: &'a [PathBuf],
     cameras: &'a [LineCamera],
     options: &'a MatchOptions,
     held_back: Option<HeldBackGround>,
-    /// Whether somebody said what heights of the model count from.
+    /// Whether the reference radius of the model's heights is stated.
     radius_is_stated: bool,
     /// Whether pages show the similarities of units.
     has_surfaces: bool,
@@ -315,7 +316,7 @@ fn matched(
     Ok((told, UnitShots::of(&units)))
 }
 
-/// Units of the points of segments, in the order of their first points; behind them those of ground that is held back.
+/// Units of the points of segments, in the order of their first points; then those of withheld ground.
 fn units_of<'a>(
     grid: &HeightGrid,
     segments: &[&'a [Shot]],
@@ -349,16 +350,16 @@ fn units_of<'a>(
     units
 }
 
-/// What a search of all units gave.
+/// Result of the search of all units.
 struct Searched {
     units: Vec<UnitResult>,
     measure: Similarity,
-    /// Median of model minus laser by correlation, and the largest at which concordance sees something, metres.
+    /// Median of model minus laser by correlation, and the largest bias at which concordance is usable, metres.
     located_m: Option<[f64; 2]>,
 }
 
-/// Searches all units by the measure that was asked for. Correlation, which sees no bias, says how far the model lies off; without a
-/// measure that was asked for it stays where the bias is too large for concordance.
+/// Searches all units by the requested measure. Correlation, which is insensitive to bias, estimates the bias of the
+/// model; without a requested measure it is kept where the bias is too large for concordance.
 fn searched(grid: &HeightGrid, units: &[Unit<'_>], options: &MatchOptions) -> Searched {
     let by = |measure: Similarity| -> Vec<UnitResult> {
         units
@@ -390,8 +391,8 @@ fn searched(grid: &HeightGrid, units: &[Unit<'_>], options: &MatchOptions) -> Se
     }
 }
 
-/// Enters similarities at all shifts by the measure that ran, of every unit that was searched. They are computed for themselves,
-/// since most searches, of a calibration's rounds or of another measure, come on no page.
+/// Enters similarities at all shifts by the measure that ran, of every searched unit. They are computed separately,
+/// since most searches, in a calibration's rounds or by another measure, are not shown on a page.
 fn enter_surfaces(grid: &HeightGrid, units: &[Unit<'_>], search: &mut Searched, reach: u32) {
     let measure = search.measure;
     let each = units.par_iter().zip(&mut search.units);
@@ -399,7 +400,7 @@ fn enter_surfaces(grid: &HeightGrid, units: &[Unit<'_>], search: &mut Searched, 
         .for_each(|(unit, told)| told.similarity = Some(unit.surface(grid, measure, reach)));
 }
 
-/// Median of model minus laser over the units that are kept and do not judge, metres.
+/// Median of model minus laser over the kept units that are not withheld, metres.
 fn median_bias_m(units: &[UnitResult]) -> Option<f64> {
     let kept = units.iter().filter(|unit| unit.is_kept() && !unit.judges);
     let biases_m: Vec<f64> = kept.filter_map(|unit| Some(unit.found?.bias_m)).collect();

@@ -1,4 +1,4 @@
-//! What is asked of a match, and what it gives.
+//! Request and result of a match.
 
 use std::path::PathBuf;
 
@@ -16,33 +16,34 @@ use crate::{
 /// similarities above 0.9 and contrasts above 1.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MatchOptions {
-    /// Most points of a segment.
+    /// Maximum number of points of a segment.
     pub segment_points: usize,
     /// Population variance of laser heights that a segment must exceed, m².
     pub least_variance_m2: f64,
-    /// The measure; none takes `pearson` while the median bias exceeds a tenth of the relief, or 100 m, else `ccc`.
+    /// The measure; `None` selects `pearson` where the median bias exceeds a tenth of the relief, or 100 m, otherwise
+    /// `ccc`.
     pub similarity: Option<Similarity>,
-    /// Shifts are tried within so many cells.
+    /// Shifts are searched within this many cells.
     pub search_cells: u32,
     /// Similarity that a unit must exceed.
     pub least_score: f64,
-    /// What the best similarity over the mean of those above 0 must exceed.
+    /// Ratio of the best similarity to the mean of those above 0 that a unit must exceed.
     pub least_contrast: f64,
-    /// Largest root mean square of model minus laser, bias removed, over all shots that were held out, metres.
+    /// Largest root mean square of model minus laser, bias removed, over all held-out shots, metres.
     pub limit_m: f64,
-    /// Of the clusters.
+    /// Seed of the clusters.
     pub seed: u64,
     /// Shots that are taken.
     pub filter: ShotFilter,
 }
 
-/// Which ground is held back: every so manieth rectangle of a lattice, shifted by a seed. They do not depend on the model, so that
-/// a shot stays on its side whatever model it is matched with.
+/// Withheld ground: every *n*-th rectangle of a lattice, shifted by a seed. The rectangles do not depend on the model,
+/// so that a shot stays on its side with every model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct HeldBackGround {
-    /// Every so manieth rectangle.
+    /// Every *n*-th rectangle is withheld.
     pub every: u32,
-    /// Which of them.
+    /// Seed of the shift.
     pub seed: u64,
 }
 
@@ -55,22 +56,22 @@ pub struct ModelRequest<'a> {
     pub pedr: &'a [PathBuf],
     /// Images that it was made from.
     pub images: &'a [LineCamera],
-    /// How.
+    /// Options.
     pub options: &'a MatchOptions,
-    /// Ground that judges.
+    /// Withheld ground.
     pub held_back: HeldBackGround,
 }
 
 /// What to match.
 #[derive(Debug, Clone, Serialize)]
 pub struct MatchRequest {
-    /// How.
+    /// Options.
     pub options: MatchOptions,
     /// The body.
     pub body: Body,
-    /// Radius of the sphere that heights of the model count from, metres, where it is stated.
+    /// Radius of the reference sphere of the model's heights, metres, where it is stated.
     pub radius_m: Option<f64>,
-    /// Whether that is meant to be another sphere than that of the model's map.
+    /// Whether that sphere is meant to differ from that of the model's map.
     pub heights_apart: bool,
     /// The terrain model.
     #[serde(skip)]
@@ -92,14 +93,14 @@ pub struct MatchImage {
     pub isd: PathBuf,
 }
 
-/// What a match gives.
+/// The result of a match.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LaserMatch {
-    /// Radius of the sphere that heights of the model count from, metres.
+    /// Radius of the reference sphere of the model's heights, metres.
     pub radius_m: f64,
     /// Size of a cell towards the east and the north, metres.
     pub cell_m: [f64; 2],
-    /// Shots on the model, passes that they are of, and segments.
+    /// Shots on the model.
     pub shots: usize,
     /// Passes.
     pub tracks: usize,
@@ -113,9 +114,9 @@ pub struct LaserMatch {
     pub located_bias_m: Option<f64>,
     /// Median of model minus laser over the units that are kept, metres.
     pub bias_m: Option<f64>,
-    /// Of the kept units all shots that were held out.
+    /// All held-out shots of the kept units.
     pub held_out: Option<HeldOut>,
-    /// By how much their standard deviations were widened; none of too few units.
+    /// Widening of their standard deviations; `None` with too few units.
     pub widened: Option<Widened>,
     /// Every unit, kept or not.
     pub units: Vec<UnitResult>,
@@ -125,13 +126,13 @@ pub struct LaserMatch {
     pub images: Vec<String>,
     /// The verdict.
     pub verdict: Verdict,
-    /// What was left out.
+    /// Records and points that were left out.
     pub complaints: Vec<String>,
-    /// How much that is.
+    /// Their number.
     pub complaint_count: u64,
 }
 
-/// Model minus laser at shots that were held out: root mean squares about the bias of the shots that were used, metres.
+/// Model minus laser at held-out shots: root mean squares about the bias of the used shots, metres.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeldOut {
     /// Shots.
@@ -149,23 +150,23 @@ pub struct UnitResult {
     pub unit: usize,
     /// East longitude and latitude of its middle, radians.
     pub place_rad: [f64; 2],
-    /// Whether its ground is held back: it judges, and no other unit shares a shot with it.
+    /// Whether its ground is withheld: it validates, and no other unit shares a shot with it.
     pub judges: bool,
     /// Shots.
     pub shots: usize,
-    /// Passes that they are of.
+    /// Passes of these shots.
     pub strips: usize,
     /// Largest distance of a shot from the middle, metres.
     pub radius_m: f64,
     /// Standard deviation of its laser heights, metres.
     pub relief_m: f64,
-    /// What the search found; absent where there was none.
+    /// Result of the search; absent where it found no shift.
     pub found: Option<UnitMatch>,
-    /// Shots that were held out, where the model has heights with and without the shift.
+    /// Held-out shots, where the model has heights with and without the shift.
     pub held_out: Option<HeldOut>,
     /// Similarity over the shifts of that search; absent in matches of models that are made round by round.
     pub similarity: Option<SimilaritySurface>,
-    /// Why it is not kept; empty for one that is.
+    /// Why it is rejected; empty if it is kept.
     pub refused_because: String,
 }
 
@@ -177,7 +178,7 @@ impl UnitResult {
     }
 }
 
-/// What the search of a unit found: where the model has the ground, seen from where the laser has it.
+/// Result of the search of a unit: position of the ground in the model relative to that by the laser.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct UnitMatch {
     /// Shift to the east and the north, cells.
@@ -192,12 +193,12 @@ pub struct UnitMatch {
     pub contrast: f64,
     /// Mean of model minus laser over the shots that were used, metres.
     pub bias_m: f64,
-    /// Standard deviations; none where least squares have no place.
+    /// Standard deviations; `None` where least squares give no position.
     pub sigma: Option<MatchSigma>,
 }
 
-/// Standard deviations of a unit: those of leaving out single shots, widened as all units ask for ([`Widened`]). Errors of the laser
-/// that its shots share are not in them.
+/// Standard deviations of a unit: from leaving out single shots, widened by the scatter of all units ([`Widened`]).
+/// Errors of the laser that its shots share are not included.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MatchSigma {
     /// Of the shift to the east and the north, metres.
@@ -207,7 +208,7 @@ pub struct MatchSigma {
 }
 
 impl MatchSigma {
-    /// The same, so many times as wide.
+    /// The same, widened by these factors.
     pub(super) fn wider(self, by: Widened) -> Self {
         Self {
             shift_m: self.shift_m.map(|sigma_m| by.shift * sigma_m),
@@ -216,8 +217,9 @@ impl MatchSigma {
     }
 }
 
-/// By how much standard deviations of units were widened, 1 and more: by as much units scatter about a plane over the ground beyond
-/// what leaving out their shots says. A model errs in common over the shots of a unit, which these cannot tell.
+/// Factors by which standard deviations of units were widened, at least 1: scatter of units about a plane over the
+/// ground relative to that predicted by leaving out their shots. The shots of a unit share an error of the model, which
+/// they cannot show.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Widened {
     /// Of shifts.
@@ -231,15 +233,15 @@ pub struct Widened {
 pub struct MatchedPoint {
     /// Number of its unit.
     pub unit: usize,
-    /// Whether that is held back.
+    /// Whether that unit is withheld.
     pub judges: bool,
     /// File, record and shot.
     pub name: String,
     /// East longitude, latitude, radians, and radius, metres, by the laser.
     pub laser: [f64; 3],
-    /// The same where the model has it.
+    /// The same by the model.
     pub model: [f64; 3],
-    /// Standard deviations of what the two differ by towards the east, the north and up, metres, by the matching alone.
+    /// Standard deviations of their difference towards the east, the north and up, metres, from the matching only.
     pub sigma_m: [f64; 3],
     /// Line and sample in each image, where the image shows it.
     pub in_images: Vec<Option<[f64; 2]>>,

@@ -1,8 +1,8 @@
-//! How units scatter about each other: what their own shots cannot tell of their standard deviations.
+//! Scatter of units: the part of their standard deviations that their own shots do not show.
 //!
-//! A model is shifted by an error of the orientation that it was made with, which changes evenly over the ground: shifts and biases of
-//! units lie about a plane. What they lie off it is error of the model over a unit, which all of its shots share, so that leaving out
-//! single shots does not show it.
+//! An orientation error shifts a model by an amount that changes linearly over the ground: shifts and biases of units
+//! lie about a plane. Deviations from it are errors of the model that all shots of a unit share, so that leaving out
+//! single shots does not show them.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -12,19 +12,19 @@ use crate::{
     units::wrap_pi,
 };
 
-/// Fewest units by which it is told: three make a plane.
+/// Minimum number of units: three make a plane.
 const UNITS_MIN: usize = 10;
 /// Unknowns of a plane.
 const UNKNOWNS: f64 = 3.0;
-/// Rounds of weighing; the last ones change nothing that matters.
+/// Rounds of reweighting; the last ones change nothing significant.
 const ROUNDS: usize = 20;
-/// A unit that lies off the plane by more than this many widened standard deviations and so many cells was matched by chance.
+/// A unit farther from the plane than this many widened standard deviations and this many cells was matched by chance.
 const OFF_SIGMAS: f64 = 5.0;
 const OFF_CELLS: f64 = 1.0;
-/// Standard deviations are not smaller than steps of least squares, cells and metres.
+/// Lower bounds of standard deviations: the steps of least squares, cells and metres.
 const FLOOR: [f64; 3] = [1e-3, 1e-3, 1e-3];
 
-/// A unit's place, from a common one in units of their spread, and what is known there.
+/// A unit's position, relative to the mean in units of their spread, and its values.
 struct Seen {
     /// Index of the unit.
     unit: usize,
@@ -34,7 +34,7 @@ struct Seen {
     sigmas: [f64; 3],
 }
 
-/// A plane through values of units, and what they are off it.
+/// A plane through values of units, and their residuals.
 struct Plane {
     off: Vec<f64>,
     /// The same over standard deviations.
@@ -42,7 +42,7 @@ struct Plane {
 }
 
 impl Plane {
-    /// Through one of the values, units weighed down that lie far off it.
+    /// Through one of the values, with lower weights for units far from it.
     fn of(seen: &[Seen], at: usize) -> Option<Self> {
         let robust = RobustWeight::Huber {
             limit: RobustWeight::HUBER_LIMIT,
@@ -79,7 +79,7 @@ impl Plane {
     }
 }
 
-/// Robust standard deviation of residuals of so many planes about these.
+/// Robust standard deviation of residuals about this many planes.
 fn spread(normalised: &[f64], planes: f64) -> f64 {
     let count = normalised.len() as f64;
     Summary::of(normalised).nmad * (count / (count - planes * UNKNOWNS)).sqrt()
@@ -112,8 +112,8 @@ fn seen(units: &[UnitResult], cell_m: [f64; 2]) -> Vec<Seen> {
     seen
 }
 
-/// Widens the standard deviations of all units by how those that are kept and do not judge scatter about a plane, and refuses those of
-/// them that lie far off it; `None` and nothing done where they are too few or lie on a line.
+/// Widens the standard deviations of all units by the scatter of kept units that are not withheld about a plane, and
+/// rejects those of them that are far from it; `None`, with nothing changed, where they are too few or lie on a line.
 ///
 /// * `cell_m` – size of a cell towards the east and the north, metres
 pub(super) fn widen(units: &mut [UnitResult], cell_m: [f64; 2]) -> Option<Widened> {
@@ -136,7 +136,7 @@ pub(super) fn widen(units: &mut [UnitResult], cell_m: [f64; 2]) -> Option<Widene
         let sigmas = east.normalised[index].hypot(north.normalised[index]) / widened.shift;
         if off_cells > OFF_CELLS && sigmas > OFF_SIGMAS {
             units[of.unit].refused_because = format!(
-                "its shift lies {off_cells:.1} cells, {sigmas:.0} standard deviations, off what the units around have; expected at most \
+                "its shift is {off_cells:.1} cells, {sigmas:.0} standard deviations, from the plane through the units; expected at most \
                  {OFF_CELLS} cell or {OFF_SIGMAS} standard deviations"
             );
         }
@@ -159,7 +159,7 @@ mod tests {
 
     const CELL_M: [f64; 2] = [100.0, 100.0];
 
-    /// Units on a slanting plane, each off it by `times` its standard deviation.
+    /// Units on a slanting plane, each deviating by `times` its standard deviation.
     fn units(count: usize, times: f64) -> Vec<UnitResult> {
         let mut random = Random::new(7, "units about a plane");
         let of = |unit: usize| {
@@ -215,7 +215,7 @@ mod tests {
             for (before, after) in before.iter().zip(&after) {
                 let sigma = |of: &UnitResult| of.found.and_then(|of| of.sigma).map(|of| of.bias_m);
                 let ratio = sigma(after).zip(sigma(before)).map(|(a, b)| a / b);
-                // Judging units with the others.
+                // Withheld units are widened too.
                 assert_eq!(
                     ratio.map(|of| (1e9 * of).round()),
                     widened.map(|of| (1e9 * of.bias).round())

@@ -1,4 +1,4 @@
-//! Where the heights of a unit fit those of the model best: all shifts by whole cells, then the place between them.
+//! The shift at which the heights of a unit fit the model best: all shifts by whole cells, then between them.
 
 use super::{
     shots::Shot,
@@ -9,13 +9,13 @@ use crate::geom::height_grid::HeightGrid;
 
 /// Share of a unit's points that must have a height in the model, at every shift that counts.
 const COVERED: f64 = 0.9;
-/// Heights of the model vary by this factor more or less than the laser's at most: in kilometres they vary by a thousandth.
+/// Largest ratio of the relief of model and laser, either way: heights in kilometres have a thousandth of the relief.
 const RELIEF: f64 = 2.0;
 
 /// The best shift of a unit, of all within some cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Best {
-    /// How far the model lies from the laser, rows (southwards) and columns (eastwards), between whole cells.
+    /// Shift of the model against the laser, rows (southwards) and columns (eastwards), between whole cells.
     pub(super) shift: [f64; 2],
     /// Similarity at the nearest whole cells.
     pub(super) score: f64,
@@ -84,8 +84,9 @@ impl Surface {
     }
 }
 
-/// Where the quadratic through a value and its neighbours is largest, rows and columns from the middle, at most 1; the middle
-/// itself where it has no such place. Peaks are ridges where shots lie on parallel passes: rows and columns go together.
+/// Maximum of the quadratic through a value and its neighbours, rows and columns from the middle, at most 1; the middle
+/// itself where it has no maximum. Where shots lie on parallel passes, peaks are ridges: rows and columns are
+/// correlated.
 fn vertex(around: &[[Option<f64>; 3]; 3]) -> Option<[f64; 2]> {
     let [
         [north_west, north, north_east],
@@ -112,7 +113,7 @@ fn vertex(around: &[[Option<f64>; 3]; 3]) -> Option<[f64; 2]> {
     })
 }
 
-/// Shots with their heights from near the mean.
+/// Shots with heights relative to their mean.
 struct Moved<'a> {
     shots: &'a [&'a Shot],
     mean_m: f64,
@@ -129,7 +130,7 @@ impl<'a> Moved<'a> {
         }
     }
 
-    /// Moments at a shift by whole cells, where the model has heights enough.
+    /// Moments at a shift by whole cells, where the model has enough heights.
     fn moments(&self, grid: &HeightGrid, shift: [i64; 2]) -> Option<Moments> {
         self.taken(|shot| grid.probed_m(&shot.probe, shift))
     }
@@ -171,7 +172,7 @@ pub(super) fn moments(grid: &HeightGrid, shots: &[&Shot], shift: [f64; 2]) -> Op
     Moved::of(shots).taken(|shot| shifted_m(grid, shot, shift))
 }
 
-/// Height of the model where a shot lies with a shift.
+/// Height of the model at a shifted shot.
 pub(super) fn shifted_m(grid: &HeightGrid, shot: &Shot, shift: [f64; 2]) -> Option<f64> {
     grid.height_m([shot.cell[0] + shift[0], shot.cell[1] + shift[1]])
 }
@@ -191,7 +192,7 @@ pub(super) fn rms_m(
     is_covered.then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
 }
 
-/// Whether the relief of model and laser is of one size.
+/// Whether model and laser have relief of similar size.
 pub(super) fn is_one_relief(moments: &Moments) -> bool {
     let [model, laser] = moments.variances();
     let ratio = (model / laser).sqrt();
@@ -205,7 +206,7 @@ mod tests {
 
     const SIZE: usize = 120;
 
-    /// Ground that repeats nowhere near: waves of incommensurable lengths, in cells.
+    /// Ground without nearby repetition: waves of incommensurable lengths, in cells.
     fn ground_m(row: f64, column: f64) -> f64 {
         let waves = [
             [0.11, 0.05, 300.0],
@@ -278,7 +279,7 @@ mod tests {
             let best = find(&model, &shots, measure, 20);
             assert!(
                 best.is_some_and(|best| {
-                    // A quadratic stands for the peak, heights between cells for the ground: tenths of a cell.
+                    // A quadratic approximates the peak, interpolated heights the ground: tenths of a cell.
                     (best.shift[0] - 7.0).hypot(best.shift[1] - 12.0) < 0.25
                         && best.score > 0.99
                         && !best.at_border
@@ -294,7 +295,7 @@ mod tests {
         let shots = shots();
         let shots: Vec<&Shot> = shots.iter().collect();
         let best = find(&model, &shots, Similarity::Ccc, 20);
-        // A quadratic stands for the peak, a ridge as the passes are nearly parallel: tenths of a cell.
+        // A quadratic approximates the peak, a ridge as the passes are nearly parallel: tenths of a cell.
         assert!(
             best.is_some_and(|best| (best.shift[0] + 3.4).hypot(best.shift[1] - 5.7) < 0.2),
             "{best:?}"

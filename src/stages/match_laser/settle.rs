@@ -1,7 +1,8 @@
-//! The place of a unit between cells by least squares: where model and laser differ least about a bias, and how well that is known.
+//! The position of a unit between cells by least squares: the shift at which model and laser differ least about a bias,
+//! and its precision.
 //!
-//! A quadratic through similarities a cell apart errs by tenths of a cell on ground that is rough within a cell. Standard deviations are
-//! those of leaving out one shot after the other, as the model errs by other amounts here than there.
+//! A quadratic through similarities a cell apart errs by tenths of a cell on ground that is rough within a cell.
+//! Standard deviations come from leaving out one shot after the other, as errors of the model vary with position.
 //!
 //! # Source
 //! Leaving out: MacKinnon & White 1985, *Some heteroskedasticity-consistent covariance matrix estimators*, HC3, which is the jackknife of
@@ -12,17 +13,17 @@ use nalgebra::{Matrix3, Vector3};
 use super::{search::shifted_m, shots::Shot};
 use crate::geom::height_grid::HeightGrid;
 
-/// Steps that are tried, and the length of the last, cells.
+/// Maximum number of steps, and the length of the last, cells.
 const STEPS: usize = 30;
 const STEP: f64 = 1e-3;
-/// Slopes are taken over so many cells to either side.
+/// Slopes are taken over this many cells to either side.
 const SIDE: f64 = 0.5;
-/// A place farther from where similarity has it is another one, cells.
+/// Largest distance from the position by similarity, cells.
 const FAR: f64 = 1.0;
-/// Leverage of a shot from which the place is what this shot makes it: the others leave it open.
+/// Leverage of a shot above which this shot determines the position: the others do not.
 const LEVERAGE_MAX: f64 = 0.9;
 
-/// Where least squares have a unit.
+/// Position of a unit by least squares.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Settled {
     /// Rows (southwards) and columns (eastwards), cells.
@@ -33,18 +34,19 @@ pub(super) struct Settled {
     pub(super) sigma_bias_m: f64,
 }
 
-/// Why least squares have no place for a unit.
+/// Why least squares give no position for a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Unsettled {
-    /// Steps lead away, or do not end.
-    #[error("least squares find no place within a cell of its best shift")]
+    /// Steps diverge, or do not end.
+    #[error("least squares find no position within a cell of its best shift")]
     NotFound,
-    /// Without one of the shots the place would be open.
-    #[error("its place hangs on one shot")]
+    /// Without one of the shots the position would not be determined.
+    #[error("its position depends on one shot")]
     OneShot,
 }
 
-/// Differences of model and laser about a shift: normal equations of bias and shift, and of every shot its row and what it misses.
+/// Differences of model and laser about a shift: normal equations of bias and shift, and the row and residual of every
+/// shot.
 struct Linear {
     normals: Matrix3<f64>,
     right: Vector3<f64>,
@@ -110,7 +112,7 @@ pub(super) fn settled(
         let solved = linear.normals.cholesky().ok_or(Unsettled::NotFound)?;
         let step = solved.solve(&linear.right);
         let step = [step[1], step[2]];
-        // On ground that is rough within a cell whole steps may lead to and fro for ever.
+        // On ground that is rough within a cell, full steps may oscillate indefinitely.
         if step[0] * last[0] + step[1] * last[1] < 0.0 {
             damping *= 0.5;
         }
@@ -126,7 +128,7 @@ pub(super) fn settled(
             let [sigma_bias_m, south, east] = Linear::at(grid, shots, shift).sigmas()?;
             return Ok(Settled {
                 shift,
-                // A step that was shortened to its end may leave the way open that it asks for.
+                // A damped step may end short of the full step, which adds to the standard deviation.
                 sigma_cells: [south.hypot(step[0]), east.hypot(step[1])],
                 sigma_bias_m,
             });

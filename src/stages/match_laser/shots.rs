@@ -20,19 +20,19 @@ use crate::{
     units::wrap_two_pi,
 };
 
-/// A track ends where latitude jumps so far from one shot to the next, radians (0.1°, as in the program of Li et al. 2023), or
-/// after so long without a shot, seconds: 100 km of flight.
+/// A track ends where latitude jumps by this angle between shots, radians (0.1°, as in the program of Li et al. 2023),
+/// or after this time without a shot, seconds: 100 km of flight.
 const JUMP_RAD: f64 = 0.1 * std::f64::consts::PI / 180.0;
 const PAUSE_S: f64 = 30.0;
 /// A segment ends at a gap of three spacings of shots, which come every 0.1 s.
 const GAP_S: f64 = 0.3;
-/// Of the points of a segment so many must have a height in the model.
+/// Share of a segment's points that must have a height in the model.
 const COVERED: f64 = 13.0 / 15.0;
-/// Edges to the east and the north of a rectangle of ground that is held back or not: a few units of shots, and two segments of a
-/// profile, which runs north or south; and the radius on which they are as long, metres.
+/// Edges to the east and the north of a rectangle of ground that is withheld or not, metres: a few units of shots, and
+/// two segments of a profile, which runs north or south; and the radius at which they have this length, metres.
 const HELD_BACK_M: [f64; 2] = [5_000.0, 10_000.0];
 const RADIUS_M: f64 = 3_396_190.0;
-/// Complaints kept with their text; all are counted.
+/// Maximum number of complaints that are kept with their text; all are counted.
 const COMPLAINTS_MAX: usize = 1_000;
 
 /// A shot over the model.
@@ -51,12 +51,12 @@ pub(super) struct Shot {
     pub(super) probe: Probe,
     /// Towards the east and the north from the middle of the model, metres.
     pub(super) plan_m: [f64; 2],
-    /// Which pass over the box.
+    /// Number of the pass over the box.
     pub(super) track: usize,
 }
 
 impl Shot {
-    /// Whether it lies on ground that is held back.
+    /// Whether it lies on withheld ground.
     #[allow(
         clippy::cast_possible_truncation,
         reason = "rectangles of a planet are some thousands"
@@ -67,10 +67,10 @@ impl Shot {
         };
         let [width_rad, height_rad] = HELD_BACK_M.map(|edge_m| edge_m / RADIUS_M);
         let row = (self.latitude_rad / height_rad).floor();
-        // So wide at the southern edge of the row: rows need not know of each other.
+        // Width at the southern edge of the row, independent of other rows.
         let east_rad = width_rad / (row * height_rad).cos().max(0.01);
         let column = (self.longitude_rad / east_rad).floor();
-        // Rows shifted by half of the distance: held-back rectangles surround each other evenly.
+        // Rows are shifted by half the distance, so that withheld rectangles are evenly spaced.
         let half = i64::from((every / 2).max(1));
         let place = column as i64 + half * row as i64;
         let shift = (seed % u64::from(every)).cast_signed();
@@ -78,7 +78,7 @@ impl Shot {
     }
 }
 
-/// What a search gave.
+/// Result of a search.
 #[derive(Default)]
 pub(super) struct Shots {
     pub(super) shots: Vec<Shot>,
@@ -149,7 +149,7 @@ struct Gathered<'a> {
 }
 
 impl Gathered<'_> {
-    /// Makes sure that no file before holds one of these shots.
+    /// Checks that no earlier file holds one of these shots.
     fn require_distinct(&mut self, file: usize, footprints: &Footprints<AsRead>) -> Result<()> {
         let Some((_, other)) = self.seen.take_all(file, &footprints.et_tag_s) else {
             return Ok(());
@@ -217,7 +217,7 @@ impl Shots {
         self.tracks = self.shots.last().map_or(0, |last| last.track + 1);
     }
 
-    /// Segments: shots of one track without a gap, at most so many, none of them half on ground that is held back.
+    /// Segments: at most `points` shots of one track without a gap, either all or none of them on withheld ground.
     pub(super) fn segments(
         &self,
         points: usize,

@@ -1,12 +1,12 @@
-//! How alike two series of heights are.
+//! Similarity of two series of heights.
 
 use serde::{Deserialize, Serialize};
 
-/// A measure of how alike the heights of a terrain model and of a laser are.
+/// A measure of the similarity of the heights of a terrain model and of a laser.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Similarity {
-    /// Concordance: 1 for equal heights alone.
+    /// Concordance: 1 only for equal heights.
     Ccc,
     /// Correlation: 1 for heights that differ by a constant and a factor.
     Pearson,
@@ -15,7 +15,7 @@ pub enum Similarity {
 }
 
 impl Similarity {
-    /// Its word on the command line and in products.
+    /// Its name on the command line and in products.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -36,7 +36,7 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// Takes a pair of numbers, which should be counted from near their means: sums of squares lose digits otherwise.
+    /// Adds a pair of numbers, which should be relative to about their means: sums of squares lose digits otherwise.
     pub fn add(&mut self, model: f64, laser: f64) {
         self.count += 1.0;
         self.sums[0] += model;
@@ -67,7 +67,7 @@ impl Moments {
         })
     }
 
-    /// How alike they are; `None` where a series is flat and the measure has no value.
+    /// Their similarity; `None` where a series is flat and the measure has no value.
     ///
     /// # Source
     /// Li et al. 2023, eq. 18: `ρ_c = 2 cov / (σ² + σ² + (μ − μ)²)`, never above the correlation in size.
@@ -82,7 +82,7 @@ impl Moments {
             Similarity::Pearson => (model * laser).sqrt(),
             Similarity::CccBiasRemoved => 0.5 * (model + laser),
         };
-        // Written so that no numbers at all have no value either.
+        // Written so that empty series have no value either.
         (over > 1e-9).then(|| covariance / over)
     }
 }

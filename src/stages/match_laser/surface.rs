@@ -1,8 +1,8 @@
-//! How alike the heights of a unit are at all shifts, as pictures need it.
+//! Similarity of the heights of a unit at all shifts, for display.
 
 use serde::{Deserialize, Serialize};
 
-/// Most values from side to side: all shifts of a search within 70 cells one by one.
+/// Maximum number of values from side to side: every shift of a search within 70 cells.
 const SIDE_MAX: i64 = 141;
 /// Levels above that of similarity 0.
 const STEPS: f64 = 254.0;
@@ -10,7 +10,7 @@ const STEPS: f64 = 254.0;
 /// Similarity over the shifts of a search, in levels of a byte.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SimilaritySurface {
-    /// A value stands for so many by so many shifts, and is their best; odd, so that one value has no shift in its middle.
+    /// Edge of the square of shifts of which a value is the best; odd, so that one value is centred on the zero shift.
     pub step_cells: u32,
     /// Values from that one to each side.
     pub reach: u32,
@@ -42,7 +42,7 @@ impl SimilaritySurface {
         }
     }
 
-    /// Place of a level between similarity 0 and 1; none where nothing is known.
+    /// Place of a level between similarity 0 and 1; `None` where the similarity is not known.
     #[must_use]
     pub fn share(level: u8) -> Option<f64> {
         let above = level.checked_sub(1)?;
@@ -80,7 +80,7 @@ fn level(similarity: Option<f64>) -> u8 {
 mod tests {
     use super::*;
 
-    /// A peak of 0.9 at row 3, column −5, and nothing known of column 7.
+    /// A peak of 0.9 at row 3, column −5, and no value in column 7.
     fn peak([row, column]: [i64; 2]) -> Option<f64> {
         let far = ((row - 3) as f64).hypot((column + 5) as f64);
         (column != 7).then_some(0.9 - 0.1 * far)
@@ -117,7 +117,7 @@ mod tests {
             let of = SimilaritySurface::of(reach, peak);
             let step = i64::from(of.step_cells);
             assert!(of.side() <= 141 && step % 2 == 1);
-            // All shifts are in it, and no row is of shifts beyond the search alone.
+            // It holds all shifts, and no row is entirely beyond the search.
             let edge = i64::from(of.reach) * step;
             assert!(edge + step / 2 >= reach && edge - step / 2 <= reach);
             assert_eq!(of.levels.iter().max(), Some(&175));

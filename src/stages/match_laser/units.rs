@@ -1,4 +1,4 @@
-//! Units: their search, and what shots say that took no part in it.
+//! Units: their search, and its validation by held-out shots.
 
 use super::{
     result::{HeldOut, MatchOptions, MatchSigma, MatchedPoint, UnitMatch, UnitResult},
@@ -10,15 +10,16 @@ use super::{
 };
 use crate::geom::{height_grid::HeightGrid, statistics::Summary};
 
-/// Every so manieth shot of a unit is held out.
+/// Every *n*-th shot of a unit is held out.
 const HELD_OUT_EVERY: usize = 4;
-/// A unit has more points than this, of at least so many passes.
+/// A unit has more points than this, of at least this many passes.
 const POINTS_MIN: usize = 15;
 const STRIPS_MIN: usize = 2;
-/// A shift below a cell cannot make held-out shots better; they may be worse by this share.
+/// A shift below a cell cannot improve held-out shots; they may be worse by this factor.
 const NO_SHIFT_SHARE: f64 = 1.1;
-/// Shifts of units differ by less than this from their median, cells: an orbit drifts by 7 over an image (Li et al. 2023: 0.01 m
-/// a line over 24,000 lines, cells of 35.8 m). Of narrow searches by less than this share: of shifts by chance a tenth agrees so.
+/// Largest difference of a unit's shift from the median, cells: an orbit drifts by 7 over an image (Li et al. 2023:
+/// 0.01 m a line over 24,000 lines, cells of 35.8 m). In narrow searches the limit is this share of the reach: a tenth
+/// of chance shifts agree so closely.
 const AGREE_CELLS: f64 = 10.0;
 const AGREE_SHARE: f64 = 1.0 / 3.0;
 
@@ -72,7 +73,7 @@ impl<'a> Unit<'a> {
         }
     }
 
-    /// Whether its ground is held back.
+    /// Whether its ground is withheld.
     pub(super) const fn judges(&self) -> bool {
         self.told.judges
     }
@@ -83,7 +84,7 @@ impl<'a> Unit<'a> {
         shots.map(|shot| shot.name.clone()).collect()
     }
 
-    /// Searches the unit, and judges what is found by its own shots.
+    /// Searches the unit and validates the result with its own shots.
     pub(super) fn matched(
         &self,
         grid: &HeightGrid,
@@ -95,7 +96,7 @@ impl<'a> Unit<'a> {
         told
     }
 
-    /// How alike its heights are at all shifts of the search.
+    /// Similarity of its heights at all shifts of the search.
     pub(super) fn surface(
         &self,
         grid: &HeightGrid,
@@ -105,7 +106,7 @@ impl<'a> Unit<'a> {
         surface(grid, &self.used, measure, reach)
     }
 
-    /// Why the unit is not kept, after what is found is entered.
+    /// Enters the result; returns why the unit is rejected, empty if it is kept.
     fn judged(
         &self,
         grid: &HeightGrid,
@@ -136,7 +137,7 @@ impl<'a> Unit<'a> {
         let wrong = [
             (
                 best.at_border,
-                "its best shift lies at the border of the search, or of the model".to_owned(),
+                "its best shift is at the border of the search, or of the model".to_owned(),
             ),
             (
                 !(best.score > options.least_score),
@@ -168,7 +169,7 @@ impl<'a> Unit<'a> {
             .unwrap_or_default()
     }
 
-    /// What held-out shots say of a shift.
+    /// Held-out shots with and without a shift.
     fn held_out(&self, grid: &HeightGrid, shift: [f64; 2], bias_m: f64) -> Option<HeldOut> {
         let bias_before_m = moments(grid, &self.used, [0.0; 2])?.bias();
         Some(HeldOut {
@@ -178,8 +179,7 @@ impl<'a> Unit<'a> {
         })
     }
 
-    /// The control point of a unit that is kept: of the shots that were used the one nearest to their bias, so that its height
-    /// is no accident of its own.
+    /// The control point of a kept unit: the used shot nearest to their bias, so that its height is not an outlier.
     pub(super) fn point(&self, grid: &HeightGrid, told: &UnitResult) -> Option<MatchedPoint> {
         let found = told.found.as_ref()?;
         let sigma = found.sigma?;
@@ -211,7 +211,7 @@ impl<'a> Unit<'a> {
 
 fn found(grid: &HeightGrid, best: &Best, bias_m: f64, settled: Option<Settled>) -> UnitMatch {
     let [south, east] = best.shift;
-    // Not −south: no shift has no sign.
+    // Not −south: a zero shift has no sign.
     let shift_cells = [east, 0.0 - south];
     let of = |size: [f64; 2]| [shift_cells[0] * size[0], shift_cells[1] * size[1]];
     UnitMatch {
@@ -232,24 +232,24 @@ fn found(grid: &HeightGrid, best: &Best, bias_m: f64, settled: Option<Settled>) 
     }
 }
 
-/// Why held-out shots do not bear a shift out, if they do not.
+/// Why held-out shots do not confirm a shift, if they do not.
 fn not_better(held_out: Option<&HeldOut>, [south, east]: [f64; 2]) -> Option<String> {
     let Some(of) = held_out else {
-        return Some("the model has too few heights at the shots that were held out".to_owned());
+        return Some("the model has too few heights at the held-out shots".to_owned());
     };
     let is_shifted = south.hypot(east) >= 1.0;
     let most_m = of.before_m * if is_shifted { 1.0 } else { NO_SHIFT_SHARE };
-    // Written so that NaN is refused too.
+    // Written so that NaN is rejected too.
     (!(of.after_m < most_m)).then(|| {
         format!(
-            "shots that were held out are no better: {:.1} m without the shift, {:.1} m with it",
+            "the shift does not improve the held-out shots: {:.1} m without it, {:.1} m with it",
             of.before_m, of.after_m
         )
     })
 }
 
-/// Refuses units whose shift is far from the median of all that are kept so far and do not judge, for a search within so many cells;
-/// how many of these were kept before.
+/// Rejects units whose shift is far from the median of all kept units that are not withheld, for a search within
+/// `search_cells`; returns the number of these before.
 pub(super) fn refuse_lonely(units: &mut [UnitResult], search_cells: u32) -> usize {
     let most = AGREE_CELLS.min(AGREE_SHARE * f64::from(search_cells));
     let kept = units.iter().filter(|unit| unit.is_kept() && !unit.judges);
@@ -269,7 +269,7 @@ pub(super) fn refuse_lonely(units: &mut [UnitResult], search_cells: u32) -> usiz
         let [east, north] = [0, 1].map(|axis| found.shift_cells[axis] - median[axis]);
         if !(east.hypot(north) < most) {
             unit.refused_because = format!(
-                "its shift lies {:.0} cells from the median of all units; expected less than {most:.1}",
+                "its shift is {:.0} cells from the median of all units; expected less than {most:.1}",
                 east.hypot(north)
             );
         }

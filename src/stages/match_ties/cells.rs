@@ -16,11 +16,11 @@ use crate::{
 
 /// Cells that the common ground is cut into.
 const CELLS: f64 = 320.0;
-/// Lines and samples of an image at which it is asked whether the other shows them too.
+/// Numbers of lines and samples of an image at which overlap with the other is tested.
 const ASKED: [u32; 2] = [257, 33];
-/// Of the cells' noise in ascending order, the place of that which counts as the image's: texture only adds.
+/// Quantile of the cells' noise that counts as the noise of the image: texture only adds to it.
 const QUIET_SHARE: f64 = 0.25;
-/// Noise may leave a place as uncertain as this, pixels, or it is flat.
+/// Largest standard deviation of a place from noise, pixels; beyond it, the place is flat.
 const FLAT_PX: f64 = 0.2;
 
 /// A part of an image: lines and samples.
@@ -30,15 +30,15 @@ pub(super) struct Cell {
     samples: Range<usize>,
 }
 
-/// A place of a cell, or why it has none.
+/// A place of a cell, or why it has no place.
 pub(super) type Place = std::result::Result<Vector2<f64>, Unmatched>;
 
-/// What is common to two images, in pixels of the first.
+/// The overlap of two images, in pixels of the first.
 pub(super) struct Common {
     /// First and last line and sample that the other shows too.
     low: Vector2<f64>,
     high: Vector2<f64>,
-    /// Metres of a pixel of each image in the middle.
+    /// Size of a pixel of each image on the ground in the middle, metres.
     pub(super) spacing_m: [Vector2<f64>; 2],
     /// Distance from the first camera to the ground and from the second, in the middle, metres.
     pub(super) ranges_m: [f64; 2],
@@ -125,7 +125,7 @@ impl Common {
             .collect()
     }
 
-    /// Which of `parts` lines and samples of parts a place lies in.
+    /// The part that holds a place, of `parts` along lines and samples.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -146,8 +146,8 @@ impl Cell {
         Vector2::new(middle(&self.lines), middle(&self.samples))
     }
 
-    /// The pixels at `level` in which places are looked for, with those around them that templates need; of missing lines
-    /// the longest stretch between them. `None` where that is too short for a template.
+    /// The pixels at `level` that are searched for places, with the surroundings that templates need; where lines are
+    /// missing, the longest stretch between them. `None` where that is too short for a template.
     fn pixels(&self, pixels: &Pyramid, level: usize) -> Result<Option<Patch>> {
         let size = 1_usize << level;
         let margin = usize::try_from(HALF_LEAST_SQUARES + 1).unwrap_or_default();

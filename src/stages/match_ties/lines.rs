@@ -1,4 +1,4 @@
-//! The lines of one camera, which fly together: what they see of one ground.
+//! Tie points between the lines of one camera, which fly together.
 
 use std::sync::atomic::AtomicBool;
 
@@ -13,7 +13,7 @@ use crate::{
     ties::{MatchedPair, TiePoint},
 };
 
-/// Lines of a camera with their pixels, and what is known of the ground.
+/// Lines of a camera with their pixels, and known places of the ground.
 #[derive(Debug, Clone, Copy)]
 pub struct LinesToMatch<'a> {
     /// The body.
@@ -24,11 +24,11 @@ pub struct LinesToMatch<'a> {
     pub pixels: &'a [Pyramid],
     /// Places of the ground, body-fixed, metres.
     pub ground_m: &'a [Vector3<f64>],
-    /// How far a place may lie from where another line is expected to see it, metres on the ground.
+    /// Largest distance of a place from its expected position in another line, metres on the ground.
     pub reach_m: f64,
 }
 
-/// Tie points between lines, and what became of every pair of them.
+/// Tie points between lines, and statistics of every pair.
 #[derive(Debug)]
 pub struct TiesOfLines {
     /// The points, their images by index.
@@ -40,7 +40,7 @@ pub struct TiesOfLines {
 /// Measures tie points between all pairs of lines.
 ///
 /// # Errors
-/// An orientation that sees no ground; lines with no ground in common; nothing that is found; a stop.
+/// An orientation that sees no ground; lines with no ground in common; no tie point; a stop.
 pub fn match_lines(lines: &LinesToMatch<'_>, stop: &AtomicBool) -> Result<TiesOfLines> {
     let heights = Heights::at(lines.body, lines.ground_m.to_vec());
     let margin = Margin::within(lines.cameras.len(), lines.reach_m);

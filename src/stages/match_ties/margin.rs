@@ -1,4 +1,4 @@
-//! How far from where it is expected a place may lie: what is stated to be uncertain of the orientations.
+//! Search margin about an expected place, from the stated uncertainty of the orientations.
 
 use serde::Serialize;
 
@@ -10,17 +10,18 @@ use crate::{
 
 /// Standard deviations of uncertainty that a search covers.
 const SIGMAS: f64 = 3.0;
-/// How far an attitude read a second too late puts what nadir images see, metres: it turns by 0.9 mrad at 380 km.
+/// Displacement on the ground of nadir images per second of attitude delay, metres: the attitude turns by 0.9 mrad at
+/// 380 km.
 const ATTITUDE_CLOCK_M_S: f64 = 340.0;
-/// How far line times a second too late put it, metres.
+/// Displacement on the ground per second of line-time delay, metres.
 const LINE_TIMES_M_S: f64 = 3_000.0;
 
-/// How far the orientations of images may be off.
+/// Uncertainty of the orientations of images.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Margin {
     /// Standard deviations of each image's position, metres, and pointing, radians.
     images: Vec<[f64; 2]>,
-    /// No search reaches farther, metres: images of a site that is valid do not lie farther apart.
+    /// Largest reach of a search, metres: images of a valid site do not disagree by more.
     most_m: f64,
 }
 
@@ -39,7 +40,7 @@ impl Margin {
         }
     }
 
-    /// A margin that is the same for all of so many images, metres.
+    /// The same margin for all images, metres.
     pub(super) fn within(images: usize, most_m: f64) -> Self {
         Self {
             images: vec![[most_m, 0.0]; images],
@@ -47,7 +48,8 @@ impl Margin {
         }
     }
 
-    /// How far two images at these distances from the ground may have a place from where they are expected to, metres.
+    /// Largest distance of a place from its expected position, for two images at these distances from the ground,
+    /// metres.
     pub(super) fn reach_m(&self, images: [usize; 2], ranges_m: [f64; 2]) -> f64 {
         let squares = images.iter().zip(ranges_m).map(|(image, range_m)| {
             let [position_m, pointing_rad] = self.images.get(*image).copied().unwrap_or_default();
@@ -72,7 +74,7 @@ fn sigmas(config: &AdjustmentConfig, image: &str) -> [f64; 2] {
             norm(&config.position_sigma_m),
             norm(&config.rotation_sigma_rad),
         ],
-        // Rotations get what moves the ground as far.
+        // Rotations move the ground as far, hence √2.
         AdjustmentModel::Published => {
             let [nadir_m, off_nadir_m] = config.published_sigmas_m();
             [std::f64::consts::SQRT_2 * nadir_m.max(off_nadir_m), 0.0]

@@ -1,10 +1,11 @@
 //! Tie points that areograph measures itself.
 //!
-//! Of every pair of images with pixels the common ground is cut into cells. In each the place with the most texture is
-//! searched in the other image: where orientations and MOLA's heights expect it, distorted as they say, within the margin of
-//! what they are stated to be uncertain by, which is long along the epipolar curve where the height is uncertain. Correlation
-//! goes from coarse to fine, least squares ends it, and the same is done from the other image. What is ambiguous, flat or
-//! different in the two directions is counted and left out; blunders are left to the adjustment.
+//! The common ground of every pair of images with pixels is divided into cells. In each, the place with the most
+//! texture is searched in the other image: at the position and with the distortion that orientations and MOLA heights
+//! predict, within their stated uncertainty, which is long along the epipolar curve where the height is uncertain.
+//! Correlation proceeds from coarse to fine, least squares refines it, and the search is repeated from the other image.
+//! Ambiguous or flat places and those that differ in the two directions are counted and left out; blunders are left to
+//! the adjustment.
 //!
 //! Tie points belong to one pass: places, margins and standard deviations follow from one orientation. The second pass
 //! sees only the adjusted orientation of the first and matches all cells anew. The pixels of an image are in a
@@ -39,15 +40,15 @@ use crate::{
 pub use lines::{LinesToMatch, TiesOfLines, match_lines};
 pub use margin::Margin;
 
-/// A pair with fewer tie points is remarked on.
+/// A pair with fewer tie points gets a remark.
 const FEW_TIES: u32 = 60;
-/// Of the parts of the common ground, the share without a tie point above which that is remarked on.
+/// Share of the parts of the common ground without a tie point above which a remark states it.
 const EMPTY_PARTS_MAX: f64 = 0.25;
 
 stage_inputs! {
-    /// Images with one orientation and their pixels, what is known of heights, and the tie points of files.
+    /// Images with one orientation and their pixels, known heights, and the tie points of files.
     pub struct MatchTies<'a> {
-        /// Which orientation.
+        /// Round of the orientation.
         pub round: Round,
         /// The images.
         pub images: SiteImages<'a>,
@@ -59,9 +60,9 @@ stage_inputs! {
         pub converted: &'a Output<Converted>,
         /// Profiles.
         pub profiles: &'a Output<Vec<Profile>>,
-        /// How far the orientations may be off.
+        /// Uncertainty of the orientations.
         pub margin: &'a Margin,
-        /// What was read.
+        /// Tie points that were read.
         pub read: TiesOfFiles<'a>,
     }
 }
@@ -78,7 +79,7 @@ impl Input for TiesOfFiles<'_> {
     }
 }
 
-/// Nothing was matched.
+/// A failed match.
 #[derive(Debug, thiserror::Error)]
 enum MatchError {
     #[error("image {image}: its orientation sees no ground: {unseen}")]
@@ -101,7 +102,7 @@ impl Cause for MatchError {
             }
             Self::NothingMatched(_) => {
                 "check that images.pixels belong to these images, and that both show the same ground; if the \
-                 orientations are farther off than the margin, check start times, or give larger standard deviations \
+                 orientation errors exceed the margin, check start times, or give larger standard deviations \
                  in [adjustment]"
             }
         }
@@ -178,7 +179,7 @@ impl Stage for MatchTies<'_> {
     }
 }
 
-/// The tie points of files, and behind them those that were matched.
+/// The tie points of files, followed by those that were matched.
 fn joined(mut ties: Ties, matched: Vec<Matched>, images: &[OrientedImage<'_>]) -> Result<Ties> {
     if matched.is_empty() {
         if ties.points.is_empty() {
@@ -199,8 +200,8 @@ fn joined(mut ties: Ties, matched: Vec<Matched>, images: &[OrientedImage<'_>]) -
     Ok(ties)
 }
 
-/// One point for every place of an image that was found in others; where several pairs measured a place of their first image,
-/// it is as uncertain as in the worst of them.
+/// One point for every place of an image that was found in others; where several pairs measured a place of their first
+/// image, the largest standard deviations apply.
 fn points(matched: &[Matched]) -> Vec<TiePoint> {
     let mut known: BTreeMap<(usize, u64, u64), usize> = BTreeMap::new();
     let mut points: Vec<TiePoint> = Vec::new();
@@ -227,14 +228,14 @@ fn larger(one: &TieMeasure, other: &TieMeasure) -> Option<[f64; 2]> {
     Some([one[0].max(other[0]), one[1].max(other[1])])
 }
 
-/// What must be weighed of a pair, one sentence each.
+/// Remarks on a pair, one sentence each.
 fn remarks<'a>(pair: &MatchedPair, name: impl Fn(usize) -> &'a str) -> Vec<String> {
     let [first, second] = pair.images.map(name);
     let mut remarks = Vec::new();
     if pair.is_refused {
         remarks.push(format!(
-            "images {first} and {second}: {} of {} places are found within {:.0} m of where they are expected, which may be by \
-             chance, so that none is taken ({})",
+            "images {first} and {second}: {} of {} places are found within {:.0} m of their expected positions, too few to be \
+             significant; none is used ({})",
             pair.ties,
             pair.cells,
             pair.reach_m,

@@ -17,16 +17,16 @@ use crate::{
     watch::Watch,
 };
 
-/// How far apart the two directions may have a place, pixels.
+/// Largest difference of a place between the two directions, pixels.
 const ONE_WAY_PX: f64 = 0.25;
 /// Largest standard deviation of a tie point in an image, pixels.
 const SIGMA_MAX_PX: f64 = 0.3;
-/// Parts along and across the flight into which the common ground is cut to tell how tie points are distributed.
+/// Parts along and across the flight into which the common ground is divided to assess the distribution of tie points.
 const PARTS: [usize; 2] = [10, 2];
-/// Of the places that were searched, the share that must be found for any of them to be believed: chance finds one in
-/// some hundred.
+/// Smallest share of searched places that must be found for the result to be significant: chance finds one in some
+/// hundred.
 const FOUND_SHARE_MIN: f64 = 0.1;
-/// Fewer tie points of a pair are not believed.
+/// Minimum number of tie points of a pair.
 const TIES_MIN: u32 = 10;
 
 /// Tie points of a pair, each measured in the first image and in the second.
@@ -42,7 +42,7 @@ struct Placed {
     part: [usize; 2],
 }
 
-/// The part of the common ground that a cell lies in, and what became of its place.
+/// The part of the common ground of a cell, and the result of its place.
 type Tried = ([usize; 2], std::result::Result<Placed, Unmatched>);
 
 /// Tie points of the images with these indices; `None` where they have no ground in common.
@@ -132,7 +132,7 @@ fn both_ways(
     Ok(Ok(found))
 }
 
-/// Finds a place where the orientations and heights expect it, within the margin.
+/// Searches a place where orientations and heights predict it, within the margin.
 fn one_way(
     search: &Search<'_>,
     place: &Vector2<f64>,
@@ -150,8 +150,8 @@ fn one_way(
     search.find(&prediction.affine, &reach_px)
 }
 
-/// Standard deviations of lines and samples in both images: a match tells how one place lies against the other, so that either
-/// image gets half of the variance.
+/// Standard deviations of lines and samples in both images: a match determines one place relative to the other, so that
+/// each image gets half of the variance.
 fn sigmas(found: &Found) -> [[f64; 2]; 2] {
     let half = 0.5 * found.covariance_px2;
     let back = found
@@ -181,7 +181,7 @@ fn placed(found: &Found, indices: [usize; 2], part: [usize; 2]) -> Placed {
     }
 }
 
-/// The tie points of a pair, and what is told of all of its cells.
+/// The tie points of a pair, and statistics of all of its cells.
 fn account(tried: Vec<Tried>, images: [usize; 2], reach_m: f64) -> Matched {
     let cells = u32::try_from(tried.len()).unwrap_or(u32::MAX);
     let parts: BTreeSet<[usize; 2]> = tried.iter().map(|(part, _)| *part).collect();

@@ -1,4 +1,4 @@
-//! One place of an image in another one: from coarse to fine by correlation, at last by least squares.
+//! Search for one place of an image in another one: from coarse to fine by correlation, finally by least squares.
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -14,25 +14,25 @@ use crate::{
 const HALF: i64 = 10;
 /// Half the edge of the template of least squares, pixels.
 pub(super) const HALF_LEAST_SQUARES: i64 = 15;
-/// The search begins at the level at which it reaches so far at most, pixels.
+/// The search begins at the level at which its reach is at most this, pixels.
 const REACH_PX: f64 = 24.0;
 /// Near an edge the coarse templates do not fit: a finer one may then search farther, pixels.
 const REACH_MAX_PX: f64 = 64.0;
-/// How far the finer levels search about what the coarser one found, pixels.
+/// Reach of the finer levels about the result of the coarser one, pixels.
 const REFINED_PX: f64 = 3.0;
 /// Room that interpolation, smoothing and the steps of least squares need around a window, pixels.
 const ROOM_PX: f64 = 8.0;
-/// Least correlation of a search.
+/// Minimum correlation of a search.
 const CORRELATION_MIN: f64 = 0.5;
-/// Least correlation after least squares: a template of 31 pixels on unlike ground reaches 0.5 at most.
+/// Minimum correlation after least squares: a template of 31 pixels on unlike ground reaches 0.5 at most.
 const CORRELATION_AT_LAST_MIN: f64 = 0.7;
-/// Of the best correlation, what another peak may have.
+/// Largest share of the best correlation that another peak may have.
 const SECOND_MAX: f64 = 0.85;
-/// What shifts a place besides noise, pixels: interpolation and whole grey values (below 0.02 by the tests of `imaging`),
-/// and relief within the template, which no affine distortion follows: together 0.038 along the samples of the synthetic
-/// mission's roughest pair, whose pixels are 1.5 times as large in one image as in the other. Larger by half, since rims
-/// make some of these errors larger than a normal distribution has them: of three standard deviations 99 in 100 must be
-/// within.
+/// Systematic error of a place, pixels: interpolation and whole grey values (below 0.02 by the tests of `imaging`), and
+/// relief within the template, which no affine distortion follows: together 0.038 along the samples of the synthetic
+/// mission's roughest pair, whose pixels are 1.5 times as large in one image as in the other. The value is larger by
+/// half, since rims give these errors heavier tails than a normal distribution has: 99 in 100 must be within three
+/// standard deviations.
 const SYSTEMATIC_PX: f64 = 0.06;
 
 /// A place that was found.
@@ -44,7 +44,7 @@ pub(super) struct Found {
     pub(super) correlation: f64,
 }
 
-/// What is searched where.
+/// The images of a search.
 pub(super) struct Search<'a> {
     /// The image of the template, and the other.
     pub(super) views: [&'a View<'a>; 2],
@@ -52,7 +52,7 @@ pub(super) struct Search<'a> {
     pub(super) levels: [usize; 2],
 }
 
-/// What a step of the search gives: a failure of the place, or of the machine.
+/// Result of a step of the search: failures of the place, or of the system.
 type Step<T> = Result<std::result::Result<T, Unmatched>>;
 
 /// Leaves the function with a place that is not matched.
@@ -183,8 +183,8 @@ fn template(pixels: &Pyramid, level: usize, at_level: &Affine, half: i64) -> Ste
         .ok_or(Unmatched::Missing))
 }
 
-/// What the other image shows within `reach` pixels of where the template is expected, as the template's image would show
-/// it; less of it near the edge of the other image.
+/// The part of the other image within `reach` pixels of the expected place of the template, resampled to the template's
+/// image; less of it near the edge of the other image.
 fn area(
     pixels: &Pyramid,
     level: usize,
@@ -224,7 +224,7 @@ fn area(
         .ok_or(Unmatched::Edge))
 }
 
-/// First pixel and size of what the other image must have for a template and `reach` pixels around it.
+/// First pixel and size of the window of the other image that a template and `reach` pixels around it need.
 fn around(at_level: &Affine, template: &Patch, reach: &Vector2<f64>) -> ([i64; 2], [usize; 2]) {
     let half = Vector2::new(template.size[0] as f64, template.size[1] as f64) * 0.5;
     let room = at_level.matrix.abs() * half + reach + Vector2::repeat(ROOM_PX);
@@ -237,7 +237,7 @@ fn around(at_level: &Affine, template: &Patch, reach: &Vector2<f64>) -> ([i64; 2
     )
 }
 
-/// How many pixels around the template may be searched before and behind it on each axis, at most `steps`, so that
+/// Number of pixels before and behind the template that may be searched on each axis, at most `steps`, so that
 /// `window` of the other image holds all of it; `None` where it does not even hold the template.
 fn margins(
     at_level: &Affine,
@@ -262,7 +262,7 @@ fn margins(
         if outside.is_empty() {
             return Some(margins);
         }
-        // A side of which both corners are outside gives way first.
+        // Sides of which both corners are outside shrink first.
         let mut gives_way = |corners_min: usize| {
             let mut any = false;
             for (axis, sides) in margins.iter_mut().enumerate() {

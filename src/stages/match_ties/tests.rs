@@ -1,5 +1,4 @@
-//! Two invented cameras over invented ground: every tie point is held against where the second camera truly sees what the
-//! first one saw.
+//! Two invented cameras over invented ground: every tie point is compared with its true place in the second image.
 
 #![allow(
     clippy::cast_possible_truncation,
@@ -21,7 +20,7 @@ pub(in crate::stages) fn hill_m(place_m: &Vector3<f64>) -> f64 {
     15.0 * (place_m.z / 400.0).sin() + 10.0 * ((place_m.y + 0.3 * place_m.z) / 260.0).cos()
 }
 
-/// What becomes of two images with these pixels, the second of which is believed to look `off_m` farther north and east.
+/// Match of two images with these pixels; the assumed pointing of the second is `off_m` too far north and east.
 fn matched(pixels: [&[u8]; 2], off_m: [f64; 2], most_m: f64) -> Matched {
     let folder = tempfile::tempdir().unwrap();
     let pyramids = pixels.map(|pixels| Invented::pyramid(folder.path(), pixels));
@@ -39,7 +38,7 @@ fn matched(pixels: [&[u8]; 2], off_m: [f64; 2], most_m: f64) -> Matched {
     matched.unwrap().unwrap()
 }
 
-/// Differences from where the second camera truly sees what the first one sees, over their standard deviations.
+/// Errors in the second image, pixels and standard deviations.
 fn errors_px(matched: &Matched) -> Vec<[[f64; 2]; 2]> {
     let cameras = [Invented::camera(0, [0.0; 2]), Invented::camera(1, [0.0; 2])];
     let folder = tempfile::tempdir().unwrap();
@@ -77,7 +76,7 @@ fn matched_places_are_within_what_they_state_and_other_images_give_none() {
     let good = matched([&one, &two], [110.0, -70.0], 250.0);
     let errors = errors_px(&good);
     println!("{:?}", good.account);
-    // Of what both images show whole, nearly all.
+    // Nearly all cells that both images show whole.
     let edge = good.account.unmatched[&Unmatched::Edge];
     assert!(
         good.account.ties * 5 >= (good.account.cells - edge) * 4,
@@ -104,7 +103,7 @@ fn matched_places_are_within_what_they_state_and_other_images_give_none() {
             errors.len()
         );
     }
-    // The same bytes whatever the number of threads.
+    // The same bytes with any number of threads.
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build()
@@ -132,7 +131,7 @@ fn matched_places_are_within_what_they_state_and_other_images_give_none() {
         &Invented::waves(6),
         2,
     );
-    // Exchanged pixels are refused by their labels: nothing else could tell them from orientations that err.
+    // Exchanged pixels are rejected by their labels: nothing else distinguishes them from orientation errors.
     for (what, first, second) in [
         ("mirrored", &one, &mirrored),
         ("of another place", &one, &elsewhere),
@@ -157,7 +156,7 @@ fn matched_places_are_within_what_they_state_and_other_images_give_none() {
         found.account.unmatched[&Unmatched::Flat],
         found.account.cells
     );
-    // What never came down is counted, and the rest is matched.
+    // Missing lines are counted, and the rest is matched.
     let lines = LINES * 6 / 10;
     let found = matched([&one, &two[..(lines * SAMPLES) as usize]], [0.0; 2], 250.0);
     assert!(found.account.ties >= 80, "{:?}", found.account);

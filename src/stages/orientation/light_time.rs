@@ -22,15 +22,15 @@ use crate::{
     time::Et,
 };
 
-/// Steps of the search for the instant at which a position was left; each leaves 1e-5 of what the one before left.
+/// Steps of the search for the instant at which a position was left; each reduces the error to 1e-5 of that before it.
 const STEPS: u32 = 3;
 
-/// Where the rays of an exposure start.
+/// The origin of the rays of an exposure.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::stages) struct RayOrigin {
     /// The spacecraft relative to the centre of Mars.
     pub(in crate::stages) state: State,
-    /// Mars as it stands for the ground that is seen; stamped with the exposure's instant.
+    /// Orientation of Mars for the ground that is seen; stamped with the exposure's instant.
     pub(in crate::stages) to_mars: Rotation<J2000, BodyFixed>,
 }
 
@@ -38,7 +38,7 @@ impl RayOrigin {
     /// The origin at `exposure` of a camera that looks along `boresight`, J2000.
     ///
     /// # Errors
-    /// Kernels that do not reach there.
+    /// Kernels that do not cover the instant.
     /// # Accuracy
     /// For [`LightTime::Surface`] the light time is that to the ellipsoid along the boresight: ground one kilometre
     /// above it is seen 0.011 m (`v/c`) away along the track, and the limb at the edge of a wide-angle image, four times
@@ -77,12 +77,13 @@ impl RayOrigin {
 }
 
 impl OrientationSample {
-    /// When and where the spacecraft was, geometrically, if this is its position: the inverse of [`RayOrigin::at`].
+    /// Instant and geometric position of the spacecraft for which this is the position: the inverse of
+    /// [`RayOrigin::at`].
     ///
     /// # Errors
-    /// Kernels that do not reach there.
+    /// Kernels that do not cover the instant.
     /// # Accuracy
-    /// [`LightTime::Centre`] takes the velocity of the kernels: one that is 10 m/s off leaves 0.01 mm.
+    /// [`LightTime::Centre`] uses the velocity of the kernels: an error of 10 m/s leaves 0.01 mm.
     pub(in crate::stages) fn flown(
         &self,
         session: &Session,
@@ -96,7 +97,7 @@ impl OrientationSample {
                 let mars = session.mars_state(self.et)?;
                 let told_m = without_aberration_m(&seen.xyz_m, &mars.velocity_m_s);
                 let velocity_m_s = session.state(self.et)?.velocity_m_s;
-                // CSPICE's `LT` takes the light time of where the target is at the exposure.
+                // CSPICE's `LT` uses the light time to the position of the target at the exposure.
                 let (mut earlier_s, mut flown_m) = (light_time_s(told_m.norm()), told_m);
                 for _ in 0..STEPS {
                     let then = session.mars_state(self.et.plus(-earlier_s))?;
@@ -108,7 +109,7 @@ impl OrientationSample {
         }
     }
 
-    /// Mars as it stands for the ground that is seen, stamped with the exposure's instant.
+    /// Orientation of Mars for the ground that is seen, stamped with the exposure's instant.
     pub(in crate::stages) fn mars_seen(&self, light_time: LightTime) -> Rotation<J2000, BodyFixed> {
         match light_time {
             LightTime::None | LightTime::Centre | LightTime::Support => {
@@ -139,28 +140,28 @@ fn mars_at(left: Et, exposure: Et) -> Rotation<J2000, BodyFixed> {
     Rotation::new(*body_rotation(Body::Mars, left).matrix(), exposure)
 }
 
-/// What the convention of a run means for an image.
+/// Effect of the light-time convention of a run on an image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LightTimeEffect {
-    /// That of all positions of the camera.
+    /// The convention of all positions of the camera.
     pub convention: LightTime,
     /// Light time from the ground along the boresight in the middle of the image, seconds.
     #[schemars(range(min = 0.0))]
     pub light_time_s: f64,
-    /// The other conventions; none where the boresight misses the ground.
+    /// The other conventions; empty where the boresight misses the ground.
     pub others: Vec<OtherConvention>,
 }
 
-/// What another convention would make of an image, in the middle of it.
+/// Effect of another convention in the middle of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct OtherConvention {
-    /// The other one.
+    /// The other convention.
     pub convention: LightTime,
-    /// How far away on the ellipsoid the boresight would meet the ground, metres.
+    /// Shift of the boresight on the ellipsoid, metres.
     #[schemars(range(min = 0.0))]
     pub ground_m: f64,
-    /// By how many lines later the same ground would be found.
+    /// Shift of the same ground in lines, positive for later ones.
     pub lines: f64,
-    /// And at how many samples more.
+    /// Shift of the same ground in samples.
     pub samples: f64,
 }

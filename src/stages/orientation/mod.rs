@@ -35,7 +35,7 @@ const OUTLINE_INTERVALS: u32 = 10;
 pub struct Orientation {
     /// Image identifier.
     pub image: String,
-    /// The body that it sees.
+    /// The body that it shows.
     pub body: Body,
     /// Samples over the whole header image, both ends included.
     pub samples: Vec<OrientationSample>,
@@ -44,11 +44,11 @@ pub struct Orientation {
     pub outline: Option<Vec<GroundPoint>>,
     /// Tables for camera models, in J2000.
     pub tables: CameraTables,
-    /// What all positions here are, and how far others would be.
+    /// The light-time convention of all positions, and its difference from the others.
     pub light_time: LightTimeEffect,
     /// What the reader should know, one sentence each.
     pub notes: Vec<String>,
-    /// Why the orientation is not to be trusted; empty when it is valid.
+    /// Why the orientation is invalid; empty when it is valid.
     pub invalid_because: Vec<String>,
 }
 
@@ -61,14 +61,14 @@ pub struct OrientationSample {
     pub line_offset: f64,
     /// Perspective centre, where straight rays start: see [`LightTimeEffect`].
     pub position: Position<BodyFixed>,
-    /// How the camera looks.
+    /// Rotation from camera to Mars-fixed axes.
     pub camera_to_mars: Rotation<CameraFrame, BodyFixed>,
     /// The same rotation as ω, φ, κ.
     pub angles: OmegaPhiKappa,
     /// Where the boresight meets the ellipsoid, if it does.
     pub boresight: Option<BoresightGround>,
-    /// From the perspective centre to where the kernels have the spacecraft at the epoch, geometrically, body-fixed, metres: what
-    /// ranges are measured from.
+    /// From the perspective centre to the geometric position of the spacecraft by the kernels at the epoch, from where
+    /// ranges are measured; body-fixed, metres.
     pub to_spacecraft_m: Vector3<f64>,
 }
 
@@ -76,7 +76,7 @@ impl Orientation {
     /// [`OrientationSample::to_spacecraft_m`] between the samples, at `line_offset` lines from the middle.
     ///
     /// # Accuracy
-    /// Linear: over half a second the hundred metres to the apparent position bend by 1e-5 m.
+    /// Linear: over half a second the curvature of the hundred metres to the apparent position is 1e-5 m.
     #[must_use]
     pub fn to_spacecraft_m(&self, line_offset: f64) -> Vector3<f64> {
         let after = self
@@ -190,7 +190,7 @@ impl GroundPoint {
     }
 }
 
-/// Where the outer edges of the first and the last sample look, camera frame.
+/// Viewing directions of the outer edges of the first and the last sample, camera frame.
 fn swath_directions(image: &ImageTimes) -> [Vector3<f64>; 2] {
     let detector = image.detector();
     [0.0, detector.samples].map(|sample| detector.look(sample))

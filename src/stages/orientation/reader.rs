@@ -1,4 +1,4 @@
-//! The camera of an image as the kernels have it, at any instant.
+//! The camera of an image by the kernels, at any instant.
 
 use super::{Camera, RayOrigin};
 use crate::{
@@ -12,7 +12,7 @@ use crate::{
     time::{Et, PointingBias},
 };
 
-/// Reads where the camera of an image was and looked.
+/// Reads position and attitude of the camera of an image.
 #[derive(Clone, Copy)]
 pub(in crate::stages) struct CameraReader<'a> {
     /// Of the spacecraft that carries the camera.
@@ -26,8 +26,8 @@ pub(in crate::stages) struct CameraReader<'a> {
 impl CameraReader<'_> {
     /// Checks that position and attitude are covered over the image with its padding.
     ///
-    /// What is asked is what will be read: attitude at the exposures shifted by the pointing bias, positions as much
-    /// earlier as light may take.
+    /// The checked times are those that are read: attitude at the exposures shifted by the pointing bias, positions
+    /// earlier by up to the light time.
     ///
     /// # Errors
     /// A gap, named with its ends and the kernels beside it.
@@ -55,7 +55,7 @@ impl CameraReader<'_> {
         Ok(mounting * attitude.inertial_to_bus)
     }
 
-    /// Where the spacecraft is.
+    /// Geometric position of the spacecraft.
     pub(in crate::stages) fn geometric(&self, et: Et) -> Result<Position<BodyFixed>> {
         Ok(body_rotation(Body::Mars, et).apply(&self.session.state(et)?.position))
     }

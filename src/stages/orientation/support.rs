@@ -1,4 +1,4 @@
-//! Orientation by support data: the tables of the file on a uniform grid, interpolated as camera models do it.
+//! Orientation by support data: the tables of the file on a uniform grid, interpolated as in camera models.
 
 use super::tables::{CameraTables, InterpolationCheck};
 use crate::{frames::Rotation, pds::isd::SupportTables, time::Et};
@@ -9,9 +9,8 @@ const INTERVALS_MIN: usize = 30;
 impl CameraTables {
     /// The uniform tables of `support`, a node for every row of its attitudes.
     ///
-    /// Attitudes between rows lie on arcs, as usgscsm brings tables onto its own grid; positions are cubics. Rows that are
-    /// uniform stay what they are. From then on the grid is the orientation: nothing else is known of it, with which its
-    /// interpolation could be compared.
+    /// Attitudes between rows lie on arcs, as in usgscsm's resampling; positions are cubics. Uniform rows are
+    /// unchanged. The grid then defines the orientation: its interpolation has no reference.
     pub(in crate::stages) fn of_support(support: &SupportTables) -> Self {
         let span = support.span();
         let intervals = (support.pointing.et_s.len() - 1).max(INTERVALS_MIN);

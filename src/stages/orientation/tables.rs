@@ -1,4 +1,4 @@
-//! Tables of an orientation for camera models, and how well they are interpolated.
+//! Tables of an orientation for camera models, and their interpolation error.
 
 use nalgebra::{Matrix3, Vector3, Vector4};
 use serde::{Deserialize, Serialize};
@@ -15,10 +15,10 @@ use crate::{
     time::Et,
 };
 
-/// Where between two nodes the interpolation is compared with the kernels, shares of their distance.
+/// Points between two nodes at which the interpolation is compared with the kernels, shares of their distance.
 const CHECKED_AT: [f64; 3] = [0.25, 0.5, 0.75];
 
-/// Uniform tables from a little before to a little after the image, as camera models want them.
+/// Uniform tables from a little before to a little after the image, as camera models require.
 ///
 /// Positions follow the same convention as the samples, see [`super::LightTimeEffect`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -43,21 +43,21 @@ pub struct CameraTables {
     pub mars_angular_velocity_rad_s: Vec<Vector3<f64>>,
     /// Bus → camera, at the first epoch.
     pub bus_to_camera: Rotation<SpacecraftBus, CameraFrame>,
-    /// How well the tables are interpolated over the image.
+    /// Interpolation error of the tables over the image.
     pub interpolation: InterpolationCheck,
 }
 
 /// Interpolation between the nodes of [`CameraTables`], as camera models do it, against the kernels.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct InterpolationCheck {
-    /// Largest distance between what both see of the same ground, image pixels.
+    /// Largest distance between the image coordinates of the same ground by both, image pixels.
     pub error_max_px: f64,
-    /// Epochs that were compared; none of tables that are all that is known, those of support data.
+    /// Epochs that were compared; 0 for tables of support data, which have no reference.
     pub epochs: usize,
 }
 
 impl InterpolationCheck {
-    /// Largest error that tables should have, image pixels: tables with more get more nodes.
+    /// Largest acceptable error of tables, image pixels: tables with a larger one get more nodes.
     pub const LIMIT_PX: f64 = 0.01;
 
     /// Whether the error is below the limit.
@@ -89,7 +89,7 @@ impl InterpolationCheck {
     }
 }
 
-/// Where the camera is and how it looks at one instant.
+/// Position and rotation of the camera at one instant.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::stages) struct Camera {
     /// Perspective centre.
@@ -98,7 +98,7 @@ pub(in crate::stages) struct Camera {
     pub(in crate::stages) to_mars: Rotation<CameraFrame, BodyFixed>,
 }
 
-/// What a camera model makes of the nodes: rotated to Mars first, then interpolated.
+/// The nodes as a camera model uses them: rotated to Mars first, then interpolated.
 pub(in crate::stages) struct Nodes {
     start_s: f64,
     step_s: f64,
@@ -140,8 +140,8 @@ impl Nodes {
     }
 }
 
-/// How far apart two cameras see the same ground, in image pixels, at most over the middle and both ends
-/// of a line; the ground is taken as near as it can be, straight below.
+/// Largest distance between the image coordinates of the same ground in two cameras, in image pixels, over the middle
+/// and both ends of a line; the ground is assumed at its shortest range, at nadir.
 fn error_px(image: &ImageTimes, kernels: &Camera, interpolated: &Camera) -> f64 {
     let position_m = kernels.position.xyz_m;
     let distance_m = position_m.norm() - image.body.model().equatorial_radius_m;

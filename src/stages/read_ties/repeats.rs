@@ -26,7 +26,7 @@ fn place(measure: &TieMeasure) -> Place {
     (measure.image, line, sample)
 }
 
-/// Leaves out every point that was measured at the same places as an earlier one, and says how many these were.
+/// Leaves out every point that was measured at the same places as an earlier one, and reports their number.
 pub(super) fn leave_out(points: &mut Vec<TiePoint>) -> Option<String> {
     let mut known: BTreeMap<BTreeSet<Place>, String> = BTreeMap::new();
     let (mut repeated, mut example) = (0, None);
@@ -46,7 +46,7 @@ pub(super) fn leave_out(points: &mut Vec<TiePoint>) -> Option<String> {
     });
     example.map(|example| {
         format!(
-            "{repeated} repeat the measurements of another one and are left out, for example {example}"
+            "{repeated} repeat the measurements of another point and are omitted, for example {example}"
         )
     })
 }
@@ -64,7 +64,7 @@ impl fmt::Display for SharedPlaces {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             formatter,
-            "{} are measured at a place of another one, for example {}",
+            "{} are measured at the position of another point, for example {}",
             self.points, self.example
         )
     }

@@ -50,7 +50,7 @@ pub struct MethodRun {
     pub mean_step_lines: Vec<f64>,
 }
 
-/// An iteration's way to the line of one point.
+/// The steps of an iteration to the line of one point, and its result.
 type Way = (Vec<f64>, std::result::Result<Solution, Unseen>);
 
 /// All iterations, each with the evaluations of every point (0 without a result).

@@ -1,8 +1,7 @@
 //! Registration: which line and sample of an image sees each footprint.
 //!
-//! Every profile goes into every image, not only into the one exposed with it. Production is Newton's
-//! method; the published iterations run beside it on the same points, so that what they cost and how they
-//! converge is known for this site.
+//! Every profile goes into every image, not only into the one exposed with it. Production is Newton's method; the
+//! published iterations run beside it on the same points, so that their cost and convergence are known for this site.
 
 mod methods;
 mod points;
@@ -36,7 +35,7 @@ use crate::{
 pub use methods::{Method, MethodRun};
 pub use points::{PointOnImage, ProfileOnImage, RegisteredPoints};
 
-/// Points between two looks at whether the user stops the program.
+/// Points between two checks for a stop by the user.
 const POINTS_AT_ONCE: usize = 65_536;
 
 /// The footprints of a site in one image.
@@ -44,11 +43,11 @@ const POINTS_AT_ONCE: usize = 65_536;
 pub struct ImageRegistration {
     /// Image identifier.
     pub image: String,
-    /// The orientation that points were projected with.
+    /// The orientation with which points were projected.
     pub model: CameraModel,
     /// Points that have a line, ordered by profile, then by shot.
     pub points: RegisteredPoints,
-    /// Points that have none, by reason.
+    /// Points without a line, by reason.
     pub rejected: BTreeMap<String, u64>,
     /// One entry per profile, in the order of the profiles.
     pub profiles: Vec<ProfileOnImage>,
@@ -58,7 +57,7 @@ pub struct ImageRegistration {
     pub models: Vec<ModelDifference>,
 }
 
-/// What another model of the same image makes of the same points.
+/// Differences of another model of the same image at the same points.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ModelDifference {
     /// The other model.
@@ -74,7 +73,7 @@ pub struct ModelDifference {
 enum FootprintRejection {
     #[error(transparent)]
     Unseen(#[from] Unseen),
-    /// Mars itself stands between camera and point.
+    /// Mars is between camera and point.
     #[error("beyond the horizon")]
     BeyondHorizon,
 }
@@ -129,11 +128,11 @@ impl Stage for Register<'_> {
 
 /// Projects all profiles into `image`.
 ///
-/// Footprints are taken with the radius before the crossover correction, as in the products' x, y and z.
-/// `watch` is looked at between blocks of points, and counts them. With an orientation that sees nothing all points are rejected.
+/// Footprints have the radius before the crossover correction, as in the products' x, y and z. `watch` is checked
+/// between blocks of points, and counts them. With an orientation that sees no ground, all points are rejected.
 ///
 /// # Errors
-/// Samples that are no orientation; [`Stopped`](crate::error::Stopped).
+/// Samples that do not form an orientation; [`Stopped`](crate::error::Stopped).
 /// # Source
 /// Shan et al. 2005, eq. 3 and 4; Shan, Lee & Yoon 2002.
 pub fn register<'a>(
@@ -210,7 +209,7 @@ impl OrientedImage<'_> {
     ) -> std::result::Result<PointOnImage, FootprintRejection> {
         let solution = projector.project(point_m)?;
         let pose = projector.model().pose(solution.x);
-        // Seen from the point, the camera must stand above the horizon of a sphere through it.
+        // Seen from the point, the camera must be above the horizon of a sphere through it.
         if !(point_m.dot(&(pose.position_m - point_m)) > 0.0) {
             return Err(FootprintRejection::BeyondHorizon);
         }

@@ -1,4 +1,4 @@
-//! Points of an image as columns, and what they say of each profile.
+//! Points of an image as columns, and statistics of each profile.
 
 use serde::{Deserialize, Serialize};
 
@@ -49,7 +49,7 @@ columns! {
     y_px: f64,
     /// Distance from the camera, metres.
     range_m: f64,
-    /// Along-track focal-plane coordinate at the solution, image pixels: what the iteration leaves.
+    /// Along-track focal-plane coordinate at the solution, image pixels: the residual of the iteration.
     residual_px: f64,
     /// Last step of the iteration, lines.
     step_lines: f64,
@@ -79,7 +79,7 @@ impl RegisteredPoints {
         self.row.len()
     }
 
-    /// Whether there are none.
+    /// Whether it has no points.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.row.is_empty()
@@ -100,7 +100,7 @@ impl RegisteredPoints {
             .collect()
     }
 
-    /// Takes over the evaluations of `method` with the second-order model for the points `on_lines`.
+    /// Stores the evaluations of `method` with the second-order model for the points `on_lines`.
     pub(super) fn count(
         &mut self,
         method: Method,
@@ -120,7 +120,7 @@ impl RegisteredPoints {
     }
 }
 
-/// What the points say of each of `count` profiles.
+/// Statistics of each of `count` profiles.
 pub(super) fn on_image(points: &RegisteredPoints, count: usize) -> Vec<ProfileOnImage> {
     let mut profiles = vec![ProfileOnImage::default(); count];
     let mut spacings: Vec<Vec<f64>> = vec![Vec::new(); count];

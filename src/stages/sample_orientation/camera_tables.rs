@@ -1,4 +1,4 @@
-//! Tables for camera models, with as many nodes as they need to be interpolated.
+//! Tables for camera models, with as many nodes as interpolation needs.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -14,7 +14,7 @@ use crate::{
     time::Et,
 };
 
-/// Image lines between two nodes of the camera-model tables to begin with; ALE's spacing for long images.
+/// Initial spacing of nodes of the camera-model tables, image lines; ALE's spacing for long images.
 const TABLE_LINES: u32 = 10;
 /// Fewest nodes over the image; usgscsm resamples tables with fewer than 25.
 const TABLE_NODES_MIN: u32 = 31;
@@ -48,7 +48,7 @@ pub(super) fn require_ends(
     tables(reader, &[epochs[0], epochs[epochs.len() - 1]]).map(|_| ())
 }
 
-/// Steps over the image to begin with.
+/// Initial number of steps over the image.
 fn first_steps(image: &ImageTimes) -> u32 {
     let steps = image.line_times.lines().div_ceil(TABLE_LINES);
     steps.max(TABLE_NODES_MIN - 1)

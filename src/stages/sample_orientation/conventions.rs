@@ -1,4 +1,4 @@
-//! How far the conventions for light time place an image from one another.
+//! Differences in the position of an image between the conventions for light time.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -17,7 +17,7 @@ use crate::{
 };
 
 impl CameraReader<'_> {
-    /// What the convention means in the middle of `image`.
+    /// Effect of the convention in the middle of `image`.
     pub(super) fn effect(&self, image: &ImageTimes) -> Result<LightTimeEffect> {
         let (own, model) = (self.camera(image.middle())?, image.body.model());
         let boresight = own.to_mars.matrix() * Vector3::z();
@@ -35,7 +35,7 @@ impl CameraReader<'_> {
         })
     }
 
-    /// Where another convention has `ground`, which the boresight meets in the middle of `image`; `None` where its
+    /// Where another convention places `ground`, which the boresight meets in the middle of `image`; `None` where its
     /// boresight misses the ground.
     fn other(
         &self,
@@ -74,7 +74,7 @@ impl CameraReader<'_> {
     }
 }
 
-/// How far off the boresight a camera sees a point, along its x and y, in focal lengths.
+/// Offset of a point from the boresight of a camera, along its x and y, in focal lengths.
 fn off_boresight(camera: &Camera, point: &Position<BodyFixed>) -> Vector2<f64> {
     let away_m = point.xyz_m - camera.position.xyz_m;
     let seen_m = camera.to_mars.matrix().tr_mul(&away_m);

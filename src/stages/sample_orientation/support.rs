@@ -1,4 +1,4 @@
-//! Orientation of an image by its support data: what their tables say, sampled as that of kernels is.
+//! Orientation of an image by its support data: their tables, sampled as those of kernels.
 
 use nalgebra::Vector3;
 
@@ -20,8 +20,8 @@ use crate::{
 
 /// The orientation of `image` by its support data at `epochs`.
 ///
-/// No other positions are known than those of the tables: what they are off the spacecraft is left at zero. Ranges are
-/// measured from them where the site says that they are those of the spacecraft with the laser.
+/// Only the positions of the tables are known: their offset from the spacecraft is set to zero. Ranges are measured
+/// from them where the site declares them to be those of the spacecraft with the laser.
 pub(super) fn support_orientation(
     image: &ImageTimes,
     support: &SupportTables,

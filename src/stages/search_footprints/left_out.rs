@@ -1,10 +1,10 @@
-//! What a search left out, for those who check a site.
+//! Findings on the records and shots that a search left out.
 
 use std::collections::BTreeMap;
 
 use crate::pds::pedr::{Complaint, Reason};
 
-/// What was left out, in numbers and with the first example.
+/// Numbers of what was left out, with the first example.
 pub(super) fn findings(
     complaints: &[Complaint],
     counts: &BTreeMap<Reason, u64>,
@@ -13,7 +13,7 @@ pub(super) fn findings(
     let said = counts.values().sum::<u64>();
     let first = complaints
         .first()
-        .map(|complaint| format!("complaints of PEDR files: {said}, the first: {complaint}"));
+        .map(|complaint| format!("complaints about PEDR files: {said}, the first: {complaint}"));
     let spoiled = (spoiled_shots > 0)
         .then(|| format!("shots in the windows left out for spoiled values: {spoiled_shots}"));
     first.into_iter().chain(spoiled).collect()

@@ -36,7 +36,7 @@ impl Cause for SharedShots {
     }
 }
 
-/// Makes sure that no two files hold the same shot; `paths` are those that `file` counts into.
+/// Makes sure that no two files hold the same shot; `file` is an index into `paths`.
 ///
 /// # Errors
 /// The two files whose common shot is the earliest.

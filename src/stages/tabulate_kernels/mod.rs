@@ -1,17 +1,17 @@
 //! Adjusted orientations as states and attitudes for SPICE kernels that are loaded after the original ones.
 //!
-//! Time tags of the attitude follow the rule of the kernels that they replace: the attitude of an exposure at
-//! `t` stands at `t` + bias. ISIS and ALE read MOC attitude 1.15 s before the exposure of their own accord
-//! (`SetTimeBias(-1.15)` in ISIS, `instrument_time_bias` in ALE), as areograph does with its usual bias, so
-//! that one kernel serves all three. A second one without the bias would be wrong in each of them.
+//! Time tags of the attitude follow the rule of the kernels that they replace: the attitude of an exposure at `t` is
+//! stored at `t` + bias. By default ISIS and ALE read MOC attitude 1.15 s before the exposure (`SetTimeBias(-1.15)` in
+//! ISIS, `instrument_time_bias` in ALE), as areograph does with its usual bias, so that one kernel serves all three. A
+//! second kernel without the bias would be wrong in each of them.
 //!
-//! A shift of line times is folded into both kernels: at the tag of a line they have the orientation of the
-//! instant at which it was exposed. Therefore each pair belongs to its image alone, and to nothing else that
-//! happened meanwhile, laser shots among them.
+//! A shift of line times is folded into both kernels: at the tag of a line they have the orientation of the instant at
+//! which it was exposed. Therefore each pair is valid for its image only, not for other events at that time such as
+//! laser shots.
 //!
-//! Between two images the kernels end half way. Of two that were exposed at once, or nearer to each other than
-//! the tolerance with which attitude is asked (CSPICE takes the last file that has any within it), the later
-//! one wins in `adjusted.tm`; with its own pair alone each is right.
+//! Between two images the kernels end half way. Of two that were exposed at once, or closer in time than the tolerance
+//! with which attitude is read (CSPICE uses the last file with an attitude within it), the later one takes precedence
+//! in `adjusted.tm`; with only its own pair loaded, each is right.
 
 mod read_back;
 mod tables;
@@ -33,7 +33,7 @@ use crate::{
 pub use read_back::require_same;
 use tables::Source;
 
-/// What an SPK and a CK hold of one image; nothing of an image of support data, which has no kernels to follow.
+/// Contents of an SPK and a CK for one image; empty for an image of support data, which has no original kernels.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct KernelTables {
     /// Instants of the states, increasing.
@@ -49,7 +49,7 @@ pub struct KernelTables {
 }
 
 impl KernelTables {
-    /// Degree of the interpolation: with a state at every sample a cubic holds what lies between two of them.
+    /// Degree of the interpolation: with a state at every sample, a cubic represents the motion between two of them.
     pub const STATE_DEGREE: i32 = 3;
 }
 
@@ -68,7 +68,7 @@ stage_inputs! {
         pub kernels: &'a KernelView,
         /// Padding and tolerance with which the image was sampled.
         pub coverage: &'a KernelsConfig,
-        /// The pointing bias that readers of the kernels will apply, where it is not that of the camera.
+        /// The pointing bias that users of the kernels will apply, where it is not that of the camera.
         pub pointing: &'a PointingConfig,
     }
 }
@@ -127,11 +127,11 @@ impl Cause for TabulateError {
 
 /// States and attitudes around one of `images`, whose adjusted orientation is `orientation`.
 ///
-/// Attitudes are those of samples and camera tables; positions those of the original kernels with the
-/// difference at the samples, interpolated, added; they are geometric, so that a reader who follows the light-time
-/// convention of `orientation` finds its positions. Around the image, where there are neither, the original
-/// motion goes on with the difference at the end. Sampling an image with its kernels loaded gives its
-/// orientation back within 1 mm and 1e-9 rad.
+/// Attitudes are those of samples and camera tables; positions those of the original kernels with the difference at the
+/// samples, interpolated, added; they are geometric, so that a user of the light-time convention of `orientation`
+/// obtains its positions. Around the image, where neither is available, the original motion continues with the
+/// difference at the end. Sampling an image with its kernels loaded reproduces its orientation within 1 mm and 1e-9
+/// rad.
 ///
 /// # Errors
 /// [`Kind::Coverage`] where the original kernels do not reach around an image; [`Kind::Bug`] for too few samples.
@@ -155,13 +155,13 @@ pub fn tabulate_kernels(
     source.tables()
 }
 
-/// The time that the kernels of an image hold: its exposures with padding, half way to other images of its spacecraft at
-/// most.
+/// The time that the kernels of an image cover: its exposures with padding, at most half way to other images of its
+/// spacecraft.
 fn span(images: &[&ImageTimes], index: usize, padding_s: f64) -> Interval {
     let spacecraft = images[index].instrument.spacecraft;
     let exposed = images[index].exposures();
     let mut span = exposed.padded(padding_s);
-    // Kernels of another spacecraft are none of this one's.
+    // Kernels of another spacecraft do not interfere.
     for other in images
         .iter()
         .filter(|other| other.instrument.spacecraft == spacecraft)

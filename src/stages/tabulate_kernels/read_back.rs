@@ -1,4 +1,4 @@
-//! Whether kernels that were written give the orientation that they were made from.
+//! Whether written kernels reproduce the orientation that they were made from.
 
 use super::TabulateError;
 use crate::{
@@ -12,8 +12,8 @@ use crate::{
     },
 };
 
-/// What may be lost on the way into a kernel and back, metres: 30 times the 3e-5 m that MGS flies in the
-/// 7e-9 s to which ET is rounded.
+/// Tolerance for positions read back from a kernel, metres: 30 times the 3e-5 m that MGS flies in the 7e-9 s to which
+/// ET is rounded.
 const POSITION_TOLERANCE_M: f64 = 1e-3;
 /// The same for rotations, radians: 100 times what the bus turns in the 1.5e-8 s to which ticks are rounded.
 const ROTATION_TOLERANCE_RAD: f64 = 1e-9;
@@ -21,8 +21,8 @@ const ROTATION_TOLERANCE_RAD: f64 = 1e-9;
 /// Makes sure that `session`, with the original kernels and those of the image, gives every sample of `orientation`.
 ///
 /// # Errors
-/// [`Kind::Bug`](crate::error::Kind::Bug) for orientations that do not come back within 1 mm and 1e-9 rad, and
-/// what [`Session`] says of kernels that cannot be read.
+/// [`Kind::Bug`](crate::error::Kind::Bug) for orientations that are not reproduced within 1 mm and 1e-9 rad, and the
+/// errors of [`Session`] for unreadable kernels.
 pub fn require_same(
     session: &Session,
     image: &ImageTimes,

@@ -38,9 +38,9 @@ pub(super) struct Source<'a> {
     pub(super) orientation: &'a Orientation,
     pub(super) tolerance_s: f64,
     pub(super) bias: PointingBias,
-    /// When the CK holds attitudes.
+    /// The time that the CK covers.
     pub(super) attitude_span: Interval,
-    /// When the SPK holds positions.
+    /// The time that the SPK covers.
     pub(super) orbit_span: Interval,
 }
 
@@ -78,7 +78,7 @@ impl Source<'_> {
         flown.collect()
     }
 
-    /// What the adjustment adds to geometric positions in IAU 2000, metres, over ET.
+    /// Corrections of geometric positions by the adjustment in IAU 2000, metres, over ET.
     fn difference(&self, flown: &[(Et, Position<J2000>)]) -> Result<SampledOrientation> {
         let mut samples = Vec::new();
         for (et, position) in flown {
@@ -130,7 +130,7 @@ impl Source<'_> {
         Ok(epochs)
     }
 
-    /// As much of the span as the original kernels hold.
+    /// The part of the span that the original kernels cover.
     fn known_orbit(&self) -> Result<Interval> {
         let exposed = self.times.exposures();
         self.session.require_position(exposed)?;
@@ -201,7 +201,7 @@ impl Source<'_> {
         nodes
     }
 
-    /// The original motion from `end` on, turned by what the adjustment turned it there; without `end` itself.
+    /// The original motion from `end` on, rotated by the correction of the adjustment there; without `end` itself.
     fn continued(&self, end: &Node, limit: Et) -> Result<Vec<Node>> {
         let original = self.original(end.exposure)?.inertial_to_bus;
         let turned = end.to_bus * original.matrix().transpose();
@@ -218,7 +218,7 @@ impl Source<'_> {
     }
 }
 
-/// Instants from `end`, without itself, to `limit`, at most `step_s` apart; none where they are the same.
+/// Instants from `end`, without itself, to `limit`, at most `step_s` apart; empty where the two are the same.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

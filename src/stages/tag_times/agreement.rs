@@ -1,4 +1,4 @@
-//! What is said of an image twice must agree: its product, its clock and UTC, its stop time and lines.
+//! What is stated twice about an image must agree: its product, its clock and UTC, its stop time and lines.
 
 use nalgebra::Matrix3;
 
@@ -15,20 +15,20 @@ use crate::{
     units::{RADIANS_PER_DEGREE, SECONDS_PER_MS},
 };
 
-/// Clock and UTC, or stop time and lines, that lie farther apart than this are remarked on, seconds.
+/// Clock and UTC, or stop time and lines, that differ by more than this get a remark, seconds.
 ///
-/// UTC in MOC labels is cut to 10 ms: in five labels it lies 1 to 5 ms from the clock, and in three the time from
-/// start to stop is 4 to 6 ms less than that of the lines. It is 60 m on the ground.
+/// UTC in MOC labels is truncated to 10 ms: in five labels it differs by 1 to 5 ms from the clock, and in three the
+/// time from start to stop is 4 to 6 ms less than that of the lines. The limit is 60 m on the ground.
 pub(super) const CLOSE_S: f64 = 0.02;
-/// Farther apart than this they are those of two images, seconds.
+/// With a larger difference they belong to two images, seconds.
 const TOLERANCE_S: f64 = 1.0;
-/// Speed of the spacecraft's shadow on the ground, metres per second: what a time is worth there.
+/// Ground speed of the spacecraft, metres per second: converts times into distances.
 const GROUND_SPEED_M_S: f64 = 3_000.0;
 
-/// A camera that kernels mount this far from its instrument file is mounted otherwise, radians: 4 m on the ground, a
-/// hundred times the rounding of angles in kernels.
+/// Mountings of a camera in kernels and instrument file that differ by more than this contradict each other, radians: 4
+/// m on the ground, a hundred times the rounding of angles in kernels.
 const MOUNTING_RAD: f64 = 1e-5;
-/// What a radian is on the ground, metres: the height of the mapping orbit.
+/// Height of the mapping orbit, metres: converts angles into distances on the ground.
 const HEIGHT_M: f64 = 380_000.0;
 
 /// Two statements of which one belongs to another image.
@@ -108,7 +108,7 @@ impl Cause for Contradiction {
     }
 }
 
-/// What the label of `product` is for must be what the image's identifier names, where both name a product.
+/// The product of the label must be the one that the image's identifier names, where both name a product.
 pub(super) fn of_one_product(
     image: &ImageConfig,
     product: Option<&str>,
@@ -171,7 +171,7 @@ pub(super) fn start_agrees(
         });
     }
     let lacks_second = if apart_s > TOLERANCE_S - CLOSE_S {
-        "; of a whole second, a leap second that the kernels lack may be the cause"
+        "; a difference of a whole second may be a leap second that the kernels lack"
     } else {
         ""
     };
@@ -184,7 +184,7 @@ pub(super) fn start_agrees(
     }))
 }
 
-/// A remark on exposures that do not begin within `close_s` of when clock or UTC say.
+/// A remark on exposures that do not begin within `close_s` of clock or UTC.
 pub(super) fn pieces_agree(
     image: &str,
     first: Et,
@@ -216,11 +216,11 @@ pub(super) fn pieces_agree(
 pub(super) fn piece_follows(piece: &LinePiece, next: &LinePiece) -> Option<String> {
     let lines = f64::from(next.first_line - piece.first_line);
     let pause_s = next.start.since(piece.start) - lines * piece.period_s;
-    // Written so that NaN is told.
+    // Written so that NaN is reported.
     (!(pause_s <= 0.5 * piece.period_s)).then(|| {
         format!(
-            "nothing is exposed for {pause_s:.4} s, {:.1} lines, before line {}; a first line or a start of its exposures \
-             may be wrong",
+            "no line is exposed for {pause_s:.4} s, {:.1} lines, before line {}; a first line or a start of its \
+             exposures may be wrong",
             pause_s / piece.period_s,
             next.first_line
         )
@@ -256,14 +256,15 @@ pub(super) fn stop_agrees(
     )))
 }
 
-/// A remark on a camera that the kernels mount otherwise than its instrument file.
+/// A remark on a camera whose mounting differs between the kernels and its instrument file.
 pub(super) fn mounting_agrees(camera: &Instrument, kernels: &Matrix3<f64>) -> Option<String> {
     let turn = kernels * bus_to_camera(&camera.mounting).transpose();
     let turn_rad = rotation_vector(&turn).norm();
-    // Written so that NaN is told.
+    // Written so that NaN is reported.
     (!(turn_rad <= MOUNTING_RAD)).then(|| {
         format!(
-            "the kernels mount {} {:.4}° from where its instrument file has it, {} on the ground; the kernels are used",
+            "the mounting of {} in the kernels differs by {:.4}° from its instrument file, {} on the ground; the \
+             kernels are used",
             camera.name,
             turn_rad / RADIANS_PER_DEGREE,
             ground(turn_rad * HEIGHT_M)
@@ -271,7 +272,7 @@ pub(super) fn mounting_agrees(camera: &Instrument, kernels: &Matrix3<f64>) -> Op
     })
 }
 
-/// How close to an instant its UTC is, written with so many digits.
+/// Resolution of a UTC string as it is written, at least [`CLOSE_S`], seconds.
 fn close_s(utc: &str) -> f64 {
     let decimals = utc.split_once('.').map_or(0, |(_, fraction)| {
         fraction.bytes().take_while(u8::is_ascii_digit).count()
@@ -301,7 +302,7 @@ mod tests {
         }
     }
 
-    /// What is said of a start so many seconds from its UTC.
+    /// The remark on a start `apart_s` after its UTC.
     fn start(apart_s: f64, utc: &str) -> Result<Option<String>, Contradiction> {
         let at = Et::from_seconds;
         start_agrees(

@@ -1,4 +1,4 @@
-//! What a camera can sum, and the pixels that it has.
+//! Summing and samples of an image against the detector of its camera.
 
 use crate::{
     error::{Cause, Kind, Result},
@@ -17,7 +17,7 @@ enum DetectorError {
         max: u32,
     },
     #[error(
-        "image {image}: crosstrack_summing {code} of {instrument} stands for summing that varies over the line; \
+        "image {image}: crosstrack_summing {code} of {instrument} denotes summing that varies over the line; \
          expected one summing for all samples"
     )]
     VariableSumming {
@@ -39,7 +39,7 @@ enum DetectorError {
         pixels: u32,
     },
     #[error(
-        "image {image}: its {samples} samples of {crosstrack} pixels are a part of the {pixels} pixels of \
+        "image {image}: its {samples} samples of {crosstrack} pixels cover only part of the {pixels} pixels of \
          {instrument}, and its first pixel is unknown; expected first_detector"
     )]
     FirstPixel {
@@ -63,8 +63,8 @@ impl Cause for DetectorError {
                     .to_owned()
             }
             Self::FirstPixel { .. } => {
-                "add `first_detector` to the image's table; ISIS and ALE put such files on the first pixel, first_detector = 0, and a \
-                 file from which columns were cut begins as many pixels later"
+                "add `first_detector` to the image's table: ISIS and ALE assume the first pixel, first_detector = 0; \
+                 a file whose first columns were removed begins that many pixels later"
                     .to_owned()
             }
             Self::VariableSumming { .. } => {
@@ -75,7 +75,7 @@ impl Cause for DetectorError {
     }
 }
 
-/// Makes sure that `instrument` sums so many lines and pixels, and has the pixels of these samples.
+/// Checks that `instrument` supports this summing, and that its detector covers these samples.
 ///
 /// # Errors
 /// The limit of the instrument that the image breaks.
@@ -126,7 +126,7 @@ pub(super) fn fits_detector(
     Ok(())
 }
 
-/// An image with fewer samples than its detector has, of which nothing says where on the line they lie.
+/// An image with fewer samples than its detector has, whose position on the line is not stated.
 pub(super) struct PartOfLine<'a> {
     pub(super) instrument: &'a Instrument,
     pub(super) samples: u32,
@@ -137,7 +137,7 @@ impl PartOfLine<'_> {
     /// A remark that the image is put on the first pixel.
     ///
     /// # Errors
-    /// An image by a label that never says so (`is_open`), where the first pixel is nobody's choice.
+    /// An image whose kind of label never states the first pixel (`is_open`).
     pub(super) fn on_first_pixel(&self, image: &str, is_open: bool) -> Result<String> {
         let (samples, pixels) = (self.samples, self.instrument.detector.pixels);
         if is_open {
@@ -151,8 +151,8 @@ impl PartOfLine<'_> {
             .into());
         }
         Ok(format!(
-            "nothing says where on the {pixels} pixels its {samples} samples begin (EDIT_MODE_ID, first_detector); pixel 0 is \
-             taken"
+            "the first pixel of its {samples} samples on the {pixels} pixels of the detector is not stated \
+             (EDIT_MODE_ID, first_detector); pixel 0 is assumed"
         ))
     }
 }

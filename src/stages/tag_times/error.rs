@@ -1,11 +1,11 @@
-//! What keeps the times of an image from being told.
+//! Errors of image times.
 
 use crate::{
     error::{Cause, Kind},
     image::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN},
 };
 
-/// An image whose times cannot be told.
+/// An image whose times cannot be determined.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum ImageError {
     #[error("image {image}: no {key}, neither in the label nor in the configuration")]

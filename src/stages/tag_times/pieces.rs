@@ -15,11 +15,11 @@ use crate::{
     units::SECONDS_PER_MS,
 };
 
-/// Times of rows and UTC of the start that lie farther apart are remarked on, seconds: labels round the latter to a
+/// Times of rows and UTC of the start that differ by more than this get a remark, seconds: labels round the latter to a
 /// millisecond, and in three it is 0.5 ms from the first row.
 const ROWS_CLOSE_S: f64 = 0.002;
 
-/// What is known of the lines of an image.
+/// The keys that determine the line times of an image.
 pub(super) struct Pieces<'a> {
     pub(super) image: &'a ImageConfig,
     pub(super) fields: &'a ImageFields,
@@ -28,10 +28,10 @@ pub(super) struct Pieces<'a> {
 }
 
 impl Pieces<'_> {
-    /// When the lines were exposed, by what tells it first: the pieces of the configuration, the `rows` of a file, a start with
-    /// a line period. And the exposure of a detector line in seconds, and where the start comes from.
+    /// Line times by the first source that is given: the pieces of the configuration, the `rows` of a file, a start
+    /// with a line period. Also the exposure of a detector line in seconds, and the source of the start.
     ///
-    /// Of an image whose rows tell their times (`in_rows`), and its label no clock, a label without rows says too little.
+    /// Where rows hold the times and the label no clock (`in_rows`), a label without rows is not sufficient.
     pub(super) fn line_times(
         &self,
         rows: Option<&RowTimes>,
@@ -74,7 +74,7 @@ impl Pieces<'_> {
 
     /// Lines in the pieces that the configuration lists, and the exposure of a detector line of the first one in seconds.
     ///
-    /// A start that is told beside them must agree with theirs.
+    /// A start that is stated beside them must agree with theirs.
     fn listed(
         &self,
         exposures: &[ExposurePiece],
@@ -94,9 +94,9 @@ impl Pieces<'_> {
         Ok((times, exposure_s))
     }
 
-    /// Lines as the rows of the label's file have them, and the exposure of a detector line of the first one in seconds.
+    /// Lines by the rows of the label's file, and the exposure of a detector line of the first one in seconds.
     ///
-    /// A start that is told beside them must agree with theirs.
+    /// A start that is stated beside them must agree with theirs.
     fn of_rows(
         &self,
         rows: &RowTimes,
@@ -149,7 +149,7 @@ const fn is_even(fields: &ImageFields) -> bool {
     fields.line_period_s.is_some() || fields.exposure_s.is_some()
 }
 
-/// Times of the lines that the file of the label has, unless the configuration tells others, which win.
+/// Line times in the label's file, unless the configuration states others, which take precedence.
 pub(super) fn rows_of<'a>(
     image: &ImageConfig,
     rows: Option<&'a RowTimes>,
@@ -162,7 +162,7 @@ pub(super) fn rows_of<'a>(
     };
     if let (Some(key), Some(_)) = (key, rows) {
         notes.push(format!(
-            "{key} of the configuration replaces the times that the file has of its lines"
+            "{key} of the configuration replaces the line times of the file"
         ));
     }
     rows.filter(|_| key.is_none())

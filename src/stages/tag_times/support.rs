@@ -1,4 +1,4 @@
-//! Image support data as a source of times, camera and orientation: whether they are of the site's body, and what is told.
+//! Image support data as a source of times, camera and orientation, checked to be those of the site's body.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use crate::{
     spice::Session,
 };
 
-/// Support data of an image, and the file that they stand in.
+/// Support data of an image, and their file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SupportFile {
     /// File name, without folders.
@@ -32,7 +32,7 @@ pub struct SupportFile {
 }
 
 impl SupportFile {
-    /// What the file at `path` says of `image`, which sees `body`.
+    /// Reads the support data of `image`, which shows `body`, from the file at `path`.
     ///
     /// # Errors
     /// As [`read_isd`]; support data of another body.
@@ -55,17 +55,17 @@ impl SupportFile {
         Ok((said, file))
     }
 
-    /// What is taken from the file.
+    /// A note on what is used from the file.
     fn note(&self) -> String {
         format!(
-            "camera, line times and orientation are those of the support data {}; nothing is applied to them, neither a \
-             pointing bias nor a clock correction nor light time",
+            "camera, line times and orientation are those of the support data {}; no pointing bias, clock correction \
+             or light time is applied to them",
             self.name
         )
     }
 }
 
-/// Times and camera of an image by its support data.
+/// Times and camera of an image from its support data.
 pub(super) fn supported(
     body: Body,
     image: &ImageConfig,

@@ -17,7 +17,7 @@ pub enum NetError {
         /// How many there are.
         found: usize,
     },
-    /// A picture, or a brick, and what hangs on it can turn, shrink or move.
+    /// A picture or brick, with the parts tied to it, can turn, shrink or move.
     #[error(
         "UnderconnectedPicture: {what} {name} has ties and controls: {ties}; expected two or more at different places, \
          in a part of the net with two controls"
@@ -54,10 +54,10 @@ pub enum NetError {
         /// The picture.
         picture: String,
     },
-    /// All pictures are.
+    /// All pictures are mirror images.
     #[error("the pictures are a mirror image of the controls")]
     MirroredFigure,
-    /// A picture has another size than its table says.
+    /// A picture differs in size from its table.
     #[error(
         "WrongUnits: a unit of picture {picture} is {found_m:.4e} m on the ground; expected {expected_m:.4e} m within a factor of 2"
     )]
@@ -69,7 +69,7 @@ pub enum NetError {
         /// Size by its table, metres.
         expected_m: f64,
     },
-    /// A control that the map does not hold.
+    /// A control beyond the map.
     #[error(
         "WrongUnits: control {point} is {x_m:.4e} m east and {y_m:.4e} m north; the map reaches {limit_m:.4e} m"
     )]
@@ -83,7 +83,7 @@ pub enum NetError {
         /// How far the map reaches, metres.
         limit_m: f64,
     },
-    /// A control at a place that the projection does not have.
+    /// A control outside the area of the projection.
     #[error("control {point} lies outside the area of the projection")]
     NotOnTheMap {
         /// The point.
@@ -94,7 +94,7 @@ pub enum NetError {
     Film {
         /// The picture.
         picture: String,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
 }

@@ -7,10 +7,10 @@ use crate::stages::judge::{
     Verdict,
 };
 
-/// Share of measurements that may be blunders in a net that is to be used.
+/// Largest share of blunders in a valid net.
 const REMOVED_MAX: f64 = 0.1;
 
-/// What is known of a net when it is judged.
+/// The evidence on which a net is judged.
 pub(super) struct Evidence<'a> {
     pub(super) totals: &'a Totals,
     pub(super) bricks: &'a [BrickResult],
@@ -21,31 +21,31 @@ pub(super) struct Evidence<'a> {
     pub(super) remarks: &'a [String],
 }
 
-/// Share of flagged measurements that a good net has: two in a thousand lie beyond the limit by chance.
+/// Largest share of flagged measurements in a good net: two in a thousand exceed the limit by chance.
 const FLAGGED_MAX: f64 = 0.01;
 
-/// A net is invalid when nothing controls its measurements, or too many of them are blunders.
+/// A net is invalid without redundancy, or with too many blunders.
 pub(super) fn judge(of: &Evidence) -> Verdict {
     let totals = of.totals;
     let mut reasons = Vec::new();
     if totals.redundancy == 0 {
         reasons.push(
-            "no equation is left over: nothing tells a wrong measurement from a right one"
+            "the net has no redundancy: wrong measurements cannot be distinguished from right ones"
                 .to_owned(),
         );
     }
     if totals.removed as f64 > REMOVED_MAX * of.measurements as f64 {
         reasons.push(format!(
-            "{} of {} measurements were left out as blunders; expected a tenth at most",
+            "{} of {} measurements were left out as blunders; expected at most a tenth",
             totals.removed, of.measurements
         ));
     }
     Verdict::of(reasons, remarks(of), checks(of))
 }
 
-/// Fewer controls cannot tell a gross error of one of them.
+/// Minimum number of controls for identifying a gross error of one of them.
 const CONTROLS_MIN: usize = 5;
-/// Seams that are wider than so many standard deviations of a measurement tell of a bent brick.
+/// Seams wider than this many standard deviations of a measurement indicate a bent brick.
 const SEAMS_SIGMA: f64 = 3.0;
 
 fn checks(of: &Evidence) -> Vec<Check> {
@@ -140,11 +140,11 @@ fn remarks(of: &Evidence) -> Vec<String> {
     let kept = of.controls.len() - rejected.len();
     say(
         kept < CONTROLS_MIN,
-        format!("{kept} controls: a gross error of one could not be told from the others"),
+        format!("{kept} controls: a gross error of one could not be identified"),
     );
     say(
         kept == 2 && of.controls.iter().all(|control| control.sigma_m.is_none()),
-        "two controls without standard deviations: those of the points count from them".to_owned(),
+        "two controls without standard deviations: those of points are relative to them".to_owned(),
     );
     say(
         of.complaints > 0,

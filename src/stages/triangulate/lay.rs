@@ -29,7 +29,7 @@ pub(super) struct Laid {
     pub(super) remarks: Vec<String>,
 }
 
-/// Bricks that were put together by areograph and do not hang together become one.
+/// Lays the bricks; bricks that areograph formed and that are not connected become one.
 pub(super) fn lay_with_fallback(
     config: &NetConfig,
     data: &NetData,
@@ -45,7 +45,7 @@ pub(super) fn lay_with_fallback(
         Err(NetError::Underconnected { .. }) if !named && bricks.len() > 1 => {
             let all = vec![("1".to_owned(), (0..data.net.pictures).collect())];
             let mut laid = lay(config, data, names, &all)?;
-            let text = "the pictures do not hang together in bricks and were tied as one";
+            let text = "the pictures are not connected in bricks and were tied as one brick";
             laid.remarks.push(text.to_owned());
             Ok(laid)
         }
@@ -151,8 +151,8 @@ fn lay(
     })
 }
 
-/// Leaves out what a brick shows of a point that is a blunder among the bricks: a measurement that is alone in its brick shows
-/// nowhere else.
+/// Leaves out a brick's measurements of a point that is a blunder among the bricks: the only measurement of a point in
+/// a brick shows nowhere else.
 fn clean_seams(net: &Net, figures: &mut [Figure], removed: &mut [bool]) -> Result<(), PlaneError> {
     let of_bricks = bricks_as_pictures(net, figures);
     let all: Vec<usize> = (0..figures.len()).collect();

@@ -37,7 +37,7 @@ stage_inputs! {
     }
 }
 
-/// What of a net's configuration enters the result.
+/// The keys of a net's configuration that enter the result.
 #[derive(Debug)]
 pub struct NetKeys<'a>(pub &'a NetConfig);
 
@@ -47,7 +47,7 @@ impl Input for NetKeys<'_> {
         inputs.setting("controls", &self.0.controls);
         inputs.setting("map", &self.0.map);
         inputs.setting("triangulation", &self.0.triangulation);
-        // Which key a file belongs to: hashes alone do not tell.
+        // Number of files of each key: hashes do not identify the key.
         inputs.setting("files", &kinds(self.0).map(Vec::len));
     }
 }

@@ -1,4 +1,4 @@
-//! The figure on the map, by SCALE, MORTAR or in one shot, LOCAL, and the adjustment that tells standard deviations.
+//! The figure on the map, by SCALE, MORTAR or in one shot, LOCAL, and the adjustment that gives standard deviations.
 
 use std::collections::BTreeMap;
 
@@ -14,10 +14,10 @@ use crate::{
     },
 };
 
-/// Weight of a control that nothing is known of.
+/// Weight of a control without a standard deviation.
 const HELD: f64 = 1e8;
 
-/// Every picture on the map, and how well it is known.
+/// Every picture on the map, with its precision.
 pub(super) struct Placed {
     pub(super) pictures: Vec<Similarity>,
     /// From each brick's figure to the map.
@@ -86,8 +86,9 @@ pub(super) fn place(config: &NetConfig, data: &NetData, laid: &Laid) -> Result<P
 
 /// SCALE of an adjusted figure on its controls, by their weights.
 ///
-/// Residuals of ties lie in the map and shrink with it. An adjustment on controls of little weight therefore makes the figure
-/// too small, with many ties by more than the standard deviation of its size; place and direction it leaves as they are.
+/// Residuals of ties are measured on the map and shrink with it. An adjustment on controls of low weight therefore
+/// makes the figure too small, with many ties by more than the standard deviation of its size. Place and direction are
+/// not affected.
 fn on_controls(weighted: &Net, places: &[Option<Place>]) -> Similarity {
     let shown = shown_controls(weighted, places);
     let (figure, given): (Vec<Place>, Vec<Place>) = shown
@@ -98,7 +99,7 @@ fn on_controls(weighted: &Net, places: &[Option<Place>]) -> Similarity {
     fit_weighted(&figure, &given, weight).unwrap_or(Similarity::IDENTITY)
 }
 
-/// Standard deviation of a coordinate of an image by what the bricks leave; none without redundancy.
+/// Standard deviation of a coordinate of an image from the residuals of the bricks; `None` without redundancy.
 fn estimated_sigma_m(laid: &Laid, unit_m: &[f64]) -> Option<f64> {
     let (mut squares, mut redundancy) = (0.0, 0);
     for (figure, unit_m) in laid.figures.iter().zip(unit_m) {
@@ -109,7 +110,7 @@ fn estimated_sigma_m(laid: &Laid, unit_m: &[f64]) -> Option<f64> {
     (redundancy > 0).then(|| (squares / redundancy as f64).sqrt())
 }
 
-/// The net without blunders and rejected controls, the others by their weights.
+/// The net without blunders and rejected controls, the other controls with their weights.
 fn weighted(config: &NetConfig, data: &NetData, laid: &Laid, tie_sigma_m: Option<f64>) -> Net {
     let shown = shown_controls(&laid.net, &laid.block.places);
     let kept = shown
@@ -122,7 +123,7 @@ fn weighted(config: &NetConfig, data: &NetData, laid: &Laid, tie_sigma_m: Option
             .filter(|(of_control, _)| *of_control > 0.0)
             .map_or(HELD, |(of_control, of_tie)| (of_tie / of_control).powi(2));
         let mut control = laid.net.controls[*index];
-        // Exact ties would leave controls without a voice.
+        // Exact ties would leave controls without influence.
         control.weight = weight.clamp(1.0 / HELD, HELD);
         control
     });
@@ -132,7 +133,7 @@ fn weighted(config: &NetConfig, data: &NetData, laid: &Laid, tie_sigma_m: Option
     }
 }
 
-/// Standard deviation of a control: its own, that of all, or what SCALE found.
+/// Standard deviation of a control: its own, the configured one, or the estimate of SCALE.
 pub(super) fn control_sigma_m(
     config: &NetConfig,
     data: &NetData,
@@ -143,7 +144,7 @@ pub(super) fn control_sigma_m(
     stated.or(laid.scaled.sigma)
 }
 
-/// What each brick's image of a point on several bricks lies off the mean over the bricks, metres on the map.
+/// Deviation of each brick's image of a point on several bricks from the mean over the bricks, metres on the map.
 fn seams_of(laid: &Laid, pictures: &[Similarity]) -> Vec<Place> {
     let mut brick_of = vec![0; laid.net.pictures];
     for (brick, figure) in laid.figures.iter().enumerate() {

@@ -21,17 +21,17 @@ use crate::{
     units::RADIANS_PER_DEGREE,
 };
 
-/// Complaints kept with their text; all are counted.
+/// Maximum number of complaints that are kept with their text; all are counted.
 const COMPLAINTS_MAX: usize = 1_000;
 
-/// A net as its tables have it.
+/// A net as read from its tables.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct NetData {
     /// Names of the pictures, in the order of their first measurement.
     pub pictures: Vec<String>,
     /// Names of the points likewise.
     pub points: Vec<String>,
-    /// Name of the brick of every picture, empty where the table has none.
+    /// Name of the brick of every picture, empty where the table has no name.
     pub bricks: Vec<String>,
     /// Size of a unit of every picture on the ground, where it is known.
     pub metres_per_unit: Vec<Option<f64>>,
@@ -41,9 +41,9 @@ pub struct NetData {
     pub control_sigma_m: Vec<Option<f64>>,
     /// Rows that were left out, one sentence each; at most 1000 are kept.
     pub complaints: Vec<String>,
-    /// All of them.
+    /// Number of all complaints.
     pub complaint_count: u64,
-    /// What a reader must weigh, one sentence each.
+    /// Remarks for the reader, one sentence each.
     pub remarks: Vec<String>,
 }
 
@@ -97,7 +97,7 @@ pub fn read_net(config: &NetConfig) -> Result<NetData> {
     Ok(data)
 }
 
-/// Names that were met.
+/// Names read so far.
 #[derive(Default)]
 struct Index {
     pictures: BTreeMap<String, usize>,
@@ -137,7 +137,7 @@ impl NetData {
         }
     }
 
-    /// The rows of a table; what was not taken is complained of.
+    /// The rows of a table; skipped rows become complaints.
     fn take<T>(&mut self, path: &Path, table: Rows<T>) -> Vec<T> {
         for (line, text) in table.complaints {
             self.complain(format!("{} line {line}: {text}", file_name(path)));

@@ -1,4 +1,4 @@
-//! What a triangulation gives, with names and in metres.
+//! The result of a triangulation, with names and in metres.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -16,9 +16,9 @@ pub struct Triangulation {
     pub measurements: Vec<MeasurementResult>,
     /// Every control that a picture shows.
     pub controls: Vec<ControlResult>,
-    /// The bricks; of a solution of all pictures at once those that told its blunders.
+    /// The bricks; for a solution of all pictures at once, those in which its blunders were identified.
     pub bricks: Vec<BrickResult>,
-    /// What lies between the bricks; none for a single one.
+    /// Seams between the bricks; `None` for a single one.
     pub seams: Option<Seams>,
     /// Sums of the net.
     pub totals: Totals,
@@ -26,7 +26,7 @@ pub struct Triangulation {
     pub verdict: Verdict,
     /// Rows that were left out, one sentence each.
     pub complaints: Vec<String>,
-    /// All of them.
+    /// Number of all complaints.
     pub complaint_count: u64,
 }
 
@@ -53,7 +53,7 @@ pub struct PictureResult {
     pub ties: u32,
     /// Root mean square of a coordinate of its deviations from the means of those, metres.
     pub deviation_rms_m: f64,
-    /// What an orthographic picture of its size departs from a similarity on this map, metres.
+    /// Departure of an orthographic picture of its size from a similarity on this map, metres.
     pub projection_floor_m: f64,
 }
 
@@ -74,7 +74,7 @@ pub struct PointResult {
     pub sigma_m: Option<f64>,
 }
 
-/// How far the image of a point lies from the mean of its images.
+/// Offset of the image of a point from the mean of its images.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Deviation {
     /// East, metres.
@@ -90,13 +90,13 @@ pub struct MeasurementResult {
     pub picture: String,
     /// The point.
     pub point: String,
-    /// Where it was measured, film corrected, units of the picture.
+    /// Measured position, film corrected, units of the picture.
     pub at: [f64; 2],
-    /// Where its point is on the map, metres.
+    /// Position of its point on the map, metres.
     pub place_m: [f64; 2],
     /// Image minus the mean of the point, metres on the map.
     pub deviation: Deviation,
-    /// The same within its brick, as BRICK prints it; none for a point on one picture of the brick.
+    /// The same within its brick, as BRICK prints it; `None` for a point on one picture of the brick.
     pub in_brick: Option<Deviation>,
     /// Share of its own error that shows in its deviation, 0 to 1.
     pub redundancy: f64,
@@ -124,7 +124,7 @@ pub struct ControlResult {
     pub given_m: [f64; 2],
     /// Given minus computed, metres.
     pub residual_m: [f64; 2],
-    /// Given minus computed by SCALE of the free figure, metres, from which gross errors are told.
+    /// Given minus computed by SCALE of the free figure, metres; identifies gross errors.
     pub scale_residual_m: [f64; 2],
     /// Standard deviation with which it was used, metres.
     pub sigma_m: Option<f64>,
@@ -153,12 +153,12 @@ pub struct BrickResult {
     pub flagged: u32,
     /// Measurements that were left out.
     pub removed: u32,
-    /// What its two rough guesses shrank, before that was put back.
+    /// Shrinkage by its two rough guesses, before it was reversed.
     #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub shrinkage: Option<ShrinkageResult>,
 }
 
-/// What two controls did to the figure between them.
+/// Shrinkage of the figure between two controls.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ShrinkageResult {
     /// Their distance as computed over the one as given.
@@ -167,7 +167,7 @@ pub struct ShrinkageResult {
     pub law: f64,
 }
 
-/// What lies between bricks: the last line of table 1.
+/// Seams between bricks: the last line of table 1.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Seams {
     /// Points on several bricks.
@@ -179,7 +179,7 @@ pub struct Seams {
     /// The same after LOCAL, where it ran.
     #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub local_rms_m: Option<[f64; 2]>,
-    /// What the two controls of EXTEND shrank, before that was put back.
+    /// Shrinkage by the two controls of EXTEND, before it was reversed.
     #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub shrinkage: Option<ShrinkageResult>,
 }
@@ -195,7 +195,7 @@ pub struct Totals {
     pub unknowns: u64,
     /// Equations beyond the unknowns.
     pub redundancy: u64,
-    /// Standard deviation of a coordinate of an image of a tie, as used, metres; absent when nothing tells it.
+    /// Standard deviation of a coordinate of an image of a tie, as used, metres; absent when it is not determined.
     #[serde(skip_serializing_if = "crate::stored::is_left_out")]
     pub tie_sigma_m: Option<f64>,
     /// Whether it was given, not estimated.

@@ -2,13 +2,13 @@
 
 use crate::geom::plane::Place;
 
-/// Largest |x| and |y|; 0 of none.
+/// Largest |x| and |y|; 0 without places.
 pub(super) fn largest(of: &[Place]) -> [f64; 2] {
     let part = |part: fn(&Place) -> f64| of.iter().map(part).fold(0.0, f64::max);
     [part(|of| of.re.abs()), part(|of| of.im.abs())]
 }
 
-/// Root mean squares of x and y; 0 of none.
+/// Root mean squares of x and y; 0 without places.
 pub(super) fn rms(of: &[Place]) -> [f64; 2] {
     let count = of.len().max(1) as f64;
     let part = |part: fn(&Place) -> f64| {
@@ -23,7 +23,7 @@ pub(super) fn rms_of_both(of: &[Place]) -> f64 {
     (0.5 * (x * x + y * y)).sqrt()
 }
 
-/// Half of the longer side of the box round places.
+/// Half of the longer side of the bounding box of places.
 pub(super) fn half_side(places: &[Place]) -> f64 {
     let side = |part: fn(&Place) -> f64| {
         let low = places.iter().map(part).fold(f64::INFINITY, f64::min);

@@ -285,7 +285,7 @@ fn mistakes_of_laser_and_bus_are_told() {
         text.replacen(line, &format!("{first}]"), 1)
     });
     assert!(
-        told.contains("adjustment.common_bus says nothing of E02-"),
+        told.contains("adjustment.common_bus does not control E02-"),
         "{told}"
     );
     let (_, told, _) = {
@@ -296,12 +296,12 @@ fn mistakes_of_laser_and_bus_are_told() {
         })
     };
     assert!(
-        told.contains("adjustment.common_bus did nothing: the file of the altimeter does not tell"),
+        told.contains("adjustment.common_bus did nothing: the altimeter file does not state"),
         "{told}"
     );
     // Every frame is recorded 59 m to either side in turn: together they say nothing wrong of laser and profile, and every
     // one contradicts them.
-    let remark = "coordinates of the laser in the images lie beyond 3.29";
+    let remark = "image coordinates of laser spots exceed 3.29";
     let refused = "contradicts the rest of the network";
     let (_, told, _) = ending(&mission, "sound", |text| text);
     assert!(!told.contains(remark), "{told}");
