@@ -113,7 +113,7 @@ impl Probe {
     #[must_use]
     #[allow(
         clippy::cast_possible_truncation,
-        reason = "a cast of floating point numbers ends at the bounds, far outside of any grid"
+        reason = "a cast from floating point saturates, far outside any grid"
     )]
     pub fn at(cell: [f64; 2]) -> Self {
         let first = cell.map(f64::floor);

@@ -66,10 +66,10 @@ impl LightTime {
             }
             Self::None => "geometric, at the exposure (no light time, no aberration)",
             Self::Centre => {
-                "as seen from the centre of Mars with light time and aberration (LT+S), as ISIS and ALE have them"
+                "as seen from the centre of Mars with light time and aberration (LT+S), as in ISIS and ALE"
             }
             Self::Support => {
-                "as the support data of the image have them (neither light time nor aberration is added or taken away)"
+                "as in the support data of the image (neither light time nor aberration is added or removed)"
             }
         }
     }

@@ -198,7 +198,7 @@ impl TabulatedFlight {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "negative and non-finite numbers become 0, whose instant is not the one asked for"
+        reason = "negative and non-finite numbers become 0, whose instant is not the requested one"
     )]
     fn beam(&self, et: Et) -> Option<Beam> {
         let steps = et.since(self.first) / BEAM_STEP_S;

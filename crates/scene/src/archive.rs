@@ -57,7 +57,7 @@ impl ArchiveOptions {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "a cast of floating point numbers ends at the bounds; too many files are refused"
+        reason = "a cast from floating point saturates; too many files are rejected"
     )]
     pub fn of_size(seed: u64, gb: f64) -> Self {
         let frames = f64::from(REVOLUTIONS) * Orbit::period_s() / FRAME_S;
@@ -190,7 +190,7 @@ fn write_truth(
         crossover_amplitude_m: CROSSOVER_AMPLITUDE_M,
         crossover_period_s: CROSSOVER_PERIOD_S,
         crossover_rule: "ground and spacecraft of the files are too high by the residual, amplitude sin(2 pi et / period) at the frame's mid-point; radii are those before its subtraction",
-        bad_rule: "range_m: ranges of the revolution are too long; time_s: its tags are late by so much more than the clock's bias; orbit_m: its ground and its spacecraft are too high",
+        bad_rule: "range_m: ranges of the revolution are too long; time_s: its tags are late by this much in addition to the clock bias; orbit_m: its ground and its spacecraft are too high",
         bad_profiles: files.iter().filter_map(|file| file.bad.clone()).collect(),
         files,
     };
@@ -339,5 +339,5 @@ fn bad_revolution(bits: u64) -> u32 {
 const README: &str = "\
 pedr/*.b        PEDR files of 12 revolutions each, about a day
 kernels/        archive.tm and what it loads: leap seconds, clock, Mars, orbit
-truth.json      what is wrong with the data: clock bias, noise, bad revolutions, gaps
+truth.json      injected errors: clock bias, noise, bad revolutions, gaps
 ";

@@ -21,7 +21,7 @@ use areograph_geom::calibration::Offset;
 
 const README: &str = "Three lines of a camera in one orbit: support data (isd/), pixels (images/), PEDR files of laser passes in two\n\
     directions over their ground (pedr/), a calibration file. The lines are mounted askew and the orbit is wrong by hundreds of\n\
-    metres; truth.json tells by how much, and where the lines truly see places of the ground.\n\
+    metres; truth.json gives both, and the true image coordinates of ground points.\n\
     Next: areograph calibrate calibration.toml\n";
 
 /// Middle of the ground.

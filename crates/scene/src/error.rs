@@ -7,7 +7,7 @@ use areograph_base::error::{Cause, Kind};
 pub enum SceneError {
     /// The folder holds something that is not an older scene.
     #[error(
-        "the folder is not empty and holds no scene of areograph (no list {list} of its files)"
+        "the folder is not empty and contains no areograph scene (its file list {list} is missing)"
     )]
     NotAScene {
         /// File by which a scene is recognised.

@@ -235,7 +235,7 @@ mod tests {
         let photos = folder.path().join("photos");
         fs::create_dir(&photos).unwrap();
         put(&photos.join("holiday.txt"), "sea").unwrap();
-        assert!(refusal(&photos).contains("holds no scene of areograph"));
+        assert!(refusal(&photos).contains("contains no areograph scene"));
         assert!(photos.join("holiday.txt").exists());
 
         let place = folder.path().join("mission");

@@ -195,7 +195,7 @@ pub(super) fn write_attitude(folder: &Path, session: &Session, arcs: &[Arc]) -> 
         .collect();
     let comment = format!(
         "{SYNTHETIC}\nTime tags carry the error of the mission's kernels: the attitude of time t \
-         stands at t - 1.15 s."
+         is stored at t - 1.15 s."
     );
     write_ck(&folder.join(CK_NAME), session, &segments, &comment)
 }
@@ -288,7 +288,7 @@ fn write_planets(folder: &Path, span: Interval) -> Result<()> {
         ),
     ];
     let comment = format!(
-        "{SYNTHETIC}\nMars by Standish's approximate elements; the Sun rests at the solar system barycentre."
+        "{SYNTHETIC}\nMars by Standish's approximate elements; the Sun is fixed at the solar system barycentre."
     );
     write_spk(&folder.join(PLANETS_NAME), &segments, &comment)
 }

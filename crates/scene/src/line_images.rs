@@ -78,7 +78,7 @@ impl LineImages<'_> {
         let rows: Option<Vec<Vec<Vector3<f64>>>> = rows.collect();
         let rows = rows.ok_or_else(|| SceneError::Image {
             image: line.name.to_owned(),
-            error: format!("lines {} to {} see no ground", lines.start, lines.end),
+            error: format!("lines {} to {} do not see the ground", lines.start, lines.end),
         })?;
         let sharp: Vec<Vec<f64>> = rows
             .windows(3)
@@ -151,7 +151,7 @@ impl LineImages<'_> {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "clamped to a byte just before; 0 stands for no pixel"
+        reason = "clamped to a byte just before; 0 means no pixel"
     )]
     fn read_out(&self, line: &StereoLine, dn: f64, at_line: u32, sample: u32) -> u8 {
         let key = line

@@ -13,7 +13,7 @@ use areograph_base::error::{Locate, Result};
 use areograph_geom::plane::Place;
 
 const README: &str = "A net of 25 rectified pictures for plane triangulation: measurements, controls, a net file.\n\
-    Some measurements and two controls are wrong on purpose; truth.json tells which, and where everything is.\n\
+    Some measurements and two controls are wrong on purpose; truth.json lists them, with all true positions.\n\
     Next: areograph triangulate net.toml\n";
 
 /// The tertiary net of the paper with more points and controls, and noise.

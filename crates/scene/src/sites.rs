@@ -200,7 +200,7 @@ pub(super) fn planned_site<'a>(
 ) -> SiteFile<'a> {
     let is_demo = *errors == SceneErrors::demo();
     let ties_of_demo = || {
-        let note = "A line, the noise of these tie points, is 1.1 to 1.6 focal-plane pixels.";
+        let note = "The noise of these tie points is one line, 1.1 to 1.6 focal-plane pixels.";
         (note.to_owned(), [1.6, 1.0])
     };
     let ties_with_noise = |noise_px: f64| {
@@ -314,7 +314,7 @@ pub(super) fn planned_label(arc: &Arc, session: &Session) -> Result<String> {
 pub(super) fn image_label(label: &Label<'_>) -> String {
     let mut lines = vec![
         "PDS_VERSION_ID = PDS3".to_owned(),
-        "NOTE = \"SYNTHETIC: written by areograph scene, there is no such image file\"".to_owned(),
+        "NOTE = \"SYNTHETIC: written by areograph scene, no such image file exists\"".to_owned(),
         format!("FILE_NAME = \"{}.IMQ\"", label.id.replace('-', "")),
         "RECORD_TYPE = UNDEFINED".to_owned(),
         "SPACECRAFT_NAME = MARS_GLOBAL_SURVEYOR".to_owned(),
@@ -361,14 +361,14 @@ kernels/     text kernels; orbit (three rival versions), attitude, Mars and Sun 
              nav.tm, gsfc.tm, ipng.tm load them with one version of the orbit each, and nav_wa.tm, gsfc_wa.tm
              and ipng_wa.tm with the frames of the wide-angle cameras as well
 pedr/        MOLA PEDR files: two whole days, five single revolutions; version K is in IAU 1991, L in IAU 2000
-images/      with --images alone: the six narrow-angle images, as the archive has them
+images/      with --images only: the six narrow-angle images, as in the archive
 labels/      labels of six narrow-angle images and three wide-angle ones
-ties/        places that both images of a site show, as measured in them; some are blunders
+ties/        tie points measured in both images of a site; some are blunders
 sites/       configurations for `areograph run`; gusev_context chooses among the three orbits, and has a profile
              that is simultaneous with no image
-truth.json   what really happened: biases, orientation of the images, footprints in the sites' windows,
-             how far the rival orbits are off (the orbit `gsfc` is the true one), and for the tie points when and
-             from where the images were truly taken; which errors were drawn from which sizes
+truth.json   true values: biases, orientation of the images, footprints in the sites' windows, errors of the rival
+             orbits (the orbit `gsfc` is the true one), and for the tie points the true time and position of each
+             exposure; drawn errors and the sizes from which they were drawn
 
 Image ids, times, summing, line counts, line periods and emission angles are those of Shan et al. 2005, Table 2; of
 E04-01275, for which it prints 7424 lines, 8064 are exposed, as their Table 4 demands. Terrain, orbits and

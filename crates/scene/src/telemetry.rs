@@ -57,7 +57,7 @@ pub(super) fn enter(record: &mut Record, seed: u64) {
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "held within the field"
+            reason = "clamped to the field"
         )]
         record.reflectivity_millipercent[shot].set(reflectivity as u16);
         record.optical_width[shot] = counts(sigma_ns / 0.1);
@@ -87,7 +87,7 @@ fn enter_receiver(record: &mut Record, chance: &impl Fn(u64, usize) -> f64) {
     record.range_window_cm = I32::new(WINDOW_CM);
 }
 
-#[allow(clippy::cast_possible_truncation, reason = "held within the field")]
+#[allow(clippy::cast_possible_truncation, reason = "clamped to the field")]
 fn counts(value: f64) -> I16 {
     I16::new(value.round().clamp(0.0, f64::from(i16::MAX)) as i16)
 }
@@ -95,7 +95,7 @@ fn counts(value: f64) -> I16 {
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "held within the field"
+    reason = "clamped to the field"
 )]
 fn byte(value: f64) -> u8 {
     value.round().clamp(0.0, 255.0) as u8

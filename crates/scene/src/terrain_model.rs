@@ -24,8 +24,8 @@ use areograph_base::{
 };
 use areograph_geom::{calibration::Offset, ellipsoid::spherical_to_xyz_m, height_grid::HeightGrid};
 
-const README: &str = "A stereo terrain model (model.tif) that lies aside of the ground, PEDR files of passes over it (pedr/) and support\n\
-    data of two images that show it (isd/); truth.json tells by how much the model lies aside.\n\
+const README: &str = "A stereo terrain model (model.tif) shifted from the ground, PEDR files of passes over it (pedr/) and support\n\
+    data of two images that show it (isd/); truth.json gives the shift.\n\
     Next: areograph pedr match model.tif pedr --isd s1=isd/s1.json --isd s2=isd/s2.json\n";
 
 /// Middle of the model.

@@ -272,7 +272,7 @@ fn select_ephemerides(
                 &format!("orbit of {}, solution {family}", SPACECRAFT.name),
             )?;
         } else {
-            set.add(path, "ephemeris of planets")?;
+            set.add(path, "planetary ephemeris")?;
         }
     }
     Ok(())

@@ -298,7 +298,7 @@ pub enum PointRejection {
     #[error("behind a camera that measured it")]
     BehindCamera,
     /// No line of a camera that has measured it sees it.
-    #[error("in the plane of no line of a camera that measured it")]
+    #[error("not in the plane of any line of a camera that measured it")]
     Unseen,
 }
 

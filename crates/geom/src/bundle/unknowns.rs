@@ -73,14 +73,14 @@ impl Unknown {
             }
             Self::TimeBias { .. } => "time bias".to_owned(),
             Self::RangeBias { .. } => "range bias".to_owned(),
-            Self::AttitudeClock => "offset of the attitude's clock".to_owned(),
+            Self::AttitudeClock => "attitude clock offset".to_owned(),
             Self::ProfileShift { axis, .. } => {
                 format!("shift {}", ["east", "north", "up"][axis % 3])
             }
-            Self::LineTime { .. } => "line times against the laser".to_owned(),
+            Self::LineTime { .. } => "laser line time offset".to_owned(),
             Self::Boresight { axis } => {
                 format!(
-                    "{} angle of the laser's boresight",
+                    "{} boresight angle of the laser",
                     ["first", "second"][axis % 2]
                 )
             }

@@ -52,7 +52,7 @@ pub enum SightError {
     #[error("its rays cross behind a camera")]
     Behind,
     /// The steps did not end.
-    #[error("its rays lead to no place")]
+    #[error("its rays do not determine a position")]
     NotConverged,
 }
 

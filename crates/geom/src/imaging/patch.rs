@@ -114,7 +114,7 @@ impl Patch {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "held against the size of the patch"
+        reason = "compared with the size of the patch"
     )]
     fn split(&self, axis: usize, coordinate: f64) -> Option<(usize, f64)> {
         let behind = coordinate - 0.5 - self.first[axis] as f64;

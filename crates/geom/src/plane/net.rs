@@ -49,7 +49,7 @@ pub enum PlaneError {
     },
     /// A picture, and what hangs on it, can turn, shrink or move.
     #[error(
-        "picture {picture} is tied to the net by {ties} points; expected two or more that lie apart, \
+        "picture {picture} is tied to the net by {ties} points; expected two or more distinct points, \
          on a part of the net that has controls"
     )]
     UnderconnectedPicture {

@@ -100,13 +100,13 @@ impl Default for SurfaceOptions {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SurfaceError {
     /// Too few shots.
-    #[error("{shots} laser shots make no surface, expected at least {SHOTS_MIN}")]
+    #[error("{shots} laser shots are too few for a surface; expected at least {SHOTS_MIN}")]
     TooFew {
         /// Shots.
         shots: usize,
     },
     /// Shots or options that give no positive definite covariance.
-    #[error("laser shots determine no surface: a coordinate or a standard deviation is no number")]
+    #[error("laser shots do not determine a surface: a coordinate or a standard deviation is not a number")]
     NotANumber,
 }
 

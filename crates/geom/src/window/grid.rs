@@ -147,7 +147,7 @@ impl WindowGrid {
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "0 to 360; what is no number becomes 0, and a margin that is one was asked above"
+            reason = "0 to 360; NaN becomes 0, and the margin was checked above"
         )]
         let column = ((turns - turns.floor()) * COLUMNS as f64) as usize;
         let cell = row * COLUMNS + column.min(COLUMNS - 1);

@@ -133,7 +133,7 @@ fn faults_of_cspice_carry_both_messages_of_naif() {
     let long = "9".repeat(300);
     assert_eq!(
         session.sclk_to_et(&long).unwrap_err().cause.to_string(),
-        "a clock string cannot be given to CSPICE: 300 bytes long, at most 255 are possible"
+        "a clock string cannot be given to CSPICE: 300 bytes long; expected at most 255"
     );
     assert!(
         session.state(et(0.0)).is_err() && session.mounting(usual_instrument(), et(0.0)).is_err()
@@ -434,7 +434,7 @@ fn a_path_that_is_too_long_for_cspice_is_named() {
     assert_eq!(failure.file.as_deref(), Some(&*path));
     let text = failure.to_string();
     assert!(
-        text.contains("bytes long, at most 255 are possible"),
+        text.contains("bytes long; expected at most 255"),
         "{text}"
     );
 }
