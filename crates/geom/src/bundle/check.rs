@@ -1,10 +1,10 @@
-//! Values and indices that a network must have before anything is computed.
+//! Checks of values and indices before a network is adjusted.
 
 use super::{BundleError, CommonBus, Network, Part, Spot, View};
 use crate::pushbroom::ExteriorOrientation;
 
 /// # Errors
-/// The first value that is none, the first index without a target.
+/// The first invalid value, the first index without a target.
 pub(super) fn check<M: ExteriorOrientation>(network: &Network<M>) -> Result<(), BundleError> {
     for (index, image) in network.images.iter().enumerate() {
         let part = Part::Image(index);
