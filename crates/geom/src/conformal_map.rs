@@ -10,7 +10,7 @@ use serde::Serialize;
 pub enum Projection {
     /// Mercator's, on the equator.
     Mercator,
-    /// Stereographic, about any place.
+    /// Stereographic, about any point.
     Stereographic,
 }
 

@@ -368,7 +368,7 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
         }
         // The triangle has the singular values of the rows.
         let singular_values = rows.eliminate().singular_values();
-        // Written so that NaN is refused.
+        // Written so that NaN is rejected.
         if singular_values.min() > DIRECTION_RATIO_MIN * singular_values.max() {
             Ok(())
         } else {

@@ -1,4 +1,4 @@
-//! Places as distances towards east and north from the middle of a site.
+//! Planimetric coordinates towards east and north from the middle of a site.
 
 use nalgebra::{Vector2, Vector3};
 

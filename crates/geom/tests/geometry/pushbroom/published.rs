@@ -1,4 +1,4 @@
-//! What theory says of the convergence of the two published iterations, and the points of Shan 2002.
+//! The theoretical convergence of the two published iterations, and the points of Shan 2002.
 
 use areograph_base::units::RADIANS_PER_DEGREE;
 use areograph_geom::{
@@ -12,7 +12,7 @@ use super::{
     scene::{EOS_NADIR, EOS_OBLIQUE, GUSEV, Held, PAPER, Scene},
 };
 
-/// Ratio of successive steps once the first ones are over, and long before rounding.
+/// Ratio of successive steps after the first ones, and long before rounding.
 fn contraction(steps: &[f64]) -> f64 {
     let late = steps
         .windows(2)
@@ -77,7 +77,7 @@ fn contraction_is_what_theory_says() {
             );
             assert!((r_b - 0.10).abs() < 0.01, "B {r_b}"); // turn per line × range / flight per line
         } else {
-            // Only Mars turns under a held camera: a hundredth of the orbit's turn, and less.
+            // Only Mars rotates under a held camera: a hundredth of the orbit's turn, and less.
             assert!(r_b.abs() < 1e-3, "B {r_b}");
         }
     }
