@@ -128,7 +128,7 @@ impl BlockCholesky {
     fn rows_of(&self, matrix: &BlockMatrix, position: usize) -> Result<DMatrix<f64>, Singular> {
         let (first, size) = (self.first[position], self.size(position));
         let left = self.starts[first];
-        // Transposed while it grows, so that what is known already is a matrix of full rows.
+        // Stored transposed while it grows, so that the known part is a matrix of full rows.
         let mut grown = DMatrix::zeros(self.starts[position + 1] - left, size);
         for before in first..position {
             let mut block = self
