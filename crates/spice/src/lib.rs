@@ -7,8 +7,7 @@
 //! | call CSPICE | [`Session`], one at a time in a process |
 //! | find gaps in coverage | [`Session::coverage`], [`Session::require_position`], [`Session::require_attitude`] |
 //! | compute positions in parallel without CSPICE | [`Session::trajectory`] |
-//! | write kernels: of a synthetic mission, of adjusted orientations | [`write_spk`], [`write_ck`],
-//! [`write_encoded_ck`] |
+//! | write kernels: synthetic missions, adjusted orientations | [`write_spk`], [`write_ck`], [`write_encoded_ck`] |
 //!
 //! Kilometres are converted to metres here, and nowhere else.
 //!

@@ -89,7 +89,7 @@ pub(super) fn explain(set: &KernelSet, error: SpiceError, needs: &[Need]) -> Spi
             KernelRole::Spk | KernelRole::Ck | KernelRole::Meta
         )
     });
-    // Binary planetary constants are no text, and define none of these.
+    // Binary planetary constants are not text, and define none of these.
     let defined: Vec<_> = texts
         .filter_map(|kernel| text_kernel::assignments(&read_text(&kernel.path).ok()?).ok())
         .collect();
