@@ -57,7 +57,7 @@ pub fn cut_at_antimeridian(ring_rad: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
     let (west, east) = longitudes.fold((f64::INFINITY, f64::NEG_INFINITY), |(west, east), x| {
         (west.min(x), east.max(x))
     });
-    // From a place within -π..π on, a ring reaches no farther than a turn.
+    // From a point within -π..π on, a ring extends no farther than a turn.
     let strips: Vec<(i32, i32)> = if east - west > PI {
         [-3, -2, -1, 0, 1, 2].map(|half| (half, half + 1)).to_vec()
     } else {

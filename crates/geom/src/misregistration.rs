@@ -172,7 +172,7 @@ impl Frame {
         Some(Self { middle, half_width })
     }
 
-    /// Products of powers up to `order` at a place of the first image.
+    /// Products of powers up to `order` at a position of the first image.
     fn terms(&self, place: [f64; 2], order: u8) -> Vec<f64> {
         let [u, v] = [0, 1].map(|axis| (place[axis] - self.middle[axis]) / self.half_width[axis]);
         let mut terms = vec![1.0, u, v];

@@ -115,7 +115,7 @@ impl Geometry {
         Orbit::new(middle, self.0.x, self.0.y)
     }
 
-    /// The site, as if seen straight down from a circle.
+    /// The site at nadir from a circular orbit.
     fn first_guess(image: &PlannedImage) -> Self {
         let latitude_rad = image.site.latitude_deg * RADIANS_PER_DEGREE;
         let longitude_rad = image.site.longitude_deg * RADIANS_PER_DEGREE;

@@ -52,7 +52,7 @@ pub struct ArchiveOptions {
 }
 
 impl ArchiveOptions {
-    /// The archive of about `gigabytes` (10⁹ bytes); at least one file.
+    /// The archive of about `gb` gigabytes (10⁹ bytes); at least one file.
     #[must_use]
     #[allow(
         clippy::cast_possible_truncation,

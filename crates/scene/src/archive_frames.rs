@@ -134,7 +134,7 @@ impl Look {
         }
     }
 
-    /// Where the beam passes the sphere of `radius_m`; for a beam that only grazes it, the nearest point.
+    /// Intersection of the beam with the sphere of `radius_m`; for a beam that only grazes it, the nearest point.
     fn at_radius_m(&self, radius_m: f64) -> Vector3<f64> {
         let b = self.spacecraft_m.dot(&self.direction);
         let c = self.spacecraft_m.norm_squared() - radius_m * radius_m;

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 /// Errors of a synthetic mission. The drawn values are in `truth.json`.
 ///
-/// All are normally distributed about 0 with the given standard deviation, unless a field says otherwise.
+/// All are normally distributed about 0 with the given standard deviation, unless stated otherwise.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SceneErrors {
     /// The cause of the along-track misregistration of a site's two images.
@@ -25,8 +25,8 @@ pub struct SceneErrors {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Misregistration {
-    /// Lines were exposed later than labels say by the residuals of Shan et al. 2005, Table 5, to half a line and
-    /// with the other sign: the same in every mission.
+    /// Lines were exposed later than stated by the labels, by the residuals of Shan et al. 2005, Table 5, to half a
+    /// line and with the opposite sign: the same in every mission.
     Published,
     /// Lines of each image were exposed later by an individual number of lines.
     LineTimes {
@@ -181,7 +181,7 @@ impl SceneErrors {
     /// * attitude 0.4 mrad: between the 0.26 mrad of 100 m, which the crossovers of MOLA leave in the horizontal, and the
     ///   0.5 mrad of the 200 m that Yoon & Shan 2004 take for images off nadir. Along the track 0.4 mrad, 150 m,
     ///   is what two images that disagree by 225 to 271 m allow for line times and pitch together, which no tie
-    ///   point tells apart: 30 lines are 100 to 165 m of it, 0.15 mrad are left to pitch. Drift and bend 1e-5 rad,
+    ///   point separates: 30 lines are 100 to 165 m of it, 0.15 mrad remain for pitch. Drift and bend 1e-5 rad,
     ///   2 arcseconds: residuals of C-kernels to a parabola (Shan et al. 2005, Table 4) reach 5;
     /// * jitter of 1 to 5 µrad and 0.1 to 2 s: a choice, below those 5 arcseconds (24 µrad);
     /// * MOLA profiles 70 m east and north, 1 m in radius: 100 m in the horizontal and 1 m radially (Neumann et al. 2001, as

@@ -61,7 +61,7 @@ pub(super) enum Echo {
 pub(super) struct Shot {
     /// True time.
     pub et: Et,
-    /// Where the beam meets the ground, IAU 2000, metres.
+    /// Intersection of the beam with the ground, IAU 2000, metres.
     pub ground_m: Vector3<f64>,
     /// Its target.
     pub echo: Echo,
@@ -184,7 +184,7 @@ impl Look {
         self.spacecraft_m + range_m * self.direction
     }
 
-    /// Where the beam passes the sphere of `radius_m`; for a beam that only grazes it, the nearest point.
+    /// Intersection of the beam with the sphere of `radius_m`; for a beam that only grazes it, the nearest point.
     fn at_radius(&self, radius_m: f64) -> FileCoordinates {
         let b = self.spacecraft_m.dot(&self.direction);
         let c = self.spacecraft_m.norm_squared() - radius_m * radius_m;
@@ -194,8 +194,8 @@ impl Look {
 
 /// Computes one frame.
 ///
-/// The frame's straight track is that of the beam, without jitter, on the sphere of the mid-point's radius; each shot is
-/// displaced along the beam by the parallax times the difference of its radius from the mid-point's.
+/// The frame's straight track is that of the beam, without jitter, on the sphere of the mid-point's radius; each shot
+/// is displaced along the beam by the parallax times the difference of its radius from the mid-point's.
 ///
 /// # Errors
 /// [`SceneError::BeamMisses`], or an error of `flight`.

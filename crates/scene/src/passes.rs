@@ -42,7 +42,7 @@ pub(super) struct Passes {
 }
 
 impl Passes {
-    /// How many there are.
+    /// Number of passes.
     pub(super) const fn count(&self) -> u32 {
         2 * self.of_direction
     }

@@ -292,7 +292,7 @@ mod tests {
             let range_m = TERRAIN.range_m(&origin, &direction).unwrap();
             let hit = origin + range_m * direction;
             let error_m = hit.norm() - TERRAIN.radius_m(&hit.normalize());
-            prop_assert!(error_m.abs() < 1e-4, "{error_m}"); // metres: a tenth of what a PEDR can say
+            prop_assert!(error_m.abs() < 1e-4, "{error_m}"); // metres: a tenth of the resolution of a PEDR file
             prop_assert!((hit.norm() - 3.39e6).abs() < 25_000.0);
         }
 
@@ -327,7 +327,7 @@ mod tests {
             let range_m = ROUGH.range_m(&origin, &direction).unwrap();
             let hit = origin + range_m * direction;
             let error_m = hit.norm() - ROUGH.radius_m(&hit.normalize());
-            prop_assert!(error_m.abs() < 1e-4, "{error_m}"); // metres: a tenth of what a PEDR can say
+            prop_assert!(error_m.abs() < 1e-4, "{error_m}"); // metres: a tenth of the resolution of a PEDR file
             // The mean over a spot deviates less from the ground than the relief within it: slopes are up to 1.
             let farther_m = ROUGH.spot_farther_m(&hit, &direction, 75.0);
             prop_assert!(farther_m.abs() < 75.0, "{farther_m}");

@@ -85,7 +85,7 @@ pub fn position_kernels(kernels: &KernelSet) -> Result<KernelSet> {
     Ok(kernels.of_roles(|role| role != KernelRole::Ck))
 }
 
-/// Kernels enter by content and place in the load order.
+/// Kernels enter by content and position in the load order.
 impl Input for &KernelView {
     fn add_to(&self, _field: &str, inputs: &mut Inputs) {
         let Some(kernels) = &self.kernels else {

@@ -128,7 +128,8 @@ impl BlockMatrix {
         &self.pattern
     }
 
-    /// The block in the rows of `row` and the columns of `column`, which is not before it; `None` where they do not meet.
+    /// The block in the rows of `row` and the columns of `column`, which is not before it; `None` where they do not
+    /// meet.
     #[must_use]
     pub fn block(&self, row: usize, column: usize) -> Option<DMatrixView<'_, f64>> {
         let values = &self.values[self.pattern.values_of(row, column)?];

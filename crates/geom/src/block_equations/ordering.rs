@@ -4,12 +4,12 @@ use std::collections::VecDeque;
 
 use super::BlockPattern;
 
-/// In patterns of more blocks than this, those that meet more than half of the others come last: unknowns that all images
-/// share. Among the images they would make the envelope as wide as the matrix; at its end each is a row.
+/// In patterns of more blocks than this, those that meet more than half of the others come last: unknowns common to all
+/// images. Among the images they would make the envelope as wide as the matrix; at its end each is a row.
 const SHARED_LAST_ABOVE: usize = 16;
 
-/// The reverse Cuthill–McKee order: the block at each position. Equal candidates are taken by their index. Blocks that most
-/// others meet come last.
+/// The reverse Cuthill–McKee order: the block at each position. Ties are broken by index. Blocks that most others meet
+/// come last.
 pub(super) fn order(pattern: &BlockPattern) -> Vec<usize> {
     let neighbours = neighbours(pattern);
     let mut order = Vec::with_capacity(neighbours.len());

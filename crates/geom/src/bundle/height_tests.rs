@@ -127,7 +127,7 @@ fn dense(
     let weights = heights.covariance_m2().cholesky().unwrap().inverse();
     normal += rows.tr_mul(&(&weights * &rows));
     right -= rows.tr_mul(&(&weights * above_m));
-    // Scaled by hand, for the plain inverse to be exact enough.
+    // Scaled explicitly, for the plain inverse to be accurate enough.
     let scale = normal.diagonal().map(|value| 1.0 / value.sqrt());
     for row in 0..unknowns {
         for column in 0..unknowns {

@@ -105,7 +105,7 @@ impl Heights {
         })
     }
 
-    /// The same heights as if slopes gave no information about planimetry, and planimetry were exact.
+    /// The same heights without the information of slopes about planimetry, and without its uncertainty.
     pub(super) fn without_plan(&self) -> Self {
         let mut heights = self.clone();
         heights.surface.relief = None;

@@ -317,7 +317,7 @@ fn against_dense(network: &Network<EulerPolynomial>) {
     for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
         normal[(column, column)] += sigma.powi(-2);
     }
-    // Scaled by hand, for the plain inverse to be exact enough.
+    // Scaled explicitly, for the plain inverse to be accurate enough.
     let scale = normal.diagonal().map(|value| 1.0 / value.sqrt());
     let scaled = DMatrix::from_fn(unknowns, unknowns, |row, column| {
         normal[(row, column)] * scale[row] * scale[column]

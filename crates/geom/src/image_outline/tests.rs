@@ -34,7 +34,7 @@ fn overlaps_are_shares_of_the_smaller_outline() {
     assert!((across.overlap(&east) - 0.5).abs() < 1e-12);
 }
 
-/// A quadrangle of great circles about a place: from its centre along two directions of a tangent plane.
+/// A quadrangle of great circles about a point: from its centre along two directions of a tangent plane.
 struct Patch {
     centre: Vector3<f64>,
     across: Vector3<f64>,

@@ -1,4 +1,4 @@
-//! Patches of invented ground with known positions.
+//! Patches of synthetic ground with known positions.
 
 #![allow(clippy::cast_possible_truncation, reason = "numbers of a byte")]
 
@@ -231,7 +231,7 @@ fn a_search_finds_the_pixel_and_tells_of_a_second_place() {
 fn texture_is_found_where_it_is_and_not_in_noise() {
     let mut random = Random(15);
     let ground = Ground::new(&mut random);
-    // Ground only around line 60, sample 90; elsewhere nothing but noise.
+    // Ground only around line 60, sample 90; only noise elsewhere.
     let mut image = ground.image(
         [0, 0],
         [120, 160],

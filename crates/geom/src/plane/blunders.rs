@@ -35,7 +35,7 @@ pub struct Blunder {
 pub struct Cleaned {
     /// The brick.
     pub figure: Figure,
-    /// What was removed, in order.
+    /// Removed measurements, in order.
     pub blunders: Vec<Blunder>,
     /// Indices of all removed measurements.
     pub removed: Vec<usize>,

@@ -11,7 +11,7 @@ use super::{
 /// Weight of a seam's mean in LOCAL: as much as ten images.
 const SEAM_WEIGHT: f64 = 10.0;
 
-/// A brick: some pictures in a local figure whose place, size and direction are approximate.
+/// A brick: some pictures in a local figure whose position, size and orientation are approximate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
     /// Indices of its pictures in the net.

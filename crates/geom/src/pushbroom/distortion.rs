@@ -30,7 +30,7 @@ struct DistortedLine {
     along: f64,
     /// Unit of the law per sample.
     per_sample: f64,
-    /// First and last place, by the coordinate across the track.
+    /// First and last point, by the coordinate across the track.
     ends: [CurvePoint; 2],
 }
 
@@ -39,9 +39,10 @@ struct DistortedLine {
 enum Law {
     /// The angle off the boresight is a polynomial of odd powers of the distance in thousands of pixels.
     Angle,
-    /// Ideal places are `1 − Σ kᵢ r²ⁱ` times the distorted ones, millimetres, in front of a focal length.
+    /// Ideal coordinates are `1 − Σ kᵢ r²ⁱ` times the distorted ones, millimetres, in front of a focal length.
     Radial { focal_length_mm: f64 },
-    /// Across the track ideal places are the distorted ones over `1 + k c²`, millimetres, in front of a focal length.
+    /// Across the track ideal coordinates are the distorted ones over `1 + k c²`, millimetres, in front of a focal
+    /// length.
     AcrossQuotient { focal_length_mm: f64 },
 }
 

@@ -20,7 +20,7 @@ pub(super) struct Kriging {
     strengths: DVector<f64>,
 }
 
-/// Weights of shots, one column a place, with the multiplier that keeps their sum at 1.
+/// Weights of shots, one column a point, with the multiplier that keeps their sum at 1.
 pub(super) struct Weights {
     of_shots: DMatrix<f64>,
     multipliers: DVector<f64>,
@@ -63,7 +63,7 @@ impl Kriging {
         })
     }
 
-    /// Height of the surface at a place, metres.
+    /// Height of the surface at a point, metres.
     pub(super) fn height_m(&self, place: &Vector2<f64>) -> f64 {
         let shots = self.shots.iter().zip(&self.strengths);
         let above_m = shots.map(|(shot, strength)| strength * self.covariance(shot, place));

@@ -41,7 +41,7 @@ impl Variogram {
         }
     }
 
-    /// Half the mean square difference of heights between two places, m².
+    /// Half the mean square difference of heights between two points, m².
     pub(super) fn between(self, one: &Vector2<f64>, other: &Vector2<f64>) -> f64 {
         let distance_m = (one - other).norm();
         0.5 * self.roughness_m.powi(2) * (distance_m / REFERENCE_M).powf(2.0 * Self::HURST)

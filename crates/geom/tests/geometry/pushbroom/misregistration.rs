@@ -16,7 +16,7 @@ const OBLIQUE: Scene = Scene {
     ..GUSEV
 };
 
-/// Where both images see a point, lines and pixels from their middles.
+/// Image coordinates of a point in both images, lines and pixels from their middles.
 fn seen(point_m: &Vector3<f64>) -> Pair {
     let place = |scene: &Scene| {
         let model = scene.rotation_vector();

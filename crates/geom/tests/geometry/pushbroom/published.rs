@@ -134,7 +134,7 @@ fn all_methods_find_the_same_line() {
     }
 }
 
-/// Where the corrected table puts the first and the tenth of its points, lines and pixels.
+/// The first and the tenth point by the corrected table, lines and pixels.
 const SEEN_2002: [(usize, f64, f64); 2] = [(0, -2681.9, 194.9), (9, -1879.7, 199.7)];
 
 fn point_m(index: usize) -> Vector3<f64> {
