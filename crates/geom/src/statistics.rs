@@ -238,8 +238,8 @@ fn spread_of_blocks(terms: &[f64]) -> f64 {
 
 /// Effective number of independent residuals about a line: `n (1 − ρ) / (1 + ρ)`, at most `n`.
 ///
-/// `ρ` is the correlation of neighbours. Its estimate `r` from residuals about a fitted line is too small by about `(2
-/// + 4 ρ) / n`, which is corrected.
+/// `ρ` is the correlation of neighbours. Its estimate `r` from residuals about a fitted line is too small by about
+/// `(2 + 4 ρ) / n`, which is corrected.
 ///
 /// # Source
 /// Effective number: Santer et al. 2000. Bias: after Marriott & Pope 1954, Biometrika 41, 390–402, who

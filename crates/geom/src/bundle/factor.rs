@@ -1,8 +1,9 @@
 //! The factor of the reduced equations, observed heights included.
 //!
 //! Heights have a full covariance and tie all images to each other. The equations stay sparse without them; with their
-//! rows `G` in the shared unknowns and their covariance `Σ`, `(S + Gᵀ Σ⁻¹ G)⁻¹ = S⁻¹ − Z K⁻¹ Zᵀ`, `Z = S⁻¹ Gᵀ`, `K = Σ
-//! + G Z`. At most a few hundred heights are observed, so `Z` takes as many solutions of the sparse equations.
+//! rows `G` in the shared unknowns and their covariance `Σ`,
+//! `(S + Gᵀ Σ⁻¹ G)⁻¹ = S⁻¹ − Z K⁻¹ Zᵀ`, `Z = S⁻¹ Gᵀ`, `K = Σ + G Z`. At most a few hundred heights are observed, so `Z`
+//! takes as many solutions of the sparse equations.
 //!
 //! # Source
 //! Woodbury 1950, Inverting modified matrices.

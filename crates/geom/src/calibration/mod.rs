@@ -1,9 +1,10 @@
 //! Offset angles and look angles of the lines of one camera, from tie points of several lines and from control points.
 //!
 //! The model is that of Li et al. 2023, its misprints corrected: `P = S + m · R · R_u · (tan ψx, tan ψy, 1)ᵀ`, with the
-//! position `S` of the spacecraft, the rotation `R` from its axes to body-fixed ones, an offset rotation `R_u = R_φ R_ω
-//! R_κ` and polynomials `tan ψx(s)`, `tan ψy(s)` of every line. Axes of the spacecraft: x across the flight, y along
-//! it, z down. Residuals are tangents, `V = (XX/ZZ − tan ψx, YY/ZZ − tan ψy)` with `(XX, YY, ZZ)ᵀ = R_uᵀ Rᵀ (P − S)`.
+//! position `S` of the spacecraft, the rotation `R` from its axes to body-fixed ones, an offset rotation
+//! `R_u = R_φ R_ω R_κ` and polynomials `tan ψx(s)`, `tan ψy(s)` of every line. Axes of the spacecraft: x across the
+//! flight, y along it, z down. Residuals are tangents, `V = (XX/ZZ − tan ψx, YY/ZZ − tan ψy)` with
+//! `(XX, YY, ZZ)ᵀ = R_uᵀ Rᵀ (P − S)`.
 //!
 //! Ground points are eliminated one by one by reflections of their rows. This preserves the null space of the points,
 //! which normal equations would lose in rounding.

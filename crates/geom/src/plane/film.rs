@@ -79,8 +79,8 @@ impl FourCorners {
     }
 }
 
-/// The additional correction of cathode-ray recorders (*Dicomed*) after [`FourCorners`]: `δx = a x + b x²` and `δy = a'
-/// y + b' y²` that are 0 at the corners, with the origin at a corner, hence `δx = b x (x − W)`.
+/// The additional correction of cathode-ray recorders (*Dicomed*) after [`FourCorners`]: `δx = a x + b x²` and
+/// `δy = a' y + b' y²` that are 0 at the corners, with the origin at a corner, hence `δx = b x (x − W)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CornerZero {
     corner: Place,

@@ -78,8 +78,8 @@ impl Frame {
 /// Adjusts `net`: every point is tied to the mean of its images (weight 1), every control to the mean of its images
 /// by its own weight.
 ///
-/// For a point on `r` pictures the paper's `r` equations `X_i − mean(X) = 0` have rank `r − 1`; they are replaced by `r
-/// − 1` orthonormal contrasts with the same sum of squares. Coordinates are centred and scaled.
+/// For a point on `r` pictures the paper's `r` equations `X_i − mean(X) = 0` have rank `r − 1`; they are replaced by
+/// `r − 1` orthonormal contrasts with the same sum of squares. Coordinates are centred and scaled.
 ///
 /// # Errors
 /// [`PlaneError`] for a net that leaves a picture free; see [`check`].
