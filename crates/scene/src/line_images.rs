@@ -78,7 +78,7 @@ impl LineImages<'_> {
         let rows: Option<Vec<Vec<Vector3<f64>>>> = rows.collect();
         let rows = rows.ok_or_else(|| SceneError::Image {
             image: line.name.to_owned(),
-            error: format!("lines {} to {} do not see the ground", lines.start, lines.end),
+            error: format!("lines {} to {} miss the ground", lines.start, lines.end),
         })?;
         let sharp: Vec<Vec<f64>> = rows
             .windows(3)

@@ -3,7 +3,7 @@
 //! CSPICE keeps global state and is not thread safe. Every call is a method of [`Cspice`], and a
 //! `Cspice` exists only while the process-wide lock is held, so no call can happen without it.
 
-#![allow(unsafe_code, reason = "CSPICE is a C library; only this file calls it")]
+#![allow(unsafe_code, reason = "CSPICE is a C library, called only here")]
 #![allow(
     clippy::unused_self,
     reason = "a method needs `self` as the proof that the lock is held"

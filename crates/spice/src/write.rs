@@ -232,7 +232,7 @@ fn check_lengths<T>(name: &str, instants: &[T], columns: &[usize]) -> Result<()>
     } else if instants.is_empty() {
         "it holds no instants".to_owned()
     } else if let Some(count) = columns.iter().find(|count| **count != instants.len()) {
-        format!("a column of {count} values for {} instants", instants.len())
+        format!("column of {count} values for {} instants", instants.len())
     } else {
         return Ok(());
     };

@@ -109,7 +109,7 @@ impl<'a> Rendering<'a> {
             .ground_of_line_m(self.terrain, middle(line), samples.map(middle));
         let nothing = || SceneError::Image {
             image: self.image.flown.arc.image.id.to_owned(),
-            error: format!("line {line} does not see the ground"),
+            error: format!("line {line} misses the ground"),
         };
         let seen: Option<Vec<Vector3<f64>>> = seen.into_iter().collect();
         Ok(seen.ok_or_else(nothing)?)

@@ -433,8 +433,5 @@ fn a_path_that_is_too_long_for_cspice_is_named() {
     assert_eq!(failure.kind(), Kind::Input);
     assert_eq!(failure.file.as_deref(), Some(&*path));
     let text = failure.to_string();
-    assert!(
-        text.contains("bytes long; expected at most 255"),
-        "{text}"
-    );
+    assert!(text.contains("bytes long; expected at most 255"), "{text}");
 }

@@ -197,6 +197,6 @@ fn columns_that_do_not_fit_are_refused() {
     let failure = write_ck(&at.join("uneven.bc"), &session, &[ck], "").unwrap_err();
     assert_eq!(
         failure.cause.to_string(),
-        "segment turning: a column of 2 for 3 instants"
+        "segment turning: column of 2 values for 3 instants"
     );
 }
