@@ -1,8 +1,8 @@
-//! Links CSPICE so that what is built can be moved.
+//! Links CSPICE so that the build products can be moved.
 //!
-//! `cspice-sys` asks for a static `libcspice.a`, and where there is one it is inside the program.
-//! Where `$CSPICE_DIR/lib` holds the shared library and an empty archive instead, the shared library is
-//! copied beside the programs of the profile, and whoever links this crate learns of it (`DEP_AREOGRAPH_CSPICE_SHARED`).
+//! `cspice-sys` requires a static `libcspice.a`, and where one exists it is linked into the program. Where
+//! `$CSPICE_DIR/lib` holds the shared library and an empty archive instead, the shared library is copied beside the
+//! programs of the profile, and dependent crates receive its path (`DEP_AREOGRAPH_CSPICE_SHARED`).
 
 use std::{
     env,
@@ -13,7 +13,7 @@ use std::{
 
 const SHARED: &str = "libcspice.so";
 
-/// An archive without members is its magic number, `!<arch>` and a line end.
+/// An archive without members consists of its magic number, `!<arch>` and a line end.
 const EMPTY_ARCHIVE_BYTES: u64 = 8;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -44,7 +44,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Copies a file unless it is there already; with its time, so that cargo does not take the copy for a change.
+/// Copies a file unless the copy exists; keeps its time, so that cargo does not take the copy for a change.
 fn copy_with_time(from: &Path, to: &Path) -> Result<(), Box<dyn Error>> {
     let (source, present) = (fs::metadata(from)?, fs::metadata(to));
     let modified = source.modified()?;

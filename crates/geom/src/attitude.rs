@@ -79,7 +79,7 @@ pub fn matrix_of_spice_quaternion([w, x, y, z]: [f64; 4]) -> Matrix3<f64> {
         .into_inner()
 }
 
-/// Quaternions of matrices as [`spice_quaternion`] has them, each with the sign that lies nearest to the one before.
+/// Quaternions of matrices in the convention of [`spice_quaternion`], each with the sign nearest to the one before.
 #[must_use]
 pub fn continuous_quaternions<'a>(
     matrices: impl IntoIterator<Item = &'a Matrix3<f64>>,
@@ -89,7 +89,7 @@ pub fn continuous_quaternions<'a>(
     quaternions
 }
 
-/// Chooses signs so that each quaternion lies nearest to the one before it.
+/// Chooses signs so that each quaternion is nearest to the one before it.
 pub fn make_continuous(quaternions: &mut [[f64; 4]]) {
     for index in 1..quaternions.len() {
         let previous = quaternions[index - 1];
@@ -104,7 +104,7 @@ pub fn make_continuous(quaternions: &mut [[f64; 4]]) {
     }
 }
 
-/// Matrix from the bus to a camera that is mounted so.
+/// Matrix from the bus to a camera with this mounting.
 #[must_use]
 pub fn bus_to_camera(mounting: &Mounting) -> Matrix3<f64> {
     frame_rotation_3(mounting.yaw_rad)
@@ -149,14 +149,14 @@ pub fn left_jacobian_product(vector_rad: &Vector3<f64>, rate_rad: &Vector3<f64>)
     rate_rad + across * first + vector_rad.cross(&across) * second
 }
 
-/// Steps towards the mean rotation that are tried; each leaves the cube of what was left.
+/// Maximum number of steps towards the mean rotation; each leaves the cube of the remaining error.
 const MEAN_STEPS_MAX: u32 = 20;
-/// Size of the last step, radians.
+/// A step below this ends the iteration, radians.
 const MEAN_STEP_RAD: f64 = 1e-14;
 
 /// The rotation from which the rotation vectors to all of `matrices` add up to zero.
 ///
-/// For rotations less than a right angle apart there is one such; the identity for none.
+/// It is unique for rotations less than a right angle apart; it is the identity for an empty slice.
 #[must_use]
 pub fn mean_rotation(matrices: &[Matrix3<f64>]) -> Matrix3<f64> {
     let Some(first) = matrices.first() else {

@@ -40,7 +40,7 @@ pub fn project(
     focal_length: f64,
 ) -> Result<Vector2<f64>, BehindCamera> {
     let depth_m = camera_point_m.z;
-    // Written so that NaN is refused.
+    // Written so that NaN is rejected.
     if !(depth_m > 0.0) {
         return Err(BehindCamera { depth_m });
     }

@@ -10,7 +10,7 @@ use serde::Serialize;
 pub enum Projection {
     /// Mercator's, on the equator.
     Mercator,
-    /// Stereographic, about any place.
+    /// Stereographic, about any point.
     Stereographic,
 }
 
@@ -31,7 +31,8 @@ pub struct ConformalMap {
 }
 
 impl ConformalMap {
-    /// East and north on the map, metres; `None` for a pole of Mercator's projection and for the antipode of the centre.
+    /// East and north on the map, metres; `None` for a pole of Mercator's projection and for the antipode of the
+    /// centre.
     #[must_use]
     pub fn project(&self, longitude_rad: f64, latitude_rad: f64) -> Option<(f64, f64)> {
         let turn_rad = (longitude_rad - self.longitude_rad + PI).rem_euclid(TAU) - PI;
@@ -55,7 +56,7 @@ impl ConformalMap {
         }
     }
 
-    /// East longitude in `-π..π` and areocentric latitude, radians, of a place on the map, metres.
+    /// East longitude in `-π..π` and areocentric latitude, radians, of a map point, metres.
     #[must_use]
     pub fn unproject(&self, (x_m, y_m): (f64, f64)) -> (f64, f64) {
         let (sin_centre, cos_centre) = self.latitude_rad.sin_cos();
@@ -82,7 +83,7 @@ impl ConformalMap {
         (longitude_rad, latitude_rad)
     }
 
-    /// Metres on the map for a metre on the sphere at a place on the map.
+    /// Metres on the map for a metre on the sphere at a map point.
     #[must_use]
     pub fn scale(&self, place_m: (f64, f64)) -> f64 {
         match self.projection {
@@ -93,7 +94,7 @@ impl ConformalMap {
         }
     }
 
-    /// Change of the scale with distance on the sphere, `|∇ ln k|`, per metre, at a place on the map.
+    /// Change of the scale with distance on the sphere, `|∇ ln k|`, per metre, at a map point.
     #[must_use]
     pub fn scale_gradient(&self, place_m: (f64, f64)) -> f64 {
         match self.projection {

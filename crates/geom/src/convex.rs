@@ -1,6 +1,6 @@
-//! Convex rings in a plane: hulls, areas, and what two of them share.
+//! Convex rings in a plane: hulls, areas and intersections.
 
-/// Twice the area of the triangle of three points, positive when it is walked counterclockwise.
+/// Twice the area of the triangle of three points, positive when it is counterclockwise.
 fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
@@ -26,14 +26,14 @@ pub fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     ring
 }
 
-/// The area of a ring, positive when it is walked counterclockwise.
+/// The area of a ring, positive when it is counterclockwise.
 #[must_use]
 pub fn area(ring: &[[f64; 2]]) -> f64 {
     let triangles = (2..ring.len()).map(|next| turn(ring[0], ring[next - 1], ring[next]));
     0.5 * triangles.sum::<f64>()
 }
 
-/// What a ring shares with a convex one that is walked counterclockwise (Sutherland and Hodgman).
+/// The intersection of a ring with a convex counterclockwise one (Sutherland and Hodgman).
 #[must_use]
 pub fn clipped(ring: Vec<[f64; 2]>, by: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut ring = ring;

@@ -1,4 +1,4 @@
-//! Areocentric and areographic coordinates, and where a ray meets the ellipsoid.
+//! Areocentric and areographic coordinates, and the intersection of a ray with the ellipsoid.
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -88,7 +88,7 @@ impl Spherical {
     }
 }
 
-/// Rows that turn Mars-fixed vectors into east, north and up at a place; at a pole east is the Y axis.
+/// Rows that rotate Mars-fixed vectors into east, north and up at a point; at a pole east is the Y axis.
 #[must_use]
 pub fn local_axes(place_m: &Vector3<f64>) -> Matrix3<f64> {
     let up = place_m.try_normalize(0.0).unwrap_or_else(Vector3::z);
@@ -101,9 +101,9 @@ pub fn local_axes(place_m: &Vector3<f64>) -> Matrix3<f64> {
     ])
 }
 
-/// Where the ray from `origin` along `direction` first meets the ellipsoid of `model`, metres.
+/// First intersection of the ray from `origin` along `direction` with the ellipsoid of `model`, metres.
 ///
-/// `direction` need not have unit length. `None` when the ray misses or the ellipsoid lies behind.
+/// `direction` need not have unit length. `None` when the ray misses the ellipsoid or points away from it.
 #[must_use]
 pub fn ray_meets_ellipsoid<F: Frame>(
     model: &BodyModel,
@@ -153,7 +153,7 @@ pub fn on_ellipsoid_m(model: &BodyModel, place_m: &Vector3<f64>) -> Vector3<f64>
     up / ((up.x / a).powi(2) + (up.y / a).powi(2) + (up.z / c).powi(2)).sqrt()
 }
 
-/// Height of a place above the ellipsoid of `model` along the radius, metres, and how it changes with the place.
+/// Height of a point above the ellipsoid of `model` along the radius, metres, and its change with the point.
 #[must_use]
 pub fn height_m(model: &BodyModel, place_m: &Vector3<f64>) -> (f64, Vector3<f64>) {
     let up = place_m.normalize();

@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use areograph_base::units::wrap_pi;
 
-/// A grid of heights. Places in it are rows (southwards) and columns (eastwards), 0 in the middle of the first cell.
+/// A grid of heights. Grid coordinates are rows (southwards) and columns (eastwards), 0 in the middle of the first
+/// cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct HeightGrid {
     /// Rows and columns.
@@ -13,14 +14,14 @@ pub struct HeightGrid {
     pub first_rad: [f64; 2],
     /// Size of a cell in longitude and latitude, both above 0, radians.
     pub cell_rad: [f64; 2],
-    /// The sphere that heights count from, metres.
+    /// The sphere that heights refer to, metres.
     pub radius_m: f64,
-    /// Heights row by row, metres; NaN where there is none.
+    /// Heights row by row, metres; NaN where missing.
     pub heights_m: Vec<f32>,
 }
 
 impl HeightGrid {
-    /// West, south, east and north edge, radians; east lies above west by the width of the grid.
+    /// West, south, east and north edge, radians; the east edge is the west edge plus the width of the grid.
     #[must_use]
     pub fn edges_rad(&self) -> [f64; 4] {
         let [west, north] = [0, 1].map(|axis| {
@@ -52,7 +53,7 @@ impl HeightGrid {
         ]
     }
 
-    /// Row and column of a place, inside the grid or outside; longitudes of any turn.
+    /// Row and column of a point, inside the grid or outside; longitudes of any turn.
     #[must_use]
     pub fn cell_of(&self, longitude_rad: f64, latitude_rad: f64) -> [f64; 2] {
         let [middle_rad, _] = self.middle_rad();
@@ -72,14 +73,14 @@ impl HeightGrid {
         ]
     }
 
-    /// Height between the four nearest cells, metres; `None` outside, and where one of them has none.
+    /// Height between the four nearest cells, metres; `None` outside, and where one of them has no height.
     #[must_use]
     pub fn height_m(&self, cell: [f64; 2]) -> Option<f64> {
         let probe = Probe::at(cell);
         self.probed_m(&probe, [0, 0])
     }
 
-    /// The same at a probe that is shifted by whole rows and columns.
+    /// The same at a probe shifted by whole rows and columns.
     #[must_use]
     pub fn probed_m(&self, probe: &Probe, shift: [i64; 2]) -> Option<f64> {
         let [row, column] = [0, 1].map(|axis| usize::try_from(probe.first[axis] + shift[axis]));
@@ -99,12 +100,12 @@ impl HeightGrid {
     }
 }
 
-/// A place between four cells: shifted by whole cells it keeps its weights.
+/// A position between four cells; when shifted by whole cells it keeps its weights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Probe {
     /// Row and column of the cell in the north-west.
     first: [i64; 2],
-    /// Of the cells north-west, north-east, south-west, south-east.
+    /// Weights of the cells north-west, north-east, south-west, south-east.
     weights: [f64; 4],
 }
 
@@ -113,7 +114,7 @@ impl Probe {
     #[must_use]
     #[allow(
         clippy::cast_possible_truncation,
-        reason = "a cast of floating point numbers ends at the bounds, far outside of any grid"
+        reason = "a cast from floating point saturates, far outside any grid"
     )]
     pub fn at(cell: [f64; 2]) -> Self {
         let first = cell.map(f64::floor);
@@ -153,7 +154,7 @@ mod tests {
         let grid = plane();
         for cell in [[0.0, 0.0], [2.25, 1.5], [3.999, 2.999]] {
             let [longitude_rad, latitude_rad] = grid.place_rad(cell);
-            // The other side of the antimeridian, as files have it.
+            // The other side of the antimeridian, as in files.
             let back = grid.cell_of(wrap_pi(longitude_rad), latitude_rad);
             assert!((back[0] - cell[0]).hypot(back[1] - cell[1]) < 1e-9); // rounding, cells
             let height_m = grid.height_m(cell);

@@ -1,4 +1,4 @@
-//! Outlines of images on the ground, known by their corners, and how two images of one place see it.
+//! Outlines of images on the ground from their corners, and the overlap and convergence of two images.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -12,20 +12,20 @@ use crate::{
 };
 use areograph_base::units::{RADIANS_PER_DEGREE, wrap_two_pi};
 
-/// How far the corners of the index may be off, radians of latitude: the kind of its latitudes is not known, ...
+/// Error bound of the corners in the index, radians of latitude: the kind of its latitudes is not known, ...
 pub const INDEX_LATITUDE_RAD: f64 = 0.35 * RADIANS_PER_DEGREE;
 /// ... and of longitude at the equator: nor is its prime meridian.
 pub const INDEX_LONGITUDE_RAD: f64 = 0.3 * RADIANS_PER_DEGREE;
-/// Corners farther from the centre than this are none, radians.
+/// Corners farther from the centre than this are invalid, radians.
 const CORNER_RAD: f64 = 60.0 * RADIANS_PER_DEGREE;
 /// Beyond this latitude, its margin included, an outline reaches round the pole, radians.
 const POLAR_RAD: f64 = 89.0 * RADIANS_PER_DEGREE;
 /// From this latitude on areas are compared in the plane of the pole, radians.
 const PLANE_RAD: f64 = 75.0 * RADIANS_PER_DEGREE;
-/// Edges are walked in pieces no longer than this, radians.
+/// Edges are sampled in pieces no longer than this, radians.
 const PIECE_RAD: f64 = RADIANS_PER_DEGREE;
 
-/// The outline of an image by its corners, with great circles between them.
+/// The outline of an image from its corners, with great circles between them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImageOutline {
     /// (longitude, latitude) of the corners in their order round the image, radians.
@@ -33,8 +33,8 @@ pub struct ImageOutline {
 }
 
 impl ImageOutline {
-    /// The outline of corners around a centre; where some of them are no corners of this image, a box that holds it
-    /// whichever way it lies, `half_diagonal_rad` to all sides. None where that is not known either.
+    /// The outline of corners around a centre. Where some corners are invalid, a square of `half_diagonal_rad` to all
+    /// sides that contains the image in any orientation; `None` where that is not known either.
     #[must_use]
     pub fn new(
         corners_rad: [Option<[f64; 2]>; 4],
@@ -61,14 +61,14 @@ impl ImageOutline {
         cut_at_antimeridian(&self.corners_rad)
     }
 
-    /// The ground that the image may show when its corners are off by `latitude_rad` in latitude, and by
+    /// The ground that the image may show when its corners are in error by `latitude_rad` in latitude, and by
     /// `longitude_rad` over the cosine of latitude in longitude; see [`widened`].
     #[must_use]
     pub fn widened(&self, latitude_rad: f64, longitude_rad: f64) -> Region {
         Region::new(&widened(&self.corners_rad, latitude_rad, longitude_rad))
     }
 
-    /// The share of the smaller of two outlines that the other one shows, 0 to 1.
+    /// The share of the smaller of two outlines that the other one covers, 0 to 1.
     #[must_use]
     pub fn overlap(&self, other: &Self) -> f64 {
         let both = [self, other].map(|outline| &*outline.corners_rad);
@@ -93,7 +93,7 @@ impl ImageOutline {
     }
 }
 
-/// The corners of a box about a centre; four places round the pole where it holds that.
+/// The corners of a box about a centre; four points round the pole where the box contains it.
 fn square([longitude, latitude]: [f64; 2], half_rad: f64) -> Vec<[f64; 2]> {
     let Some(width) = half_width_rad(latitude, half_rad) else {
         let lowest = latitude - half_rad.copysign(latitude);
@@ -110,12 +110,12 @@ fn square([longitude, latitude]: [f64; 2], half_rad: f64) -> Vec<[f64; 2]> {
     ]
 }
 
-/// Whether longitudes say little of where a ring is.
+/// Whether a ring is too close to a pole for longitudes to locate it.
 fn is_polar(ring_rad: &[[f64; 2]]) -> bool {
     goes_round_pole(ring_rad) || ring_rad.iter().any(|place| place[1].abs() > PLANE_RAD)
 }
 
-/// A place in the plane of a pole, its distance from there kept.
+/// A point in the plane of a pole, its distance from the pole kept.
 fn in_polar_plane([longitude, latitude]: [f64; 2], north: bool) -> [f64; 2] {
     let side = if north { 1.0 } else { -1.0 };
     let distance = FRAC_PI_2 - side * latitude;
@@ -125,9 +125,10 @@ fn in_polar_plane([longitude, latitude]: [f64; 2], north: bool) -> [f64; 2] {
     ]
 }
 
-/// The ground within a ring of places (longitude, latitude; radians) with great circles between them, and around it: by
-/// `latitude_rad` in latitude, by a cap of radius `longitude_rad` at the farthest latitude in longitude. A convex outline in
-/// the plane of longitude and latitude that holds all of it; a whole cap where the ring goes round a pole or close to it.
+/// The ground within a ring of points (longitude, latitude; radians) with great circles between them, and around it: by
+/// `latitude_rad` in latitude, by a cap of radius `longitude_rad` at the farthest latitude in longitude. The result is
+/// a convex outline in the plane of longitude and latitude that contains all of it, or a whole cap where the ring goes
+/// round a pole or close to it.
 #[must_use]
 pub fn widened(ring_rad: &[[f64; 2]], latitude_rad: f64, longitude_rad: f64) -> WindowShape {
     let edge = walked(ring_rad);
@@ -172,8 +173,8 @@ pub fn widened(ring_rad: &[[f64; 2]], latitude_rad: f64, longitude_rad: f64) -> 
     }
 }
 
-/// Places along the edges of a ring and just beyond them towards the poles, longitudes in one stretch: straight lines round
-/// all of them in the plane of longitude and latitude have the great circles within.
+/// Points along the edges of a ring and just beyond them towards the poles, longitudes in one stretch: straight lines
+/// round all of them in the plane of longitude and latitude contain the great circles.
 fn walked(ring_rad: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let next = ring_rad.iter().cycle().skip(1);
     let edges = ring_rad.iter().zip(next).flat_map(|(from, to)| {
@@ -206,19 +207,19 @@ pub fn angle_rad(one_rad: [f64; 2], other_rad: [f64; 2]) -> f64 {
     one.cross(&other).norm().atan2(one.dot(&other))
 }
 
-/// Where an image was taken from, as it is known of its middle.
+/// Viewing geometry of an image, as known for its centre.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sight {
     /// (longitude, latitude) of its centre, radians.
     pub centre_rad: [f64; 2],
-    /// (longitude, latitude) of the place below the spacecraft, radians.
+    /// (longitude, latitude) of the point below the spacecraft, radians.
     pub below_rad: [f64; 2],
     /// Height of the spacecraft, metres.
     pub altitude_m: f64,
 }
 
 impl Sight {
-    /// Up at the centre, and towards the spacecraft from there, on a sphere.
+    /// Up at the centre, and the direction from there to the spacecraft, on a sphere.
     fn up_and_ray(&self, radius_m: f64) -> (Vector3<f64>, Vector3<f64>) {
         let up = direction(self.centre_rad);
         let spacecraft_m = direction(self.below_rad) * (radius_m + self.altitude_m);
@@ -228,15 +229,15 @@ impl Sight {
 
 /// The angle between the rays of two images to their spacecraft, radians.
 ///
-/// A line of a pushbroom image is seen from above that line: an image looks alike all along its track, and not from above
-/// its centre as a frame does. So each image has the ray of its own centre, and one is carried along the great circle to the
-/// centre of the other.
+/// A pushbroom image views every line from above that line: the viewing direction is constant along the track, and does
+/// not vary about the centre as in a frame. So each image has the ray of its own centre, and one ray is carried along
+/// the great circle to the centre of the other.
 #[must_use]
 pub fn convergence_rad(one: &Sight, other: &Sight, radius_m: f64) -> f64 {
     let (one_up, one_ray) = one.up_and_ray(radius_m);
     let (other_up, other_ray) = other.up_and_ray(radius_m);
     let carried = Rotation3::rotation_between(&one_up, &other_up);
-    // None of centres on either side of Mars, which share no ground.
+    // Undefined for centres on opposite sides of Mars, which share no ground.
     (carried.unwrap_or_else(Rotation3::identity) * one_ray).angle(&other_ray)
 }
 

@@ -8,14 +8,14 @@ use serde::{Deserialize, Serialize};
 use super::collinearity::{BehindCamera, by_camera_point, project};
 use areograph_base::body::Body;
 
-/// Newton steps that are tried.
+/// Maximum number of Newton steps.
 const STEPS_MAX: u32 = 20;
-/// Length of the last step, metres.
+/// A step below this ends the iteration, metres.
 const STEP_M: f64 = 1e-4;
 /// Largest condition number of the normal matrix with unit diagonal.
 const CONDITION_MAX: f64 = 1e12;
 
-/// What a measuring error is the same for in all images.
+/// The unit in which the measuring error is the same for all images.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
@@ -37,7 +37,7 @@ pub enum Weighting {
     },
 }
 
-/// One measurement: the orientation of the measured line and the place in that line.
+/// One measurement: the orientation of the measured line and the position in that line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
     /// Perspective centre of the line, Mars-fixed, metres.
@@ -46,8 +46,8 @@ pub struct Ray {
     pub mars_to_camera: Matrix3<f64>,
     /// Focal length in pixels of the image.
     pub focal_length_px: f64,
-    /// Measured place in the focal plane along and across the track, pixels of the image; along it is 0 but for
-    /// distortion.
+    /// Measured position in the focal plane along and across the track, pixels of the image; along the track it is 0
+    /// except for distortion.
     pub focal_px: Vector2<f64>,
     /// Standard deviation along the track, in focal-plane pixels of the image.
     pub along_sigma_px: f64,
@@ -68,7 +68,7 @@ impl Ray {
     }
 }
 
-/// Which intersections are refused.
+/// Limits beyond which intersections are rejected.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct IntersectionLimits {
     /// Smallest angle between the two rays that differ most, radians.
@@ -110,7 +110,7 @@ impl IntersectionLimits {
     }
 }
 
-/// Why a point was not intersected; counted, never a number in a product.
+/// Why a point was not intersected; counted, never a value in a product.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[serde(rename_all = "snake_case")]
 pub enum Unintersected {
@@ -120,7 +120,7 @@ pub enum Unintersected {
         /// Number of rays.
         rays: usize,
     },
-    /// Rays that run too close to parallel, as of an image with itself.
+    /// The rays are too close to parallel, as those of an image with itself.
     #[error("rays meet at {angle_deg:.3} degrees at most")]
     NearParallel {
         /// Largest angle between two rays, degrees.
@@ -167,7 +167,7 @@ pub struct Intersection {
     pub weighted_squares: f64,
     /// Angle between the two rays that differ most, radians.
     pub convergence_rad: f64,
-    /// Steps that were taken.
+    /// Number of steps.
     pub steps: u32,
 }
 
@@ -191,7 +191,7 @@ pub fn intersect(rays: &[Ray], limits: &IntersectionLimits) -> Result<Intersecti
         return Err(Unintersected::FewRays { rays: rays.len() });
     }
     let convergence_rad = convergence_rad(rays);
-    // Written so that NaN is refused.
+    // Written so that NaN is rejected.
     if !(convergence_rad >= limits.convergence_min_rad) {
         return Err(Unintersected::NearParallel {
             angle_deg: convergence_rad.to_degrees(),
@@ -294,7 +294,7 @@ fn well_conditioned_inverse(normal: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let scale = Matrix3::from_diagonal(&normal.diagonal().map(|value| 1.0 / value.sqrt()));
     let scaled = scale * normal * scale;
     let eigenvalues = scaled.symmetric_eigenvalues();
-    // Written so that NaN is refused.
+    // Written so that NaN is rejected.
     if !(eigenvalues.max() <= CONDITION_MAX * eigenvalues.min()) {
         return None;
     }

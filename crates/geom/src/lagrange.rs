@@ -1,14 +1,14 @@
-//! Interpolation between uniform nodes as camera models of the Community Sensor Model do it.
+//! Interpolation between uniform nodes as in camera models of the Community Sensor Model.
 
 use nalgebra::SVector;
 
-/// Most nodes that one value is made from.
+/// Maximum number of nodes for one value.
 const NODES_MAX: usize = 8;
 
 /// The value at `at` of the polynomial through up to eight nodes around it; `at` counts nodes from 0.
 ///
-/// Eight nodes inside the table, and six, four, two towards its ends, where fewer lie on one side; beyond
-/// the ends the last two nodes are continued. Fewer than two nodes give the only value, or zeros.
+/// Eight nodes are used inside the table, and six, four, two towards its ends, where fewer lie on one side; beyond the
+/// ends the last two nodes are extrapolated. Fewer than two nodes give the only value, or zeros.
 ///
 /// # Source
 /// `lagrangeInterp` of `usgscsm` (order 8 for positions and quaternions of line scanners).

@@ -7,7 +7,7 @@
 //! | triangulate pictures in the plane | [`plane`] |
 //! | calibrate the lines of a camera | [`calibration`] |
 //! | convert datums and coordinates | [`body_rotation`], [`ellipsoid`], [`map_projection`] |
-//! | say which shots lie in a window | [`window`] |
+//! | test which shots lie in a window | [`window`] |
 //! | match patches of pixels | [`imaging`] |
 //!
 //! It also has attitude, polynomials, Chebyshev pieces, interpolation, statistics, random numbers, heights on a grid,

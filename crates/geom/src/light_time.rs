@@ -1,12 +1,12 @@
-//! Light time and stellar aberration: from where straight rays of the geometry start.
+//! Light time and stellar aberration: the origin of the straight rays of the geometry.
 //!
-//! Light that a line exposed at `t` records left the ground `λ = range / c` earlier, and the camera, which moves
-//! over the ground with `v`, sees it come from ahead. To the first order in `v/c` both together are as if the camera
-//! had stood where it was at `t − λ`, relative to Mars as it stood then, and had looked as it did at `t`: the ray from
-//! there to the ground is straight. The motion of Mars around the Sun cancels.
+//! Light that a line exposed at `t` records left the ground `λ = range / c` earlier, and the camera, which moves over
+//! the ground with `v`, sees it displaced forwards. To the first order in `v/c` both effects together are equivalent to
+//! a camera at its position at `t − λ`, relative to Mars as it was then, with its attitude at `t`: the ray from there
+//! to the ground is straight. The motion of Mars around the Sun cancels.
 //!
 //! Source: the first order of light time to the surface point and of stellar aberration (NAIF's `spkcpt` with `LT+S`);
-//! what is left out is of the order `(V/c)²` of the range, with the 24 km/s of Mars 1 mm at 380 km.
+//! omitted terms are of the order `(V/c)²` of the range, with the 24 km/s of Mars 1 mm at 380 km.
 
 use nalgebra::Vector3;
 #[cfg(feature = "schema")]
@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use areograph_base::{constants::SPEED_OF_LIGHT_M_S, time::Interval};
 
-/// Steps of the inverse of the aberration; each leaves 1e-4 of what the one before left.
+/// Steps of the inverse of the aberration; each reduces the error to 1e-4.
 const STEPS: u32 = 4;
 
 /// Which positions of the camera the geometry uses: one convention for a whole run.
@@ -23,13 +23,13 @@ const STEPS: u32 = 4;
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum LightTime {
-    /// Where the camera was when the light left the ground: light time to the surface point and aberration.
+    /// Position of the camera when the light left the ground: light time to the surface point and aberration.
     Surface,
-    /// Where it was when the line was exposed.
+    /// Position when the line was exposed.
     None,
-    /// Where it seems to be from the centre of Mars, with light time and aberration, as ISIS and ALE have it.
+    /// Apparent position from the centre of Mars, with light time and aberration, as in ISIS and ALE.
     Centre,
-    /// Where the support data of an image have it; no convention of a run.
+    /// Position in the support data of an image; not a convention of a run.
     Support,
 }
 
@@ -56,7 +56,7 @@ impl LightTime {
         }
     }
 
-    /// What positions of the camera are, a clause for people.
+    /// Definition of the camera positions, a clause for people.
     #[must_use]
     pub const fn positions(self) -> &'static str {
         match self {
@@ -66,15 +66,15 @@ impl LightTime {
             }
             Self::None => "geometric, at the exposure (no light time, no aberration)",
             Self::Centre => {
-                "as seen from the centre of Mars with light time and aberration (LT+S), as ISIS and ALE have them"
+                "as seen from the centre of Mars with light time and aberration (LT+S), as in ISIS and ALE"
             }
             Self::Support => {
-                "as the support data of the image have them (neither light time nor aberration is added or taken away)"
+                "as in the support data of the image (neither light time nor aberration is added or removed)"
             }
         }
     }
 
-    /// When positions are read for instants in `exposures`.
+    /// The interval of instants at which positions are read for `exposures`.
     #[must_use]
     pub fn read_over(self, exposures: Interval) -> Interval {
         match self {
@@ -92,7 +92,8 @@ pub fn light_time_s(distance_m: f64) -> f64 {
     distance_m / SPEED_OF_LIGHT_M_S
 }
 
-/// A position as an observer who moves with `velocity_m_s` sees it: turned towards the velocity, at the same distance.
+/// The apparent position for an observer who moves with `velocity_m_s`: turned towards the velocity, at the same
+/// distance.
 ///
 /// # Source
 /// NAIF's `stelab`: `sin φ = |r̂ × v| / c`.

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use super::convex::{area, clipped};
 use areograph_base::units::wrap_pi;
 
-/// The places of a ring, each the shorter way in longitude from the place before it, the first from `near_rad`.
+/// The points of a ring, each the shorter way in longitude from the point before it, the first from `near_rad`.
 #[must_use]
 pub fn in_one_stretch(near_rad: f64, ring_rad: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut before_rad = near_rad;
@@ -16,7 +16,7 @@ pub fn in_one_stretch(near_rad: f64, ring_rad: &[[f64; 2]]) -> Vec<[f64; 2]> {
     places.collect()
 }
 
-/// By how much longitude grows along a ring and back to its first place: a turn, or one less, where it goes round a pole.
+/// Total change of longitude along a closed ring: 0, or a turn of either sign where it goes round a pole.
 fn turn_rad(ring_rad: &[[f64; 2]]) -> f64 {
     let next = ring_rad.iter().cycle().skip(1);
     let steps = ring_rad
@@ -32,9 +32,9 @@ pub fn goes_round_pole(ring_rad: &[[f64; 2]]) -> bool {
     turn_rad(ring_rad).abs() > PI
 }
 
-/// A ring as closed rings within -π..π, counterclockwise: cut at the antimeridian, and closed along the pole nearer to it
-/// where it goes round one (RFC 7946, 3.1.6 and 3.1.9). One wider than half a turn is cut at the prime meridian too, since not
-/// every reader takes a ring as wide as Mars. Edges are straight in longitude and latitude.
+/// A ring as closed rings within -π..π, counterclockwise: cut at the antimeridian, and closed along the nearer pole
+/// where it goes round one (RFC 7946, 3.1.6 and 3.1.9). A ring wider than half a turn is cut at the prime meridian too,
+/// since not every reader accepts a ring as wide as Mars. Edges are straight in longitude and latitude.
 #[must_use]
 pub fn cut_at_antimeridian(ring_rad: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
     let Some(first) = ring_rad.first() else {
@@ -57,7 +57,7 @@ pub fn cut_at_antimeridian(ring_rad: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
     let (west, east) = longitudes.fold((f64::INFINITY, f64::NEG_INFINITY), |(west, east), x| {
         (west.min(x), east.max(x))
     });
-    // From a place within -π..π on, a ring reaches no farther than a turn.
+    // From a point within -π..π on, a ring extends no farther than a turn.
     let strips: Vec<(i32, i32)> = if east - west > PI {
         [-3, -2, -1, 0, 1, 2].map(|half| (half, half + 1)).to_vec()
     } else {

@@ -1,10 +1,10 @@
-//! A map without seams: Lambert's azimuthal equal-area projection about the middle of what is shown.
+//! A map without seams: Lambert's azimuthal equal-area projection about the middle of the points shown.
 
 use nalgebra::Vector3;
 
 use super::ellipsoid::{Spherical, spherical_to_xyz_m};
 
-/// A sphere seen from above a centre; the same at poles and at 0°, only the antipode has no place.
+/// A sphere seen from above a centre; uniform at poles and at 0°, only the antipode is undefined.
 ///
 /// # Source
 /// Snyder 1987, Map Projections, USGS Professional Paper 1395, eq. 24-2 to 24-4.
@@ -28,7 +28,7 @@ impl MapProjection {
 
     /// A map about the middle of `points` (longitude, latitude), radians.
     ///
-    /// Points that are spread evenly over the whole globe have no middle: then 0° N 0° E.
+    /// Points spread evenly over the whole globe have no middle: then 0° N 0° E.
     #[must_use]
     pub fn of_points(points: impl Iterator<Item = (f64, f64)>, radius_m: f64) -> Self {
         let sum: Vector3<f64> = points
@@ -62,7 +62,7 @@ impl MapProjection {
         let (sin_latitude, cos_latitude) = latitude_rad.sin_cos();
         let (sin_turn, cos_turn) = (longitude_rad - self.longitude_rad).sin_cos();
         let cos_distance = sin_centre * sin_latitude + cos_centre * cos_latitude * cos_turn;
-        // Below this the place depends on the last bits of the coordinates.
+        // Below this the position depends on the last bits of the coordinates.
         if 1.0 + cos_distance < 1e-12 {
             return None;
         }
@@ -73,8 +73,8 @@ impl MapProjection {
         ))
     }
 
-    /// East longitude and areocentric latitude, radians, of a place on the map in metres; `None` outside
-    /// the disc that holds the whole sphere.
+    /// East longitude and areocentric latitude, radians, of a map point in metres; `None` outside the disc that
+    /// contains the whole sphere.
     #[must_use]
     pub fn unproject(&self, (x_m, y_m): (f64, f64)) -> Option<(f64, f64)> {
         let distance_m = x_m.hypot(y_m);

@@ -1,10 +1,10 @@
-//! How far footprints disagree between two images: tie points say which places of the images belong together.
+//! Misregistration of footprints between two images, with tie points as reference.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::statistics::{Summary, outliers};
 
-/// The same thing in two images: line and sample in each.
+/// The same feature in two images: line and sample in each.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pair {
     /// Line and sample in the first image.
@@ -13,17 +13,17 @@ pub struct Pair {
     pub second: [f64; 2],
 }
 
-/// Which place of the second image shows what a place of the first one shows, by tie points.
+/// The transformation from the first image to the second, from tie points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImageToImage {
     transformation: Transformation,
-    /// Tie points that it rests on.
+    /// Number of tie points used.
     pub ties: usize,
     /// Tie points rejected as outliers.
     pub ties_rejected: usize,
-    /// What it leaves of the tie points' lines.
+    /// Residuals of the tie points' lines.
     pub tie_lines: Summary,
-    /// What it leaves of the tie points' samples.
+    /// Residuals of the tie points' samples.
     pub tie_samples: Summary,
     /// First and last line of the tie points in the first image.
     ends: [f64; 2],
@@ -36,9 +36,9 @@ pub struct Misregistration {
     pub lines: Summary,
     /// Transformed minus projected sample of every footprint.
     pub samples: Summary,
-    /// Standard deviation of the mean of `lines` by the scatter of the tie points.
+    /// Standard deviation of the mean of `lines` from the scatter of the tie points.
     pub lines_sigma: f64,
-    /// Footprints that were left out because their line lies beyond the tie points'.
+    /// Footprints omitted because their line lies beyond the tie points.
     pub beyond_ties: usize,
 }
 
@@ -46,15 +46,15 @@ pub struct Misregistration {
 const SECOND_ORDER_ABOVE: usize = 50;
 /// A tie point farther from the median residual than this many robust standard deviations is an outlier.
 const OUTLIER_SIGMA: f64 = 5.0;
-/// Fits with ever fewer outliers.
+/// Maximum number of fits with outliers removed.
 const ROUNDS: u32 = 10;
 
 impl ImageToImage {
     /// The transformation that `ties` determine.
     ///
-    /// It takes places of the first image to the second, by polynomials of first order in line and sample,
-    /// or of second with more than 50 tie points; outliers are left out one round after the other. `None`
-    /// for fewer than four tie points, for tie points on one line, and for coordinates that are not finite.
+    /// It takes positions of the first image to the second, by polynomials of first order in line and sample, or of
+    /// second order with more than 50 tie points; outliers are removed in successive rounds. `None` for fewer than four
+    /// tie points, for collinear tie points, and for coordinates that are not finite.
     ///
     /// # Source
     /// Shan et al. 2005 compare features by eye; they find about one MOLA spacing along the flight.
@@ -100,12 +100,12 @@ impl ImageToImage {
         self.transformation.order
     }
 
-    /// Line and sample of the second image that show what the first one shows at `first`; `None` beyond the lines of the tie
+    /// Line and sample of the second image conjugate to `first` in the first image; `None` beyond the lines of the tie
     /// points.
     #[must_use]
     pub fn second(&self, first: [f64; 2]) -> Option<[f64; 2]> {
         let [low, high] = self.ends;
-        // A residual is where the transformation leads, minus where a pair says.
+        // A residual is the transformed minus the measured position.
         let pair = Pair {
             first,
             second: [0.0; 2],
@@ -114,10 +114,10 @@ impl ImageToImage {
         (low <= first[0] && first[0] <= high).then(|| [0, 1].map(|axis| lead(axis)[0]))
     }
 
-    /// How far `footprints` lie in the second image from where the tie points say.
+    /// Misregistration of `footprints` in the second image against the tie points.
     ///
-    /// Relief moves a tie point across the track between images of different emission: only tie points near
-    /// the profile tell of its samples.
+    /// Relief moves a tie point across the track between images of different emission: only tie points near the profile
+    /// are valid for its samples.
     #[must_use]
     pub fn misregistration(&self, footprints: &[Pair]) -> Misregistration {
         let [low, high] = self.ends;
@@ -132,7 +132,7 @@ impl ImageToImage {
         }
     }
 
-    /// Standard deviation of the mean transformed line of `pairs`, by the residuals of the tie points: relief that no
+    /// Standard deviation of the mean transformed line of `pairs`, from the residuals of the tie points: relief that no
     /// polynomial follows counts as scatter. Zero without pairs.
     fn mean_sigma(&self, pairs: &[Pair]) -> f64 {
         let fit = &self.transformation;
@@ -141,7 +141,8 @@ impl ImageToImage {
             mean += DVector::from_vec(fit.frame.terms(pair.first, fit.order)) / pairs.len() as f64;
         }
         let scatter = self.tie_lines.standard_deviation;
-        // The summary divides by one less than the number; the fit has used up as many as it has coefficients.
+        // The summary divides by one less than the number; the fit has used as many degrees of freedom as it has
+        // coefficients.
         let spare = (self.ties - 1) as f64 / (self.ties - mean.len()) as f64;
         scatter * (spare * mean.dot(&(&fit.cofactors * &mean))).sqrt()
     }
@@ -171,7 +172,7 @@ impl Frame {
         Some(Self { middle, half_width })
     }
 
-    /// Products of powers up to `order` at a place of the first image.
+    /// Products of powers up to `order` at a position of the first image.
     fn terms(&self, place: [f64; 2], order: u8) -> Vec<f64> {
         let [u, v] = [0, 1].map(|axis| (place[axis] - self.middle[axis]) / self.half_width[axis]);
         let mut terms = vec![1.0, u, v];
@@ -192,7 +193,7 @@ struct Transformation {
     cofactors: DMatrix<f64>,
 }
 
-/// Singular values below this share of the largest tell of tie points on one line.
+/// Singular values below this share of the largest indicate collinear tie points.
 const SINGULAR_SHARE: f64 = 1e-9;
 
 impl Transformation {

@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Unit vectors of an orbit as columns: radial, along the track, across it (along the orbit's normal).
 ///
-/// Position and velocity are in one inertial frame, of any length; along the track is at right angles
-/// to the radius, hence not quite the direction of flight. The three are right-handed.
+/// Position and velocity are in one inertial frame, of any length; along the track is at right angles to the radius,
+/// hence not exactly the direction of flight. The three are right-handed.
 #[must_use]
 pub fn radial_along_cross(position: &Vector3<f64>, velocity: &Vector3<f64>) -> Matrix3<f64> {
     let radial = position.normalize();

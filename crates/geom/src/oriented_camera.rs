@@ -1,4 +1,4 @@
-//! An image as intersection and adjustment use it: orientation and detector together.
+//! An image for intersection and adjustment: orientation and detector together.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -30,7 +30,7 @@ impl<M> OrientedCamera<M> {
 }
 
 impl<M: ExteriorOrientation> OrientedCamera<M> {
-    /// Time as the orientation takes it, and focal coordinates along and across the track in pixels, of a place in the image.
+    /// Abscissa of the orientation, and focal coordinates along and across the track in pixels, of an image position.
     ///
     /// Lines and samples are 0 at the outer edge of the first one.
     #[must_use]
@@ -41,7 +41,7 @@ impl<M: ExteriorOrientation> OrientedCamera<M> {
         )
     }
 
-    /// The ray of a place, with a standard deviation of a pixel along the track and of a sample across it.
+    /// The ray of an image position, with a standard deviation of a pixel along the track and of a sample across it.
     #[must_use]
     pub fn ray(&self, line: f64, sample: f64) -> Ray {
         let (x_lines, focal_px) = self.focal_plane_coordinates(line, sample);
@@ -56,7 +56,7 @@ impl<M: ExteriorOrientation> OrientedCamera<M> {
         }
     }
 
-    /// Whether a place lies in the image, its edges included.
+    /// Whether a position lies in the image, its edges included.
     #[must_use]
     pub fn shows(&self, line: f64, sample: f64) -> bool {
         (0.0..=self.lines()).contains(&line) && (0.0..=self.detector.samples).contains(&sample)
@@ -69,12 +69,12 @@ impl<M: ExteriorOrientation> OrientedCamera<M> {
         let camera_m = pose.camera_vector_m(ground_m);
         let rate_m = motion.camera_vector_rate_m(&pose, &camera_m);
         let [_, missed_rate_m] = missed_m(&self.detector.distortion, &camera_m, &rate_m);
-        // The point lies in the plane of its line, so that the change of its depth does not count.
+        // The point lies in the plane of its line, so that the change of its depth has no effect.
         self.detector.focal_length_px * missed_rate_m.abs() / camera_m.z
     }
 
-    /// How far apart the line exposed at `x_lines` and the next lie on the ground at a point of it, metres, across the
-    /// ray.
+    /// Distance on the ground between the line exposed at `x_lines` and the next at a point of it, metres,
+    /// perpendicular to the ray.
     #[must_use]
     pub fn line_spacing_m(&self, x_lines: f64, ground_m: &Vector3<f64>) -> f64 {
         let depth_m = self.orientation.pose(x_lines).camera_vector_m(ground_m).z;

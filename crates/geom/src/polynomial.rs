@@ -10,7 +10,7 @@ pub struct Polynomial {
     coefficients: Vec<f64>,
 }
 
-/// A polynomial with what it leaves of the samples it was fitted to.
+/// A polynomial with its residuals at the samples.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Fit {
     /// The polynomial.
@@ -47,7 +47,7 @@ impl Polynomial {
     ///
     /// The fit runs in `u = x / max|x|`, where its matrix has a condition number near 10; with
     /// monomials in image lines it would be of order 1e15. `None` when there are fewer samples than
-    /// coefficients, when lengths differ, or when the abscissae do not tell the coefficients apart.
+    /// coefficients, when lengths differ, or when the abscissae do not separate the coefficients.
     #[must_use]
     pub fn fit(x: &[f64], y: &[f64], order: usize) -> Option<Fit> {
         let half_width = x.iter().fold(0.0_f64, |most, value| most.max(value.abs()));

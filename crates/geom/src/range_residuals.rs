@@ -1,4 +1,4 @@
-//! Ranges, the file's own orbit and the kernels' orbit against each other, shot by shot.
+//! Ranges, the file's own orbit and the kernels' orbit compared shot by shot.
 //!
 //! Geometric states only: the range is to the spacecraft's centre of mass.
 
@@ -14,7 +14,7 @@ use areograph_base::{
     time::Et,
 };
 
-/// Where the kernels have the spacecraft at one instant, and the axes of its orbit.
+/// Position of the spacecraft by the kernels at one instant, and the axes of its orbit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpacecraftState {
     /// Position.
@@ -49,7 +49,7 @@ pub struct RangeResiduals {
 }
 
 impl RangeResiduals {
-    /// Those of a shot in IAU 2000.
+    /// The residuals of a shot in IAU 2000.
     #[must_use]
     pub fn of(shot: &Footprint, spacecraft: &SpacecraftState) -> Self {
         let direction = spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, 1.0);
@@ -69,7 +69,7 @@ impl RangeResiduals {
 
 /// Measured range minus the geometric distance of spacecraft and footprint, metres.
 ///
-/// Any frame will do that both positions share; the sign is that of Shan et al. 2005, Table 3.
+/// Any frame common to both positions serves; the sign is that of Shan et al. 2005, Table 3.
 #[must_use]
 pub fn range_residual_m<F: Frame>(
     range_m: f64,
@@ -89,7 +89,7 @@ pub fn footprint(shot: &Footprint, radius_m: f64) -> Position<BodyFixed> {
     ))
 }
 
-/// The spacecraft where the PEDR file has it.
+/// The position of the spacecraft in the PEDR file.
 #[must_use]
 pub fn own_spacecraft(shot: &Footprint) -> Position<BodyFixed> {
     Position::new(spherical_to_xyz_m(

@@ -39,7 +39,7 @@ impl RobustWeight {
         }
     }
 
-    /// The function whose sum these weights make small, `z²/2` near zero.
+    /// The function that these weights minimise in sum, `z²/2` near zero.
     #[must_use]
     pub fn cost(self, z: f64) -> f64 {
         match self {

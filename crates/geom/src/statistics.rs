@@ -7,11 +7,11 @@ use serde::{Deserialize, Serialize};
 /// Factor that makes the median absolute deviation of a normal distribution its standard deviation.
 const NORMAL_MAD: f64 = 1.4826;
 
-/// A spread below this counts as this when outliers are judged, metres: PEDR ranges and radii come
-/// in whole centimetres, so half of a profile may agree exactly.
+/// Floor of the spread for the detection of outliers, metres: PEDR ranges and radii are whole centimetres, so half of a
+/// profile may agree exactly.
 const SPREAD_FLOOR_M: f64 = 0.01;
 
-/// Fewer residuals than this tell nothing of the correlation of neighbours.
+/// Minimum number of residuals for the correlation of neighbours.
 const CORRELATED_MIN: usize = 10;
 
 /// Critical value of the test of standardised residuals: one good observation in a thousand fails it.
@@ -20,8 +20,8 @@ const CORRELATED_MIN: usize = 10;
 /// Baarda 1968, A testing procedure for use in geodetic networks.
 pub const BAARDA_LIMIT: f64 = 3.29;
 
-/// Between which values 99 % of all `sqrt(weighted squares / redundancy)` lie when standard deviations are right: the
-/// roots of χ² over its `redundancy` degrees of freedom; `None` where there is not even one.
+/// Limits that contain 99 % of all `sqrt(weighted squares / redundancy)` when standard deviations are correct: the
+/// roots of χ² over its `redundancy` degrees of freedom; `None` without redundancy.
 ///
 /// # Source
 /// Wilson & Hilferty 1931, The distribution of chi-square: within 0.01 of the exact roots from 10 degrees of freedom.
@@ -79,7 +79,8 @@ impl Summary {
         }
     }
 
-    /// Largest distance from the median that is no outlier's, for `sigma` robust standard deviations, of values in metres.
+    /// Largest distance from the median within which a value in metres is not an outlier, for `sigma` robust standard
+    /// deviations.
     ///
     /// The robust standard deviation is the NMAD, at least 1 cm.
     #[must_use]
@@ -104,10 +105,11 @@ pub fn mean_and_deviation(values: &[f64]) -> [f64; 2] {
     [mean, (squares / (n - 1.0).max(1.0)).sqrt()]
 }
 
-/// The largest of `values`, `None` of none; NaN if one of them is NaN, so that no limit is kept by chance.
+/// The largest of `values`, `None` for an empty sequence; NaN if one of them is NaN, so that no limit is satisfied by
+/// chance.
 #[must_use]
 pub fn largest(values: impl IntoIterator<Item = f64>) -> Option<f64> {
-    // No comparison with NaN holds: one that is held already stays.
+    // No comparison with NaN is true: once held, it stays.
     let larger = |held: f64, next: f64| {
         if next.is_nan() || next > held {
             next
@@ -118,7 +120,7 @@ pub fn largest(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     values.into_iter().reduce(larger)
 }
 
-/// The middle of at least one value, the mean of both middles of an even number; their order is lost.
+/// The middle of at least one value, the mean of both middles for an even number; their order is lost.
 fn median(values: &mut [f64]) -> f64 {
     let middle = values.len() / 2;
     let (below, upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
@@ -199,7 +201,7 @@ impl Trend {
             .map(|(s, value)| value - mean - slope * (s - mean_s))
             .collect();
         let rest: f64 = residuals.iter().map(|residual| residual.powi(2)).sum();
-        // However strongly they hang together, one of them is free.
+        // However strong their correlation, at least one of them is independent.
         let free = (effective_count(&residuals) - 2.0).max(1.0);
         let scores = seconds.iter().zip(&residuals);
         let scores: Vec<f64> = scores.map(|(s, rest)| (s - mean_s) * rest).collect();
@@ -211,10 +213,10 @@ impl Trend {
     }
 }
 
-/// Standard deviation of a sum whose terms hang together over up to a tenth of their number: by the
-/// sums of ten blocks in a row, which must be as good as independent; 0 for too few terms.
+/// Standard deviation of a sum whose terms are correlated over up to a tenth of their number: from the sums of ten
+/// consecutive blocks, which must be practically independent; 0 for too few terms.
 ///
-/// Residuals that are no noise at all, such as waves of a model that does not fit, show here.
+/// Systematic residuals, such as waves of a model that does not fit, appear here.
 ///
 /// # Source
 /// Liang & Zeger 1986, Biometrika 73, 13–22, with blocks as clusters.
@@ -234,10 +236,10 @@ fn spread_of_blocks(terms: &[f64]) -> f64 {
     (squares * BLOCKS as f64 / (BLOCKS - 1) as f64).sqrt()
 }
 
-/// How many independent values residuals about a line are worth: `n (1 − ρ) / (1 + ρ)`, at most `n`.
+/// Effective number of independent residuals about a line: `n (1 − ρ) / (1 + ρ)`, at most `n`.
 ///
-/// `ρ` is the correlation of neighbours. Its estimate `r` from residuals about a fitted line is too
-/// small by about `(2 + 4 ρ) / n`, which is put back.
+/// `ρ` is the correlation of neighbours. Its estimate `r` from residuals about a fitted line is too small by about
+/// `(2 + 4 ρ) / n`, which is corrected.
 ///
 /// # Source
 /// Effective number: Santer et al. 2000. Bias: after Marriott & Pope 1954, Biometrika 41, 390–402, who
@@ -364,8 +366,8 @@ mod tests {
                 inside += u32::from(trend.slope.abs() <= trend.uncertainty);
             }
             let share = f64::from(inside) / f64::from(SERIES);
-            // 0.683 for a normal distribution; 2000 series tell it to 0.01, the estimate of the
-            // correlation from 180 values costs some more.
+            // 0.683 for a normal distribution; 2000 series determine it to 0.01, the estimate of the correlation from
+            // 180 values adds some error.
             assert!((0.60..=0.76).contains(&share), "{neighbours}: {share}");
         }
     }

@@ -1,9 +1,8 @@
 //! Uncertainty budget of ground points from two images, from the residuals of their intersection.
 //!
 //! # Source
-//! Shan et al. 2005, eq. 5 to 9. Its equation 7 sums the squares of both images; along the track the
-//! paper does so, across the track it takes their average, which makes heights better by √2. Both
-//! readings are given.
+//! Shan et al. 2005, eq. 5 to 9. Its equation 7 sums the squares of both images; along the track the paper does so,
+//! across the track it takes their average, which reduces height uncertainties by √2. Both readings are given.
 
 #[cfg(feature = "schema")]
 use schemars::JsonSchema;
@@ -39,7 +38,7 @@ impl ResidualMoments {
     }
 }
 
-/// What the budget is made of.
+/// Input of the budget.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BudgetInput {
     /// Residuals of the two images of each site.
@@ -68,7 +67,7 @@ pub struct PointUncertainty {
     pub height_m: f64,
 }
 
-/// What the ground points themselves contribute along the track.
+/// The contribution of the ground points themselves along the track.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
@@ -78,7 +77,7 @@ pub enum GroundPart {
         /// Pixels.
         along_px: f64,
     },
-    /// Orientation alone explains more than the whole discrepancy.
+    /// Orientation explains more than the whole discrepancy.
     NotResolvable,
 }
 
@@ -90,28 +89,28 @@ pub struct UncertaintyBudget {
     pub along_px: f64,
     /// Along-track discrepancy of MOLA footprints, pixels.
     pub total_along_px: f64,
-    /// Part of the footprints in it, eq. 6.
+    /// Contribution of the footprints to it, eq. 6.
     pub ground: GroundPart,
     /// Eq. 8 and 9 with the average of the images' across-track residuals, as the paper computes.
     pub paper_average: PointUncertainty,
-    /// Eq. 8 and 9 with the sum of squares of both images, as the paper's eq. 7 says.
+    /// Eq. 8 and 9 with the sum of squares of both images, as in the paper's eq. 7.
     pub equation_7: PointUncertainty,
 }
 
-/// Input without a meaning.
+/// Invalid input.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BudgetError {
-    /// No site at all.
+    /// No site.
     #[error("no stereo pair has residuals; expected at least one")]
     NoSites,
-    /// A number that cannot be.
+    /// A number outside its range.
     #[error("{what} is {value}, expected {expected}")]
     Value {
         /// Which number.
         what: &'static str,
         /// Its value.
         value: f64,
-        /// What it should be.
+        /// The expected value.
         expected: &'static str,
     },
 }
@@ -130,7 +129,7 @@ impl Cause for BudgetError {
     }
 }
 
-/// The budget of one or more stereo pairs; nothing is rounded on the way.
+/// The budget of one or more stereo pairs; intermediate results are not rounded.
 ///
 /// # Errors
 /// No pair; numbers that are not finite or not positive where they must be.

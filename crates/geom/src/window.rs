@@ -1,4 +1,4 @@
-//! Windows on the ground: which directions from the centre of Mars lie inside.
+//! Windows on the ground as sets of directions from the centre of Mars.
 
 mod bounds;
 mod extent;
@@ -20,8 +20,8 @@ use areograph_base::units::{longitude_step_rad, wrap_pi, wrap_two_pi};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum WindowShape {
-    /// From `west_rad` eastwards to `east_rad`, both `0..2π`; `west > east` crosses 0°.
-    /// A box over all longitudes has `west = 0`, `east = 2π`, and holds a pole when it reaches ±π/2.
+    /// From `west_rad` eastwards to `east_rad`, both `0..2π`; `west > east` crosses 0°. A box over all longitudes has
+    /// `west = 0`, `east = 2π`, and contains a pole when it extends to ±π/2.
     Box {
         /// Western edge, radians.
         west_rad: f64,
@@ -37,16 +37,16 @@ pub enum WindowShape {
         /// Polygons, rings, vertices: radians.
         polygons: Vec<Vec<Vec<[f64; 2]>>>,
     },
-    /// What an image sees, which its times and the kernels tell; until then it holds nothing.
+    /// The ground that an image sees, from its times and the kernels; empty until these are applied.
     Image {
         /// Identifier of the image.
         image: String,
-        /// How far beyond its outline the window reaches, metres.
+        /// Margin of the window beyond its outline, metres.
         margin_m: f64,
     },
 }
 
-/// A window made ready for many tests.
+/// A window prepared for many tests.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Region {
     pieces: Vec<Piece>,
@@ -77,9 +77,9 @@ struct Ring {
 impl Region {
     /// The region of a window's outline.
     ///
-    /// Edges of polygons are straight in longitude and latitude (RFC 7946) and go the shorter way
-    /// round Mars; an edge along a whole turn keeps it. A ring that winds once round Mars is closed
-    /// along the pole that is nearer to its vertices. A ring of fewer than three vertices holds nothing.
+    /// Edges of polygons are straight in longitude and latitude (RFC 7946) and go the shorter way round Mars; an edge
+    /// along a whole turn keeps it. A ring that winds once round Mars is closed along the pole nearer to its vertices.
+    /// A ring of fewer than three vertices is empty.
     #[must_use]
     pub fn new(shape: &WindowShape) -> Self {
         let pieces = match shape {
@@ -130,7 +130,7 @@ impl Region {
 
     /// Whether some direction within `margin_rad` (great circle) of this one may lie inside.
     ///
-    /// Never false when there is one; may be true when there is none.
+    /// Never false when such a direction exists; may be true when none does.
     #[must_use]
     pub fn may_contain_within(
         &self,
@@ -154,7 +154,8 @@ impl Piece {
     }
 }
 
-/// Half the width in longitude, radians, of a cap about a direction of this latitude; none of a cap that holds a pole.
+/// Half the width in longitude, radians, of a cap about a direction of this latitude; `None` for a cap that contains a
+/// pole.
 pub(super) fn half_width_rad(latitude_rad: f64, cap_rad: f64) -> Option<f64> {
     let holds_pole = latitude_rad.abs() + cap_rad >= FRAC_PI_2;
     (!holds_pole).then(|| (cap_rad.sin() / latitude_rad.cos()).min(1.0).asin())
@@ -220,8 +221,8 @@ impl Ring {
         if !(self.bounds.south..=self.bounds.north).contains(&latitude_rad) {
             return false;
         }
-        // The copies of the point that can lie within the ring; a point on the seam of a ring round a
-        // pole has one at either end.
+        // The copies of the point that can lie within the ring; a point on the seam of a ring round a pole has one at
+        // either end.
         let first = west_rad + wrap_two_pi(longitude_rad - west_rad);
         [first - TAU, first, first + TAU].into_iter().any(|x| {
             let point = Coord { x, y: latitude_rad };
@@ -230,7 +231,7 @@ impl Ring {
     }
 }
 
-/// Closes a line that went once round Mars along the pole nearer to its vertices.
+/// Closes a line that winds once round Mars along the pole nearer to its vertices.
 fn close_along_pole(line: &mut Vec<Coord<f64>>, turn: f64) {
     let mean_latitude = line.iter().map(|vertex| vertex.y).sum::<f64>() / line.len() as f64;
     let pole = FRAC_PI_2.copysign(mean_latitude);
@@ -287,7 +288,7 @@ mod tests {
         ) {
             let north = south + share * (90.0 - south);
             let away = |a: f64, b: f64| (a - b + 180.0).rem_euclid(360.0) - 180.0;
-            // Edges belong to the box by convention; here only what is off them by more than rounding.
+            // Edges belong to the box by convention; here only points that are off them by more than rounding.
             prop_assume!(away(longitude, west).abs() > 1e-9 && away(longitude, west + width).abs() > 1e-9);
             prop_assume!((latitude - south).abs() > 1e-9 && (latitude - north).abs() > 1e-9);
             let expected = box_by_hand(west, width, south, north, [longitude, latitude]);

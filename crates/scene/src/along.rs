@@ -1,4 +1,4 @@
-//! Laser shots along given kernels, for a real flight of which no PEDR file is at hand.
+//! Laser shots along given kernels, for a real flight without an available PEDR file.
 
 use std::{
     fs,
@@ -32,27 +32,27 @@ use areograph_geom::ellipsoid::Spherical;
 use areograph_pds::read_label;
 use areograph_spice::{KernelSet, Session};
 
-/// Shortest stretch that is flown, seconds.
+/// Shortest stretch of flight, seconds.
 const STRETCH_MIN_S: f64 = 20.0;
-/// Beams are asked for at multiples of this from a frame's mid-point: half the spacing of shots.
+/// Beams are computed at multiples of this from a frame's mid-point: half the spacing of shots.
 const BEAM_STEP_S: f64 = 0.05;
 /// Margin of the windows around the shots, degrees.
 const WINDOW_MARGIN_DEG: f64 = 0.1;
-/// The invented orbit number; the file's name says 10 000 more, as the archive's do.
+/// The synthetic orbit number; the file name has 10 000 more, as in the archive.
 const ORBIT: u32 = 1;
 /// Name of the file.
 const PEDR_NAME: &str = "ap10001l.b";
 
-/// Writes PEDR files for the flight that the kernels of `metakernel` tell, with a site configuration that
-/// has one window per stretch of flight and one image per label.
+/// Writes PEDR files for the flight of the kernels of `metakernel`, with a site configuration that has one window per
+/// stretch of flight and one image per label.
 ///
 /// The laser looks along the bus's +Z. Attitude is read 1.15 s early and time tags are 0.117 s late, as in
-/// [`super::write_scene`]. Shots are exact: of the options the seed counts. No session may be open on this thread.
+/// [`super::write_scene`]. Shots are exact: of the options only the seed is used. No session may be open on this
+/// thread.
 ///
 /// # Errors
-/// [`SceneError::NothingToFly`], [`SceneError::BeamMisses`]; [`SceneError::NotAScene`],
-/// [`SceneError::Foreign`] and [`SceneError::Changed`] when the folder holds something else; what the kernels
-/// and labels are refused for.
+/// [`SceneError::NothingToFly`], [`SceneError::BeamMisses`]; [`SceneError::NotAScene`], [`SceneError::Foreign`] and
+/// [`SceneError::Changed`] when the folder holds something else; errors of the kernels and labels.
 pub fn write_scene_along(
     directory: &Path,
     metakernel: &Path,
@@ -137,7 +137,7 @@ pub fn write_scene_along(
 
 /// Stretches of true time in which both orbit and attitude are known.
 fn stretches(session: &Session) -> Result<Vec<Interval>> {
-    /// Kernel ends are met to less than this by the times that are asked for, seconds.
+    /// Requested times stay this far inside the ends of kernels, seconds.
     const ROUNDING_S: f64 = 0.01;
     let coverage = session.coverage()?;
     let attitude = areograph_base::time::Intervals::union_of(
@@ -164,7 +164,7 @@ fn stretches(session: &Session) -> Result<Vec<Interval>> {
     Ok(flown)
 }
 
-/// Beams of one stretch, asked from the kernels at every instant that its frames need.
+/// Beams of one stretch, read from the kernels at every instant that its frames need.
 struct TabulatedFlight {
     tags: Vec<Et>,
     first: Et,
@@ -198,12 +198,12 @@ impl TabulatedFlight {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "negative and non-finite numbers become 0, whose instant is not the one asked for"
+        reason = "negative and non-finite numbers become 0, whose instant is not the requested one"
     )]
     fn beam(&self, et: Et) -> Option<Beam> {
         let steps = et.since(self.first) / BEAM_STEP_S;
         let index = steps.round();
-        // A microsecond is 3 mm of flight; sums of binary fractions are a thousand times closer.
+        // A microsecond is 3 mm of flight; sums of binary fractions are a thousand times more accurate.
         let tabulated = (steps - index).abs() * BEAM_STEP_S < 1e-6 && index >= 0.0;
         self.beams
             .get(index as usize)
@@ -226,7 +226,7 @@ impl Flight for Flights {
     }
 }
 
-/// A window around shots, wherever they lie.
+/// A window around shots anywhere on the body.
 fn window_around(id: &str, kept: &[KeptShot]) -> Window {
     let mut longitudes_deg = Vec::with_capacity(kept.len());
     let mut latitude_deg = [90.0_f64, -90.0];
@@ -247,7 +247,7 @@ fn window_around(id: &str, kept: &[KeptShot]) -> Window {
     }
 }
 
-/// The narrowest `[west, east]`, 0 to 360, that holds all of some longitudes; west may exceed east.
+/// The narrowest `[west, east]`, 0 to 360, that contains all longitudes; west may exceed east.
 fn longitudes_around(mut longitudes_deg: Vec<f64>) -> [f64; 2] {
     longitudes_deg.sort_by(f64::total_cmp);
     let (Some(first), Some(last)) = (longitudes_deg.first(), longitudes_deg.last()) else {
@@ -272,7 +272,7 @@ fn hundredths(degrees: f64) -> f64 {
     (degrees * 100.0).round() / 100.0
 }
 
-/// An image of the site file, named after the product that its label tells.
+/// An image of the site file, named after the product in its label.
 fn site_image(label: &Path) -> Result<SiteImage> {
     let label = absolute(label)?;
     let product = read_label(&label, built_in_instruments())?.product_id;

@@ -24,41 +24,41 @@ use areograph_geom::{
 
 /// Kernels reach this far beyond the frames, seconds.
 const KERNEL_MARGIN_S: f64 = 60.0;
-/// Newton steps that are tried.
+/// Maximum number of Newton steps.
 const ITERATIONS_MAX: u32 = 40;
-/// Size of the last Newton step, radians: 0.4 µm on the ground.
+/// A Newton step below this ends the iteration, radians: 0.4 µm on the ground.
 const STEP_MAX_RAD: f64 = 1e-13;
 
-/// Where the spacecraft is and where the laser looks.
+/// Position of the spacecraft and direction of the laser.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Beam {
-    /// Spacecraft from the centre of Mars as the orbit has it, J2000, metres.
+    /// Spacecraft from the centre of Mars by the orbit, J2000, metres.
     pub spacecraft_m: Vector3<f64>,
-    /// Where it truly is, minus that, IAU 2000, metres.
+    /// True minus this position, IAU 2000, metres.
     pub position_error_m: Vector3<f64>,
-    /// Direction of the laser (+Z of the bus but for its boresight's error), J2000, unit length.
+    /// Direction of the laser (+Z of the bus plus its boresight error), J2000, unit length.
     pub direction: Vector3<f64>,
-    /// The same without jitter: what the altimeter's products know of it.
+    /// The same without jitter, as in the altimeter's products.
     pub steady_direction: Vector3<f64>,
 }
 
-/// Something that flies: knows its beam at any time that it is asked for.
+/// A flight, which gives its beam at any time.
 pub(super) trait Flight {
     /// The beam at the true time `et`.
     ///
     /// # Errors
-    /// When the flight does not reach there.
+    /// When the flight does not cover this time.
     fn beam(&self, et: Et) -> Result<Beam>;
 }
 
-/// The flight of one image day as the kernels tell it.
+/// The flight of one image day by its kernels.
 #[derive(Debug)]
 pub(super) struct Arc {
     /// The image.
     pub image: &'static PlannedImage,
     /// When it is exposed.
     pub exposed: Interval,
-    /// Frames of the day's PEDR file lie within.
+    /// Interval that contains the frames of the day's PEDR file.
     pub frames: Interval,
     /// The orbit `gsfc`.
     pub orbit: Orbit,
@@ -94,7 +94,7 @@ impl Arc {
         })
     }
 
-    /// Matrix from the camera to Mars (IAU 2000) at `et`, as the kernels tell it.
+    /// Matrix from the camera to Mars (IAU 2000) at `et`, by the kernels.
     pub(super) fn camera_to_mars(&self, et: Et) -> Matrix3<f64> {
         let j2000_to_camera = bus_to_camera(usual_instrument()) * self.attitude.j2000_to_bus(et);
         body_matrix(&MARS_IAU2000, et) * j2000_to_camera.transpose()
@@ -115,7 +115,7 @@ impl Geometry {
         Orbit::new(middle, self.0.x, self.0.y)
     }
 
-    /// The site, as if seen straight down from a circle.
+    /// The site at nadir from a circular orbit.
     fn first_guess(image: &PlannedImage) -> Self {
         let latitude_rad = image.site.latitude_deg * RADIANS_PER_DEGREE;
         let longitude_rad = image.site.longitude_deg * RADIANS_PER_DEGREE;
@@ -123,7 +123,7 @@ impl Geometry {
         Self(Vector3::new(longitude_rad, anomaly_rad, 0.0))
     }
 
-    /// What is left to reach: longitude, latitude and emission (or roll, for nadir), radians.
+    /// Remaining error: longitude, latitude and emission (or roll, for nadir), radians.
     fn miss(self, image: &PlannedImage, middle: Et) -> Option<Vector3<f64>> {
         let state: OrbitState = self.orbit(middle).state(middle);
         let mars = body_matrix(&MARS_IAU2000, middle);
@@ -204,7 +204,7 @@ mod tests {
                 &boresight,
             )
             .unwrap();
-            // 1e-9 of the radius is 3 mm on the ground; the attitude turns evenly between its samples.
+            // 1e-9 of the radius is 3 mm on the ground; the attitude rotates uniformly between its samples.
             assert!(
                 (hit.xyz_m.normalize() - image.site.direction()).norm() < 3e-8,
                 "{}",

@@ -1,4 +1,4 @@
-//! An invented archive: PEDR files of any number of days, the kernels that go with them, and what was drawn.
+//! A synthetic archive: PEDR files of any number of days, their kernels, and the drawn errors.
 
 use std::{
     fmt,
@@ -34,30 +34,30 @@ const DAYS: [f64; 2] = [1.0, 2_000.0];
 const REVOLUTIONS: u32 = 12;
 /// The first revolution begins after this, ET seconds: 1999-03-01, when mapping began.
 const START_S: f64 = -26_570_000.0;
-/// Seconds at the ends of a revolution with late tags that have no frames, so that the files stay in order.
+/// Seconds without frames at the ends of a revolution with late tags, so that the files stay in order.
 const APART_S: f64 = 16.0;
 /// Lost packets: share of revolutions with a gap, and shortest and longest gap, seconds.
 const GAP_SHARE: f64 = 0.3;
 const GAP_S: [f64; 2] = [14.0, 420.0];
-/// Of so many files three have a bad revolution, each of another kind.
+/// In each group of this many files, three have a bad revolution, each of another kind.
 const BAD_EVERY: u32 = 5;
 
-/// Which archive to invent.
+/// Options of a synthetic archive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArchiveOptions {
-    /// Seed of everything that is drawn.
+    /// Seed of all drawn values.
     pub seed: u64,
     /// Files, of 12 revolutions each: about a day.
     pub days: u32,
 }
 
 impl ArchiveOptions {
-    /// The archive of about so many gigabytes (10⁹ bytes); at least one file.
+    /// The archive of about `gb` gigabytes (10⁹ bytes); at least one file.
     #[must_use]
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "a cast of floating point numbers ends at the bounds; too many files are refused"
+        reason = "a cast from floating point saturates; too many files are rejected"
     )]
     pub fn of_size(seed: u64, gb: f64) -> Self {
         let frames = f64::from(REVOLUTIONS) * Orbit::period_s() / FRAME_S;
@@ -69,7 +69,7 @@ impl ArchiveOptions {
     }
 }
 
-/// What was written.
+/// Summary of the archive written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ArchiveSummary {
     /// Folder of the archive; PEDR files lie in `pedr`, kernels in `kernels`.
@@ -112,7 +112,7 @@ struct ArchiveTruth {
     files: Vec<ArchiveFileTruth>,
 }
 
-/// A revolution that is wrong in its file.
+/// A bad revolution of a file.
 #[derive(Debug, Clone, Serialize)]
 struct BadTruth {
     file: String,
@@ -131,12 +131,12 @@ struct ArchiveFileTruth {
     bad: Option<BadTruth>,
 }
 
-/// Writes an archive into `directory`, replacing an older scene that nobody added to or changed.
+/// Writes an archive into `directory`, replacing an older scene unless files were added or changed.
 ///
-/// The same options give the same bytes, whatever the number of threads. Coordinates are IAU 2000, as in files of version L.
+/// The same options give the same bytes with any number of threads. Coordinates are IAU 2000, as in files of version L.
 ///
 /// # Errors
-/// Too few or too many days; a folder that holds something else; the system's refusal to write.
+/// Too few or too many days; a folder that holds something else; errors of writing.
 pub fn write_archive(directory: &Path, options: &ArchiveOptions) -> Result<ArchiveSummary> {
     let days = f64::from(options.days);
     let [least, most] = DAYS;
@@ -190,7 +190,7 @@ fn write_truth(
         crossover_amplitude_m: CROSSOVER_AMPLITUDE_M,
         crossover_period_s: CROSSOVER_PERIOD_S,
         crossover_rule: "ground and spacecraft of the files are too high by the residual, amplitude sin(2 pi et / period) at the frame's mid-point; radii are those before its subtraction",
-        bad_rule: "range_m: ranges of the revolution are too long; time_s: its tags are late by so much more than the clock's bias; orbit_m: its ground and its spacecraft are too high",
+        bad_rule: "range_m: ranges of the revolution are too long; time_s: its tags are late by this much in addition to the clock bias; orbit_m: its ground and its spacecraft are too high",
         bad_profiles: files.iter().filter_map(|file| file.bad.clone()).collect(),
         files,
     };
@@ -204,12 +204,12 @@ fn write_truth(
     put(&path, &text)
 }
 
-/// A file before it is flown.
+/// A file before its frames are computed.
 struct PlannedFile {
     name: String,
     first_orbit: u32,
     seed: u64,
-    /// Of each revolution: what is wrong with it, and a gap in its frames.
+    /// For each revolution: its error, and a gap in its frames.
     revolutions: Vec<(Option<Badness>, Option<Interval>)>,
 }
 
@@ -330,14 +330,14 @@ fn start_of(orbit_number: u32) -> Et {
     Et::from_seconds(START_S + f64::from(orbit_number.saturating_sub(1)) * Orbit::period_s())
 }
 
-/// Which revolution of a file is the bad one: neither the first nor the last.
+/// The index of a file's bad revolution: neither the first nor the last.
 fn bad_revolution(bits: u64) -> u32 {
     1 + u32::try_from(bits % u64::from(REVOLUTIONS - 2)).unwrap_or(0)
 }
 
-/// What a person reads first.
+/// Contents of the archive, for `README.txt`.
 const README: &str = "\
 pedr/*.b        PEDR files of 12 revolutions each, about a day
 kernels/        archive.tm and what it loads: leap seconds, clock, Mars, orbit
-truth.json      what is wrong with the data: clock bias, noise, bad revolutions, gaps
+truth.json      injected errors: clock bias, noise, bad revolutions, gaps
 ";

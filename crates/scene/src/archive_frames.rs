@@ -1,8 +1,9 @@
-//! Frames of an invented archive: one orbit for the whole mission, a laser near nadir, the file's own orbit and ground a
-//! crossover residual too high.
+//! Frames of a synthetic archive: one orbit for the whole mission, a laser near nadir, the file's own orbit and ground
+//! a crossover residual too high.
 //!
-//! The ground is where the file says it is; ranges are measured to it from where the kernels have the spacecraft at the
-//! true time. What a check of ranges finds is therefore what was drawn: noise, the residual, and the errors of bad orbits.
+//! The true ground is that of the file; ranges are measured to it from the position of the spacecraft in the kernels at
+//! the true time. A check of ranges therefore finds the drawn errors: noise, the residual, and the errors of bad
+//! orbits.
 
 use std::f64::consts::TAU;
 
@@ -35,15 +36,16 @@ use areograph_pds::pedr::{FrameValues, Record, SHOTS};
 /// Standard deviation of a range, metres, and its step: those of [`super::SceneErrors::realistic`].
 pub(super) const RANGE_NOISE_M: f64 = 1.0;
 pub(super) const RANGE_STEP_M: f64 = 0.375;
-/// Of so many revolutions one looks aside, by at most this angle, for this long, so long after its start.
+/// One of this many revolutions has an off-nadir look, by at most this angle, for this duration, this long after its
+/// start.
 const ASIDE_EVERY: u32 = 8;
 const ASIDE_RAD: f64 = 18.0 * RADIANS_PER_DEGREE;
 const ASIDE_S: f64 = 900.0;
 const ASIDE_AFTER_S: f64 = 2_000.0;
-/// The bus wanders about nadir by this angle, with this period.
+/// The bus oscillates about nadir by this angle, with this period.
 const WANDER_RAD: f64 = 0.2 * RADIANS_PER_DEGREE;
 const WANDER_S: f64 = 1_100.0;
-/// Of so many revolutions one has a stretch without attitude, so long after its start; the file has it at nadir.
+/// One of this many revolutions has a stretch without attitude, this long after its start; the file has it at nadir.
 const UNKNOWN_EVERY: u32 = 5;
 const UNKNOWN_S: [f64; 2] = [5_000.0, 5_060.0];
 /// Attitude flag of a frame without attitude.
@@ -52,16 +54,16 @@ const NO_ATTITUDE: u16 = 3;
 const AHEAD_RAD: f64 = 0.1 * RADIANS_PER_DEGREE;
 /// Small relief along the track: shots over which it changes, and its size in metres.
 const ROUGHNESS: [(u64, f64); 3] = [(64, 25.0), (12, 8.0), (1, 1.0)];
-/// Half the height over which the parallax is taken, metres.
+/// Half the height interval of the parallax, metres.
 const PARALLAX_STEP_M: f64 = 500.0;
 
-/// What is wrong with a whole revolution in its file.
+/// Error of a whole revolution in its file.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Badness {
     /// Ranges are too long, metres.
     RangeM(f64),
-    /// Time tags are late by more than the clock's bias, seconds.
+    /// Time tags are late in addition to the clock bias, seconds.
     TimeS(f64),
     /// Ground and spacecraft of the file are too high, metres.
     OrbitM(f64),
@@ -75,7 +77,7 @@ impl Badness {
         }
     }
 
-    /// Seconds by which tags are late besides the clock's bias.
+    /// Seconds by which tags are late in addition to the clock bias.
     pub(super) fn time_s(of: Option<Self>) -> f64 {
         match of {
             Some(Self::TimeS(seconds)) => seconds,
@@ -91,22 +93,22 @@ impl Badness {
     }
 }
 
-/// Which frame to fly.
+/// The frame to compute.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ArchiveFrame {
-    /// Mid-point as the file tags it, a whole number of microseconds.
+    /// Mid-point as tagged in the file, a whole number of microseconds.
     pub tag: Et,
     /// Number of the frame in its file, from 0.
     pub index: u32,
     /// Orbit number.
     pub orbit: u32,
-    /// What is wrong with it.
+    /// Its error.
     pub bad: Option<Badness>,
     /// Seed of its file.
     pub seed: u64,
 }
 
-/// Where the spacecraft is and where the laser looks, IAU 2000.
+/// Position of the spacecraft and direction of the laser, IAU 2000.
 struct Look {
     spacecraft_m: Vector3<f64>,
     direction: Vector3<f64>,
@@ -114,7 +116,7 @@ struct Look {
 }
 
 impl Look {
-    /// The look at `et`; of a frame without attitude straight down.
+    /// The look at `et`; straight down for a frame without attitude.
     fn at(orbit: &Orbit, et: Et, revolution: u32, has_attitude: bool) -> Self {
         let state = orbit.state(et);
         let mars = body_matrix(&MARS_IAU2000, et);
@@ -132,7 +134,7 @@ impl Look {
         }
     }
 
-    /// Where the beam passes the sphere of `radius_m`; for a beam that only grazes it, the nearest point.
+    /// Intersection of the beam with the sphere of `radius_m`; for a beam that only grazes it, the nearest point.
     fn at_radius_m(&self, radius_m: f64) -> Vector3<f64> {
         let b = self.spacecraft_m.dot(&self.direction);
         let c = self.spacecraft_m.norm_squared() - radius_m * radius_m;
@@ -144,7 +146,7 @@ impl Look {
     }
 }
 
-/// Roll of the bus: it wanders about nadir, and looks aside once in some revolutions.
+/// Roll of the bus: it oscillates about nadir, and has one off-nadir look in some revolutions.
 fn roll_rad(orbit: &Orbit, et: Et, revolution: u32) -> f64 {
     let wander = (TAU * (et.seconds() / WANDER_S).rem_euclid(1.0)).sin();
     let since_s = orbit.since_southernmost_s(et) - ASIDE_AFTER_S;
@@ -158,7 +160,7 @@ fn roll_rad(orbit: &Orbit, et: Et, revolution: u32) -> f64 {
 /// The record of a frame.
 ///
 /// # Errors
-/// A value that does not fit its field, which is a bug.
+/// A value that does not fit its field, which is an internal error.
 pub(super) fn fly(orbit: &Orbit, terrain: &Terrain, frame: &ArchiveFrame) -> Result<Record> {
     let late_s = usual_altimeter().clock_bias_s + Badness::time_s(frame.bad);
     let et = frame.tag.plus(-late_s);
@@ -193,12 +195,12 @@ pub(super) fn fly(orbit: &Orbit, terrain: &Terrain, frame: &ArchiveFrame) -> Res
     Ok(record)
 }
 
-/// Where a shot, counted from 0, lies in its frame: −0.475 to 0.475.
+/// Position of a shot, counted from 0, in its frame: −0.475 to 0.475.
 fn share_of(shot: usize) -> f64 {
     (shot as f64 - 9.5) / SHOTS as f64
 }
 
-/// Everything of a frame but its shots, before the crossover residual.
+/// The values of a frame except its shots, before the crossover residual.
 fn frame_values(
     looks: &[Look; 3],
     terrain: &Terrain,
@@ -271,13 +273,13 @@ fn frame_values(
     })
 }
 
-/// Which gravity model the orbit of a revolution rests on: 3 and more, as parallax and crossovers ask for. It changes
-/// every 60 revolutions, as if orbits had been made anew by stretches of the mission.
+/// The gravity model of a revolution's orbit: 3 and more, as parallax and crossovers require. It changes every 60
+/// revolutions, as if orbits had been recomputed by stretches of the mission.
 fn gravity_model(revolution: u32) -> u16 {
     3 + u16::try_from(revolution / 60 % 3).unwrap_or(0)
 }
 
-/// Flies the shots of a frame and enters them into its values.
+/// Computes the shots of a frame and enters them into its values.
 ///
 /// * `radii_m` – radius of the ground at the frame's first edge, its middle and its last edge
 fn fly_shots(looks: &[Look; 3], radii_m: [f64; 3], frame: &ArchiveFrame, values: &mut FrameValues) {
@@ -333,7 +335,7 @@ fn fly_shots(looks: &[Look; 3], radii_m: [f64; 3], frame: &ArchiveFrame, values:
     }
 }
 
-/// Small relief at a shot of a file, metres: numbers drawn every so many shots, and straight lines between them.
+/// Small relief at a shot of a file, metres: values drawn at intervals of shots, with linear interpolation.
 fn roughness_m(seed: u64, number: u64) -> f64 {
     ROUGHNESS
         .iter()

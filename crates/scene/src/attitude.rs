@@ -1,4 +1,4 @@
-//! The invented attitude: nadir pointing, held inertially while an off-nadir image is taken.
+//! The synthetic attitude: nadir pointing, held inertially while an off-nadir image is taken.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
@@ -66,10 +66,10 @@ pub(super) struct AttitudeSample {
     pub rate_rad_s: Vector3<f64>,
 }
 
-/// Attitude over an arc: samples every [`CK_STEP_S`], the bus turning evenly in between.
+/// Attitude over an arc: samples every [`CK_STEP_S`], with uniform rotation in between.
 ///
-/// That is what a type 3 C-kernel says between its samples, so the kernel *is* the truth, whatever the
-/// angular acceleration.
+/// A type 3 C-kernel interpolates its samples in this way, so the kernel *is* the truth, whatever the angular
+/// acceleration.
 #[derive(Debug, Clone)]
 pub(super) struct Attitude {
     samples: Vec<AttitudeSample>,
@@ -105,7 +105,7 @@ impl Attitude {
         &self.samples
     }
 
-    /// Matrix from J2000 to the bus at `et`; outside the span the nearest interval goes on.
+    /// Matrix from J2000 to the bus at `et`; outside the span the nearest interval is extrapolated.
     pub(super) fn j2000_to_bus(&self, et: Et) -> Matrix3<f64> {
         let after = self
             .samples
@@ -120,7 +120,7 @@ impl Attitude {
     }
 }
 
-/// The attitude that is sampled.
+/// The sampled attitude.
 fn attitude_at(orbit: &Orbit, hold: Option<&Hold>, et: Et) -> Matrix3<f64> {
     let nadir = nadir_attitude(&orbit.state(et));
     let Some(hold) = hold else { return nadir };
@@ -200,12 +200,12 @@ mod tests {
         }
         let early = attitude.j2000_to_bus(middle.plus(-500.0));
         let nadir = nadir_attitude(&orbit().state(middle.plus(-500.0)));
-        assert!((early - nadir).abs().max() < 1e-7); // even turning between samples
+        assert!((early - nadir).abs().max() < 1e-7); // uniform rotation between samples
         let fastest_deg_s = attitude
             .samples()
             .iter()
             .map(|sample| sample.rate_rad_s.norm() / RADIANS_PER_DEGREE)
             .fold(0.0, f64::max);
-        assert!(fastest_deg_s < 0.35, "{fastest_deg_s}"); // what MGS can do
+        assert!(fastest_deg_s < 0.35, "{fastest_deg_s}"); // within the capability of MGS
     }
 }

@@ -1,4 +1,5 @@
-//! A synthetic camera of two stereo lines in two orbits, with its support data, tie points, laser control and the truth.
+//! A synthetic camera of two stereo lines in two orbits, with its support data, tie points, laser control and true
+//! values.
 
 use std::{collections::BTreeMap, fmt::Write as _, path::Path};
 
@@ -14,8 +15,8 @@ use areograph_base::error::{Locate as _, Result};
 use areograph_geom::{calibration::Offset, ellipsoid::local_axes};
 
 const README: &str = "Two stereo lines of a camera in two orbits: support data, tie points, laser control, a calibration file.\n\
-    The lines are mounted askew and the orbits are wrong by hundreds of metres; truth.json tells by how much, and where\n\
-    everything is.\n\
+    The lines are mounted askew and the orbits are wrong by hundreds of metres; truth.json gives both, and all\n\
+    true positions.\n\
     Next: areograph calibrate calibration.toml\n";
 
 /// Noise: tie points and control in images, pixels; control on the ground, metres.
@@ -28,7 +29,7 @@ const POINTS: [[usize; 2]; 2] = [[206, 476], [80, 160]];
 /// Share of the swath that points are drawn from, the middle.
 const SWATH: f64 = 0.92;
 
-/// The lines as they truly are. Sample errors are those of the paper's synthetic case: 2e-7 and 1e-7 a pixel, 1e-11 a pixel squared.
+/// The true lines. Sample errors are those of the paper's synthetic case: 2e-7 and 1e-7 a pixel, 1e-11 a pixel squared.
 fn lines() -> [StereoLine; 2] {
     let offset = |phi: f64, omega: f64, kappa: f64| Offset {
         phi_rad: phi.to_radians(),
@@ -59,7 +60,7 @@ fn lines() -> [StereoLine; 2] {
     ]
 }
 
-/// The orbits: that of the calibration, and another one, whose error as seen from its track is the same but for a fifth.
+/// The orbits: that of the calibration, and another one, whose error in its own axes differs from the first by a fifth.
 fn orbits() -> [Orbit; 2] {
     [
         Orbit {
@@ -89,7 +90,7 @@ fn orbits() -> [Orbit; 2] {
     ]
 }
 
-/// The file of the truth.
+/// The file of true values.
 #[derive(Serialize)]
 struct Truth {
     seed: u64,
@@ -99,22 +100,22 @@ struct Truth {
     orbit_bias_m: BTreeMap<&'static str, [f64; 3]>,
     /// Its drift, metres a line.
     orbit_drift_m_per_line: BTreeMap<&'static str, [f64; 3]>,
-    /// Places of the points of every orbit, Mars-fixed metres.
+    /// True positions of the points of every orbit, Mars-fixed metres.
     points_m: BTreeMap<&'static str, BTreeMap<String, [f64; 3]>>,
 }
 
-/// Tables of an orbit, and where its points are.
+/// Tables of an orbit, and the true positions of its points.
 struct Tables {
     ties: String,
     control: String,
     points_m: BTreeMap<String, [f64; 3]>,
 }
 
-/// Writes a synthetic camera of two stereo lines into `directory`, replacing an older scene that nobody added to or changed.
-/// The same seed gives the same bytes.
+/// Writes a synthetic camera of two stereo lines into `directory`, replacing an older scene unless files were added or
+/// changed. The same seed gives the same bytes.
 ///
 /// # Errors
-/// [`SceneError`](super::SceneError) when the folder holds something else; the system's refusal to write.
+/// [`SceneError`](super::SceneError) when the folder holds something else; errors of writing.
 pub fn write_calibration_scene(directory: &Path, seed: u64) -> Result<String> {
     let draft = Draft::begin(directory, README)?;
     let isd = draft.folder("isd")?;
@@ -196,7 +197,7 @@ fn tables(orbit: &Orbit, lines: &[StereoLine; 2], counts: [usize; 2], seed: u64)
     tables
 }
 
-/// Where the laser says that a place is.
+/// The laser's measurement of a position.
 fn laser(place_m: &Vector3<f64>, random: &mut Random) -> Vector3<f64> {
     let off_m = Vector3::new(
         HORIZONTAL_M * random.normal(),

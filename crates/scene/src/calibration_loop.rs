@@ -1,5 +1,5 @@
-//! Three lines of a camera in one orbit with their pixels, laser passes over the ground in two directions, and the truth: what
-//! `areograph calibrate` works on from pixels.
+//! Three lines of a camera in one orbit with their pixels, laser passes over the ground in two directions, and true
+//! values: the input of `areograph calibrate` from pixels.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -21,7 +21,7 @@ use areograph_geom::calibration::Offset;
 
 const README: &str = "Three lines of a camera in one orbit: support data (isd/), pixels (images/), PEDR files of laser passes in two\n\
     directions over their ground (pedr/), a calibration file. The lines are mounted askew and the orbit is wrong by hundreds of\n\
-    metres; truth.json tells by how much, and where the lines truly see places of the ground.\n\
+    metres; truth.json gives both, and the true image coordinates of ground points.\n\
     Next: areograph calibrate calibration.toml\n";
 
 /// Middle of the ground.
@@ -29,8 +29,8 @@ const LONGITUDE_DEG: f64 = -63.13;
 const LATITUDE_DEG: f64 = -33.0;
 /// Lines and samples of an image: 65 by 22 km.
 const SIZE: [u32; 2] = [2_400, 800];
-/// Laser passes over that ground: those of a direction lie 1.4 km apart, of both as dense as the 126 over a whole swath in
-/// Li et al. 2023.
+/// Laser passes over that ground: those of one direction are 1.4 km apart; both together are as dense as the 126 over a
+/// whole swath in Li et al. 2023.
 const PASSES: Passes = Passes {
     longitude_rad: LONGITUDE_DEG * RADIANS_PER_DEGREE,
     latitude_rad: LATITUDE_DEG * RADIANS_PER_DEGREE,
@@ -38,23 +38,23 @@ const PASSES: Passes = Passes {
     half_width_m: 12_000.0,
     half_s: 12.0,
 };
-/// Places along and across the ground at which the truth is told, and the share of the swath that they cover.
+/// Points along and across the ground with true image coordinates, and the share of the swath that they cover.
 const CHECKED: [u32; 2] = [19, 7];
 const CHECKED_SHARE: [f64; 2] = [0.84, 0.9];
 
-/// How three lines and the ground that they see are invented.
+/// A scene of three lines and the ground that they see.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LineScene {
     /// Seed of the ground and of noise.
     pub seed: u64,
     /// Lines and samples of an image.
     pub size: [u32; 2],
-    /// Whether support data are wrong by the mounting and the orbit; else they are what the lines truly do.
+    /// Whether support data have errors of the mounting and the orbit; otherwise they are exact.
     pub is_wrong: bool,
 }
 
 impl LineScene {
-    /// Images of 65 by 22 km, support data that are wrong.
+    /// Images of 65 by 22 km, support data with errors.
     #[must_use]
     pub const fn of_seed(seed: u64) -> Self {
         Self {
@@ -64,7 +64,7 @@ impl LineScene {
         }
     }
 
-    /// Passes as dense over less ground.
+    /// Passes of the same density over less ground.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -81,7 +81,7 @@ impl LineScene {
     }
 }
 
-/// The lines as they truly are: offsets and errors of the paper's synthetic case, and a third line between them.
+/// The true lines: offsets and errors of the paper's synthetic case, and a third line between them.
 fn lines(scene: &LineScene) -> [StereoLine; 3] {
     let wrong = if scene.is_wrong { 1.0 } else { 0.0 };
     let offset = |angles_deg: [f64; 3]| {
@@ -136,7 +136,7 @@ fn orbit(scene: &LineScene) -> Orbit {
     }
 }
 
-/// The file of the truth.
+/// The file of true values.
 #[derive(Serialize)]
 struct Truth {
     made_by: &'static str,
@@ -148,11 +148,11 @@ struct Truth {
     orbit_bias_m: [f64; 3],
     /// Its drift, metres a line.
     orbit_drift_m_per_line: [f64; 3],
-    /// Places of the ground that all lines see.
+    /// Ground points that all lines see.
     checked: Vec<Checked>,
 }
 
-/// A place and where the lines truly see it.
+/// A ground point and its true image coordinates in the lines.
 #[derive(Serialize)]
 struct Checked {
     /// Mars-fixed metres.
@@ -161,19 +161,19 @@ struct Checked {
     seen: BTreeMap<&'static str, [f64; 2]>,
 }
 
-/// Writes three lines with their pixels and laser passes into `directory`, replacing an older scene that nobody added to or
-/// changed. The same seed gives the same bytes.
+/// Writes three lines with their pixels and laser passes into `directory`, replacing an older scene unless files were
+/// added or changed. The same seed gives the same bytes.
 ///
 /// # Errors
-/// [`SceneError`](super::SceneError) when the folder holds something else; the system's refusal to write.
+/// [`SceneError`](super::SceneError) when the folder holds something else; errors of writing.
 pub fn write_calibration_loop_scene(directory: &Path, seed: u64) -> Result<String> {
     write_line_scene(directory, &LineScene::of_seed(seed))
 }
 
-/// Writes such a scene of another size, or one whose support data are right.
+/// Writes such a scene of another size, or one with exact support data.
 ///
 /// # Errors
-/// As [`write_calibration_loop_scene`].
+/// Those of [`write_calibration_loop_scene`].
 pub fn write_line_scene(directory: &Path, scene: &LineScene) -> Result<String> {
     let seed = scene.seed;
     let draft = Draft::begin(directory, README)?;
@@ -223,7 +223,7 @@ pub fn write_line_scene(directory: &Path, scene: &LineScene) -> Result<String> {
     ))
 }
 
-/// Places on an even lattice that all lines see.
+/// Ground points on a regular grid that all lines see.
 fn checked(orbit: &Orbit, lines: &[StereoLine], terrain: &Terrain) -> Vec<Checked> {
     let [along, across] = CHECKED;
     let share = |at: u32, of: u32| f64::from(at) / f64::from(of - 1) - 0.5;

@@ -1,7 +1,7 @@
-//! Wide-angle images around two of the narrow-angle ones, a site of their own.
+//! Wide-angle images around two of the narrow-angle ones, with a site of their own.
 //!
-//! Where their samples look follows the formula of the instrument kernel word for word, and where a point lies
-//! in an image is searched for with it: nothing here goes through the camera models of the program.
+//! Look directions of samples follow the formula of the instrument kernel word for word, and image coordinates of
+//! points are solved for with it, independently of the camera models of the program.
 
 use nalgebra::{Matrix2, Vector2, Vector3};
 
@@ -31,7 +31,7 @@ use areograph_config::built_in_instruments;
 use areograph_geom::{light_time::light_time_s, pushbroom::Pose};
 use areograph_spice::Session;
 
-/// The place that the images show.
+/// The site of the images.
 pub(super) static CONTEXT_SITE: Site = Site {
     id: "gusev_context",
     name: "Gusev crater, wide angle",
@@ -42,16 +42,16 @@ pub(super) static CONTEXT_SITE: Site = Site {
 const WINDOW_HALF_DEG: [f64; 2] = [1.5, 1.0];
 /// Epochs of an image: the ends of 30 equal intervals.
 const EPOCHS: u32 = 31;
-/// Tie points of the two red images, and places that are looked at for them.
+/// Tie points of the two red images, and candidate points examined for them.
 const TIES: [usize; 2] = [60, 2_000];
 /// Standard deviation of a measurement, lines and samples.
 const NOISE_PX: f64 = 0.2;
-/// No tie point is nearer to the edge of an image, pixels.
+/// No tie point is nearer than this to the edge of an image, pixels.
 const EDGE_PX: f64 = 5.0;
-/// Steps of the search for a place, and the last of them in lines and samples: ET is rounded at 1e-7 of a line.
+/// Steps of the search for a position, and the last of them in lines and samples: ET is rounded at 1e-7 of a line.
 const STEPS_MAX: u32 = 30;
 const LAST_STEP_PX: f64 = 1e-6;
-/// Half the interval of its slopes.
+/// Half the interval of its derivatives.
 const SLOPE_STEP_PX: f64 = 0.5;
 
 /// An image that is exposed around the middle of a narrow-angle one.
@@ -75,7 +75,7 @@ pub(super) struct PlannedContext {
     pub samples: u32,
 }
 
-/// The images; line periods make square pixels at nadir. The last one is exposed while attitude is held.
+/// The images; line periods give square pixels at nadir. The last one is exposed while attitude is held.
 pub(super) static CONTEXT_IMAGES: [PlannedContext; 3] = [
     PlannedContext {
         id: "E02-00666",
@@ -119,10 +119,10 @@ pub(super) struct ContextImage<'a> {
 }
 
 impl<'a> ContextImage<'a> {
-    /// The images over their arcs; each begins at a reading of the clock.
+    /// The images over their arcs; each begins at a clock reading.
     ///
     /// # Errors
-    /// [`SceneError::NoCamera`] when the program does not know a camera, what the clock kernel says.
+    /// [`SceneError::NoCamera`] when the program does not know a camera; errors of the clock kernel.
     pub(super) fn all(days: &'a [Flown], session: &Session) -> Result<Vec<Self>> {
         let planned = CONTEXT_IMAGES.iter();
         planned
@@ -171,7 +171,7 @@ impl<'a> ContextImage<'a> {
     /// A detached PDS3 label.
     ///
     /// # Errors
-    /// What the session says of times.
+    /// Errors of time conversion in the session.
     pub(super) fn label(&self, session: &Session) -> Result<String> {
         Ok(image_label(&Label {
             id: self.plan.id,
@@ -189,12 +189,12 @@ impl<'a> ContextImage<'a> {
         }))
     }
 
-    /// Where the camera truly is, and its axes.
+    /// True position of the camera, and its axes.
     fn pose(&self, et: Et) -> Pose {
         self.flown.camera_pose(self.camera, et, 0.0)
     }
 
-    /// From where it sees ground at a distance along straight rays.
+    /// Origin of the straight rays for ground at a distance.
     fn seen_from(&self, et: Et, range_m: f64) -> Pose {
         self.flown
             .camera_pose(self.camera, et, light_time_s(range_m))
@@ -224,7 +224,7 @@ impl<'a> ContextImage<'a> {
         let r = across.hypot(along);
         let powers = (0_i32..).map(|index| r.powi(2 * index + 1));
         let terms = coefficients_rad.iter().zip(powers);
-        // The kernel has the sense of the samples in the sign of its coefficients.
+        // In the kernel the signs of the coefficients express the sense of the samples.
         let sense = detector.samples_along.sign();
         let phi: f64 = terms
             .map(|(coefficient, power)| -sense * coefficient * power)
@@ -233,8 +233,8 @@ impl<'a> ContextImage<'a> {
         Vector3::new(phi.abs().sin() * along / r, -sin * across / r, cos)
     }
 
-    /// Line and sample that see a point, by Newton's method with slopes from differences; `None` where there
-    /// are none near the image.
+    /// Line and sample that see a point, by Newton's method with numerical derivatives; `None` where none exist near
+    /// the image.
     fn place(&self, ground_m: &Vector3<f64>) -> Option<[f64; 2]> {
         let missed = |place: &Vector2<f64>| {
             let et = self.time_of(place.x);
@@ -268,7 +268,7 @@ impl<'a> ContextImage<'a> {
         inside(line, self.plan.lines) && inside(sample, self.plan.samples)
     }
 
-    /// How the image was taken, and where it shows the shots among `kept`.
+    /// True exposure of the image, and image coordinates of the shots among `kept`.
     pub(super) fn truth(&self, kept: &[KeptShot]) -> ContextTruth {
         let step_s = self.exposed().duration_s() / f64::from(EPOCHS - 1);
         let epochs = (0..EPOCHS).map(|index| self.start.plus(step_s * f64::from(index)));

@@ -1,4 +1,4 @@
-//! Errors as drawn for the day of one image, and the flight with them.
+//! Errors drawn for the day of one image, and the flight with them.
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use serde::Serialize;
@@ -16,30 +16,31 @@ use areograph_geom::{
     orbit_axes::radial_along_cross, pushbroom::Pose,
 };
 
-/// The polynomial of an attitude error is held from so many half images from the middle on: shots of the window are
-/// nearer, and it does not grow over the day.
+/// The polynomial of an attitude error is held constant beyond this many half images from the middle: shots of the
+/// window are nearer, and it does not grow over the day.
 const POLYNOMIAL_REACH: f64 = 4.0;
 
-/// What went wrong on the day of one image.
+/// Errors of the day of one image.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct DayErrors {
-    /// Lines by which all lines were exposed later than the label says.
+    /// Lines by which all lines were exposed later than in the label.
     pub time_bias_lines: f64,
-    /// Seconds by which the attitude of the C-kernel is too late: at `t` the bus had its attitude of `t` + this.
+    /// Seconds by which the attitude of the C-kernel is late: the true attitude at `t` is that of the C-kernel at `t` +
+    /// this.
     pub attitude_clock_s: f64,
-    /// Place of bus, camera and laser minus the orbit `gsfc`, IAU 2000, metres.
+    /// Position of bus, camera and laser minus the orbit `gsfc`, IAU 2000, metres.
     pub bus_position_m: Vector3<f64>,
-    /// Place of the camera minus that of the bus, IAU 2000, metres.
+    /// Position of the camera minus that of the bus, IAU 2000, metres.
     pub camera_position_m: Vector3<f64>,
-    /// Turn of the bus.
+    /// Rotation of the bus.
     pub attitude: Option<AttitudeError>,
-    /// Angles by which the laser points from +Z of the bus towards its X and Y, radians: the same on all days.
+    /// Angles between the laser and +Z of the bus towards its X and Y, radians: the same on all days.
     pub boresight_rad: [f64; 2],
     /// Shift of the day's profile in the PEDR file.
     pub profile_shift: ProfileShift,
 }
 
-/// By how much the bus was turned against the C-kernel: its matrix from J2000 was `exp([e]×)` times the C-kernel's.
+/// Rotation of the bus against the C-kernel: its true matrix from J2000 was `exp([e]×)` times the C-kernel's.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct AttitudeError {
     /// Where `x` is 0.
@@ -64,12 +65,12 @@ struct Sinusoid {
     phase_rad: f64,
 }
 
-/// How far the PEDR file has a profile from where it is.
+/// Offset of a profile in the PEDR file from its true position.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct ProfileShift {
     /// Towards the east, the north and up, metres.
     pub east_north_radial_m: [f64; 3],
-    /// The first two as a turn of Mars.
+    /// The first two as a rotation of Mars.
     #[serde(skip)]
     rotation: Matrix3<f64>,
 }
@@ -101,12 +102,12 @@ impl ProfileShift {
         self.east_north_radial_m[2]
     }
 
-    /// The turn that takes true directions to those of the file, both IAU 2000.
+    /// The rotation from true directions to those of the file, both IAU 2000.
     pub(super) const fn rotation(&self) -> &Matrix3<f64> {
         &self.rotation
     }
 
-    /// Where the file has a point, IAU 2000, metres.
+    /// Position of a point in the file, IAU 2000, metres.
     pub(super) fn applied(&self, ground_m: &Vector3<f64>) -> Vector3<f64> {
         let radius_m = ground_m.norm();
         self.rotation * ground_m * ((radius_m + self.radial_m()) / radius_m)
@@ -130,14 +131,14 @@ impl AttitudeError {
         }
     }
 
-    /// Turn at `et` without jitter, radians about the axes of the bus.
+    /// Rotation at `et` without jitter, radians about the axes of the bus.
     fn steady_at(&self, et: Et) -> Vector3<f64> {
         let late_s = et.since(Et::from_seconds(self.middle_et_s));
         let x = (late_s / self.half_image_s).clamp(-POLYNOMIAL_REACH, POLYNOMIAL_REACH);
         self.constant_rad + x * (self.linear_rad + x * self.quadratic_rad)
     }
 
-    /// Turn at `et`, radians about the axes of the bus.
+    /// Rotation at `et`, radians about the axes of the bus.
     fn at(&self, et: Et) -> Vector3<f64> {
         let late_s = et.since(Et::from_seconds(self.middle_et_s));
         let mut turn_rad = self.steady_at(et);
@@ -210,7 +211,7 @@ impl DayErrors {
         }
     }
 
-    /// Whether the bus shakes.
+    /// Whether the attitude has jitter.
     pub(super) fn has_jitter(&self) -> bool {
         let jitter = self.attitude.as_ref().map(|attitude| &attitude.jitter);
         jitter.is_some_and(|sinusoids| !sinusoids.is_empty())
@@ -224,17 +225,17 @@ fn orbit_axes(arc: &Arc) -> Matrix3<f64> {
     body_matrix(&MARS_IAU2000, middle) * radial_along_cross(&state.position_m, &state.velocity_m_s)
 }
 
-/// The day of an image as it was flown. The kernels tell the arc, the truth is the arc with the errors.
+/// The true flight of an image day: the arc of the kernels plus the errors.
 #[derive(Debug)]
 pub(super) struct Flown {
-    /// What the kernels tell.
+    /// The arc of the kernels.
     pub arc: Arc,
-    /// How the truth differs.
+    /// Errors of the kernels.
     pub errors: DayErrors,
 }
 
 impl Flown {
-    /// True place of the bus, IAU 2000, metres.
+    /// True position of the bus, IAU 2000, metres.
     pub(super) fn bus_position_m(&self, et: Et) -> Vector3<f64> {
         body_matrix(&MARS_IAU2000, et) * self.arc.orbit.state(et).position_m
             + self.errors.bus_position_m
@@ -245,7 +246,7 @@ impl Flown {
         self.turned_by(AttitudeError::at, et)
     }
 
-    /// The matrix that the C-kernel has for `et`, turned by what `turn` says of the attitude's error.
+    /// The C-kernel's matrix at `et`, rotated by the attitude error `turn`.
     fn turned_by(&self, turn: impl Fn(&AttitudeError, Et) -> Vector3<f64>, et: Et) -> Matrix3<f64> {
         let read = et.plus(self.errors.attitude_clock_s);
         let told = self.arc.attitude.j2000_to_bus(read);
@@ -255,8 +256,8 @@ impl Flown {
         }
     }
 
-    /// From where `camera` sees ground along straight rays at `exposure`, and its axes: the bus and Mars as they were
-    /// when the light left the ground, `light_time_s` earlier, the attitude as it is. Without light time the true pose.
+    /// Origin of the straight rays of `camera` at `exposure`, and its axes: the bus and Mars at the instant when the
+    /// light left the ground, `light_time_s` earlier, the attitude of the exposure. Without light time the true pose.
     pub(super) fn camera_pose(&self, camera: &Instrument, exposure: Et, light_time_s: f64) -> Pose {
         let left = exposure.plus(-light_time_s);
         let j2000_to_camera = bus_to_camera(camera) * self.j2000_to_bus(exposure);
@@ -396,8 +397,8 @@ mod tests {
         }
     }
 
-    /// A photon is followed from the ground to the camera in axes that neither turn nor move with Mars; in those of
-    /// the camera it has lost the camera's velocity.
+    /// A photon is followed from the ground to the camera in axes that neither rotate nor move with Mars; in those of
+    /// the camera, the camera's velocity is subtracted from its own.
     #[test]
     fn rays_are_straight_from_where_the_camera_stood_when_the_light_left() {
         for image in &IMAGES {
@@ -411,7 +412,7 @@ mod tests {
                 let look = Vector3::new(look[0], look[1], 1.0);
                 let ground_m = at_once.position_m + 4.1e5 * at_once.mars_to_camera.tr_mul(&look);
                 let orbit = |et: Et| flown.arc.orbit.state(et);
-                // Of the true orbit alone: the demo has no errors of the bus.
+                // For the true orbit only: the demo has no errors of the bus.
                 let there_m = |light_time_s: f64| {
                     let left = exposure.plus(-light_time_s);
                     body_matrix(&MARS_IAU2000, left).tr_mul(&ground_m)

@@ -1,31 +1,31 @@
-//! What can go wrong while a mission is invented.
+//! Errors of the scene writer.
 
 use areograph_base::error::{Cause, Kind};
 
-/// Faults of the scene writer.
+/// Errors of the scene writer.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
     /// The folder holds something that is not an older scene.
     #[error(
-        "the folder is not empty and holds no scene of areograph (no list {list} of its files)"
+        "the folder is not empty and contains no areograph scene (its file list {list} is missing)"
     )]
     NotAScene {
         /// File by which a scene is recognised.
         list: &'static str,
     },
-    /// The folder holds more than an older scene.
+    /// The folder holds files outside an older scene.
     #[error("the folder holds {entry}, which `areograph scene` did not write")]
     Foreign {
         /// Path below the folder.
         entry: String,
     },
-    /// A file of the older scene is not what was written.
+    /// A file of the older scene has been changed.
     #[error("{file} was changed since `areograph scene` wrote it")]
     Changed {
         /// Path below the folder.
         file: String,
     },
-    /// No orbit shows the site as asked.
+    /// No orbit shows the site as planned.
     #[error(
         "no orbit found that shows {image} as planned: last step {step} rad after {iterations} iterations, expected below 1e-13 rad"
     )]
@@ -37,51 +37,51 @@ pub enum SceneError {
         /// Steps taken.
         iterations: u32,
     },
-    /// The true orientation of an image is none.
+    /// The true orientation of an image is invalid.
     #[error("image {image}: no camera sees its tie points: {error}")]
     NoCamera {
         /// Image id.
         image: String,
-        /// What is wrong with it.
+        /// The reason.
         error: String,
     },
-    /// An image that cannot be rendered or coded.
+    /// An image that cannot be rendered or encoded.
     #[error("image {image}: {error}")]
     Image {
         /// Image id.
         image: String,
-        /// What is wrong with it.
+        /// The reason.
         error: String,
     },
-    /// The beam leaves Mars.
+    /// The beam misses Mars.
     #[error("the laser beam misses Mars at ET {et_s:.3}")]
     BeamMisses {
         /// True time of the shot.
         et_s: f64,
     },
-    /// A frame asks for an instant that was not tabulated.
+    /// A frame needs an instant that was not tabulated.
     #[error("no beam was tabulated for ET {et_s:.6}")]
     NotTabulated {
-        /// True time that was asked for.
+        /// The requested true time.
         et_s: f64,
     },
-    /// A number out of its range: a day shorter than its image or longer than a file may be, more noise than images
-    /// have room for.
+    /// An option out of its range: a day shorter than its image or longer than a file may be, more noise than the image
+    /// margins allow.
     #[error("{option} is {value}; expected {least} to {most}")]
     Option {
         /// Name of the option.
         option: &'static str,
-        /// What was asked.
+        /// The requested value.
         value: f64,
         /// Least value.
         least: f64,
         /// Largest value.
         most: f64,
     },
-    /// The kernels to fly along do not cover a single stretch of 20 s.
+    /// The kernels do not cover a single stretch of 20 s.
     #[error("the kernels have no interval of {least_s} s or more with both orbit and attitude")]
     NothingToFly {
-        /// Shortest stretch that is flown, seconds.
+        /// Shortest stretch of flight, seconds.
         least_s: f64,
     },
 }

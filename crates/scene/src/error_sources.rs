@@ -1,17 +1,17 @@
-//! What is wrong with the data of a mission, and how rough its ground is: kinds and sizes of errors.
+//! Error sources of a mission, and the roughness of its ground: kinds and sizes.
 
 use serde::Serialize;
 
-/// Errors of an invented mission. What is drawn from them is in `truth.json`.
+/// Errors of a synthetic mission. The drawn values are in `truth.json`.
 ///
-/// All are normally distributed about 0 with the given standard deviation, unless a field says otherwise.
+/// All are normally distributed about 0 with the given standard deviation, unless stated otherwise.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SceneErrors {
-    /// Why the two images of a site do not meet along the track.
+    /// The cause of the along-track misregistration of a site's two images.
     pub misregistration: Misregistration,
-    /// Errors of the place, against the orbit `gsfc`.
+    /// Errors of position, against the orbit `gsfc`.
     pub position: PositionErrors,
-    /// Errors of the attitude of the bus, hence of camera and laser alike, against the C-kernel.
+    /// Errors of the attitude of the bus, hence common to camera and laser, against the C-kernel.
     pub attitude: AttitudeErrors,
     /// Errors of the laser altimeter and of its products.
     pub altimeter: AltimeterErrors,
@@ -21,44 +21,44 @@ pub struct SceneErrors {
     pub tie_noise_px: f64,
 }
 
-/// Why images do not meet along the track.
+/// Cause of the along-track misregistration.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Misregistration {
-    /// Lines were exposed later than labels say by the residuals of Shan et al. 2005, Table 5, to half a line and
-    /// with the other sign: the same in every mission.
+    /// Lines were exposed later than stated by the labels, by the residuals of Shan et al. 2005, Table 5, to half a
+    /// line and with the opposite sign: the same in every mission.
     Published,
-    /// Lines of each image were exposed later by a number of lines of its own.
+    /// Lines of each image were exposed later by an individual number of lines.
     LineTimes {
         /// Standard deviation, lines.
         sigma_lines: f64,
     },
-    /// The attitude was read at a time that is off by the same amount in all images. A bus that points at nadir turns
-    /// by 0.05 degrees a second, 0.3 km on the ground; one that is held inertially does not turn.
+    /// The attitude was read with a time offset that is the same in all images. A bus that points at nadir turns by
+    /// 0.05 degrees a second, 0.3 km on the ground; one that is held inertially does not turn.
     AttitudeClock {
         /// Standard deviation, seconds.
         sigma_s: f64,
     },
 }
 
-/// Whose place is wrong.
+/// Object of the position error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PositionErrors {
-    /// Of the camera alone; the laser is where the orbit says.
+    /// The camera only; the laser follows the orbit.
     Camera {
         /// Standard deviation along each axis of IAU 2000, metres.
         sigma_m: f64,
     },
-    /// Of the bus: camera and laser are off together.
+    /// The bus: camera and laser have the same error.
     Bus {
         /// Standard deviations along radius, track and orbit normal, metres.
         sigma_radial_along_cross_m: [f64; 3],
     },
 }
 
-/// Errors of the attitude: rotations about the axes of the bus as `constant + linear x + quadratic x²` with `x` from
-/// −1 to 1 over the image, and jitter on top.
+/// Errors of the attitude: rotations about the axes of the bus as `constant + linear x + quadratic x²` with `x` from −1
+/// to 1 over the image, plus jitter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AttitudeErrors {
     /// Standard deviations of the constant in roll, pitch and yaw, radians.
@@ -71,7 +71,7 @@ pub struct AttitudeErrors {
     pub jitter: Jitter,
 }
 
-/// Sinusoids of the attitude; amplitudes and periods are spread evenly in their logarithm.
+/// Sinusoids of the attitude; amplitudes and periods are uniform in their logarithm.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Jitter {
     /// Sinusoids about each axis.
@@ -85,20 +85,20 @@ pub struct Jitter {
 /// Errors of the laser altimeter and of its products.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AltimeterErrors {
-    /// Standard deviation of where a profile lies to the east and to the north, metres.
+    /// Standard deviation of a profile's shift to the east and to the north, metres.
     pub plan_sigma_m: f64,
-    /// Standard deviation of how high a profile lies, metres.
+    /// Standard deviation of a profile's radial shift, metres.
     pub radial_sigma_m: f64,
     /// Standard deviation of a single range, metres.
     pub shot_noise_m: f64,
     /// Ranges are multiples of this, metres; 0 where they are exact.
     pub range_step_m: f64,
-    /// Diameter of the spot whose mean range is measured, metres.
+    /// Diameter of the spot over which a range is averaged, metres.
     pub spot_m: f64,
-    /// Standard deviation of each of the two angles by which the laser points elsewhere than along +Z of the bus, radians:
-    /// the same in the whole mission.
+    /// Standard deviation of each of the two angles between the laser and +Z of the bus, radians: the same in the whole
+    /// mission.
     pub boresight_sigma_rad: f64,
-    /// Whether files hold what the instrument tells of its echoes: channel 4, energies, pulse widths, thresholds.
+    /// Whether files contain the instrument's echo data: channel 4, energies, pulse widths, thresholds.
     #[serde(skip)]
     pub tells_echoes: bool,
 }
@@ -113,10 +113,10 @@ pub enum Relief {
     SelfAffine(Roughness),
 }
 
-/// How rough self-affine ground is: heights `d` apart differ by `ν (d / 300 m)^0.7` (root mean square).
+/// Roughness of self-affine ground: heights `d` apart differ by `ν (d / 300 m)^0.7` (root mean square).
 ///
-/// The sizes span what MOLA has seen of plains and of highlands, the exponent is the usual one of Mars at these
-/// lengths: both are choices, not the relief of the real sites.
+/// The sizes span MOLA's results for plains and highlands, the exponent is the usual one of Mars at these lengths: both
+/// are choices, not the relief of the real sites.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Roughness {
@@ -129,7 +129,7 @@ pub enum Roughness {
 }
 
 impl Roughness {
-    /// ν, metres: how much heights 300 m apart differ (root mean square).
+    /// ν, metres: difference of heights 300 m apart (root mean square).
     #[must_use]
     pub const fn height_difference_at_300_m(self) -> f64 {
         match self {
@@ -142,7 +142,7 @@ impl Roughness {
 
 impl SceneErrors {
     /// Those of the worked example: exact shots over gentle ground, attitudes without error, line times that reproduce
-    /// Shan et al. 2005, Table 5, and cameras 20 m off their place along each axis.
+    /// Shan et al. 2005, Table 5, and cameras displaced by 20 m along each axis.
     #[must_use]
     pub const fn demo() -> Self {
         Self {
@@ -172,7 +172,7 @@ impl SceneErrors {
         }
     }
 
-    /// Those that the real mission may have had, drawn anew for every seed: a fair test of stated uncertainties.
+    /// Plausible errors of the real mission, drawn anew for every seed: a fair test of stated uncertainties.
     ///
     /// # Source
     /// * line times 30 lines: half of the 225 to 271 m by which the images of a pair disagree (Shan et al. 2005, Table 5);
@@ -181,7 +181,7 @@ impl SceneErrors {
     /// * attitude 0.4 mrad: between the 0.26 mrad of 100 m, which the crossovers of MOLA leave in the horizontal, and the
     ///   0.5 mrad of the 200 m that Yoon & Shan 2004 take for images off nadir. Along the track 0.4 mrad, 150 m,
     ///   is what two images that disagree by 225 to 271 m allow for line times and pitch together, which no tie
-    ///   point tells apart: 30 lines are 100 to 165 m of it, 0.15 mrad are left to pitch. Drift and bend 1e-5 rad,
+    ///   point separates: 30 lines are 100 to 165 m of it, 0.15 mrad remain for pitch. Drift and bend 1e-5 rad,
     ///   2 arcseconds: residuals of C-kernels to a parabola (Shan et al. 2005, Table 4) reach 5;
     /// * jitter of 1 to 5 µrad and 0.1 to 2 s: a choice, below those 5 arcseconds (24 µrad);
     /// * MOLA profiles 70 m east and north, 1 m in radius: 100 m in the horizontal and 1 m radially (Neumann et al. 2001, as
@@ -221,12 +221,13 @@ impl SceneErrors {
         }
     }
 
-    /// These errors, but the disagreement of the images comes from one offset of the attitude's clock.
+    /// These errors, with a common attitude clock offset as the cause of misregistration.
     ///
     /// # Source
-    /// 0.73 s: what nadir-pointing buses turn by in the 225 to 271 m of Shan et al. 2005, Table 5, where the image off
-    /// nadir is the right one. An inference from that table, which does not say it. With it the attitude errs by no more
-    /// than 0.1 mrad otherwise, 38 m on the ground: a clock that explains what pairs disagree by leaves no more.
+    /// 0.73 s: the time in which nadir-pointing buses rotate by the 225 to 271 m of Shan et al. 2005, Table 5, if the
+    /// off-nadir image is correct. This is an inference from that table, which does not state it. Other attitude errors
+    /// are then at most 0.1 mrad, 38 m on the ground: a clock that explains the misregistration of pairs leaves no
+    /// more.
     #[must_use]
     pub const fn with_attitude_clock(self) -> Self {
         Self {

@@ -1,4 +1,4 @@
-//! A folder that appears whole or not at all, and knows which of its files are its own.
+//! A folder that is written completely or not at all, with a list of its own files.
 
 use std::{
     collections::BTreeMap,
@@ -14,28 +14,28 @@ use super::error::SceneError;
 use areograph_base::error::{IoError, Locate, Result};
 use areograph_store::files::hash_file;
 
-/// What a person reads first.
+/// Name of the introductory text.
 const README: &str = "README.txt";
 const README_LINE: &str =
     "A synthetic mission, written by `areograph scene`. Nothing in this folder is mission data.";
-/// File by which a scene is recognised: one line per file that was written, BLAKE3 and path.
+/// File by which a scene is recognised: one line per written file, BLAKE3 and path.
 const LIST: &str = ".scene";
 
-/// A scene that is being written in a temporary folder beside its final place.
+/// A scene being written in a temporary folder beside its final location.
 ///
-/// Dropped unfinished, it leaves nothing; a process that is killed leaves a folder `.partial-…`.
+/// Dropped unfinished, it leaves nothing; a killed process leaves a folder `.partial-…`.
 pub(super) struct Draft {
     final_place: PathBuf,
-    /// Holds the new scene and, for the moment of the exchange, the older one.
+    /// Contains the new scene and, during the exchange, the older one.
     workshop: TempDir,
     folder: PathBuf,
 }
 
 impl Draft {
-    /// Begins a scene that will stand at `directory`.
+    /// Begins a scene for `directory`.
     ///
     /// # Errors
-    /// [`SceneError`] when `directory` holds anything but an unchanged scene; the system's refusal.
+    /// [`SceneError`] when `directory` contains anything except an unchanged scene; errors of writing.
     pub(super) fn begin(directory: &Path, readme: &str) -> Result<Self> {
         refuse_foreign(directory)?;
         let final_place = path::absolute(directory)
@@ -50,7 +50,7 @@ impl Draft {
             })
             .map_err(IoError::on("create a folder"))
             .in_file(parent)?;
-        // A folder of its own: temporary ones are private, a scene is for everyone.
+        // A separate folder: temporary ones are private, a scene is readable by everyone.
         let folder = workshop.path().join("new");
         fs::create_dir(&folder)
             .map_err(IoError::on("create"))
@@ -63,7 +63,7 @@ impl Draft {
         })
     }
 
-    /// A folder of the draft, created.
+    /// Creates a folder of the draft.
     pub(super) fn folder(&self, name: &str) -> Result<PathBuf> {
         let folder = self.folder.join(name);
         fs::create_dir_all(&folder)
@@ -77,11 +77,11 @@ impl Draft {
         &self.folder
     }
 
-    /// Lists the files of the draft and moves it to its final place. An older scene there steps aside
-    /// first: a folder cannot be replaced in one step.
+    /// Lists the files of the draft and moves it to its final location. An older scene there is moved aside first: a
+    /// folder cannot be replaced in one step.
     ///
     /// # Errors
-    /// As [`Self::begin`]; an older scene is then where it was.
+    /// Those of [`Self::begin`]; an older scene then remains in place.
     pub(super) fn finish(self) -> Result<()> {
         put(&self.folder.join(LIST), &list(&self.folder)?)?;
         refuse_foreign(&self.final_place)?;
@@ -95,7 +95,7 @@ impl Draft {
         }
         fs::rename(&self.folder, &self.final_place)
             .inspect_err(|_| {
-                // Nothing more can be done when this fails too; the first error is the one to tell.
+                // If this fails too, nothing more can be done; the first error is reported.
                 let _ = fs::rename(&older, &self.final_place);
             })
             .map_err(IoError::on("rename into place"))
@@ -111,7 +111,7 @@ pub(super) fn put(path: &Path, text: &str) -> Result<()> {
         .in_file(path)
 }
 
-/// The text of [`LIST`]: what the files below `folder` hold.
+/// The text of [`LIST`]: hashes of the files below `folder`.
 fn list(folder: &Path) -> Result<String> {
     let mut text = String::new();
     for (name, path) in below(folder)? {
@@ -122,7 +122,7 @@ fn list(folder: &Path) -> Result<String> {
     Ok(text)
 }
 
-/// Refuses a folder that holds anything but a scene as it was written. Files that are gone do not matter.
+/// Rejects a folder that contains anything except a scene as it was written. Missing files are ignored.
 fn refuse_foreign(folder: &Path) -> Result<()> {
     let held = below(folder)?;
     if held.is_empty() {
@@ -159,14 +159,14 @@ fn refuse_foreign(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Files, folders and links below `folder` by their path from there, with `/`; none when there is no folder.
+/// Files, folders and links below `folder` by their path from there, with `/`; empty without a folder.
 fn below(folder: &Path) -> Result<BTreeMap<String, PathBuf>> {
     let mut found = BTreeMap::new();
     let mut folders = vec![(String::new(), folder.to_owned())];
     while let Some((prefix, folder)) = folders.pop() {
         for entry in entries(&folder)? {
             let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
-            // Of the entry itself: links are not followed.
+            // Metadata of the entry itself: links are not followed.
             if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
                 folders.push((format!("{name}/"), entry.path()));
             }
@@ -208,7 +208,7 @@ mod tests {
         }
         drop(Draft::begin(&place, "").unwrap());
         assert_eq!(entries(folder.path()).unwrap().len(), 1);
-        // A scene of which something is gone is a scene still.
+        // A scene with a missing file is still a scene.
         fs::remove_file(place.join("sites/a.toml")).unwrap();
         write_scene(&place, "three");
     }
@@ -235,7 +235,7 @@ mod tests {
         let photos = folder.path().join("photos");
         fs::create_dir(&photos).unwrap();
         put(&photos.join("holiday.txt"), "sea").unwrap();
-        assert!(refusal(&photos).contains("holds no scene of areograph"));
+        assert!(refusal(&photos).contains("contains no areograph scene"));
         assert!(photos.join("holiday.txt").exists());
 
         let place = folder.path().join("mission");

@@ -1,5 +1,5 @@
-//! Images of the synthetic mission as the camera takes them: every pixel shows the ground that ties and shots are measured on,
-//! by its albedo and its slope towards the Sun, with the blur and the noise of the camera.
+//! Images of the synthetic mission as the camera would take them: pixels show the ground of ties and shots, by its
+//! albedo and its slope towards the Sun, with the blur and the noise of the camera.
 
 mod light;
 mod rendering;
@@ -21,12 +21,12 @@ use areograph_spice::Session;
 /// Lines that are rendered at a time.
 const STRIP_LINES: u32 = 128;
 
-/// How images are coded: by a coder that the spacecraft had.
+/// Encoding of images, by one of the spacecraft's encoders.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Coder {
-    /// By what the pixel before says, without loss; the archive has most images in this code.
+    /// Prediction from the preceding pixel, lossless; the code of most images in the archive.
     Predictive,
-    /// By cosines over squares of 16 × 16 pixels, in steps of two numbers: with loss.
+    /// Cosine transform of blocks of 16 × 16 pixels, in steps of two numbers: lossy.
     Transform,
 }
 
@@ -58,10 +58,10 @@ pub(super) fn image_name(id: &str) -> String {
     format!("{}.imq", id.replace('-', "").to_lowercase())
 }
 
-/// Writes the images that came down into `folder`; how each of them was made.
+/// Writes the delivered images into `folder`; returns the true values of each.
 ///
 /// # Errors
-/// An image that sees no ground, or cannot be coded; the system's refusal to write.
+/// An image that does not see the ground, or cannot be encoded; errors of writing.
 pub(super) fn write_images(
     folder: &Path,
     days: &[&Flown],

@@ -1,4 +1,4 @@
-//! Kernels of the invented mission: text ones as shipped, binary ones by CSPICE's own writers.
+//! Kernels of the synthetic mission: text ones as shipped, binary ones by CSPICE's own writers.
 
 use std::{
     fs,
@@ -70,11 +70,11 @@ const TEXT_KERNELS: [(&str, &str); 7] = [
 /// How many of them a metakernel loads; the other Mars models would replace the first.
 const LOADED: usize = 4;
 
-/// How many of them an archive's metakernel loads: there are no images.
+/// How many of them an archive's metakernel loads: it has no images.
 const ARCHIVE_LOADED: usize = 3;
 /// Its name.
 pub(super) const ARCHIVE_METAKERNEL: &str = "archive.tm";
-/// The orbit of an archive reaches so far beyond its files, seconds.
+/// Margin of an archive's orbit beyond its files, seconds.
 const ARCHIVE_MARGIN_S: f64 = 60.0;
 
 /// File name of the orbit of one family.
@@ -113,7 +113,7 @@ pub(super) fn write_text_kernels(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Name of the metakernel that knows the wide-angle cameras too.
+/// Name of the metakernel that also loads the wide-angle cameras.
 pub(super) fn wide_angle_metakernel(family: &str) -> String {
     format!("{family}_wa.tm")
 }
@@ -142,7 +142,7 @@ pub(super) fn image_start(session: &Session, image: &PlannedImage) -> Result<Et>
     session.sclk_to_et(image.sclk_start)
 }
 
-/// Attitude samples of an arc as a C-kernel takes them.
+/// Attitude samples of an arc in the columns of a C-kernel.
 struct AttitudeColumns {
     instants: Vec<Et>,
     quaternions: Vec<[f64; 4]>,
@@ -179,7 +179,7 @@ impl AttitudeColumns {
     }
 }
 
-/// Writes the attitude of all arcs: the attitude of true time `t` stands at `t − 1.15 s`.
+/// Writes the attitude of all arcs: the attitude of true time `t` is stored at `t − 1.15 s`.
 pub(super) fn write_attitude(folder: &Path, session: &Session, arcs: &[Arc]) -> Result<()> {
     let columns: Vec<AttitudeColumns> = arcs.iter().map(AttitudeColumns::of).collect();
     let segments: Vec<CkSegment> = arcs
@@ -195,7 +195,7 @@ pub(super) fn write_attitude(folder: &Path, session: &Session, arcs: &[Arc]) -> 
         .collect();
     let comment = format!(
         "{SYNTHETIC}\nTime tags carry the error of the mission's kernels: the attitude of time t \
-         stands at t - 1.15 s."
+         is stored at t - 1.15 s."
     );
     write_ck(&folder.join(CK_NAME), session, &segments, &comment)
 }
@@ -246,7 +246,7 @@ pub(super) fn versions(arc: &Arc, seed: u64) -> [Version; 3] {
     FAMILIES.map(|family| Version::new(family, arc.image.id, seed, middle))
 }
 
-/// Mars around the Sun; the Sun stands at the barycentre, and Mars at its own, for want of moons.
+/// Mars around the Sun; the Sun is at the solar system barycentre, and Mars at its own, since no moons are modelled.
 fn write_planets(folder: &Path, span: Interval) -> Result<()> {
     let days = |days: f64| days * SECONDS_PER_DAY;
     let epochs = epochs(span.padded(days(4.0)), days(1.0));
@@ -288,7 +288,7 @@ fn write_planets(folder: &Path, span: Interval) -> Result<()> {
         ),
     ];
     let comment = format!(
-        "{SYNTHETIC}\nMars by Standish's approximate elements; the Sun rests at the solar system barycentre."
+        "{SYNTHETIC}\nMars by Standish's approximate elements; the Sun is fixed at the solar system barycentre."
     );
     write_spk(&folder.join(PLANETS_NAME), &segments, &comment)
 }

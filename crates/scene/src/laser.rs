@@ -1,4 +1,4 @@
-//! Laser shots over the invented terrain, frame by frame, as a PEDR tells them.
+//! Laser shots over the synthetic terrain, frame by frame, as in a PEDR file.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -30,29 +30,29 @@ pub(super) const FRAME_S: f64 = 2.0;
 pub(super) const SHOT_S: f64 = 0.1;
 /// Clock of MOLA, hertz: shots lie exactly 0.1 s apart.
 pub(super) const CLOCK_HZ: f64 = 1e8;
-/// MOLA's orbit model number; from 3 on readers use parallax and crossover.
+/// MOLA's orbit model number; from 3 on readers apply parallax and crossover corrections.
 const ORBIT_QUALITY: u16 = 3;
-/// Share of half-frames that see clouds, and of shots that come to nothing.
+/// Share of half-frames with clouds, and of shots without a return.
 pub(super) const CLOUD_SHARE: f64 = 0.02;
 pub(super) const MISSING_SHARE: f64 = 0.005;
 /// Amplitude, metres, and period, seconds, of the crossover residual.
 pub(super) const CROSSOVER_AMPLITUDE_M: f64 = 0.8;
 pub(super) const CROSSOVER_PERIOD_S: f64 = 3_000.0;
 
-/// The residual that crossover analysis found at `et`, metres; smooth, to be subtracted from radii.
+/// The crossover residual at `et`, metres; smooth, to be subtracted from radii.
 pub(super) fn crossover_residual_m(et: Et) -> f64 {
     let turns = (et.seconds() / CROSSOVER_PERIOD_S).rem_euclid(1.0);
     CROSSOVER_AMPLITUDE_M * (std::f64::consts::TAU * turns).sin()
 }
 
-/// What a shot met.
+/// Target of a shot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Echo {
     /// The ground.
     Ground,
     /// A cloud above it.
     Cloud,
-    /// Nothing that was heard.
+    /// No return was detected.
     Missing,
 }
 
@@ -61,19 +61,19 @@ pub(super) enum Echo {
 pub(super) struct Shot {
     /// True time.
     pub et: Et,
-    /// Where the beam meets the ground, IAU 2000, metres.
+    /// Intersection of the beam with the ground, IAU 2000, metres.
     pub ground_m: Vector3<f64>,
-    /// What it met.
+    /// Its target.
     pub echo: Echo,
-    /// Range that was measured, metres; 0 when nothing was heard.
+    /// Measured range, metres; 0 without a return.
     pub range_m: f64,
-    /// Where the product has the ground, IAU 2000, metres, but for its rounding and its linear frame.
+    /// Ground point in the product, IAU 2000, metres, before its rounding and its linear frame.
     pub told_ground_m: Vector3<f64>,
-    /// How far the linear frame of a PEDR places the footprint from there, before rounding, metres.
+    /// Error of the linear frame of a PEDR at the footprint, before rounding, metres.
     pub frame_error_m: f64,
 }
 
-/// One frame: what the file says and what is true.
+/// One frame: values of the file and true values.
 #[derive(Debug, Clone)]
 pub(super) struct Frame {
     /// Values of the record.
@@ -91,10 +91,10 @@ pub(super) struct LaserErrors {
     pub shift: ProfileShift,
 }
 
-/// Which frame to fly.
+/// The frame to compute.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FrameRequest<'a> {
-    /// Mid-point as the file tags it, a whole number of microseconds.
+    /// Mid-point as tagged in the file, a whole number of microseconds.
     pub tag: Et,
     /// Number of the frame in its file, from 0.
     pub index: u64,
@@ -108,7 +108,7 @@ pub(super) struct FrameRequest<'a> {
     pub errors: &'a LaserErrors,
 }
 
-/// A place in the file's frame.
+/// A position in the file's frame.
 #[derive(Debug, Clone, Copy)]
 struct FileCoordinates {
     longitude_rad: f64,
@@ -130,7 +130,7 @@ impl FileCoordinates {
 /// The beam at one instant, in IAU 2000 and in the file's frame.
 struct Look {
     et: Et,
-    /// Spacecraft as the orbit has it, and as it is.
+    /// Spacecraft by the orbit, and its true position.
     orbit_m: Vector3<f64>,
     spacecraft_m: Vector3<f64>,
     direction: Vector3<f64>,
@@ -157,13 +157,13 @@ impl Look {
         }
     }
 
-    /// Where the file has a point of the ground, but for the shift along the radius.
+    /// Position of a ground point in the file, except for the radial shift.
     fn place(&self, ground_m: &Vector3<f64>) -> FileCoordinates {
         FileCoordinates::of(&(self.ground_to_file * ground_m))
     }
 
-    /// Where the file has the spacecraft: on the orbit, but moved along the beam until ranges of about `range_m` agree
-    /// with the ground as the file has it. In the archive's files they do.
+    /// Position of the spacecraft in the file: on the orbit, but moved along the beam until ranges of about `range_m`
+    /// agree with the ground of the file, as they do in the archive's files.
     fn place_spacecraft(&self, range_m: f64, shift: &ProfileShift) -> FileCoordinates {
         let ground_m = shift.applied(&self.at_range_m(range_m));
         let beam = (ground_m - self.orbit_m).normalize();
@@ -184,7 +184,7 @@ impl Look {
         self.spacecraft_m + range_m * self.direction
     }
 
-    /// Where the beam passes the sphere of `radius_m`; for a beam that only grazes it, the nearest point.
+    /// Intersection of the beam with the sphere of `radius_m`; for a beam that only grazes it, the nearest point.
     fn at_radius(&self, radius_m: f64) -> FileCoordinates {
         let b = self.spacecraft_m.dot(&self.direction);
         let c = self.spacecraft_m.norm_squared() - radius_m * radius_m;
@@ -192,13 +192,13 @@ impl Look {
     }
 }
 
-/// Flies one frame.
+/// Computes one frame.
 ///
-/// The frame's straight track is that of the beam, without jitter, on the sphere of the mid-point's radius; each shot is
-/// displaced along the beam by the parallax times the difference of its radius from the mid-point's.
+/// The frame's straight track is that of the beam, without jitter, on the sphere of the mid-point's radius; each shot
+/// is displaced along the beam by the parallax times the difference of its radius from the mid-point's.
 ///
 /// # Errors
-/// [`SceneError::BeamMisses`], or what `flight` says.
+/// [`SceneError::BeamMisses`], or an error of `flight`.
 pub(super) fn fly_frame(
     flight: &impl Flight,
     terrain: &Terrain,
@@ -232,14 +232,14 @@ pub(super) fn fly_frame(
     Ok(Frame { values, shots: all })
 }
 
-/// Everything of a frame but its shots.
+/// The values of a frame except its shots.
 fn frame_values(
     middle: &Look,
     [first, last]: [&Look; 2],
     terrain: &Terrain,
     request: &FrameRequest<'_>,
 ) -> Result<FrameValues> {
-    /// Half the height over which the parallax is taken, metres.
+    /// Half the height interval of the parallax, metres.
     const PARALLAX_STEP_M: f64 = 500.0;
     let mid_range_m = middle.range_m(terrain)?;
     let ground_m = middle.at_range_m(mid_range_m);
@@ -301,7 +301,7 @@ fn frame_values(
     })
 }
 
-/// Flies one shot (counted from 0) and enters it into the frame's values.
+/// Computes one shot (counted from 0) and enters it into the frame's values.
 fn fly_shot(
     look: &Look,
     index: usize,
@@ -364,7 +364,7 @@ fn fly_shot(
     })
 }
 
-/// The range that is measured: the mean over the spot with noise, in steps.
+/// The measured range: the mean over the spot with noise, in steps.
 fn measured_range_m(
     look: &Look,
     terrain: &Terrain,
@@ -383,7 +383,7 @@ fn measured_range_m(
     range_m
 }
 
-/// Distance from where the linear frame places a ground shot to where the file should have it, metres.
+/// Distance of a ground shot in the linear frame from its intended position in the file, metres.
 fn frame_error_m(
     look: &Look,
     index: usize,

@@ -1,26 +1,26 @@
 //! A synthetic mission with known truth: kernels, PEDR files, labels and site configurations.
 //!
-//! | file | what it invents |
+//! | file | contents |
 //! |---|---|
-//! | `plan` | six images, three sites, which days are written in full |
-//! | `error_sources`, `drawn` | what is wrong with the data: kinds and sizes, and what one mission has of them |
-//! | `orbit`, `versions` | the true orbit of a day, and two rivals that are metres off |
+//! | `plan` | six images, three sites, the days written in full |
+//! | `error_sources`, `drawn` | errors of the data: kinds and sizes, and the values drawn for one mission |
+//! | `orbit`, `versions` | the true orbit of a day, and two rivals with errors of metres |
 //! | `attitude`, `arc` | pointing, and orbit and attitude solved so that an image shows its site |
-//! | `terrain`, `roughness`, `laser` | the ground, and laser shots on it as a PEDR frame tells them |
-//! | `images` | what the six images show, pixel by pixel |
+//! | `terrain`, `roughness`, `laser` | the ground, and laser shots on it in PEDR frames |
+//! | `images` | the six images, pixel by pixel |
 //! | `context` | wide-angle images around two of the six, a fourth site |
-//! | `telemetry` | what the instrument tells of its echoes besides ranges |
-//! | `archive`, `archive_frames` | PEDR files of any number of days, with kernels to check them by |
-//! | `ties` | places that two images show, in images that were truly taken elsewhere and at other times |
+//! | `telemetry` | echo data of the instrument besides ranges |
+//! | `archive`, `archive_frames` | PEDR files of any number of days, with kernels to check them |
+//! | `ties` | tie points of two images whose true positions and times differ from the nominal ones |
 //! | `calibration`, `pushbroom_pair` | two stereo lines of a camera for its calibration |
 //! | `calibration_loop`, `line_images` | three lines with their pixels and laser passes: the calibration from pixels |
-//! | `terrain_model`, `passes` | a terrain model that lies aside, laser passes over it |
+//! | `terrain_model`, `passes` | a shifted terrain model, laser passes over it |
 //! | `kernels`, `pedr`, `sites`, `truth` | the files |
 //! | `mission`, `along` | the entry points of a mission |
 //!
-//! Injected errors: attitude stands 1.15 s early in the C-kernel, laser time tags are 0.117 s late,
-//! version K files are in IAU 1991; tie points see images that were exposed some lines off their labels,
-//! and a few of them are blunders. [`SceneErrors`] has more of them. `truth.json` holds all of it.
+//! Injected errors: attitude is stored 1.15 s early in the C-kernel, laser time tags are 0.117 s late, version K files
+//! are in IAU 1991; tie points are measured in images exposed some lines off their labels, and a few of them are
+//! blunders. [`SceneErrors`] has further errors. `truth.json` contains all of them.
 //!
 //! ```
 //! use areograph_scene::{SceneOptions, write_scene};
@@ -88,14 +88,14 @@ pub use plane::write_plane_scene;
 pub use plane_net::{PlaneRecipe, PlaneScene};
 pub use terrain_model::write_terrain_model_scene;
 
-/// How a mission is invented.
+/// Options of a synthetic mission.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SceneOptions {
-    /// Seed of terrain, clouds, orbit differences and all errors that are drawn.
+    /// Seed of terrain, clouds, orbit differences and all drawn errors.
     pub seed: u64,
     /// Seconds of frames in the files of whole days, 600 to 90 000; other files hold at most one revolution.
     pub day_s: f64,
-    /// What is wrong with the data, and the relief.
+    /// Errors of the data, and the relief.
     pub errors: SceneErrors,
 }
 
@@ -110,7 +110,7 @@ impl Default for SceneOptions {
     }
 }
 
-/// What was written.
+/// Summary of the mission written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SceneSummary {
     /// Folder of the mission.

@@ -1,4 +1,4 @@
-//! What the lines of a stereo camera show of invented ground, pixel by pixel.
+//! Images of the lines of a stereo camera over synthetic ground, pixel by pixel.
 
 use std::{fs::File, io::BufWriter, path::Path};
 
@@ -18,22 +18,22 @@ use areograph_geom::ellipsoid::local_axes;
 
 /// Spacings of the lattices of albedo, metres: the finest is two pixels.
 const LATTICES_M: [f64; 5] = [54.0, 108.0, 216.0, 432.0, 864.0];
-/// Share of albedo that a lattice adds or takes at most.
+/// Largest relative change of albedo by a lattice.
 const CONTRAST: f64 = 0.14;
-/// Numbers of a flat place of mean albedo, and of a black one.
+/// Values of a flat point of mean albedo, and of a black one.
 const LEVEL_DN: [f64; 2] = [130.0, 12.0];
 /// Noise of a pixel.
 const NOISE_DN: f64 = 1.0;
-/// Share of its light that a pixel gets from either neighbour on an axis.
+/// Share of its light that a pixel receives from each neighbour on an axis.
 const BLUR: f64 = 0.12;
 /// Towards the Sun from the middle of the ground: east, north and up. All lines fly over within two minutes.
 const SUN: [f64; 3] = [-0.75, 0.25, 0.61];
-/// Ground is met within so many metres of height: a thousandth of a pixel.
+/// Height tolerance of the intersection with the ground, metres: a thousandth of a pixel.
 const TOLERANCE_M: f64 = 0.05;
 /// Lines that are rendered at a time.
 const STRIP: u32 = 100;
 
-/// The ground and its light.
+/// The ground and its illumination.
 pub(super) struct LineImages<'a> {
     pub(super) orbit: &'a Orbit,
     pub(super) terrain: &'a Terrain,
@@ -41,10 +41,10 @@ pub(super) struct LineImages<'a> {
 }
 
 impl LineImages<'_> {
-    /// Writes what a line shows as a TIFF of 8 bits.
+    /// Writes the image of a line as a TIFF of 8 bits.
     ///
     /// # Errors
-    /// A pixel that sees no ground; the system's refusal to write.
+    /// A pixel that does not see the ground; errors of writing.
     pub(super) fn write(&self, path: &Path, line: &StereoLine) -> Result<()> {
         let [lines, samples] = self.orbit.size;
         let pixels = self.pixels(line)?;
@@ -72,13 +72,13 @@ impl LineImages<'_> {
 
     fn strip(&self, line: &StereoLine, lines: std::ops::Range<u32>) -> Result<Vec<u8>> {
         let sun = self.sun();
-        // Slopes take a place on every side, blurring another one.
+        // Slopes require a point on every side, blurring another one.
         let rows = i64::from(lines.start) - 2..i64::from(lines.end) + 2;
         let rows = rows.map(|row| self.ground_m(line, row as f64 + 0.5));
         let rows: Option<Vec<Vec<Vector3<f64>>>> = rows.collect();
         let rows = rows.ok_or_else(|| SceneError::Image {
             image: line.name.to_owned(),
-            error: format!("lines {} to {} see no ground", lines.start, lines.end),
+            error: format!("lines {} to {} miss the ground", lines.start, lines.end),
         })?;
         let sharp: Vec<Vec<f64>> = rows
             .windows(3)
@@ -133,7 +133,7 @@ impl LineImages<'_> {
         Some(ground_m)
     }
 
-    /// The number of a place by the albedo and the slope of its ground.
+    /// The value of a ground point by its albedo and slope.
     fn number(&self, ground_m: &Vector3<f64>, slope: &Vector3<f64>, sun: &Vector3<f64>) -> f64 {
         let normal = slope.normalize() * slope.dot(ground_m).signum();
         let light = normal.dot(sun).max(0.0) / sun.dot(&ground_m.normalize());
@@ -151,7 +151,7 @@ impl LineImages<'_> {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "clamped to a byte just before; 0 stands for no pixel"
+        reason = "clamped to a byte just before; 0 means no pixel"
     )]
     fn read_out(&self, line: &StereoLine, dn: f64, at_line: u32, sample: u32) -> u8 {
         let key = line

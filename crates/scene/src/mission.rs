@@ -1,4 +1,4 @@
-//! The whole invented mission, from plan to folder.
+//! The whole synthetic mission, from plan to folder.
 
 use std::path::Path;
 
@@ -33,17 +33,17 @@ use areograph_pds::ties::ties_table;
 
 /// Fewest and most seconds of frames in a day's file.
 const DAY_S: [f64; 2] = [600.0, 90_000.0];
-/// Least and largest noise of tie points: what is left of the edge that images keep free for it.
+/// Least and largest noise of tie points, within the margin that images keep for it.
 const TIE_NOISE_PX: [f64; 2] = [0.0, 5.0];
 
-/// Writes the synthetic mission into `directory`, replacing an older one that nobody added to or changed.
+/// Writes the synthetic mission into `directory`, replacing an older one unless files were added or changed.
 ///
 /// The same seed gives the same bytes. Everything is written beside `directory` and renamed at the end.
 /// No session may be open on this thread.
 ///
 /// # Errors
-/// [`SceneError::NotAScene`], [`SceneError::Foreign`] and [`SceneError::Changed`] when the folder holds
-/// something else, [`SceneError::Option`], the system's refusal to write.
+/// [`SceneError::NotAScene`], [`SceneError::Foreign`] and [`SceneError::Changed`] when the folder holds something else,
+/// [`SceneError::Option`], errors of writing.
 pub fn write_scene(directory: &Path, options: &SceneOptions) -> Result<SceneSummary> {
     write(directory, options, None)
 }
@@ -128,7 +128,7 @@ fn is_of(site: &Site, sites: &[&Site]) -> bool {
     sites.iter().any(|of| of.id == site.id)
 }
 
-/// Refuses options that no mission can be made with.
+/// Rejects options that are out of range.
 fn check(options: &SceneOptions) -> Result<()> {
     let named = [
         ("day_s", options.day_s, DAY_S),
@@ -195,7 +195,7 @@ pub(super) fn write_truth(draft: &Draft, truth: &Truth) -> Result<()> {
     put(&path, &text)
 }
 
-/// Solves the arcs and writes their kernels, and labels of the images that came down.
+/// Solves the arcs and writes their kernels, and labels of the delivered images.
 fn write_kernels(draft: &Draft, options: &SceneOptions) -> Result<Vec<Arc>> {
     let kernels = draft.folder("kernels")?;
     let labels = draft.folder("labels")?;
@@ -227,7 +227,7 @@ fn write_kernels(draft: &Draft, options: &SceneOptions) -> Result<Vec<Arc>> {
     Ok(arcs)
 }
 
-/// What was written for one day.
+/// Output of one day.
 struct Day {
     file: FileTruth,
     /// Over the day's site.

@@ -1,4 +1,4 @@
-//! The invented orbit: an undisturbed ellipse like that of the mapping mission.
+//! The synthetic orbit: an unperturbed ellipse like that of the mapping mission.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -16,7 +16,7 @@ const ARGUMENT_OF_PERIAPSIS_RAD: f64 = -90.0 * RADIANS_PER_DEGREE;
 /// Inclination to the equator of Mars.
 const INCLINATION_RAD: f64 = 92.896 * RADIANS_PER_DEGREE;
 
-/// Where the spacecraft is and how it moves, in J2000 from the centre of Mars.
+/// Position and velocity of the spacecraft, in J2000 from the centre of Mars.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct OrbitState {
     /// Position, metres.

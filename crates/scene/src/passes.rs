@@ -1,4 +1,4 @@
-//! Laser passes in two directions over one place, as PEDR files.
+//! Laser passes in two directions over one site, as PEDR files.
 
 use std::path::Path;
 
@@ -25,24 +25,24 @@ use areograph_geom::{body_rotation::body_matrix, ellipsoid::Spherical};
 /// The first pass, ET seconds: 1999-03-01; the others follow by days.
 const START_S: f64 = -26_570_000.0;
 const APART_S: f64 = 86_400.0;
-/// Sphere on which passes are spread over their width, metres.
+/// Sphere on which passes are distributed over their width, metres.
 const RADIUS_M: f64 = 3_396_190.0;
 
-/// Passes over a place, the first half of them on their way north, the others south.
+/// Passes over a site, the first half of them northbound, the others southbound.
 pub(super) struct Passes {
     /// East longitude and latitude.
     pub(super) longitude_rad: f64,
     pub(super) latitude_rad: f64,
     /// Passes in each of two directions.
     pub(super) of_direction: u32,
-    /// Half the width that they are spread over, metres.
+    /// Half the width over which they are distributed, metres.
     pub(super) half_width_m: f64,
     /// Half their length, seconds.
     pub(super) half_s: f64,
 }
 
 impl Passes {
-    /// How many there are.
+    /// Number of passes.
     pub(super) const fn count(&self) -> u32 {
         2 * self.of_direction
     }
@@ -50,7 +50,7 @@ impl Passes {
     /// Writes a file of every pass into `folder`.
     ///
     /// # Errors
-    /// A beam that misses Mars; the system's refusal to write.
+    /// A beam that misses Mars; errors of writing.
     pub(super) fn write(&self, folder: &Path, terrain: &Terrain, seed: u64) -> Result<()> {
         (0..self.count()).try_for_each(|number| self.write_pass(folder, terrain, number, seed))
     }
@@ -80,7 +80,7 @@ impl Passes {
     }
 }
 
-/// A pass that looks at nadir.
+/// A pass with nadir pointing.
 struct Pass(Orbit);
 
 impl Flight for Pass {
@@ -97,9 +97,9 @@ impl Flight for Pass {
 }
 
 impl Pass {
-    /// The pass that is over a place at `et`, on its way north or south.
+    /// The northbound or southbound pass that is over a site at `et`.
     fn over(et: Et, longitude_rad: f64, latitude_rad: f64, northwards: bool) -> Self {
-        /// Steps towards it: each leaves a fiftieth, the eccentricity's share.
+        /// Steps of its solution: each leaves a fiftieth, the eccentricity's share.
         const STEPS: usize = 8;
         let sense = if northwards { 1.0 } else { -1.0 };
         let from_node_rad = if northwards {

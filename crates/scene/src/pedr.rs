@@ -1,4 +1,4 @@
-//! One PEDR file of the invented mission.
+//! One PEDR file of the synthetic mission.
 
 use std::path::Path;
 
@@ -21,21 +21,21 @@ use areograph_base::{
 use areograph_config::usual_altimeter;
 use areograph_pds::pedr::{LABEL_RECORDS, LabelInfo, PedrWriter, Record};
 
-/// Frames that are flown side by side before they are written in order.
+/// Frames computed in parallel before they are written in order.
 const BLOCK: usize = 4_096;
-/// What the linear frame model should hold, metres.
+/// Required accuracy of the linear frame model, metres.
 const FRAME_MODEL_LIMIT_M: f64 = 0.2;
 /// Frames below this off-nadir angle point at nadir, radians.
 const NADIR_MAX_RAD: f64 = 0.05 * RADIANS_PER_DEGREE;
 
-/// What labels say of the files.
+/// Note in the labels of the files.
 pub(super) const NOTE: &str = "SYNTHETIC: written by areograph scene, not from mission data";
 
-/// What a file holds.
+/// Content of a file.
 pub(super) struct PedrRequest<'a> {
     /// Name of the file, lower case.
     pub name: &'a str,
-    /// Mid-points of the frames as the file tags them.
+    /// Mid-points of the frames as tagged in the file.
     pub tags: &'a [Et],
     /// Datum of the coordinates.
     pub datum: Datum,
@@ -47,8 +47,8 @@ pub(super) struct PedrRequest<'a> {
     pub errors: LaserErrors,
 }
 
-/// Mid-points of the frames that fit into `span`, as late clocks tag them: whole microseconds, so that
-/// both forms of time in a record agree.
+/// Mid-points of the frames that fit into `span`, as tagged by the late clock: whole microseconds, so that both forms
+/// of time in a record agree.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -63,10 +63,10 @@ pub(super) fn frame_tags(span: Interval) -> Vec<Et> {
         .collect()
 }
 
-/// Flies and writes one file; returns its counts and the ground shots that `keep` wants.
+/// Computes and writes one file; returns its counts and the ground shots selected by `keep`.
 ///
 /// # Errors
-/// What the flight says, a beam that misses Mars, the system's refusal to write.
+/// Errors of the flight, a beam that misses Mars, errors of writing.
 pub(super) fn write_pedr(
     folder: &Path,
     flight: &(impl Flight + Sync),

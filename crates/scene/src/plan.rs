@@ -1,4 +1,4 @@
-//! What the invented mission does: the six images of Shan et al. 2005 and the days around them.
+//! Plan of the synthetic mission: the six images of Shan et al. 2005 and the days around them.
 
 use areograph_base::{
     body::Datum,
@@ -7,12 +7,12 @@ use areograph_base::{
 };
 use areograph_config::usual_instrument;
 
-/// A place that two images show.
+/// A site that two images show.
 #[derive(Debug)]
 pub struct Site {
-    /// Identifier, as the site's TOML has it.
+    /// Identifier, as in the site's TOML.
     pub id: &'static str,
-    /// What the report calls it.
+    /// Name in the report.
     pub name: &'static str,
     /// Areocentric latitude of the image centres, IAU 2000, degrees.
     pub latitude_deg: f64,
@@ -57,14 +57,14 @@ impl Site {
     }
 }
 
-/// Where the camera looks during an image.
+/// Pointing of the camera during an image.
 #[derive(Debug, Clone, Copy)]
 pub enum Look {
     /// The bus at nadir; the camera's mounting leaves 0.14°.
     Nadir,
     /// The bus rolled out of nadir and held inertially.
     Roll {
-        /// Emission angle at the image centre against the areocentric vertical, degrees.
+        /// Emission angle at the image centre from the areocentric vertical, degrees.
         emission_deg: f64,
         /// Whether the camera looks east.
         east: bool,
@@ -76,9 +76,9 @@ pub enum Look {
 pub struct PlannedImage {
     /// Product id with `-` for `/`.
     pub id: &'static str,
-    /// The place it shows.
+    /// The site it shows.
     pub site: &'static Site,
-    /// UTC of the first line as Shan et al. 2005, Table 2, prints it.
+    /// UTC of the first line as printed in Shan et al. 2005, Table 2.
     pub utc_start: &'static str,
     /// The same as a clock string, rounded down to 1/256 s; this is the truth.
     pub sclk_start: &'static str,
@@ -90,9 +90,9 @@ pub struct PlannedImage {
     pub lines_header: u32,
     /// Lines delivered.
     pub lines_delivered: u32,
-    /// Lines by which all lines were truly exposed later than the label says; tie points show it.
+    /// Lines by which all lines were truly exposed later than in the label; tie points show it.
     pub time_bias_lines: f64,
-    /// Where it looks.
+    /// Its pointing.
     pub look: Look,
     /// Number in the name of the day's PEDR file.
     pub pedr_number: u32,
@@ -103,7 +103,7 @@ pub struct PlannedImage {
 }
 
 impl PlannedImage {
-    /// Whether any of it came down.
+    /// Whether any part of it was delivered.
     #[must_use]
     pub fn is_delivered(&self) -> bool {
         self.lines_delivered > 0
@@ -192,13 +192,13 @@ pub static SITES: [&Site; 3] = [&EOS_CHASMA, &GUSEV_CRATER, &ISIDIS];
 
 /// The six images in order of time.
 ///
-/// Ids, dates, summing, lines, line periods and emission angles are those of Shan et al. 2005, Table 2. Of E04-01275 the
-/// table prints 7 424 header lines, of which the first-order RMSE in their Table 4 would be 9.7 m instead of the
-/// 11.45 m printed: 8 064 are flown, 7 424 delivered. The table does not say at which end of the ray the emission
-/// angle is; it is taken at the ground, as the archive has it. Line spacing over line period is 3.04 km/s for the
-/// three nadir images and 3.39 to 3.42 km/s for the three that are held inertially. Exposures are line periods
-/// divided by the summing. Time biases are the mean residuals of their Table 5 along the track, to half a line and with
-/// the other sign.
+/// Ids, dates, summing, lines, line periods and emission angles are those of Shan et al. 2005, Table 2. For E04-01275
+/// the table prints 7 424 header lines, with which the first-order RMSE in their Table 4 would be 9.7 m instead of the
+/// 11.45 m printed: 8 064 are exposed, 7 424 delivered. The table does not state at which end of the ray the emission
+/// angle is; it is taken at the ground, as in the archive. Line spacing over line period is 3.04 km/s for the three
+/// nadir images and 3.39 to 3.42 km/s for the three that are held inertially. Exposures are line periods divided by the
+/// summing. Time biases are the mean residuals of their Table 5 along the track, to half a line and with the opposite
+/// sign.
 pub static IMAGES: [PlannedImage; 6] = [
     PlannedImage {
         id: "E02-00665",
@@ -301,8 +301,8 @@ pub static IMAGES: [PlannedImage; 6] = [
     },
 ];
 
-/// An image that was exposed and never came down, invented as a whole. The laser's profile of its day is simultaneous
-/// with no image.
+/// An image that was exposed and not delivered, entirely invented. The laser profile of its day is simultaneous with no
+/// image.
 pub static LOST_IMAGE: PlannedImage = PlannedImage {
     id: "E02-01071",
     site: &EAST_OF_GUSEV,
@@ -337,7 +337,7 @@ mod tests {
 
     #[test]
     fn line_spacing_tells_which_images_are_off_nadir() {
-        // Metres per line as Table 2 prints them; ground track 3.05 km/s, inertially held 3.40 km/s.
+        // Metres per line as printed in Table 2; ground track 3.05 km/s, inertially held 3.40 km/s.
         let printed_m = [4.4, 3.3, 4.9, 4.4, 5.5, 4.1];
         for (image, spacing_m) in IMAGES.iter().zip(printed_m) {
             let speed_m_s = spacing_m / image.line_period_s();

@@ -1,4 +1,4 @@
-//! A synthetic net of rectified pictures as files, with blunders, gross controls and the truth.
+//! A synthetic net of rectified pictures as files, with blunders, gross control errors and true values.
 
 use std::{collections::BTreeMap, fmt::Write as _, path::Path};
 
@@ -13,7 +13,7 @@ use areograph_base::error::{Locate, Result};
 use areograph_geom::plane::Place;
 
 const README: &str = "A net of 25 rectified pictures for plane triangulation: measurements, controls, a net file.\n\
-    Some measurements and two controls are wrong on purpose; truth.json tells which, and where everything is.\n\
+    Some measurements and two controls are wrong on purpose; truth.json lists them, with all true positions.\n\
     Next: areograph triangulate net.toml\n";
 
 /// The tertiary net of the paper with more points and controls, and noise.
@@ -24,21 +24,21 @@ const RECIPE: PlaneRecipe = PlaneRecipe {
     control_sigma_m: 800.0,
     ..PlaneRecipe::TERTIARY
 };
-/// Ties that are misidentified, and by how far, metres.
+/// Number of misidentified ties, and their displacement, metres.
 const BLUNDERS: usize = 3;
 const BLUNDER_M: f64 = 2_000.0;
 /// Errors of two controls in Y, metres, as in the secondary net of the paper.
 const GROSS_M: [f64; 2] = [17_000.0, 19_000.0];
 
-/// The file of the truth.
+/// The file of true values.
 #[derive(Serialize)]
 struct Truth {
     seed: u64,
     noise_m: f64,
     control_sigma_m: f64,
-    /// Measurements that are misidentified: picture and point.
+    /// Misidentified measurements: picture and point.
     blunders: Vec<[String; 2]>,
-    /// Controls that are wrong.
+    /// Controls with gross errors.
     gross_controls: Vec<String>,
     /// East and north of every point on the map, metres.
     points_m: BTreeMap<String, [f64; 2]>,
@@ -46,11 +46,11 @@ struct Truth {
     pictures: BTreeMap<String, [f64; 4]>,
 }
 
-/// Writes a synthetic net into `directory`, replacing an older scene that nobody added to or changed. The same seed gives the
-/// same bytes.
+/// Writes a synthetic net into `directory`, replacing an older scene unless files were added or changed. The same seed
+/// gives the same bytes.
 ///
 /// # Errors
-/// [`SceneError`](super::SceneError) when the folder holds something else; the system's refusal to write.
+/// [`SceneError`](super::SceneError) when the folder holds something else; errors of writing.
 pub fn write_plane_scene(directory: &Path, seed: u64) -> Result<String> {
     let draft = Draft::begin(directory, README)?;
     let mut scene = RECIPE.simulate(seed);
@@ -165,7 +165,8 @@ longitude_deg = 0.0
 local = \"yes\"
 ";
 
-/// Moves some measurements of points on three pictures or more by what a wrong crater does; their indices.
+/// Displaces some measurements of points on three pictures or more as a misidentified crater would; returns their
+/// indices.
 fn misidentify(scene: &mut PlaneScene, seed: u64) -> Vec<usize> {
     let mut views = vec![0; scene.net.points];
     for of in &scene.net.measurements {

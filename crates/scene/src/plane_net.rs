@@ -1,9 +1,9 @@
-//! A synthetic net of rectified pictures with its truth: pictures side by side that overlap, points at random.
+//! A synthetic net of overlapping rectified pictures with true values; points are random.
 
 use super::random::Random;
 use areograph_geom::plane::{Control, Measurement, Net, Place, Similarity};
 
-/// How a net is invented. Lengths are metres on the map.
+/// Parameters of a synthetic net. Lengths are metres on the map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlaneRecipe {
     /// Pictures from west to east, and from south to north.
@@ -12,13 +12,13 @@ pub struct PlaneRecipe {
     pub side_m: f64,
     /// Distance between the middles of neighbours.
     pub spacing_m: f64,
-    /// Points, evenly spread; each is measured in every picture that shows it.
+    /// Number of points, uniformly distributed; each is measured in every picture that shows it.
     pub points: usize,
     /// Standard deviation of a measured coordinate, on the map.
     pub noise_m: f64,
-    /// Points whose place is given, as far apart as they can be.
+    /// Number of controls, as far apart as possible.
     pub controls: usize,
-    /// Standard deviation of a given coordinate.
+    /// Standard deviation of a control coordinate.
     pub control_sigma_m: f64,
 }
 
@@ -34,7 +34,7 @@ impl PlaneRecipe {
         control_sigma_m: 0.0,
     };
 
-    /// Twenty-five pictures of 25 km, as the tertiary net of the paper has them, 20 km apart, 500 points, exact.
+    /// Twenty-five pictures of 25 km, as in the tertiary net of the paper, 20 km apart, 500 points, exact.
     pub const TERTIARY: Self = Self {
         grid: [5, 5],
         side_m: 25_000.0,
@@ -45,19 +45,19 @@ impl PlaneRecipe {
     };
 }
 
-/// An invented net and what is true of it.
+/// A synthetic net and its true values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlaneScene {
-    /// What is measured and given; controls have weight 1.
+    /// Measurements and controls; controls have weight 1.
     pub net: Net,
-    /// True way of every picture to the map.
+    /// True similarity from every picture to the map.
     pub pictures: Vec<Similarity>,
-    /// True place of every point on the map.
+    /// True map position of every point.
     pub points: Vec<Place>,
 }
 
 impl PlaneRecipe {
-    /// The net of `seed`. Pictures have sizes of 700 to 1400 units and any direction.
+    /// The net of `seed`. Pictures have sizes of 700 to 1400 units and any orientation.
     #[must_use]
     pub fn simulate(&self, seed: u64) -> PlaneScene {
         let mut random = Random::new(seed, "plane pictures");
@@ -137,7 +137,7 @@ fn around(place: Place, spacing: f64, half: f64, grid: [usize; 2]) -> Vec<usize>
         .collect()
 }
 
-/// Points as far apart as they can be, one after the other.
+/// Points as far apart as possible, one after the other.
 fn far_apart(points: &[Place], count: usize) -> Vec<usize> {
     let mut chosen = Vec::with_capacity(count);
     let middle = points.iter().sum::<Place>() / points.len().max(1) as f64;

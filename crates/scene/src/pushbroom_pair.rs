@@ -1,4 +1,4 @@
-//! Stereo lines of a camera over waves of ground, in a circular orbit: where they truly look, and what support data say.
+//! Stereo lines of a camera over undulating ground, in a circular orbit: true geometry and support data.
 
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use serde_json::{Value, json};
@@ -24,31 +24,31 @@ const SPHERE_M: f64 = 3_396_000.0;
 const GRAVITY_M3_S2: f64 = 4.282_837e13;
 /// Waves of the ground: height and length, metres.
 const WAVES: [[f64; 2]; 2] = [[600.0, 83_000.0], [300.0, 31_000.0]];
-/// Nodes of the tables: a second apart, some seconds before and behind the image.
+/// Nodes of the tables: a second apart, some seconds before and after the image.
 const NODE_S: f64 = 1.0;
 const AROUND_S: f64 = 5.0;
-/// Distance of the Sun, which nothing here depends on, metres.
+/// Distance of the Sun, which has no effect here, metres.
 const SUN_M: f64 = 2.2e11;
-/// Steps in the search for the place in an image.
+/// Steps in the search for the image coordinates.
 const STEPS: usize = 20;
 
 /// A line of the camera.
 pub(super) struct StereoLine {
     /// Its name.
     pub(super) name: &'static str,
-    /// How far ahead it looks, as the laboratory has it.
+    /// Forward pitch in the laboratory geometry.
     pub(super) pitch_deg: f64,
-    /// How it is truly mounted.
+    /// Its true mounting.
     pub(super) offset: Offset,
-    /// What the look angles differ from the laboratory's by, at the last sample: of m₁, n₁ and n₂.
+    /// Differences of the look angles from the laboratory's, at the last sample: of m₁, n₁ and n₂.
     pub(super) errors: [f64; 3],
 }
 
-/// What the support data of an orbit are wrong by, Mars-fixed.
+/// Errors of the support data of an orbit, Mars-fixed.
 pub(super) struct OrbitError {
     /// Metres.
     pub(super) bias_m: [f64; 3],
-    /// Metres for every line period from the middle.
+    /// Metres per line period from the middle.
     pub(super) drift_m_per_line: [f64; 3],
 }
 
@@ -61,21 +61,21 @@ impl OrbitError {
 /// An orbit over one stretch of ground.
 pub(super) struct Orbit {
     pub(super) name: &'static str,
-    /// When the middle of the stretch is below, ET seconds.
+    /// Time of the pass over the middle of the stretch, ET seconds.
     pub(super) start_et_s: f64,
     /// East longitude and latitude of the middle.
     pub(super) longitude_deg: f64,
     pub(super) latitude_deg: f64,
     /// Lines and samples of its images.
     pub(super) size: [u32; 2],
-    /// Whether the spacecraft is yawed until it flies along over the turning ground: minutes apart its lines then see the same
-    /// ground also where the swath is narrow.
+    /// Whether the spacecraft is yawed to compensate for the rotation of the ground: lines minutes apart then see the
+    /// same ground also with a narrow swath.
     pub(super) is_steered: bool,
     /// True minus support data.
     pub(super) error: OrbitError,
 }
 
-/// Where a line truly looks from while it is exposed, Mars-fixed.
+/// True pose of a line while it is exposed, Mars-fixed.
 pub(super) struct TruePose {
     /// Metres.
     pub(super) position_m: Vector3<f64>,
@@ -84,14 +84,14 @@ pub(super) struct TruePose {
 }
 
 impl StereoLine {
-    /// From the axes across, along and down to the camera: z where it looks, y along the samples.
+    /// From the axes across, along and down to the camera: z in the look direction, y along the samples.
     fn mounting(&self) -> Matrix3<f64> {
         let (sin, cos) = self.pitch_deg.to_radians().sin_cos();
         let (y, z) = (Vector3::x(), Vector3::new(0.0, sin, cos));
         Matrix3::from_rows(&[y.cross(&z).transpose(), y.transpose(), z.transpose()])
     }
 
-    /// The line as it truly is, with so many samples.
+    /// The true line, with `samples` samples.
     pub(super) fn truth(&self, samples: f64) -> LineCamera {
         let (sin, cos) = self.pitch_deg.to_radians().sin_cos();
         let [m1, n1, n2] = self.errors;
@@ -103,7 +103,7 @@ impl StereoLine {
     }
 }
 
-/// The spacecraft's own axes, rows, over those across, along and down.
+/// The axes of the spacecraft, as rows, in those across, along and down.
 fn bus_axes() -> Matrix3<f64> {
     Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 }
@@ -131,13 +131,13 @@ impl Orbit {
         LINE_M / (Self::rate_rad_s() * SPHERE_M)
     }
 
-    /// Position over the middle, along the flight and the orbit's normal, J2000.
+    /// Position over the middle, along-track direction and orbit normal, J2000.
     fn frame(&self) -> Matrix3<f64> {
         let (sin_lon, cos_lon) = self.longitude_deg.to_radians().sin_cos();
         let (sin_lat, cos_lat) = self.latitude_deg.to_radians().sin_cos();
         let up = Vector3::new(cos_lat * cos_lon, cos_lat * sin_lon, sin_lat);
         let east = Vector3::new(-sin_lon, cos_lon, 0.0);
-        // North, a little against the turning of Mars, as over 87 degrees of inclination.
+        // North, slightly against the rotation of Mars, as at an inclination of 87 degrees.
         let along = (up.cross(&east) - 0.05 * east).normalize();
         let to_mars = Self::to_mars(self.start_et_s);
         to_mars.transpose() * Matrix3::from_columns(&[up, along, up.cross(&along)])
@@ -175,9 +175,9 @@ impl Orbit {
         ])
     }
 
-    /// How fast the spacecraft turns, J2000.
+    /// Rotation rate of the spacecraft, J2000.
     fn turn_rad_s(&self, et_s: f64) -> Vector3<f64> {
-        /// Seconds to either side over which it is taken.
+        /// Half the interval over which it is computed, seconds.
         const SIDE_S: f64 = 0.5;
         if !self.is_steered {
             return self.frame().column(2) * Self::rate_rad_s();
@@ -187,13 +187,13 @@ impl Orbit {
         Vector3::new(skew[(2, 1)], skew[(0, 2)], skew[(1, 0)])
     }
 
-    /// When the first line of a camera's image is exposed: its middle looks at the middle of the stretch.
+    /// Exposure time of the first line of a camera's image, whose middle looks at the middle of the stretch.
     fn first_s(&self, line: &StereoLine) -> f64 {
         let ahead_rad = line.pitch_deg.to_radians().tan() * HEIGHT_M / SPHERE_M;
         self.start_et_s - ahead_rad / Self::rate_rad_s() - 0.5 * self.lines() * Self::period_s()
     }
 
-    /// A place of the ground, Mars-fixed metres: `share` of the way along the stretch, and across it from -1 to 1.
+    /// A ground point, Mars-fixed metres: `share` of the way along the stretch, and across it from -1 to 1.
     pub(super) fn ground(&self, share: f64, across: f64) -> Vector3<f64> {
         let along_m = (share - 0.5) * self.lines() * LINE_M;
         let across_m = across * 0.5 * self.samples() * PIXEL_MM / FOCAL_MM * HEIGHT_M;
@@ -219,7 +219,7 @@ impl Orbit {
         frame * local * (SPHERE_M + height_m)
     }
 
-    /// Where a line truly looks from at a line of its image.
+    /// True pose of a line at a line of its image.
     pub(super) fn true_pose(
         &self,
         line: &StereoLine,
@@ -229,7 +229,7 @@ impl Orbit {
         let period_s = Self::period_s();
         let et_s = self.first_s(line) + at_line * period_s;
         let to_mars = Self::to_mars(et_s);
-        // All lines' images lie evenly about the middle of the stretch.
+        // The images of all lines are centred on the middle of the stretch.
         let after_lines = (et_s - self.start_et_s) / period_s;
         let to_axes = self.axes(et_s) * to_mars.transpose();
         TruePose {
@@ -238,7 +238,7 @@ impl Orbit {
         }
     }
 
-    /// What a line misses a place by when it sees it with a sample: tangents.
+    /// Residual of a ground point seen by a line with a sample: tangents.
     fn missed(
         &self,
         line: &StereoLine,
@@ -251,7 +251,7 @@ impl Orbit {
         seen.xy() / seen.z - camera.tangents(2.0 * at.y / self.samples() - 1.0)
     }
 
-    /// Line and sample at which a line of the camera truly sees a place; nothing outside of the image.
+    /// True line and sample of a ground point in a line of the camera; `None` outside the image.
     pub(super) fn sees(&self, line: &StereoLine, place_m: &Vector3<f64>) -> Option<[f64; 2]> {
         let camera = line.truth(self.samples());
         let mut at = Vector2::new(0.5 * self.lines(), 0.5 * self.samples());
@@ -267,7 +267,7 @@ impl Orbit {
         inside.then(|| at.into())
     }
 
-    /// The support data of a line's image, as the laboratory and the kernels have it.
+    /// The support data of a line's image, from the laboratory and the kernels.
     pub(super) fn support_data(&self, line: &StereoLine) -> String {
         let period_s = Self::period_s();
         let first_s = self.first_s(line);

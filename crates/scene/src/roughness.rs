@@ -1,7 +1,7 @@
 //! Self-affine ground around a site: noise in octaves from 51 km to 25 m, and craters.
 //!
-//! A height is a sum of octaves of value noise on square lattices whose nodes are hashed, so that nothing is stored
-//! and any point costs the same: about a quarter of a microsecond, and the craters near it.
+//! A height is a sum of octaves of value noise on square lattices whose nodes are hashed, so that nothing is stored and
+//! the cost is the same everywhere: about a quarter of a microsecond, plus the craters nearby.
 
 use std::collections::HashMap;
 
@@ -16,25 +16,25 @@ use super::{
 const FINEST_M: f64 = 12.5;
 /// Octaves; the coarsest lattice has 51.2 km.
 const OCTAVES: i32 = 13;
-/// Exponent of Hurst.
+/// Hurst exponent.
 const HURST: f64 = 0.7;
-/// Amplitude of an octave in units of `ν (spacing / 300 m)^H` by which the sum of all has structure function
-/// `ν² (d / 300 m)^2H`, to 4 % in height from 50 m to 2 km.
+/// Amplitude of an octave in units of `ν (spacing / 300 m)^H` for which the sum of all octaves has the structure
+/// function `ν² (d / 300 m)^2H`, to 4 % in height from 50 m to 2 km.
 const OCTAVE_SHARE: f64 = 0.4251;
-/// Full roughness up to here from the site, none from there on, metres; windows reach 33 km.
+/// Full roughness up to the first distance from the site, zero beyond the second, metres; windows extend to 33 km.
 const REACH_M: [f64; 2] = [40_000.0, 60_000.0];
 
-/// Craters with a diameter of 100 m or more per square kilometre; with the square of the diameter fewer are larger,
-/// hence one of 1 km in 1 000 km². The order of what Martian plains have.
+/// Craters with a diameter of 100 m or more per square kilometre; the number falls with the square of the diameter,
+/// hence one of 1 km in 1 000 km². The order of magnitude of Martian plains.
 const CRATERS_PER_KM2: f64 = 0.1;
 /// Smallest and largest radius, metres.
 const CRATER_RADIUS_M: [f64; 2] = [50.0, 2_000.0];
-/// Depth over radius of worn craters; fresh ones have 0.4.
+/// Depth over radius of degraded craters; fresh ones have 0.4.
 const CRATER_DEPTH: f64 = 0.16;
 /// Edge of a cell of the crater grid, metres.
 const CELL_M: f64 = 1_000.0;
 
-/// The ground around one site, added to what lies below.
+/// The ground around one site, added to the terrain below it.
 pub(super) struct RoughPatch {
     centre: Vector3<f64>,
     east: Vector3<f64>,
@@ -85,7 +85,7 @@ impl RoughPatch {
         }
     }
 
-    /// Height at a place on the reference sphere, metres; `None` where the patch has ended.
+    /// Height at a point on the reference sphere, metres; `None` outside the patch.
     pub(super) fn height_m(&self, place_m: &Vector3<f64>) -> Option<f64> {
         let plan_m = Vector2::new(self.east.dot(place_m), self.north.dot(place_m));
         let distance_m = plan_m.norm();
@@ -137,7 +137,7 @@ impl Octave {
         self.height_m * between(lower, upper, along_y)
     }
 
-    /// Value of a node: evenly spread, of mean 0 and standard deviation 1.
+    /// Value of a node: uniform, of mean 0 and standard deviation 1.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -150,7 +150,7 @@ impl Octave {
 }
 
 impl Bowl {
-    /// Reach of the ejecta in crater radii.
+    /// Extent of the ejecta in crater radii.
     pub(super) const REACH: f64 = 2.5;
 
     /// Height at a distance from the centre, metres.
@@ -172,7 +172,7 @@ fn fade(share: f64) -> f64 {
     share * share * share * (10.0 + share * (6.0 * share - 15.0))
 }
 
-/// Craters of the square around the site that the patch lies in.
+/// Craters of the square around the site that contains the patch.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -184,7 +184,7 @@ fn craters(random: &mut Random) -> Vec<Crater> {
     let count = CRATERS_PER_KM2 * (2.0 * half_m / 1_000.0).powi(2);
     (0..count as usize)
         .map(|_| {
-            // The share of craters that are larger falls with the square of the radius.
+            // The share of larger craters falls with the square of the radius.
             let share = random.between((smallest_m / largest_m).powi(2), 1.0);
             let radius_m = smallest_m / share.sqrt();
             Crater {
@@ -206,7 +206,7 @@ fn cell(plan_m: &Vector2<f64>) -> [i32; 2] {
     [plan_m.x, plan_m.y].map(|component_m| (component_m / CELL_M).floor() as i32)
 }
 
-/// Which craters can reach into which cell.
+/// Craters that can extend into each cell.
 fn grid(craters: &[Crater]) -> HashMap<[i32; 2], Vec<usize>> {
     let mut cells: HashMap<[i32; 2], Vec<usize>> = HashMap::new();
     for (index, crater) in craters.iter().enumerate() {
@@ -229,7 +229,7 @@ mod tests {
 
     const SITE: Vector3<f64> = Vector3::new(0.6, 0.8, 0.0);
 
-    /// How much heights `apart_m` apart differ (root mean square), over places and directions of some patches, metres.
+    /// Differences of heights `apart_m` apart (root mean square), over points and directions of some patches, metres.
     fn differ_m(roughness: Roughness, apart_m: f64) -> f64 {
         const PATCHES: u64 = 12;
         const PAIRS: u64 = 1_500;
@@ -255,7 +255,7 @@ mod tests {
                     roughness.height_difference_at_300_m() * (apart_m / 300.0).powf(HURST);
                 let found_m = differ_m(roughness, apart_m);
                 println!("{roughness:?} {apart_m} m: {found_m:.3} m, expected {expected_m:.3} m");
-                // 4 % because there are but thirteen octaves; 18 000 pairs, fewer independent ones at 2 km: 1 %.
+                // 4 % because there are only thirteen octaves; 18 000 pairs, fewer independent ones at 2 km: 1 %.
                 assert!(
                     (found_m / expected_m - 1.0).abs() < 0.07,
                     "{found_m} {expected_m}"
@@ -284,7 +284,7 @@ mod tests {
                 .filter(|crater| crater.bowl.radius_m > radius_m);
             larger.count()
         };
-        // Of diameters above 200 m there are a quarter: 360, and 16 in standard deviation; times four.
+        // A quarter has diameters above 200 m: 360, with a standard deviation of 16; times four.
         assert!(beyond(100.0).abs_diff(360) < 65, "{}", beyond(100.0));
         assert!((3..30).contains(&beyond(500.0)), "{}", beyond(500.0)); // 14 of 1 km
         let all_in = craters.iter().all(|crater| {
@@ -301,7 +301,7 @@ mod tests {
             REFERENCE_RADIUS_M * (angle_rad.cos() * SITE + angle_rad.sin() * Vector3::z())
         };
         assert!(patch.height_m(&place(30_000.0)).unwrap().abs() > 0.1);
-        // A metre before the end nothing is left; beyond it, and on the other side of Mars, there is none.
+        // A metre before the end the height is zero; beyond it, and on the other side of Mars, it is undefined.
         assert!(patch.height_m(&place(59_998.0)).unwrap().abs() < 1e-3);
         assert!(patch.height_m(&place(60_010.0)).is_none());
         assert!(patch.height_m(&-place(0.0)).is_none());

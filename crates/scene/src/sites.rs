@@ -1,4 +1,4 @@
-//! Site configurations, image labels and the note that go with an invented mission.
+//! Site configurations, image labels and the README of a synthetic mission.
 
 use std::fmt::Write as _;
 
@@ -14,10 +14,10 @@ use areograph_base::error::Result;
 use areograph_config::{usual_altimeter, usual_instrument};
 use areograph_spice::Session;
 
-/// Sources that products repeat.
+/// Source stated in the products.
 const INJECTED: &str = "injected by areograph scene";
 
-/// What measures tie points in pixels, ready to be switched on.
+/// Option for matching tie points in pixels, as a comment.
 const MATCH: &str = "# match = true  # also measures tie points in the pixels of the images, with or without files\n";
 
 /// A window of a site file, degrees.
@@ -38,7 +38,7 @@ pub(super) struct SiteImage {
     pub label: String,
     /// Lines delivered, when fewer than the label's.
     pub lines_delivered: Option<u32>,
-    /// Path of its pixels, where there are some.
+    /// Path of its pixels, if any.
     pub pixels: Option<String>,
 }
 
@@ -46,13 +46,13 @@ pub(super) struct SiteImage {
 pub(super) struct SiteTies {
     /// Path of the file.
     pub file: String,
-    /// What the site file says of their noise.
+    /// Note on their noise in the site file.
     pub note: String,
     /// Standard deviations along and across the track, focal-plane pixels.
     pub sigma_px: [f64; 2],
 }
 
-/// Where the kernels of a site file come from.
+/// Kernels of a site file.
 pub(super) enum SiteKernels {
     /// Path of a metakernel.
     Metakernel(String),
@@ -79,19 +79,19 @@ impl SiteKernels {
     }
 }
 
-/// What a site file says.
+/// Content of a site file.
 pub(super) struct SiteFile<'a> {
     /// Identifier.
     pub id: &'a str,
     /// Free text.
     pub description: String,
-    /// Where its kernels come from.
+    /// Its kernels.
     pub kernels: SiteKernels,
     /// Paths of the PEDR files.
     pub pedr: Vec<String>,
-    /// Tie points, where there are any.
+    /// Tie points, if any.
     pub ties: Option<SiteTies>,
-    /// How far ranges may be off on average, where more than usual.
+    /// Limit of the mean range residual, where not the usual one.
     pub range_mean_max_m: Option<f64>,
     /// Windows.
     pub windows: Vec<Window>,
@@ -99,7 +99,7 @@ pub(super) struct SiteFile<'a> {
     pub images: Vec<SiteImage>,
 }
 
-/// A string as TOML writes it.
+/// A string in TOML quotes.
 fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
@@ -180,17 +180,17 @@ pub(super) fn window(site: &Site, [east_deg, north_deg]: [f64; 2]) -> Window {
     }
 }
 
-/// Limit of mean range residuals where errors are drawn, metres. A profile that lies 70 m beside its place is
-/// 26 m too near or too far at 22 degrees off nadir; orbits add 9 m.
+/// Limit of mean range residuals where errors are drawn, metres. A profile shifted by 70 m is 26 m too near or too far
+/// at 22 degrees off nadir; orbits add 9 m.
 const RANGE_MEAN_MAX_M: f64 = 85.0;
 
-/// Limit of mean range residuals, where it is not the usual one.
+/// Limit of mean range residuals, where not the usual one.
 pub(super) fn range_mean_max_m(errors: &SceneErrors) -> Option<f64> {
     (*errors != SceneErrors::demo()).then_some(RANGE_MEAN_MAX_M)
 }
 
-/// The site file of `site`, whose images and PEDR files are those of its arcs and whose tie points are those of `ties`; the
-/// images may have pixels.
+/// The site file of `site`, with the images and PEDR files of its arcs and the tie points of `ties`; the images may
+/// have pixels.
 pub(super) fn planned_site<'a>(
     site: &'a Site,
     arcs: [&Arc; 2],
@@ -200,7 +200,7 @@ pub(super) fn planned_site<'a>(
 ) -> SiteFile<'a> {
     let is_demo = *errors == SceneErrors::demo();
     let ties_of_demo = || {
-        let note = "A line, the noise of these tie points, is 1.1 to 1.6 focal-plane pixels.";
+        let note = "The noise of these tie points is one line, 1.1 to 1.6 focal-plane pixels.";
         (note.to_owned(), [1.6, 1.0])
     };
     let ties_with_noise = |noise_px: f64| {
@@ -256,13 +256,13 @@ pub(super) fn planned_site<'a>(
     }
 }
 
-/// What a label says.
+/// Content of a label.
 pub(super) struct Label<'a> {
     /// Product id with `-` for `/`.
     pub id: &'a str,
     /// Instrument.
     pub instrument: &'a str,
-    /// Filter, where the camera has one.
+    /// Filter, if the camera has one.
     pub filter: Option<&'a str>,
     /// UTC of the first line.
     pub start: &'a str,
@@ -276,7 +276,7 @@ pub(super) struct Label<'a> {
     pub summing: u32,
     /// First detector pixel, counted from 0.
     pub first_detector: u32,
-    /// Why it was taken.
+    /// Rationale of the image.
     pub rationale: &'a str,
     /// Lines.
     pub lines: u32,
@@ -287,7 +287,7 @@ pub(super) struct Label<'a> {
 /// A detached PDS3 label of the arc's image.
 ///
 /// # Errors
-/// What the session says of the time of the last line.
+/// Errors of the session in converting the time of the last line.
 pub(super) fn planned_label(arc: &Arc, session: &Session) -> Result<String> {
     let image = arc.image;
     let look = match image.look {
@@ -314,7 +314,7 @@ pub(super) fn planned_label(arc: &Arc, session: &Session) -> Result<String> {
 pub(super) fn image_label(label: &Label<'_>) -> String {
     let mut lines = vec![
         "PDS_VERSION_ID = PDS3".to_owned(),
-        "NOTE = \"SYNTHETIC: written by areograph scene, there is no such image file\"".to_owned(),
+        "NOTE = \"SYNTHETIC: written by areograph scene, no such image file exists\"".to_owned(),
         format!("FILE_NAME = \"{}.IMQ\"", label.id.replace('-', "")),
         "RECORD_TYPE = UNDEFINED".to_owned(),
         "SPACECRAFT_NAME = MARS_GLOBAL_SURVEYOR".to_owned(),
@@ -355,20 +355,20 @@ pub(super) fn image_label(label: &Label<'_>) -> String {
     lines.join("\r\n") + "\r\n"
 }
 
-/// What `README.txt` says below its first line.
+/// Text of `README.txt` below its first line.
 pub(super) const README: &str = "\
 kernels/     text kernels; orbit (three rival versions), attitude, Mars and Sun as binary kernels;
              nav.tm, gsfc.tm, ipng.tm load them with one version of the orbit each, and nav_wa.tm, gsfc_wa.tm
              and ipng_wa.tm with the frames of the wide-angle cameras as well
 pedr/        MOLA PEDR files: two whole days, five single revolutions; version K is in IAU 1991, L in IAU 2000
-images/      with --images alone: the six narrow-angle images, as the archive has them
+images/      with --images only: the six narrow-angle images, as in the archive
 labels/      labels of six narrow-angle images and three wide-angle ones
-ties/        places that both images of a site show, as measured in them; some are blunders
+ties/        tie points measured in both images of a site; some are blunders
 sites/       configurations for `areograph run`; gusev_context chooses among the three orbits, and has a profile
              that is simultaneous with no image
-truth.json   what really happened: biases, orientation of the images, footprints in the sites' windows,
-             how far the rival orbits are off (the orbit `gsfc` is the true one), and for the tie points when and
-             from where the images were truly taken; which errors were drawn from which sizes
+truth.json   true values: biases, orientation of the images, footprints in the sites' windows, errors of the rival
+             orbits (the orbit `gsfc` is the true one), and for the tie points the true time and position of each
+             exposure; drawn errors and the sizes from which they were drawn
 
 Image ids, times, summing, line counts, line periods and emission angles are those of Shan et al. 2005, Table 2; of
 E04-01275, for which it prints 7424 lines, 8064 are exposed, as their Table 4 demands. Terrain, orbits and
@@ -376,7 +376,7 @@ attitudes are invented.
 The wide-angle images of gusev_context are invented, and so is its profile of 2001-03-12 (ap18983l.b).
 ";
 
-/// What `README.txt` says of a flight along given kernels.
+/// Text of `README.txt` for a flight along given kernels.
 pub(super) const README_ALONG: &str = "\
 pedr/        a MOLA PEDR file, version L (IAU 2000), of shots flown along given kernels over invented terrain
 sites/       a configuration for `areograph run`

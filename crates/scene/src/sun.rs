@@ -1,4 +1,4 @@
-//! Mars on its way around the Sun, for light time, aberration and the angles of illumination.
+//! The orbit of Mars around the Sun, for light time, aberration and illumination angles.
 
 use nalgebra::Vector3;
 
@@ -17,7 +17,7 @@ const OBLIQUITY_DEG: f64 = 23.439_28;
 /// Position of Mars from the Sun at `et`, metres, J2000.
 ///
 /// # Accuracy
-/// About 25″ of longitude in 1800–2050, 0.03° seen as an angle of illumination.
+/// About 25″ of longitude in 1800–2050, 0.03° as an illumination angle.
 /// # Source
 /// Standish, "Keplerian elements for approximate positions of the major planets", table 1.
 pub(super) fn mars_from_sun_m(et: Et) -> Vector3<f64> {

@@ -1,26 +1,26 @@
-//! What the instrument tells of its echoes: channels, energies, pulse widths, thresholds, background, range gate.
+//! Echo data of the instrument: channels, energies, pulse widths, thresholds, background, range gate.
 //!
-//! No mission file was at hand: the fields are those that `pedr2tab` prints, sizes are choices that look like an
-//! altimeter's and hang together as physics has them. A weak echo has little energy, a slope widens the pulse, the Sun
-//! makes background. Nothing here moves a footprint.
+//! No mission file was available: the fields are those that `pedr2tab` prints; sizes are plausible choices for an
+//! altimeter, with consistent physics. A weak echo has little energy, a slope widens the pulse, the Sun contributes
+//! background. None of these moves a footprint.
 
 use zerocopy::byteorder::big_endian::{I16, I32, U16};
 
 use super::random::{mix, unit_of};
 use areograph_pds::pedr::{Record, SHOTS};
 
-/// Distance at which echoes have their usual energy, centimetres.
+/// Range at which echoes have their nominal energy, centimetres.
 const USUAL_RANGE_CM: f64 = 3.85e7;
-/// Millivolts of a count of a threshold, channels 1 to 4. Source: `pedr2tab`.
+/// Millivolts per count of a threshold, channels 1 to 4. Source: `pedr2tab`.
 const MV_PER_COUNT: [f64; 4] = [2.29, 1.32, 0.763, 0.440];
 /// Width of the range window, centimetres.
 const WINDOW_CM: i32 = 1_200_000;
-/// Share of echoes of the ground, and of clouds, that channels 1 to 3 hear first; the others are heard in channel 4,
-/// which the MOLA team's own grids leave out.
+/// Share of ground echoes, and of cloud echoes, that trigger in channels 1 to 3; the others trigger in channel 4, which
+/// the MOLA team's own grids exclude.
 const GROUND_CHANNELS: [f64; 3] = [0.80, 0.95, 0.99];
 const CLOUD_CHANNELS: [f64; 3] = [0.30, 0.50, 0.70];
 
-/// The channel that hears an echo, by a number in `0 <= chance < 1`.
+/// The channel in which an echo triggers, by a random number `0 <= chance < 1`.
 pub(super) fn channel(is_ground: bool, chance: f64) -> u8 {
     let until = if is_ground {
         GROUND_CHANNELS
@@ -33,7 +33,7 @@ pub(super) fn channel(is_ground: bool, chance: f64) -> u8 {
         .map_or(4, |(channel, _)| channel)
 }
 
-/// Enters what the instrument tells into a record whose ranges, classes and angles are known.
+/// Enters the echo data into a record whose ranges, classes and angles are known.
 pub(super) fn enter(record: &mut Record, seed: u64) {
     let chance = |purpose: u64, number: usize| unit_of(mix(mix(seed ^ purpose) ^ number as u64));
     for shot in 0..SHOTS {
@@ -49,7 +49,7 @@ pub(super) fn enter(record: &mut Record, seed: u64) {
         let reflectivity_percent = 8.0 + 14.0 * chance(13, shot);
         let range = f64::from(record.range_cm[shot].get()) / USUAL_RANGE_CM;
         let energy = 25.0 * reflectivity_percent * (transmitted_mj / 42.0) / (range * range);
-        // The spot of a beam that meets the ground aslant is deep: 130 m of it, 6.7 ns a metre there and back.
+        // The spot of a beam at oblique incidence is deep: 130 m of it, 6.7 ns a metre two-way.
         let off_nadir_rad = 1e-6 * f64::from(record.off_nadir_microdegrees.get()).to_radians();
         let sigma_ns = (4.0 + 12.0 * chance(14, shot).powi(2)).hypot(200.0 * off_nadir_rad.tan());
         record.received_energy[shot] = counts(energy);
@@ -57,7 +57,7 @@ pub(super) fn enter(record: &mut Record, seed: u64) {
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "held within the field"
+            reason = "clamped to the field"
         )]
         record.reflectivity_millipercent[shot].set(reflectivity as u16);
         record.optical_width[shot] = counts(sigma_ns / 0.1);
@@ -87,7 +87,7 @@ fn enter_receiver(record: &mut Record, chance: &impl Fn(u64, usize) -> f64) {
     record.range_window_cm = I32::new(WINDOW_CM);
 }
 
-#[allow(clippy::cast_possible_truncation, reason = "held within the field")]
+#[allow(clippy::cast_possible_truncation, reason = "clamped to the field")]
 fn counts(value: f64) -> I16 {
     I16::new(value.round().clamp(0.0, f64::from(i16::MAX)) as i16)
 }
@@ -95,7 +95,7 @@ fn counts(value: f64) -> I16 {
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "held within the field"
+    reason = "clamped to the field"
 )]
 fn byte(value: f64) -> u8 {
     value.round().clamp(0.0, 255.0) as u8

@@ -1,9 +1,9 @@
-//! Invented relief: an ellipsoid with swells, craters, and small hills or rough ground around the sites, the same for the
-//! same seed.
+//! Synthetic relief: an ellipsoid with swells, craters, and small hills or rough ground around the sites, reproducible
+//! by its seed.
 //!
-//! Everything is a function of the direction in three dimensions, so there is no seam in longitude and
-//! nothing special about the poles. One radius costs about 25 sines and the craters of one grid cell,
-//! well under a microsecond; on rough ground three quarters of one.
+//! All terms are functions of the direction in three dimensions, so that there is no seam in longitude and no
+//! singularity at the poles. One radius costs about 25 sines and the craters of one grid cell, well under a
+//! microsecond; on rough ground three quarters of one.
 
 use std::collections::HashMap;
 
@@ -19,9 +19,9 @@ use super::{
 
 /// Radius of the sphere on which lengths along the ground are counted, metres.
 pub(super) const REFERENCE_RADIUS_M: f64 = 3_390_000.0;
-/// Edge of a cell of the crater grid, metres; no smaller than the reach of the largest crater.
+/// Edge of a cell of the crater grid, metres; no smaller than the extent of the largest crater.
 const CELL_M: f64 = 130_000.0;
-/// Large craters are kept this far from the sites, metres beyond their reach.
+/// Large craters are kept this far from the sites, metres beyond their extent.
 const SITE_CLEARANCE_M: f64 = 60_000.0;
 
 /// A plane wave through space, seen where it cuts the surface.
@@ -31,13 +31,13 @@ struct Wave {
     height_m: f64,
 }
 
-/// A bowl and where it is.
+/// A bowl and its position.
 struct Crater {
     centre_m: Vector3<f64>,
     bowl: Bowl,
 }
 
-/// The shape of the invented Mars, in IAU 2000 body-fixed components.
+/// The shape of the synthetic Mars, in IAU 2000 body-fixed components.
 pub(super) struct Terrain {
     areoid: Vec<Wave>,
     relief: Vec<Wave>,
@@ -47,7 +47,7 @@ pub(super) struct Terrain {
 }
 
 impl Terrain {
-    /// The terrain of `seed`; around `sites` (directions) large craters are missing, and the ground is as `near_sites`.
+    /// The terrain of `seed`; around `sites` (directions) there are no large craters, and the ground is `near_sites`.
     pub(super) fn new(seed: u64, sites: &[Vector3<f64>], near_sites: Relief) -> Self {
         let mut random = Random::new(seed, "terrain");
         // Number, wavelengths and heights: swells of kilometres, plains, hills.
@@ -125,14 +125,14 @@ impl Terrain {
         smooth_m + self.roughness_m(&place_m).unwrap_or(0.0)
     }
 
-    /// What the rough ground near a site adds, metres; `None` elsewhere.
+    /// Contribution of the rough ground near a site, metres; `None` elsewhere.
     fn roughness_m(&self, place_m: &Vector3<f64>) -> Option<f64> {
         self.rough.iter().find_map(|patch| patch.height_m(place_m))
     }
 
-    /// How much farther than along its middle a beam is on the mean over a round spot, metres; 0 on smooth ground.
+    /// Excess of the mean range over a round spot against the range along the beam's axis, metres; 0 on smooth ground.
     ///
-    /// * `ground_m` – where the middle meets the ground
+    /// * `ground_m` – intersection of the axis with the ground
     /// * `direction` – of the beam, unit length
     /// * `diameter_m` – of the spot, in the plane across the beam
     pub(super) fn spot_farther_m(
@@ -141,7 +141,7 @@ impl Terrain {
         direction: &Vector3<f64>,
         diameter_m: f64,
     ) -> f64 {
-        /// Points on each of two circles that stand for equal areas, and radii of the circles.
+        /// Points on each of two circles that represent equal areas, and radii of the circles.
         const POINTS: u32 = 6;
         const CIRCLES: [f64; 2] = [0.5, 0.866_025_403_784_438_6];
         let up = ground_m.normalize();
@@ -247,7 +247,7 @@ fn cell(place_m: &Vector3<f64>) -> [i32; 3] {
     [place_m.x, place_m.y, place_m.z].map(|component| (component / CELL_M).floor() as i32)
 }
 
-/// Which craters can reach into which cell.
+/// Craters that can extend into each cell.
 fn grid(craters: &[Crater]) -> HashMap<[i32; 3], Vec<usize>> {
     let mut cells: HashMap<[i32; 3], Vec<usize>> = HashMap::new();
     for (index, crater) in craters.iter().enumerate() {
@@ -292,7 +292,7 @@ mod tests {
             let range_m = TERRAIN.range_m(&origin, &direction).unwrap();
             let hit = origin + range_m * direction;
             let error_m = hit.norm() - TERRAIN.radius_m(&hit.normalize());
-            prop_assert!(error_m.abs() < 1e-4, "{error_m}"); // metres: a tenth of what a PEDR can say
+            prop_assert!(error_m.abs() < 1e-4, "{error_m}"); // metres: a tenth of the resolution of a PEDR file
             prop_assert!((hit.norm() - 3.39e6).abs() < 25_000.0);
         }
 
@@ -327,8 +327,8 @@ mod tests {
             let range_m = ROUGH.range_m(&origin, &direction).unwrap();
             let hit = origin + range_m * direction;
             let error_m = hit.norm() - ROUGH.radius_m(&hit.normalize());
-            prop_assert!(error_m.abs() < 1e-4, "{error_m}"); // metres: a tenth of what a PEDR can say
-            // The mean over a spot is nearer to the ground than the relief within it: slopes reach 1.
+            prop_assert!(error_m.abs() < 1e-4, "{error_m}"); // metres: a tenth of the resolution of a PEDR file
+            // The mean over a spot deviates less from the ground than the relief within it: slopes are up to 1.
             let farther_m = ROUGH.spot_farther_m(&hit, &direction, 75.0);
             prop_assert!(farther_m.abs() < 75.0, "{farther_m}");
         }

@@ -1,5 +1,5 @@
-//! A stereo terrain model of invented ground that lies aside, laser passes over it, and images that show it: what
-//! `areograph pedr match` finds its control points from.
+//! A shifted stereo terrain model of synthetic ground, laser passes over it, and images that show it: the input from
+//! which `areograph pedr match` derives control points.
 
 use std::{fs::File, io::BufWriter, path::Path};
 
@@ -24,24 +24,24 @@ use areograph_base::{
 };
 use areograph_geom::{calibration::Offset, ellipsoid::spherical_to_xyz_m, height_grid::HeightGrid};
 
-const README: &str = "A stereo terrain model (model.tif) that lies aside of the ground, PEDR files of passes over it (pedr/) and support\n\
-    data of two images that show it (isd/); truth.json tells by how much the model lies aside.\n\
+const README: &str = "A stereo terrain model (model.tif) shifted from the ground, PEDR files of passes over it (pedr/) and support\n\
+    data of two images that show it (isd/); truth.json gives the shift.\n\
     Next: areograph pedr match model.tif pedr --isd s1=isd/s1.json --isd s2=isd/s2.json\n";
 
 /// Middle of the model.
 const LONGITUDE_RAD: f64 = -60.0 * RADIANS_PER_DEGREE;
 const LATITUDE_RAD: f64 = -30.0 * RADIANS_PER_DEGREE;
-/// Sphere that its heights count from.
+/// Sphere that its heights refer to.
 const RADIUS_M: f64 = 3_396_190.0;
 /// Rows and columns, and edge of a cell, metres.
 const SIZE: [u32; 2] = [430, 560];
 const CELL_M: f64 = 150.0;
-/// How far the model has the ground to the east and the north, cells, and above it, metres.
+/// Shift of the model to the east and the north, cells, and above the ground, metres.
 const SHIFT_CELLS: [f64; 2] = [12.3, -7.4];
 const BIAS_M: f64 = 35.0;
 /// Noise of its heights, metres.
 const NOISE_M: f64 = 8.0;
-/// What stands for no height, in the corner of so many cells.
+/// The value for a missing height, and the size of the corner without heights, cells.
 const NO_HEIGHT: f32 = -32_768.0;
 const CORNER: u32 = 20;
 /// Passes over it.
@@ -59,19 +59,20 @@ struct Truth {
     made_by: &'static str,
     synthetic: &'static str,
     seed: u64,
-    /// How far the model has the ground to the east and the north.
+    /// Shift of the model to the east and the north.
     shift_cells: [f64; 2],
     shift_m: [f64; 2],
-    /// How far above the ground.
+    /// Height of the model above the ground.
     bias_m: f64,
     noise_m: f64,
     radius_m: f64,
 }
 
-/// Writes the scene into `directory`, replacing an older one that nobody added to or changed. The same seed gives the same bytes.
+/// Writes the scene into `directory`, replacing an older one unless files were added or changed. The same seed gives
+/// the same bytes.
 ///
 /// # Errors
-/// [`SceneError`](super::SceneError) when the folder holds something else; the system's refusal to write.
+/// [`SceneError`](super::SceneError) when the folder holds something else; errors of writing.
 pub fn write_terrain_model_scene(directory: &Path, seed: u64) -> Result<String> {
     let draft = Draft::begin(directory, README)?;
     let (pedr, isd) = (draft.folder("pedr")?, draft.folder("isd")?);
@@ -133,7 +134,7 @@ fn write_model(path: &Path, terrain: &Terrain, seed: u64) -> Result<()> {
         if row + column < CORNER {
             return NO_HEIGHT;
         }
-        // The ground that the model has here lies aside of here.
+        // The ground shown at this position of the model is displaced.
         let [longitude_rad, latitude_rad] = grid.place_rad([
             f64::from(*row) + SHIFT_CELLS[1],
             f64::from(*column) - SHIFT_CELLS[0],
@@ -153,7 +154,7 @@ fn write_model(path: &Path, terrain: &Terrain, seed: u64) -> Result<()> {
     })
 }
 
-/// Writes an equirectangular map as GDAL does.
+/// Writes an equirectangular map in GDAL's encoding.
 fn encode(file: File, grid: &HeightGrid, heights_m: &[f32]) -> tiff::TiffResult<()> {
     /// Model, area, sphere (both half-axes), equirectangular, metres, parallel, meridian.
     const KEYS: [u16; 40] = [
@@ -179,7 +180,7 @@ fn encode(file: File, grid: &HeightGrid, heights_m: &[f32]) -> tiff::TiffResult<
     image.write_data(heights_m)
 }
 
-/// Support data of an image that is what they say.
+/// Exact support data of an image.
 fn support_data(name: &'static str, pitch_deg: f64) -> String {
     let line = StereoLine {
         name,

@@ -1,5 +1,4 @@
-//! Tie points of an image pair, as images show them that were taken at other times and from other places
-//! than labels and kernels say.
+//! Tie points of an image pair, measured in images whose true times and positions differ from labels and kernels.
 
 use std::path::Path;
 
@@ -27,33 +26,33 @@ use areograph_geom::{
 };
 use areograph_pds::ties::ties_table;
 
-/// Tie points of a pair, as many as the paper has at Gusev; fewer where the images hardly overlap.
+/// Tie points of a pair, as many as in the paper at Gusev; fewer where the images hardly overlap.
 const TIES: usize = 154;
-/// Places of the first image that are looked at for one tie point.
+/// Candidate positions of the first image for one tie point.
 const PLACES_PER_TIE: usize = 20;
-/// No tie point is nearer to the edge of an image, pixels: blunders stay inside, and noise of a pixel.
+/// No tie point is nearer to the edge of an image, pixels: blunders stay inside, plus noise of a pixel.
 const EDGE_PX: f64 = BLUNDER_PX[1] + 5.0;
-/// One tie point of so many is a blunder, the first of them in the middle of the first so many.
+/// One of this many tie points is a blunder, the first in the middle of the first group.
 const BLUNDER_EVERY: usize = 20;
 /// Shortest and longest blunder, in any direction.
 const BLUNDER_PX: [f64; 2] = [20.0, 100.0];
-/// Intervals between poses of an image, a tenth of a second each: where the bus changes its rate,
-/// interpolation is off by 0.1 mm on the ground.
+/// Intervals between poses of an image, a tenth of a second each: where the rate of the bus changes, interpolation is
+/// in error by 0.1 mm on the ground.
 const INTERVALS: u32 = 160;
-/// The same of an image with jitter, 2 to 5 ms each: a twentieth of the shortest period, for 2 mm on the ground.
+/// The same for an image with jitter, 2 to 5 ms each: a twentieth of the shortest period, for 2 mm on the ground.
 const INTERVALS_OF_JITTER: u32 = 3_600;
-/// Height errors that ranges of neighbouring pixels end at, metres: a thousandth of a pixel.
+/// Height tolerance for ranges of neighbouring pixels, metres: a thousandth of a pixel.
 const NEIGHBOUR_M: f64 = 1e-3;
-/// Lines at which the truth tells the pose: the ends of 30 equal intervals.
+/// Lines for which `truth.json` contains the pose: the ends of 30 equal intervals.
 const TOLD_POSES: u32 = 31;
 
-/// An image as it was truly taken.
+/// The true image.
 pub(super) struct TrueImage<'a> {
     pub(super) flown: &'a Flown,
     pub(super) oriented_camera: OrientedCamera<SampledOrientation>,
 }
 
-/// A point on the ground and where both images see it.
+/// A ground point and its image coordinates in both images.
 struct Tie {
     ground_m: Vector3<f64>,
     measures: [TieMeasure<String>; 2],
@@ -94,13 +93,13 @@ impl<'a> TrueImage<'a> {
         Ok(projector.map_err(|error| no_camera(self.flown, &error))?)
     }
 
-    /// Line and sample at the far edges of where tie points may lie.
+    /// Largest line and sample of a tie point.
     fn extent_px(&self) -> [f64; 2] {
         let lines = f64::from(self.flown.arc.image.lines_delivered);
         [lines, self.oriented_camera.detector.samples].map(|length| length - EDGE_PX)
     }
 
-    /// The ground that a random place of the image shows.
+    /// The ground at a random position of the image.
     fn any_ground_m(&self, terrain: &Terrain, random: &mut Random) -> Option<Vector3<f64>> {
         let [line, sample] = self
             .extent_px()
@@ -108,7 +107,7 @@ impl<'a> TrueImage<'a> {
         self.ground_m(terrain, line, sample)
     }
 
-    /// The ground that a place of the image shows.
+    /// The ground at a position of the image.
     pub(super) fn ground_m(
         &self,
         terrain: &Terrain,
@@ -123,7 +122,7 @@ impl<'a> TrueImage<'a> {
         Some(pose.position_m + range_m * direction)
     }
 
-    /// The ground that some neighbouring samples of a line show, to a millimetre: each range starts from those before it.
+    /// The ground at some neighbouring samples of a line, to a millimetre: each range starts from those before it.
     pub(super) fn ground_of_line_m(
         &self,
         terrain: &Terrain,
@@ -149,7 +148,7 @@ impl<'a> TrueImage<'a> {
         ground.collect()
     }
 
-    /// Where the image shows a point, unless that is outside or too near to an edge.
+    /// Image coordinates of a point, unless outside or too near to an edge.
     pub(super) fn measure(
         &self,
         projector: &Projector<'_, SampledOrientation>,
@@ -174,7 +173,7 @@ impl<'a> TrueImage<'a> {
         inside.then_some(measure)
     }
 
-    /// How many focal-plane pixels a line is in the middle of the image.
+    /// Focal-plane pixels of a line in the middle of the image.
     fn focal_px_per_line(&self, terrain: &Terrain) -> Result<f64> {
         let camera = &self.oriented_camera;
         let [line, sample] = [camera.lines(), camera.detector.samples].map(|length| 0.5 * length);
@@ -208,22 +207,22 @@ impl<'a> TrueImage<'a> {
     }
 }
 
-/// When a line was truly exposed, counted from the outer edge of the first one.
+/// True exposure time of a line, counted from the outer edge of the first one.
 fn exposed(flown: &Flown, line: f64) -> Et {
     let arc = &flown.arc;
     let exposed_s = (line + flown.errors.time_bias_lines) * arc.image.line_period_s();
     arc.exposed.start.plus(exposed_s)
 }
 
-/// True pose of the camera, or the one that sees ground along straight rays after a light time.
+/// True pose of the camera, or the origin of its straight rays after a light time.
 fn pose(flown: &Flown, exposure: Et, light_time_s: f64) -> Pose {
     let mut pose = flown.camera_pose(usual_instrument(), exposure, light_time_s);
     pose.position_m += flown.errors.camera_position_m;
     pose
 }
 
-/// Light time from the ground on the boresight, seconds: within the narrow swath it changes by less than what MGS
-/// flies a centimetre in.
+/// Light time from the ground on the boresight, seconds: within the narrow swath it changes by less than the time in
+/// which MGS flies a centimetre.
 fn seen_after_s(flown: &Flown, terrain: &Terrain, exposure: Et) -> Result<f64> {
     let pose = pose(flown, exposure, 0.0);
     let boresight = pose.mars_to_camera.row(2).transpose();
@@ -257,7 +256,7 @@ fn no_camera(flown: &Flown, error: &dyn std::error::Error) -> SceneError {
 /// Writes the tie points of a pair into `folder`, measured with noise of `noise_px`.
 ///
 /// # Errors
-/// [`SceneError::NoCamera`]; the system's refusal to write.
+/// [`SceneError::NoCamera`]; errors of writing.
 pub(super) fn write_ties(
     folder: &Path,
     [first, second]: [&Flown; 2],
@@ -286,7 +285,7 @@ pub(super) fn ties_name(site: &str) -> String {
     format!("{site}.csv")
 }
 
-/// Tie points spread over the ground that both images show, measured without error.
+/// Tie points distributed over the common ground of both images, measured without error.
 fn exact_ties(
     pair: &[TrueImage<'_>; 2],
     terrain: &Terrain,
@@ -339,7 +338,7 @@ fn spoil(
     spoilt.unzip()
 }
 
-/// Moves one of the measurements far away.
+/// Displaces one of the measurements by a blunder.
 fn blunder(measures: &mut [TieMeasure<String>], random: &mut Random) -> BlunderTruth {
     let image = usize::from(random.between(0.0, 1.0) < 0.5);
     let [least_px, most_px] = BLUNDER_PX;

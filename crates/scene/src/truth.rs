@@ -1,4 +1,4 @@
-//! What the mission really did, for `truth.json`.
+//! True values of the mission, for `truth.json`.
 
 use std::collections::BTreeMap;
 
@@ -23,7 +23,7 @@ use areograph_geom::{
 /// Epochs of an image: the ends of 30 equal intervals.
 const EPOCHS: u32 = 31;
 
-/// The whole truth.
+/// All true values.
 #[derive(Debug, Serialize)]
 pub(super) struct Truth {
     pub made_by: &'static str,
@@ -48,19 +48,19 @@ pub(super) struct Truth {
     pub rendered: Vec<RenderedTruth>,
 }
 
-/// How the pixels of an image were made.
+/// True values of a rendered image.
 #[derive(Debug, Serialize)]
 pub(super) struct RenderedTruth {
     image: &'static str,
     coder: &'static str,
-    /// Zenith angle of the Sun over the site.
+    /// Incidence angle of the Sun over the site.
     sun_incidence_deg: f64,
-    /// Where the Sun stands, from north to east.
+    /// Azimuth of the Sun, from north to east.
     sun_azimuth_deg: f64,
 }
 
 impl RenderedTruth {
-    /// An image in the light of a Sun at this zenith angle and azimuth, degrees.
+    /// An image under a Sun at this incidence angle and azimuth, degrees.
     pub(super) const fn new(
         image: &PlannedImage,
         coder: &'static str,
@@ -84,7 +84,7 @@ pub(super) struct DrawnTruth {
 }
 
 impl DrawnTruth {
-    /// What was drawn for a day.
+    /// The values drawn for a day.
     pub(super) fn of(flown: &Flown) -> Self {
         Self {
             image: flown.arc.image.id,
@@ -149,7 +149,7 @@ pub(super) struct ImageTruth {
     lines_delivered: u32,
     look: &'static str,
     emission_deg: Option<f64>,
-    /// By the label's times, the orbit `gsfc` and the attitude of the C-kernel, one entry per epoch.
+    /// By the times of the label, the orbit `gsfc` and the attitude of the C-kernel, one entry per epoch.
     #[serde(flatten)]
     poses: Poses,
     /// Each family's orbit minus `gsfc` along the radial, along-track and cross-track axes of `gsfc`, metres, one
@@ -166,20 +166,20 @@ pub(super) struct FileTruth {
     pub shots_ground: u64,
     pub shots_cloud: u64,
     pub shots_missing: u64,
-    /// Shots that the linear frame model places more than 0.2 m from the truth.
+    /// Shots that the linear frame model misplaces by more than 0.2 m.
     pub shots_beyond_frame_model: u64,
     /// Lowest |latitude| of such shots in nadir-pointing frames, degrees.
     pub beyond_frame_model_from_latitude_deg: Option<f64>,
 }
 
-/// A shot that met the ground, and where its record is.
+/// A shot that met the ground, with the position of its record.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct KeptShot {
     /// Record of the file, counted from 1 with the label records.
     pub record: u32,
     /// Shot in the frame, 1 to 20.
     pub shot: u8,
-    /// The truth.
+    /// The true values.
     pub truth: Shot,
 }
 
@@ -193,11 +193,11 @@ pub(super) struct ContextTruth {
     pub lines: u32,
     #[serde(flatten)]
     pub poses: Poses,
-    /// Shots of the PEDR file of the image's day that the image shows.
+    /// Shots of the PEDR file of the image's day inside the image.
     pub shots: Vec<ContextShot>,
 }
 
-/// Where an image shows a shot; lines and samples are 0 at the outer edge of the first one.
+/// Image coordinates of a shot; lines and samples are 0 at the outer edge of the first one.
 #[derive(Debug, Serialize)]
 pub(super) struct ContextShot {
     pub record: u32,
@@ -213,7 +213,8 @@ pub(super) struct ProfileTruth {
     pub image: Option<&'static str>,
     pub file: String,
     pub orbit_differences: BTreeMap<&'static str, OrbitDifference>,
-    /// Largest distance between the linear frame model and where the file should have a shot, metres, before rounding.
+    /// Largest distance between the linear frame model and the intended position of a shot in the file, metres, before
+    /// rounding.
     pub frame_error_max_m: f64,
     /// Record of the file, counted from 1 with the label, one entry per shot that met the ground.
     pub record: Vec<u32>,
@@ -222,7 +223,7 @@ pub(super) struct ProfileTruth {
     pub ground_iau2000_m: Vec<[f64; 3]>,
 }
 
-/// How one family's orbit differs from the truth over a profile.
+/// Differences of one family's orbit from the truth over a profile.
 #[derive(Debug, Serialize)]
 pub(super) struct OrbitDifference {
     /// At the middle of the image, metres.
@@ -241,17 +242,17 @@ pub(super) struct TiesTruth {
     pub ties: Vec<TieTruth>,
 }
 
-/// How an image was truly taken.
+/// True exposure of an image.
 #[derive(Debug, Serialize)]
 pub(super) struct TieCameraTruth {
     pub image: &'static str,
     pub time_bias_lines: f64,
     pub position_bias_m: [f64; 3],
-    /// How many focal-plane pixels a line is, in the middle of the image.
+    /// Focal-plane pixels of a line in the middle of the image.
     pub focal_px_per_line: f64,
     /// Lines, 0 at the outer edge of the first one, with the poses in which they were truly exposed.
     pub line: Vec<f64>,
-    /// How much earlier the light left the ground on the boresight, one entry per line.
+    /// Light time from the ground on the boresight, one entry per line.
     pub light_time_s: Vec<f64>,
     #[serde(flatten)]
     pub poses: Poses,
@@ -265,7 +266,7 @@ pub(super) struct TieTruth {
     pub blunder: Option<BlunderTruth>,
 }
 
-/// A measurement that was moved far away.
+/// A measurement displaced by a blunder.
 #[derive(Debug, Serialize)]
 pub(super) struct BlunderTruth {
     pub image: String,
@@ -274,20 +275,20 @@ pub(super) struct BlunderTruth {
 }
 
 impl Truth {
-    /// The truth that all missions share; images, files and profiles are still to come.
+    /// The true values common to all missions; images, files and profiles are added later.
     pub(super) fn new(seed: u64, errors: SceneErrors) -> Self {
         Self {
             made_by: "areograph scene",
             synthetic: "all of this is invented; only ids, times, summing, lines, line periods and emission angles of the narrow-angle images follow Shan et al. 2005",
-            table_2: "emission angles are those of Shan et al. 2005, Table 2, taken at the ground; of E04-01275 the table prints 7424 header lines, of which the RMSE of the first order in their Table 4 would be 9.7 m instead of the 11.45 m printed: it has 8064 here, of which 7424 are delivered",
-            orbit: "positions of images belong to the orbit gsfc (kernels/gsfc.tm), which is the true one but for errors_drawn; nav and ipng, and the site files use nav, differ from it by orbit_differences",
+            table_2: "emission angles are those of Shan et al. 2005, Table 2, taken at the ground; of E04-01275 the table prints 7424 header lines, for which the first-order RMSE in their Table 4 would be 9.7 m instead of the 11.45 m printed; here it has 8064 lines, of which 7424 are delivered",
+            orbit: "positions of images belong to the orbit gsfc (kernels/gsfc.tm), which is true except for errors_drawn; nav (used by the site files) and ipng differ from it by orbit_differences",
             seed,
             errors,
-            errors_rule: "errors are standard deviations and ranges, errors_drawn what was drawn from them for the day of each image; lines were exposed time_bias_lines later than the label says; the bus had the attitude that the C-kernel, its bias removed, has attitude_clock_s later, turned by attitude: matrix from J2000 to the bus = exp([e]x) times that of the kernel, e = constant + linear x + quadratic x^2 (x = (et - middle) / half_image, held beyond -4 and 4) + jitter; bus_position_m (camera and laser) and camera_position_m (camera alone) are added to the orbit gsfc, IAU 2000; the laser points boresight_rad from +Z of the bus towards its X and Y, the same in the whole mission; east_north_radial_m is where the PEDR file has its shots minus where they were, and its spacecraft is that of gsfc, moved along the beam until ranges agree with the ground as the file has it",
+            errors_rule: "errors are standard deviations and ranges, errors_drawn the values drawn from them for the day of each image; lines were exposed time_bias_lines later than the label states; the true attitude of the bus is that of the C-kernel, its bias removed, attitude_clock_s later, turned by attitude: matrix from J2000 to the bus = exp([e]x) times that of the kernel, e = constant + linear x + quadratic x^2 (x = (et - middle) / half_image, held beyond -4 and 4) + jitter; bus_position_m (camera and laser) and camera_position_m (camera only) are added to the orbit gsfc, IAU 2000; the laser points boresight_rad from +Z of the bus towards its X and Y, the same in the whole mission; east_north_radial_m is the position of the shots in the PEDR file minus their true position; the spacecraft of the file is that of gsfc, moved along the beam until ranges agree with the ground of the file",
             errors_drawn: Vec::new(),
             biases: Biases {
                 ck_bias_s: usual_instrument().pointing.ck_bias_s,
-                ck_rule: "the attitude of true time t stands in the C-kernel at t + ck_bias_s",
+                ck_rule: "the attitude of true time t is stored in the C-kernel at t + ck_bias_s",
                 mola_clock_bias_s: usual_altimeter().clock_bias_s,
                 mola_clock_sign: "late",
                 mola_clock_rule: "true time = tag - mola_clock_bias_s, in all files; coordinates hold at the true time",
@@ -297,13 +298,13 @@ impl Truth {
                 period_s: CROSSOVER_PERIOD_S,
                 rule: "residual = amplitude_m sin(2 pi et / period_s) at the frame's mid-point; radii are the raw ones, before its subtraction",
             },
-            frame_model: "a PEDR frame is linear in latitude and longitude: near the poles, in slews and on steep ground seen off nadir it cannot hold 20 true footprints to 0.2 m, nor does it know of jitter; the counts are under files and profiles",
+            frame_model: "a PEDR frame is linear in latitude and longitude: near the poles, in slews and on steep ground seen off nadir it cannot represent 20 true footprints to 0.2 m, and it does not include jitter; the counts are under files and profiles",
             images: Vec::new(),
             files: Vec::new(),
             profiles: Vec::new(),
-            tie_rule: "line n of an image was truly exposed when its label has line n + time_bias_lines, from the place of the orbit gsfc at that time plus position_bias_m (IAU 2000), with the true attitude of that time (errors_rule); line, position and quaternion of a camera are its true poses; it sees ground by light that left it light_time_s before the exposure, from where the camera and Mars were then, with the attitude of the exposure (light time and aberration); tie points are measured in images taken like that, at ground_iau2000_m; the position bias against nav is position_bias_m less the orbit difference of nav; measurements have the noise tie_noise_px of errors in lines and samples, blunders come on top of it",
+            tie_rule: "line n of an image was truly exposed when its label has line n + time_bias_lines, from the position of the orbit gsfc at that time plus position_bias_m (IAU 2000), with the true attitude of that time (errors_rule); line, position and quaternion of a camera are its true poses; it images ground by light that left it light_time_s before the exposure, with the positions of camera and Mars at that instant and the attitude of the exposure (light time and aberration); tie points are measured in such images, at ground_iau2000_m; the position bias against nav is position_bias_m less the orbit difference of nav; measurements have the noise tie_noise_px of errors in lines and samples, plus blunders",
             ties: Vec::new(),
-            wide_angle_rule: "wide-angle images are taken when their labels say, from the true place of the bus with its true attitude, by light that left the ground as much earlier as it takes from each point; lines and samples of shots follow the formula of the instrument kernel moc20.ti",
+            wide_angle_rule: "wide-angle images are exposed at the times of their labels, from the true position of the bus with its true attitude; the light time of each point is applied; lines and samples of shots follow the formula of the instrument kernel moc20.ti",
             wide_angle: Vec::new(),
             rendered: Vec::new(),
         }
@@ -311,7 +312,7 @@ impl Truth {
 }
 
 impl ImageTruth {
-    /// Orientation of the arc's image as the kernels tell it, and how far the rival orbits are off.
+    /// Orientation of the arc's image by the kernels, and the differences of the rival orbits.
     pub(super) fn of(arc: &Arc, versions: &[Version]) -> Self {
         let image = arc.image;
         let step_s = arc.exposed.duration_s() / f64::from(EPOCHS - 1);

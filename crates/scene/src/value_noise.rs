@@ -1,14 +1,14 @@
-//! Noise that is smooth between the nodes of a lattice: what albedo is made of.
+//! Smooth noise between the nodes of a lattice, used for albedo.
 
 use nalgebra::Vector3;
 
 use super::random::{mix, unit_of};
 
-/// Value noise, −1 to 1: numbers at whole places, smoothly blended between them.
+/// Value noise, −1 to 1: values at integer positions, smoothly interpolated.
 pub(super) fn noise(place: &Vector3<f64>, key: u64) -> f64 {
     let corner = place.map(f64::floor);
     let share = (place - corner).map(|share| share * share * (3.0 - 2.0 * share));
-    // Each node has a number by x, then y, then z: what two nodes have in common is mixed once.
+    // The value of a node is hashed by x, then y, then z: common parts of two nodes are computed once.
     let between = |axis: usize, hash: u64, value: &dyn Fn(u64) -> f64| {
         let [near, far] = [0.0, 1.0].map(|step| value(mix(hash ^ (corner[axis] + step).to_bits())));
         near + share[axis] * (far - near)

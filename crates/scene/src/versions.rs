@@ -1,4 +1,4 @@
-//! Three rival orbits of the same flight: the true one and two that are smoothly off.
+//! Three rival orbits of the same flight: the true one and two with smooth errors.
 
 use nalgebra::Vector3;
 
@@ -9,7 +9,7 @@ use super::{
 use areograph_base::time::Et;
 use areograph_geom::orbit_axes::radial_along_cross;
 
-/// Families of orbit solutions, as the archive names them.
+/// Families of orbit solutions, named as in the archive.
 pub(super) const FAMILIES: [&str; 3] = ["nav", "gsfc", "ipng"];
 
 /// One family's orbit of one arc.
@@ -24,9 +24,9 @@ pub(super) struct Version {
 }
 
 impl Version {
-    /// The orbit of `family` on the day of `image`; `gsfc`, on which the PEDR files rest, is the truth.
+    /// The orbit of `family` on the day of `image`; `gsfc`, the orbit of the PEDR files, is the truth.
     ///
-    /// Differences stay below 50 m and lie mostly across the track.
+    /// Differences stay below 50 m and are mostly across the track.
     pub(super) fn new(family: &'static str, image: &str, seed: u64, middle: Et) -> Self {
         let mut random = Random::new(seed, &format!("{family} {image}"));
         // Largest radial and along-track difference; least and largest across the track.
@@ -64,13 +64,13 @@ impl Version {
 
     /// This version minus the truth at `et` along the axes of the true orbit, metres.
     pub(super) fn radial_along_cross_m(&self, et: Et) -> Vector3<f64> {
-        // A tenth of the difference swings with the revolution.
+        // A tenth of the difference varies with the revolution.
         let slow = 1.0 + 0.1 * (Orbit::mean_motion_rad_s() * et.since(self.middle)).sin();
         slow * self.offset_m
     }
 
-    /// State of this version at `et`; what is added to the true velocity is a central difference, good to
-    /// 1e-8 m/s.
+    /// State of this version at `et`; the difference from the true velocity is a central difference, accurate to 1e-8
+    /// m/s.
     pub(super) fn state(&self, orbit: &Orbit, et: Et) -> OrbitState {
         const STEP_S: f64 = 1.0;
         let truth = orbit.state(et);

@@ -1,4 +1,4 @@
-//! Prints where Mars Global Surveyor was: position and velocity relative to Mars in J2000.
+//! Prints the state of Mars Global Surveyor: position and velocity relative to Mars in J2000.
 //!
 //! `cargo run --package areograph-spice --example state -- 2001-02-03T04:05:06 naif0012.tls mgs.bsp de430.bsp`
 #![allow(

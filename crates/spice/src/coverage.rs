@@ -1,4 +1,4 @@
-//! When kernels hold position and attitude, gaps inside a file included, and when they are needed.
+//! Coverage of position and attitude by kernels, gaps inside a file included, and required coverage.
 
 use std::collections::BTreeMap;
 
@@ -20,16 +20,16 @@ use areograph_base::{
 /// Positions of one body relative to each centre that some segment uses.
 type ByCentre = BTreeMap<i32, Vec<Interval>>;
 
-/// What the kernels of a session hold of one spacecraft.
+/// Coverage of one spacecraft by the kernels of a session.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Coverage {
-    /// When the position of the spacecraft relative to Mars is known.
+    /// Intervals of known position of the spacecraft relative to Mars.
     pub spk: Intervals,
-    /// When the attitude of the bus is known with its rates; time as the C-kernels count it.
+    /// Intervals of known attitude of the bus with its rates, in the time of the C-kernels.
     pub ck: Intervals,
     /// For each kernel that holds the spacecraft: its index in the set, and its own intervals.
     pub per_kernel: Vec<(usize, Intervals)>,
-    /// C-kernels with attitudes of the bus that have no rates, by their index: these are not read.
+    /// Indices of C-kernels with attitudes of the bus without rates, which are not read.
     #[serde(skip)]
     pub without_rates: Vec<usize>,
     #[serde(skip)]
@@ -37,10 +37,10 @@ pub struct Coverage {
 }
 
 impl Coverage {
-    /// What `set`, which `cspice` has loaded, holds of `spacecraft`.
+    /// The coverage of `spacecraft` by `set`, which `cspice` has loaded.
     ///
     /// # Errors
-    /// [`super::SpiceError::Spice`] when a C-kernel cannot be read; [`super::SpiceError::MissingText`] without clock.
+    /// [`super::SpiceError::Spice`] when a C-kernel cannot be read; [`super::SpiceError::MissingText`] without a clock.
     pub(super) fn of(
         set: &KernelSet,
         cspice: &Cspice,
@@ -95,25 +95,25 @@ impl Coverage {
         Ok(coverage)
     }
 
-    /// Ends of ephemeris segments, in order: the motion may jump there.
+    /// Ends of ephemeris segments, in order: the motion may be discontinuous there.
     pub(super) fn seams(&self) -> &[Et] {
         &self.seams
     }
 }
 
-/// Times for which kernels of the spacecraft of the laser are needed, and of others.
+/// Required coverage of the spacecraft of the laser, and of others.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct RequiredCoverage {
-    /// Instants that ephemerides must touch.
+    /// Instants that ephemerides must cover.
     pub positions: Intervals,
-    /// Instants that attitudes must touch, as the C-kernels count time: exposures with the pointing bias.
+    /// Instants that attitudes must cover, in the time of the C-kernels: exposures with the pointing bias.
     pub attitudes: Intervals,
     /// The same of other spacecraft, by their identifiers.
     pub others: BTreeMap<String, RequiredCoverage>,
 }
 
 impl RequiredCoverage {
-    /// When kernels of any spacecraft must hold positions and attitudes.
+    /// Required coverage of positions and attitudes for any spacecraft.
     #[must_use]
     pub fn of_all(&self) -> [Intervals; 2] {
         let all = || std::iter::once(self).chain(self.others.values());
@@ -133,7 +133,7 @@ pub(super) fn interval_of([start, stop]: [f64; 2]) -> Interval {
     Interval::new(Et::from_seconds(start), Et::from_seconds(stop))
 }
 
-/// When the spacecraft relative to Mars follows: directly, or through a centre that both are known from.
+/// Coverage of the spacecraft relative to Mars: directly, or through a centre relative to which both are known.
 fn relative_to_mars(of_spacecraft: &ByCentre, of_mars: &ByCentre) -> Intervals {
     let mut known = Vec::new();
     for (centre, intervals) in of_spacecraft {

@@ -1,8 +1,8 @@
-//! Segments of binary kernels, checked before CSPICE sees the file: it believes what a file says of itself, and reads
+//! Segments of binary kernels, checked before CSPICE reads the file: CSPICE trusts the counts of a file, and reads
 //! beyond its arrays where a count is wrong.
 //!
-//! It checks only that the segments are as long, ordered and finite as they state, and is no reader of kernels: CSPICE
-//! is the reference.
+//! Only the lengths, order and finiteness of segments are checked. This is not a kernel reader: CSPICE is the
+//! reference.
 //!
 //! Source: NAIF, DAF Required Reading: file record, summary records, addresses of 8-byte words.
 
@@ -20,7 +20,7 @@ use std::{
 use super::{error::SpiceError, role::KernelRole};
 use areograph_base::error::{IoError, Locate, Result};
 
-/// Raised when [`check_contents`] finds more than before: what passed it then is looked at again.
+/// Increased when [`check_contents`] detects more than before: kernels that passed earlier are checked again.
 pub(super) const CHECK: u32 = 1;
 /// Bytes of a DAF record.
 const RECORD_SIZE: usize = 1_024;
@@ -43,7 +43,7 @@ pub(super) struct Segment {
     pub(super) integers: [i32; SUMMARY_INTEGERS_MAX],
 }
 
-/// What the integers of a summary say of a segment.
+/// The content of a segment by the integers of its summary.
 #[derive(Debug, Clone, Copy)]
 struct Content {
     body: i32,
@@ -54,7 +54,7 @@ struct Content {
 }
 
 impl Segment {
-    /// Its integers as those of a kernel of `role`; their addresses have been found to rise from 1.
+    /// Its content in a kernel of `role`; its addresses have been checked to rise from 1.
     fn content(&self, role: KernelRole) -> Content {
         let [body, _, third, fourth, fifth, sixth] = self.integers;
         let (kind, begin, end) = match role {
@@ -75,16 +75,16 @@ impl Segment {
 /// The segments of a binary kernel, in file order; later ones win.
 ///
 /// # Errors
-/// [`SpiceError::DamagedKernel`] when the file is shorter than it says or its list is broken.
+/// [`SpiceError::DamagedKernel`] when the file is shorter than it states or its list is broken.
 pub(super) fn segments(path: &Path) -> Result<Vec<Segment>> {
     let mut reader = Reader::open(path)?;
     reader.segments().in_file(path)
 }
 
-/// Makes sure that the words of every segment are what the counts of the segment say, finite and in order.
+/// Checks that the words of every segment agree with the counts of the segment, and are finite and in order.
 ///
 /// # Errors
-/// [`SpiceError::DamagedKernel`] with the segment and what is wrong.
+/// [`SpiceError::DamagedKernel`] with the segment and the problem.
 pub(super) fn check_contents(path: &Path, role: KernelRole) -> Result<()> {
     let mut reader = Reader::open(path)?;
     let segments = reader.segments().in_file(path)?;
@@ -227,7 +227,7 @@ impl Reader {
         let mut found = Vec::new();
         let mut next = f64::from(first);
         let mut records_left = self.size / RECORD_SIZE as u64;
-        // Zero ends the chain; every other number has to be a record's.
+        // Zero ends the chain; every other number must be that of a record.
         while next.abs() > 0.0 || next.is_nan() {
             if !(next >= 1.0 && next.fract().abs() < f64::EPSILON) {
                 return Err(damaged(format!(
@@ -280,7 +280,7 @@ impl Reader {
             segment.integers[integers - 1],
         );
         let addresses_fit = 1 <= begin && begin <= end && i64::from(end) < first_free_word;
-        // Written so that NaN is refused too; an infinite time is no end of a segment either.
+        // Written so that NaN is rejected too; an infinite time is not a valid end of a segment either.
         let ordered = segment.start <= segment.stop;
         let finite = segment.start.is_finite() && segment.stop.is_finite();
         if !(addresses_fit && ordered && finite) {

@@ -1,17 +1,17 @@
-//! What can go wrong with kernels and with CSPICE.
+//! Errors of kernels and of CSPICE.
 
 use areograph_base::{
     error::{Cause, Kind},
     time::{Et, Interval},
 };
 
-/// An error of kernels, of what they hold, or of a CSPICE call.
+/// An error of kernels, of their content, or of a CSPICE call.
 #[derive(Debug, thiserror::Error)]
 pub enum SpiceError {
     /// CSPICE signalled an error.
     #[error("{call}: {short}: {long}")]
     Spice {
-        /// The routine that was called, and with what where NAIF's text does not say it.
+        /// The routine called, and its argument where NAIF's text does not state it.
         call: String,
         /// NAIF's short message, for example `SPICE(SPKINSUFFDATA)`.
         short: String,
@@ -21,18 +21,18 @@ pub enum SpiceError {
     /// A session is open on this thread already; waiting for it would never end.
     #[error("a SPICE session is already open on this thread")]
     SessionOpen,
-    /// The file is something else than a kernel that can be loaded.
+    /// The file is not a kernel that can be loaded.
     #[error("is {found}; expected {expected}")]
     NotAKernel {
-        /// What it is.
+        /// What the file is.
         found: String,
-        /// What was expected in its place.
+        /// What was expected.
         expected: &'static str,
     },
-    /// A binary kernel is shorter than its own file record says, or its segment list is broken.
+    /// A binary kernel is shorter than its own file record states, or its segment list is broken.
     #[error("damaged binary kernel: {problem}")]
     DamagedKernel {
-        /// What is wrong, with numbers.
+        /// The problem, with numbers.
         problem: String,
     },
     /// A text does not follow the rules of NAIF text kernels.
@@ -40,18 +40,18 @@ pub enum SpiceError {
     TextKernel {
         /// Line, counted from 1.
         line: usize,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
     },
-    /// A metakernel names a file that is not there.
+    /// A metakernel names a file that does not exist.
     #[error("names {name}, which does not exist{candidates}")]
     MissingKernel {
-        /// Name after the path symbols were replaced.
+        /// Name with the path symbols replaced.
         name: String,
         /// Similar names, if any, as the end of the sentence.
         candidates: String,
     },
-    /// A folder of kernels lacks something that is needed.
+    /// A folder of kernels lacks a required one.
     #[error("no kernel in this folder {what}")]
     NothingToSelect {
         /// What is missing, for example `defines the MGS clock (SCLK_DATA_TYPE_94)`.
@@ -69,7 +69,7 @@ pub enum SpiceError {
         /// Names of the kernels of the set.
         set: Vec<String>,
     },
-    /// A kernel is not what it was when it was chosen.
+    /// A kernel has changed since it was chosen.
     #[error("kernel changed while it was in use: BLAKE3 was {was}, is {is}")]
     KernelChanged {
         /// Hash when it was chosen.
@@ -77,53 +77,53 @@ pub enum SpiceError {
         /// Hash now.
         is: String,
     },
-    /// A text is too long for CSPICE, or cannot be handed to it.
+    /// A text is too long for CSPICE, or cannot be passed to it.
     #[error("{what} cannot be given to CSPICE: {problem}")]
     Unusable {
-        /// What it is: a path, a clock string, ...
+        /// The kind of text: a path, a clock string, ...
         what: &'static str,
-        /// Why not.
+        /// The reason.
         problem: String,
     },
-    /// Kernels do not hold what was asked.
+    /// Kernels do not cover the required interval.
     #[error("no {what} of {of} for {gap} ({gap_utc}), required for {required}; {neighbours}")]
     CoverageGap {
         /// `position` or `attitude`.
         what: &'static str,
         /// The spacecraft.
         of: String,
-        /// The part that is missing.
+        /// The gap.
         gap: Interval,
         /// The same in UTC.
         gap_utc: String,
-        /// What was asked for.
+        /// The required interval.
         required: Interval,
-        /// Which kernels end or begin there.
+        /// Kernels that end or begin there.
         neighbours: String,
     },
-    /// No attitude sample near enough.
+    /// No attitude sample within the tolerance.
     #[error("no attitude of {of} within {tolerance_s} s of {kernel_time} (time of the C-kernel)")]
     NoAttitude {
         /// The spacecraft.
         of: String,
-        /// Instant as the C-kernel counts time.
+        /// Instant in the time of the C-kernel.
         kernel_time: Et,
-        /// How far it was allowed to look.
+        /// Tolerance of the search.
         tolerance_s: f64,
     },
     /// A kernel holds NaN or an infinity.
     #[error("{what} at {instant} (UTC {utc}) is not finite{part}")]
     NotFinite {
-        /// Whose position, velocity or attitude.
+        /// The position, velocity or attitude concerned.
         what: String,
-        /// When, as the kernel counts time.
+        /// The instant, in the time of the kernel.
         instant: Et,
         /// The same in UTC.
         utc: String,
-        /// Which part of the kernel holds it, as the end of the sentence.
+        /// The part of the kernel that holds it, as the end of the sentence.
         part: String,
     },
-    /// The kernels' motion cannot be tabulated this well.
+    /// The kernels' motion cannot be tabulated to the tolerance.
     #[error(
         "trajectory near {near}: {error_m} m off with pieces of {piece_s} s; required {tolerance_m} m"
     )]
@@ -134,7 +134,7 @@ pub enum SpiceError {
         error_m: f64,
         /// Length of the piece, seconds.
         piece_s: f64,
-        /// Distance that was asked for, metres.
+        /// Required tolerance, metres.
         tolerance_m: f64,
     },
     /// Columns for a kernel writer do not fit together.
@@ -142,15 +142,15 @@ pub enum SpiceError {
     Segment {
         /// Name of the segment.
         segment: String,
-        /// What does not fit.
+        /// The mismatch.
         problem: String,
     },
 }
 
-/// Names of a set that a message repeats.
+/// Maximum number of kernel names in a message.
 const NAMES_MAX: usize = 12;
 
-/// That none of a set of kernels defines `variable`, as the end of a sentence.
+/// States that no kernel of a set defines `variable`, as the end of a sentence.
 fn without(names: &[String], variable: &str) -> String {
     let more = match names.len() {
         0 => return ", which is empty".to_owned(),
@@ -161,7 +161,7 @@ fn without(names: &[String], variable: &str) -> String {
     format!(": none of {first}{more} defines {variable}")
 }
 
-/// CSPICE's short messages that mean "the kernels do not reach there".
+/// CSPICE's short messages for insufficient coverage.
 const COVERAGE_MESSAGES: [&str; 3] = [
     "SPICE(SPKINSUFFDATA)",
     "SPICE(NOFRAMECONNECT)",
@@ -169,7 +169,7 @@ const COVERAGE_MESSAGES: [&str; 3] = [
 ];
 
 impl SpiceError {
-    /// The same error of CSPICE, known to come from `value`.
+    /// The same error of CSPICE, with the `value` that caused it.
     pub(super) fn of(mut self, value: &str) -> Self {
         if let Self::Spice { call, .. } = &mut self {
             *call = format!("{call}(\"{value}\")");

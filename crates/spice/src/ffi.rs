@@ -3,7 +3,7 @@
 //! CSPICE keeps global state and is not thread safe. Every call is a method of [`Cspice`], and a
 //! `Cspice` exists only while the process-wide lock is held, so no call can happen without it.
 
-#![allow(unsafe_code, reason = "CSPICE is a C library; this file is its fence")]
+#![allow(unsafe_code, reason = "CSPICE is a C library, called only here")]
 #![allow(
     clippy::unused_self,
     reason = "a method needs `self` as the proof that the lock is held"
@@ -24,10 +24,10 @@ mod write;
 
 pub(super) use write::CkColumns;
 
-/// What a CSPICE call gives back.
+/// Result of a CSPICE call.
 pub(super) type Called<T> = Result<T, SpiceError>;
 
-/// Longest file name that CSPICE takes (`FILSIZ` in its kernel loader).
+/// Longest file name that CSPICE accepts (`FILSIZ` in its kernel loader).
 pub const PATH_LENGTH_MAX: usize = 255;
 /// Lengths of CSPICE's short and long error messages, with the closing zero.
 const SHORT_MESSAGE_SIZE: usize = 26;
@@ -44,15 +44,15 @@ thread_local! {
     static HELD_HERE: Cell<bool> = const { Cell::new(false) };
 }
 
-/// The right to call CSPICE: holds the process-wide lock, and unloads every kernel when it goes.
+/// The right to call CSPICE: holds the process-wide lock, and unloads every kernel when dropped.
 ///
-/// It stays on its thread because the lock's guard does.
+/// It is not `Send`, like the guard of the lock.
 #[derive(Debug)]
 pub(super) struct Cspice {
     _lock: MutexGuard<'static, ()>,
 }
 
-/// A state as CSPICE gives it: kilometres and kilometres per second.
+/// A state in CSPICE's units: kilometres and kilometres per second.
 pub(super) type StateKm = [f64; 6];
 /// A 3 by 3 matrix by rows.
 pub(super) type Rows = [[f64; 3]; 3];
@@ -73,7 +73,7 @@ impl Cspice {
         if HELD_HERE.get() {
             return Err(SpiceError::SessionOpen);
         }
-        // A thread that panicked inside a session has unloaded its kernels on the way out.
+        // A thread that panicked inside a session unloaded its kernels while unwinding.
         let lock = CSPICE.lock().unwrap_or_else(PoisonError::into_inner);
         HELD_HERE.set(true);
         let cspice = Self { _lock: lock };
@@ -135,7 +135,7 @@ impl Cspice {
         self.check("furnsh_c")
     }
 
-    /// `str2et_c`: UTC to ET. (`utc2et_c` would take a thirteenth month for the next January.)
+    /// `str2et_c`: UTC to ET. (`utc2et_c` would accept a thirteenth month as the next January.)
     pub(super) fn utc_to_et(&self, utc: &str) -> Called<f64> {
         let text = c_text("a UTC string", utc)?;
         let mut et = 0.0;
@@ -340,7 +340,7 @@ impl Drop for Cspice {
     }
 }
 
-/// A length as CSPICE counts it; larger ones saturate, and no slice here is that large.
+/// A length in CSPICE's type; larger ones saturate, and no slice here is that large.
 fn length(size: usize) -> c_int {
     c_int::try_from(size).unwrap_or(c_int::MAX)
 }
@@ -352,11 +352,11 @@ fn text_of(bytes: &[u8]) -> String {
         .unwrap_or_default()
 }
 
-/// A zero-ended copy, refused when CSPICE could not take it whole.
+/// A zero-ended copy; rejected when CSPICE could not accept it whole.
 fn c_text(what: &'static str, text: &str) -> Called<CString> {
     if text.len() > PATH_LENGTH_MAX {
         let problem = format!(
-            "{} bytes long, at most {PATH_LENGTH_MAX} are possible",
+            "{} bytes long; expected at most {PATH_LENGTH_MAX}",
             text.len()
         );
         return Err(SpiceError::Unusable { what, problem });
@@ -371,7 +371,7 @@ fn c_text(what: &'static str, text: &str) -> Called<CString> {
     })
 }
 
-/// The path for CSPICE, refused when it could not be taken whole.
+/// The path for CSPICE; rejected when it could not be accepted whole.
 pub(super) fn c_path(path: &Path) -> Called<CString> {
     let text = path.to_str().ok_or_else(|| SpiceError::Unusable {
         what: "a path",

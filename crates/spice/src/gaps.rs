@@ -1,4 +1,4 @@
-//! Making sure that kernels hold what is needed, and telling which gap is in the way.
+//! Checks of required coverage, and the gaps in it.
 
 use super::{coverage::RequiredCoverage, error::SpiceError, role::KernelRole, session::Session};
 use areograph_base::{
@@ -7,10 +7,10 @@ use areograph_base::{
 };
 
 impl Session {
-    /// For each kernel that holds the spacecraft: its index in the set, and the required instants for which CSPICE reads
-    /// it, because no later kernel of its role holds them.
+    /// For each kernel that holds the spacecraft: its index in the set, and the required instants for which CSPICE
+    /// reads it, because no later kernel of its role covers them.
     ///
-    /// * `tolerance_s` – how far outside its intervals a C-kernel may be asked, seconds
+    /// * `tolerance_s` – how far outside its intervals a C-kernel may be read, seconds
     ///
     /// # Errors
     /// As [`Self::coverage`].
@@ -35,7 +35,7 @@ impl Session {
         Ok(in_use)
     }
 
-    /// Makes sure that the position of the spacecraft is known throughout `required`.
+    /// Checks that the position of the spacecraft is known throughout `required`.
     ///
     /// # Errors
     /// [`SpiceError::CoverageGap`] with the first gap and the kernels beside it.
@@ -44,11 +44,10 @@ impl Session {
         self.require(required, held, "position", KernelRole::Spk)
     }
 
-    /// Makes sure that the attitude is known for every exposure in `exposures`.
+    /// Checks that the attitude is known for every exposure in `exposures`.
     ///
-    /// What is looked for are the instants as the C-kernels count them, with `padding_s` seconds more
-    /// at both ends; an instant within `tolerance_s` of a C-kernel's interval is known, as it is to
-    /// [`Session::attitude`].
+    /// The instants are those in the time of the C-kernels, with `padding_s` seconds more at both ends; an instant
+    /// within `tolerance_s` of a C-kernel's interval is covered, as in [`Session::attitude`].
     ///
     /// # Errors
     /// [`SpiceError::CoverageGap`] with the first gap and the kernels beside it.
@@ -75,7 +74,7 @@ impl Session {
         if held.cover(required) {
             return Ok(());
         }
-        // An instant without length has no gap of any length either.
+        // An instant has no extent, hence no gap of any extent.
         let gap = held.gaps_in(required).first().copied().unwrap_or(required);
         let gap_utc = format!("UTC {} .. {}", self.utc(gap.start), self.utc(gap.stop));
         let neighbours = self.neighbours(gap, role)?;
@@ -90,7 +89,7 @@ impl Session {
         .into())
     }
 
-    /// The spacecraft, and its number where another one is meant than usual: files of several may be at hand.
+    /// The spacecraft, with its number unless it is the usual one: files of several may be present.
     pub(super) fn whom(&self, role: KernelRole) -> String {
         let of = self.spacecraft();
         match role {
@@ -100,7 +99,7 @@ impl Session {
         }
     }
 
-    /// Which kernels end before a gap and begin after it.
+    /// The kernels that end before a gap and begin after it.
     fn neighbours(&self, gap: Interval, role: KernelRole) -> Result<String> {
         let kernels = self.kernels().kernels();
         let mut before: Option<(Et, usize)> = None;
@@ -153,7 +152,7 @@ impl Session {
         Ok(sentences.join(", "))
     }
 
-    /// UTC for messages; without leap seconds it says so.
+    /// UTC for messages; without leap seconds the text states so.
     fn utc(&self, et: Et) -> String {
         self.et_to_utc(et)
             .unwrap_or_else(|_| "unknown (no leap seconds)".to_owned())

@@ -1,4 +1,4 @@
-//! Kernel files: what they are, by their content, and in which order they are loaded.
+//! Kernel files: their role, from their content, and their load order.
 
 use std::{
     fs::{self, File},
@@ -14,16 +14,16 @@ use areograph_store::files::{InputFiles, file_name, hash_file};
 
 /// Largest text kernel that is read, bytes; the archive's largest is below 2 MB.
 const TEXT_SIZE_MAX: u64 = 64 << 20;
-/// What a file should have been, for messages.
+/// What a file is expected to be, for messages.
 const EXPECTED: &str =
     "a binary SPK, CK or PCK (DAF/...) or a text kernel with a \\begindata block";
 
-/// A kernel file as it was when it was chosen.
+/// A kernel file as of its selection.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Kernel {
     /// Path as given or found.
     pub path: PathBuf,
-    /// What it is for.
+    /// Its role.
     pub role: KernelRole,
     /// Size.
     pub bytes: u64,
@@ -32,7 +32,8 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    /// Looks into a file, hashes it and checks the words of a binary one, unless this content passed the check before.
+    /// Identifies and hashes a file and checks the words of a binary one, unless the same content has passed the check
+    /// before.
     ///
     /// # Errors
     /// [`IoError`]; [`SpiceError::NotAKernel`]; [`SpiceError::DamagedKernel`].
@@ -44,7 +45,7 @@ impl Kernel {
         let binary = first_bytes(path)?.starts_with(b"DAF/");
         if binary && !files.has_passed(&file.blake3, daf::CHECK) {
             daf::check_contents(path, role)?;
-            // What was checked is what was hashed.
+            // The checked content is the hashed content.
             files.verify(path)?;
             files.note_passed(&file.blake3, daf::CHECK);
         }
@@ -63,7 +64,7 @@ impl Kernel {
     }
 }
 
-/// Kernels in load order (later ones win), and why each is there.
+/// Kernels in load order (later ones win), with the reason for each.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct KernelSet {
     pub(super) kernels: Vec<Kernel>,
@@ -71,20 +72,20 @@ pub struct KernelSet {
 }
 
 impl KernelSet {
-    /// These files in this order; of files with the same content the last one is loaded, as SPICE lets
-    /// the last one win.
+    /// These files in this order; of files with the same content only the last one is loaded, since in SPICE the last
+    /// one wins.
     ///
     /// # Errors
-    /// [`IoError`] for a file that cannot be read, [`SpiceError::NotAKernel`] for a file that is none
-    /// (its role is found by content, never by name), [`SpiceError::DamagedKernel`] for a truncated one.
+    /// [`IoError`] for a file that cannot be read, [`SpiceError::NotAKernel`] for a file that is not a kernel (its role
+    /// is found by content, never by name), [`SpiceError::DamagedKernel`] for a truncated one.
     pub fn from_files(files: &[PathBuf]) -> Result<Self> {
         Self::from_files_of(&InputFiles::default(), files)
     }
 
-    /// As [`Self::from_files`], with the hashes that a run has of its input files.
+    /// Like [`Self::from_files`], with the hashes that a run has of its input files.
     ///
     /// # Errors
-    /// Those of [`Self::from_files`]; a file that is no longer what the run has read.
+    /// Those of [`Self::from_files`]; a file that has changed since the run read it.
     pub fn from_files_of(run: &InputFiles, files: &[PathBuf]) -> Result<Self> {
         let mut set = Self::default();
         for path in files {
@@ -93,14 +94,14 @@ impl KernelSet {
         Ok(set)
     }
 
-    /// The same kernels and behind them one that was looked into.
+    /// The same kernels followed by an inspected one.
     #[must_use]
     pub fn with(mut self, kernel: Kernel) -> Self {
         self.kernels.push(kernel);
         self
     }
 
-    /// The same kernels and behind them `files`, which therefore win.
+    /// The same kernels followed by `files`, which therefore win.
     ///
     /// # Errors
     /// As [`Self::from_files`].
@@ -112,7 +113,7 @@ impl KernelSet {
         Ok(set)
     }
 
-    /// Appends a file; an earlier one of the same content gives up its place, since later files win.
+    /// Appends a file; an earlier one of the same content is removed, since later files win.
     pub(super) fn add(&mut self, path: &Path, reason: &str, files: &InputFiles) -> Result<()> {
         let kernel = Kernel::inspect(path, files)?;
         if kernel.role == KernelRole::Meta {
@@ -151,13 +152,13 @@ impl KernelSet {
         }
     }
 
-    /// Why each kernel was chosen or left out, one line each.
+    /// The reason for choosing or omitting each kernel, one line each.
     #[must_use]
     pub fn explanation(&self) -> &[String] {
         &self.explanation
     }
 
-    /// What of the explanation the list of kernels does not say itself: all but that one was listed.
+    /// The part of the explanation that the list of kernels does not contain: all except that a kernel was listed.
     pub fn notes(&self) -> impl Iterator<Item = &String> {
         let plain = |line: &str| {
             let mut kernels = self.kernels.iter();
@@ -172,7 +173,7 @@ impl KernelSet {
     /// Hashes every kernel again, after use.
     ///
     /// # Errors
-    /// [`SpiceError::KernelChanged`] naming the file that is no longer what was loaded.
+    /// [`SpiceError::KernelChanged`] naming the file that has changed since it was loaded.
     pub fn verify_unchanged(&self) -> Result<()> {
         for kernel in &self.kernels {
             let (is, _) = hash_file(&kernel.path)?;
@@ -185,7 +186,7 @@ impl KernelSet {
     }
 }
 
-/// What a file is, by its content.
+/// The role of a file, from its content.
 pub(super) fn role_of(path: &Path) -> Result<KernelRole> {
     let start = first_bytes(path)?;
     let role = match start.as_slice() {
@@ -260,7 +261,7 @@ fn text_role(path: &Path) -> Result<KernelRole> {
     let text = read_text(path)?;
     let assignments = text_kernel::assignments(&text).in_file(path)?;
     let defines = |part: &str| assignments.iter().any(|found| found.name.starts_with(part));
-    // Whatever the header says: CSPICE loads what such a variable lists, unseen and unhashed.
+    // Regardless of the header: CSPICE loads the files that such a variable lists, unchecked and unhashed.
     if defines("KERNELS_TO_LOAD") {
         return Ok(KernelRole::Meta);
     }

@@ -1,15 +1,15 @@
-//! CSPICE behind one fence: kernels in, times, states, attitudes and tabulated trajectories out.
+//! The interface to CSPICE: kernels in, times, states, attitudes and tabulated trajectories out.
 //!
 //! | to | use |
 //! |---|---|
 //! | choose and check kernels | [`KernelSet`] |
-//! | show a stage some of them | [`KernelView`] |
-//! | ask CSPICE | [`Session`], one at a time in a process |
-//! | know where the gaps are | [`Session::coverage`], [`Session::require_position`], [`Session::require_attitude`] |
-//! | leave CSPICE behind, for parallel work | [`Session::trajectory`] |
-//! | write kernels: of an invented mission, of adjusted orientations | [`write_spk`], [`write_ck`], [`write_encoded_ck`] |
+//! | show a stage some of the kernels | [`KernelView`] |
+//! | call CSPICE | [`Session`], one at a time in a process |
+//! | find gaps in coverage | [`Session::coverage`], [`Session::require_position`], [`Session::require_attitude`] |
+//! | compute positions in parallel without CSPICE | [`Session::trajectory`] |
+//! | write kernels: synthetic missions, adjusted orientations | [`write_spk`], [`write_ck`], [`write_encoded_ck`] |
 //!
-//! Kilometres become metres here, and nowhere else.
+//! Kilometres are converted to metres here, and nowhere else.
 //!
 //! No other crate links CSPICE.
 //!

@@ -1,7 +1,7 @@
 //! Metakernels: reading them, and writing the one that reproduces a run.
 //!
-//! Source: NAIF, Kernel Required Reading: `KERNELS_TO_LOAD`, `PATH_SYMBOLS`, `PATH_VALUES`, and `+`
-//! at the end of a string that goes on in the next one.
+//! Source: NAIF, Kernel Required Reading: `KERNELS_TO_LOAD`, `PATH_SYMBOLS`, `PATH_VALUES`, and `+` at the end of a
+//! string that continues in the next one.
 
 use std::{
     fs,
@@ -23,20 +23,20 @@ const STRING_MAX: usize = 80;
 impl KernelSet {
     /// The kernels that a metakernel lists; relative paths count from the metakernel's own folder.
     ///
-    /// A name that is not there is sought once more without regard to case and to `.`, `_`, `-`,
-    /// since archives and tools write the same name differently; the explanation then says so.
+    /// A missing file is searched for again without regard to case and to `.`, `_`, `-`, since archives and tools write
+    /// the same name differently; the explanation then states this.
     ///
     /// # Errors
-    /// [`SpiceError::NotAKernel`] for a file that is no metakernel, [`SpiceError::TextKernel`] for a
-    /// broken line, [`SpiceError::MissingKernel`], and those of [`KernelSet::from_files`].
+    /// [`SpiceError::NotAKernel`] for a file that is not a metakernel, [`SpiceError::TextKernel`] for a malformed line,
+    /// [`SpiceError::MissingKernel`], and those of [`KernelSet::from_files`].
     pub fn from_metakernel(metakernel: &Path) -> Result<Self> {
         Self::from_metakernel_of(&InputFiles::default(), metakernel)
     }
 
-    /// As [`Self::from_metakernel`], with the hashes that a run has of its input files.
+    /// Like [`Self::from_metakernel`], with the hashes that a run has of its input files.
     ///
     /// # Errors
-    /// Those of [`Self::from_metakernel`]; a file that is no longer what the run has read.
+    /// Those of [`Self::from_metakernel`]; a file that has changed since the run read it.
     pub fn from_metakernel_of(run: &InputFiles, metakernel: &Path) -> Result<Self> {
         run.admit(metakernel)?;
         let role = role_of(metakernel)?;
@@ -70,7 +70,7 @@ impl KernelSet {
 
     /// A metakernel that loads the same kernels in the same order.
     ///
-    /// * `relative_to` – the folder it will lie in; paths are written relative to it where possible
+    /// * `relative_to` – the folder of the metakernel; paths are written relative to it where possible
     #[must_use]
     pub fn metakernel_text(&self, relative_to: Option<&Path>) -> String {
         self.metakernel_text_before(relative_to, &[])
@@ -79,7 +79,7 @@ impl KernelSet {
     /// A metakernel that loads the same kernels in the same order, and then those of `later`.
     ///
     /// * `relative_to` – as for [`Self::metakernel_text`]
-    /// * `later` – their paths are written as they are, relative to the metakernel's folder
+    /// * `later` – their paths are written unchanged, relative to the metakernel's folder
     #[must_use]
     pub fn metakernel_text_before(&self, relative_to: Option<&Path>, later: &[Kernel]) -> String {
         let described = self.kernels.iter().chain(later).map(|kernel| {
@@ -116,7 +116,7 @@ fn is_list_variable(assignment: &Assignment) -> bool {
     ["KERNELS_TO_LOAD", "PATH_SYMBOLS", "PATH_VALUES"].contains(&assignment.name.as_str())
 }
 
-/// Names to load, symbols replaced.
+/// Names to load, with symbols replaced.
 fn listed_names(assignments: &[Assignment]) -> std::result::Result<Vec<String>, SpiceError> {
     let symbols = strings(assignments, "PATH_SYMBOLS")?;
     let values = strings(assignments, "PATH_VALUES")?;
@@ -131,7 +131,7 @@ fn listed_names(assignments: &[Assignment]) -> std::result::Result<Vec<String>, 
         });
     }
     let mut pairs: Vec<(String, String)> = symbols.into_iter().zip(values).collect();
-    // A symbol that begins with another one comes first.
+    // A symbol that begins with another one is replaced first.
     pairs.sort_by_key(|(symbol, _)| std::cmp::Reverse(symbol.len()));
     let names = strings(assignments, "KERNELS_TO_LOAD")?;
     if names.is_empty() {
@@ -215,7 +215,7 @@ fn same_name(written: &Path, name: &str) -> std::result::Result<PathBuf, SpiceEr
     })
 }
 
-/// `path` as seen from `folder`; unchanged where there is no folder or no way.
+/// `path` relative to `folder`; unchanged without a folder or a relative path.
 fn relative_path(path: &Path, folder: Option<&Path>) -> PathBuf {
     let whole = |path: &Path| fs::canonicalize(path).or_else(|_| std::path::absolute(path));
     let Ok(target) = whole(path) else {
@@ -229,7 +229,7 @@ fn relative_path(path: &Path, folder: Option<&Path>) -> PathBuf {
         .zip(folder.components())
         .take_while(|(a, b)| a == b)
         .count();
-    // Only the root in common: another disk or tree, where a relative path would mislead.
+    // Only the root is common: another disk or tree, where a relative path would mislead.
     if shared <= 1 {
         return target;
     }

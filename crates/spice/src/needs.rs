@@ -1,4 +1,4 @@
-//! What times and geometry need from text kernels, and how its absence is told.
+//! Text kernels that times and geometry require, and the errors for missing ones.
 
 use std::{borrow::Cow, path::PathBuf, sync::LazyLock};
 
@@ -13,12 +13,12 @@ use areograph_base::{
     instruments::Instrument,
 };
 
-/// Something that one text kernel of a set must define.
+/// A variable that one text kernel of a set must define.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Need {
-    /// A variable by which it is recognised.
+    /// The variable.
     pub(super) variable: Cow<'static, str>,
-    /// What it is.
+    /// Its meaning.
     pub(super) what: Cow<'static, str>,
     /// The kernel that usually holds it.
     pub(super) kernel: Cow<'static, str>,
@@ -75,13 +75,13 @@ pub(super) fn camera_frame(instrument: &Instrument) -> Need {
     }
 }
 
-/// What clock strings and attitude need.
+/// Text kernels that clock strings and attitude require.
 pub(super) fn clocks(of: &'static Spacecraft) -> [Need; 2] {
     [LEAP_SECONDS, clock(of)]
 }
 
-/// An error of CSPICE, or the kernel whose absence explains it: the first of `needs` that no text
-/// kernel of `set` defines.
+/// An error of CSPICE, or the missing kernel that explains it: the first of `needs` that no text kernel of `set`
+/// defines.
 pub(super) fn explain(set: &KernelSet, error: SpiceError, needs: &[Need]) -> SpiceError {
     let texts = set.kernels().iter().filter(|kernel| {
         !matches!(
@@ -89,7 +89,7 @@ pub(super) fn explain(set: &KernelSet, error: SpiceError, needs: &[Need]) -> Spi
             KernelRole::Spk | KernelRole::Ck | KernelRole::Meta
         )
     });
-    // Binary planetary constants are no text, and define none of these.
+    // Binary planetary constants are not text, and define none of these.
     let defined: Vec<_> = texts
         .filter_map(|kernel| text_kernel::assignments(&read_text(&kernel.path).ok()?).ok())
         .collect();
@@ -108,7 +108,7 @@ pub(super) fn explain(set: &KernelSet, error: SpiceError, needs: &[Need]) -> Spi
     }
 }
 
-/// What time tagging and geometry need from text kernels, but for the frame of the camera.
+/// Text kernels that time tagging and geometry require, except the frame of the camera.
 static NEEDS: LazyLock<[Need; 4]> = LazyLock::new(|| {
     [
         LEAP_SECONDS,
@@ -123,7 +123,7 @@ pub(super) fn defines(assignments: &[Assignment], variable: &str) -> bool {
     !values_of(assignments, variable).is_empty()
 }
 
-/// What all images need, and the frames of those cameras that `texts` know: one at least.
+/// The requirements of all images, and the frames of those cameras that `texts` define: one at least.
 pub(super) fn needs(texts: &[(PathBuf, Vec<Assignment>)], cameras: &[Instrument]) -> Vec<Need> {
     let cameras: Vec<Need> = cameras.iter().map(camera_frame).collect();
     let known = |need: &&Need| {

@@ -1,4 +1,4 @@
-//! Which kernel a number comes from that is none: asked only when one was read.
+//! The kernel that a non-finite number comes from, searched for only when one was read.
 
 use std::path::PathBuf;
 

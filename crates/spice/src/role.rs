@@ -1,10 +1,10 @@
-//! What a kernel is for.
+//! Roles of kernels.
 
 use std::fmt;
 
 use serde::Serialize;
 
-/// What a kernel is for.
+/// The role of a kernel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum KernelRole {

@@ -1,4 +1,4 @@
-//! Choosing kernels from a folder, with a reason for each.
+//! Selection of kernels from a folder, with a reason for each.
 
 use std::{
     fs,
@@ -27,12 +27,12 @@ use areograph_store::files::{InputFiles, file_name};
 
 /// Deepest folder below the root that is searched.
 const DEPTH_MAX: usize = 16;
-/// Most files that are looked into.
+/// Maximum number of files that are inspected.
 const FILES_MAX: usize = 100_000;
 /// Orbit solutions that mark their files by name; a file without a mark is `nav`.
 const MARKED_FAMILIES: [&str; 2] = ["gsfc", "ipng"];
 
-/// Files of a folder by what they hold.
+/// Files of a folder by their content.
 #[derive(Default)]
 struct Found {
     texts: Vec<(PathBuf, Vec<Assignment>)>,
@@ -42,16 +42,16 @@ struct Found {
 }
 
 impl KernelSet {
-    /// Chooses from a folder: the latest text kernels (pinned ones win), planetary ephemerides, the
-    /// chosen orbit solution, and attitudes from the worst quality to the best, so that the best wins.
+    /// Selects from a folder: the latest text kernels (pinned ones win), planetary ephemerides, the chosen orbit
+    /// solution, and attitudes from the worst quality to the best, so that the best wins.
     ///
     /// * `cameras` – cameras whose frames the text kernels may define, one of them at least
-    /// * `required` – instants that ephemerides and attitudes must touch; without any, only text
-    ///   kernels are chosen, which is enough to tag times
+    /// * `required` – instants that ephemerides and attitudes must cover; without any, only text kernels are selected,
+    ///   which is enough to tag times
     ///
     /// # Errors
-    /// [`SpiceError::NothingToSelect`] when a needed text kernel or the orbit solution is missing;
-    /// [`IoError`] when the folder cannot be read.
+    /// [`SpiceError::NothingToSelect`] when a required text kernel or the orbit solution is missing; [`IoError`] when
+    /// the folder cannot be read.
     pub fn select(
         selection: &KernelSelection,
         cameras: &[Instrument],
@@ -60,10 +60,10 @@ impl KernelSet {
         Self::select_of(&InputFiles::default(), selection, cameras, required)
     }
 
-    /// As [`Self::select`], with the hashes that a run has of its input files.
+    /// Like [`Self::select`], with the hashes that a run has of its input files.
     ///
     /// # Errors
-    /// Those of [`Self::select`]; a file that is no longer what the run has read.
+    /// Those of [`Self::select`]; a file that has changed since the run read it.
     pub fn select_of(
         run: &InputFiles,
         selection: &KernelSelection,
@@ -86,7 +86,7 @@ impl KernelSet {
     }
 }
 
-/// The kernels chosen so far, and the hashes that the run has.
+/// The kernels selected so far, and the hashes that the run has.
 struct Selected<'a> {
     set: KernelSet,
     run: &'a InputFiles,
@@ -165,7 +165,7 @@ fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// For each need the pinned kernel that defines it, or the latest one.
+/// For each requirement the pinned kernel that defines it, or the latest one.
 fn select_texts(
     selection: &KernelSelection,
     cameras: &[Instrument],
@@ -193,7 +193,7 @@ fn select_texts(
             let what = format!("defines {what} ({variable})");
             return Err(SpiceError::NothingToSelect { what }.into());
         };
-        // One file may serve two needs: the clock kernel of MGS also defines its bus frame.
+        // One file may satisfy two requirements: the clock kernel of MGS also defines its bus frame.
         let served = candidates
             .iter()
             .any(|(path, _)| pinned(path) || chosen.contains(&path.as_path()));
@@ -203,7 +203,7 @@ fn select_texts(
             chosen.push(best);
         }
     }
-    // Last, so that a pinned file wins whatever else defines the same variables.
+    // Last, so that a pinned file wins over other definitions of the same variables.
     for name in &selection.pinned {
         for (path, _) in texts.iter().filter(|(path, _)| file_name(path) == *name) {
             set.add(path, "pinned")?;
@@ -212,7 +212,7 @@ fn select_texts(
     Ok(())
 }
 
-/// Whether planetary constants have the Mars of IAU 2000, the frame of every product.
+/// Whether planetary constants have the Mars of IAU 2000, the frame of all products.
 fn mars_fits(variable: &str, assignments: &[Assignment]) -> bool {
     variable != MARS.variable
         || values_of(assignments, variable)
@@ -272,20 +272,20 @@ fn select_ephemerides(
                 &format!("orbit of {}, solution {family}", SPACECRAFT.name),
             )?;
         } else {
-            set.add(path, "ephemeris of planets")?;
+            set.add(path, "planetary ephemeris")?;
         }
     }
     Ok(())
 }
 
-/// Attitudes that touch the required times, the worst quality first, and what commanded ones fill in.
+/// Attitudes that overlap the required times, the worst quality first, and the intervals that commanded ones fill.
 fn select_attitudes(
     selection: &KernelSelection,
     attitudes: &[PathBuf],
     required: &Intervals,
     set: &mut Selected<'_>,
 ) -> Result<()> {
-    // Times of a C-kernel are clock ticks: the text kernels chosen so far turn them into ET.
+    // Times of a C-kernel are clock ticks: the text kernels selected so far convert them to ET.
     let session = Session::open(&set.set)?;
     let (mut telemetry, mut commanded) = (Vec::new(), Vec::new());
     for quality in selection.ck_quality.iter().rev() {
@@ -339,7 +339,7 @@ fn select_attitudes(
     Ok(())
 }
 
-/// Says which required attitudes come from commanded kernels, because no telemetry that wins holds them.
+/// States which required attitudes come from commanded kernels, because no winning telemetry covers them.
 fn explain_commanded(
     required: &Intervals,
     telemetry: &Intervals,
@@ -347,7 +347,7 @@ fn explain_commanded(
     set: &mut Selected<'_>,
 ) {
     let mut missing = required.without(telemetry);
-    // The last one wins where several hold the same instant.
+    // The last one wins where several cover the same instant.
     for (name, held) in commanded.into_iter().rev() {
         for filled in missing.intersection(&held).as_slice() {
             if filled.duration_s() > 0.0 {
@@ -378,7 +378,7 @@ fn family_of(path: &Path, family: &str) -> bool {
     parts.iter().any(|part| part == family) || (family == "nav" && unmarked())
 }
 
-/// Commanded attitude is told by its name: `mgs_ext_roto_all_v*`.
+/// Commanded attitude is recognised by its name: `mgs_ext_roto_all_v*`.
 #[must_use]
 pub fn quality_of(path: &Path) -> CkQuality {
     let parts = name_parts(path);
@@ -389,7 +389,7 @@ pub fn quality_of(path: &Path) -> CkQuality {
     }
 }
 
-/// Sorts names with their numbers as numbers: `v9` before `v10`; in a tie by path.
+/// Sort key that compares numbers in names as numbers: `v9` before `v10`; in a tie by path.
 fn natural_order(path: &Path) -> (Vec<(usize, String)>, PathBuf) {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let stem = stem.to_ascii_lowercase();

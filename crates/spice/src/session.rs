@@ -60,15 +60,15 @@ pub struct Attitude {
     pub inertial_to_bus: Rotation<J2000, SpacecraftBus>,
     /// Angular velocity of the bus, J2000 components, radians per second.
     pub angular_velocity_rad_s: Vector3<f64>,
-    /// How far from the asked instant the kernel's attitude holds, seconds; 0 inside its intervals.
+    /// Distance of the kernel's attitude from the requested instant, seconds; 0 inside its intervals.
     pub distance_s: f64,
 }
 
-/// The only way to CSPICE: holds the process-wide lock and one set of loaded kernels.
+/// The only access to CSPICE: holds the process-wide lock and one set of loaded kernels.
 ///
-/// A second session on another thread waits for this one to end; on the same thread it is refused.
-/// Kernels are unloaded when the session goes. Clock, orbit and attitude are those of one spacecraft, that of the laser
-/// unless [`Session::of`] says otherwise.
+/// A second session on another thread waits for this one to end; on the same thread it is rejected. Kernels are
+/// unloaded when the session is dropped. Clock, orbit and attitude are those of one spacecraft, that of the laser
+/// unless [`Session::of`] selects another.
 ///
 /// ```
 /// use std::path::Path;
@@ -89,7 +89,7 @@ pub struct Session {
     spacecraft: &'static Spacecraft,
 }
 
-/// CSPICE with its kernels, and what they hold of every spacecraft, once it was asked for.
+/// CSPICE with its kernels, and their coverage of every spacecraft, once requested.
 #[derive(Debug)]
 struct Loaded {
     cspice: Cspice,
@@ -102,7 +102,7 @@ impl Session {
     /// Waits for the lock and loads `kernels` in their order.
     ///
     /// # Errors
-    /// [`SpiceError::Spice`] with the file whose loading failed; [`SpiceError::SessionOpen`].
+    /// [`SpiceError::Spice`] with the file that failed to load; [`SpiceError::SessionOpen`].
     pub fn open(kernels: &KernelSet) -> Result<Self> {
         let cspice = Cspice::lock()?;
         for kernel in kernels.kernels() {
@@ -152,10 +152,10 @@ impl Session {
         &self.loaded.kernels
     }
 
-    /// What all loaded kernels hold of the spacecraft, at the level of intervals.
+    /// Coverage of the spacecraft by all loaded kernels, at the level of intervals.
     ///
     /// # Errors
-    /// [`SpiceError::Spice`] when a C-kernel cannot be read; [`SpiceError::MissingText`] without clock.
+    /// [`SpiceError::Spice`] when a C-kernel cannot be read; [`SpiceError::MissingText`] without a clock.
     pub fn coverage(&self) -> Result<&Coverage> {
         let known = &self.loaded.coverages[self.spacecraft.place()];
         if let Some(coverage) = known.get() {
@@ -165,7 +165,7 @@ impl Session {
         Ok(known.get_or_init(|| coverage))
     }
 
-    /// An error of CSPICE, or the absence of a kernel that explains it.
+    /// An error of CSPICE, or the missing kernel that explains it.
     fn explain(&self, error: SpiceError, needs: &[Need]) -> SpiceError {
         explain(self.kernels(), error, needs)
     }
@@ -173,7 +173,7 @@ impl Session {
     /// Instant of a UTC string such as `1999-08-24T14:12:13.64`, with or without a closing `Z`.
     ///
     /// # Errors
-    /// [`SpiceError::Spice`] when the string is no date; [`SpiceError::MissingText`].
+    /// [`SpiceError::Spice`] when the string is not a date; [`SpiceError::MissingText`].
     pub fn utc_to_et(&self, utc: &str) -> Result<Et> {
         let utc = utc.trim();
         let seconds = self
@@ -191,7 +191,7 @@ impl Session {
         self.et_to_utc_with(et, UTC_DECIMALS)
     }
 
-    /// UTC of an instant with so many digits of a second, ISO 8601 without a zone letter.
+    /// UTC of an instant with `decimals` digits of a second, ISO 8601 without a zone letter.
     ///
     /// # Errors
     /// [`SpiceError::MissingText`] without a leap-second kernel.
@@ -203,7 +203,7 @@ impl Session {
     /// Instant of a string of the spacecraft's clock, such as `619971158:28` or `1/0844996544.086`.
     ///
     /// # Errors
-    /// [`SpiceError::Spice`] when the string is no clock reading; [`SpiceError::MissingText`].
+    /// [`SpiceError::Spice`] when the string is not a clock reading; [`SpiceError::MissingText`].
     pub fn sclk_to_et(&self, sclk: &str) -> Result<Et> {
         let seconds = self.cspice().sclk_to_et(self.spacecraft.naif, sclk.trim());
         let seconds = seconds.map_err(|error| self.explain(error, &clocks(self.spacecraft)))?;
@@ -222,8 +222,8 @@ impl Session {
     /// Geometric state of the spacecraft relative to Mars: no light time, no aberration.
     ///
     /// # Errors
-    /// [`SpiceError::Spice`], of kind coverage when the kernels do not reach there;
-    /// [`SpiceError::NotFinite`] with the kernel that holds NaN or an infinity.
+    /// [`SpiceError::Spice`], of kind coverage when the kernels do not cover the instant; [`SpiceError::NotFinite`]
+    /// with the kernel that holds NaN or an infinity.
     pub fn state(&self, et: Et) -> Result<State> {
         let state = self
             .cspice()
@@ -233,7 +233,7 @@ impl Session {
 
     /// State of the spacecraft as seen from the centre of Mars, corrected for light time and aberration (`LT+S`).
     ///
-    /// The geometry takes it only where a run follows the convention of ISIS and ALE.
+    /// The geometry uses it only where a run follows the convention of ISIS and ALE.
     ///
     /// # Errors
     /// As [`Self::state`].
@@ -271,7 +271,7 @@ impl Session {
         self.finite("apparent position or velocity", "the Sun", et, state)
     }
 
-    /// The state in metres, refused with the kernel that makes it no number.
+    /// The state in metres; a non-finite one is rejected with the kernel that causes it.
     fn finite(&self, what: &str, of: &str, et: Et, state_km: StateKm) -> Result<State> {
         let state = State::from_km(state_km);
         let finite = all_finite(state.position.xyz_m.as_slice())
@@ -301,12 +301,12 @@ impl Session {
     /// Attitude of the bus at `exposure`, read from the C-kernel at `lookup`.
     ///
     /// * `lookup` – made by [`areograph_base::time::PointingBias::lookup`] from the same exposure
-    /// * `tolerance_s` – how far outside its intervals the C-kernel may be asked, seconds
+    /// * `tolerance_s` – how far outside its intervals the C-kernel may be read, seconds
     ///
     /// # Errors
     /// [`SpiceError::NoAttitude`] when there is no attitude with rates within the tolerance;
     /// [`SpiceError::NotFinite`] with the kernel that holds NaN or an infinity;
-    /// [`SpiceError::MissingText`] without clock or leap seconds.
+    /// [`SpiceError::MissingText`] without a clock or leap seconds.
     pub fn attitude(&self, lookup: CkLookup, exposure: Et, tolerance_s: f64) -> Result<Attitude> {
         let kernel_time = lookup.kernel_time();
         let ticks = self.et_to_ticks(kernel_time)?;
@@ -347,7 +347,7 @@ impl Session {
         Ok(ticks.map_err(|error| self.explain(error, &clocks(self.spacecraft)))?)
     }
 
-    /// Mounting of `instrument` as the loaded kernels have it, turned to its camera axes.
+    /// Mounting of `instrument` by the loaded kernels, converted to its camera axes.
     ///
     /// # Errors
     /// [`SpiceError::MissingText`] when no loaded kernel defines the two frames.
@@ -357,7 +357,7 @@ impl Session {
         et: Et,
     ) -> Result<Rotation<SpacecraftBus, CameraFrame>> {
         let [bus, camera] = [&instrument.naif.bus_frame, &instrument.naif.frame]
-            // A name with a zero byte is cut there, and then no kernel defines it.
+            // A name with a zero byte is truncated there, and then no kernel defines it.
             .map(|name| CString::new(name.split('\0').next().unwrap_or_default()));
         let needs = [camera_frame(instrument), bus_frame(instrument.spacecraft)];
         let rows = self
@@ -372,7 +372,8 @@ impl Session {
         Ok(Rotation::new(turn * matrix(&rows), et))
     }
 
-    /// Matrix from J2000 to the frame of `body` in the loaded planetary constants, to tell which report they follow.
+    /// Matrix from J2000 to the frame of `body` in the loaded planetary constants, to identify the IAU report they
+    /// follow.
     ///
     /// # Errors
     /// [`SpiceError::Spice`] when no planetary constants of the body are loaded.

@@ -50,7 +50,7 @@ pub(super) fn values_of<'a>(assignments: &'a [Assignment], name: &str) -> Vec<&'
 /// All assignments of a text kernel.
 ///
 /// # Errors
-/// [`SpiceError::TextKernel`] with the line that breaks the rules.
+/// [`SpiceError::TextKernel`] with the malformed line.
 pub(super) fn assignments(text: &str) -> Result<Vec<Assignment>, SpiceError> {
     let mut tokens = tokens(text)?.into_iter().peekable();
     let mut found = Vec::new();
@@ -131,7 +131,7 @@ fn line_tokens(
     Ok(())
 }
 
-/// A quoted string at the start of `rest`, and how many bytes it takes.
+/// A quoted string at the start of `rest`, and its length in bytes.
 fn quoted(line: usize, rest: &str) -> Result<(Token, usize), SpiceError> {
     let mut text = String::new();
     let mut position = 1;
@@ -150,7 +150,7 @@ fn quoted(line: usize, rest: &str) -> Result<(Token, usize), SpiceError> {
     ))
 }
 
-/// A name or number at the start of `rest`, and how many bytes it takes.
+/// A name or number at the start of `rest`, and its length in bytes.
 fn word(rest: &str) -> (Token, usize) {
     let end = rest
         .find(|next: char| next.is_whitespace() || "(),='".contains(next))
@@ -159,7 +159,7 @@ fn word(rest: &str) -> (Token, usize) {
     let name_only = rest[..end]
         .strip_suffix('+')
         .filter(|_| rest[end..].starts_with('='));
-    // A lone comma is no name; it takes one byte so that reading goes on.
+    // A lone comma is not a name; one byte is consumed so that reading continues.
     let end = name_only.map_or(end, str::len).max(1);
     (Token::Word(rest[..end].to_owned()), end)
 }

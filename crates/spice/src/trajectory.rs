@@ -1,4 +1,4 @@
-//! The motion of MGS as polynomials, so that parallel work needs no CSPICE.
+//! The motion of MGS as polynomials, so that parallel work does not need CSPICE.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -13,7 +13,7 @@ use areograph_geom::chebyshev::ChebyshevVector;
 
 /// Length of the longest pieces, a twelfth of an orbit.
 const PIECE_LONGEST_S: f64 = 600.0;
-/// Pieces are not made shorter than this: a motion that needs it has a jump.
+/// Shortest pieces: a motion that needs shorter ones has a discontinuity.
 const PIECE_SHORTEST_S: f64 = 1.0;
 
 /// Position of MGS relative to the centre of Mars in J2000, in Chebyshev pieces over disjoint intervals.
@@ -26,13 +26,13 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
-    /// Largest distance from CSPICE at instants that were not used for the fit, metres.
+    /// Largest distance from CSPICE at instants not used for the fit, metres.
     #[must_use]
     pub const fn max_error_m(&self) -> f64 {
         self.max_error_m
     }
 
-    /// Geometric position at `et`; `None` outside the intervals that were asked for.
+    /// Geometric position at `et`; `None` outside the requested intervals.
     #[must_use]
     pub fn position(&self, et: Et) -> Option<Position<J2000>> {
         self.piece(et).map(|piece| Position::new(piece.value(et)))
@@ -64,12 +64,12 @@ impl Trajectory {
 impl Session {
     /// Tabulates the position of MGS over `intervals` to within `tolerance_m` of CSPICE, metres.
     ///
-    /// Pieces end where segments of the kernels end, since the motion may jump there, and are halved
-    /// until instants apart from the samples agree.
+    /// Pieces end where segments of the kernels end, since the motion may be discontinuous there, and are halved until
+    /// instants apart from the samples agree.
     ///
     /// # Errors
-    /// [`SpiceError::CoverageGap`] when the kernels do not hold an interval;
-    /// [`SpiceError::NoConvergence`] when pieces of a second still miss the tolerance.
+    /// [`SpiceError::CoverageGap`] when the kernels do not cover an interval; [`SpiceError::NoConvergence`] when pieces
+    /// of a second still exceed the tolerance.
     pub fn trajectory(&self, intervals: &Intervals, tolerance_m: f64) -> Result<Trajectory> {
         let mut trajectory = Trajectory {
             pieces: Vec::new(),
@@ -100,7 +100,7 @@ impl Session {
         let mut error_m = 0.0_f64;
         for et in polynomial.check_instants() {
             let distance_m = (polynomial.value(et) - position(et)?).norm();
-            // `max` would pass over NaN, which huge coordinates can make.
+            // `max` would ignore NaN, which huge coordinates can cause.
             error_m = error_m.max(if distance_m.is_nan() {
                 f64::INFINITY
             } else {
@@ -149,7 +149,7 @@ fn split_at(interval: Interval, seams: &[Et]) -> Vec<Interval> {
     parts
 }
 
-/// `interval` in equal pieces of at most the greatest length, the last one first.
+/// `interval` in equal pieces no longer than the maximum, the last one first.
 fn equal_pieces(interval: Interval) -> Vec<Interval> {
     let count = (interval.duration_s() / PIECE_LONGEST_S).ceil().max(1.0);
     let length_s = interval.duration_s() / count;

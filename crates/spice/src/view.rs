@@ -1,4 +1,4 @@
-//! What a stage may see of a set of kernels: what does not enter its fingerprint is not loaded.
+//! The kernels that a stage may read: kernels outside its fingerprint are not loaded.
 
 use std::cell::OnceCell;
 
@@ -8,13 +8,13 @@ use areograph_store::stage::{Input, Inputs};
 
 /// Frames of SPK segments with ids up to this are inertial (NAIF, Frames Required Reading).
 const INERTIAL_MAX: i32 = 21;
-/// Ids of the body-fixed frames that SPICE has built in, which need planetary constants alone.
+/// Ids of the body-fixed frames that are built into SPICE, which need planetary constants only.
 const BUILT_IN_BODY_FIXED: std::ops::Range<i32> = 10_000..11_000;
 
 /// Some of a run's kernels, and the session that has them loaded.
 #[derive(Debug)]
 pub struct KernelView {
-    /// `None` while it is not known which kernels a run would take.
+    /// `None` while the kernels of a run are not known.
     kernels: Option<KernelSet>,
     session: OnceCell<Session>,
 }
@@ -32,13 +32,13 @@ impl KernelView {
     /// Text kernels: clocks, constants, frames.
     #[must_use]
     pub fn text(kernels: Option<&KernelSet>) -> Self {
-        // A file headed as frames may hold a clock as well.
+        // A frame kernel by its header may contain a clock as well.
         let is_text = |role| !matches!(role, KernelRole::Spk | KernelRole::Ck);
         Self::all(kernels.map(|kernels| kernels.of_roles(is_text)).as_ref())
     }
 
-    /// What positions may depend on: all but C-kernels, unless an ephemeris is given in a frame that may turn
-    /// with them.
+    /// The kernels that positions may depend on: all except C-kernels, unless an ephemeris is given in a frame that may
+    /// rotate with them.
     ///
     /// # Errors
     /// An ephemeris whose segments cannot be listed.
@@ -47,7 +47,7 @@ impl KernelView {
         Ok(Self::all(view.as_ref()))
     }
 
-    /// The kernels; none while they are not known.
+    /// The kernels; `None` while they are not known.
     #[must_use]
     pub const fn kernels(&self) -> Option<&KernelSet> {
         self.kernels.as_ref()
@@ -85,7 +85,7 @@ pub fn position_kernels(kernels: &KernelSet) -> Result<KernelSet> {
     Ok(kernels.of_roles(|role| role != KernelRole::Ck))
 }
 
-/// Kernels enter by content and place in the load order.
+/// Kernels enter by content and position in the load order.
 impl Input for &KernelView {
     fn add_to(&self, _field: &str, inputs: &mut Inputs) {
         let Some(kernels) = &self.kernels else {

@@ -1,4 +1,4 @@
-//! Kernels of an invented mission and of adjusted orientations, written with CSPICE's own writers.
+//! Kernels of a synthetic mission and of adjusted orientations, written with CSPICE's own writers.
 
 use std::{
     ffi::c_int,
@@ -22,7 +22,7 @@ use areograph_base::{
 /// Longest segment name that a DAF holds.
 const SEGMENT_NAME_MAX: usize = 40;
 
-/// More than what CSPICE's last buffer may have left free on a full disk.
+/// More than the part of CSPICE's last buffer that may remain unwritten on a full disk.
 const PROBE_BYTES: usize = 1 << 16;
 
 /// Hermite-interpolated states (SPK type 13), J2000.
@@ -30,7 +30,7 @@ const PROBE_BYTES: usize = 1 << 16;
 pub struct SpkSegment<'a> {
     /// NAIF id of the body.
     pub target: i32,
-    /// NAIF id of the body that states are relative to.
+    /// NAIF id of the body to which states are relative.
     pub centre: i32,
     /// Name of the segment, at most 40 characters.
     pub name: &'a str,
@@ -47,7 +47,7 @@ pub struct SpkSegment<'a> {
 pub struct CkSegment<'a> {
     /// Name of the segment, at most 40 characters.
     pub name: &'a str,
-    /// Instants as the kernel counts time, increasing.
+    /// Instants in the time of the kernel, increasing.
     pub instants: &'a [Et],
     /// Quaternions of J2000 to bus, scalar first, SPICE's convention, one per instant.
     pub quaternions: &'a [[f64; 4]],
@@ -57,10 +57,10 @@ pub struct CkSegment<'a> {
     pub interval_starts: &'a [Et],
 }
 
-/// The same with instants encoded by the spacecraft clock, which takes no kernel to write.
+/// The same with instants encoded by the spacecraft clock; writing it needs no kernel.
 #[derive(Debug, Clone, Copy)]
 pub struct EncodedCkSegment<'a> {
-    /// NAIF id of the bus whose attitudes they are.
+    /// NAIF id of the bus.
     pub bus: i32,
     /// Name of the segment, at most 40 characters.
     pub name: &'a str,
@@ -77,9 +77,9 @@ pub struct EncodedCkSegment<'a> {
 /// Writes a new SPK; `comment` goes into its comment area.
 ///
 /// # Errors
-/// [`SpiceError::Segment`] for columns that do not fit, [`SpiceError::Spice`] from CSPICE (an existing
-/// file is never overwritten), [`SpiceError::SessionOpen`] when this thread has a session, [`IoError`]
-/// when the system refuses to write. A kernel that is not whole is removed.
+/// [`SpiceError::Segment`] for columns that do not match, [`SpiceError::Spice`] from CSPICE (an existing file is never
+/// overwritten), [`SpiceError::SessionOpen`] when this thread has a session, [`IoError`] when the kernel cannot be
+/// written. An incomplete kernel is removed.
 pub fn write_spk(path: &Path, segments: &[SpkSegment], comment: &str) -> Result<()> {
     for segment in segments {
         check_lengths(segment.name, segment.epochs, &[segment.states.len()])?;
@@ -141,7 +141,7 @@ pub fn write_ck(
     )
 }
 
-/// Writes a new CK whose instants are encoded already.
+/// Writes a new CK with encoded instants.
 ///
 /// # Errors
 /// As [`write_spk`].
@@ -180,7 +180,7 @@ fn fill_ck(
     })
 }
 
-/// Creates the kernel at `path`, writes into it, closes it, and makes sure that it is whole.
+/// Creates the kernel at `path`, writes into it, closes it, and checks that it is complete.
 fn fill(
     cspice: &Cspice,
     path: &Path,
@@ -198,14 +198,14 @@ fn fill(
         return whole.in_file(path);
     }
     let refused = refusal(path);
-    // What is left is no kernel; when it cannot even be removed, the first error is the one to tell.
+    // The remainder is not a kernel; when even its removal fails, the first error is reported.
     let _ = fs::remove_file(path);
     refused
         .map_or(whole, |refused| Err(refused.into()))
         .in_file(path)
 }
 
-/// Why the system refuses to write at `path`, if it does: CSPICE's messages do not tell.
+/// Why the system cannot write at `path`: CSPICE's messages do not state it.
 fn refusal(path: &Path) -> Option<IoError> {
     let probe = || -> io::Result<()> {
         let mut file = OpenOptions::new().append(true).create(true).open(path)?;
@@ -232,7 +232,7 @@ fn check_lengths<T>(name: &str, instants: &[T], columns: &[usize]) -> Result<()>
     } else if instants.is_empty() {
         "it holds no instants".to_owned()
     } else if let Some(count) = columns.iter().find(|count| **count != instants.len()) {
-        format!("a column of {count} for {} instants", instants.len())
+        format!("column of {count} values for {} instants", instants.len())
     } else {
         return Ok(());
     };
@@ -243,7 +243,7 @@ fn check_lengths<T>(name: &str, instants: &[T], columns: &[usize]) -> Result<()>
     .into())
 }
 
-/// Lines of a comment; an empty one becomes a blank, since CSPICE takes no empty strings.
+/// Lines of a comment; an empty one becomes a blank, since CSPICE accepts no empty strings.
 fn comment_lines(comment: &str) -> Vec<&str> {
     let lines = comment
         .lines()

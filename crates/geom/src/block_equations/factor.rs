@@ -5,17 +5,17 @@ use rayon::prelude::*;
 
 use super::{BlockMatrix, ordering::order};
 
-/// Smallest pivot of the scaled matrix: what is left of an unknown once all others are known, as a
-/// share of its own information. Rounding of a few hundred unknowns leaves about 1e-14.
+/// Smallest pivot of the scaled matrix: the share of an unknown's own information that remains once all others are
+/// known. Rounding of a few hundred unknowns leaves about 1e-14.
 const PIVOT_MIN: f64 = 1e-12;
 /// Unknowns that a message names.
 const NAMED_MAX: usize = 4;
 /// An unknown with less than this share of the weakest combination is not named.
 const NAMED_SHARE: f64 = 0.1;
-/// Right-hand sides that are solved together: as many threads as there are may take their part of very many.
+/// Right-hand sides solved together; larger sets are divided among the threads.
 const TOGETHER: usize = 32;
 
-/// Unknowns that the observations do not separate, or do not touch.
+/// Unknowns that the observations do not separate, or do not involve.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Singular {
     /// Indices of the unknowns in the weakest combination, the strongest first, four at most.
@@ -29,9 +29,9 @@ pub struct Singular {
 pub struct BlockCholesky {
     /// First row of each block in the order of the factor, and the number of all.
     pub(super) starts: Vec<usize>,
-    /// The first block that the rows of each block reach back to.
+    /// The first block that the rows of each block extend back to.
     pub(super) first: Vec<usize>,
-    /// Rows of each block, from the first column that they reach back to, to their own last.
+    /// Rows of each block, from the first column that they extend back to, to their own last.
     pub(super) rows: Vec<DMatrix<f64>>,
     /// The block at each position, and its first column in the matrix.
     pub(super) order: Vec<usize>,
@@ -128,7 +128,7 @@ impl BlockCholesky {
     fn rows_of(&self, matrix: &BlockMatrix, position: usize) -> Result<DMatrix<f64>, Singular> {
         let (first, size) = (self.first[position], self.size(position));
         let left = self.starts[first];
-        // Transposed while it grows, so that what is known already is a matrix of full rows.
+        // Stored transposed while it grows, so that the known part is a matrix of full rows.
         let mut grown = DMatrix::zeros(self.starts[position + 1] - left, size);
         for before in first..position {
             let mut block = self
@@ -172,7 +172,8 @@ impl BlockCholesky {
         Ok(rows)
     }
 
-    /// What hardly changes the equations up to `position`, of which `own` is left there once all before are known.
+    /// The combination that changes the equations up to `position` least; `own` is the block left there once all before
+    /// are known.
     fn weakest_combination(
         &self,
         position: usize,

@@ -10,7 +10,7 @@ use super::{BlockCholesky, BlockMatrix};
 impl BlockCholesky {
     /// The blocks of the inverse where `like` has blocks.
     ///
-    /// With `Z = S⁻¹`, `Lᵀ Z = L⁻¹` is a lower triangle: what stands right of a block of `Z` follows from what stands
+    /// With `Z = S⁻¹`, `Lᵀ Z = L⁻¹` is a lower triangle: the part of `Z` to the right of a block follows from the part
     /// below it, last rows first.
     ///
     /// # Source
@@ -43,7 +43,7 @@ impl BlockCholesky {
             .iter()
             .map(|rows| DMatrix::zeros(rows.ncols(), rows.nrows()))
             .collect();
-        // The last block that reaches back to each.
+        // The last block that extends back to each.
         let mut last: Vec<usize> = (0..blocks).collect();
         for (position, first) in self.first.iter().enumerate() {
             for reached in &mut last[*first..position] {
@@ -109,8 +109,8 @@ impl BlockCholesky {
         below
     }
 
-    /// The block of the inverse in the rows of `position` and the columns of `other`, which like none after `last`
-    /// reaches back to it.
+    /// The block of the inverse in the rows of `position` and the columns of `other`; no block after `last` extends
+    /// back to `position`.
     fn right_of(
         &self,
         (position, last): (usize, usize),
@@ -142,7 +142,7 @@ impl BlockCholesky {
 }
 
 impl BlockMatrix {
-    /// Sets a block, if the matrix has it.
+    /// Sets a block if the matrix has it.
     fn put(&mut self, row: usize, column: usize, block: &DMatrix<f64>) {
         if let Some(values) = self.pattern.values_of(row, column) {
             self.values[values].copy_from_slice(block.as_slice());

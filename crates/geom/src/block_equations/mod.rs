@@ -26,17 +26,16 @@ pub use factor::{BlockCholesky, Singular};
 pub struct BlockPattern {
     /// Columns of each block.
     columns: Vec<Range<usize>>,
-    /// Of each block those before it that it meets, ascending, and itself last.
+    /// For each block, the preceding blocks that it meets, ascending, and itself last.
     met: Vec<Vec<usize>>,
-    /// Where the values of each of these begin.
+    /// Index at which the values of each of these begin.
     starts: Vec<Vec<usize>>,
     /// Number of values.
     len: usize,
 }
 
 impl BlockPattern {
-    /// The pattern of blocks that lie side by side in `columns`, of which each of `cliques` lists some that occur together,
-    /// ascending.
+    /// The pattern of adjacent blocks in `columns`; each of `cliques` lists, ascending, blocks that occur together.
     pub fn of<'a>(
         columns: Vec<Range<usize>>,
         cliques: impl Iterator<Item = &'a [usize]>,
@@ -98,7 +97,7 @@ impl BlockPattern {
         self.columns.partition_point(|of| of.end <= column)
     }
 
-    /// Where the values of the block in the rows of `row` and the columns of `column`, not before `row`, are.
+    /// Range of the values of the block in the rows of `row` and the columns of `column`, which is not before `row`.
     fn values_of(&self, row: usize, column: usize) -> Option<Range<usize>> {
         let at = self.met[column].binary_search(&row).ok()?;
         let start = self.starts[column][at];
@@ -129,7 +128,8 @@ impl BlockMatrix {
         &self.pattern
     }
 
-    /// The block in the rows of `row` and the columns of `column`, which is not before it; `None` where they do not meet.
+    /// The block in the rows of `row` and the columns of `column`, which is not before it; `None` where they do not
+    /// meet.
     #[must_use]
     pub fn block(&self, row: usize, column: usize) -> Option<DMatrixView<'_, f64>> {
         let values = &self.values[self.pattern.values_of(row, column)?];
@@ -231,7 +231,8 @@ impl BlockMatrix {
         local
     }
 
-    /// Shows `look` the values of each pair of `blocks`, its place in the matrix of these alone, and its shape.
+    /// Calls `look` with the values of each pair of `blocks`, its position in the matrix of these blocks only, and its
+    /// shape.
     fn visit(
         &mut self,
         blocks: &[usize],

@@ -1,15 +1,15 @@
-//! An order of blocks in which those that occur together stand close together.
+//! An order of blocks in which those that occur together are close together.
 
 use std::collections::VecDeque;
 
 use super::BlockPattern;
 
-/// In patterns of more blocks than this, those that meet more than half of the others come last: unknowns that all images
-/// share. Among the images they would make the envelope as wide as the matrix; at its end each is a row.
+/// In patterns of more blocks than this, those that meet more than half of the others come last: unknowns common to all
+/// images. Among the images they would make the envelope as wide as the matrix; at its end each is a row.
 const SHARED_LAST_ABOVE: usize = 16;
 
-/// The reverse Cuthill–McKee order: the block at each position. Equal candidates are taken by their index. Blocks that most
-/// others meet come last.
+/// The reverse Cuthill–McKee order: the block at each position. Ties are broken by index. Blocks that most others meet
+/// come last.
 pub(super) fn order(pattern: &BlockPattern) -> Vec<usize> {
     let neighbours = neighbours(pattern);
     let mut order = Vec::with_capacity(neighbours.len());
@@ -25,7 +25,7 @@ pub(super) fn order(pattern: &BlockPattern) -> Vec<usize> {
         if is_taken[start] {
             continue;
         }
-        // An end of its part of the network: the last of a breadth-first walk, from anywhere.
+        // A peripheral block of its component: the last of a breadth-first search from any block.
         let walk = breadth_first(&neighbours, start, &mut is_taken.clone());
         let end = walk.last().copied().unwrap_or(start);
         order.extend(breadth_first(&neighbours, end, &mut is_taken));
@@ -35,7 +35,7 @@ pub(super) fn order(pattern: &BlockPattern) -> Vec<usize> {
     order
 }
 
-/// What each block meets, those with the fewest neighbours first.
+/// The neighbours of each block, those with the fewest neighbours first.
 fn neighbours(pattern: &BlockPattern) -> Vec<Vec<usize>> {
     let mut neighbours = vec![Vec::new(); pattern.blocks()];
     for block in 0..pattern.blocks() {
@@ -53,7 +53,7 @@ fn neighbours(pattern: &BlockPattern) -> Vec<Vec<usize>> {
     neighbours
 }
 
-/// Blocks not yet taken that hang together with `start`, from near to far.
+/// Blocks not yet taken that are connected with `start`, from near to far.
 fn breadth_first(neighbours: &[Vec<usize>], start: usize, is_taken: &mut [bool]) -> Vec<usize> {
     let mut reached = Vec::new();
     let mut queue = VecDeque::from([start]);

@@ -1,4 +1,4 @@
-//! Sparse against dense, and what a singular system says.
+//! Sparse against dense solutions, and the unknowns that a singular system names.
 
 use std::sync::Arc;
 
@@ -28,7 +28,7 @@ fn ring() -> (BlockMatrix, DMatrix<f64>) {
     let pattern = BlockPattern::of(columns, cliques.iter().map(Vec::as_slice));
     let mut sparse = BlockMatrix::zeros(&pattern);
     let mut dense = DMatrix::zeros(end, end);
-    // Rows like those of points: numbers of no pattern in the columns of a clique.
+    // Rows like those of points: irregular numbers in the columns of a clique.
     let mut number = 0.7_f64;
     for clique in &cliques {
         let of: Vec<usize> = clique

@@ -1,4 +1,5 @@
-//! Spots of a laser on the cameras' bus: derivatives, signs, and the equations by parts against the dense ones.
+//! Spots of a laser on the bus of the cameras: derivatives, signs, and the partitioned equations against the dense
+//! ones.
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 
@@ -24,7 +25,7 @@ const RANGE_M: f64 = 380e3;
 /// Points of the network that the laser met.
 const SHOTS: std::ops::Range<usize> = 0..4;
 
-/// The network with a spot of each shot in the image that it was fired during: where the initial orientation sees it.
+/// The network with a spot of each shot in the image during which it was fired, where the initial orientation sees it.
 fn with_spots() -> Network<EulerPolynomial> {
     let mut network = network();
     let spots = network.ranges.iter().map(|range| {
@@ -194,8 +195,8 @@ fn spots_by_parts_equal_the_dense_equations() {
     }
 }
 
-/// A shift of a profile is one error, whether heights or spots see it: what is said of it does not depend on which of the
-/// two it is an unknown of.
+/// A shift of a profile is one error, whether heights or spots see it: the result does not depend on which of the two
+/// it is an unknown of.
 #[test]
 fn a_profile_on_relief_lies_in_one_place() {
     let options = SurfaceOptions {
@@ -225,8 +226,8 @@ fn a_profile_on_relief_lies_in_one_place() {
     assert_eq!(shift.profile, 1);
     let found = own.common_bus.as_ref().unwrap().profile_shifts_m[0];
     for (axis, found) in found.iter().enumerate() {
-        // Shares of its standard deviation: robust weights judge a height by its variance, of which the shift is a part in
-        // one way and not in the other.
+        // Shares of its standard deviation: robust weights depend on the variance of a height, which includes the shift
+        // in one case and not in the other.
         let sigma_m = shift.root_cofactors_m[axis];
         let apart_m = found.value - shift.shift_m[axis];
         assert!(
@@ -249,7 +250,7 @@ fn a_profile_on_relief_lies_in_one_place() {
     }
 }
 
-/// A bus that was rolled by more than its attitude says: the laser met the ground elsewhere, and its spots tell.
+/// A bus rolled by more than its attitude states: the laser met the ground elsewhere, and its spots reveal it.
 #[test]
 fn spots_tell_a_roll_that_ties_do_not_know() {
     const ROLL_RAD: f64 = 3e-4;
@@ -270,8 +271,8 @@ fn spots_tell_a_roll_that_ties_do_not_know() {
         image.sigmas = std::array::from_fn(|index| if held(index) { 0.0 } else { 1e-3 });
         image.time_bias_sigma_s = 0.0;
     }
-    // In truth every image was rolled, so the ground lies to one side of where it is taken to be: footprints are recorded
-    // there, points of ties begin where they are not.
+    // In truth every image was rolled, so the true ground is to one side of the assumed ground: footprints are recorded
+    // there, and tie points start in wrong positions.
     let moved_m = |point: usize| {
         let pose = network.images[0].base.pose(0.0);
         let across = pose.mars_to_camera.row(1).transpose();
@@ -287,7 +288,7 @@ fn spots_tell_a_roll_that_ties_do_not_know() {
     bus.profiles[0].axes = Matrix3::identity();
     bus.boresight_sigma_rad = 1e-6;
     let adjusted = solve(&network, &BundleOptions::default()).unwrap();
-    // Rolled by that, the camera has what lies farther along its y axis where the spots are.
+    // With that roll, the spots fall on ground farther along the y axis of the camera.
     for image in 0..2 {
         let roll_rad = adjusted.images[image].correction.rotation_rad[0].x;
         assert!(

@@ -1,10 +1,10 @@
-//! Values and indices that a network must have before anything is computed.
+//! Checks of values and indices before a network is adjusted.
 
 use super::{BundleError, CommonBus, Network, Part, Spot, View};
 use crate::pushbroom::ExteriorOrientation;
 
 /// # Errors
-/// The first value that is none, the first index without a target.
+/// The first invalid value, the first index without a target.
 pub(super) fn check<M: ExteriorOrientation>(network: &Network<M>) -> Result<(), BundleError> {
     for (index, image) in network.images.iter().enumerate() {
         let part = Part::Image(index);
@@ -34,14 +34,14 @@ pub(super) fn check<M: ExteriorOrientation>(network: &Network<M>) -> Result<(), 
     }
     if let Some(clock) = &network.attitude_clock {
         let part = Part::Images;
-        let what = "standard deviation of the offset of the attitude's clock";
+        let what = "standard deviation of the attitude clock offset";
         deviation(part, what, clock.sigma_s)?;
         if clock.turns_rad_s.len() != network.images.len() {
             let missing = Part::Image(clock.turns_rad_s.len());
             return Err(BundleError::Unmatched { part, missing });
         }
         for component in clock.turns_rad_s.iter().flatten() {
-            finite(part, "turn against the stars", *component)?;
+            finite(part, "inertial rotation rate", *component)?;
         }
     }
     if let Some(bus) = &network.common_bus {
@@ -80,16 +80,16 @@ pub(super) fn check<M: ExteriorOrientation>(network: &Network<M>) -> Result<(), 
 fn check_view<M>(network: &Network<M>, part: Part, view: &View) -> Result<(), BundleError> {
     matched(network, part, view.point, view.image)?;
     finite(part, "line", view.x_lines)?;
-    finite(part, "place in the line", view.y_px)?;
+    finite(part, "position in the line", view.y_px)?;
     positive(part, "standard deviation", view.sigma_px.x)?;
     positive(part, "standard deviation", view.sigma_px.y)
 }
 
 fn check_bus<M>(network: &Network<M>, bus: &CommonBus) -> Result<(), BundleError> {
     let part = Part::Images;
-    let what = "standard deviation of the laser's boresight";
+    let what = "standard deviation of the laser boresight";
     deviation(part, what, bus.boresight_sigma_rad)?;
-    let what = "standard deviation of line times against the laser";
+    let what = "standard deviation of the laser line time offset";
     deviation(part, what, bus.line_time_sigma_s)?;
     if bus.profiles.len() != network.range_bias_sigmas_m.len() {
         let missing = Part::Profile(bus.profiles.len().min(network.range_bias_sigmas_m.len()));
@@ -97,7 +97,7 @@ fn check_bus<M>(network: &Network<M>, bus: &CommonBus) -> Result<(), BundleError
     }
     for (index, profile) in bus.profiles.iter().enumerate() {
         for sigma_m in &profile.sigma_m {
-            let what = "standard deviation of where it lies";
+            let what = "standard deviation of its position";
             deviation(Part::Profile(index), what, *sigma_m)?;
         }
     }

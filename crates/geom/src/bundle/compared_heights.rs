@@ -1,4 +1,4 @@
-//! Heights of points beside the surface, whether they took part or not: each by itself, so that there may be many.
+//! Heights of points against the surface, used in the adjustment or not: each independently, so that there may be many.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -14,14 +14,14 @@ use crate::pushbroom::ExteriorOrientation;
 const TOGETHER: usize = 64;
 
 impl HeightResidual {
-    /// Standard deviation of the height against the surface by the point's own rays, metres.
+    /// Standard deviation of the height against the surface from the point's own rays, metres.
     #[must_use]
     pub fn sigma_m(&self) -> f64 {
         self.surface_sigma_m.hypot(self.ray_sigma_m)
     }
 }
 
-/// Every compared point of `control` that is determined, there.
+/// Every compared point of `control` that is determined at this state.
 pub(super) fn compared<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
     at: &Linearised,

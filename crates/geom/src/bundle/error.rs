@@ -1,4 +1,4 @@
-//! What cannot be adjusted.
+//! Reasons for which a network cannot be adjusted.
 
 use super::{
     Part,
@@ -8,16 +8,16 @@ use super::{
 /// A network that cannot be adjusted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BundleError {
-    /// A standard deviation, coordinate or number that is none.
+    /// An invalid standard deviation, coordinate or number.
     #[error("{what} of {part} is {value}, expected {expected}")]
     Value {
         /// What it belongs to.
         part: Part,
-        /// What it is.
+        /// Which quantity.
         what: &'static str,
         /// The value.
         value: f64,
-        /// What it should be.
+        /// The expected value.
         expected: &'static str,
     },
     /// An index of a point, image or profile that the network does not have.
@@ -47,7 +47,7 @@ pub enum BundleError {
     NotConverged {
         /// Steps taken.
         steps: usize,
-        /// The sum where it was given up.
+        /// Weighted sum of squares at which the iteration was stopped.
         weighted_squares: f64,
     },
 }

@@ -1,4 +1,4 @@
-//! Single unknowns of the settled adjustment: their values, cofactors, and what was expected of them.
+//! Single unknowns of the converged adjustment: their values, cofactors and expected values.
 
 use super::{AdjustedBus, Estimate, Residual, layout::Layout, unknowns::State};
 use crate::block_equations::BlockMatrix;
@@ -15,7 +15,7 @@ fn variance(cofactors: &BlockMatrix, column: usize) -> f64 {
     cofactors.element(column, column).unwrap_or_default()
 }
 
-/// Residual of what an unknown was expected to be, where that has a weight.
+/// Residual of the expected value of an unknown, where that has a weight.
 pub(super) fn prior<M>(
     layout: &Layout<'_, M>,
     state: &State,
@@ -32,7 +32,7 @@ pub(super) fn prior<M>(
     })
 }
 
-/// What is found of laser and profiles; residuals of spots are still to come.
+/// Estimates of laser and profiles; residuals of spots are added later.
 pub(super) fn of_bus<M>(
     layout: &Layout<'_, M>,
     state: &State,

@@ -2,8 +2,8 @@
 //!
 //! Heights have a full covariance and tie all images to each other. The equations stay sparse without them; with their
 //! rows `G` in the shared unknowns and their covariance `Σ`,
-//! `(S + Gᵀ Σ⁻¹ G)⁻¹ = S⁻¹ − Z K⁻¹ Zᵀ`, `Z = S⁻¹ Gᵀ`, `K = Σ + G Z`. At most some hundred heights are observed: `Z` is as
-//! many solutions of the sparse equations.
+//! `(S + Gᵀ Σ⁻¹ G)⁻¹ = S⁻¹ − Z K⁻¹ Zᵀ`, `Z = S⁻¹ Gᵀ`, `K = Σ + G Z`. At most a few hundred heights are observed, so `Z`
+//! takes as many solutions of the sparse equations.
 //!
 //! # Source
 //! Woodbury 1950, Inverting modified matrices.
@@ -19,7 +19,7 @@ pub(super) struct Factor {
     heights: Option<HeightFactor>,
 }
 
-/// What heights add to the factor.
+/// The contribution of heights to the factor.
 struct HeightFactor {
     /// `G`.
     by_shared: DMatrix<f64>,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::layout::Layout;
 use crate::{block_equations::BlockPattern, pushbroom::ExteriorOrientation};
 
-/// Points of a group; more than these are several. Fixed, so that sums do not depend on the number of threads.
+/// Points of a group; larger sets are divided. Fixed, so that sums do not depend on the number of threads.
 const GROUP_MAX: usize = 256;
 
 /// Points whose rows contain the same shared unknowns.

@@ -73,7 +73,7 @@ pub(super) fn surface_with(
     LaserSurface::new(&shots, &[], options).unwrap()
 }
 
-/// A clock of the attitude: the first and the last image follow nadir, the second is held towards a star.
+/// An attitude clock: the first and the last image follow nadir, the second is held towards a star.
 fn attitude_clock() -> AttitudeClock {
     AttitudeClock {
         sigma_s: 1.0,
@@ -85,7 +85,7 @@ fn attitude_clock() -> AttitudeClock {
     }
 }
 
-/// Where the network settles with heights of full covariance, and all that can be said of it.
+/// The converged network with heights of full covariance, and its statistics.
 struct Dense {
     /// Inverse of the normal matrix of all unknowns, and its solution there.
     cofactors: DMatrix<f64>,
@@ -127,7 +127,7 @@ fn dense(
     let weights = heights.covariance_m2().cholesky().unwrap().inverse();
     normal += rows.tr_mul(&(&weights * &rows));
     right -= rows.tr_mul(&(&weights * above_m));
-    // Scaled by hand, for the plain inverse to be exact enough.
+    // Scaled explicitly, for the plain inverse to be accurate enough.
     let scale = normal.diagonal().map(|value| 1.0 / value.sqrt());
     for row in 0..unknowns {
         for column in 0..unknowns {
@@ -202,7 +202,7 @@ fn relief_and_the_attitudes_clock_by_parts_equal_the_dense_equations() {
     are_those_of_the_dense_equations(network, &surface);
 }
 
-/// The equations of `network` with heights above `surface`, solved by parts, and what is said of the solution.
+/// The equations of `network` with heights above `surface`, solved by parts, and the statistics of the solution.
 pub(super) fn are_those_of_the_dense_equations(
     mut network: Network<EulerPolynomial>,
     surface: &LaserSurface,
@@ -245,7 +245,8 @@ pub(super) fn are_those_of_the_dense_equations(
     let heights = layout.heights.as_ref().unwrap();
     let dense = dense(&layout, &settled.at, heights, active.len());
     for step in dense.step.iter().skip(shared) {
-        // Metres: where the parts have settled, to 1e-10 of the sum of squares, the whole has little left to move.
+        // Metres: once the parts have converged to 1e-10 of the sum of squares, the remaining step of the whole is
+        // small.
         assert!(step.abs() < 1e-3, "{step}");
     }
     let Settled { reduced, .. } = &settled;
@@ -327,7 +328,7 @@ fn ground_that_stands_higher_lifts_the_points_and_moves_them_little_in_plan() {
         heights.sum::<f64>() / CONTROLLED.len() as f64
     };
     let lifted_m = mean_height_m(50.0) - mean_height_m(0.0);
-    // Metres. The four points with coordinates of their own hold back: heights of 10 m and of 5 m share the lift.
+    // Metres. The four points with coordinates of their own resist: heights of 10 m and of 5 m share the lift.
     assert!((30.0..51.0).contains(&lifted_m), "{lifted_m}");
 }
 
@@ -375,7 +376,7 @@ fn heights_that_are_only_compared_change_nothing() {
 fn a_height_that_no_surface_explains_loses_its_weight() {
     let mut network = network();
     let surface = surface(&network, 0.0);
-    // One point lies in a hole between the profiles: its rays say so.
+    // One point lies in a hole between the profiles, as its rays show.
     let hole_m = network.points[6].ground_m.normalize() * 900.0;
     network.points[6].ground_m -= hole_m;
     let mut network = measured(network);

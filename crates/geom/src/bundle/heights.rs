@@ -1,4 +1,4 @@
-//! Heights that are observed: where the surface lies under the points, and how well it is known.
+//! Observed heights: the surface under the points, and its uncertainty.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -8,30 +8,30 @@ use crate::{
     surface::{LaserSurface, SurfaceHeights},
 };
 
-/// Heights that are observed, as they were when the surface was last asked.
+/// Observed heights, as of the last evaluation of the surface.
 #[derive(Clone)]
 pub(super) struct Heights {
     /// Their points.
     pub(super) points: Vec<usize>,
-    /// Where the points were then.
+    /// Positions of the points then.
     places_m: Vec<Vector3<f64>>,
     pub(super) surface: SurfaceHeights,
-    /// Where heights depend on plan, profiles of the surface whose shift is an unknown of its own, and its columns.
+    /// Where heights depend on planimetry: profiles of the surface whose shift is an unknown of its own, and its
+    /// columns.
     pub(super) shared: Vec<(usize, [Option<usize>; 3])>,
-    /// What is added to each variance because its residual is too large for it.
+    /// Inflation of each variance because its residual is too large for it.
     pub(super) inflation_m2: DVector<f64>,
 }
 
-/// Points that moved by less than this find the surface as it was, metres: a hundredth of a metre in height on a
-/// slope of 1 %.
+/// Points that moved by less than this keep their surface, metres: a hundredth of a metre in height on a slope of 1 %.
 const MOVED_M: f64 = 1.0;
-/// Degrees of freedom of Student's distribution, whose weights heights get: craters between the profiles make the
-/// errors of a surface longer in the tail than normal ones.
+/// Degrees of freedom of Student's distribution for the weights of heights: craters between the profiles give the
+/// errors of a surface longer tails than the normal distribution has.
 const STUDENT_FREEDOM: f64 = 4.0;
 
 impl Heights {
-    /// The surface under those of `points` that take part; where heights depend on plan, `shared` profiles have unknowns of their
-    /// own.
+    /// The surface under the `points` that take part; where heights depend on planimetry, `shared` profiles have
+    /// unknowns of their own.
     pub(super) fn at(
         surface: &LaserSurface,
         points: Vec<usize>,
@@ -48,7 +48,7 @@ impl Heights {
         }
     }
 
-    /// The same with the surface where the points are now; whether they had moved.
+    /// Re-evaluates the surface at the current points; returns whether they had moved.
     pub(super) fn follow(&mut self, surface: &LaserSurface, state: &State) -> bool {
         let places_m: Vec<Vector3<f64>> =
             self.points.iter().map(|at| state.points_m[*at]).collect();
@@ -91,8 +91,8 @@ impl Heights {
         }
     }
 
-    /// How the height at `index`, as measured minus predicted, grows with shifts of profiles that are unknowns of their own, and
-    /// the columns of these.
+    /// Change of the height at `index`, as measured minus predicted, with shifts of profiles that are unknowns of their
+    /// own, and the columns of these.
     pub(super) fn by_shared(&self, index: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let profiles = self.surface.relief.iter().flat_map(|of| &of.profiles);
         profiles.flat_map(move |profile| {
@@ -105,7 +105,7 @@ impl Heights {
         })
     }
 
-    /// The same heights as if slopes said nothing of the place, and none of it were open.
+    /// The same heights without the information of slopes about planimetry, and without its uncertainty.
     pub(super) fn without_plan(&self) -> Self {
         let mut heights = self.clone();
         heights.surface.relief = None;
@@ -114,7 +114,8 @@ impl Heights {
         heights
     }
 
-    /// Weights by what the rays alone leave of each height; the largest change of a standard deviation, metres.
+    /// Robust weights from the part of each height that the rays leave undetermined; returns the largest change of a
+    /// standard deviation, metres.
     pub(super) fn reweigh(
         &mut self,
         misclosures_m: &DVector<f64>,
@@ -136,7 +137,7 @@ impl Heights {
     }
 }
 
-/// The surface at some places; what comes of the shifts of `shared` profiles is no part of its errors.
+/// The surface at some positions; its errors do not include the effect of shifts of `shared` profiles.
 fn predicted(
     surface: &LaserSurface,
     places_m: &[Vector3<f64>],

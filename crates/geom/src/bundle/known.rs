@@ -1,8 +1,8 @@
-//! Coordinates of points that are known beforehand.
+//! A priori coordinates of points.
 
 use nalgebra::{Matrix3, Vector3};
 
-/// How well coordinates are known beforehand.
+/// A priori uncertainty of coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KnownCoordinates {
     /// Principal axes of their covariance, Mars-fixed unit vectors, one a row.
@@ -48,7 +48,7 @@ mod tests {
 
     #[test]
     fn a_covariance_becomes_axes_and_one_that_is_none_is_refused() {
-        // Well known upwards, badly in plan: the axes are those of the ground, not of Mars.
+        // Well known in height, poorly in planimetry: the axes are those of the ground, not of Mars.
         let up = Vector3::new(1.0, 2.0, -2.0) / 3.0;
         let covariance_m2 = Matrix3::identity() * 1e6 - up * up.transpose() * (1e6 - 4.0);
         let known = KnownCoordinates::of_covariance(&covariance_m2).unwrap();

@@ -1,4 +1,4 @@
-//! A network laid out for its adjustment: which observations belong to a point, and their weighted rows.
+//! A network prepared for its adjustment: the observations of each point, and their weighted rows.
 
 use std::ops::Range;
 
@@ -18,16 +18,16 @@ use crate::{
     robust::RobustWeight,
 };
 
-/// A point whose rows determine one direction this much worse than another counts as undetermined.
+/// A point whose rows determine one direction this much worse than another is undetermined.
 const DIRECTION_RATIO_MIN: f64 = 1e-6;
 
-/// The rows of all views at a state: computed once, and used for the equations, the points and the covariances.
+/// The rows of all views at a state, computed once for the equations, the points and the covariances.
 pub(super) struct Linearised {
     pub(super) state: State,
     views: Vec<Result<[Row; 2], Unseen>>,
 }
 
-/// A network laid out for its adjustment.
+/// A network prepared for its adjustment.
 pub(super) struct Layout<'a, M> {
     pub(super) network: &'a Network<M>,
     pub(super) columns: Columns,
@@ -36,16 +36,16 @@ pub(super) struct Layout<'a, M> {
     pub(super) ranges: Lists,
     /// Spots of each point.
     pub(super) spots: Lists,
-    /// Profile that each point is recorded with, where that may lie elsewhere.
+    /// Profile that each point is recorded with, where its recorded position may be offset.
     profile_of_point: Vec<Option<usize>>,
     pub(super) robust: Option<RobustWeight>,
-    /// Heights that are observed.
+    /// Observed heights.
     pub(super) heights: Option<Heights>,
     /// Focal pixels per line of each view, initially: the unit of its residual along the track.
     px_per_line: Vec<f64>,
     /// The same of each spot.
     spot_px_per_line: Vec<f64>,
-    /// How each spot moves with the angles of the boresight; where its point is not seen it takes no part.
+    /// Motion of each spot with the boresight angles; a spot whose point is not seen is not used.
     spot_by_boresight: Vec<[Vector2<f64>; 2]>,
     /// Initial position at the instant of each range.
     range_bases_m: Vec<Vector3<f64>>,
@@ -238,7 +238,7 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
             }
         }
         if let Some(known) = &self.network.points[point].known {
-            // Where it is recorded: where it lies, and how far its profile is recorded from there.
+            // The recorded position: the true position plus the shift of the point's profile.
             let recorded_m = state.points_m[point] + self.shift_m(state, point);
             let from_initial_m = self.network.points[point].ground_m - recorded_m;
             for (axis, sigma_m) in known.axes.row_iter().zip(&known.sigma_m) {
@@ -327,7 +327,7 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
         Ok(())
     }
 
-    /// Sets the derivative by the attitude's clock in the last row, one of `image`.
+    /// Sets the derivative by the attitude clock in the last row, one of `image`.
     fn by_clock(&self, rows: &mut PointRows, row: &Row, image: usize, factor: f64) {
         let clock = self.network.attitude_clock.as_ref();
         if let (Some(clock), Some(column)) = (clock, self.columns.attitude_clock) {
@@ -336,7 +336,7 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
         }
     }
 
-    /// Factor of a view's weights, and its part of the sum that is made small.
+    /// Factor of a view's weights, and its part of the minimised sum.
     fn robust_factor(&self, pair: &[Row; 2]) -> (f64, f64) {
         let squares: f64 = pair
             .iter()
@@ -351,7 +351,7 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
         }
     }
 
-    /// Why `point` cannot take part, from its rows at the start.
+    /// Why `point` cannot be adjusted, from its rows at the start.
     pub(super) fn fitness(
         &self,
         rows: &mut PointRows,
@@ -368,7 +368,7 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
         }
         // The triangle has the singular values of the rows.
         let singular_values = rows.eliminate().singular_values();
-        // Written so that NaN is refused.
+        // Written so that NaN is rejected.
         if singular_values.min() > DIRECTION_RATIO_MIN * singular_values.max() {
             Ok(())
         } else {

@@ -1,14 +1,14 @@
 //! Combined bundle adjustment of pushbroom images, ground points and laser ranges.
 //!
-//! Unknown are 18 coefficients of a correction to each image's orientation, the ground points, and where
-//! asked for a time bias of each image and a range bias of each profile. The orientation itself may be of
-//! any form. Coefficients belong to powers of `t = x/L`, `L` half the number of lines: all positions are
-//! metres, all rotations radians, of like size.
-//! Observed are focal coordinates, ranges, and the initial values themselves with their standard
-//! deviations. Residuals are observed minus computed.
+//! The unknowns are 18 coefficients of a correction to each image's orientation, the ground points and, if requested, a
+//! time bias of each image and a range bias of each profile. The orientation itself may be of any form. Coefficients
+//! belong to powers of `t = x/L`, `L` half the number of lines, so all positions are metres, all rotations radians, of
+//! similar size.
+//! The observations are focal coordinates, ranges, and the initial values themselves with their standard deviations.
+//! Residuals are observed minus computed.
 //!
-//! A view is compared with where the unknowns project its point: the line that sees it, and the place in
-//! that line. Lines count as focal-plane pixels, as many as they are initially.
+//! A view is compared with the projection of its point: the line that sees it, and the position in that line. Lines are
+//! converted to focal-plane pixels at the initial scale.
 //!
 //! This module uses indices and numbers; `stages/adjust` adds identifiers and statistics. Corrections apply to an
 //! orientation of any form, so that the sampled orientation itself can be adjusted. Unknowns with a standard deviation
@@ -23,9 +23,9 @@
 //! Yoon & Shan 2004. They adjust the coefficients of ω, φ and κ, which near the equator cannot be
 //! separated; here a rotation about the camera's own axes is added to them. They state one standard deviation
 //! an image for 18 unknowns, in metres; here each unknown has its own.
-//! Their residual along the track is the point's place in the focal plane of the measured line. An error of
-//! the line then counts as the more pixels the faster the image flies over the ground, and the adjustment
-//! learns from many noisy lines to fly slowly: a bias of errors in variables.
+//! Their along-track residual is the point's position in the focal plane of the measured line. An error of the line
+//! then counts as more pixels the faster the image flies over the ground, and noisy lines bias the adjustment towards a
+//! slow flight: a bias of errors in variables.
 //!
 //! ```
 //! use areograph_geom::{
@@ -152,7 +152,7 @@ pub struct BundleImage<M> {
     pub line_period_s: f64,
     /// Focal length, pixels of the image.
     pub focal_length_px: f64,
-    /// Where its detector line lies in the focal plane.
+    /// Position of its detector line in the focal plane.
     pub distortion: Distortion,
     /// Standard deviation of each unknown, initially zero, at `[3·quantity + power]`, metres and radians;
     /// infinite leaves it free, 0 holds it fixed.
@@ -166,7 +166,7 @@ pub struct BundleImage<M> {
 pub struct BundlePoint {
     /// Initial coordinates, Mars-fixed, metres.
     pub ground_m: Vector3<f64>,
-    /// How well they are known beforehand, when they are observations.
+    /// Their a priori uncertainty, when they are observations.
     pub known: Option<KnownCoordinates>,
 }
 
@@ -179,7 +179,7 @@ pub struct View {
     pub image: usize,
     /// Measured line, from the middle of the image.
     pub x_lines: f64,
-    /// Measured place in the line, pixels from the principal point.
+    /// Measured position in the line, pixels from the principal point.
     pub y_px: f64,
     /// Standard deviations along and across the track, focal-plane pixels.
     pub sigma_px: Vector2<f64>,
@@ -194,7 +194,7 @@ pub struct Range {
     pub image: usize,
     /// The instant of the shot as a line, `(t_shot − t_mid)/τ`: not the line that the point falls in.
     pub x_lines: f64,
-    /// From where the image's rays start at that instant to the laser, Mars-fixed, metres: light time and aberration.
+    /// From the origin of the image's rays at that instant to the laser, Mars-fixed, metres: light time and aberration.
     pub to_laser_m: Vector3<f64>,
     /// Measured distance, metres.
     pub range_m: f64,
@@ -206,17 +206,17 @@ pub struct Range {
 
 /// An offset of the time at which attitudes were read, the same for all images.
 ///
-/// An image whose camera turns against the stars, as one that follows nadir does, was then turned by so much more or less
-/// than its attitude says; one that is held towards a star was not.
+/// An image whose camera rotates inertially, as one that follows nadir does, was rotated by an amount proportional to
+/// the offset against its attitude; one that is held towards a star was not.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AttitudeClock {
     /// Standard deviation of the offset, seconds.
     pub sigma_s: f64,
-    /// How each image turns against the stars, camera components, radians per second.
+    /// Inertial rotation rate of each image, camera components, radians per second.
     pub turns_rad_s: Vec<Vector3<f64>>,
 }
 
-/// Points whose height is that of a surface.
+/// Points whose height is compared with a surface.
 #[derive(Debug, Clone)]
 pub struct HeightControl {
     /// The ground.
@@ -227,7 +227,7 @@ pub struct HeightControl {
     pub observed: Vec<usize>,
 }
 
-/// All that enters an adjustment.
+/// The input of an adjustment.
 #[derive(Debug, Clone)]
 pub struct Network<M> {
     /// Images.
@@ -242,12 +242,12 @@ pub struct Network<M> {
     pub range_bias_sigmas_m: Vec<f64>,
     /// Heights of points above a surface.
     pub heights: Option<HeightControl>,
-    /// An offset of the attitude's clock, where it is an unknown.
+    /// An attitude clock offset, where it is an unknown.
     pub attitude_clock: Option<AttitudeClock>,
     /// A laser on the bus of the cameras, where its spots in the images are observations.
     pub common_bus: Option<CommonBus>,
-    /// Where each image is expected against its initial orientation, Mars-fixed, metres: what its constant position unknowns
-    /// are within their standard deviations of. Empty where that is nothing for all.
+    /// Expected position of each image relative to its initial orientation, Mars-fixed, metres: the a priori values of
+    /// its constant position unknowns. Empty where they are zero for all.
     pub expected_m: Vec<Vector3<f64>>,
 }
 
@@ -267,14 +267,14 @@ impl<M> Default for Network<M> {
     }
 }
 
-/// How to adjust.
+/// Options of an adjustment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BundleOptions {
-    /// Weights of image coordinates once the quadratic adjustment has settled.
+    /// Weights of image coordinates once the quadratic adjustment has converged.
     pub robust: Option<RobustWeight>,
-    /// Steps that are taken in each of the two.
+    /// Maximum number of steps in each of the two.
     pub steps_max: u32,
-    /// Rounds in which observed heights find their surface and their weights.
+    /// Maximum number of iterations of the surface and weights of observed heights.
     pub height_rounds_max: u32,
 }
 
@@ -288,17 +288,17 @@ impl Default for BundleOptions {
     }
 }
 
-/// Why a point takes no part.
+/// Why a point is not adjusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum PointRejection {
-    /// It is observed in no two images and has no coordinates of its own.
+    /// It is observed in fewer than two images and has no coordinates of its own.
     #[error("too few rays to determine the point")]
     Undetermined,
     /// It lies behind a camera that has measured it.
     #[error("behind a camera that measured it")]
     BehindCamera,
     /// No line of a camera that has measured it sees it.
-    #[error("in the plane of no line of a camera that measured it")]
+    #[error("not in the plane of any line of a camera that measured it")]
     Unseen,
 }
 
@@ -309,13 +309,13 @@ pub struct Residual {
     pub value: f64,
     /// Its a priori standard deviation.
     pub sigma: f64,
-    /// Redundancy number, `0..=1`: how much of an error of the observation shows in its residual.
+    /// Redundancy number, `0..=1`: the share of an error of the observation that its residual shows.
     pub redundancy: f64,
-    /// Factor of its weight from robust estimation, 1 without.
+    /// Factor of its weight from robust estimation; 1 without it.
     pub weight_factor: f64,
 }
 
-/// Below this redundancy number a residual says nothing about its observation.
+/// Below this redundancy number a residual carries no information about its observation.
 const REDUNDANCY_MIN: f64 = 1e-6;
 
 impl Residual {
@@ -343,11 +343,11 @@ pub struct HeightResidual {
     pub above_m: f64,
     /// Standard deviation of the surface, metres, without robust weights.
     pub surface_sigma_m: f64,
-    /// Standard deviation that the point's own rays leave to its height when orientations are known, metres.
+    /// Standard deviation that the point's own rays leave in its height when orientations are known, metres.
     pub ray_sigma_m: f64,
     /// Distance of the nearest shot, metres.
     pub nearest_shot_m: f64,
-    /// Factor of its weight from robust estimation, 1 without.
+    /// Factor of its weight from robust estimation; 1 without it.
     pub weight_factor: f64,
     /// Redundancy number; 0 of heights that are only compared.
     pub redundancy: f64,
@@ -356,12 +356,12 @@ pub struct HeightResidual {
 /// An adjusted image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AdjustedImage {
-    /// What is added to the initial orientation; its coefficients are the unknowns.
+    /// Correction added to the initial orientation; its coefficients are the unknowns.
     pub correction: OrientationCorrection,
-    /// Cofactors of the unknowns in the same order, rows of fixed ones zero; times σ0² the covariance.
+    /// Cofactors of the unknowns in the same order, rows of fixed ones zero; σ0² times these is the covariance.
     pub cofactors: DMatrix<f64>,
-    /// Residuals of the initial values, `None` where free or fixed; what the attitude's clock adds to the correction is no
-    /// part of them.
+    /// Residuals of the initial values, `None` where free or fixed; they exclude the part of the correction due to the
+    /// attitude clock.
     pub priors: [Option<Residual>; ORIENTATION_UNKNOWNS],
     /// Time bias, seconds, with the square root of its cofactor, when it is unknown.
     pub time_bias_s: Option<(f64, f64)>,
@@ -372,7 +372,7 @@ pub struct AdjustedImage {
 pub struct AdjustedPoint {
     /// Coordinates, Mars-fixed, metres.
     pub ground_m: Vector3<f64>,
-    /// Cofactors, m²; times σ0² the covariance.
+    /// Cofactors, m²; σ0² times these is the covariance.
     pub cofactor_m2: Matrix3<f64>,
     /// Residuals of the initial coordinates along their principal axes, when they were observed.
     pub priors: Option<[Residual; 3]>,
@@ -391,22 +391,23 @@ pub struct Adjustment {
     pub ranges: Vec<Option<Residual>>,
     /// Range bias of each profile with the square root of its cofactor, metres, when it is unknown.
     pub range_biases_m: Vec<Option<(f64, f64)>>,
-    /// Offset of the attitude's clock with the square root of its cofactor, seconds, when it is unknown: attitudes are
-    /// those that the images had so much later.
+    /// Attitude clock offset with the square root of its cofactor, seconds, when it is unknown: the attitudes read are
+    /// those that the images had this much later.
     pub attitude_clock_s: Option<(f64, f64)>,
-    /// What spots of a laser on the same bus say, where they are observations.
+    /// Estimates from spots of a laser on the same bus, where they are observations.
     pub common_bus: Option<AdjustedBus>,
     /// Heights that are observations.
     pub heights: Vec<HeightResidual>,
-    /// Whether surface and weights had come to rest in the last round.
+    /// Whether surface and weights had converged in the last iteration.
     pub heights_settled: bool,
-    /// Heights that are compared, each with the standard deviation that rays and surface give it alone.
+    /// Heights that are compared, each with the standard deviation from its own rays and the surface only.
     pub compared: Vec<HeightResidual>,
     /// Weighted sum of squares of the observed heights, with their full covariance.
     pub height_squares: f64,
-    /// What the relief under the points with an observed height says of the place, when the ground has any.
+    /// What the relief under the points with an observed height determines about planimetry, where the ground has
+    /// relief.
     pub relief: Option<ReliefOfSite>,
-    /// Cofactors of the mean of the points with an observed height, m²: what they share does not average out.
+    /// Cofactors of the mean of the points with an observed height, m²: common errors do not average out.
     pub mean_cofactor_m2: Option<Matrix3<f64>>,
     /// Scalar observations, initial values with a standard deviation included.
     pub observations: usize,
@@ -428,7 +429,7 @@ impl Adjustment {
         self.observations - self.unknowns
     }
 
-    /// A posteriori standard deviation of unit weight, pixels; 1 where nothing is redundant.
+    /// A posteriori standard deviation of unit weight, pixels; 1 without redundancy.
     #[must_use]
     pub fn sigma0(&self) -> f64 {
         match self.degrees_of_freedom() {

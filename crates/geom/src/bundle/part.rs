@@ -1,4 +1,4 @@
-//! What of a network is spoken of.
+//! Parts of a network, for messages.
 
 /// A part of a network, by its index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -21,7 +21,7 @@ pub enum Part {
     /// A spot of the laser.
     #[error("spot {0}")]
     Spot(usize),
-    /// What all images share.
+    /// Unknowns common to all images.
     #[error("all images")]
     Images,
 }

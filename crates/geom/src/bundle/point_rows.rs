@@ -1,4 +1,4 @@
-//! The weighted rows of one point in the shared unknowns and in its coordinates, and the elimination of these.
+//! The weighted rows of one point in the shared unknowns and in its coordinates, and the elimination of the latter.
 
 use std::ops::Range;
 
@@ -6,18 +6,18 @@ use nalgebra::{DVector, Matrix3, Vector3};
 
 use super::rows::{ImagePartials, Row};
 
-/// Shared unknowns that stand side by side, in the equations and in a point's rows.
+/// Shared unknowns with adjacent columns, in the equations and in a point's rows.
 #[derive(Debug, Clone)]
 pub(super) struct Run {
     /// Columns in the equations.
     pub(super) columns: Range<usize>,
-    /// The first one's place in the rows.
+    /// Position of the first one in the rows.
     pub(super) first: usize,
 }
 
 /// The weighted rows of one point: views by twos, then ranges, then its own coordinates if observed.
 ///
-/// It is used for one point after another, so that its memory is asked for only once.
+/// It is reused for one point after another, so that its memory is allocated only once.
 #[derive(Debug, Clone, Default)]
 pub(super) struct PointRows {
     /// Which shared unknowns the rows contain.
@@ -30,9 +30,9 @@ pub(super) struct PointRows {
     pub(super) by_point: Vec<Vector3<f64>>,
     /// Standard deviation and weight factor of each row.
     pub(super) weights: Vec<(f64, f64)>,
-    /// Their part of the sum that is made small.
+    /// Their part of the minimised sum.
     pub(super) cost: f64,
-    /// Room for [`PointRows::eliminate`].
+    /// Workspace of [`PointRows::eliminate`].
     sums: Vec<f64>,
 }
 
@@ -100,9 +100,10 @@ impl PointRows {
         self.runs.iter().flat_map(|run| run.columns.clone())
     }
 
-    /// Transforms at least three rows so that the point is left in the first three, and gives its triangle `R`.
+    /// Transforms at least three rows so that the coordinates of the point remain in the first three only, and returns
+    /// their triangle `R`.
     ///
-    /// `by_point` is used up; all else is transformed in place.
+    /// `by_point` is consumed; everything else is transformed in place.
     ///
     /// # Source
     /// Householder 1958, Unitary triangularization of a nonsymmetric matrix.
@@ -128,7 +129,7 @@ impl PointRows {
             if length == 0.0 {
                 continue;
             }
-            // The mirror's normal takes the place of the column; its first entry is made large, not small.
+            // The mirror's normal replaces the column; its first entry is made large, not small.
             let pivot = below[0][axis];
             let image = -length.copysign(pivot);
             below[0][axis] = pivot - image;
@@ -155,7 +156,7 @@ impl PointRows {
 
     /// Step of the point that goes with a step of the shared unknowns.
     pub(super) fn point_step_m(&mut self, shared: &DVector<f64>) -> Option<Vector3<f64>> {
-        // What the shared unknowns leave of the misclosures; from here on a row is nothing but that.
+        // Misclosures reduced by the shared unknowns; from here on a row is that value only.
         for row in 0..self.weights.len() {
             let at = row * self.width;
             let known: f64 = self

@@ -1,4 +1,4 @@
-//! Covariances, residuals, redundancy numbers and correlations of the settled adjustment.
+//! Covariances, residuals, redundancy numbers and correlations of the converged adjustment.
 
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Vector3};
 use rayon::prelude::*;
@@ -20,13 +20,13 @@ use crate::{block_equations::BlockMatrix, pushbroom::ExteriorOrientation};
 /// Correlations above this are reported.
 const CORRELATION_REPORTED: f64 = 0.95;
 
-/// What one point contributes: its estimate, and a residual for each of its rows.
+/// The contribution of one point: its estimate, and a residual for each of its rows.
 struct Judged {
     point: AdjustedPoint,
     residuals: Vec<Residual>,
 }
 
-/// What observed heights do to the points that carry them.
+/// Effect of observed heights on their points.
 struct Controls {
     /// Index among the heights of each point that has one.
     of_point: Vec<Option<usize>>,
@@ -37,7 +37,7 @@ struct Controls {
     left: DMatrix<f64>,
 }
 
-/// What an observed height does to its point.
+/// Effect of an observed height on its point.
 struct Control<'a> {
     turned: &'a Vector3<f64>,
     through: &'a [f64],
@@ -69,7 +69,7 @@ impl Controls {
     }
 }
 
-/// The adjustment where it has settled; observations, unknowns and history are left to the caller.
+/// The adjustment at convergence; the caller fills in observations, unknowns and history.
 pub(super) fn judge<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
     settled: &Settled,
@@ -163,7 +163,7 @@ fn judge_points<M: ExteriorOrientation>(
     controls: Option<&Controls>,
 ) -> Vec<Result<Judged, PointRejection>> {
     let of_group = |group: &Group| -> Vec<Option<Judged>> {
-        // What the points of a group need of the cofactors is one small matrix.
+        // The points of a group need only one small matrix of the cofactors.
         let local = cofactors.local(&group.blocks);
         let mut room = Room::default();
         let points = group.points.iter();
@@ -184,7 +184,7 @@ fn judge_points<M: ExteriorOrientation>(
     judged
 }
 
-/// Room for one point, used again for the next.
+/// Workspace of one point, reused for the next.
 #[derive(Default)]
 struct Room {
     rows: PointRows,
@@ -216,8 +216,8 @@ fn judge_point<M: ExteriorOrientation>(
         let cofactors = column_of(cofactors, place);
         Vector3::from(coupling.map(|coupling| dot(cofactors, coupling)))
     }));
-    // Cofactors of the point transformed by its triangle: what its rays leave open, what the shared unknowns add, and
-    // what an observed height takes away.
+    // Cofactors of the point transformed by its triangle: the part its rays leave undetermined, plus that of the shared
+    // unknowns, minus that of an observed height.
     let mut transformed_cofactor = Matrix3::identity();
     for (place, between) in between.iter().enumerate() {
         transformed_cofactor += between * Vector3::from(coupling.map(|row| row[place])).transpose();
@@ -238,7 +238,7 @@ fn judge_point<M: ExteriorOrientation>(
     }
     let residuals: Vec<Residual> = (0..rows.weights.len())
         .map(|row| {
-            // What the point does to the row, what the shared unknowns do, and what both do together.
+            // The effect of the point on the row, that of the shared unknowns, and that of both together.
             let own = inverse.tr_mul(&rows.by_point[row]);
             let mut leverage = own.dot(&(transformed_cofactor * own));
             let partials = rows.row(row);
@@ -267,7 +267,8 @@ fn judge_point<M: ExteriorOrientation>(
     })
 }
 
-/// Cofactors of the mean of `points`: what their rays leave open averages out, what they share does not.
+/// Cofactors of the mean of `points`: the part that their rays leave undetermined averages out, the common part does
+/// not.
 fn mean_cofactor_m2<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
     at: &Linearised,
@@ -308,7 +309,7 @@ fn column_of(matrix: &DMatrix<f64>, column: usize) -> &[f64] {
     &matrix.as_slice()[column * matrix.nrows()..(column + 1) * matrix.nrows()]
 }
 
-/// Sum of products, as far as the first reaches.
+/// Sum of products over the length of the first.
 fn dot(first: &[f64], second: &[f64]) -> f64 {
     first.iter().zip(second).map(|(a, b)| a * b).sum()
 }
@@ -332,7 +333,7 @@ fn judge_image<M: ExteriorOrientation>(
     cofactors: &BlockMatrix,
 ) -> AdjustedImage {
     let columns = &layout.columns.of_image[image];
-    // A correction is an unknown of the image and, of rotations, what the attitude's clock turns by.
+    // A correction is an unknown of the image plus, for rotations, the rotation by the attitude clock.
     let shares = |coefficient: usize| {
         let clock = layout.network.attitude_clock.as_ref();
         let turn_rad_s = match clock {

@@ -1,8 +1,8 @@
-//! What Gauss–Newton steps leave out, learnt from how the gradient changes.
+//! The curvature that Gauss–Newton steps omit, estimated from changes of the gradient.
 //!
-//! Gauss–Newton neglects the curvature of the observations times their residuals. Of very many noisy ties that sums up:
-//! along what only the initial orientations hold, slow bends that all images share, it is as large as all that is known,
-//! of either sign. Steps then come to rest only slowly, and where the sign is negative they swing from one side to the other.
+//! Gauss–Newton neglects the curvature of the observations times their residuals. For very many noisy ties that adds
+//! up: along slow bends common to all images, which only the initial orientations constrain, it is as large as the
+//! known information, of either sign. Steps then converge only slowly, and where the sign is negative they oscillate.
 //! The change of the gradient from step to step shows this curvature.
 //!
 //! # Source
@@ -16,19 +16,19 @@ use super::{factor::Factor, reduce::Settled};
 const REMEMBERED: usize = 8;
 /// A remembered step counts if the curvature along it is at least this share of that of Gauss–Newton.
 const CURVATURE_MIN: f64 = 1e-3;
-/// Steps are remembered where Gauss–Newton expects less than this relative fall of the sum of squares: farther off, the
-/// equations themselves change.
+/// Steps are remembered where Gauss–Newton expects less than this relative decrease of the sum of squares: farther
+/// away, the equations themselves change.
 const NEAR: f64 = 1e-3;
 
-/// Where the last steps began.
+/// Starting points of the last steps.
 #[derive(Default)]
 pub(super) struct QuasiNewton {
-    /// Corrections of the shared unknowns, and the right-hand side there: the gradient with its sign turned.
+    /// Corrections of the shared unknowns, and the right-hand side there: the negative gradient.
     visited: Vec<(DVector<f64>, DVector<f64>)>,
 }
 
 impl QuasiNewton {
-    /// The step from `now`, and whether it is more than that of Gauss–Newton.
+    /// The step from `now`, and whether it differs from that of Gauss–Newton.
     pub(super) fn step(&mut self, now: &Settled, factor: &Factor) -> (DVector<f64>, bool) {
         let right = &now.reduced.right;
         let step = factor.solve(right);
@@ -65,7 +65,7 @@ impl QuasiNewton {
         self.visited.clear();
     }
 
-    /// The steps that show a curvature, oldest first.
+    /// The steps with usable curvature, oldest first.
     fn pairs(&self, factor: &Factor) -> Vec<Pair> {
         let pairs = self.visited.windows(2).filter_map(|between| {
             let [(from, before), (to, after)] = between else {
@@ -84,7 +84,7 @@ impl QuasiNewton {
     }
 }
 
-/// A step and what it did to the gradient.
+/// A step and the resulting change of the gradient.
 struct Pair {
     step: DVector<f64>,
     change: DVector<f64>,

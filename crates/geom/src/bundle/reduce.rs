@@ -1,8 +1,8 @@
-//! Reduced normal equations: each point's coordinates are eliminated, the shared unknowns are left.
+//! Reduced normal equations: each point's coordinates are eliminated, the shared unknowns remain.
 //!
-//! An orthogonal transformation of a point's rows leaves its three coordinates in the first three of
-//! them. The squares of the other rows sum up to the Schur complement `U − W V⁻¹ Wᵀ`; nothing is
-//! subtracted, so nothing is lost to cancellation. Images that share no point have no block in it.
+//! An orthogonal transformation of a point's rows confines its three coordinates to the first three of them. The
+//! squares of the other rows sum up to the Schur complement `U − W V⁻¹ Wᵀ`; nothing is subtracted, so there is no
+//! cancellation. Images that share no point have no block in it.
 
 use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
@@ -18,7 +18,7 @@ use crate::{
     pushbroom::{ExteriorOrientation, Unseen},
 };
 
-/// Groups that are summed side by side before they are added to the whole, one after the other: a bound of memory.
+/// Groups summed in parallel before they are added to the whole, one after the other: a memory bound.
 const TOGETHER: usize = 64;
 /// Numbers of a group's rows that are multiplied together: as many as a processor's cache holds.
 const ROWS_TOGETHER: usize = 16_384;
@@ -29,13 +29,13 @@ pub(super) struct Reduced {
     pub(super) matrix: BlockMatrix,
     /// With them, as the sum.
     pub(super) right: DVector<f64>,
-    /// The sum that is made small.
+    /// The minimised sum.
     pub(super) cost: f64,
     /// Heights, where they are observed.
     pub(super) heights: Option<ReducedHeights>,
 }
 
-/// Where an iteration has come to.
+/// State of an iteration.
 pub(super) struct Settled {
     pub(super) at: Linearised,
     pub(super) reduced: Reduced,
@@ -109,7 +109,7 @@ pub(super) fn reduce<M: ExteriorOrientation>(
         }
     }
     for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
-        // Infinite standard deviations weigh nothing.
+        // Infinite standard deviations have no weight.
         let weight = sigma.powi(-2);
         let correction = at.state.corrections[column] - layout.columns.expected[column];
         sum.matrix.add_to_diagonal(column, weight);

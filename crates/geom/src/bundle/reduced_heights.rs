@@ -1,9 +1,9 @@
 //! Heights of points above a surface, observed to be 0 with a full covariance.
 //!
-//! Points are still eliminated one by one. With the triangle `R` that their own rows leave, the change of a height by
-//! the point is `u = R⁻ᵀ ∂h/∂P`; what the rays alone leave open of it has the variance `u·u`, and the shared unknowns
-//! see it through `G = −uᵀC`, `C` what the transformed rows hold of them. Given these the heights are observations of
-//! the shared unknowns with the covariance `Σ` = that of the surface + diag(u·u), and then of the points.
+//! Points are still eliminated one by one. With the triangle `R` that remains of their own rows, the change of a height
+//! by the point is `u = R⁻ᵀ ∂h/∂P`; the variance that the rays leave in it is `u·u`, and the shared unknowns see it
+//! through `G = −uᵀC`, `C` their part of the transformed rows. The heights are then observations of the shared unknowns
+//! with the covariance `Σ` = that of the surface + diag(u·u), and after that of the points.
 //!
 //! # Source
 //! The partitioned inverse (Woodbury 1950) of normal equations with additional observations of the points.
@@ -21,20 +21,20 @@ use crate::pushbroom::{ExteriorOrientation, Unseen};
 /// Heights in terms of the shared unknowns.
 #[derive(Clone)]
 pub(super) struct ReducedHeights {
-    /// What the rays leave of each height, metres, and its change by the shared unknowns.
+    /// The misclosure of each height after its rays, metres, and its change by the shared unknowns.
     pub(super) misclosures_m: DVector<f64>,
     pub(super) by_shared: DMatrix<f64>,
-    /// Variance that the rays of each point leave to its height when orientations are known, m².
+    /// Variance that the rays of each point leave in its height when orientations are known, m².
     pub(super) ray_variances_m2: DVector<f64>,
-    /// Heights as they are, metres.
+    /// Current height differences, metres.
     differences_m: DVector<f64>,
-    /// `u` of each point, and how the point moves with its height.
+    /// `u` of each point, and the motion of the point with its height.
     pub(super) turned: Vec<Vector3<f64>>,
     moves: Vec<Vector3<f64>>,
     /// Covariance of surface and rays together, `Σ`, m².
     pub(super) covariance_m2: DMatrix<f64>,
     factor: Cholesky<f64, Dyn>,
-    /// Covariance of the surface alone.
+    /// Covariance of the surface only.
     of_surface: Cholesky<f64, Dyn>,
 }
 
@@ -79,7 +79,7 @@ impl ReducedHeights {
         let ray_variances_m2 =
             DVector::from_iterator(count, turned.iter().map(Vector3::norm_squared));
         let with_rays_m2 = &covariance_m2 + DMatrix::from_diagonal(&ray_variances_m2);
-        // A covariance that is none comes from points that are nowhere.
+        // An invalid covariance comes from points without a finite position.
         let factor = Cholesky::new(with_rays_m2.clone()).ok_or(Unseen::BehindCamera)?;
         let of_surface = Cholesky::new(covariance_m2).ok_or(Unseen::BehindCamera)?;
         Ok(Self {
@@ -95,7 +95,7 @@ impl ReducedHeights {
         })
     }
 
-    /// What the heights add to the right-hand side of the shared unknowns' normal equations.
+    /// The contribution of the heights to the right-hand side of the shared unknowns' normal equations.
     pub(super) fn right(&self) -> DVector<f64> {
         -self
             .by_shared
@@ -112,7 +112,7 @@ impl ReducedHeights {
         self.factor.inverse()
     }
 
-    /// How far each point moves for its height, beyond what its rays say, with a step of the shared unknowns.
+    /// How far each height moves its point, in addition to its rays, with a step of the shared unknowns.
     pub(super) fn moves_m(&self, shared: &DVector<f64>) -> Vec<Vector3<f64>> {
         let pull = self
             .factor
@@ -123,8 +123,8 @@ impl ReducedHeights {
 
     /// Residuals of the heights, `left` being `Σ⁻¹ − Σ⁻¹ G Q Gᵀ Σ⁻¹`, `Q` the cofactors of the shared unknowns.
     ///
-    /// Redundancy numbers are the diagonal of the covariance of the surface times `left`. Of correlated observations one
-    /// may lie outside `0..=1`; their sum is what counts.
+    /// Redundancy numbers are the diagonal of the covariance of the surface times `left`. With correlated observations
+    /// a single number may lie outside `0..=1`; only their sum is meaningful.
     pub(super) fn residuals(&self, heights: &Heights, left: &DMatrix<f64>) -> Vec<HeightResidual> {
         let redundancies = (heights.covariance_m2() * left).diagonal();
         (0..heights.points.len())
@@ -145,7 +145,7 @@ impl ReducedHeights {
             .collect()
     }
 
-    /// Residuals of the heights, each times what it weighs beside the others: `C⁻¹ d`.
+    /// Residuals of the heights times the inverse of their covariance: `C⁻¹ d`.
     pub(super) fn weighted_differences(&self) -> DVector<f64> {
         self.of_surface.solve(&self.differences_m)
     }

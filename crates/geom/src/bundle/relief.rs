@@ -1,4 +1,4 @@
-//! What relief says of the place: heights of points on slopes fit the surface in one place only.
+//! Planimetry from relief: heights of points on slopes fit the surface in one position only.
 
 use nalgebra::{DMatrix, Matrix3, MatrixXx2};
 
@@ -8,17 +8,17 @@ use super::{
 };
 use crate::{pushbroom::ExteriorOrientation, surface::ProfileOnRelief};
 
-/// What the relief of a site says of the place.
+/// What the relief of a site determines about planimetry.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReliefOfSite {
-    /// Standard deviations towards east and north to which heights alone tell where the images lie against the surface,
+    /// Standard deviations towards east and north of the position of the images against the surface from heights only,
     /// metres, whether they are used for it or not.
     pub sigma_m: [f64; 2],
-    /// Where the profiles lie, when heights are used for it; those whose shift is an unknown of its own are not among them.
+    /// Shifts of the profiles, when heights are used for it, without those whose shift is an unknown of its own.
     pub profiles: Vec<ProfileShift>,
 }
 
-/// How far a profile is recorded from where it lies.
+/// Offset between the recorded and the true position of a profile.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ProfileShift {
     /// Index of the profile.
@@ -29,8 +29,8 @@ pub struct ProfileShift {
     pub root_cofactors_m: [f64; 3],
 }
 
-/// The relief under `heights`, `left` being the inverse of the covariance of what heights differ by from all that is known
-/// without them.
+/// The relief under `heights`; `left` is the inverse of the covariance of their differences, given all other
+/// information.
 pub(super) fn of_site<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
     settled: &Settled,
@@ -59,8 +59,8 @@ pub(super) fn of_site<M: ExteriorOrientation>(
     })
 }
 
-/// To what a shift that all points share is known by heights alone: what they differ by is uncertain by rays, surface and
-/// all that is known of orientations beforehand.
+/// Standard deviation of a shift common to all points from heights only: their differences are uncertain by rays,
+/// surface and a priori orientations.
 fn sigma_m<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
     settled: &Settled,

@@ -47,15 +47,15 @@ impl Row {
     }
 }
 
-/// A step below this many lines finds the line of a view: rates that turn by 1e-4 of themselves per line are
-/// exact to 1e-7.
+/// A step below this many lines ends the search for the line of a view: rates that change by 1e-4 of themselves per
+/// line are exact to 1e-7.
 const LAST_STEP_LINES: f64 = 1e-3;
 
 /// How far a point at its initial coordinates moves along the focal plane from the measured line to the next,
 /// with the initial orientation, focal-plane pixels.
 ///
-/// The unit of the residuals along the track must not depend on the unknowns: a model that flies slower
-/// would make them smaller.
+/// The unit of the along-track residuals must not depend on the unknowns: a model that flies more slowly would make
+/// them smaller.
 pub(super) fn initial_px_per_line<M: ExteriorOrientation>(
     image: &BundleImage<M>,
     view: &View,
@@ -67,7 +67,7 @@ pub(super) fn initial_px_per_line<M: ExteriorOrientation>(
     (by_camera_point_off_line(image, &camera_m) * rate_m).x
 }
 
-/// Change of how far the line misses a point, and of the point's place across the track, by the point.
+/// Change of the along-track miss of the line, and of the point's across-track position, with the point.
 fn by_camera_point_off_line<M>(image: &BundleImage<M>, camera_m: &Vector3<f64>) -> Matrix2x3<f64> {
     let mut partials = by_camera_point(camera_m, image.focal_length_px);
     let [_, slope] = image.distortion.curve(camera_m.y / camera_m.z);
@@ -76,8 +76,8 @@ fn by_camera_point_off_line<M>(image: &BundleImage<M>, camera_m: &Vector3<f64>) 
     partials
 }
 
-/// The rows of a view of `ground_m`, along the track and across it: what was measured minus where the
-/// line that sees the point lies, `px_per_line` focal-plane pixels each, and where in that line the point does.
+/// The rows of a view of `ground_m`, along and across the track: measured minus computed, with `px_per_line`
+/// focal-plane pixels a line; computed are the line that sees the point and the position in that line.
 pub(super) fn of_view<M: ExteriorOrientation>(
     image: &BundleImage<M>,
     correction: &OrientationCorrection,
@@ -98,13 +98,13 @@ pub(super) fn of_view<M: ExteriorOrientation>(
     )?;
     let (x_lines, camera_m) = (seen.solution.x, seen.solution.camera_m);
     let focal_y_px = -image.focal_length_px * camera_m.y / camera_m.z;
-    // The sense is that of the point's place in the focal plane of the measured line.
+    // The sign is that of the point's position in the focal plane of the measured line.
     let misclosures = [
         px_per_line * (x_lines - view.x_lines),
         view.y_px - focal_y_px,
     ];
-    // What moves the point along the focal plane by one pixel is made up for by `1/rate_px.x` lines less,
-    // and these move it across.
+    // A motion of the point by one pixel along the focal plane is compensated by `1/rate_px.x` lines less, and these
+    // move it across.
     let by_camera_point = by_camera_point_off_line(image, &camera_m);
     let rate_px = by_camera_point * seen.rate_m;
     let [along, across] = [0, 1].map(|axis| by_camera_point.row(axis).transpose());
@@ -114,7 +114,7 @@ pub(super) fn of_view<M: ExteriorOrientation>(
     ];
     let vector_rad = correction.turn_rad(x_lines);
     let by_time_m = if image.time_bias_sigma_s > 0.0 {
-        // The initial orientation turns and advances under its correction.
+        // The initial orientation rotates and advances under its correction.
         let (_, motion) = image
             .base
             .pose_and_rate(x_lines + correction.time_shift_lines);
@@ -141,8 +141,8 @@ pub(super) fn of_view<M: ExteriorOrientation>(
 
 /// The row of a range to `ground_m`; its derivative by the bias of its profile is 1.
 ///
-/// `base_m` is the initial position at the instant of the shot. That instant does not come from the
-/// image, so a time bias of the image does not move it.
+/// `base_m` is the initial position at the instant of the shot. That instant does not depend on the image, so a time
+/// bias of the image does not move it.
 pub(super) fn of_range<M>(
     image: &BundleImage<M>,
     correction: &OrientationCorrection,

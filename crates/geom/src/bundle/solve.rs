@@ -1,4 +1,4 @@
-//! Gauss–Newton steps corrected by what they teach, with damping only where a step makes matters worse.
+//! Gauss–Newton steps with learnt curvature, damped only where a step increases the sum.
 
 use std::collections::BTreeSet;
 
@@ -24,29 +24,29 @@ use areograph_base::units::METRES_PER_KM;
 
 /// A step below this ends the iteration, kilometres and radians.
 const STEP: f64 = 1e-8;
-/// So does a relative change of the weighted sum of squares below this.
+/// A relative change of the weighted sum of squares below this ends it too.
 const CHANGE: f64 = 1e-8;
-/// The same with robust weights: how a blunder is shared between the two rays of a tie hardly changes the
-/// sum, so that the point creeps long after everything else is converged.
+/// The same with robust weights: the division of a blunder between the two rays of a tie hardly changes the sum, so
+/// that the point creeps long after everything else has converged.
 const CHANGE_ROBUST: f64 = 1e-6;
-/// The same before robust weights are given: where blunders make the sum, it need not be the least.
+/// The same before robust weights are applied: where blunders dominate the sum, it need not reach its minimum.
 const CHANGE_ROUGH: f64 = 0.1;
-/// A relative rise of the sum below this is rounding, of positions of 4e6 m in the main.
+/// A relative increase of the sum below this is rounding, mainly of positions of 4e6 m.
 const ROUNDING: f64 = 1e-10;
-/// Damping after a first step that made matters worse, as a share of each unknown's own information. What only
-/// the initial values hold has so little of its own.
+/// Damping after a first step that increased the sum, as a share of each unknown's own information. Unknowns held only
+/// by their initial values have little of it.
 const DAMPING: f64 = 1e-10;
-/// What each further such step multiplies it with, and each good one.
+/// Factor of the damping after each further such step, and its inverse after each good one.
 const RAISED: f64 = 10.0;
 const EASED: f64 = 0.1;
-/// A step is good when the sum falls by this share of what its equations expect.
+/// A step is good when the sum decreases by this share of the expected decrease.
 const GOOD_SHARE: f64 = 0.5;
 
 /// Adjusts a network.
 ///
 /// # Errors
-/// Values that are none, indices without a target, too few observations, a singular network, an
-/// iteration that does not converge.
+/// Invalid values, indices without a target, too few observations, a singular network, an iteration that does not
+/// converge.
 pub fn solve<M: ExteriorOrientation>(
     network: &Network<M>,
     options: &BundleOptions,
@@ -135,10 +135,10 @@ fn count<M: ExteriorOrientation>(layout: &Layout<'_, M>, active: &[usize]) -> (u
     )
 }
 
-/// Standard deviations that change by less than this leave the weights of heights as they are, metres.
+/// Standard deviations that change by less than this leave the weights of heights unchanged, metres.
 const HEIGHT_CHANGE_M: f64 = 0.01;
 
-/// Where an iteration ends.
+/// Convergence criterion of an iteration.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stop {
     pub(super) steps_max: u32,
@@ -146,7 +146,7 @@ pub(super) struct Stop {
     pub(super) change: f64,
 }
 
-/// Goes on with heights as observations; and whether they came to rest.
+/// Continues with heights as observations; returns whether they converged.
 fn with_heights<M: ExteriorOrientation>(
     layout: &mut Layout<'_, M>,
     (control, rounds_max): (&HeightControl, u32),
@@ -220,7 +220,7 @@ pub(super) fn settle<M: ExteriorOrientation>(
             }
             _ => {
                 curvature.forget();
-                // A step that learnt from others may have learnt too much.
+                // A step with learnt curvature may overshoot.
                 if !is_corrected {
                     damping = DAMPING.max(RAISED * damping);
                 }

@@ -1,4 +1,5 @@
-//! Observation equations of spots: where the mounting has a shot in an image, against where its footprint is seen.
+//! Observation equations of spots: the position of a shot in an image by the mounting against the projection of its
+//! footprint.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -8,16 +9,16 @@ use super::{
 };
 use crate::pushbroom::{ExteriorOrientation, OrientationCorrection, Unseen};
 
-/// What a spot depends on beside its image and its point.
+/// Parameters of a spot besides its image and its point.
 #[derive(Clone, Copy)]
 pub(super) struct Pointing {
     /// Focal-plane pixels of a line.
     pub(super) px_per_line: f64,
-    /// What line times are late by against the shots, seconds.
+    /// Delay of line times against the shots, seconds.
     pub(super) late_s: f64,
-    /// Angles of the boresight.
+    /// Boresight angles.
     pub(super) boresight_rad: [f64; 2],
-    /// How the spot moves with each of these, see [`by_boresight`].
+    /// Motion of the spot with each of these, see [`by_boresight`].
     pub(super) by_boresight: [Vector2<f64>; 2],
 }
 
@@ -26,16 +27,16 @@ pub(super) struct Pointing {
 pub(super) struct SpotRow {
     /// As if the spot were a view.
     pub(super) row: Row,
-    /// By the angles of the boresight.
+    /// By the boresight angles.
     pub(super) by_boresight: [f64; 2],
-    /// By what line times are late.
+    /// By the delay of line times.
     pub(super) by_line_time: f64,
     /// By the time bias of the image.
     pub(super) by_time: f64,
 }
 
-/// How a spot moves along the track and across it with each angle of the boresight, pixels per radian: in the initial
-/// orientation, as its place does.
+/// Motion of a spot along and across the track with each boresight angle, pixels per radian: in the initial
+/// orientation, as for its position.
 pub(super) fn by_boresight<M: ExteriorOrientation>(
     image: &BundleImage<M>,
     spot: &Spot,
@@ -51,8 +52,8 @@ pub(super) fn by_boresight<M: ExteriorOrientation>(
 
 /// The rows of a spot whose footprint is at `ground_m`, along the track and across it.
 ///
-/// The spot moves in the image as the ground does that the laser meets; where lines were exposed later than they say, it is in
-/// an earlier one.
+/// The spot moves in the image with the ground point that the laser meets; where lines were exposed later than stated,
+/// it is in an earlier line.
 pub(super) fn of_spot<M: ExteriorOrientation>(
     image: &BundleImage<M>,
     correction: &OrientationCorrection,

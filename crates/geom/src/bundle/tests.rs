@@ -1,4 +1,4 @@
-//! What the public interface does not show: derivatives, and the elimination against dense equations.
+//! Details that the public interface does not show: derivatives, and the elimination against dense equations.
 
 use nalgebra::{DMatrix, DVector, Vector2, Vector3};
 
@@ -72,7 +72,7 @@ pub(super) fn network() -> Network<EulerPolynomial> {
             if number == 2 && index != 8 {
                 continue;
             }
-            // Any line will do: the equations need not be met where they are only compared.
+            // Any line serves: the equations need not be satisfied where they are only compared.
             let seen = image.base.pose(x_lines).camera_vector_m(&ground_m);
             let focal = project(&seen, image.focal_length_px).unwrap();
             network.views.push(View {
@@ -185,7 +185,7 @@ fn derivatives_at(
                     let partials = analytic[row].by_image();
                     DVector::from_column_slice(&partials[group.clone()]).norm()
                 };
-                // A row takes up a part of the other's derivatives with the line.
+                // A row also includes part of the other's derivatives by the line.
                 let scale = norm(axis).max(0.1 * norm(1 - axis));
                 let numeric = (ahead[axis] - behind[axis]) / (2.0 * step);
                 close(numeric, partials[unknown], scale.max(1e-2));
@@ -317,7 +317,7 @@ fn against_dense(network: &Network<EulerPolynomial>) {
     for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
         normal[(column, column)] += sigma.powi(-2);
     }
-    // Scaled by hand, for the plain inverse to be exact enough.
+    // Scaled explicitly, for the plain inverse to be accurate enough.
     let scale = normal.diagonal().map(|value| 1.0 / value.sqrt());
     let scaled = DMatrix::from_fn(unknowns, unknowns, |row, column| {
         normal[(row, column)] * scale[row] * scale[column]

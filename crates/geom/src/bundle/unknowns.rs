@@ -1,4 +1,4 @@
-//! Which unknown of images and profiles stands in which column of the reduced equations.
+//! Columns of the unknowns of images and profiles in the reduced equations.
 
 use std::{fmt, ops::Range};
 
@@ -29,28 +29,28 @@ pub enum Unknown {
         /// Index of the profile.
         profile: usize,
     },
-    /// Offset of the attitude's clock of all images.
+    /// Offset of the attitude clock, common to all images.
     AttitudeClock,
-    /// How far a profile is recorded from where it lies, towards east, north or up.
+    /// Offset of a profile's recorded position from its true one, towards east, north or up.
     ProfileShift {
         /// Index of the profile.
         profile: usize,
         /// 0 east, 1 north, 2 up.
         axis: usize,
     },
-    /// What the line times of an image are late by against the laser's shots.
+    /// Delay of the line times of an image against the laser's shots.
     LineTime {
         /// Index of the image.
         image: usize,
     },
-    /// An angle by which the laser points elsewhere than its mounting says.
+    /// An angle between the laser's actual pointing and its mounting.
     Boresight {
         /// 0 or 1.
         axis: usize,
     },
 }
 
-/// Names of the quantities that an orientation is corrected by.
+/// Names of the corrected quantities of an orientation.
 const QUANTITIES: [&str; 6] = [
     "X position",
     "Y position",
@@ -63,7 +63,7 @@ const QUANTITIES: [&str; 6] = [
 const POWERS: [&str; 3] = ["constant", "linear", "quadratic"];
 
 impl Unknown {
-    /// What the unknown is of its image or profile.
+    /// Name of the unknown within its image or profile.
     #[must_use]
     pub fn quantity(self) -> String {
         match self {
@@ -73,14 +73,14 @@ impl Unknown {
             }
             Self::TimeBias { .. } => "time bias".to_owned(),
             Self::RangeBias { .. } => "range bias".to_owned(),
-            Self::AttitudeClock => "offset of the attitude's clock".to_owned(),
+            Self::AttitudeClock => "attitude clock offset".to_owned(),
             Self::ProfileShift { axis, .. } => {
                 format!("shift {}", ["east", "north", "up"][axis % 3])
             }
-            Self::LineTime { .. } => "line times against the laser".to_owned(),
+            Self::LineTime { .. } => "laser line time offset".to_owned(),
             Self::Boresight { axis } => {
                 format!(
-                    "{} angle of the laser's boresight",
+                    "{} boresight angle of the laser",
                     ["first", "second"][axis % 2]
                 )
             }
@@ -114,7 +114,7 @@ pub(super) fn names(unknowns: &[Unknown]) -> String {
 }
 
 impl Unknown {
-    /// Size of a change that matters as much as a kilometre, a radian or a second.
+    /// The change of this unknown that is comparable to a kilometre, a radian or a second.
     pub(super) fn step_unit(self) -> f64 {
         match self {
             Self::Orientation { coefficient, .. } if coefficient < 9 => METRES_PER_KM,
@@ -132,15 +132,15 @@ impl Unknown {
 pub(super) struct Columns {
     pub(super) unknowns: Vec<Unknown>,
     pub(super) sigmas: Vec<f64>,
-    /// What they are expected to be.
+    /// Their expected values.
     pub(super) expected: Vec<f64>,
     /// Column of each image's 18 coefficients and its time bias.
     pub(super) of_image: Vec<[Option<usize>; ORIENTATION_UNKNOWNS + 1]>,
-    /// All columns of each image: they stand side by side.
+    /// All columns of each image; they are adjacent.
     pub(super) images: Vec<Range<usize>>,
-    /// Columns that stand side by side because they belong to one image or profile.
+    /// Columns that are adjacent because they belong to one image or profile.
     pub(super) blocks: Vec<Range<usize>>,
-    /// Column of what the line times of each image are late by.
+    /// Column of the delay of each image's line times.
     pub(super) line_time_of_image: Vec<Option<usize>>,
     /// Column of each profile's bias.
     pub(super) of_profile: Vec<Option<usize>>,
@@ -148,9 +148,9 @@ pub(super) struct Columns {
     pub(super) shift_of_profile: Vec<[Option<usize>; 3]>,
     /// All columns of each profile.
     pub(super) profiles: Vec<Range<usize>>,
-    /// Column of the offset of the attitude's clock.
+    /// Column of the attitude clock offset.
     pub(super) attitude_clock: Option<usize>,
-    /// Columns of the angles of the laser's boresight.
+    /// Columns of the boresight angles of the laser.
     pub(super) boresight: [Option<usize>; 2],
 }
 
@@ -254,7 +254,7 @@ pub(super) struct State {
     pub(super) corrections: DVector<f64>,
     pub(super) orientations: Vec<OrientationCorrection>,
     pub(super) range_biases_m: Vec<f64>,
-    /// How far each profile is recorded from where it lies, Mars-fixed.
+    /// Offset of each profile's recorded position from its true one, Mars-fixed.
     pub(super) profile_shifts_m: Vec<Vector3<f64>>,
     pub(super) line_times_s: Vec<f64>,
     pub(super) boresight_rad: [f64; 2],

@@ -3,14 +3,14 @@
 use nalgebra::{Matrix2x3, Matrix3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Where the spacecraft is, and how its axes lie, while a line is exposed.
+/// Position and axes of the spacecraft while a line is exposed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinePose {
     /// Position, body-fixed, metres.
     pub position_m: Vector3<f64>,
     /// From body-fixed components to the axes across the flight, along it and down.
     pub body_to_axes: Matrix3<f64>,
-    /// Time from the middle of the orbit's images, mean line periods: what an orbit's drift counts in.
+    /// Time from the middle of the orbit's images, mean line periods: the abscissa of an orbit's drift.
     pub after_lines: f64,
 }
 
@@ -51,7 +51,7 @@ impl Offset {
     /// Change of `(XX, YY, ZZ)ᵀ = R_uᵀ u` by φ, ω and κ, columns.
     ///
     /// # Source
-    /// Li et al. 2023, eq. 10, mended.
+    /// Li et al. 2023, eq. 10, corrected.
     fn partials(&self, u: &Vector3<f64>, turned: &Vector3<f64>) -> Matrix3<f64> {
         let r = self.rotation();
         let (sk, ck) = self.kappa_rad.sin_cos();
@@ -69,7 +69,7 @@ impl Offset {
 /// A line of the camera: its offset rotation and the polynomials of its look angles.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct LineCamera {
-    /// Offset from where the support data mount it.
+    /// Offset from the mounting in the support data.
     pub offset: Offset,
     /// `tan ψx` across the flight: coefficients of the powers of `s'`, which is −1 at the first edge and 1 at the last.
     pub m: Vec<f64>,
@@ -95,40 +95,40 @@ impl LineCamera {
     }
 }
 
-/// Everything that is estimated.
+/// All estimated parameters.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct CalibrationState {
     /// The lines of the camera.
     pub cameras: Vec<LineCamera>,
-    /// Drift of the orbit from line to line, body-fixed metres: the same for all lines of the camera, as they fly together. What
-    /// stays the same of an orbit's error cannot be told from offsets, which take it up.
+    /// Drift of the orbit from line to line, body-fixed metres: the same for all lines of the camera, as they fly
+    /// together. The constant part of an orbit's error is not separable from the offsets, which absorb it.
     pub drift_m_per_line: [f64; 3],
 }
 
-/// A residual and how it changes.
+/// A residual and its partial derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Linear {
     /// `V`, tangents across and along.
     pub(super) residual: Vector2<f64>,
     /// By φ, ω, κ.
     pub(super) by_offset: Matrix2x3<f64>,
-    /// By the ground point, body-fixed metres; by the position of the spacecraft it is the opposite.
+    /// By the ground point, body-fixed metres; the derivative by the position of the spacecraft is the negative.
     pub(super) by_place: Matrix2x3<f64>,
 }
 
 impl CalibrationState {
-    /// Where the spacecraft was, body-fixed metres.
+    /// Position of the spacecraft, body-fixed metres.
     pub(super) fn position_m(&self, pose: &LinePose) -> Vector3<f64> {
         pose.position_m + self.drift_m(pose.after_lines)
     }
 
-    /// What the orbit is wrong by after so many line periods, body-fixed metres.
+    /// Error of the orbit after this many line periods, body-fixed metres.
     #[must_use]
     pub fn drift_m(&self, after_lines: f64) -> Vector3<f64> {
         Vector3::from(self.drift_m_per_line) * after_lines
     }
 
-    /// Residual of a place seen at a sample `s'` of a line; `None` behind the camera, or when it is no number.
+    /// Residual of a ground point seen at a sample `s'` of a line; `None` behind the camera, or when it is not finite.
     pub(super) fn linear(
         &self,
         camera: usize,
@@ -141,7 +141,7 @@ impl CalibrationState {
         let u = pose.body_to_axes * (place_m - position_m);
         let rotation = line.offset.rotation();
         let q = rotation.tr_mul(&u);
-        // Written so that NaN is refused.
+        // Written so that NaN is rejected.
         if !(q.z > 0.0) {
             return None;
         }

@@ -8,17 +8,17 @@ use super::{
     sight::{GroundPoint, SightError},
 };
 
-/// Rows that are kept before they are folded into a triangle.
+/// Rows collected before they are folded into a triangle.
 const ROWS_MAX: usize = 2_048;
 
-/// Rows `[A | l]` whose squares are those of all that were added: an upper triangle.
+/// Rows `[A | l]` with the squares of all rows that were added: an upper triangle.
 #[derive(Debug, Clone)]
 pub(super) struct Triangle {
     unknowns: usize,
     rows: DMatrix<f64>,
     waiting: Vec<DMatrix<f64>>,
     waiting_rows: usize,
-    /// Rows that were added, and what is left of the squares of their right sides by and by.
+    /// Number of rows added, and the accumulated squares of their remaining right sides.
     pub(super) count: usize,
 }
 
@@ -55,7 +55,7 @@ impl Triangle {
         self.waiting_rows = 0;
     }
 
-    /// The triangle of the unknowns and its right side; rows that are not there are zero.
+    /// The triangle of the unknowns and its right side; missing rows are zero.
     pub(super) fn finish(mut self) -> (DMatrix<f64>, DVector<f64>) {
         self.fold();
         let mut square = DMatrix::zeros(self.unknowns, self.unknowns + 1);
@@ -66,7 +66,7 @@ impl Triangle {
     }
 }
 
-/// Rows `[A | −V]` of a point over the free combinations, its coordinates eliminated at its place under `state`.
+/// Rows `[A | −V]` of a point over the free combinations, its coordinates eliminated at its position under `state`.
 pub(super) fn reduced_rows(
     point: &GroundPoint,
     state: &CalibrationState,

@@ -1,4 +1,4 @@
-//! Which parameters there are, and which combinations of them are free.
+//! The parameters, and which combinations of them are free.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -51,13 +51,13 @@ impl Layout {
         3 + 2 * (self.order + 1)
     }
 
-    /// Parameters in all.
+    /// Number of parameters.
     #[must_use]
     pub const fn len(self) -> usize {
         self.orbit() + 3
     }
 
-    /// Never: a drift has three components.
+    /// Always false: a drift has three components.
     #[must_use]
     pub const fn is_empty(self) -> bool {
         self.len() == 0
@@ -68,7 +68,7 @@ impl Layout {
         self.cameras * self.of_camera()
     }
 
-    /// What the parameter with an index is.
+    /// The parameter with an index.
     #[must_use]
     pub const fn parameter(self, index: usize) -> Parameter {
         let orbit = self.orbit();
@@ -123,7 +123,7 @@ impl CalibrationState {
         }
     }
 
-    /// The same with something added to its parameters, in their order.
+    /// The same with an increment added to its parameters, in their order.
     #[must_use]
     pub fn moved(&self, by: &DVector<f64>) -> Self {
         let mut moved = self.clone();
@@ -146,17 +146,17 @@ impl CalibrationState {
     }
 }
 
-/// Combinations of parameters that an adjustment may change, each in units of its standard deviations beforehand.
+/// Combinations of parameters that an adjustment may change, each in units of its a priori standard deviations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Freedom {
-    /// Standard deviation of every parameter beforehand.
+    /// A priori standard deviation of every parameter.
     pub(super) scale: DVector<f64>,
     /// Orthonormal columns over the scaled parameters.
     pub(super) directions: DMatrix<f64>,
 }
 
 impl Freedom {
-    /// The parameters that `frees` says are free, one by one; `sigma` gives their standard deviations beforehand.
+    /// The parameters that `frees` declares free, one by one; `sigma` gives their a priori standard deviations.
     #[must_use]
     pub fn each(
         layout: Layout,
@@ -176,8 +176,8 @@ impl Freedom {
         }
     }
 
-    /// What φ and the scale `m₁` of the cameras differ by, and nothing that they have in common: all that ties tell without
-    /// misleading (a common pitch can imitate a scale, and would be driven away by it).
+    /// The differences of φ and of the scale `m₁` between the cameras, without their common parts: all that ties
+    /// determine without bias (a common pitch can imitate a scale, which would bias it).
     #[must_use]
     pub fn differential(layout: Layout, sigma: impl Fn(Parameter) -> f64) -> Self {
         let kinds = [0, 4];
@@ -244,7 +244,7 @@ fn scale(layout: Layout, sigma: impl Fn(Parameter) -> f64) -> DVector<f64> {
     DVector::from_iterator(layout.len(), layout.parameters().map(sigma))
 }
 
-/// Orthonormal differences of `count` things: the first two, then each further one against the mean of those before it.
+/// Orthonormal differences of `count` items: the first two, then each further one against the mean of those before it.
 pub(super) fn contrasts(count: usize) -> Vec<Vec<f64>> {
     let contrast = |next: usize| {
         let before = next as f64;

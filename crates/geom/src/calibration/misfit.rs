@@ -1,4 +1,4 @@
-//! What cameras miss the known place of a point by, in the plane and in height, and what is to be expected of that.
+//! Misfit of cameras at control points, in planimetry and in height, and its expectation.
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
@@ -8,38 +8,38 @@ use super::{
 };
 use crate::ellipsoid::local_axes;
 
-/// Sum of squares over the variances of measurement and known place, and the sum that is to be expected.
+/// Sum of squares over the variances of measurement and control, and its expectation.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Missed {
-    /// Of the coordinates.
+    /// Sum of squares of the coordinates.
     pub square: f64,
-    /// What that is on average when standard deviations are true: the number of coordinates, more by the parameters' own errors for a point
-    /// that was not used to find them, less for one that was.
+    /// Its mean when standard deviations are true: the number of coordinates, plus the effect of the parameters' errors
+    /// for a withheld point, minus it for a point that was used.
     pub expected: f64,
-    /// How many coordinates are free to differ: all of a point that was not used, and as many as are expected of one that was.
+    /// Number of degrees of freedom: all coordinates of a withheld point, the expected number for one that was used.
     pub free: f64,
 }
 
-/// What a point of known place misses.
+/// Misfit at a control point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Misfit {
     /// East and north.
     pub plane: Missed,
-    /// Up; none of a point that one camera sees, which tells no height.
+    /// Up; `None` for a point seen by one camera, which determines no height.
     pub height: Option<Missed>,
 }
 
-/// Whether a point took part in finding the parameters.
+/// Whether a point was used to estimate the parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TookPart {
-    /// It did, and drew them towards it.
+    /// It was used, and drew them towards it.
     Yes,
-    /// It was held back.
+    /// It was withheld.
     No,
 }
 
 impl GroundPoint {
-    /// The middle of where its sights meet the sphere of a radius.
+    /// The mean of the intersections of its sights with the sphere of a radius.
     fn at_radius(
         &self,
         state: &CalibrationState,
@@ -52,7 +52,7 @@ impl GroundPoint {
         Ok(sum_m / self.sights.len() as f64)
     }
 
-    /// What the cameras miss a known place by; `None` for a point of unknown place.
+    /// Misfit of the cameras at a control point; `None` for a point without control.
     ///
     /// * `covariance` – of the parameters
     ///
@@ -67,12 +67,13 @@ impl GroundPoint {
         let Some(known) = &self.known else {
             return Ok(None);
         };
-        // By one sight, or by parallel ones, a place is seen in the plane alone.
+        // One sight, or parallel ones, determine planimetry only.
         let (place_m, axes) = match self.unaided().place(state) {
             Ok(place_m) => (place_m, 3),
             Err(_) => (self.at_radius(state, known.place_m.norm())?, 2),
         };
-        // Where it is seen: control may lie kilometres off, where angles that cancel in the solution would not.
+        // At the point that the cameras see: control may be kilometres away, where angles that cancel in the solution
+        // would not.
         let rows = self.sights.iter().map(|sight| sight.rows(state, &place_m));
         let of = Stacked::of(&rows.collect::<Result<Vec<_>, _>>()?, known)?;
         let by_place = &of.by_place * local_axes(&known.place_m).transpose();
@@ -115,11 +116,11 @@ impl Missed {
     }
 }
 
-/// Rows of all sights of a point where they see it, over their standard deviations.
+/// Rows of all sights of a point at the point that they see, over their standard deviations.
 struct Stacked {
     by_place: DMatrix<f64>,
     by_parameters: DMatrix<f64>,
-    /// Covariance of the residuals by measurement and known place.
+    /// Covariance of the residuals from measurement and control.
     noise: DMatrix<f64>,
 }
 

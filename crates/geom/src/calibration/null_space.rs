@@ -1,4 +1,4 @@
-//! What tie points see of the offset angles, and what they do not.
+//! The datum defect of tie points: which offset angles they determine, and which they do not.
 
 use nalgebra::DMatrix;
 #[cfg(feature = "schema")]
@@ -14,9 +14,9 @@ use super::{
 };
 use areograph_base::units::RADIANS_PER_DEGREE;
 
-/// A combination that is known worse than this is not seen: no offset of a camera is as large.
+/// A combination with a larger standard deviation is not determined: no offset of a camera is as large.
 const SEEN_RAD: f64 = RADIANS_PER_DEGREE;
-/// Share of a named combination that must lie in what is not seen for it to be called so.
+/// Share of a named combination that must lie in the undetermined space for it to be reported.
 const SHARE_MIN: f64 = 0.9;
 /// Singular values below this share of the largest are rounding.
 const ROUNDING: f64 = 1e-13;
@@ -34,12 +34,12 @@ pub enum Axis {
     Yaw,
 }
 
-/// What the angles of the cameras have in common, or differ by.
+/// Common angle of the cameras, or a difference between them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Combination {
-    /// All cameras alike.
+    /// The same for all cameras.
     Common,
     /// The first camera against the second.
     Differential,
@@ -51,7 +51,7 @@ pub enum Combination {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 pub struct AngleCombination {
-    /// Alike, or by how much they differ.
+    /// Common or differential.
     pub combination: Combination,
     /// Which angle.
     pub axis: Axis,
@@ -74,28 +74,28 @@ impl AngleCombination {
     }
 }
 
-/// A combination of all offset angles, and how well ties know it.
+/// A combination of all offset angles, and its standard deviation from ties.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TieDirection {
-    /// Standard deviation by the ties alone, radians; none where they say nothing at all.
+    /// Standard deviation from the ties only, radians; `None` where they do not determine it.
     pub sigma_rad: Option<f64>,
     /// Components along the named combinations, which have unit length, the largest first; those above a tenth.
     pub shares: Vec<(AngleCombination, f64)>,
 }
 
-/// What tie points alone say of the offset angles.
+/// The offset angles as determined by tie points only.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TieSight {
-    /// Orthonormal combinations, the least known first.
+    /// Orthonormal combinations, the least determined first.
     pub directions: Vec<TieDirection>,
-    /// How many of them are not seen: known worse than to a degree.
+    /// Number of undetermined combinations: known to worse than a degree.
     pub unseen: u32,
-    /// Named combinations that lie in what is not seen.
+    /// Named combinations in the undetermined space.
     pub unseen_names: Vec<AngleCombination>,
 }
 
 impl TieSight {
-    /// What is not seen, in words.
+    /// The undetermined combinations, in words.
     #[must_use]
     pub fn unseen_words(&self) -> String {
         let names: Vec<String> = self.unseen_names.iter().map(|of| of.words()).collect();
@@ -107,10 +107,10 @@ impl TieSight {
     }
 }
 
-/// What `ties` see of the offset angles at a state, without any knowledge beforehand.
+/// The offset angles that `ties` determine at a state, without a priori knowledge.
 ///
 /// # Errors
-/// A point without a place.
+/// A point without a position.
 pub fn tie_sight(
     ties: &[GroundPoint],
     state: &CalibrationState,

@@ -1,14 +1,14 @@
-//! Ground points and what sees them: their places under a calibration, with covariances, and what they miss.
+//! Ground points and their sights: positions under a calibration, with covariances and residuals.
 
 use nalgebra::{DMatrix, Matrix2x3, Matrix3, Vector2, Vector3};
 
 use super::camera::{CalibrationState, LinePose};
 
-/// Steps towards a place.
+/// Maximum number of steps of an intersection.
 const STEPS_MAX: u32 = 20;
-/// Length of the last step, metres.
+/// A step below this ends the iteration, metres.
 const STEP_M: f64 = 1e-4;
-/// Smallest sine of the angle between the rays of a point of unknown place.
+/// Smallest sine of the angle between the rays of a point without control.
 const CONVERGENCE_MIN: f64 = 0.01;
 
 /// A line of a camera that sees a point.
@@ -16,7 +16,7 @@ const CONVERGENCE_MIN: f64 = 0.01;
 pub struct Sight {
     /// The camera.
     pub camera: usize,
-    /// Where it was when the line was exposed.
+    /// Its pose when the line was exposed.
     pub pose: LinePose,
     /// The sample, −1 to 1.
     pub s: f64,
@@ -24,35 +24,35 @@ pub struct Sight {
     pub sigma: [f64; 2],
 }
 
-/// A place that is known, by something else than the camera.
+/// A control point, known independently of the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KnownPlace {
-    /// body-fixed, metres.
+    /// Position, body-fixed, metres.
     pub place_m: Vector3<f64>,
-    /// Rows along axes in which its errors do not depend on each other, over their standard deviations, 1/m.
+    /// Rows along axes in which its errors are independent, over their standard deviations, 1/m.
     pub whitening: Matrix3<f64>,
 }
 
 /// A point on the ground.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroundPoint {
-    /// What sees it.
+    /// Its sights.
     pub sights: Vec<Sight>,
-    /// Where it is, if that is known.
+    /// Its control, if any.
     pub known: Option<KnownPlace>,
 }
 
-/// Why a point has no place.
+/// Why a point has no position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum SightError {
-    /// Its rays are parallel, or there is one only.
+    /// Its rays are parallel, or it has only one.
     #[error("its rays do not cross")]
     Parallel,
-    /// It lies behind a camera, or the numbers are none.
+    /// It lies behind a camera, or its numbers are not finite.
     #[error("its rays cross behind a camera")]
     Behind,
-    /// The steps did not end.
-    #[error("its rays lead to no place")]
+    /// The iteration did not converge.
+    #[error("its rays do not determine a position")]
     NotConverged,
 }
 
@@ -64,7 +64,7 @@ pub(super) struct SightRows {
 }
 
 impl Sight {
-    /// Residual and change by place over the standard deviations.
+    /// Residual and its change with position over the standard deviations.
     fn weighted(
         &self,
         state: &CalibrationState,
@@ -96,7 +96,7 @@ impl Sight {
         for (row, sigma) in self.sigma.iter().enumerate() {
             for axis in 0..3 {
                 by_parameters[(row, first + axis)] = linear.by_offset[(row, axis)] / sigma;
-                // The spacecraft moves against the place.
+                // The spacecraft moves in the opposite sense to the point.
                 let by_position = -by_place[(row, axis)];
                 by_parameters[(row, layout.orbit() + axis)] = by_position * self.pose.after_lines;
             }
@@ -121,7 +121,7 @@ impl Sight {
         (position_m, direction)
     }
 
-    /// Where its ray first meets the sphere of a radius, body-fixed metres.
+    /// First intersection of its ray with the sphere of a radius, body-fixed metres.
     #[must_use]
     pub fn at_radius(&self, state: &CalibrationState, radius_m: f64) -> Option<Vector3<f64>> {
         let (position_m, direction) = self.ray(state);
@@ -132,7 +132,7 @@ impl Sight {
 }
 
 impl GroundPoint {
-    /// The point by its sights alone.
+    /// The point from its sights only.
     #[must_use]
     pub fn unaided(&self) -> Self {
         Self {
@@ -164,7 +164,7 @@ impl GroundPoint {
         Ok(inverse * right)
     }
 
-    /// Normal equations of its place over the standard deviations, and the step that they ask for.
+    /// Normal equations of its position over the standard deviations, and the step that they give.
     fn step(
         &self,
         state: &CalibrationState,
@@ -183,7 +183,7 @@ impl GroundPoint {
         Ok((normal, right))
     }
 
-    /// Its place under a calibration, with what is known of it otherwise.
+    /// Its position under a calibration, with its control if it has any.
     ///
     /// # Errors
     /// [`SightError`].
@@ -201,7 +201,7 @@ impl GroundPoint {
         Err(SightError::NotConverged)
     }
 
-    /// Residuals of its sights at a place, tangents across and along.
+    /// Residuals of its sights at a position, tangents across and along.
     ///
     /// # Errors
     /// [`SightError::Behind`].
@@ -219,7 +219,7 @@ impl GroundPoint {
         self.sights.iter().map(residual).collect()
     }
 
-    /// Covariance of its place, of its measurements and of the parameters, m².
+    /// Covariance of its position from its measurements and the parameters, m².
     ///
     /// # Errors
     /// [`SightError`].

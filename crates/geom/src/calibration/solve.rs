@@ -1,4 +1,4 @@
-//! Gauss–Newton over the free combinations of parameters, with what was known of them beforehand.
+//! Gauss–Newton over the free combinations of parameters, with their a priori values.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -9,26 +9,26 @@ use super::{
     sight::{GroundPoint, SightError},
 };
 
-/// Steps that are tried.
+/// Maximum number of steps.
 const STEPS_MAX: u32 = 40;
-/// Length of the last step, in standard deviations of what is estimated.
+/// A step below this ends the iteration, in standard deviations of the estimates.
 const STEP: f64 = 1e-3;
 
-/// Why there is no calibration.
+/// Why the calibration failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum CalibrationError {
-    /// A point has no place.
+    /// A point has no position.
     #[error("point {point}: {why}")]
     Point {
         /// Its index.
         point: usize,
-        /// Why.
+        /// The reason.
         why: SightError,
     },
-    /// The steps did not end.
+    /// The iteration did not converge.
     #[error("the adjustment does not converge in {STEPS_MAX} steps")]
     NotConverged,
-    /// A free combination has no standard deviation beforehand and is seen by nothing.
+    /// A free combination has no a priori standard deviation and is not observed.
     #[error("the points do not determine the free parameters")]
     Singular,
 }
@@ -36,9 +36,9 @@ pub enum CalibrationError {
 /// Where an adjustment begins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Start<'a> {
-    /// What was known beforehand: the geometry of the laboratory.
+    /// The a priori values: the laboratory geometry.
     pub known: &'a CalibrationState,
-    /// Where the steps begin.
+    /// The first state of the iteration.
     pub from: &'a CalibrationState,
 }
 
@@ -47,15 +47,15 @@ pub struct Start<'a> {
 pub struct Solved {
     /// The parameters.
     pub state: CalibrationState,
-    /// Their covariance, in their order; zero for what was not free.
+    /// Their covariance, in their order; zero for fixed ones.
     pub covariance: DMatrix<f64>,
-    /// Places of the points.
+    /// Positions of the points.
     pub places_m: Vec<Vector3<f64>>,
     /// Steps.
     pub steps: u32,
 }
 
-/// Adjusts the free combinations to `points` and to what was known beforehand.
+/// Adjusts the free combinations to `points` and to their a priori values.
 ///
 /// # Errors
 /// [`CalibrationError`].
@@ -89,7 +89,7 @@ pub fn solve(
     Err(CalibrationError::NotConverged)
 }
 
-/// Triangle and right side over the free combinations at a state, and the places of the points there.
+/// Triangle and right side over the free combinations at a state, and the positions of the points there.
 type Linearised = (DMatrix<f64>, DVector<f64>, Vec<Vector3<f64>>);
 
 fn linearised(
@@ -100,7 +100,7 @@ fn linearised(
 ) -> Result<Linearised, CalibrationError> {
     let unknowns = freedom.len();
     let mut triangle = Triangle::new(unknowns);
-    // Beforehand every free combination is what is known of it, with a standard deviation of one.
+    // The a priori value of every free combination is an observation with a standard deviation of one.
     let off = freedom.components(&(known.vector() - state.vector()));
     let mut beforehand = DMatrix::identity(unknowns, unknowns + 1);
     beforehand.column_mut(unknowns).copy_from(&off);

@@ -1,4 +1,4 @@
-//! The model against central differences, and what ties see, on a circular orbit with two stereo lines.
+//! The model against central differences, and the datum defect of ties, on a circular orbit with two stereo lines.
 
 use nalgebra::{DVector, Matrix3, Vector3};
 
@@ -13,11 +13,12 @@ const PIXEL: f64 = 8e-5;
 /// Tangent at the last sample.
 const EDGE: f64 = 1_292.0 * PIXEL;
 
-/// Turns of a planet while the spacecraft flies a radian: none, and that of Mars under this orbit, which takes 6 960 s a turn.
+/// Rotations of the planet while the spacecraft flies a radian: a planet at rest, and Mars under this orbit of 6 960 s
+/// a revolution.
 const AT_REST: f64 = 0.0;
 const TURNING: f64 = 0.078_5;
 
-/// The spacecraft over the equator of a planet that turns, flying north, `angle` radians further on.
+/// The spacecraft over the equator of a rotating planet, flying north, `angle` radians further on.
 fn pose_over(turning: f64, angle: f64) -> LinePose {
     let at_rest = pose(angle);
     let turned =
@@ -65,7 +66,7 @@ fn scattered(index: usize, purpose: usize) -> f64 {
     2.0 * turned.fract() - 1.0
 }
 
-/// Where a line of a camera sees a place, by bisection of the flight: the angle of the orbit, and the sample.
+/// Where a line of a camera sees a point, by bisection of the flight: the angle of the orbit, and the sample.
 fn seen(
     state: &CalibrationState,
     turning: f64,
@@ -97,12 +98,12 @@ fn seen(
     (low, s)
 }
 
-/// Ties that `truth` sees over a planet at rest, with a noise of so many pixels.
+/// Ties that `truth` sees over a planet at rest, with noise of `noise_px` pixels.
 fn ties(truth: &CalibrationState, count: usize, noise_px: f64) -> Vec<GroundPoint> {
     ties_over(AT_REST, truth, count, noise_px)
 }
 
-/// The same over one that turns.
+/// The same over a rotating planet.
 fn ties_over(
     turning: f64,
     truth: &CalibrationState,
@@ -211,7 +212,7 @@ fn partials_agree_with_central_differences() {
     }
 }
 
-/// Standard deviations by ties alone, degrees, the largest first.
+/// Standard deviations from ties only, degrees, the largest first.
 fn sigmas_deg(of: &TieSight) -> Vec<Option<f64>> {
     let sigmas = of.directions.iter();
     sigmas.map(|of| of.sigma_rad.map(f64::to_degrees)).collect()
@@ -230,7 +231,7 @@ fn ties_leave_common_roll_differential_pitch_and_yaw_unseen() {
     assert!(named(Combination::Differential, Axis::Pitch), "{sight:?}");
     assert!(named(Combination::Differential, Axis::Yaw), "{sight:?}");
     assert_eq!(sight.unseen_names.len(), 3);
-    // The other three are known as the sheet's table has it: about 0.1, 0.005 and 0.0001 degrees.
+    // The other three are known as in the paper's table: about 0.1, 0.005 and 0.0001 degrees.
     let sigma_deg: Vec<f64> = sigmas_deg(&sight).into_iter().flatten().collect();
     let sigma_deg = &sigma_deg[sigma_deg.len() - 3..];
     for (found, expected) in sigma_deg.iter().zip([0.115, 0.005, 1e-4]) {
@@ -239,8 +240,8 @@ fn ties_leave_common_roll_differential_pitch_and_yaw_unseen() {
     }
 }
 
-/// Between two looks a planet that turns moves across the flight: ties see pitch and yaw of the lines apart, if only to degrees
-/// over its equator, where a planet at rest hides them from all ties.
+/// Between two looks a rotating planet moves across the flight: ties separate pitch and yaw of the lines, if only to
+/// degrees over its equator, where a planet at rest hides them from all ties.
 #[test]
 fn ties_over_a_turning_planet_see_pitch_and_yaw_apart_to_degrees() {
     let truth = laboratory();
@@ -264,14 +265,15 @@ fn ties_over_a_turning_planet_see_pitch_and_yaw_apart_to_degrees() {
         seen_deg[1..].iter().all(|deg| *deg < 10.0),
         "{seen_deg:?} degrees"
     );
-    // The common roll turns all rays about the flight, whatever turns below.
+    // The common roll turns all rays about the flight, whatever rotates below.
     assert!(seen_deg[0] > 10.0, "{seen_deg:?} degrees");
     let (name, share) = turning.directions[0].shares[0];
     assert_eq!(name.words(), "common roll");
     assert!(share.abs() > 0.99, "{share}");
 }
 
-/// A third line between the two: their differences have names of their own, and the common roll is as unseen.
+/// A third line between the two: their differences have names of their own, and the common roll is equally
+/// undetermined.
 #[test]
 fn three_lines_have_names_for_all_angles() {
     let mut truth = laboratory();
@@ -309,7 +311,8 @@ fn sigma(of: Parameter) -> f64 {
     }
 }
 
-/// Lines that differ in roll and scale: the two-parameter step finds both, all angles are led astray by the scale.
+/// Lines that differ in roll and scale: the two-parameter step finds both, while freeing all angles biases them through
+/// the scale.
 #[test]
 fn all_angles_take_a_scale_for_a_common_pitch() {
     let known = laboratory();
@@ -326,7 +329,7 @@ fn all_angles_take_a_scale_for_a_common_pitch() {
     let layout = known.layout();
     let two = solve(&points, start, &Freedom::differential(layout, sigma)).unwrap();
     let [first, second] = [0, 1].map(|camera| two.state.cameras[camera].clone());
-    // Exact points: what is left is of what the prior pulls.
+    // Exact points: the remainder is the pull of the prior.
     let error_px = (first.offset.phi_rad - truth.cameras[0].offset.phi_rad).abs() / PIXEL;
     assert!(error_px < 0.02, "{error_px} px");
     let scale_px = (first.m[1] - truth.cameras[0].m[1]).abs() / PIXEL;
@@ -339,7 +342,7 @@ fn all_angles_take_a_scale_for_a_common_pitch() {
     let pitch_deg = (all.state.cameras[0].offset.omega_rad + all.state.cameras[1].offset.omega_rad)
         .to_degrees()
         / 2.0;
-    // Ties see the common pitch to 0.005 degrees: it goes where the scale leads it, tens of pixels away.
+    // Ties determine the common pitch to 0.005 degrees: the scale biases it by tens of pixels.
     assert!(pitch_deg.abs() > 0.05, "{pitch_deg} degrees");
 }
 
@@ -372,7 +375,7 @@ fn a_calibration_of_exact_points_is_exact_where_it_can_be_seen() {
             .iter()
             .zip(point.residuals(&solved.state, &place_m).unwrap())
         {
-            // What the priors pull, with points known to a metre.
+            // The pull of the priors, with points known to a metre.
             let off_px = residual.norm() / PIXEL;
             assert!(off_px < 0.02, "camera {}: {off_px} px", sight.camera);
         }

@@ -18,7 +18,7 @@ fn overlaps_are_shares_of_the_smaller_outline() {
     let square = outline([[10.0, 0.0], [12.0, 0.0], [12.0, 2.0], [10.0, 2.0]]);
     for (other, share) in [
         ([[11.0, 0.0], [13.0, 0.0], [13.0, 2.0], [11.0, 2.0]], 0.5),
-        // The other way round, and within.
+        // The other direction, and containment.
         ([[10.5, 1.5], [11.5, 1.5], [11.5, 0.5], [10.5, 0.5]], 1.0),
         ([[20.0, 0.0], [22.0, 0.0], [22.0, 2.0], [20.0, 2.0]], 0.0),
         // A diamond with its middle on a corner: a quarter of it.
@@ -34,7 +34,7 @@ fn overlaps_are_shares_of_the_smaller_outline() {
     assert!((across.overlap(&east) - 0.5).abs() < 1e-12);
 }
 
-/// A quadrangle of great circles about a place: from its centre along two directions of a tangent plane.
+/// A quadrangle of great circles about a point: from its centre along two directions of a tangent plane.
 struct Patch {
     centre: Vector3<f64>,
     across: Vector3<f64>,
@@ -124,7 +124,7 @@ fn widened_outlines_hold_every_direction_of_the_image_and_of_its_margin() {
                 "{corners:?} by {radius_rad}: {beside:?}"
             );
         }
-        // Nor does it hold half of Mars: what is nearer to the equator than all of it, and the other side.
+        // It does not contain half of Mars: neither what is nearer to the equator than all of it, nor the other side.
         if latitude.abs() > 70.0 {
             let below = (lowest - radius_rad - 0.01 * DEGREE).copysign(latitude);
             assert!(!region.contains(random.between(0.0, TAU), below));
@@ -189,7 +189,7 @@ fn rays_converge_where_they_do() {
     let angle = convergence_rad(&sight(1.0), &sight(-1.0), 1e9);
     // Curvature: 400 km of 10^9 m.
     assert!((angle - FRAC_PI_2).abs() < 1e-3);
-    // Off a sphere: the law of sines in the triangle of its centre, the ground and the spacecraft.
+    // On a sphere: the law of sines in the triangle of its centre, the ground and the spacecraft.
     let away_rad = 2.0 * DEGREE;
     let sight = |[longitude, latitude]: [f64; 2], below_rad| Sight {
         centre_rad: [longitude * DEGREE, latitude * DEGREE],
@@ -222,7 +222,7 @@ fn nadir_images_shifted_along_the_track_do_not_converge() {
         let angle = convergence_rad(&sight(one), &sight(other), RADIUS_M);
         assert!(angle < 1e-7, "{angle}");
     }
-    // And two that look forward alike along one track over the pole.
+    // And two with the same forward look along one track over the pole.
     let forward = |north_deg: f64| {
         let at = |colatitude_deg: f64| {
             let longitude = if colatitude_deg > 0.0 { 0.3 } else { 0.3 + PI };

@@ -1,26 +1,26 @@
-//! How an image is distorted against another one near a place.
+//! The local distortion of an image against another one.
 
 use nalgebra::{Matrix2, Vector2};
 
-/// The place in another image of a place near `from`: `to + matrix · (place − from)`, lines and samples.
+/// Position in another image of a position near `from`: `to + matrix · (place − from)`, lines and samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Affine {
-    /// A place in one image.
+    /// A position in one image.
     pub from: Vector2<f64>,
-    /// The same place in the other.
+    /// The conjugate position in the other.
     pub to: Vector2<f64>,
-    /// Lines and samples of the other image for each line and sample of the one.
+    /// Lines and samples of the other image for each line and sample of the first.
     pub matrix: Matrix2<f64>,
 }
 
 impl Affine {
-    /// The place in the other image.
+    /// The position in the other image.
     #[must_use]
     pub fn apply(&self, place: &Vector2<f64>) -> Vector2<f64> {
         self.to + self.matrix * (place - self.from)
     }
 
-    /// The same between images of which one pixel is `here` and `there` pixels of these.
+    /// The same between reduced images, of which one pixel is `here` and `there` pixels of these.
     #[must_use]
     pub fn reduced(&self, here: f64, there: f64) -> Self {
         Self {
@@ -30,7 +30,7 @@ impl Affine {
         }
     }
 
-    /// From the other image to the one; `None` where the distortion leaves no area.
+    /// From the other image to the first; `None` where the distortion is singular.
     #[must_use]
     pub fn inverse(&self) -> Option<Self> {
         Some(Self {

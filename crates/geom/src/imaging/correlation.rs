@@ -1,26 +1,26 @@
-//! Where a patch agrees best with another image, to a pixel.
+//! Matching of a patch in another image to a pixel.
 
 use super::Patch;
 
-/// A second place that correlates is another one when it is farther than this, pixels.
+/// A second peak is distinct when it is farther away than this, pixels.
 const APART_PX: usize = 3;
-/// Sums of squares about the mean below this are those of a flat patch.
+/// Sums of squares about the mean below this belong to a flat patch.
 const FLAT: f64 = 1e-3;
 
-/// Where a template correlates best.
+/// Position of the best correlation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peak {
-    /// Line and sample of the area at which the first pixel of the template lies then, counted from 0.
+    /// Line and sample of the area for the first pixel of the template, counted from 0.
     pub at: [usize; 2],
-    /// Normalised cross-correlation there.
+    /// Normalised cross-correlation at that position.
     pub correlation: f64,
-    /// The largest one of another peak; −1 where there is none.
+    /// The largest correlation of another peak; −1 without one.
     pub second: f64,
 }
 
 /// Searches `area` for `template` by normalised cross-correlation at every whole pixel.
 ///
-/// Returns nothing where the area is smaller than the template, or one of them has no texture.
+/// Returns `None` where the area is smaller than the template, or one of them has no texture.
 #[must_use]
 pub fn search(template: &Patch, area: &Patch) -> Option<Peak> {
     let places = [0, 1].map(|axis| (area.size[axis] + 1).saturating_sub(template.size[axis]));
@@ -67,7 +67,7 @@ fn product(centred: &[f32], size: [usize; 2], area: &Patch, at: [usize; 2]) -> f
     .sum()
 }
 
-/// The best place of a surface and the best other peak.
+/// The best position of a surface and the best other peak.
 fn peaks(surface: &[f64], places: [usize; 2]) -> Option<Peak> {
     let value = |line: usize, sample: usize| surface[line * places[1] + sample];
     let best = (0..surface.len()).max_by(|one, other| surface[*one].total_cmp(&surface[*other]))?;

@@ -1,18 +1,18 @@
-//! Where an image has texture by which a place can be found again.
+//! Selection of positions with enough texture for matching.
 
 use super::Patch;
 
-/// A place whose surroundings are unlike those beside it.
+/// A position with texture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Texture {
     /// Line and sample of its pixel, counted from 0.
     pub at: [i64; 2],
-    /// Standard deviation that the image's noise alone leaves of the place in its worst direction, pixels.
+    /// Standard deviation of the position in its worst direction from the image's noise only, pixels.
     pub sigma_px: f64,
 }
 
-/// The noise that takes part in what is measured, of a pixel, by the operator of Immerkær 1996: second differences along and across,
-/// which straight edges and slopes do not pass; the median is not moved by the few corners.
+/// Noise of a pixel by the operator of Immerkær 1996: second differences along and across, which suppress straight
+/// edges and slopes; the median is robust against the few corners.
 #[must_use]
 pub fn noise_dn(patch: &Patch) -> Option<f64> {
     const SIGMA_OF_MEDIAN: f64 = 1.482_602_218_505_602;
@@ -36,10 +36,10 @@ pub fn noise_dn(patch: &Patch) -> Option<f64> {
     Some(SIGMA_OF_MEDIAN * *median)
 }
 
-/// The place of `patch` with the most texture in a square of `2 half + 1` pixels around it.
+/// The position of `patch` with the most texture in a square of `2 half + 1` pixels around it.
 ///
-/// `noise_dn` is the standard deviation of a pixel: its own part in the slopes does not count. Nothing is returned where
-/// noise alone would make such slopes.
+/// `noise_dn` is the standard deviation of a pixel; its contribution to the slopes is removed. Returns `None` where
+/// noise alone explains the slopes.
 ///
 /// # Source
 /// Förstner & Gülch 1987: the smallest eigenvalue of the normal equations of a shift.

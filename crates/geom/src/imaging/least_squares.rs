@@ -1,41 +1,41 @@
-//! Where exactly a patch lies in another image: least squares over its pixels.
+//! Subpixel matching of a patch in another image: least squares over its pixels.
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 use super::{Affine, Patch};
 
-/// Shift of two coordinates, four elements of the affine distortion, offset and gain of the light.
+/// Shift of two coordinates, four elements of the affine distortion, offset and gain of the brightness.
 const UNKNOWNS: usize = 8;
-/// Steps after which a match is given up.
+/// Maximum number of steps.
 const STEPS_MAX: usize = 20;
-/// A shift below this is the last step, pixels.
+/// A shift below this ends the iteration, pixels.
 const LAST_STEP_PX: f64 = 0.003;
-/// Farther from its start a match has found something else, pixels.
+/// A match farther from its start than this is a mismatch, pixels.
 const SHIFT_MAX_PX: f64 = 3.0;
-/// Pixels within which residuals go together: smoothing joins two, the light on slopes a few more.
+/// Pixels within which residuals are correlated: smoothing correlates two, illumination of slopes a few more.
 const JOINED_PX: usize = 5;
-/// Gains of the light that two images of the same ground may have.
+/// Admissible gains of the brightness between two images of the same ground.
 const GAIN: [f64; 2] = [0.1, 10.0];
 
-/// A patch found in another image.
+/// A patch matched in another image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeastSquaresMatch {
     /// From the middle of the patch to the other image.
     pub affine: Affine,
-    /// Covariance of the place in the other image, lines and samples, pixels².
+    /// Covariance of the position in the other image, lines and samples, pixels².
     pub covariance_px2: Matrix2<f64>,
-    /// Correlation of the patch with what the other image shows there.
+    /// Correlation of the patch with the other image there.
     pub correlation: f64,
 }
 
-/// Why a patch is not found.
+/// Why a patch is not matched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LeastSquaresFailure {
-    /// It lies beyond what is there of the other image.
+    /// It lies outside the available part of the other image.
     Outside,
-    /// The steps do not become small, or lead away.
+    /// The steps do not converge, or diverge.
     NotConverged,
-    /// The pixels do not determine the place.
+    /// The pixels do not determine the position.
     Undetermined,
 }
 
@@ -45,17 +45,17 @@ type Row = SVector<f64, UNKNOWNS>;
 /// Equations of one pixel each at an estimate.
 struct Equations {
     rows: Vec<Row>,
-    /// Template minus what is computed.
+    /// Template minus computed values.
     left: Vec<f64>,
     correlation: f64,
 }
 
-/// Moves `start` until the pixels of `template` are as near as possible to those of `other`, whose light may differ by an
-/// offset and a gain and whose surface may be inclined otherwise.
+/// Moves `start` until the pixels of `template` agree best with those of `other`; brightness may differ by an offset
+/// and a gain, and the surface may be inclined differently.
 ///
-/// The covariance takes residuals as they are: neighbours go together, and where texture is strong they may be larger. It is
-/// the sum over all pairs of near pixels of what their residuals do to the place (Newey & West 1987, in two dimensions), or what
-/// independent residuals would do, where that is larger.
+/// The covariance takes residuals as they are: neighbours are correlated, and residuals may be larger where texture is
+/// strong. It is the sum over all pairs of near pixels of the effect of their residuals on the position (Newey & West
+/// 1987, in two dimensions), or the result for independent residuals where that is larger.
 ///
 /// # Errors
 /// [`LeastSquaresFailure`].
@@ -125,7 +125,7 @@ fn finish(
     })
 }
 
-/// Offset and gain by which the other image is as bright and as rich in contrast as the template.
+/// Offset and gain by which the other image has the brightness and contrast of the template.
 fn initial_light(
     template: &Patch,
     other: &Patch,
@@ -223,7 +223,7 @@ fn inverse(equations: &Equations) -> Result<Normals, LeastSquaresFailure> {
     Ok(scale * inverse * scale)
 }
 
-/// What residuals that go together within [`JOINED_PX`] leave of the place.
+/// Contribution to the position's covariance of residuals correlated within [`JOINED_PX`].
 fn joined(equations: &Equations, inverse: &Normals, size: [usize; 2]) -> Matrix2<f64> {
     let influence = inverse.fixed_rows::<2>(0).into_owned();
     let moves: Vec<Vector2<f64>> = equations

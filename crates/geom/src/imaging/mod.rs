@@ -1,5 +1,5 @@
-//! Pixels as numbers: patches of images, where they have texture, how well two of them agree, and where exactly one lies
-//! in the other. Pure functions; places are lines and samples, 0 at the outer edge of the first pixel.
+//! Image matching: patches of images, their texture, their correlation, and least-squares matching. Pure functions;
+//! positions are lines and samples, 0 at the outer edge of the first pixel.
 
 mod affine;
 mod correlation;

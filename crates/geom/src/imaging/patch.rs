@@ -15,7 +15,7 @@ pub struct Patch {
     pub values: Vec<f32>,
 }
 
-/// A number between pixels, and how it changes.
+/// An interpolated value, and its gradient.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Between {
     /// The number.
@@ -37,9 +37,10 @@ impl Patch {
         &self.values[start + samples.start..start + samples.end]
     }
 
-    /// The mean of every pixel with its neighbours, weighted 1, 2, 1 along and across the lines; a pixel less at every edge.
+    /// The mean of every pixel with its neighbours, weighted 1, 2, 1 along and across the lines; each edge loses a
+    /// pixel.
     ///
-    /// What alternates from sample to sample, as the detectors of a camera do, is gone; noise is 3/8 of what it was.
+    /// The alternation from sample to sample of a camera's detectors is removed; noise is reduced to 3/8.
     #[must_use]
     pub fn smoothed(&self) -> Self {
         let size = self.size.map(|length| length.saturating_sub(2));
@@ -64,7 +65,8 @@ impl Patch {
         }
     }
 
-    /// The number at a place of the image, by cubic convolution; `None` where the patch lacks one of the 16 pixels around.
+    /// The value at a position of the image, by cubic convolution; `None` where the patch lacks one of the 16 pixels
+    /// around it.
     ///
     /// # Source
     /// Keys 1981, a = −1/2.
@@ -92,7 +94,7 @@ impl Patch {
         Some(between)
     }
 
-    /// The number alone, by the same rule: NaN where one of the 16 pixels is missing.
+    /// The value only, by the same rule: NaN where one of the 16 pixels is missing.
     #[must_use]
     pub fn number(&self, place: &Vector2<f64>) -> f32 {
         let (Some((top, down)), Some((left, right))) =
@@ -110,11 +112,11 @@ impl Patch {
         rows.sum()
     }
 
-    /// The first of the four pixels around a coordinate, and how far it is behind the second.
+    /// The first of the four pixels around a coordinate, and the coordinate's distance behind the second.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "held against the size of the patch"
+        reason = "compared with the size of the patch"
     )]
     fn split(&self, axis: usize, coordinate: f64) -> Option<(usize, f64)> {
         let behind = coordinate - 0.5 - self.first[axis] as f64;
@@ -125,8 +127,8 @@ impl Patch {
             .then(|| (pixel as usize - 1, behind - pixel))
     }
 
-    /// The rectangle of another image with this `first` pixel and `size`, as this image shows it; `None` where the patch
-    /// does not hold all of it.
+    /// The rectangle of another image with this `first` pixel and `size`, resampled from this image; `None` where the
+    /// patch does not contain all of it.
     #[must_use]
     pub fn resampled(&self, first: [i64; 2], size: [usize; 2], warp: &Affine) -> Option<Self> {
         let mut values = Vec::with_capacity(size[0] * size[1]);
@@ -154,8 +156,8 @@ impl Patch {
     }
 }
 
-/// Weights of four equally spaced numbers for one between the second and the third, `t` behind the second, and how they
-/// change with `t`.
+/// Weights of four equally spaced values for one between the second and the third, `t` behind the second, and their
+/// derivatives by `t`.
 fn cubic(t: f64) -> [[f64; 4]; 2] {
     let (t2, t3) = (t * t, t * t * t);
     [

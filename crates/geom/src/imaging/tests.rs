@@ -1,4 +1,4 @@
-//! Patches of invented ground, of which it is known where they lie.
+//! Patches of synthetic ground with known positions.
 
 #![allow(clippy::cast_possible_truncation, reason = "numbers of a byte")]
 
@@ -58,7 +58,7 @@ impl Ground {
             .sum()
     }
 
-    /// Bytes of an image whose places lie at `warp` on the ground.
+    /// Bytes of an image whose positions lie at `warp` on the ground.
     fn image(
         &self,
         first: [i64; 2],
@@ -118,7 +118,7 @@ fn pair(random: &mut Random, noise: f64) -> (Patch, Patch, Affine) {
     (here.smoothed(), there.smoothed(), truth)
 }
 
-/// Starts as far off as a search by whole pixels leaves it.
+/// Starts with the error that a search by whole pixels leaves.
 fn start(truth: &Affine, random: &mut Random) -> Affine {
     let off = Vector2::new(random.between(-0.7, 0.7), random.between(-0.7, 0.7));
     let turn = Matrix2::from_fn(|_, _| random.between(-0.01, 0.01));
@@ -188,7 +188,7 @@ fn least_squares_says_why_it_finds_nothing() {
         match_least_squares(&template, &flat, &truth),
         Err(LeastSquaresFailure::Undetermined)
     );
-    // Other ground is not found, or does not look alike.
+    // Other ground is not found, or correlates poorly.
     for _ in 0..20 {
         let (_, elsewhere, _) = pair(&mut random, 1.0);
         if let Ok(matched) = match_least_squares(&template, &elsewhere, &truth) {
@@ -206,7 +206,7 @@ fn a_search_finds_the_pixel_and_tells_of_a_second_place() {
     let template = ground.image([17, 42], [21, 21], |place| *place, light, &mut random);
     let peak = search(&template, &area).unwrap();
     assert_eq!(peak.at, [17, 42]);
-    // Ground of waves is like itself elsewhere too, and yet not nearly as much.
+    // Ground of waves resembles itself elsewhere too, but much less.
     assert!(peak.correlation > 0.9 && peak.second < 0.8, "{peak:?}");
     // The same ground twice, 30 samples apart.
     let twice = ground.image(
@@ -231,7 +231,7 @@ fn a_search_finds_the_pixel_and_tells_of_a_second_place() {
 fn texture_is_found_where_it_is_and_not_in_noise() {
     let mut random = Random(15);
     let ground = Ground::new(&mut random);
-    // Ground only around line 60, sample 90; elsewhere nothing but noise.
+    // Ground only around line 60, sample 90; only noise elsewhere.
     let mut image = ground.image(
         [0, 0],
         [120, 160],

@@ -1,4 +1,4 @@
-//! Blunders in a brick: the largest deviations, and what the rest becomes without them.
+//! Blunders in a brick: the largest deviations, and the solution without them.
 
 use super::{
     Place,
@@ -8,25 +8,25 @@ use super::{
 
 /// Robust standard deviations beyond which a deviation is flagged.
 pub const FLAG_LIMIT: f64 = 3.5;
-/// Factor that makes the median of normal values without their signs their standard deviation.
+/// Factor from the median of absolute normal values to their standard deviation.
 const NORMAL_MEDIAN: f64 = 1.4826;
 /// Deviations below this share of a figure's extent are rounding.
 const ROUNDING: f64 = 1e-9;
-/// A removal stands when it takes more than this share from the root mean square.
+/// A removal is kept when it reduces the root mean square by more than this share.
 const DROP: f64 = 0.30;
-/// Measurements that are removed together where one alone takes too little: blunders of one size hide each other.
+/// Measurements removed together where one reduces it too little: blunders of one size mask each other.
 const TOGETHER: usize = 4;
 
-/// A measurement that was taken out of its brick.
+/// A measurement removed from its brick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Blunder {
-    /// Index of the measurement; of a point on two pictures the first of both, which cannot be told apart.
+    /// Index of the measurement; for a point on two pictures the first of both, which are not separable.
     pub measurement: usize,
     /// Its deviation when it was removed, figure units.
     pub deviation: Place,
     /// Root mean square of the brick's deviations before the removal and after it, figure units.
     pub rms: [f64; 2],
-    /// Whether the whole point went, as it was on two pictures.
+    /// Whether the whole point was removed, as it was on two pictures.
     pub whole_point: bool,
 }
 
@@ -35,13 +35,13 @@ pub struct Blunder {
 pub struct Cleaned {
     /// The brick.
     pub figure: Figure,
-    /// What was removed, in order.
+    /// Removed measurements, in order.
     pub blunders: Vec<Blunder>,
-    /// Indices of all measurements that are left out.
+    /// Indices of all removed measurements.
     pub removed: Vec<usize>,
 }
 
-/// Standard deviation of a coordinate by the median of all of them without their signs; 0 for none.
+/// Standard deviation of a coordinate from the median of the absolute values; 0 without any.
 #[must_use]
 pub fn robust_sigma(deviations: impl Iterator<Item = Place>) -> f64 {
     let mut sizes: Vec<f64> = deviations
@@ -54,10 +54,11 @@ pub fn robust_sigma(deviations: impl Iterator<Item = Place>) -> f64 {
     NORMAL_MEDIAN * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Solves a brick, takes out the worst deviation that is flagged and solves again, for as long as that takes more than
-/// 30 % from the root mean square.
+/// Solves a brick, removes the worst flagged deviation and solves again, as long as that reduces the root mean square
+/// by more than 30 %.
 ///
-/// A removal that takes less is tried with the next ones, up to four together. A point on two pictures goes as a whole.
+/// A removal that reduces it less is tried with the next ones, up to four together. A point on two pictures is removed
+/// as a whole.
 ///
 /// # Errors
 /// Those of [`brick`], for the net as it is given.
@@ -103,7 +104,7 @@ pub fn clean(net: &Net, pictures: &[usize]) -> Result<Cleaned, PlaneError> {
     })
 }
 
-/// A part of a net on the way.
+/// An intermediate state of a part of a net.
 struct State {
     figure: Figure,
     blunders: Vec<Blunder>,
@@ -131,7 +132,7 @@ impl State {
         tied.copied().collect()
     }
 
-    /// The brick without its worst deviation, if that is flagged and the rest still hangs together.
+    /// The brick without its worst deviation, if that is flagged and the rest remains connected.
     fn without_the_worst(&self, all: &[usize]) -> Option<Self> {
         let tied = self.tied();
         let sigma = robust_sigma(tied.iter().map(|(_, deviation)| *deviation));

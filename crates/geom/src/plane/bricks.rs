@@ -1,4 +1,4 @@
-//! BRICK, EXTEND, MORTAR and LOCAL: the solver on a few pictures, on bricks, and on the pictures of a brick again.
+//! BRICK, EXTEND, MORTAR and LOCAL: the solver on a few pictures, on bricks, and again on the pictures of a brick.
 
 use super::{
     Place,
@@ -11,7 +11,7 @@ use super::{
 /// Weight of a seam's mean in LOCAL: as much as ten images.
 const SEAM_WEIGHT: f64 = 10.0;
 
-/// A brick: some pictures in a figure of their own, whose place, size and direction are rough guesses.
+/// A brick: some pictures in a local figure whose position, size and orientation are approximate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
     /// Indices of its pictures in the net.
@@ -24,7 +24,7 @@ pub struct Figure {
     pub deviations: Vec<(usize, Place)>,
     /// Equations of ties, and unknowns without the four of the figure.
     pub redundancy: Redundancy,
-    /// What the two guesses shrank, before that was put back; none of a single picture.
+    /// Shrinkage by the two guesses before it was corrected; `None` for a single picture.
     pub shrinkage: Option<Shrinkage>,
 }
 
@@ -39,12 +39,12 @@ pub struct Block {
     pub seams: Vec<(usize, usize, Place)>,
     /// Equations and unknowns.
     pub redundancy: Redundancy,
-    /// What two controls shrank, before that was put back.
+    /// Shrinkage by two controls before it was corrected.
     pub shrinkage: Option<Shrinkage>,
 }
 
-/// BRICK: ties `pictures` together on two rough guesses, points of the picture with most ties, far apart, where that
-/// picture has them. What the guesses shrink is put back.
+/// BRICK: ties `pictures` together on two approximate points of the picture with most ties, far apart, where that
+/// picture has them. Their shrinkage is corrected.
 ///
 /// # Errors
 /// [`PlaneError::UnderconnectedPicture`], [`PlaneError::EqualPoints`].
@@ -99,7 +99,7 @@ fn alone(part: &Net) -> Figure {
     }
 }
 
-/// Two ties of the picture with most of them, the farther apart the better, where that picture has them.
+/// Two ties of the picture with most of them, as far apart as possible, where that picture has them.
 fn rough_guesses(part: &Net) -> Vec<Control> {
     let by_point = part.by_point();
     let ties = |of: &[usize]| -> Vec<usize> {
@@ -135,7 +135,7 @@ fn rough_guesses(part: &Net) -> Vec<Control> {
 }
 
 impl PlaneError {
-    /// The failure of a part with the indices of the whole net; that it has no two guesses is for want of ties.
+    /// The error of a part with the indices of the whole net; missing guesses are reported as missing ties.
     pub(super) fn of_part(self, points: &[usize], pictures: &[usize]) -> Self {
         match self {
             Self::TooFewControls { found } => Self::UnderconnectedPicture {
@@ -202,8 +202,8 @@ impl Figure {
     }
 }
 
-/// EXTEND: ties bricks by their common points on two controls, those farthest apart, and puts back what these shrink: a
-/// figure that is free but for its place, size and direction.
+/// EXTEND: ties bricks by their common points on two controls, those farthest apart, and corrects the shrinkage: a
+/// figure that is free except for its place, size and direction.
 ///
 /// # Errors
 /// [`PlaneError`]; its pictures are bricks.
@@ -294,10 +294,10 @@ fn join(
     })
 }
 
-/// LOCAL: ties the pictures of every brick again, with the means of its seams as controls, which evens them out. A
-/// brick with fewer than two points in others stays as it is.
+/// LOCAL: ties the pictures of every brick again, with the means of its seams as controls, which distributes the seams.
+/// A brick with fewer than two points in others is unchanged.
 ///
-/// Returns the way of every picture of the net to the block.
+/// Returns the similarity from every picture of the net to the block.
 ///
 /// # Errors
 /// [`PlaneError`].
@@ -335,7 +335,7 @@ pub fn local(net: &Net, figures: &[Figure], block: &Block) -> Result<Vec<Similar
 }
 
 impl Block {
-    /// The way of every picture of the net to the block, through its brick.
+    /// The similarity from every picture of the net to the block, through its brick.
     #[must_use]
     pub fn pictures(&self, net: &Net, figures: &[Figure]) -> Vec<Similarity> {
         let mut pictures = vec![Similarity::IDENTITY; net.pictures];

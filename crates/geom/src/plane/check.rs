@@ -1,17 +1,18 @@
-//! What must hold before a net is solved.
+//! Conditions that a net must satisfy before it is solved.
 
 use super::{
     Place,
     net::{Net, PlaneError},
 };
 
-/// Places closer than this share of all that is measured are one place.
+/// Points closer than this share of the whole extent are coincident.
 const EQUAL: f64 = 1e-9;
 
-/// Checks that every picture hangs on the net, every part of the net on two controls, and that no two points are one.
+/// Checks that every picture is tied to the net, every part of the net to two controls, and that no two points
+/// coincide.
 ///
 /// # Errors
-/// [`PlaneError`]; of a part without controls its first picture.
+/// [`PlaneError`]; for a part without controls its first picture.
 pub fn check(net: &Net) -> Result<(), PlaneError> {
     equal_points(net)?;
     let (by_point, control_of) = (net.by_point(), net.control_of());
@@ -78,7 +79,7 @@ fn equal_controls(net: &Net) -> Result<(), PlaneError> {
     })
 }
 
-/// Two that have one place, by the order in which they are named.
+/// Two coincident points, in the order in which they are named.
 fn equal_pair(mut places: Vec<(Place, usize)>) -> Option<(usize, usize)> {
     places.sort_by(|(a, _), (b, _)| a.re.total_cmp(&b.re).then(a.im.total_cmp(&b.im)));
     let first = places.first()?.0;
@@ -93,7 +94,7 @@ fn equal_pair(mut places: Vec<(Place, usize)>) -> Option<(usize, usize)> {
     Some((one.min(two), one.max(two)))
 }
 
-/// Which pictures hang together.
+/// The connected components of the pictures.
 struct Parts(Vec<usize>);
 
 impl Parts {

@@ -1,14 +1,14 @@
-//! SCALE: one figure on its controls, gross errors among them found by least median of squares.
+//! SCALE: one figure on its controls, gross errors among them detected by least median of squares.
 
 use super::{Place, similarity::Similarity};
 
 /// Median of the squared length of a vector whose coordinates are normal with variance 1: `2 ln 2`.
 const MEDIAN_OF_SQUARES: f64 = 2.0 * std::f64::consts::LN_2;
-/// Fewer controls cannot outvote a gross error.
+/// Minimum number of controls for the detection of a gross error.
 const JUDGED_MIN: usize = 5;
-/// Robust standard deviations within which the first choice of controls lies.
+/// Robust standard deviations within which controls are selected first.
 const FIRST_CHOICE: f64 = 5.0;
-/// Rounds of choosing and fitting.
+/// Maximum number of rounds of selection and fit.
 const ROUNDS: usize = 20;
 
 /// A figure on its controls.
@@ -20,7 +20,7 @@ pub struct Scaled {
     pub residuals: Vec<Place>,
     /// Whether each control was kept.
     pub kept: Vec<bool>,
-    /// Standard deviation of a coordinate of a kept control, `√(Σ|v|² / (2n − 4))`; none for two controls.
+    /// Standard deviation of a coordinate of a kept control, `√(Σ|v|² / (2n − 4))`; `None` for two controls.
     pub sigma: Option<f64>,
 }
 
@@ -46,13 +46,13 @@ impl Scaled {
     }
 }
 
-/// The similarity that takes `from` closest to `to`, all weights alike; none of fewer than two places that differ.
+/// The similarity that fits `from` to `to` best, with equal weights; `None` for fewer than two distinct points.
 #[must_use]
 pub fn fit_similarity(from: &[Place], to: &[Place]) -> Option<Similarity> {
     fit_weighted(from, to, |_| 1.0)
 }
 
-/// The same with a weight of each pair of places, by its index, above 0.
+/// The same with a weight of each pair of points, by its index, above 0.
 #[must_use]
 pub fn fit_weighted(
     from: &[Place],
@@ -87,12 +87,12 @@ pub fn fit_weighted(
 
 /// SCALE: puts `figure` on its controls `given` by one similarity, which keeps its shape.
 ///
-/// With five controls or more the similarity through each two of them (through a fixed choice of pairs beyond sixty
-/// controls) is judged by the median of the squared residuals; what lies near the best one is fitted, and controls
-/// farther off than `limit` standard deviations are left out until the choice stands. Two gross errors that hide each other
-/// from a rejection one by one are found so.
+/// With five controls or more, the similarities through pairs of them (a fixed choice of pairs beyond sixty controls)
+/// are ranked by the median of the squared residuals. The controls near the best one are fitted, and those farther away
+/// than `limit` standard deviations are removed until the selection is stable. This detects two gross errors that mask
+/// each other in a rejection one by one.
 ///
-/// Returns none for fewer than two controls that differ.
+/// Returns `None` for fewer than two distinct controls.
 ///
 /// # Source
 /// Rousseeuw 1984, "Least median of squares regression", J. Am. Stat. Assoc. 79, 871–880.
@@ -126,7 +126,7 @@ pub fn scale(figure: &[Place], given: &[Place], limit: f64) -> Option<Scaled> {
     })
 }
 
-/// The similarity through two controls with the least median of squares, and the standard deviation that it implies.
+/// The similarity through two controls with the least median of squares, and its standard deviation.
 fn least_median(figure: &[Place], given: &[Place]) -> Option<(Similarity, f64)> {
     let count = figure.len();
     let mut best: Option<(f64, Similarity)> = None;
@@ -183,7 +183,7 @@ fn sigma_of(
 }
 
 fn within(similarity: &Similarity, figure: &[Place], given: &[Place], distance: f64) -> Vec<bool> {
-    // Exact data leave rounding, which is no gross error.
+    // Exact data leave rounding, which is not a gross error.
     let size = given.iter().map(|given| given.norm()).fold(0.0, f64::max);
     let reach = distance.max(1e-9 * size);
     let residuals = figure.iter().zip(given);

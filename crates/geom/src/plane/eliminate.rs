@@ -1,8 +1,8 @@
 //! Sparse orthogonal decomposition: pictures are eliminated one by one, each by reflections of the rows that touch it.
 //!
-//! The order is that of least degree, so that in a net of many pictures a front stays small. What is left of the rows of
-//! a picture is a triangle over its neighbours, which waits for the first of them: no row is squared, as normal
-//! equations would, and the triangular factor is at hand for the covariances.
+//! The order is that of least degree, so that in a net of many pictures a front stays small. The remaining rows of a
+//! picture are a triangle over its neighbours, which is kept until the first of them is eliminated: no row is squared,
+//! as in normal equations, and the triangular factor is available for the covariances.
 
 use nalgebra::{Complex, Matrix2, Vector2};
 
@@ -11,7 +11,7 @@ type Number = Complex<f64>;
 /// Below this share of its column a pivot is rounding: the unknown is free.
 const FREE: f64 = 1e-10;
 
-/// Rows over the same pictures, which are named by their places in the order of elimination, ascending.
+/// Rows over the same pictures, which are identified by their positions in the order of elimination, ascending.
 pub(super) struct Rows {
     pub(super) pictures: Vec<usize>,
     /// Row by row: two numbers a picture, then the right-hand side.
@@ -56,7 +56,7 @@ pub(super) fn order_of_least_degree(mut neighbours: Vec<Vec<usize>>) -> Vec<usiz
     order
 }
 
-/// Both ascending lists in one, without some.
+/// The union of two ascending lists, without some elements.
 fn union(one: &[usize], two: &[usize], without: [usize; 2]) -> Vec<usize> {
     let mut both = Vec::with_capacity(one.len() + two.len());
     let (mut i, mut j) = (0, 0);
@@ -79,7 +79,7 @@ fn union(one: &[usize], two: &[usize], without: [usize; 2]) -> Vec<usize> {
 /// The triangular factor of `rows` over `count` pictures.
 ///
 /// # Errors
-/// The place of a picture that the rows leave free.
+/// The position of a picture that the rows leave free.
 pub(super) fn factorise(count: usize, rows: Vec<Rows>) -> Result<Vec<Step>, usize> {
     let sizes = column_norms(count, &rows);
     let mut waiting: Vec<Vec<Rows>> = (0..count).map(|_| Vec::new()).collect();
@@ -106,7 +106,7 @@ pub(super) fn factorise(count: usize, rows: Vec<Rows>) -> Result<Vec<Step>, usiz
     Ok(steps)
 }
 
-/// The unknowns of every place.
+/// The solution by position in the order of elimination.
 pub(super) fn substitute(steps: &[Step]) -> Vec<Vector2<Number>> {
     let mut unknowns = vec![Vector2::zeros(); steps.len()];
     for (place, step) in steps.iter().enumerate().rev() {
@@ -192,7 +192,7 @@ impl Front {
         }
     }
 
-    /// Turns the rows into a staircase by reflections; a row is touched from its first number on.
+    /// Transforms the rows into a staircase by reflections; a row is processed from its first number on.
     fn reduce(&mut self) {
         let right = 2 * self.pictures.len();
         let (mut next, mut end) = (0, 0);
@@ -209,7 +209,7 @@ impl Front {
         self.leads = leads;
     }
 
-    /// Puts what `column` has in rows `from..to` into the first of them; false where it has nothing.
+    /// Reflects rows `from..to` so that `column` is non-zero only in the first of them; false where it was zero.
     fn reflect(&mut self, column: usize, from: usize, to: usize) -> bool {
         let (head, tail) = self.values.split_at_mut((column + 1) * self.rows);
         let axis = &mut head[column * self.rows + from..column * self.rows + to];
@@ -245,7 +245,7 @@ impl Front {
         self.values[column * self.rows + row]
     }
 
-    /// Whether the first picture's two pivots stand out of the rounding of its columns.
+    /// Whether the first picture's two pivots exceed the rounding of its columns.
     fn holds_first(&self, sizes: &[f64; 2]) -> bool {
         self.leads.starts_with(&[0, 1]) && (0..2).all(|k| self.at(k, k).norm() > FREE * sizes[k])
     }
@@ -269,7 +269,7 @@ impl Front {
                 .collect(),
             value: Vector2::new(self.at(0, right), self.at(1, right)),
         };
-        // Also without a row: the neighbours belong together from now on.
+        // Also without a row: the neighbours are connected from now on.
         let rest = (self.pictures.len() > 1).then(|| Rows {
             pictures: self.pictures[1..].to_vec(),
             values: (2..self.leads.len())

@@ -1,4 +1,4 @@
-//! Film, and what is measured on it: ticks at corners and edges, craters boxed by two settings of a cross.
+//! Film and its measurements: ticks at corners and edges, craters boxed by two settings of a cross.
 
 use nalgebra::{Matrix4, Vector4};
 
@@ -7,13 +7,13 @@ use super::Place;
 /// Corners that lie no closer to a line than this share of their distance determine a mapping.
 const FLAT: f64 = 1e-9;
 
-/// Why ticks give no correction.
+/// Why ticks do not determine a correction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum FilmError {
-    /// Three of the corners are in line, or two in one place.
+    /// Three of the corners are collinear, or two coincide.
     #[error("the four corner ticks enclose no area")]
     Flat,
-    /// The mid-edge ticks are so far off that the correction is no longer one to one.
+    /// The mid-edge ticks are so far away that the correction is no longer one to one.
     #[error("the mid-edge ticks are off by a quarter of the picture or more")]
     TooLarge,
 }
@@ -24,8 +24,8 @@ pub fn box_centre(upper_right: Place, lower_left: Place) -> Place {
     (upper_right + lower_left) * 0.5
 }
 
-/// Linear double interpolation from four measured corner ticks to where they are known to be: shear, scales and
-/// rotation of drum scanners (*Optronics*).
+/// Linear double interpolation from four measured corner ticks to their known positions: shear, scales and rotation of
+/// drum scanners (*Optronics*).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FourCorners {
     origin: Place,
@@ -70,7 +70,7 @@ impl FourCorners {
         })
     }
 
-    /// Where a measured place is in the known frame.
+    /// The position of a measured point in the known frame.
     #[must_use]
     pub fn correct(&self, measured: Place) -> Place {
         let of = (measured - self.origin) / self.size;
@@ -79,8 +79,8 @@ impl FourCorners {
     }
 }
 
-/// What cathode-ray recorders (*Dicomed*) add to [`FourCorners`]: `δx = a x + b x²` and `δy = a' y + b' y²` that are 0 at
-/// the corners, with the origin at a corner, hence `δx = b x (x − W)`.
+/// The additional correction of cathode-ray recorders (*Dicomed*) after [`FourCorners`]: `δx = a x + b x²` and
+/// `δy = a' y + b' y²` that are 0 at the corners, with the origin at a corner, hence `δx = b x (x − W)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CornerZero {
     corner: Place,
@@ -91,7 +91,7 @@ pub struct CornerZero {
 }
 
 impl CornerZero {
-    /// From what is left at the middle of the edges after [`FourCorners`].
+    /// From the residuals at the middle of the edges after [`FourCorners`].
     ///
     /// * `corner` – the corner of the known frame from which `width` and `height` lead to the opposite one
     /// * `rests` – corrected minus known: of the x of the ticks on the lower and the upper edge, then of the y of those on
@@ -123,7 +123,7 @@ impl CornerZero {
         })
     }
 
-    /// Where a place in the known frame is seen: its own error added.
+    /// The apparent position of a point in the known frame: its own error added.
     #[must_use]
     pub fn distort(&self, known: Place) -> Place {
         let of = known - self.corner;
@@ -135,7 +135,7 @@ impl CornerZero {
             )
     }
 
-    /// The known place of one that [`FourCorners`] has corrected.
+    /// The known position of a point corrected by [`FourCorners`].
     #[must_use]
     pub fn correct(&self, seen: Place) -> Place {
         let of = seen - self.corner;
@@ -148,7 +148,7 @@ impl CornerZero {
     }
 }
 
-/// The root of `x + b x (x − W) = s` near `s`, by the formula that loses no digits for small `b`.
+/// The root of `x + b x (x − W) = s` near `s`, by the formula that is stable for small `b`.
 fn straight(seen: f64, bend: f64, size: f64) -> f64 {
     let linear = 1.0 - bend * size;
     let root = (linear * linear + 4.0 * bend * seen).max(0.0).sqrt();
@@ -174,7 +174,7 @@ mod tests {
 
     #[test]
     fn corners_come_to_their_places_and_shear_goes() {
-        // Shear, scale, rotation and a twist, as linear double interpolation has them.
+        // Shear, scale, rotation and a twist, as in linear double interpolation.
         let film = |of: Place| {
             Place::new(
                 3.0 + 0.012 * of.re - 0.0003 * of.im + 2e-8 * of.re * of.im,
@@ -186,7 +186,7 @@ mod tests {
             let rest = (corners.correct(film(known)) - known).norm();
             assert!(rest < 1e-12 * 1204.0, "{rest}"); // rounding of a picture's size
         }
-        // Of a shear alone, every place is put right.
+        // With shear only, every point is corrected.
         let sheared = |of: Place| Place::new(of.re + 0.004 * of.im, of.im);
         let corners = FourCorners::new(&KNOWN.map(sheared), &KNOWN).unwrap();
         let inside = Place::new(333.0, 777.0);

@@ -1,14 +1,14 @@
-//! Bricks for a net whose pictures are not put into bricks by hand.
+//! Automatic division of a net into bricks.
 
 use std::collections::BTreeMap;
 
 use super::net::Net;
 
-/// Puts every picture into a brick of at most about `size` pictures that share many points: the brick of every picture, counted
-/// from 0 in the order of their first pictures.
+/// Divides the pictures into bricks of at most about `size` pictures that share many points: the brick of every
+/// picture, counted from 0 in the order of their first pictures.
 ///
-/// A brick grows by the picture with most points in common with it, two at least. What is left over, fewer than half of
-/// `size`, joins the brick with most points in common.
+/// A brick grows by the picture with most points in common with it, two at least. A remainder of fewer than half of
+/// `size` joins the brick with most points in common.
 #[must_use]
 pub fn grow_bricks(net: &Net, size: usize) -> Vec<usize> {
     let shared = shared_points(net);
@@ -27,7 +27,7 @@ pub fn grow_bricks(net: &Net, size: usize) -> Vec<usize> {
                 *common.entry(*other).or_default() += count;
             }
             common.retain(|picture, _| brick_of[*picture].is_none());
-            // The first of those with most.
+            // The first of those with most points.
             let next = common.iter().rev().max_by_key(|(_, count)| **count);
             let Some((&next, _)) = next.filter(|(_, count)| **count >= 2) else {
                 break;

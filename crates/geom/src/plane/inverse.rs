@@ -1,4 +1,4 @@
-//! The inverse of the normal matrix where the triangular factor is not 0: all that covariances of neighbours need.
+//! The inverse of the normal matrix where the triangular factor is not 0: sufficient for the covariances of neighbours.
 
 use nalgebra::{Complex, Matrix2};
 
@@ -6,7 +6,7 @@ use super::eliminate::{Step, inverse_of_triangle};
 
 type Block = Matrix2<Complex<f64>>;
 
-/// Cofactors of pictures by their places in the order of elimination.
+/// Cofactors of pictures by their positions in the order of elimination.
 pub(super) struct Cofactors {
     rows: Vec<(Block, Vec<(usize, Block)>)>,
 }
@@ -49,7 +49,7 @@ impl Cofactors {
         Self { rows }
     }
 
-    /// The cofactors between two pictures that hang together; 0 between others.
+    /// The cofactors between two connected pictures; 0 between others.
     pub(super) fn between(&self, one: usize, two: usize) -> Block {
         if one == two {
             return self.rows[one].0;

@@ -1,4 +1,4 @@
-//! Pictures that show the ground as a mirror does: read from the wrong side of the film, or with an axis turned round.
+//! Mirrored pictures: read from the wrong side of the film, or with an axis reversed.
 
 use std::collections::BTreeMap;
 
@@ -8,16 +8,16 @@ use super::{
     net::{Net, PlaneError},
 };
 
-/// Squares left by one hand over those left by the other, below which the hand is certain.
+/// Squares left by one handedness over those left by the other, below which the handedness is certain.
 const CERTAIN: f64 = 0.1;
-/// Below this share of the squares of the places themselves, a rest is rounding.
+/// Below this share of the squares of the coordinates, a residual is rounding.
 const EXACT: f64 = 1e-18;
 
-/// Finds a picture, or the whole figure, of the wrong hand.
+/// Finds a picture, or the whole figure, of the wrong handedness.
 ///
-/// Each two pictures with three points in common are compared by a similarity and by one with a mirror; where one of
-/// them leaves a tenth of the squares of the other, the pictures are said to have the same hand or not. Of pictures that hang
-/// together the fewer are mirrored.
+/// Each pair of pictures with three points in common is compared by a similarity and by a mirrored one; where one of
+/// them leaves a tenth of the squares of the other, the relative handedness of the pictures is decided. Among connected
+/// pictures the minority is mirrored.
 ///
 /// # Errors
 /// [`PlaneError::MirroredPicture`].
@@ -60,7 +60,7 @@ pub fn find_mirrored(net: &Net) -> Result<(), PlaneError> {
     Ok(())
 }
 
-/// Whether pairs of pictures have the same hand, where that is certain.
+/// Whether pairs of pictures have the same handedness, where that is certain.
 fn hands(net: &Net) -> BTreeMap<(usize, usize), bool> {
     let mut shared: BTreeMap<(usize, usize), Vec<(Place, Place)>> = BTreeMap::new();
     for measured in net.by_point().iter() {
@@ -81,7 +81,8 @@ fn hands(net: &Net) -> BTreeMap<(usize, usize), bool> {
         .collect()
 }
 
-/// Whether places have the same hand in two pictures; none where three points, or their spread, do not tell.
+/// Whether points have the same handedness in two pictures; `None` where fewer than three points, or their spread, do
+/// not decide it.
 #[must_use]
 pub fn same_hand(places: &[(Place, Place)]) -> Option<bool> {
     if places.len() < 3 {

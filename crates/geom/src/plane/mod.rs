@@ -1,9 +1,9 @@
 //! Plane triangulation of rectified pictures: a similarity per picture, tied to its neighbours and to controls.
 //!
-//! Pictures that are rectified, or nearly vertical, differ from a conformal map by a similarity: four unknowns each,
-//! in which the equations from picture to map are linear. Places are complex numbers, `x + i y`, and so are the two
-//! unknowns of a picture, which halves every system. There is one solver ([`solve()`]); the five programs of the paper are
-//! ways to use it.
+//! Pictures that are rectified, or nearly vertical, differ from a conformal map by a similarity: four unknowns each, in
+//! which the equations from picture to map are linear. Positions are complex numbers, `x + i y`, and so are the two
+//! unknowns of a picture, which halves every system. There is one solver ([`solve()`]); the five programs of the paper
+//! are ways to use it.
 //!
 //! | program | here |
 //! |---|---|
@@ -36,7 +36,7 @@ mod shrinkage;
 mod similarity;
 mod solve;
 
-/// A place in a picture or on a map: `x + i y`.
+/// A position in a picture or on a map: `x + i y`.
 pub type Place = nalgebra::Complex<f64>;
 
 pub use blunders::{Blunder, Cleaned, FLAG_LIMIT, clean, robust_sigma};

@@ -1,31 +1,31 @@
-//! What is measured: places of points in pictures, and points whose place on the map is known.
+//! Measurements and controls: positions of points in pictures, and points whose map coordinates are known.
 
 use super::Place;
 
-/// A point as a picture shows it.
+/// A point measured in a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measurement {
     /// Index of the picture.
     pub picture: usize,
     /// Index of the point.
     pub point: usize,
-    /// Where, in the picture's own units.
+    /// Position, in the picture's own units.
     pub at: Place,
 }
 
-/// A point whose place on the map is given.
+/// A point whose map coordinates are given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Control {
     /// Index of the point.
     pub point: usize,
-    /// Where, in map units.
+    /// Position, in map units.
     pub at: Place,
     /// Weight against a tie, whose weight is 1: the square of (standard deviation of an image of a tie on the map ÷
     /// standard deviation of the control).
     pub weight: f64,
 }
 
-/// Pictures, points and what ties them.
+/// Pictures, points and their measurements.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Net {
     /// Number of pictures.
@@ -44,12 +44,12 @@ pub enum PlaneError {
     /// Fewer than two controls that a picture shows.
     #[error("controls that a picture shows: {found}; expected two or more")]
     TooFewControls {
-        /// How many there are.
+        /// Number of such controls.
         found: usize,
     },
-    /// A picture, and what hangs on it, can turn, shrink or move.
+    /// A picture, and those tied to it only, can rotate, shrink or move.
     #[error(
-        "picture {picture} is tied to the net by {ties} points; expected two or more that lie apart, \
+        "picture {picture} is tied to the net by {ties} points; expected two or more distinct points, \
          on a part of the net that has controls"
     )]
     UnderconnectedPicture {
@@ -58,7 +58,7 @@ pub enum PlaneError {
         /// Its points that are ties or controls.
         ties: usize,
     },
-    /// Two points of a picture have one place.
+    /// Two points of a picture coincide.
     #[error("points {first} and {second} have the same place in picture {picture}")]
     EqualPoints {
         /// The picture.
@@ -68,7 +68,7 @@ pub enum PlaneError {
         /// The other.
         second: usize,
     },
-    /// Two controls have one place on the map.
+    /// Two controls coincide on the map.
     #[error("controls {first} and {second} have the same place on the map")]
     EqualControls {
         /// One point.
@@ -76,13 +76,13 @@ pub enum PlaneError {
         /// The other.
         second: usize,
     },
-    /// A picture has the other hand than its neighbours.
+    /// A picture has the opposite handedness to its neighbours.
     #[error("picture {picture} is a mirror image of what its neighbours show")]
     MirroredPicture {
         /// The picture.
         picture: usize,
     },
-    /// All pictures have the other hand than the map.
+    /// All pictures have the opposite handedness to the map.
     #[error("the figure is a mirror image of its controls")]
     MirroredFigure,
 }
@@ -113,7 +113,7 @@ impl Net {
         of
     }
 
-    /// The net of these pictures alone, with the indices of its pictures, points and measurements in this one.
+    /// The net of these pictures only, with the indices of its pictures, points and measurements in this one.
     pub(super) fn part(&self, pictures: &[usize]) -> Part {
         let mut place = vec![None; self.pictures];
         for (index, picture) in pictures.iter().enumerate() {

@@ -1,23 +1,23 @@
-//! Two controls shrink a figure: how much, and back.
+//! Shrinkage of a figure by two controls, and its correction.
 
 use super::{Place, net::Net, similarity::Similarity, solve::Solution};
 
-/// What two controls do to the figure between them.
+/// The effect of two controls on the figure between them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shrinkage {
     /// Distance of the controls as given, map units.
     pub given: f64,
-    /// The same as computed ÷ as given.
+    /// Computed over given distance.
     pub factor: f64,
-    /// The factor that the law gives from the tie residuals.
+    /// The factor predicted from the tie residuals.
     pub law: f64,
 }
 
-/// How many times shorter two controls of equal `weight` become: `L'/L = 1 / (1 + 2T/(w L²))`.
+/// The factor by which two controls of equal `weight` shorten: `L'/L = 1 / (1 + 2T/(w L²))`.
 ///
-/// Residuals of ties lie in the map and shrink with it, which the equations of the controls alone resist. `tie_squares`
-/// is `T`, the sum of squares of the ties when the controls are held exactly, `distance` is `L`. The controls move
-/// inward along their line, each by `(L − L')/2`.
+/// Residuals of ties scale with the map and decrease as it shrinks, which only the equations of the controls resist.
+/// `tie_squares` is `T`, the sum of squares of the ties when the controls are held exactly, `distance` is `L`. The
+/// controls move inward along their line, each by `(L − L')/2`.
 ///
 /// # Source
 /// The effect: Arthur & McMacken 1977, who saw it; the law follows from the ties being homogeneous in the unknowns.
@@ -27,7 +27,7 @@ pub fn shrinkage_factor(tie_squares: f64, distance: f64, weight: f64) -> f64 {
 }
 
 impl Shrinkage {
-    /// The shrinkage of a net with exactly two controls; none for others.
+    /// The shrinkage of a net with exactly two controls; `None` for others.
     #[must_use]
     pub fn of(net: &Net, solution: &Solution) -> Option<Self> {
         let [first, second] = net.controls[..] else {
@@ -51,8 +51,8 @@ impl Shrinkage {
 }
 
 impl Solution {
-    /// The same figure with its two controls where they are given: the solution that holds them exactly. A net with
-    /// other than two controls is left as it is.
+    /// The same figure with its two controls at their given positions: the solution that holds them exactly. A net with
+    /// any other number of controls is unchanged.
     #[must_use]
     pub fn unshrunk(mut self, net: &Net) -> Self {
         let [first, second] = net.controls[..] else {

@@ -1,4 +1,4 @@
-//! Similarities of the plane, both ways round.
+//! Similarities of the plane, in both directions.
 
 use super::Place;
 
@@ -25,13 +25,13 @@ pub struct ToPicture {
 }
 
 impl Similarity {
-    /// The similarity that leaves everything in its place.
+    /// The identity.
     pub const IDENTITY: Self = Self {
         turn: Place::new(1.0, 0.0),
         shift: Place::new(0.0, 0.0),
     };
 
-    /// The place on the map of a place in the picture.
+    /// The map position of a point in the picture.
     #[must_use]
     pub fn map(&self, place: Place) -> Place {
         self.turn * place + self.shift
@@ -49,7 +49,7 @@ impl Similarity {
         self.turn.arg()
     }
 
-    /// This one after `first`.
+    /// The composition of this similarity after `first`.
     #[must_use]
     pub fn after(&self, first: &Self) -> Self {
         Self {
@@ -86,7 +86,7 @@ impl ToPicture {
         }
     }
 
-    /// The place in the picture of a place on the map.
+    /// The picture position of a point on the map.
     #[must_use]
     pub fn picture(&self, map: Place) -> Place {
         Place::new(
@@ -96,8 +96,8 @@ impl ToPicture {
     }
 }
 
-/// How far an orthographic picture departs from a conformal map by more than a similarity, metres: a floor under all
-/// deviations that no adjustment removes.
+/// Departure of an orthographic picture from a conformal map beyond a similarity, metres: a floor under all deviations
+/// that no adjustment removes.
 ///
 /// * `half_side_m` – half of the picture's side on the ground
 /// * `scale_gradient` – change of the map's scale with distance, `|∇ ln k|`, per metre: `tan φ / R` of Mercator's

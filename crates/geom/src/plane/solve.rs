@@ -33,24 +33,24 @@ impl Redundancy {
 /// The adjusted net.
 #[derive(Debug)]
 pub struct Solution {
-    /// Every picture's way to the map.
+    /// The similarity from every picture to the map.
     pub pictures: Vec<Similarity>,
-    /// Mean of the images of every point on the map; none of a point that no picture shows.
+    /// Mean of the images of every point on the map; `None` for a point that no picture shows.
     pub places: Vec<Option<Place>>,
-    /// Of every measurement: its image on the map minus the mean of its point, map units.
+    /// For every measurement: its image on the map minus the mean of its point, map units.
     pub deviations: Vec<Place>,
-    /// Of every control: given minus computed, map units; none of one that no picture shows.
+    /// For every control: given minus computed, map units; `None` for one that no picture shows.
     pub control_residuals: Vec<Option<Place>>,
     /// Equations and unknowns.
     pub redundancy: Redundancy,
     steps: Vec<Step>,
-    /// Of every picture, in the order of elimination.
+    /// Position of every picture in the order of elimination.
     place_of: Vec<usize>,
     frames: Vec<Frame>,
     map: Frame,
 }
 
-/// Origin and size by which coordinates are made small numbers about 0.
+/// Origin and size that reduce coordinates to small numbers about 0.
 #[derive(Debug, Clone, Copy)]
 struct Frame {
     centre: Place,
@@ -78,8 +78,8 @@ impl Frame {
 /// Adjusts `net`: every point is tied to the mean of its images (weight 1), every control to the mean of its images
 /// by its own weight.
 ///
-/// For a point on `r` pictures the paper's `r` equations `X_i − mean(X) = 0` have rank `r − 1`; `r − 1` orthonormal
-/// contrasts stand for them, which have the same sum of squares. Coordinates are centred and scaled.
+/// For a point on `r` pictures the paper's `r` equations `X_i − mean(X) = 0` have rank `r − 1`; they are replaced by
+/// `r − 1` orthonormal contrasts with the same sum of squares. Coordinates are centred and scaled.
 ///
 /// # Errors
 /// [`PlaneError`] for a net that leaves a picture free; see [`check`].
@@ -129,7 +129,7 @@ pub fn solve(net: &Net) -> Result<Solution, PlaneError> {
     Ok(assemble(net, &by_point, pictures, known))
 }
 
-/// What the covariances need.
+/// Quantities kept for the covariances.
 struct Known {
     steps: Vec<Step>,
     place_of: Vec<usize>,
@@ -277,13 +277,13 @@ impl Solution {
         self.tie_squares() + controls.sum::<f64>()
     }
 
-    /// Sum of squares of the deviations alone, map units squared.
+    /// Sum of squares of the deviations only, map units squared.
     #[must_use]
     pub fn tie_squares(&self) -> f64 {
         self.deviations.iter().map(Place::norm_sqr).sum()
     }
 
-    /// A posteriori standard deviation of a coordinate of an image of a tie on the map; none without redundancy.
+    /// A posteriori standard deviation of a coordinate of an image of a tie on the map; `None` without redundancy.
     #[must_use]
     pub fn sigma(&self, net: &Net) -> Option<f64> {
         let redundancy = self.redundancy.total();
@@ -307,7 +307,7 @@ pub struct Precision<'a> {
 }
 
 impl Precision<'_> {
-    /// Of a picture: cofactors of `turn` and `shift` in map units, for a measurement at the middle of its points.
+    /// For a picture: cofactors of `turn` and `shift` in map units, for a measurement at the middle of its points.
     #[must_use]
     pub fn picture(&self, picture: usize) -> [f64; 2] {
         let place = self.solution.place_of[picture];
@@ -316,12 +316,12 @@ impl Precision<'_> {
         [block[(0, 0)].re / size.powi(2), block[(1, 1)].re]
     }
 
-    /// Of the adjusted place of a point, the mean of its images; `of` are its measurements, `weight` is that of its
+    /// For the adjusted position of a point, the mean of its images; `of` are its measurements, `weight` is that of its
     /// control, if it is one.
     ///
-    /// The errors of the images are part of the error of a control: what the control puts into the net, `h`, it takes
-    /// back from the mean. A weight above the number of images claims to know the images too; then the place is that of the
-    /// control.
+    /// The errors of the images are part of the error of a control: the contribution `h` of the control to the net is
+    /// subtracted from the mean. A weight above the number of images implies that the images are known too; then the
+    /// position is that of the control.
     #[must_use]
     pub fn place(&self, net: &Net, of: &[usize], weight: Option<f64>) -> f64 {
         let count = of.len() as f64;
@@ -337,8 +337,8 @@ impl Precision<'_> {
         }
     }
 
-    /// Of the deviation of a measurement from the mean of its point, `of`: what its own error keeps of itself is this
-    /// share of its variance.
+    /// For the deviation of a measurement from the mean of its point, `of`: the share of its variance that its own
+    /// error retains.
     #[must_use]
     pub fn deviation(&self, net: &Net, of: &[usize], measurement: usize) -> f64 {
         let count = of.len() as f64;
@@ -379,7 +379,7 @@ impl std::fmt::Debug for Precision<'_> {
 }
 
 impl Solution {
-    /// The measurements of every point, as indices: what [`Precision::place`] asks for.
+    /// The measurements of every point, as indices: the input of [`Precision::place`].
     #[must_use]
     pub fn measurements_of(net: &Net) -> Vec<Vec<usize>> {
         net.by_point().iter().map(<[usize]>::to_vec).collect()

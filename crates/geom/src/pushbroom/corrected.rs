@@ -1,4 +1,4 @@
-//! Corrections to an orientation, whatever it is made of: what an adjustment adds to it.
+//! Corrections that an adjustment adds to an orientation of any form.
 
 use nalgebra::Vector3;
 
@@ -7,8 +7,8 @@ use crate::attitude::{left_jacobian_product, matrix_of_rotation_vector};
 
 /// Small polynomials of second order in `t = x/half_lines`, of position and of rotation.
 ///
-/// The rotation vector `θ(t)` has camera components: `M = exp([θ]×) M_base`, the sense of
-/// [`PoseRate::turn_rad`]. Hence no gimbal lock, wherever the camera looks.
+/// The rotation vector `θ(t)` has camera components: `M = exp([θ]×) M_base`, the sense of [`PoseRate::turn_rad`]. Hence
+/// there is no gimbal lock in any look direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OrientationCorrection {
     /// Coefficients of `1`, `t` and `t²` of the position, Mars-fixed, metres.
@@ -17,14 +17,14 @@ pub struct OrientationCorrection {
     pub rotation_rad: [Vector3<f64>; 3],
     /// Half the number of lines of the image, the unit of `t`.
     pub half_lines: f64,
-    /// Lines by which the lines were exposed later than their tags say: the base is taken there.
+    /// Lines by which the lines were exposed later than their tags: the base is evaluated there.
     pub time_shift_lines: f64,
 }
 
 /// An orientation with its correction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CorrectedOrientation<M> {
-    /// What is corrected.
+    /// The orientation before correction.
     pub base: M,
     /// Its correction.
     pub correction: OrientationCorrection,
@@ -66,13 +66,13 @@ impl OrientationCorrection {
         value(&self.rotation_rad, x / self.half_lines)
     }
 
-    /// The position's part at line `x`, metres.
+    /// The position correction at line `x`, metres.
     #[must_use]
     pub fn shift_m(&self, x: f64) -> Vector3<f64> {
         value(&self.position_m, x / self.half_lines)
     }
 
-    /// The pose of line `x` from the pose `base` that its base has there, time shift included.
+    /// The pose of line `x` from the pose `base` of its base there, time shift included.
     #[must_use]
     pub fn applied(&self, x: f64, base: &Pose) -> Pose {
         Pose {

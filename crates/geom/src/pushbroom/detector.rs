@@ -21,11 +21,11 @@ pub struct Detector {
     pub sample_sense: f64,
     /// Samples per line.
     pub samples: f64,
-    /// Where the samples look, other than in an ideal camera.
+    /// Departure of the look directions from an ideal camera.
     pub distortion: Distortion,
 }
 
-/// Places at which radial coefficients are fitted, equally spaced over the samples.
+/// Positions at which radial coefficients are fitted, equally spaced over the samples.
 const FITTED_AT: u32 = 129;
 
 /// Radial distortion of usgscsm and ISIS: ideal focal-plane coordinates are the distorted ones times
@@ -34,7 +34,7 @@ const FITTED_AT: u32 = 129;
 pub struct RadialFit {
     /// `k₀`, `k₁`, `k₂`, powers of 1/mm².
     pub coefficients: [f64; 3],
-    /// Largest distance between where a sample looks and where the coefficients let it look, samples.
+    /// Largest error of the look directions by the coefficients, samples.
     pub error_max_px: f64,
 }
 
@@ -67,7 +67,7 @@ impl Detector {
         project(camera_m, self.focal_length_px)
     }
 
-    /// How far the line misses a place of the focal plane along the track, pixels.
+    /// Distance of the line from a position of the focal plane along the track, pixels.
     #[must_use]
     pub fn missed_px(&self, focal_px: &Vector2<f64>) -> f64 {
         let [along, _] = self.distortion.curve(-focal_px.y / self.focal_length_px);
@@ -101,7 +101,7 @@ impl Detector {
         }
     }
 
-    /// The radial coefficients that are nearest to the distortion over the samples; zero without one.
+    /// The radial coefficients that approximate the distortion over the samples best; zero without distortion.
     #[must_use]
     pub fn radial_fit(&self, instrument: &Instrument) -> RadialFit {
         let mut fit = RadialFit {
@@ -121,7 +121,7 @@ impl Detector {
                 [Vector2::new(along_mm, across_mm), ideal_mm]
             })
             .collect();
-        // Powers of r over its largest value are of like size.
+        // Powers of r over its largest value are of similar size.
         let far_mm = places
             .iter()
             .map(|[from, _]| from.norm())

@@ -1,4 +1,4 @@
-//! Distortion of a detector line: where each sample looks, and which sample looks somewhere.
+//! Distortion of a detector line: the look direction of each sample, and the sample of a look direction.
 //!
 //! Look directions are tangents in camera axes, `q1/q3` along the track and `q2/q3` across it. A distorted
 //! line is a curve in this plane: every sample has its own tangent along the track.
@@ -7,15 +7,15 @@ use areograph_base::instruments::{COEFFICIENTS_MAX, DistortionModel, Instrument}
 
 /// Distances from the boresight below this are zero, thousands of pixels or millimetres.
 const DISTANCE_MIN: f64 = 1e-6;
-/// Samples at which a line is looked at before it is taken, per line.
+/// Samples per line at which a line is checked.
 const CHECKED_AT: u32 = 200;
 /// Steps of the search for a sample, and the last of them in the unit of its coordinate.
 const STEPS_MAX: u32 = 30;
 const LAST_STEP: f64 = 1e-13;
 
-/// Where the samples of an image's line look.
+/// Look directions of the samples of an image's line.
 ///
-/// Beyond its ends a line goes on straight, so that points beside the image have a sample as well.
+/// Beyond its ends a line is extended straight, so that points beside the image have a sample as well.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Distortion {
     line: Option<DistortedLine>,
@@ -30,22 +30,23 @@ struct DistortedLine {
     along: f64,
     /// Unit of the law per sample.
     per_sample: f64,
-    /// First and last place, by the coordinate across the track.
+    /// First and last point, by the coordinate across the track.
     ends: [CurvePoint; 2],
 }
 
-/// The unit in which a law measures distances from the boresight, and what it makes of them.
+/// The unit in which a law measures distances from the boresight, and its formula.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Law {
     /// The angle off the boresight is a polynomial of odd powers of the distance in thousands of pixels.
     Angle,
-    /// Ideal places are `1 − Σ kᵢ r²ⁱ` times the distorted ones, millimetres, in front of a focal length.
+    /// Ideal coordinates are `1 − Σ kᵢ r²ⁱ` times the distorted ones, millimetres, in front of a focal length.
     Radial { focal_length_mm: f64 },
-    /// Across the track ideal places are the distorted ones over `1 + k c²`, millimetres, in front of a focal length.
+    /// Across the track ideal coordinates are the distorted ones over `1 + k c²`, millimetres, in front of a focal
+    /// length.
     AcrossQuotient { focal_length_mm: f64 },
 }
 
-/// A place of the line and how it changes with the coordinate `c` across the track.
+/// A point of the line and its change with the coordinate `c` across the track.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct CurvePoint {
     c: f64,
@@ -55,7 +56,7 @@ struct CurvePoint {
     across_by_c: f64,
 }
 
-/// A line of which two samples look into one direction, or one looks back.
+/// A line of which two samples have one look direction, or one looks back.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
     "pixel {pixel:.1} of the detector does not look farther across the track than its neighbour nearer to the boresight"
@@ -71,7 +72,7 @@ impl Distortion {
 
     /// The distortion of `instrument` for an image that sums `summing` pixels in a sample.
     ///
-    /// [`Self::check`] tells whether it is one.
+    /// Its validity is tested by [`Self::check`].
     #[must_use]
     pub fn of(instrument: &Instrument, summing: f64) -> Self {
         let detector = &instrument.detector;
@@ -138,8 +139,7 @@ impl Distortion {
         Self { line: Some(line) }
     }
 
-    /// Makes sure that every pixel of `instrument` looks farther across the track than those nearer to the
-    /// boresight.
+    /// Checks that every pixel of `instrument` looks farther across the track than those nearer to the boresight.
     ///
     /// # Errors
     /// The first pixel that does not.
@@ -224,7 +224,7 @@ impl DistortedLine {
         }
     }
 
-    /// The place with coordinate `c`, by the law.
+    /// The point with coordinate `c`, by the law.
     fn within(&self, c: f64) -> CurvePoint {
         if let Law::AcrossQuotient { focal_length_mm } = self.law {
             let [scale, rate] = self.scale(c);
@@ -246,7 +246,7 @@ impl DistortedLine {
         }
     }
 
-    /// The same, beyond the ends straight on.
+    /// The same, extended straight beyond the ends.
     fn at(&self, c: f64) -> CurvePoint {
         let [first, last] = &self.ends;
         let end = if c < first.c {
@@ -264,7 +264,7 @@ impl DistortedLine {
         }
     }
 
-    /// The coordinate of the place with the tangent `across`, by Newton's method on the angle.
+    /// The coordinate of the point with the tangent `across`, by Newton's method on the angle.
     fn coordinate(&self, across: f64) -> f64 {
         let [first, last] = &self.ends;
         for (end, beyond) in [(first, across < first.across), (last, across > last.across)] {

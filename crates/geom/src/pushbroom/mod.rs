@@ -1,4 +1,4 @@
-//! A pushbroom camera: where it is and looks as a function of the image line, and which line sees a point.
+//! A pushbroom camera: its pose as a function of the image line, and the line that sees a point.
 //!
 //! The image line is `x`, in lines from the middle of the header image. `M` takes Mars-fixed components
 //! to camera components; the camera looks along +Z. A ground point `P` has the camera vector
@@ -44,7 +44,7 @@ pub use newton::{Projector, Sighting};
 pub use published::{FixedPoint, FrameFirst, Limits, Solution};
 pub use sampled::{SampledOrientation, SamplesError};
 
-/// Where the camera is and looks while one line is exposed.
+/// Position and attitude of the camera while one line is exposed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
     /// Perspective centre, Mars-fixed, metres.
@@ -96,7 +96,7 @@ pub enum Unseen {
     /// The camera's x axis lies within 0.6° of across the flight: lines do not follow each other on the ground.
     #[error("the camera flies across its lines")]
     AcrossFlight,
-    /// The steps grew three times running.
+    /// The steps grew three times in a row.
     #[error("the iteration diverges")]
     Diverged,
     /// The steps stayed above the tolerance.
@@ -126,7 +126,7 @@ impl PoseRate {
 /// Smallest share of the advance per line that must lie along the camera's x axis.
 const ALONG_SHARE_MIN: f64 = 0.01;
 
-/// Sense in which the camera's x axis points along the flight: +1 or −1 (MOC flies along −X).
+/// Sense of the camera's x axis along the flight: +1 or −1 (MOC flies along −X).
 ///
 /// # Errors
 /// [`Unseen::AcrossFlight`], [`Unseen::NotFinite`].

@@ -22,7 +22,7 @@ pub enum CameraModel {
     SecondOrder,
     /// Positions and a rotation vector as polynomials of second order.
     RotationVector,
-    /// Interpolation between the samples, no polynomial over the whole image.
+    /// Interpolation between the samples, without a polynomial over the whole image.
     Samples,
 }
 
@@ -68,7 +68,7 @@ pub struct RotationVectorPolynomial {
 }
 
 impl VectorPolynomial {
-    /// The polynomial of three components; coefficients above the second order are left out.
+    /// The polynomial of three components; coefficients above the second order are ignored.
     #[must_use]
     pub fn of(components: [&Polynomial; 3]) -> Self {
         let coefficient = |power: usize| {

@@ -7,12 +7,13 @@ use super::{Distortion, ExteriorOrientation, Pose, Solution, Unseen, flight_sens
 
 /// Lines of the table that start the iteration, equally spaced over the image.
 const NODES: u32 = 65;
-/// A step below this many lines is the last: `q1` bends so little that what it leaves is below 1e-8 lines.
+/// A step below this many lines ends the iteration: `q1` is so nearly linear that the remaining error is below 1e-8
+/// lines.
 const LAST_STEP_LINES: f64 = 1e-2;
-/// Evaluations after which the iteration is given up.
+/// Maximum number of evaluations.
 const EVALUATIONS_MAX: u32 = 20;
 
-/// A point as the line that sees it does.
+/// A point with the line that sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sighting {
     /// The line, and the camera vector there.
@@ -24,8 +25,8 @@ pub struct Sighting {
 }
 
 impl Sighting {
-    /// Finds the line of `model` that sees `point_m` (Mars-fixed) through `distortion` by steps from line
-    /// `x`; one of at most `last_step_lines` is the last. The change per line is that before it.
+    /// Finds the line of `model` that sees `point_m` (Mars-fixed) through `distortion` by steps from line `x`; a step
+    /// of at most `last_step_lines` ends the iteration. The change per line is that before the last step.
     ///
     /// # Errors
     /// [`Unseen::BehindCamera`], [`Unseen::NotConverged`], [`Unseen::NotFinite`].
@@ -69,8 +70,8 @@ impl Sighting {
     }
 }
 
-/// How far the detector line misses a point along the track, and how that changes with the point, metres
-/// in the plane of the point.
+/// Distance of the detector line from a point along the track, and its change with the point, metres in the plane of
+/// the point.
 pub(crate) fn missed_m(
     distortion: &Distortion,
     camera_m: &Vector3<f64>,

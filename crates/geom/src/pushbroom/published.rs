@@ -5,12 +5,12 @@ use nalgebra::Vector3;
 use super::{Distortion, ExteriorOrientation, PolynomialPath, Unseen, flight_sense};
 use crate::collinearity::project;
 
-/// When an iteration ends.
+/// Limits of an iteration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// A step below this ends it, lines (the papers: 0.1).
     pub tolerance_lines: f64,
-    /// Steps after which it is given up.
+    /// Maximum number of steps.
     pub steps_max: u32,
 }
 
@@ -75,8 +75,8 @@ impl<'a, M: ExteriorOrientation> FrameFirst<'a, M> {
         Self { distortion, ..self }
     }
 
-    /// Along-track frame coordinate of a point from the detector line, with the orientation of line `x`, pixels
-    /// along the flight.
+    /// Along-track frame coordinate of a point from the detector line, with the orientation of line `x`, pixels along
+    /// the flight.
     fn ahead_px(&self, x: f64, point_m: &Vector3<f64>) -> Result<f64, Unseen> {
         let camera_m = self.model.pose(x).camera_vector_m(point_m);
         if camera_m.z.is_nan() {
@@ -88,10 +88,10 @@ impl<'a, M: ExteriorOrientation> FrameFirst<'a, M> {
         Ok(self.sense * (focal_px.x + self.focal_length_px * along))
     }
 
-    /// Finds the line of `point_m` from the middle of the image; `on_step` is told every step, lines.
+    /// Finds the line of `point_m` from the middle of the image; `on_step` receives every step, lines.
     ///
     /// # Errors
-    /// Why there is none.
+    /// Why no line was found.
     pub fn solve(
         &self,
         point_m: &Vector3<f64>,
@@ -104,7 +104,7 @@ impl<'a, M: ExteriorOrientation> FrameFirst<'a, M> {
     /// The same from another line.
     ///
     /// # Errors
-    /// Why there is none.
+    /// Why no line was found.
     pub fn solve_from(
         &self,
         start: f64,
@@ -131,7 +131,7 @@ pub struct FixedPoint<'a, M> {
 }
 
 impl<'a, M: PolynomialPath> FixedPoint<'a, M> {
-    /// The iteration; the focal length, image pixels, serves the start only.
+    /// The iteration; the focal length, image pixels, is used for the start only.
     ///
     /// # Errors
     /// [`Unseen::AcrossFlight`] and [`Unseen::NotFinite`] for orientations that see nothing.
@@ -151,10 +151,10 @@ impl<'a, M: PolynomialPath> FixedPoint<'a, M> {
         }
     }
 
-    /// Finds the line of `point_m` from its frame coordinate; `on_step` is told every step, lines.
+    /// Finds the line of `point_m` from its frame coordinate; `on_step` receives every step, lines.
     ///
     /// # Errors
-    /// Why there is none.
+    /// Why no line was found.
     pub fn solve(
         &self,
         point_m: &Vector3<f64>,
@@ -168,7 +168,7 @@ impl<'a, M: PolynomialPath> FixedPoint<'a, M> {
     /// The same from another line.
     ///
     /// # Errors
-    /// Why there is none.
+    /// Why no line was found.
     pub fn solve_from(
         &self,
         start: f64,
@@ -195,7 +195,7 @@ impl<'a, M: PolynomialPath> FixedPoint<'a, M> {
     }
 }
 
-/// Steps that grow so many times running are called divergence.
+/// Consecutive growing steps that count as divergence.
 const GROWING_STEPS: u32 = 3;
 
 /// Repeats `next` from `start` until a step is below the tolerance.

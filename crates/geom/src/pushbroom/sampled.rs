@@ -1,15 +1,16 @@
-//! Orientation through its samples: no polynomial over the whole image, so that its effect can be measured.
+//! Orientation through its samples, without a polynomial over the whole image, so that the effect of one can be
+//! measured.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::{ExteriorOrientation, Pose, PoseRate};
 use crate::attitude::{left_jacobian_product, matrix_of_rotation_vector, rotation_vector};
 
-/// Orientation that agrees with every one of its samples.
+/// Orientation that interpolates every one of its samples.
 ///
-/// Between two samples positions and rotation vectors are cubics whose slopes at the samples are those
-/// of the parabola through three neighbours (exact for quadratic motion); before the first and after the
-/// last they go on straight.
+/// Between two samples positions and rotation vectors are cubics whose slopes at the samples are those of the parabola
+/// through three neighbours (exact for quadratic motion); before the first and after the last they are extended
+/// straight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SampledOrientation {
     nodes: Vec<Node>,
@@ -30,7 +31,7 @@ struct Curve {
     slope: Vector3<f64>,
 }
 
-/// Samples that are no orientation.
+/// Invalid samples of an orientation.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SamplesError {
     /// Fewer than three.
@@ -46,7 +47,7 @@ pub enum SamplesError {
         /// The line of the sample before.
         before: f64,
     },
-    /// A position that is not finite, or a matrix that is no rotation.
+    /// A position that is not finite, or a matrix that is not a rotation.
     #[error("sample {row} is not a position with a valid rotation (determinant {determinant})")]
     NotAPose {
         /// Sample, counted from 0.
@@ -56,14 +57,14 @@ pub enum SamplesError {
     },
 }
 
-/// A matrix is a rotation when its determinant and its rows' products are this close to what they should be.
+/// A matrix is a rotation when its determinant and the products of its rows match within this.
 const ROTATION_TOLERANCE: f64 = 1e-6;
 
 impl SampledOrientation {
     /// The orientation through `samples`, lines with poses.
     ///
     /// # Errors
-    /// Fewer than three samples, lines that do not increase, poses that are none.
+    /// Fewer than three samples, lines that do not increase, invalid poses.
     pub fn new(samples: &[(f64, Pose)]) -> Result<Self, SamplesError> {
         if samples.len() < 3 {
             return Err(SamplesError::TooFew(samples.len()));

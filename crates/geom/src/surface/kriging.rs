@@ -9,18 +9,18 @@ use super::{Placed, Variogram};
 pub(super) struct Kriging {
     pub(super) shots: Vec<Placed>,
     pub(super) variogram: Variogram,
-    /// A variance above that of any two places: with it the equations are positive definite, and as weights sum up
-    /// to 1 it changes nothing.
+    /// A variance above that of any two points: with it the equations are positive definite, and as weights sum up to 1
+    /// it has no effect.
     sill_m2: f64,
     factor: Cholesky<f64, Dyn>,
     /// The equations' solution for ones, and its sum.
     of_ones: DVector<f64>,
-    /// Mean height, and what each shot adds to the height of a place by its covariance with it.
+    /// Mean height, and the contribution of each shot to the height of a point by its covariance with it.
     mean_m: f64,
     strengths: DVector<f64>,
 }
 
-/// Weights of shots, one column a place, with the multiplier that keeps their sum at 1.
+/// Weights of shots, one column a point, with the multiplier that keeps their sum at 1.
 pub(super) struct Weights {
     of_shots: DMatrix<f64>,
     multipliers: DVector<f64>,
@@ -34,7 +34,7 @@ impl Weights {
 }
 
 impl Kriging {
-    /// `None` when a number is none.
+    /// `None` when a number is not finite.
     pub(super) fn new(shots: Vec<Placed>, variogram: Variogram, shot_sigma_m: f64) -> Option<Self> {
         let first = shots.first()?.plan_m;
         let reach_m = shots.iter().map(|shot| (shot.plan_m - first).norm());
@@ -63,7 +63,7 @@ impl Kriging {
         })
     }
 
-    /// Height of the surface at a place, metres.
+    /// Height of the surface at a point, metres.
     pub(super) fn height_m(&self, place: &Vector2<f64>) -> f64 {
         let shots = self.shots.iter().zip(&self.strengths);
         let above_m = shots.map(|(shot, strength)| strength * self.covariance(shot, place));
@@ -114,7 +114,7 @@ impl Kriging {
                     self.variogram.between(place, other) + weights.multipliers[column];
             }
         }
-        // Rounding leaves it a little lopsided.
+        // Rounding leaves it slightly asymmetric.
         0.5 * (&covariance + covariance.transpose())
     }
 

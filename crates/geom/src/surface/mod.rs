@@ -1,8 +1,8 @@
 //! The ground between laser shots: its height by ordinary kriging, with the covariance of its errors.
 //!
-//! Profiles of a laser altimeter sample the ground every 300 m along the track and every few kilometres across it.
-//! How far the ground strays from what lies between is learnt from the profiles themselves ([`Variogram`]);
-//! errors at neighbouring places are alike, so their covariance is full ([`SurfaceHeights::covariance_m2`]).
+//! Profiles of a laser altimeter sample the ground every 300 m along the track and every few kilometres across it. The
+//! deviation of the ground from its interpolation is estimated from the profiles themselves ([`Variogram`]); errors at
+//! neighbouring points are correlated, so their covariance is full ([`SurfaceHeights::covariance_m2`]).
 //!
 //! # Source
 //! Ordinary kriging: Cressie 1993, Statistics for spatial data, section 3.2.
@@ -44,46 +44,46 @@ use areograph_base::body::{Body, BodyModel};
 
 pub use variogram::Variogram;
 
-/// More shots than this are not kriged with: the equations grow with their cube.
+/// Maximum number of shots for kriging: the cost of the equations grows with their cube.
 const SHOTS_MAX: usize = 1500;
-/// Of more shots those within this of a place that is asked for are taken, metres.
+/// With more shots, those within this distance of a requested point are used, metres.
 const NEAR_M: f64 = 3_000.0;
-/// Fewer shots than this make no surface.
+/// Minimum number of shots of a surface.
 const SHOTS_MIN: usize = 10;
-/// Gradients are differences over this to both sides, metres: less than a spot of the laser.
+/// Half the baseline of gradients, metres: less than a spot of the laser.
 const GRADIENT_STEP_M: f64 = 30.0;
 
-/// A laser shot on the ground. Shots of a profile stand in their order along it.
+/// A laser shot on the ground. Shots of a profile are in their order along it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceShot {
-    /// Where it met the ground, Mars-fixed, metres.
+    /// Its footprint, Mars-fixed, metres.
     pub ground_m: Vector3<f64>,
     /// Index of its profile.
     pub profile: usize,
 }
 
-/// What is uncertain about a surface of laser shots.
+/// Uncertainties of a surface of laser shots.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceOptions {
     /// Noise of the height of a shot, metres.
     pub shot_sigma_m: f64,
     /// Radial error that all shots of a profile share, metres.
     pub profile_sigma_m: f64,
-    /// Error in plan between the places that are asked for and the shots on each axis, common to all of them, metres; on
-    /// a slope it becomes one of height.
+    /// Planimetric error between the requested points and the shots on each axis, common to all of them, metres; on a
+    /// slope it becomes a height error.
     pub plan_sigma_m: f64,
-    /// Roughness that is assumed at least, metres at 300 m, see [`Variogram`].
+    /// Minimum roughness, metres at 300 m, see [`Variogram`].
     pub roughness_min_m: f64,
-    /// Where relief is to tell the place: standard deviation on each axis of where a profile lies in plan, metres. The
-    /// error in plan between images and shots is then what heights are asked for, and no part of their own errors.
+    /// Where relief determines planimetry: planimetric standard deviation of a profile on each axis, metres. The
+    /// planimetric error between images and shots is then estimated from heights, and is not part of their own errors.
     pub relief_sigma_m: Option<f64>,
-    /// The body, above whose ellipsoid heights are.
+    /// The body whose ellipsoid heights refer to.
     pub body: Body,
 }
 
 impl Default for SurfaceOptions {
     /// Shots of MOLA to 1 m and their profiles to 1 m radially after crossovers (Neumann et al. 2001); 130 m in
-    /// plan: 110 m of the images and 70 m of MOLA on an axis.
+    /// planimetry: 110 m of the images and 70 m of MOLA on an axis.
     fn default() -> Self {
         Self {
             shot_sigma_m: 1.0,
@@ -96,21 +96,21 @@ impl Default for SurfaceOptions {
     }
 }
 
-/// A surface that cannot be made.
+/// Why a surface cannot be computed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SurfaceError {
     /// Too few shots.
-    #[error("{shots} laser shots make no surface, expected at least {SHOTS_MIN}")]
+    #[error("{shots} laser shots are too few for a surface; expected at least {SHOTS_MIN}")]
     TooFew {
         /// Shots.
         shots: usize,
     },
-    /// Shots or options that give no positive definite covariance.
-    #[error("laser shots determine no surface: a coordinate or a standard deviation is no number")]
+    /// Shots or options without a positive definite covariance.
+    #[error("laser shots do not determine a surface: a coordinate or a standard deviation is not a number")]
     NotANumber,
 }
 
-/// The ground by laser shots.
+/// The ground from laser shots.
 #[derive(Debug, Clone)]
 pub struct LaserSurface {
     plan: Plan,
@@ -118,41 +118,41 @@ pub struct LaserSurface {
     options: SurfaceOptions,
 }
 
-/// Heights of the surface at some places, above the ellipsoid along the radius.
+/// Heights of the surface at given points, above the ellipsoid along the radius.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfaceHeights {
     /// Heights, metres.
     pub heights_m: Vec<f64>,
     /// Slopes towards east and north, metres per metre.
     pub slopes: Vec<Vector2<f64>>,
-    /// Distance of the nearest shot in plan, metres.
+    /// Planimetric distance of the nearest shot, metres.
     pub nearest_m: Vec<f64>,
     /// Covariance of the errors of the heights, m².
     pub covariance_m2: DMatrix<f64>,
-    /// The same without what comes from errors in plan on a slope.
+    /// The same without the effect of planimetric errors on a slope.
     pub without_plan_m2: DMatrix<f64>,
-    /// The body, above whose ellipsoid they are.
+    /// The body whose ellipsoid they refer to.
     pub body: Body,
-    /// Where relief is to tell the place.
+    /// Where relief determines planimetry.
     pub relief: Option<Relief>,
 }
 
-/// What heights over relief say of the place.
+/// The information of heights over relief about planimetry.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Relief {
-    /// How each height changes with its place, metres per metre, Mars-fixed.
+    /// Change of each height with its position, metres per metre, Mars-fixed.
     pub by_place: Vec<Vector3<f64>>,
-    /// Where each profile may lie: one entry a profile of the surface.
+    /// The possible shift of each profile of the surface, one entry a profile.
     pub profiles: Vec<ProfileOnRelief>,
 }
 
-/// What heights of the surface have to do with where one of its profiles lies.
+/// Dependence of heights of the surface on the shift of one of its profiles.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProfileOnRelief {
     /// Index of the profile.
     pub profile: usize,
-    /// How measured minus predicted heights change when the profile is recorded farther to the east, to the north and
-    /// higher than it lies: one row a place.
+    /// Change of measured minus predicted heights when the profile is recorded farther to the east, to the north and
+    /// higher than its true position: one row a point.
     pub by_shift: Matrix3xX<f64>,
     /// Standard deviations of these shifts, metres.
     pub sigma_m: Vector3<f64>,
@@ -167,11 +167,11 @@ impl SurfaceHeights {
 }
 
 impl LaserSurface {
-    /// The surface of `shots` for heights near the places `around`, Mars-fixed, metres: of very many shots those near
-    /// them are taken.
+    /// The surface of `shots` for heights near the points `around`, Mars-fixed, metres: with very many shots those near
+    /// them are used.
     ///
     /// # Errors
-    /// Too few shots, a coordinate or standard deviation that is no number.
+    /// Too few shots, a coordinate or standard deviation that is not finite.
     pub fn new(
         shots: &[SurfaceShot],
         around: &[Vector3<f64>],
@@ -201,7 +201,7 @@ impl LaserSurface {
         })
     }
 
-    /// How rough the ground is.
+    /// Roughness of the ground.
     #[must_use]
     pub const fn variogram(&self) -> Variogram {
         self.kriging.variogram
@@ -216,20 +216,20 @@ impl LaserSurface {
         profiles
     }
 
-    /// Whether heights above it are to tell the place.
+    /// Whether heights above it determine planimetry.
     #[must_use]
     pub const fn uses_relief(&self) -> bool {
         self.options.relief_sigma_m.is_some()
     }
 
-    /// Shots that the surface rests on.
+    /// Number of shots of the surface.
     #[must_use]
     pub fn shots(&self) -> usize {
         self.kriging.shots.len()
     }
 
-    /// Height of a place above the ellipsoid of the surface's body along the radius, metres, and how it changes with the
-    /// place.
+    /// Height of a point above the ellipsoid of the surface's body along the radius, metres, and its change with the
+    /// point.
     #[must_use]
     pub fn height_m(&self, place_m: &Vector3<f64>) -> (f64, Vector3<f64>) {
         height_m(self.options.body.model(), place_m)
@@ -304,8 +304,8 @@ impl LaserSurface {
             .collect()
     }
 
-    /// Covariance of what the surface errs by where the places may truly be: an error in plan takes them away from a
-    /// profile, where the ground is known, as well as towards one.
+    /// Covariance of the errors of the surface at the possible true positions: a planimetric error moves a point away
+    /// from a profile, where the ground is known, as well as towards one.
     fn errors_m2(&self, at: &[Vector2<f64>]) -> DMatrix<f64> {
         let shift_m = std::f64::consts::SQRT_2 * self.options.plan_sigma_m;
         let all_around = [
@@ -341,7 +341,7 @@ impl LaserSurface {
     }
 }
 
-/// A shot in plan.
+/// A shot in planimetry.
 #[derive(Debug, Clone, Copy)]
 struct Placed {
     plan_m: Vector2<f64>,
@@ -359,7 +359,7 @@ impl Placed {
     }
 }
 
-/// Of too many shots those near the places `around`.
+/// From too many shots, those near the points `around`.
 fn near(shots: Vec<Placed>, around: &[Vector2<f64>]) -> Vec<Placed> {
     if shots.len() <= SHOTS_MAX || around.is_empty() {
         return shots;
@@ -371,7 +371,7 @@ fn near(shots: Vec<Placed>, around: &[Vector2<f64>]) -> Vec<Placed> {
     shots.into_iter().filter(is_near).collect()
 }
 
-/// Of too many shots every second, third …
+/// From too many shots, every second, third …
 fn thinned(shots: Vec<Placed>) -> Vec<Placed> {
     let step = shots.len().div_ceil(SHOTS_MAX).max(1);
     shots.into_iter().step_by(step).collect()

@@ -1,4 +1,4 @@
-//! Places as distances towards east and north from the middle of a site.
+//! Planimetric coordinates towards east and north from the middle of a site.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -29,7 +29,7 @@ impl Plan {
         }
     }
 
-    /// East and north of a Mars-fixed place, metres.
+    /// East and north of a Mars-fixed point, metres.
     pub(super) fn of(&self, place_m: &Vector3<f64>) -> Vector2<f64> {
         let across = Vector2::new(self.east.dot(place_m), self.north.dot(place_m));
         let sine = across.norm();
@@ -39,8 +39,8 @@ impl Plan {
         across * (self.radius_m * sine.atan2(self.up.dot(place_m)) / sine)
     }
 
-    /// Change of a slope's height, metres, with the place: `slope` are metres per metre towards east and north. True to 1e-4
-    /// within 50 km of the middle.
+    /// Change of a slope's height, metres, with the position: `slope` are metres per metre towards east and north. True
+    /// to 1e-4 within 50 km of the middle.
     pub(super) fn by_place(&self, place_m: &Vector3<f64>, slope: &Vector2<f64>) -> Vector3<f64> {
         let up = place_m.normalize();
         let towards = self.east * slope.x + self.north * slope.y;

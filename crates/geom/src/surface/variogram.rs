@@ -1,4 +1,4 @@
-//! How much heights differ with distance.
+//! Variation of heights with distance.
 
 use nalgebra::Vector2;
 
@@ -6,15 +6,15 @@ use super::{Placed, SurfaceOptions};
 
 /// Distance at which roughness is stated, metres: about one spacing of MOLA's shots.
 const REFERENCE_M: f64 = 300.0;
-/// Spacings over which roughness is learnt.
+/// Spacings over which roughness is estimated.
 const LAGS: usize = 5;
-/// Shots farther apart than this many times the usual distance have others missing between them.
+/// Shots farther apart than this multiple of the usual distance have missing shots between them.
 const GAP: f64 = 1.5;
 
 /// Half the mean square difference of heights at a distance: `½ ν² (d / 300 m)^(2H)`, `H = 0.7`.
 ///
-/// The exponent is not learnt: on smooth plains it comes out near 1, and craters between the profiles then are
-/// farther from the surface than its standard deviation allows.
+/// The exponent is not estimated: on smooth plains it comes out near 1, and craters between the profiles then deviate
+/// from the surface by more than its standard deviation allows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Variogram {
     /// Root mean square difference of heights 300 m apart, metres.
@@ -25,7 +25,7 @@ impl Variogram {
     /// Hurst exponent of the ground.
     pub const HURST: f64 = 0.7;
 
-    /// Roughness from heights of successive shots of every profile, without their noise.
+    /// Roughness from heights of successive shots of every profile, their noise removed.
     pub(super) fn learn(shots: &[Placed], options: &SurfaceOptions) -> Self {
         let mut squares: Vec<f64> = (1..=LAGS)
             .filter_map(|lag| {
@@ -41,7 +41,7 @@ impl Variogram {
         }
     }
 
-    /// Half the mean square difference of heights between two places, m².
+    /// Half the mean square difference of heights between two points, m².
     pub(super) fn between(self, one: &Vector2<f64>, other: &Vector2<f64>) -> f64 {
         let distance_m = (one - other).norm();
         0.5 * self.roughness_m.powi(2) * (distance_m / REFERENCE_M).powf(2.0 * Self::HURST)
@@ -53,7 +53,7 @@ impl Variogram {
     }
 }
 
-/// Mean distance and mean square height difference of shots that are `lag` apart in a profile; `None` without any.
+/// Mean distance and mean square height difference of shots `lag` apart in a profile; `None` without any.
 fn structure(shots: &[Placed], lag: usize) -> Option<(f64, f64)> {
     let pairs = |lag: usize| {
         let pairs = shots.iter().zip(shots.get(lag..).unwrap_or_default());

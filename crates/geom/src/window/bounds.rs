@@ -5,15 +5,15 @@ use std::f64::consts::{PI, TAU};
 use super::{Bounds, Region};
 use areograph_base::units::wrap_pi;
 
-/// West, south, east and north edge of the smallest box that holds all regions, radians: `west` within `-π..π`, `east` not
-/// below it and at most a turn beyond.
+/// West, south, east and north edge of the smallest box that contains all regions, radians: `west` within `-π..π`,
+/// `east` not below it and at most a turn beyond.
 #[must_use]
 pub fn bounds_rad(regions: &[Region]) -> Option<[f64; 4]> {
     let bounds = regions.iter().flat_map(|region| &region.pieces);
     let bounds: Vec<Bounds> = bounds.map(|piece| *piece.bounds()).collect();
     let south = bounds.iter().map(|of| of.south).reduce(f64::min)?;
     let north = bounds.iter().map(|of| of.north).reduce(f64::max)?;
-    // The box leaves out the widest stretch of longitudes that no region touches.
+    // The box omits the widest stretch of longitudes that no region touches.
     let mut arcs: Vec<[f64; 2]> = bounds
         .iter()
         .map(|of| {

@@ -1,11 +1,11 @@
-//! Whether windows meet a stretch of ground that many directions lie in.
+//! Whether windows may contain directions of an extent of ground.
 
 use std::f64::consts::TAU;
 
 use super::{Region, half_width_rad};
 use areograph_base::units::wrap_two_pi;
 
-/// A box in longitude and latitude, radians, and how far beyond it directions reach that belong to it.
+/// A box in longitude and latitude, radians, with the margin of the directions that belong to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
     /// Western edge.
@@ -16,7 +16,7 @@ pub struct Extent {
     pub south_rad: f64,
     /// Northern edge.
     pub north_rad: f64,
-    /// No direction that belongs to the box is farther from it than this, along the great circle.
+    /// Maximum great-circle distance from the box of a direction that belongs to it.
     pub reach_rad: f64,
 }
 

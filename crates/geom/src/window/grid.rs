@@ -10,25 +10,25 @@ use areograph_base::units::RADIANS_PER_DEGREE;
 const CELL_RAD: f64 = RADIANS_PER_DEGREE;
 const ROWS: usize = 180;
 const COLUMNS: usize = 360;
-/// A window in more cells than its share of so many, or than so few, is tested for every direction instead, so that
-/// memory stays bounded.
+/// A window in more cells than its share of this many, and in more than `CELLS_MIN`, is tested for every direction
+/// instead, so that memory stays bounded.
 const ENTRIES_MAX: usize = 1 << 22;
 const CELLS_MIN: usize = 1_024;
-/// Cells are taken wider by this, radians: far above the rounding of the tests, far below a cell.
+/// Cells are widened by this, radians: far above the rounding of the tests, far below a cell.
 const ROUNDING_RAD: f64 = 1e-6;
-/// Caps up to this radius are answered by cells, degrees: half a frame of 2 s and the parallax of its relief. Towards
-/// the poles, half a frame's change in longitude grows with the parallels' shortness.
+/// Maximum radius of caps that cells cover, degrees: half a frame of 2 s and the parallax of its relief. Towards the
+/// poles, half a frame's change in longitude grows as the parallels shorten.
 const CAP_DEG: f64 = 0.25;
 const CAP_ON_PARALLEL_DEG: f64 = 0.09;
 
-/// Windows in their order, made ready to be searched for directions.
+/// Windows in their order, prepared for searches by direction.
 ///
-/// A cell has the windows that a cap about *some* direction in it touches; each of them is then asked. So no window is
-/// lost, whatever the cap: those larger than cells stand for ask every window.
+/// A cell has the windows that a cap about *some* direction in it touches; each of them is then tested. So no window is
+/// lost for any cap: for those larger than cells every window is tested.
 #[derive(Debug, Clone)]
 pub struct WindowGrid {
     regions: Vec<Region>,
-    /// Largest cap that cells of a row answer, radians.
+    /// Largest cap that cells of a row cover, radians.
     caps_rad: Vec<f64>,
     /// Where the windows of each cell begin in `windows`, row by row, and where those of the last end.
     starts: Vec<u32>,
@@ -38,7 +38,7 @@ pub struct WindowGrid {
 }
 
 impl WindowGrid {
-    /// The grid of these windows, for caps that are larger by `margin_rad` than frames are.
+    /// The grid of these windows, for caps larger by `margin_rad` than frames.
     #[must_use]
     pub fn new(regions: Vec<Region>, margin_rad: f64) -> Self {
         let caps_rad: Vec<f64> = (0..ROWS)
@@ -124,7 +124,7 @@ impl WindowGrid {
         });
     }
 
-    /// Whether window `window` holds the direction.
+    /// Whether window `window` contains the direction.
     #[must_use]
     pub fn holds(&self, window: u32, longitude_rad: f64, latitude_rad: f64) -> bool {
         self.regions[window as usize].contains(longitude_rad, latitude_rad)
@@ -136,10 +136,10 @@ impl WindowGrid {
         self.regions.iter().any(|region| region.meets(extent))
     }
 
-    /// The windows of the direction's cell; none when only asking all of them tells.
+    /// The windows of the direction's cell; `None` when all of them have to be tested.
     fn cell(&self, longitude_rad: f64, latitude_rad: f64, margin_rad: f64) -> Option<&[u32]> {
         let row = row_of(latitude_rad)?;
-        // Written so that a margin that is no number asks them all.
+        // Written so that a NaN margin tests them all.
         if !(margin_rad <= self.caps_rad[row]) {
             return None;
         }
@@ -147,7 +147,7 @@ impl WindowGrid {
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "0 to 360; what is no number becomes 0, and a margin that is one was asked above"
+            reason = "0 to 360; NaN becomes 0, and the margin was checked above"
         )]
         let column = ((turns - turns.floor()) * COLUMNS as f64) as usize;
         let cell = row * COLUMNS + column.min(COLUMNS - 1);
@@ -156,7 +156,7 @@ impl WindowGrid {
     }
 }
 
-/// The row of a latitude; none beyond a pole.
+/// The row of a latitude; `None` beyond a pole.
 fn row_of(latitude_rad: f64) -> Option<usize> {
     let rows = (latitude_rad + FRAC_PI_2) / CELL_RAD;
     #[allow(
@@ -188,7 +188,7 @@ fn cells_of(region: &Region, caps_rad: &[f64]) -> Vec<u32> {
     cells
 }
 
-/// The columns of a row that caps of radius `cap_rad` may reach the bounds from.
+/// The columns of a row from which caps of radius `cap_rad` may extend to the bounds.
 fn columns_of(
     bounds: &Bounds,
     [south, north]: [f64; 2],

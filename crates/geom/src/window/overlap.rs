@@ -12,7 +12,7 @@ impl Region {
     pub fn intersects(&self, other: &Self) -> bool {
         let others: Vec<Polygon<f64>> = other.pieces.iter().map(Piece::polygon).collect();
         self.pieces.iter().map(Piece::polygon).any(|piece| {
-            // Longitudes of either are unwrapped from where they were written, within two turns.
+            // Longitudes of both are unwrapped from their written values, within two turns.
             let copies = (-3..=3).map(|turns| piece.translate(f64::from(turns) * TAU, 0.0));
             copies
                 .into_iter()

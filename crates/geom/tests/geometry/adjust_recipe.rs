@@ -1,4 +1,4 @@
-//! The verified synthetic recipe: a Gusev-like pair, its misregistration, and its cure.
+//! The verified synthetic recipe: a Gusev-like pair, its misregistration, and its correction.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -75,10 +75,10 @@ fn the_recipe_comes_out_as_verified() {
         // The mean of 154 lines with noise 0.7 is known to 0.06.
         assert!(along.mean.abs() < 0.15, "{along:?}");
         assert!((0.6..0.85).contains(&along.standard_deviation), "{along:?}");
-        // Height absorbs what lies across the track. The published equation takes the place across the
-        // track in the measured line: the detector is 5° to 8° off the normal of the flight, which leaves a tenth
-        // of the residual along the track, 0.07 in the prototype. The line that sees the point has no such part;
-        // what stays is that the two images do not lie exactly beside each other.
+        // Height absorbs across-track errors. The published equation takes the across-track position in the measured
+        // line: the detector is 5° to 8° off the normal of the flight, which leaves a tenth of the along-track
+        // residual, 0.07 in the prototype. The line that sees the point has no such part; the remainder arises because
+        // the two images are not exactly side by side.
         assert!(across.mean.abs() < 0.01, "{across:?}");
         assert!(across.standard_deviation < 0.04, "{across:?}");
         let shift = mola_shift_lines(&simulated, &adjustment, image);
@@ -88,7 +88,7 @@ fn the_recipe_comes_out_as_verified() {
     });
     // Opposite signs, as Yoon & Shan 2004 print them (Table 3).
     assert!(along_m[0][1] * along_m[1][1] < 0.0, "{along_m:?}");
-    // Cross-test: corrections of MOLA's image coordinates tell the same as the residuals of intersection.
+    // Cross-check: corrections of MOLA's image coordinates agree with the residuals of intersection.
     let [from_ties, from_mola] = [0, 1].map(|kind| along_m[0][kind] - along_m[1][kind]);
     println!("disagreement {from_ties} m, {from_mola} m");
     assert!(
@@ -99,7 +99,7 @@ fn the_recipe_comes_out_as_verified() {
 
 #[test]
 fn relative_position_is_healed_absolute_is_not() {
-    // Tags of both images that are late by the same way on the ground: ties cannot tell.
+    // Tags of both images late by the same distance on the ground: ties do not determine it.
     let late = Recipe::GUSEV.shift_lines[0];
     let spacing_m = [0, 1].map(|image| line_spacing_m(&Recipe::GUSEV.simulate(), image));
     let simulated = Recipe {
@@ -122,7 +122,7 @@ fn relative_position_is_healed_absolute_is_not() {
 
 #[test]
 fn many_noisy_ties_do_not_bend_the_orientation() {
-    // Everything is exact but the ties, which have noise of a whole line and pixel.
+    // Everything is exact except the ties, which have noise of a whole line and pixel.
     let simulated = Recipe {
         ties: 20_000,
         tie_noise: 1.0,
@@ -148,10 +148,10 @@ fn many_noisy_ties_do_not_bend_the_orientation() {
         worst[1]
     );
     assert!(adjustment.steps() <= 5, "{}", adjustment.steps());
-    // The truth is no correction at all, and the noise of ties is but a part of the formal variance:
-    // 4 standard deviations are passed once in 16 000 unknowns. Noise of a line is 1.5 of the assumed
-    // pixels, so that corrections may pass a prior standard deviation. Residuals in the focal plane of
-    // the measured line bend the orientation by many more.
+    // The truth is no correction at all, and the noise of ties is only a part of the formal variance: 4 standard
+    // deviations are exceeded once in 16 000 unknowns. Noise of a line is 1.5 of the assumed pixels, so that
+    // corrections may exceed a prior standard deviation. Residuals in the focal plane of the measured line bend the
+    // orientation by many more.
     assert!(worst[0] < 2.0 && worst[1] < 4.0, "{worst:?}");
 }
 
@@ -190,7 +190,7 @@ fn redundancy_numbers_add_up_to_the_degrees_of_freedom() {
 fn no_observation_makes_an_unknown_worse() {
     let simulated = Recipe::GUSEV.simulate();
     let adjustment = adjust(&simulated.network);
-    // σ0 stands on both sides of σ_post ≤ σ0·σ_prior.
+    // σ0 is on both sides of σ_post ≤ σ0·σ_prior.
     for (image, adjusted) in simulated.network.images.iter().zip(&adjustment.images) {
         for (coefficient, sigma) in image.sigmas.iter().enumerate() {
             let cofactor = adjusted.cofactors[(coefficient, coefficient)];
@@ -259,7 +259,7 @@ fn ranges_hold_the_height_of_the_orbit() {
     });
     let radial = simulated.orientations[0].path_m.coefficients[0].normalize();
     let spread = |adjustment: &Adjustment| {
-        // The constants of X, Y and Z stand at 0, 3 and 6.
+        // The constants of X, Y and Z are at 0, 3 and 6.
         let cofactors = &adjustment.images[0].cofactors;
         let position = nalgebra::Matrix3::from_fn(|row, column| cofactors[(3 * row, 3 * column)]);
         let across = Vector3::z().cross(&radial).normalize();
@@ -279,7 +279,7 @@ fn ranges_hold_the_height_of_the_orbit() {
 
 #[test]
 fn two_time_biases_explain_the_disagreement() {
-    // Orientations fixed, ties alone: one parameter an image instead of 18.
+    // Orientations fixed, ties only: one parameter an image instead of 18.
     let simulated = Recipe {
         position_bias_m: 0.0,
         ..Recipe::GUSEV
@@ -410,7 +410,7 @@ fn apart_m(a: &Adjustment, b: &Adjustment) -> f64 {
 fn any_form_of_the_initial_orientation_gives_the_same() {
     let simulated = Recipe::GUSEV.simulate();
     let angles = adjust(&simulated.network);
-    // 31 samples of the same initial orientation, as the flow has them.
+    // 31 samples of the same initial orientation, as in the flow.
     let sampled = |image: &BundleImage<CorrectedOrientation<EulerPolynomial>>| {
         let samples: Vec<_> = (-15..=15)
             .map(|k| f64::from(k) / 15.0 * image.half_lines)
@@ -452,7 +452,7 @@ fn any_form_of_the_initial_orientation_gives_the_same() {
 
 #[test]
 fn over_the_equator_it_adjusts_as_well_as_elsewhere() {
-    // There φ is −87° and ω cannot be told from κ.
+    // There φ is −87° and ω is not separable from κ.
     let simulate = |place_deg| {
         let recipe = Recipe {
             place_deg,
@@ -476,7 +476,7 @@ fn over_the_equator_it_adjusts_as_well_as_elsewhere() {
             for rotation in 9..18 {
                 let [sigma_rad, expected_rad] =
                     [image, expected].map(|image| image.cofactors[(rotation, rotation)].sqrt());
-                // The camera's own axes know nothing of latitude; ties lie elsewhere.
+                // The camera's own axes are independent of latitude; ties lie elsewhere.
                 assert!(
                     (sigma_rad / expected_rad - 1.0).abs() < 0.1,
                     "{rotation}: {sigma_rad} {expected_rad}"

@@ -1,4 +1,4 @@
-//! Where the Sun stands while an image is taken.
+//! Position of the Sun while an image is taken.
 
 use nalgebra::Vector3;
 
@@ -10,7 +10,7 @@ use areograph_base::{
 };
 use areograph_geom::{body_rotation::body_matrix, ellipsoid::local_axes};
 
-/// The image that is lit as if it had been taken half a year of Mars later at the same hour: those of the other pairs were taken
+/// The image lit as if it had been taken half a Mars year later at the same hour: those of the other pairs were taken
 /// within seven weeks.
 const OF_OTHER_SEASON: &str = "E02-01453";
 /// Half a year of Mars, seconds.
@@ -30,7 +30,7 @@ pub(super) fn sun(flown: &Flown) -> Vector3<f64> {
     (1.0 - declination_sin * declination_sin).sqrt() * hour + declination_sin * Vector3::z()
 }
 
-/// Zenith angle of the Sun over the site of an image, and where it stands, from north to east, degrees.
+/// Incidence angle of the Sun over the site of an image, and its azimuth from north to east, degrees.
 pub(super) fn incidence_and_azimuth_deg(image: &PlannedImage, sun: &Vector3<f64>) -> [f64; 2] {
     let local = local_axes(&image.site.direction()) * sun;
     let azimuth_rad = local.x.atan2(local.y).rem_euclid(std::f64::consts::TAU);

@@ -1,4 +1,4 @@
-//! An image pixel by pixel: its ground in its light, through optics and detector.
+//! Rendering of an image: its ground under its illumination, through optics and detector.
 
 use std::ops::Range;
 
@@ -20,14 +20,15 @@ use areograph_config::usual_instrument;
 
 /// Spacings of the lattices of albedo, metres: the finest is two pixels of the image with the largest ones.
 const LATTICES_M: [f64; 5] = [24.0, 48.0, 96.0, 192.0, 384.0];
-/// Share of albedo that a lattice adds or takes at most.
+/// Largest relative change of albedo by a lattice.
 const CONTRAST: f64 = 0.14;
-/// Numbers of a flat place of mean albedo, and of a black one. They grow evenly with the light: MOC's 8 bits do.
+/// Values of a flat point of mean albedo, and of a black one. They are linear in brightness, as MOC's 8 bits are.
 const LEVEL_DN: [f64; 2] = [130.0, 12.0];
 /// Noise of a pixel.
 const NOISE_DN: f64 = 1.0;
-/// By how much detectors with even numbers, counted from 1, are brighter than the others. In M01/00115, where a sample is the mean
-/// of three detectors, two of a kind and one of the other in turn, neighbours differ by a third of it: 155.729 − 155.409.
+/// Brightness difference between even and odd detectors, counted from 1. In M01/00115, where a sample is the mean of
+/// three detectors, alternately two of a kind and one of the other, neighbours differ by a third of it: 155.729 −
+/// 155.409.
 const EVEN_DN: f64 = 0.96;
 /// Focal length over aperture, and the wavelength in the middle of the band from 0.5 to 0.9 µm, millimetres.
 ///
@@ -35,15 +36,15 @@ const EVEN_DN: f64 = 0.96;
 /// Malin et al. 1992.
 const OPTICS: [f64; 2] = [10.0, 0.0007];
 
-/// An image, its ground and its light.
+/// An image, its ground and its illumination.
 pub(super) struct Rendering<'a> {
     pub(super) image: TrueImage<'a>,
     terrain: &'a Terrain,
-    /// Keys of albedo, the same for all images, and of this image's noise.
+    /// Keys of albedo, common to all images, and of this image's noise.
     keys: [u64; 2],
     /// Towards the Sun, unit vector.
     sun: Vector3<f64>,
-    /// Share of its light that a pixel gets from either neighbour on an axis.
+    /// Share of its light that a pixel receives from each neighbour on an axis.
     blur: f64,
 }
 
@@ -63,7 +64,7 @@ impl<'a> Rendering<'a> {
         })
     }
 
-    /// Zenith angle of the Sun over the site, and where it stands, from north to east, degrees.
+    /// Incidence angle of the Sun over the site, and its azimuth from north to east, degrees.
     pub(super) fn sun_deg(&self) -> [f64; 2] {
         incidence_and_azimuth_deg(self.image.flown.arc.image, &self.sun)
     }
@@ -83,9 +84,9 @@ impl<'a> Rendering<'a> {
         Ok(pixels)
     }
 
-    /// What a perfect camera would tell of the middles of these pixels and of one more on every side, line by line.
+    /// Values of a perfect camera at the middles of these pixels and of one more on every side, line by line.
     fn sharp(&self, lines: &Range<u32>, samples: &Range<u32>) -> Result<Vec<Vec<f64>>> {
-        // Slopes take another one on every side.
+        // Slopes require another one on every side.
         let around = |of: &Range<u32>| i64::from(of.start) - 2..i64::from(of.end) + 2;
         let rows = around(lines).map(|line| self.ground_m(line, around(samples)));
         let rows: Vec<Vec<Vector3<f64>>> = rows.collect::<Result<_>>()?;
@@ -108,15 +109,15 @@ impl<'a> Rendering<'a> {
             .ground_of_line_m(self.terrain, middle(line), samples.map(middle));
         let nothing = || SceneError::Image {
             image: self.image.flown.arc.image.id.to_owned(),
-            error: format!("line {line} sees no ground"),
+            error: format!("line {line} misses the ground"),
         };
         let seen: Option<Vec<Vector3<f64>>> = seen.into_iter().collect();
         Ok(seen.ok_or_else(nothing)?)
     }
 
-    /// The number of a place by the albedo and the slope of its ground.
+    /// The value of a ground point by its albedo and slope.
     fn number(&self, ground_m: &Vector3<f64>, slope: &Vector3<f64>) -> f64 {
-        // Samples grow to either side of the flight: the normal is the one that points up.
+        // Samples increase to either side of the flight: the normal is the one that points up.
         let normal = slope.normalize() * slope.dot(ground_m).signum();
         let light = normal.dot(&self.sun).max(0.0) / self.sun.dot(&ground_m.normalize());
         let albedo: f64 = (0..)
@@ -145,19 +146,19 @@ impl<'a> Rendering<'a> {
     }
 }
 
-/// How many of the detectors of a sample have even numbers, counted from 1.
+/// Number of even detectors, counted from 1, in a sample.
 fn even_detectors(sample: u32, summing: u32) -> usize {
     let first = sample * summing;
     let detectors = first..first + summing;
     detectors.filter(|detector| detector % 2 == 1).count()
 }
 
-/// Share of its light that a pixel gets from either neighbour on an axis: at half a period a pixel, contrasts are then what the width of
-/// a pixel and the diffraction of the optics leave of them.
+/// Share of its light that a pixel receives from each neighbour on an axis: at half a period a pixel, contrast is then
+/// reduced as by the width of a pixel and the diffraction of the optics.
 fn blur(summing: u32) -> f64 {
     let [f_number, wavelength_mm] = OPTICS;
     let pixel_mm = f64::from(summing) * usual_instrument().optics.pixel_pitch_mm;
-    // Of the highest frequency that the aperture passes.
+    // Relative to the highest frequency that the aperture passes.
     let frequency = (0.5 / pixel_mm * wavelength_mm * f_number).min(1.0);
     let diffraction = std::f64::consts::FRAC_2_PI
         * (frequency.acos() - frequency * (1.0 - frequency * frequency).sqrt());
@@ -171,7 +172,8 @@ mod tests {
 
     #[test]
     fn half_of_the_finest_contrast_passes_the_camera() {
-        // Two pixels of 13 µm: 19.2 periods a millimetre of the 142.9 that f/10 passes, 0.829 of the contrast; the pixel itself 0.637.
+        // Two pixels of 13 µm: 19.2 periods a millimetre of the 142.9 that f/10 passes, 0.829 of the contrast; the
+        // pixel itself 0.637.
         let left = 1.0 - 4.0 * blur(2);
         assert!((left - 0.829 * 0.637).abs() < 1e-3, "{left}");
         // Coarser ones are blurred less.

@@ -1,4 +1,4 @@
-//! Rendered images against the cameras of the tie points: both images of a pair show the same ground where its ties say.
+//! Rendered images against the cameras of the tie points: both images of a pair show the same ground at its ties.
 
 #![allow(
     clippy::cast_possible_truncation,
@@ -27,7 +27,7 @@ const HALF: i32 = 12;
 fn start(image: &PlannedImage) -> Et {
     let utc = |text| chrono::NaiveDateTime::parse_from_str(text, "%Y-%m-%dT%H:%M:%S%.f").unwrap();
     let since = utc(image.utc_start) - utc("2000-01-01T12:00:00");
-    // Leap seconds since 1999, and what terrestrial time is ahead of atomic time.
+    // Leap seconds since 1999, and the offset of terrestrial time from atomic time.
     Et::from_seconds(since.num_milliseconds() as f64 * 1e-3 + 64.2)
 }
 
@@ -41,7 +41,7 @@ fn flown(site: &str) -> Vec<Flown> {
     of_site.map(fly).collect()
 }
 
-/// The number that an image has at a place, between its pixels.
+/// The interpolated value of an image at a position.
 fn number_at(rendering: &Rendering<'_>, line: f64, sample: f64) -> f64 {
     let (top, left) = ((line - 0.5).floor(), (sample - 0.5).floor());
     let (down, right) = (line - 0.5 - top, sample - 0.5 - left);
@@ -55,7 +55,7 @@ fn number_at(rendering: &Rendering<'_>, line: f64, sample: f64) -> f64 {
     upper + down * (lower - upper)
 }
 
-/// Correlation of two lists of numbers.
+/// Correlation of two lists of values.
 fn correlation(one: &[f64], other: &[f64]) -> f64 {
     let [one, other] = [one, other].map(|numbers| {
         let of = Summary::of(numbers);
@@ -115,7 +115,7 @@ fn both_images_of_a_pair_show_the_same_ground_where_ties_say() {
         aligned.iter().all(|correlation| *correlation > 0.8),
         "{aligned:?}"
     );
-    // Nine lines farther it is other ground.
+    // Nine lines farther the ground is different.
     assert!(Summary::of(&shifted).mean < 0.5, "{shifted:?}");
 }
 
@@ -129,7 +129,7 @@ fn strips_join_without_a_seam() {
     assert_eq!(whole, parts.concat());
 }
 
-/// An image of so many lines as its file gives it back, and its file.
+/// An image of `pixels` decoded from its file, and its file.
 fn read_back(flown: &Flown, pixels: &[u8], coder: Coder) -> (ImageFile, Vec<u8>) {
     let bytes = encoded(flown, pixels, "2000-01-01T00:00:00.00", coder).unwrap();
     let folder = tempfile::tempdir().unwrap();
@@ -180,7 +180,8 @@ fn codes_give_back_what_was_rendered_or_what_their_steps_leave_of_it() {
         // Half a step of two numbers in every cosine, half a step of a 255th of the range of means, whole numbers.
         assert!(rms <= 1.0 + 0.5 + 0.5, "block {block}: {rms}");
     }
-    // Errors that are spread evenly over a step are 0.58, those of whole numbers 0.29; less where less was there to be lost.
+    // Errors uniform over a step have a standard deviation of 0.58, those of whole numbers 0.29; less where little was
+    // lost.
     let rms = rms(&mut (0..pixels.len()));
     println!("lost by the transform coder: {rms:.2} of 255");
     assert!((0.3..0.8).contains(&rms), "{rms}");
@@ -205,7 +206,7 @@ fn three_detectors_of_two_kinds_leave_a_third_of_their_difference() {
     let each = f64::from(64 * (width - 2) / 2);
     let difference = 0.5 * (sums[0] - sums[1]) / each;
     println!("even minus odd samples: {difference:.3}");
-    // The offset that M01/00115 shows; noise of a number leaves 0.01 of 21 440 pairs, and as much comes from the ground.
+    // The offset measured in M01/00115; noise of a number leaves 0.01 of 21 440 pairs, and the ground as much.
     assert!((difference - 0.32).abs() < 0.05, "{difference}");
 }
 
@@ -219,14 +220,14 @@ fn one_pair_is_of_two_seasons() {
             rendering.sun_deg()
         });
         println!("{}: {suns:.1?}", site.id);
-        // The orbit is at half past two in the afternoon: the Sun stands in the west, and not low.
+        // The local time of the orbit is half past two in the afternoon: the Sun is in the west, and not low.
         for [incidence_deg, azimuth_deg] in suns {
             assert!((30.0..55.0).contains(&incidence_deg), "{incidence_deg}");
             assert!((225.0..330.0).contains(&azimuth_deg), "{azimuth_deg}");
         }
         let turned_deg = (suns[0][1] - suns[1][1]).abs();
         let is_of_two = site.id == "gusev_crater";
-        // Seven weeks turn it by 14 degrees at most, half a year by 40.
+        // Seven weeks change it by 14 degrees at most, half a year by 40.
         assert_eq!(turned_deg > 30.0, is_of_two, "{turned_deg}");
         assert_eq!(turned_deg < 20.0, !is_of_two, "{turned_deg}");
     }

@@ -1,4 +1,4 @@
-//! Tie points of invented pairs against the flight and the ground that they were made from.
+//! Tie points of synthetic pairs against the flight and the ground from which they were computed.
 
 use super::*;
 use crate::{
@@ -69,7 +69,7 @@ fn exact_ties_lie_on_the_ground_and_meet_there() {
 #[test]
 fn poses_between_those_of_the_flight_are_those_of_the_flight() {
     let cases = IMAGES.iter().flat_map(|image| {
-        // Turns, radians: 1e-9 is 0.4 mm on the ground, 6e-9 of jitter 2 mm.
+        // Rotations, radians: 1e-9 is 0.4 mm on the ground, 6e-9 of jitter 2 mm.
         [(image, SceneErrors::demo(), 1e-9), (image, ROUGH, 6e-9)]
     });
     for (image, errors, turn_max_rad) in cases {

@@ -1,4 +1,4 @@
-//! The words of a segment, held against what its own counts say of them.
+//! The words of a segment, checked against its own counts.
 
 use super::{
     Reader, Segment,
@@ -10,13 +10,13 @@ use crate::role::KernelRole;
 
 /// Words read at a time.
 const CHUNK_WORDS: usize = 1 << 16;
-/// Words at the end of a segment in which its counts stand.
+/// Words at the end of a segment that contain its counts.
 const TAIL_WORDS: usize = 8;
-/// How far mid-point and half length of a record may lie from those that its place gives, as a part of its length:
-/// beyond rounding, far below any damage that matters.
+/// Largest deviation of the mid-point and half length of a record from those of its position, as a share of its length:
+/// above rounding, far below any damage that matters.
 const STRETCH_TOLERANCE: f64 = 1e-6;
-/// How far a quaternion's norm may lie from 1. Quaternions that were stored in single precision, or
-/// counted in 16 bits on board, stay below it.
+/// Largest deviation of a quaternion's norm from 1. Quaternions stored in single precision, or digitised in 16 bits on
+/// board, stay below it.
 const NORM_TOLERANCE: f64 = 5e-4;
 
 /// Reads a segment from its counts to its last packet.
@@ -63,7 +63,7 @@ pub(super) fn check(
         return Ok(());
     }
     let times = if layout.lists.is_empty() {
-        // Of equal steps, the third count from the end.
+        // For equal steps, the third count from the end.
         Times::Every(tail[tail.len() - 3])
     } else {
         Times::Listed(first_word)
@@ -76,7 +76,7 @@ pub(super) fn check(
     neighbours::check(reader, &states)
 }
 
-/// Times rise, and directories repeat every hundredth of them.
+/// Times increase, and directories repeat every hundredth of them.
 fn check_lists(reader: &mut Reader, layout: &Layout, mut first_word: u64) -> Result<(), Problem> {
     let mut hundredths: Vec<Vec<f64>> = Vec::new();
     for list in &layout.lists {
@@ -165,7 +165,7 @@ fn norm_of_quaternion(words: &[f64]) -> f64 {
     squares.sum::<f64>().sqrt()
 }
 
-/// CSPICE sums as many differences as a record says, and divides by its step sizes.
+/// CSPICE sums as many differences as a record states, and divides by its step sizes.
 fn check_differences(index: usize, lines: usize, words: &[f64]) -> Result<(), String> {
     let (step_sizes, counts) = (&words[1..=lines], &words[4 * lines + 7..]);
     let order = super::whole(counts[0]).filter(|order| (2..=lines + 1).contains(order));
@@ -198,7 +198,7 @@ struct Part {
 }
 
 impl Part {
-    /// Shows `each` packets of so many words, all finite, in their order.
+    /// Passes each packet of words to `each`, all finite, in order.
     fn each(
         &self,
         reader: &mut Reader,

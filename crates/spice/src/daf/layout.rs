@@ -1,4 +1,4 @@
-//! How the words of a segment are laid out, for each type of segment, from the counts at its end.
+//! Layout of the words of a segment, for each type of segment, from the counts at its end.
 //!
 //! Source: NAIF, SPK, CK and PCK Required Reading, one section for each type.
 
@@ -9,7 +9,7 @@ use crate::role::KernelRole;
 pub(super) const DIRECTORY_STEP: usize = 100;
 /// Difference lines of SPK type 1 (type 21 states the number itself).
 const DIFFERENCES: usize = 15;
-/// Largest degree of interpolation that CSPICE has room for.
+/// Largest degree of interpolation that CSPICE supports.
 const DEGREE_MAX: usize = 27;
 /// Words of a state: position and velocity.
 pub(super) const STATE: usize = 6;
@@ -20,34 +20,34 @@ pub(super) struct Layout {
     pub(super) packets: usize,
     pub(super) packet: Packet,
     pub(super) lists: Vec<List>,
-    /// Words at the end that say all this.
+    /// Words at the end that contain these counts.
     pub(super) tail: usize,
 }
 
-/// What one packet holds.
+/// Content of one packet.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Packet {
-    /// So many numbers without further rules.
+    /// Numbers without further rules.
     Numbers(usize),
-    /// Modified difference arrays with so many difference lines.
+    /// Modified difference arrays with this number of difference lines.
     Differences(usize),
-    /// So many words: mid-point and radius of a stretch of time, then Chebyshev coefficients.
+    /// Words of a record: mid-point and radius of a stretch of time, then Chebyshev coefficients.
     Chebyshev {
         words: usize,
-        /// Begin of the first stretch, ET seconds.
+        /// Start of the first stretch, ET seconds.
         begin_s: f64,
         length_s: f64,
     },
-    /// So many words, of which the first four are a quaternion.
+    /// Words of a packet, of which the first four are a quaternion.
     Quaternion(usize),
 }
 
-/// What follows the packets.
+/// A list after the packets.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum List {
-    /// So many rising times.
+    /// Increasing times.
     Times(usize),
-    /// So many entries, every hundredth of the list with that index.
+    /// Entries that repeat every hundredth of the list with that index.
     Directory { of: usize, entries: usize },
 }
 
@@ -73,7 +73,7 @@ impl Packet {
     }
 }
 
-/// The layout of a segment; none for types whose words have no rule here.
+/// The layout of a segment; `None` for types without a rule here.
 ///
 /// * `kind` – its type
 /// * `rates` – whether a CK has angular velocities
@@ -81,7 +81,7 @@ impl Packet {
 /// * `tail` – its last words, at most eight
 ///
 /// # Errors
-/// What is wrong with the counts.
+/// The problem with the counts.
 pub(super) fn layout(
     role: KernelRole,
     kind: i32,
@@ -214,7 +214,7 @@ fn chebyshev(tail: &Tail, components: usize) -> Result<Option<Layout>, String> {
     }))
 }
 
-/// Pointings and the intervals in which they may be interpolated, as CK types 3 and 5 end.
+/// Pointings and the intervals of their interpolation, at the end of CK types 3 and 5.
 fn intervals(tail: &Tail, packet: Packet, words: usize) -> Result<Option<Layout>, String> {
     let pointings = tail.count(1, "pointings")?;
     let intervals = tail.count(2, "intervals")?;
@@ -240,7 +240,7 @@ fn intervals(tail: &Tail, packet: Packet, words: usize) -> Result<Option<Layout>
     }))
 }
 
-/// CK type 2 states no count: that number of records whose words fill the segment.
+/// CK type 2 states no count: the number of records follows from the number of words.
 fn arcs_of_constant_rate(words: usize) -> Result<Option<Layout>, String> {
     const EACH: usize = 10;
     let of = |records: usize| EACH * records + before_last(records);

@@ -1,39 +1,40 @@
-//! States of an ephemeris held against their neighbours: an orbit is smooth, and no force moves a body aside and back within
-//! one step of a table.
+//! States of an ephemeris checked against their neighbours: an orbit is smooth, and no force displaces a body for one
+//! step of a table only.
 //!
-//! Every state is predicted by cubic Hermite interpolation between the one before and the one behind. A single damaged state
-//! departs from its prediction, spoils those of its two neighbours by known parts of that, and no others. A manoeuvre, a
-//! seam or noise does otherwise: the whole pattern is asked for.
+//! Every state is predicted by cubic Hermite interpolation between the one before and the one after. A single damaged
+//! state departs from its prediction, and changes the predictions of its two neighbours by known shares of that, and no
+//! others. A manoeuvre, a seam or noise does not: the whole pattern is required.
 
 use nalgebra::Vector3;
 
 use super::{Reader, layout::STATE, problem::Problem};
 
-/// Neighbours on either side that take part.
+/// Neighbours used on either side.
 const REACH: usize = 3;
 /// States read at a time.
 const CHUNK: usize = 4_096;
-/// By how much a damaged state departs more from its prediction than undamaged ones near it do.
+/// Ratio of the departure of a damaged state to those of undamaged ones near it.
 const STANDS_OUT: f64 = 100.0;
-/// Departure that rounding may explain, as a part of the distance or speed.
+/// Departure that rounding may explain, as a share of the distance or speed.
 const ROUNDING: f64 = 1e-9;
-/// Departure below which nobody is misled: a millimetre and a micrometre a second, in km and km/s.
+/// Negligible departure: a millimetre and a micrometre a second, in km and km/s.
 const NEGLIGIBLE: [f64; 2] = [1e-6, 1e-9];
-/// Nothing that has an ephemeris is a tenth of a light year away, in km, while the states next to it are so many times nearer.
+/// No body with an ephemeris is a tenth of a light year away, in km, while the adjacent states are nearer by this
+/// factor.
 const ABSURD_KM: f64 = 1e12;
 const ABSURD_TIMES: f64 = 1e9;
-/// Longest of the steps around a state to the shortest, so that the parts below hold.
+/// Largest ratio of the steps around a state for which the shares below hold.
 const UNEVEN_MAX: f64 = 1.2;
-/// Which part of its own departure a damaged position, or velocity, adds to those of its neighbours: −1/2 and 1/4 for even
-/// steps, and how far from that rounding, uneven steps and the orbit itself may lead.
+/// Share of its own departure that a damaged position, or velocity, adds to those of its neighbours: −1/2 and 1/4 for
+/// even steps, and the tolerance for rounding, uneven steps and the orbit itself.
 const PARTS: [f64; 2] = [-0.5, 0.25];
 const PART_TOLERANCE: f64 = 0.15;
 
-/// By how much more than the rounding of single precision a norm that stands out differs from those around it.
+/// Deviation of a norm from those around it that exceeds the rounding of single precision.
 const NORM_STANDS_OUT: f64 = 1e-6;
 
-/// Tells the first quaternion whose norm stands out from those around it: they may all be off, as stored numbers are, but one
-/// alone is damaged.
+/// Reports the first quaternion whose norm differs from those around it: all may deviate, as stored numbers do, but a
+/// single one is damaged.
 pub(super) fn check_norms(norms: &[f64]) -> Result<(), String> {
     for (index, norm) in norms.iter().enumerate() {
         let last_five = norms.len().saturating_sub(5);
@@ -55,7 +56,7 @@ pub(super) fn check_norms(norms: &[f64]) -> Result<(), String> {
     Ok(())
 }
 
-/// Where the states of a segment stand.
+/// Position of the states in a segment.
 pub(super) struct States {
     pub(super) first_word: u64,
     pub(super) count: usize,
@@ -67,7 +68,7 @@ pub(super) struct States {
 pub(super) enum Times {
     /// In a list that begins with this word.
     Listed(u64),
-    /// So many seconds apart.
+    /// A constant step, seconds.
     Every(f64),
 }
 
@@ -77,7 +78,7 @@ struct State {
     parts: [Vector3<f64>; 2],
 }
 
-/// Tells the first state that contradicts its neighbours.
+/// Reports the first state that contradicts its neighbours.
 pub(super) fn check(reader: &mut Reader, states: &States) -> Result<(), Problem> {
     let mut first = 0;
     while first + 2 * REACH < states.count {
@@ -122,7 +123,7 @@ fn read(
     Ok(words.iter().zip(&times_s).map(state).collect())
 }
 
-/// A state far beyond the others, whose number lets squares overflow: which one, and its largest number.
+/// A state far beyond the others, whose number makes squares overflow: its index, and its largest number.
 fn absurd(states: &[State]) -> Option<(usize, f64)> {
     let sizes = states
         .iter()
@@ -138,7 +139,7 @@ fn absurd(states: &[State]) -> Option<(usize, f64)> {
         .then_some((place, sizes[place]))
 }
 
-/// How the middle one of seven states contradicts the others.
+/// The contradiction of the middle one of seven states with the others.
 fn contradiction(states: &[State]) -> Option<String> {
     let steps_s = states
         .windows(2)
@@ -166,7 +167,7 @@ fn contradiction(states: &[State]) -> Option<String> {
     })
 }
 
-/// How far the middle one of three states is from what the others say.
+/// Departure of the middle one of three states from the interpolation of the others.
 fn departure(states: &[State]) -> [Vector3<f64>; 2] {
     let [before, own, behind] = states else {
         return Default::default();
@@ -174,7 +175,7 @@ fn departure(states: &[State]) -> [Vector3<f64>; 2] {
     let length_s = behind.time_s - before.time_s;
     let u = (own.time_s - before.time_s) / length_s;
     let ([r0, v0], [r1, v1]) = (before.parts, behind.parts);
-    // Relative to the first position, so that a distant origin costs no digits.
+    // Relative to the first position, so that a distant origin costs no precision.
     let (chord, (v0, v1)) = (r1 - r0, (v0 * length_s, v1 * length_s));
     let square = u * u;
     let cube = square * u;

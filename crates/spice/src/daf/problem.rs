@@ -1,8 +1,8 @@
-//! What is wrong with a segment.
+//! Problems of a segment.
 
 use areograph_base::error::Error;
 
-/// Why a segment is not as it says.
+/// Why a segment is invalid.
 pub(super) enum Problem {
     /// Its words contradict each other.
     Damaged(String),
@@ -11,7 +11,7 @@ pub(super) enum Problem {
 }
 
 impl Problem {
-    /// As an error that says which segment it is.
+    /// The error, with its segment.
     pub(super) fn of(self, segment: &str) -> Error {
         match self {
             Self::Damaged(problem) => super::damaged(format!("{segment}: {problem}")),

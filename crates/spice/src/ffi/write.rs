@@ -1,4 +1,4 @@
-//! CSPICE's own writers of binary kernels, behind the same fence.
+//! CSPICE's own writers of binary kernels, with the same checks.
 
 use std::{ffi::c_int, path::Path};
 
@@ -6,7 +6,7 @@ use cspice_sys as naif;
 
 use super::{Called, Cspice, StateKm, c_path, c_text, length};
 
-/// What a type 3 segment of a C-kernel holds; the columns but the last have equal length.
+/// Content of a type 3 segment of a C-kernel; the columns except the last have equal length.
 pub(crate) struct CkColumns<'a> {
     /// Name of the segment.
     pub(crate) name: &'a str,

@@ -1,4 +1,4 @@
-//! The fence around CSPICE, against real kernels.
+//! The interface to CSPICE, tested with real kernels.
 
 mod spice_kernels;
 mod spice_select;

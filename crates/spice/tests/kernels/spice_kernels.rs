@@ -1,4 +1,4 @@
-//! Kernel files, lists and folders: what is accepted, what is refused and with which words.
+//! Kernel files, lists and folders: which are accepted, which are rejected and with which messages.
 
 #![allow(
     clippy::unwrap_used,
@@ -120,7 +120,7 @@ fn faults_of_cspice_carry_both_messages_of_naif() {
         "str2et_c(\"1999-13-24T25:00:00\"): SPICE(BADTIMESTRING): The month specified was 13."
     ));
     assert_eq!(failure.kind(), Kind::Input);
-    // The session goes on after a fault.
+    // The session remains usable after an error.
     assert!(session.utc_to_et("1999-08-24T14:12:13.64").is_ok());
     for utc in ["1999-02-30T00:00:00", "1999-12-31T24:59:00", "yesterday"] {
         let kind = session.utc_to_et(utc).map_err(|failure| failure.kind());
@@ -133,7 +133,7 @@ fn faults_of_cspice_carry_both_messages_of_naif() {
     let long = "9".repeat(300);
     assert_eq!(
         session.sclk_to_et(&long).unwrap_err().cause.to_string(),
-        "a clock string cannot be given to CSPICE: 300 bytes long, at most 255 are possible"
+        "a clock string cannot be given to CSPICE: 300 bytes long; expected at most 255"
     );
     assert!(
         session.state(et(0.0)).is_err() && session.mounting(usual_instrument(), et(0.0)).is_err()
@@ -264,7 +264,7 @@ fn damaged_bytes_end_in_a_result() {
         let sound = fs::read(folder.join(name)).unwrap();
         let summary = usize::try_from(i32::from_le_bytes(sound[76..80].try_into().unwrap()));
         let summaries = (summary.unwrap() - 1) * 1_024;
-        // Every byte of the file record's numbers and of the segment list, by four values each.
+        // Every byte of the file record's numbers and of the segment list, with four values each.
         for position in (8..96).chain(summaries..summaries + 200) {
             for value in [0x00, 0x01, 0x7f, 0xff] {
                 let mut bytes = sound.clone();
@@ -433,8 +433,5 @@ fn a_path_that_is_too_long_for_cspice_is_named() {
     assert_eq!(failure.kind(), Kind::Input);
     assert_eq!(failure.file.as_deref(), Some(&*path));
     let text = failure.to_string();
-    assert!(
-        text.contains("bytes long, at most 255 are possible"),
-        "{text}"
-    );
+    assert!(text.contains("bytes long; expected at most 255"), "{text}");
 }

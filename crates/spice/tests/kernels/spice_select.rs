@@ -1,4 +1,4 @@
-//! Choosing kernels from a folder.
+//! Selection of kernels from a folder.
 
 #![allow(
     clippy::unwrap_used,
@@ -22,7 +22,7 @@ use common::real_data;
 use nalgebra::Vector3;
 use tempfile::{TempDir, tempdir};
 
-/// Where each file of the folder comes from, and its name as the archive would have it.
+/// Source of each file of the folder, and its name in the archive.
 const FILES: [(&str, &str); 11] = [
     ("mgs_text/pck00010.tpc", "pck00010.tpc"),
     ("mgs_text/pck00011.tpc", "pck00011.tpc"),
@@ -45,7 +45,7 @@ const FILES: [(&str, &str); 11] = [
 
 const BIAS: PointingBias = PointingBias::from_seconds(-1.15);
 
-/// A folder of kernels, a rival orbit and commanded attitudes among them, and the time that is required.
+/// A folder of kernels, a rival orbit and commanded attitudes among them, and the required time.
 fn archive(test: &str) -> Option<(TempDir, Interval)> {
     let temporary = tempdir().unwrap();
     let root = temporary.path();
@@ -100,7 +100,7 @@ fn selection(root: &Path) -> KernelSelection {
     }
 }
 
-/// Positions at the exposures, attitudes where the pointing bias of MGS moves them, a second more each.
+/// Positions at the exposures, attitudes shifted by the pointing bias of MGS, a second more each.
 fn around(exposures: Interval) -> RequiredCoverage {
     let attitudes = exposures.shifted(BIAS.seconds()).padded(1.0);
     RequiredCoverage {
@@ -163,7 +163,7 @@ fn pins_families_and_qualities_are_obeyed() {
         return;
     };
     let mut selection = selection(temporary.path());
-    // Nothing needs it, yet a pin is a wish.
+    // It is not required, but a pinned kernel is always selected.
     let extra = b"KPL/PCK\n\\begindata\nBODY9_X = 1\n";
     write(temporary.path(), "extra.tpc", extra);
     selection.pinned = ["naif0009.tls", "pck00011.tpc", "extra.tpc"]
@@ -258,7 +258,7 @@ fn kernels_that_meet_inside_the_bias_are_chosen_and_versions_count() {
     drop(session);
     for name in ["mgs_map2_v9.bsp", "mgs_map2_v10.bsp"] {
         let mut bytes = fs::read(root.join("mgs_map2.bsp")).unwrap();
-        // A word behind the end makes another content of it.
+        // A word after the end changes its content.
         bytes.extend_from_slice(name.as_bytes());
         write(root, name, &bytes);
     }
@@ -277,7 +277,7 @@ fn kernels_that_meet_inside_the_bias_are_chosen_and_versions_count() {
     let explanation = set.explanation().join("\n");
     for line in [
         "mgs_ext_roto_all_v9.bc: NOMINAL attitude of MGS: commanded, not measured".to_owned(),
-        // Telemetry ends 4 s into the exposures; look-ups end 1.15 s earlier than they, and 1 s later.
+        // Telemetry ends 4 s into the exposures; look-ups end 1.15 s before them, and 1 s later.
         format!(
             "attitude of {} comes from nominal mgs_ext_roto_all_v9.bc",
             Interval::new(

@@ -1,4 +1,4 @@
-//! Times, states and attitudes against numbers of an independent CSPICE run on real kernels.
+//! Times, states and attitudes compared with an independent CSPICE run on real kernels.
 
 #![allow(
     clippy::unwrap_used,
@@ -29,7 +29,7 @@ fn kernels(folder: &Path) -> KernelSet {
     KernelSet::from_files(&m0402852_files(folder)).unwrap()
 }
 
-/// The kernels of the image, and the truth beside them.
+/// The kernels of the image, and the reference values.
 fn image(test: &str) -> Option<(KernelSet, Value)> {
     let folder = real_data("ale_mgs/m0402852", test)?;
     let truth = real_data("derived/cspice_truth.json", test)?;
@@ -190,9 +190,9 @@ fn closed_rotations_equal_the_kernels() {
             continue;
         };
         let session = Session::open(&KernelSet::from_files(&[path]).unwrap()).unwrap();
-        // CSPICE multiplies the meridian out in degrees, then in radians, before it takes whole turns
-        // off: with 3e5 degrees in MOLA's years its rounding is 1e-12 rad (4 µm on the ground), with
-        // 9e5 degrees at the mission's end three times as much.
+        // CSPICE computes the meridian in degrees, then in radians, before it removes whole turns: with 3e5 degrees in
+        // MOLA's years its rounding is 1e-12 rad (4 µm on the ground), with 9e5 degrees at the mission's end three
+        // times as much.
         for (days, tolerance) in [(-900..=600, 1e-12), (601..=2_600, 3e-12)] {
             let largest = days
                 .map(|day| Et::from_seconds(f64::from(day) * 86_400.0 + 12_345.678))
@@ -251,7 +251,7 @@ fn areographic_latitudes_are_met() {
         };
         let graphic = AreographicLatitude(number(&case["lat_graphic"]) * RADIANS_PER_DEGREE);
         let expected_rad = number(&case["lat_centric"]) * RADIANS_PER_DEGREE;
-        // Above the ellipsoid the point moves along the normal, so its areocentric latitude moves too.
+        // Above the ellipsoid the point moves along the normal, so its areocentric latitude changes too.
         let foot = graphic.to_areocentric(model);
         let (a, c) = (model.equatorial_radius_m, model.polar_radius_m);
         let radius_m = (foot.0.cos() / a).hypot(foot.0.sin() / c).recip();
@@ -297,7 +297,7 @@ fn a_gap_between_attitude_files_is_named_with_its_kernels() {
     }
     let failure = session.require_position(gap).unwrap_err().to_string();
     assert!(failure.contains("m0402852.ale_0.bsp ends at"), "{failure}");
-    // The bias counts: these exposures lie inside the second slice, their look-ups before it.
+    // The bias matters: these exposures lie inside the second slice, their look-ups before it.
     let edge = coverage.ck.as_slice()[1].start;
     let exposures = Interval::new(edge.plus(1.0), edge.plus(10.0));
     assert!(

@@ -1,4 +1,4 @@
-//! Kernels written for an invented mission give back what went in.
+//! Round trip of kernels written for a synthetic mission.
 
 #![allow(
     clippy::unwrap_used,
@@ -22,10 +22,10 @@ use tempfile::tempdir;
 
 const RATE_RAD_S: f64 = 9e-4;
 const RADIUS_M: f64 = 3.77e6;
-/// The kernel of the test counts time as it is.
+/// The kernel of the test has no time bias.
 const NO_BIAS: PointingBias = PointingBias::from_seconds(0.0);
 
-/// A circle, seconds after its begin.
+/// A circle, seconds after its start.
 fn circle(t: f64) -> State {
     let (sin, cos) = (RATE_RAD_S * t).sin_cos();
     State {
@@ -34,7 +34,7 @@ fn circle(t: f64) -> State {
     }
 }
 
-/// An attitude that turns about Z.
+/// An attitude that rotates about Z.
 fn turn(t: f64) -> [f64; 4] {
     let (sin, cos) = (RATE_RAD_S * t / 2.0).sin_cos();
     [cos, 0.0, 0.0, -sin]
@@ -197,6 +197,6 @@ fn columns_that_do_not_fit_are_refused() {
     let failure = write_ck(&at.join("uneven.bc"), &session, &[ck], "").unwrap_err();
     assert_eq!(
         failure.cause.to_string(),
-        "segment turning: a column of 2 for 3 instants"
+        "segment turning: column of 2 values for 3 instants"
     );
 }

@@ -1,4 +1,4 @@
-//! What cannot be projected is told by its reason.
+//! Points that cannot be projected are reported with their reason.
 
 use areograph_config::usual_instrument;
 use areograph_geom::pushbroom::{
@@ -14,7 +14,7 @@ const LIMITS: Limits = Limits {
     steps_max: 100,
 };
 
-/// A camera that is turned by half a turn about its boresight: it flies along +X.
+/// A camera rotated by half a turn about its boresight: it flies along +X.
 struct TurnedAround<M>(M);
 
 impl<M: ExteriorOrientation> ExteriorOrientation for TurnedAround<M> {
@@ -93,7 +93,7 @@ fn a_camera_that_flies_across_its_lines_is_refused() {
     let mut model = GUSEV.rotation_vector();
     let quarter = Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
     model.reference = quarter * model.reference;
-    // Mars turns under the orbit: the flight is 4° off the orbit's plane, so the camera is turned on.
+    // Mars rotates under the orbit: the flight is 4° off the orbit's plane, so the camera is rotated accordingly.
     let (pose, motion) = model.pose_and_rate(0.0);
     let flight = pose.mars_to_camera * motion.advance_m;
     let rest =

@@ -1,4 +1,4 @@
-//! Two images of one place, one of them with a wrong clock.
+//! Two images of one site, one of them with a wrong clock.
 
 use areograph_geom::{
     misregistration::{ImageToImage, Pair},
@@ -16,7 +16,7 @@ const OBLIQUE: Scene = Scene {
     ..GUSEV
 };
 
-/// Where both images see a point, lines and pixels from their middles.
+/// Image coordinates of a point in both images, lines and pixels from their middles.
 fn seen(point_m: &Vector3<f64>) -> Pair {
     let place = |scene: &Scene| {
         let model = scene.rotation_vector();
@@ -76,7 +76,7 @@ fn a_late_clock_is_seen_in_lines() {
 fn blunders_among_the_ties_are_left_out() {
     let mut ties = ties(20, 5);
     for (index, tie) in ties.iter_mut().enumerate() {
-        // A wave of a fifth of a pixel stands for the noise of measuring.
+        // A wave of a fifth of a pixel represents the noise of measuring.
         let noise = 0.2 * (7.3 * index as f64).sin();
         tie.second[0] += noise;
         tie.second[1] -= noise;
@@ -128,7 +128,7 @@ fn the_stated_uncertainty_is_that_of_noise_in_the_ties() {
             let found = fit.misregistration(&footprints);
             squares += ((found.lines.mean - truth) / found.lines_sigma).powi(2);
         }
-        // Of 300 trials an rms is known to 4 %; 32 tie points with outliers left out tell their noise to 15 %.
+        // Of 300 trials an rms is known to 4 %; 32 tie points with outliers removed determine their noise to 15 %.
         let rms = (squares / f64::from(TRIALS)).sqrt();
         assert!((0.85..1.25).contains(&rms), "{along} × {across}: {rms}");
     }

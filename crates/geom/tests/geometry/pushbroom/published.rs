@@ -1,4 +1,4 @@
-//! What theory says of the convergence of the two published iterations, and the points of Shan 2002.
+//! The theoretical convergence of the two published iterations, and the points of Shan 2002.
 
 use areograph_base::units::RADIANS_PER_DEGREE;
 use areograph_geom::{
@@ -12,7 +12,7 @@ use super::{
     scene::{EOS_NADIR, EOS_OBLIQUE, GUSEV, Held, PAPER, Scene},
 };
 
-/// Ratio of successive steps once the first ones are over, and long before rounding.
+/// Ratio of successive steps after the first ones, and long before rounding.
 fn contraction(steps: &[f64]) -> f64 {
     let late = steps
         .windows(2)
@@ -77,7 +77,7 @@ fn contraction_is_what_theory_says() {
             );
             assert!((r_b - 0.10).abs() < 0.01, "B {r_b}"); // turn per line × range / flight per line
         } else {
-            // Only Mars turns under a held camera: a hundredth of the orbit's turn, and less.
+            // Only Mars rotates under a held camera: a hundredth of the orbit's turn, and less.
             assert!(r_b.abs() < 1e-3, "B {r_b}");
         }
     }
@@ -134,7 +134,7 @@ fn all_methods_find_the_same_line() {
     }
 }
 
-/// Where the corrected table puts the first and the tenth of its points, lines and pixels.
+/// The first and the tenth point by the corrected table, lines and pixels.
 const SEEN_2002: [(usize, f64, f64); 2] = [(0, -2681.9, 194.9), (9, -1879.7, 199.7)];
 
 fn point_m(index: usize) -> Vector3<f64> {

@@ -1,4 +1,4 @@
-//! Tie points that are matched in the mission's images, and the adjustment by them, against what the images truly show.
+//! Tie points matched in the mission's images, and the adjustment by them, against the true image coordinates.
 
 #![allow(
     clippy::disallowed_methods,
@@ -32,7 +32,7 @@ use areograph_geom::ellipsoid::local_axes;
 use areograph_pds::ties::read_ties;
 use areograph_store::hashes::HashCache;
 
-/// The mission with its images: that in the folder of the variable, or a new one.
+/// The mission with its images: from the folder in the environment variable, or a new one.
 struct Mission {
     folder: PathBuf,
     days: Vec<Flown>,
@@ -71,7 +71,7 @@ impl Mission {
         TrueImage::new(flown.unwrap(), &self.terrain).unwrap()
     }
 
-    /// A site file whose tie points are matched, and none given.
+    /// A site file with matched tie points only.
     fn matched_site(&self, site: &str) -> PathBuf {
         let text = fs::read_to_string(self.folder.join(format!("sites/{site}.toml"))).unwrap();
         let given = format!("files = [\"../ties/{site}.csv\"]\n# match = true");
@@ -86,7 +86,7 @@ impl Mission {
         path
     }
 
-    /// The site as it is, and a terrain model of its pair.
+    /// The site unchanged, with a terrain model of its pair.
     fn mapped_site(&self, site: &str) -> PathBuf {
         let text = fs::read_to_string(self.folder.join(format!("sites/{site}.toml"))).unwrap();
         let named = text.replace("site = \"", "site = \"mapped_");
@@ -119,7 +119,7 @@ impl Mission {
     }
 }
 
-/// A cube as ISIS writes it.
+/// A cube as written by ISIS.
 fn cube(image: &PlannedImage, [samples, lines]: [u32; 2], pixels: &[u8]) -> Vec<u8> {
     let label = format!(
         "Object = IsisCube\nObject = Core\nStartByte = 2049\nFormat = BandSequential\n\
@@ -145,7 +145,7 @@ fn tiff([samples, lines]: [u32; 2], pixels: &[u8]) -> Vec<u8> {
     bytes.into_inner()
 }
 
-/// Runs a site; the folder of its products.
+/// Runs a site; returns the folder of its products.
 fn run(site: &Path, out: &Path) -> PathBuf {
     let config = config::load(site).unwrap().site;
     let hashes = HashCache::in_folder(out, false);
@@ -169,7 +169,7 @@ fn run(site: &Path, out: &Path) -> PathBuf {
     outcome.folder
 }
 
-/// Where an image truly shows a point.
+/// True image coordinates of a point.
 fn place(image: &TrueImage<'_>, ground_m: &Vector3<f64>) -> Vector2<f64> {
     let seen = image.projector().unwrap().project(ground_m).unwrap();
     let camera = &image.oriented_camera;
@@ -180,8 +180,7 @@ fn place(image: &TrueImage<'_>, ground_m: &Vector3<f64>) -> Vector2<f64> {
     )
 }
 
-/// What matched tie points of a site are off by in the second image, and the standard deviations that they state, lines and
-/// samples.
+/// Errors of a site's matched tie points in the second image, and their stated standard deviations, lines and samples.
 fn errors_px(mission: &Mission, products: &Path) -> Vec<[Vector2<f64>; 2]> {
     let ties = read_ties(&products.join("exchange/matched_ties.csv"))
         .unwrap()
@@ -211,7 +210,7 @@ fn errors_px(mission: &Mission, products: &Path) -> Vec<[Vector2<f64>; 2]> {
     ties.collect()
 }
 
-/// Adjusted tie points by their identifiers, metres Mars-fixed; those that were rejected are not there.
+/// Adjusted tie points by their identifiers, metres Mars-fixed, without rejected ones.
 fn adjusted_m(products: &Path) -> BTreeMap<String, Vector3<f64>> {
     use arrow_array::Array as _;
     use arrow_array::cast::AsArray as _;
@@ -241,10 +240,10 @@ fn adjusted_m(products: &Path) -> BTreeMap<String, Vector3<f64>> {
     adjusted
 }
 
-/// What the adjusted tie points of a site are off by.
+/// Errors of a site's adjusted tie points.
 #[derive(Debug)]
 struct Judged {
-    /// Mean error and what is stated of it, east, north and up, metres.
+    /// Mean error and its stated covariance, east, north and up, metres.
     mean_m: Vector3<f64>,
     mean_sigma_m: Vector3<f64>,
     /// Root mean square of the heights' errors, metres.
@@ -279,7 +278,7 @@ impl Judged {
 fn matched_ties_are_within_what_they_state_and_adjust_as_well_as_given_ones() {
     let folder = tempfile::tempdir().unwrap();
     let is_long = areograph_testing::long();
-    // In every run one site, matched and adjusted; in the long run all, and one is mapped.
+    // Every run matches and adjusts one site; the long run does all, and maps one.
     let sites: &[&Site] = if is_long { &SITES[..] } else { &SITES[1..2] };
     let mission = Mission::new(&folder.path().join("mission"), sites);
     let truth: serde_json::Value =
@@ -307,12 +306,12 @@ fn matched_ties_are_within_what_they_state_and_adjust_as_well_as_given_ones() {
                 errors.len()
             );
         }
-        // Against truth, the adjustment by matched tie points and that by the given ones.
+        // The adjustments by matched and by given tie points against the truth.
         let ties = read_ties(&products.join("exchange/matched_ties.csv"))
             .unwrap()
             .ties;
         if is_long && site.id == "gusev_crater" {
-            // Whatever files the same pixels are in.
+            // Independent of the file format of the pixels.
             let others = run(&mission.in_other_files(site.id), folder.path());
             let others = read_ties(&others.join("exchange/matched_ties.csv")).unwrap();
             assert_eq!(others.ties, ties);
@@ -336,13 +335,14 @@ fn matched_ties_are_within_what_they_state_and_adjust_as_well_as_given_ones() {
         });
         let by_matched = Judged::of(&products, &matched_m.collect());
         println!("{}: {by_matched:.2?}", site.id);
-        // What is stated of the mean holds in height and in plan: one of 370 exceeds three standard deviations by chance.
+        // The stated uncertainty of the mean holds in height and in planimetry: one of 370 exceeds three standard
+        // deviations by chance.
         for axis in 0..3 {
             let [mean_m, sigma_m] =
                 [&by_matched.mean_m, &by_matched.mean_sigma_m].map(|of| of[axis]);
             assert!(mean_m.abs() <= 3.0 * sigma_m, "{by_matched:?}");
         }
-        // Images came with pixels, so pictures of them do.
+        // Images have pixels, so the report contains pictures of them.
         let given = run(
             &mission.folder.join(format!("sites/{}.toml", site.id)),
             folder.path(),

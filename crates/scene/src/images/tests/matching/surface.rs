@@ -1,4 +1,4 @@
-//! A terrain model of rendered images against the ground that they show.
+//! A terrain model of rendered images against their ground.
 
 use std::{fs, path::Path};
 
@@ -7,10 +7,10 @@ use areograph_base::body::Body;
 use areograph_geom::{ellipsoid::spherical_to_xyz_m, height_grid::HeightGrid, statistics::Summary};
 use areograph_pds::terrain_model::{HeightsAbove, read_terrain_model};
 
-/// Error in plan that the scene's adjusted orientations may have on an axis, metres: `mola_surface.plan_sigma_m`.
+/// Planimetric error of the scene's adjusted orientations on an axis, metres: `mola_surface.plan_sigma_m`.
 const PLAN_M: f64 = 130.0;
 
-/// A terrain model of a site, its standard deviations, and what its document says.
+/// A terrain model of a site, its standard deviations, and its document.
 pub(super) struct Published {
     heights: HeightGrid,
     sigmas_m: Vec<f32>,
@@ -35,7 +35,7 @@ impl Published {
         self.document.pointer(pointer).unwrap().as_f64().unwrap()
     }
 
-    /// Holds every height against the ground.
+    /// Compares every height with the ground.
     pub(super) fn hold_against(&self, terrain: &Terrain) {
         let grid = &self.heights;
         let columns = grid.size[1];
@@ -65,7 +65,7 @@ impl Published {
             "terrain model: {error_m:.2?}, stated {sigma_m:.2} m and {common_m:.2} m in common, slope {slope:.3}, expected {expected_m:.2} m; {}",
             self.document
         );
-        // What is stated of all heights together, and what the unknown place makes of the mean slope.
+        // The stated uncertainty of all heights together, plus the effect of the unknown planimetry on the mean slope.
         assert!(
             error_m.median.abs() <= 3.0 * common_m.hypot(PLAN_M * slope / 3.0),
             "{error_m:?}"
@@ -75,7 +75,7 @@ impl Published {
             "{error_m:?}"
         );
         assert!(error_m.n > 5_000, "{error_m:?}");
-        // The altimeter says of the heights what the truth does.
+        // The altimeter and the truth agree on the heights.
         let by_shots_m = self.stated("/mola_minus_surface/all/median");
         let apart_m = (by_shots_m + error_m.median).abs();
         assert!(apart_m <= 3.0 * common_m.max(expected_m), "{by_shots_m}");
