@@ -10,8 +10,8 @@ use crate::schema::DocumentSchema;
 #[derive(Debug, Serialize, JsonSchema)]
 #[schemars(
     title = "Differences between two runs",
-    description = "Answer of `areograph report diff --json`: for every site of both outputs what differs, B - A. \
-                   Metres, arcseconds and seconds; what is unknown is left out."
+    description = "Answer of `areograph report diff --json`: differences of every site in both outputs, B - A. \
+                   Metres, arcseconds and seconds; unknown values are omitted."
 )]
 pub struct Answer<'a> {
     /// Sites of both.

@@ -182,12 +182,12 @@ impl RunDifference {
         let moved = stages.changed.iter().map(|stage| &*stage.name);
         let new = stages.added.iter().map(|stage| &*stage.name);
         let mut told = vec![format!(
-            "stages with other inputs: {}",
+            "stages with changed inputs: {}",
             names(moved.chain(new).collect())
         )];
         if !stages.removed.is_empty() {
             let gone = stages.removed.iter().map(|stage| &*stage.name).collect();
-            told.push(format!("gone: {}", names(gone)));
+            told.push(format!("removed: {}", names(gone)));
         }
         told.push(format!("the same: {}", stages.unchanged));
         told.join("; ")

@@ -11,7 +11,7 @@ use crate::stages::adjust::{Adjusted, CorrectedPoint, PointKind, RangeResidual};
 
 pub(super) static TABLE: Declaration = Declaration {
     path: "adjusted_footprints.parquet",
-    what: "the footprints that took part in the adjustment",
+    what: "the footprints used in the adjustment",
     readers: "scripts",
     rows: "footprints",
     role: Role::Data,
@@ -88,7 +88,7 @@ fn shot_columns<'a>() -> Vec<Column<Shot<'a>>> {
         range(
             "range_m",
             Unit::Metre,
-            "measured range, metres; missing when no image was exposed meanwhile",
+            "measured range, metres; missing where no image was exposed at the time",
             |range| Some(range.range_m),
         ),
         range(
@@ -106,7 +106,7 @@ fn shot_columns<'a>() -> Vec<Column<Shot<'a>>> {
         range(
             "range_standardised",
             Unit::None,
-            "residual over its own standard deviation; missing where nothing controls it",
+            "residual over its own standard deviation; missing where it is uncontrolled",
             |range| range.residual_m.standardised,
         ),
     ]);

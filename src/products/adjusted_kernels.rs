@@ -77,7 +77,7 @@ pub(super) static POSITION: Declaration = Declaration {
 
 pub(super) static METAKERNEL: Declaration = Declaration {
     path: "adjusted.tm",
-    what: "the kernels of the site, and then the adjusted ones",
+    what: "the kernels of the site, then the adjusted kernels",
     readers: "SPICE",
     rows: "",
     role: Role::Metadata,
@@ -197,25 +197,25 @@ fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
     let bias_s = to.pointing.bias_of(&times.instrument).seconds();
     let usual_s = times.instrument.pointing.ck_bias_s;
     let others = if (bias_s - usual_s).abs() < BIAS_TOLERANCE_S {
-        "ISIS and ALE read attitude there by themselves: load the file as it is.".to_owned()
+        "ISIS and ALE apply this offset: load the file as it is.".to_owned()
     } else {
         format!(
-            "ISIS and ALE read attitude {usual_s:.3} s from the exposure whatever the kernel says: this file is \n\
-             not for them."
+            "ISIS and ALE always read attitude {usual_s:.3} s from the exposure: do not use this\n\
+             file with them."
         )
     };
     format!(
         "Orientation of image {id} after an adjustment; written by areograph {version}.\n\
-         Load it after the kernels of the mission. It holds for this image alone, which was exposed over\n\
+         Load it after the kernels of the mission. It is valid only for this image, which was exposed over\n\
          {exposed}\n\
          (UTC of the first line {utc}). Where the adjustment found that lines were exposed later or earlier\n\
-         than their tags say, the orientation of a line stands at its tag, so that nothing else that\n\
-         happened meanwhile, a laser shot for one, may be placed with this file.\n\
+         than their tags, the orientation of a line is stored at its tag: do not place anything else\n\
+         observed at the time, such as a laser shot, with this file.\n\
          \n\
          Positions: {spacecraft} relative to the centre of Mars, geometric, J2000, with the rotation of Mars of the\n\
          IAU 2000 report (pck00008 to pck00010). {positions}\n\
          \n\
-         Attitudes: J2000 to {bus_frame}. The attitude of an exposure at t stands at t {sign} {size:.3} s,\n\
+         Attitudes: J2000 to {bus_frame}. The attitude of an exposure at t is stored at t {sign} {size:.3} s,\n\
          as in the kernels that this file replaces. {others}\n",
         id = times.id,
         spacecraft = times.instrument.spacecraft.name,
@@ -280,7 +280,7 @@ fn metakernel(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<String> 
     Ok(text.replacen(
         "\n\n",
         &format!(
-            "\n\nThe last ones are adjusted: each pair for its image alone, not for laser shots nor other images, and with\n\
+            "\n\nThe last ones are adjusted: each pair is valid only for its image, not for laser shots or other images, with\n\
              the pointing bias of {}.\n\n",
             biases.join(", ")
         ),

@@ -77,13 +77,13 @@ fn columns<'a>() -> Vec<Column<Pair<'a>>> {
         column(
             "other_unknown",
             Unit::None,
-            "another one of the same image",
+            "another unknown of the same image",
             |row: &Pair| row.unknowns[1].clone(),
         ),
         column(
             "correlation",
             Unit::None,
-            "their correlation, -1 to 1; beyond 0.95 single values must not be interpreted",
+            "their correlation, -1 to 1; beyond 0.95 do not interpret single values",
             |row: &Pair| row.correlation,
         ),
     ]

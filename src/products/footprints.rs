@@ -338,7 +338,7 @@ fn ground<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "latitude_areographic_deg",
             Unit::Degree,
-            "areographic latitude, degrees, IAU 2000 radii; as older maps count",
+            "areographic latitude, degrees, IAU 2000 radii; as on older maps",
             Shot::areographic_deg,
         ),
     ]

@@ -139,7 +139,7 @@ pub(super) fn schema(title: &str, description: &str, attributes: &[Meaning]) -> 
             "name": { "type": "string" },
             "crs": closed(crs, &[]),
             "frame": {
-                "description": "The frame of the coordinates, and how far that of the CRS code is from it.",
+                "description": "The frame of the coordinates, and the offset of the CRS code's frame from it.",
                 "type": "string",
                 "minLength": 1,
             },

@@ -21,7 +21,7 @@ use crate::{
 
 pub(super) static TABLE: Declaration = Declaration {
     path: "height_check.parquet",
-    what: "heights of tie points against the ground between MOLA's shots, and of footprints that both images of a pair show, \
+    what: "heights of tie points against the MOLA surface, and of footprints that both images of a pair show, \
            before and after the adjustment",
     readers: "scripts",
     rows: "tie points and footprints",
@@ -158,7 +158,7 @@ fn columns() -> Vec<Column<Compared>> {
         column(
             "kind",
             Unit::None,
-            "tie for a tie point, footprint for a footprint where tie points say that both images of a pair show it",
+            "tie for a tie point, footprint for a footprint that both images of a pair show by the tie points",
             |row: &Compared| row.kind.to_owned(),
         ),
         column(
@@ -176,7 +176,7 @@ fn columns() -> Vec<Column<Compared>> {
         column(
             "longitude_deg",
             Unit::Degree,
-            "east longitude, degrees: of the adjusted point, or of the intersected one where there is none",
+            "east longitude, degrees: of the adjusted point, or else of the intersected point",
             |row: &Compared| Some(degrees(row.place()?.longitude_rad)),
         ),
         column(
@@ -194,7 +194,7 @@ fn columns() -> Vec<Column<Compared>> {
         column(
             "surface_sigma_m",
             Unit::Metre,
-            "standard deviation of the MOLA surface there, metres; missing of footprints, which are its shots",
+            "standard deviation of the MOLA surface there, metres; missing for footprints, which are its shots",
             |row: &Compared| row.latest()?.surface_sigma_m,
         ),
         column(

@@ -16,7 +16,7 @@
 //!   centre of Mars; they can be had by `light_time = "centre"`.
 //! * Pointing is sampled from before the first line to after the last; ALE's table starts 1.15 s late. Nodes are
 //!   as dense as an interpolation error below 0.01 pixels wants, which is measured and stated.
-//! * Distortion of the narrow angle is zero, as the instrument kernel says. ALE repeats the pixel pitch in these
+//! * Distortion of the narrow angle is zero, as the instrument kernel states. ALE repeats the pixel pitch in these
 //!   places, which `usgscsm` takes for radial coefficients per mm² and mm⁴: wrong by hundreds of pixels at the
 //!   edges. Other cameras have the three coefficients that fit the image's samples best, and what they leave.
 
@@ -316,13 +316,13 @@ fn provenance<'a>(
     let detector = times.detector();
     let distortion = if detector.distortion == Distortion::NONE {
         let source = times.support.as_ref();
-        let source = source.map_or("the instrument kernel says", |_| "the support data say");
+        let source = source.map_or("the instrument kernel states", |_| "the support data state");
         format!("optical_distortion: none, as {source}")
     } else {
         let fit = detector.radial_fit(&times.instrument);
         format!(
             "optical_distortion: the three radial coefficients that fit the camera best over the samples of this \
-             image; they leave {:.1e} pixels at most",
+             image; residuals are at most {:.1e} pixels",
             fit.error_max_px,
         )
     };

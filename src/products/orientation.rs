@@ -38,7 +38,7 @@ const CONVENTIONS: [&str; 6] = [
      m13 = sin phi, m23 = -sin omega cos phi, m12 = -cos phi sin kappa; radians, continuous over the image",
     "quaternions: (w, x, y, z) in SPICE's convention, camera to Mars, continuous over the image",
     "rotation vector: M(x) = exp([r(x)]x) M_reference, M from Mars to camera components; positions as in the second \
-     order; to be used near gimbal lock, where |cos phi| < 0.1 leaves omega and kappa badly determined",
+     order; to be used near gimbal lock, where |cos phi| < 0.1 leaves omega and kappa poorly determined",
 ];
 
 #[derive(Serialize, JsonSchema)]

@@ -29,7 +29,7 @@ const DEFINITIONS: [(&str, &str); 7] = [
     (
         "range_minus_distance",
         "measured range minus |spacecraft in the kernels - footprint with the raw radius|, \
-        both in IAU 2000; the paper's Table 3, its sign chosen here",
+        both in IAU 2000; the paper's Table 3, with the sign chosen here",
     ),
     (
         "range_minus_distance_crossover",
@@ -38,7 +38,7 @@ const DEFINITIONS: [(&str, &str); 7] = [
     (
         "decoding",
         "measured range minus |spacecraft in the PEDR file - footprint with the raw radius|: tests \
-        the reading of the file, no kernel is involved",
+        the reading of the file without kernels",
     ),
     (
         "spacecraft_radial, _along, _cross",
@@ -48,18 +48,18 @@ const DEFINITIONS: [(&str, &str); 7] = [
     (
         "trend",
         "slope of range_minus_distance over time, with its standard uncertainty from the scatter about \
-        the line, correlated neighbours counted",
+        the line, including the correlation of neighbours",
     ),
     (
         "bias_scan",
-        "spread of range_minus_distance against an assumed correction of the time tags; best_s is known \
-        as well as its scatter and the orbit allow: uncertainty_s takes the mean difference of the two \
-        orbits for what either may be off, a metre along the flight being 0.3 ms",
+        "spread of range_minus_distance against an assumed correction of the time tags; best_s is limited \
+        by its scatter and the orbit: uncertainty_s takes the mean difference of the two \
+        orbits as the error of either, a metre along the flight being 0.3 ms",
     ),
     (
         "summary",
-        "all shots of the site, each once, also when it lies in several windows; its standard deviation holds what \
-        profiles differ by, which those of the profiles do not",
+        "all shots of the site, each once, also when it lies in several windows; its standard deviation includes \
+        differences between profiles, which those of the profiles do not",
     ),
 ];
 
@@ -76,7 +76,7 @@ fn each_once(rows: &[u32]) -> Vec<usize> {
 #[derive(Serialize, JsonSchema)]
 #[schemars(
     title = "Range check of a site",
-    description = "ranges.json of areograph: residuals of measured ranges per profile (the paper's Table 3), their limits and verdicts. Metres and seconds; what is unknown is left out."
+    description = "ranges.json of areograph: residuals of measured ranges per profile (the paper's Table 3), their limits and verdicts. Metres and seconds; unknown values are omitted."
 )]
 struct Document<'a> {
     #[schemars(extend("const" = "areograph ranges 1"))]

@@ -66,7 +66,7 @@ impl Cause for RowsError {
                 "write Parquet, which also holds lists and groups, or select other columns"
             }
             Self::NoPoints | Self::Differ => {
-                "products of another version of areograph must be made again by this version"
+                "regenerate products of another version of areograph with this version"
             }
         }
         .to_owned()

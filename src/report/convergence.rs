@@ -30,7 +30,7 @@ fn write(site: &SiteProducts) -> Result<String> {
         figures += &figure(&convergence_plot(image))?;
     }
     let html = format!("{}<div class=\"plots\">\n{figures}</div>\n", methods(site));
-    Ok(folded("What the published iterations cost", &html))
+    Ok(folded("Cost of the published iterations", &html))
 }
 
 fn name(run: &MethodRun) -> String {

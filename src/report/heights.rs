@@ -78,7 +78,7 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
             after.map_or_else(nothing, |after| {
                 format!("{after}; residuals {} σ", label(along, 2))
             }),
-            "how well the images agree along track; says nothing about height or position"
+            "how well the images agree along track; not a measure of height or position"
                 .to_owned(),
         ],
         [
@@ -89,7 +89,7 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
         ],
         [
             "absolute, height".to_owned(),
-            format!("a priori: what is known of {}", known_beforehand(geometric)),
+            format!("a priori, from {}", known_beforehand(geometric)),
             height,
             "standard deviation of the common offset, and of individual tie points".to_owned(),
         ],
@@ -112,7 +112,7 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
 fn place_says(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
     let (known, by) = (known_beforehand(geometric), place_by(geometric, adjustment));
     if known == by {
-        format!("a priori, not measured by images: by what is known of {known}")
+        format!("a priori, not measured by images: from {known}")
     } else {
         format!("by {by}, not measured by images")
     }
@@ -164,7 +164,7 @@ fn agreement(check: &HeightCheck) -> String {
 
 const fn agreement_says(adjustment: &AdjustmentProducts) -> &'static str {
     if adjustment.adjusted.heights.is_some() {
-        "before: an independent test; after: how well the adjustment meets what controls it"
+        "before: an independent test; after: fit of the adjustment to its control"
     } else {
         "a test of heights: the MOLA surface did not control them"
     }
@@ -277,7 +277,7 @@ fn compared(geometric: &GeometricProducts) -> String {
             Column::Number("1.48 MAD"),
             Column::Number("mean"),
             Column::Number("standard deviation"),
-            Column::Number("σ of the mean by the surface alone"),
+            Column::Number("σ of the mean by the surface only"),
         ],
     );
     let after = geometric.adjustment.iter().map(|of| ("after", of.heights));
@@ -360,7 +360,7 @@ fn apart(check: &HeightCheck) -> String {
         "adjustment.json#/before/heights/profiles_apart/sigma_m",
     ];
     let Some(apart) = &check.apart else {
-        return paragraph("With a single profile nothing independent tests the surface.");
+        return paragraph("A single profile provides no independent test of the surface.");
     };
     let [first, second] = &apart.profiles;
     let (upper, lower) = if apart.mean_m < 0.0 {

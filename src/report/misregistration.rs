@@ -163,7 +163,7 @@ const fn rejection(reason: TieRejection) -> &'static str {
             Unintersected::NotConverged => "the iteration did not converge",
         },
         TieRejection::Unseen => "an image does not see the intersected point",
-        TieRejection::Duplicate => "identifier used before",
+        TieRejection::Duplicate => "duplicate identifier",
         TieRejection::TwiceInImage => "measured twice in one image",
         TieRejection::OutsideImage => "measured outside its image",
         TieRejection::NotFinite => "measurement not a finite number",

@@ -88,12 +88,12 @@ fn lead(site: &SiteProducts) -> String {
         "<p class=\"about\">{}</p>\n",
         link("index.html", "Report of the site")
     );
-    let mut keys = vec!["blue circle: where the orientation of the kernels has the point"];
+    let mut keys = vec!["blue circle: the point by the orientation of the kernels"];
     if site.adjustment().is_some() {
-        keys.push("orange upright cross: where the adjusted orientation has it");
-        keys.push("yellow diagonal cross: where a tie point was measured");
+        keys.push("orange upright cross: the point by the adjusted orientation");
+        keys.push("yellow diagonal cross: a measured tie point");
     } else if site.geometric.is_some() {
-        keys.push("yellow diagonal cross: where a tie point was measured");
+        keys.push("yellow diagonal cross: a measured tie point");
     }
     report
         + &list(&keys)
@@ -134,7 +134,7 @@ fn strip_figure(site: &SiteProducts, shown: &ShownImage, picture: &Picture) -> S
     let look = &shown.quick_look;
     for (lines, what) in [
         (look.lines_missing, "missing"),
-        (look.lines_suspect, "damaged or of uncertain place"),
+        (look.lines_suspect, "damaged or of uncertain position"),
     ] {
         if lines > 0 {
             let _infallible = write!(words, " {} {what}.", html::counted(lines as usize, "line"));

@@ -42,7 +42,7 @@ fn write(site: &SiteProducts) -> Result<String> {
     let evidence = planes + &models(site, &images);
     Ok(profiles(site, &images)
         + &folded(
-            "Footprints over the lines, and what other camera models move",
+            "Footprints over the lines, and the effect of other camera models",
             &evidence,
         ))
 }

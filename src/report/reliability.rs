@@ -44,7 +44,7 @@ pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentPro
     let summary = &adjustment.adjusted.summary;
     let ties = &summary.ties;
     if ties.corrections_m[0].n == 0 {
-        return paragraph("No tie point took part.");
+        return paragraph("No tie point was used.");
     }
     let registration = if adjustment.images_agree {
         "Relative registration is corrected"
@@ -71,7 +71,7 @@ pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentPro
         }
         None => {
             numbers.push((known_beforehand(geometric).to_owned(), ""));
-            "heights and position are what was known of {} beforehand"
+            "heights and position are a priori, from {}"
         }
     };
     sentence(
@@ -170,7 +170,7 @@ pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
             Column::Number("shown, mean"),
             Column::Number("least"),
             Column::Number("most"),
-            Column::Number("smallest error that is found"),
+            Column::Number("smallest detectable error"),
         ],
     );
     let mut sentences = String::new();
@@ -179,9 +179,9 @@ pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
         let [mean, least, most] = [found.mean, found.min, found.max].map(per_cent);
         let hidden = found.mean < HIDDEN;
         let consequence = if hidden {
-            "such errors cannot be found"
+            "such errors cannot be detected"
         } else {
-            "only large ones are found"
+            "only large ones are detected"
         };
         if found.mean < SHOWN {
             sentences += &paragraph(&format!(
@@ -202,7 +202,7 @@ pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
         );
     }
     let words =
-        "Shown: the redundancy number r; found by Baarda's test (3.29, power 80 %): 4.13 σ/√r.";
+        "Shown: the redundancy number r; detectable by Baarda's test (3.29, power 80 %): 4.13 σ/√r.";
     let table = table.finish() + &paragraph(words);
     sentences + &folded("Redundancy by kind of observation", &table)
 }

@@ -82,7 +82,7 @@ pub(super) fn figure(body: Body, places: &[Place]) -> Result<String> {
                      features of the ground with their extent (IAU gazetteer, whole degrees), and landing sites (rings)."
         .to_owned();
     if !unnamed.is_empty() {
-        words += &format!(" Not named for want of room: {}.", unnamed.join(", "));
+        words += &format!(" Not labelled for lack of space: {}.", unnamed.join(", "));
     }
     Ok(figure_html(
         &format!("Sites on {body}"),

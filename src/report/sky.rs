@@ -94,7 +94,7 @@ fn words(site: &SiteProducts, images: usize, unnamed: &[&str]) -> String {
         counted(images, "image")
     );
     if !unnamed.is_empty() {
-        words += &format!(" Not named for want of room: {}.", unnamed.join(", "));
+        words += &format!(" Not labelled for lack of space: {}.", unnamed.join(", "));
     }
     let Some(geometric) = &site.geometric else {
         return words;

@@ -236,7 +236,7 @@ fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
         ),
         note: escape(&if is_open(&geometric, &adjustment) {
             format!(
-                "by {}; see accuracy for what is open",
+                "by {}; see accuracy for open points",
                 place_by(&geometric, &adjustment)
             )
         } else {

@@ -44,7 +44,7 @@ fn write(site: &SiteProducts) -> String {
         );
     }
     let mut table = Table::new(
-        "What the support data hold",
+        "Contents of the support data",
         &[
             Column::Text("image"),
             Column::Text("file"),

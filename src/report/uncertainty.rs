@@ -95,7 +95,7 @@ fn without_budget(pair: &BeforeAfter) -> String {
         if let Err(reason) = &found.budget {
             let name = pair.name();
             html += &paragraph(&format!(
-                "{name}, {state} the adjustment: there is no budget, for {reason}."
+                "{name}, {state} the adjustment: there is no budget: {reason}."
             ));
         }
     }

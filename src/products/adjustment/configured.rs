@@ -14,7 +14,7 @@ use crate::{
 #[derive(Serialize, JsonSchema)]
 #[allow(
     clippy::struct_excessive_bools,
-    reason = "each is a key of the site file of its own"
+    reason = "each is a separate key of the site file"
 )]
 pub(super) struct AdjustmentKeys<'a> {
     #[schemars(transform = all_positive)]

@@ -21,7 +21,7 @@ use crate::{
 
 pub(super) static DOCUMENT: Declaration<WriteArchive> = Declaration {
     path: "archive.json",
-    what: "verdict, limits, files with their complaints, statistics by off-nadir angle, error of positions",
+    what: "verdict, limits, files with their problems, statistics by off-nadir angle, error of positions",
     readers: "scripts",
     rows: "files",
     role: Role::Metadata,

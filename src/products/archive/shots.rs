@@ -22,7 +22,7 @@ type WriteShots = fn(&Path, &ArchiveProfile, &[CheckedShot]) -> Result<u64>;
 
 pub(in crate::products) static SHOTS: Declaration<WriteShots> = Declaration {
     path: "shots/<profile>.parquet",
-    what: "every checked shot of a profile with its residuals; there is one for each of the worst profiles",
+    what: "every checked shot of a profile with its residuals; one file for each of the worst profiles",
     readers: "scripts",
     rows: "shots",
     role: Role::Data,

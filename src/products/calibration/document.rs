@@ -24,7 +24,7 @@ use crate::{
 
 pub(super) static DOCUMENT: Declaration<WriteCalibration> = Declaration {
     path: "calibration.json",
-    what: "parameters with standard deviations, what ties cannot see, figures after every step, of held-back control and of \
+    what: "parameters with standard deviations, what ties do not determine, figures after every step, of withheld control and of \
            other orbits, verdict",
     readers: "scripts",
     rows: "cameras",

@@ -21,7 +21,7 @@ use crate::{
 
 pub(in crate::products) static LIDAR: Declaration = Declaration {
     path: "exchange/lidar.json",
-    what: "shots with ranges for ISIS: a priori and adjusted points, where the adjusted images see them",
+    what: "shots with ranges for ISIS: a priori and adjusted points, with their coordinates in the adjusted images",
     readers: "ISIS",
     rows: "shots",
     role: Role::Data,

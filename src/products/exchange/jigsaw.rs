@@ -46,8 +46,8 @@ pub(in crate::products) static NETWORK: Declaration = Declaration {
 
 pub(in crate::products) static RESIDUALS: Declaration = Declaration {
     path: "exchange/residuals.csv",
-    what: "residuals of tie points as jigsaw writes them, with their standard deviations and redundancy",
-    readers: "people who know jigsaw",
+    what: "residuals of tie points in jigsaw's format, with their standard deviations and redundancy",
+    readers: "users of jigsaw",
     rows: "measurements",
     role: Role::Data,
     content: Content::Foreign,
@@ -60,8 +60,8 @@ pub(in crate::products) static RESIDUALS: Declaration = Declaration {
 
 pub(in crate::products) static POINTS: Declaration = Declaration {
     path: "exchange/bundleout_points.csv",
-    what: "adjusted tie points as jigsaw writes them; latitude, longitude and radius in metres are north, east and up",
-    readers: "people who know jigsaw",
+    what: "adjusted tie points in jigsaw's format; latitude, longitude and radius in metres are north, east and up",
+    readers: "users of jigsaw",
     rows: "tie points",
     role: Role::Data,
     content: Content::Foreign,
@@ -74,9 +74,9 @@ pub(in crate::products) static POINTS: Declaration = Declaration {
 
 pub(in crate::products) static IMAGES: Declaration = Declaration {
     path: "exchange/bundleout_images.csv",
-    what: "corrections of the orientations as jigsaw writes them over existing kernels: kilometres and degrees for powers of \
+    what: "corrections of the orientations, in jigsaw's format over existing kernels: kilometres and degrees for powers of \
            t, which is 0 in the middle of the image and 1 at its end; rotations about the camera's axes",
-    readers: "people who know jigsaw",
+    readers: "users of jigsaw",
     rows: "images",
     role: Role::Data,
     content: Content::Foreign,

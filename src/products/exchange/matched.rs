@@ -20,7 +20,7 @@ use crate::{
 
 pub(in crate::products) static TABLE: Declaration = Declaration {
     path: "exchange/matched_ties.csv",
-    what: "tie points that were matched, with the standard deviations of their measurements, as ties.files takes them",
+    what: "matched tie points, with the standard deviations of their measurements, in the format of ties.files",
     readers: "areograph, scripts",
     rows: "tie points",
     role: Role::Data,

@@ -33,7 +33,7 @@ const MARGIN_DEG: f64 = 1e-6;
 
 pub(in crate::products) static ITEM: Declaration = Declaration {
     path: "exchange/stac_item.json",
-    what: "the site for STAC catalogues: where, when, files with sizes and hashes; none where nothing says where it lies",
+    what: "the site for STAC catalogues: location, time, files with sizes and hashes; not written without a known location",
     readers: "STAC catalogues",
     rows: "",
     role: Role::Metadata,

@@ -105,7 +105,7 @@ const LOLA_LIKE_RADIUS: &str = "column 4 is the distance from the centre of Mars
      the range of column 5 belongs to the radius before it, column 6: for range constraints; \
      column 6 the same before it; no column is a height";
 const ODE_RADIUS: &str = "column 5 is the distance from the centre of Mars after the crossover correction, metres; \
-     column 3 is that minus the radius of the areoid, no height above a sphere";
+     column 3 is that minus the radius of the areoid, not a height above a sphere";
 
 /// What the readers of a CSV file must be told.
 #[derive(Serialize, JsonSchema)]

@@ -104,7 +104,7 @@ fn columns<'a>() -> Vec<Column<&'a PointResult>> {
         column(
             "pictures",
             Unit::None,
-            "pictures from which its place is taken",
+            "pictures that determine its position",
             |row: &&PointResult| row.pictures,
         )
         .in_gis(),
@@ -126,7 +126,7 @@ fn columns<'a>() -> Vec<Column<&'a PointResult>> {
         column(
             "sigma_m",
             Unit::Metre,
-            "standard deviation of x_m, and of y_m, metres on the map; missing where nothing tells it",
+            "standard deviation of x_m, and of y_m, metres on the map; missing where it is not determined",
             |row: &&PointResult| row.sigma_m,
         )
         .in_gis(),

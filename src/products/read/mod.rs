@@ -52,6 +52,6 @@ impl Cause for ReadError {
     }
 
     fn advice(&self) -> String {
-        "products of another version of areograph must be made again by this version".to_owned()
+        "regenerate products of another version of areograph with this version".to_owned()
     }
 }

@@ -17,7 +17,7 @@ const DEFINITIONS: [(&str, &str); 5] = [
     (
         "cells",
         "of common that both images show by their orientation, filled have a height; unfilled has the others by reason: flat \
-         (no texture), missing (lines or pixels), edge (of an image), unlike (nothing correlates), ambiguous (two heights do), \
+         (no texture), missing (lines or pixels), edge (of an image), unlike (no correlation), ambiguous (two heights correlate), \
          unsettled, one_way (other heights with the other image as the template), uncertain, alone (contradicted by cells around it)",
     ),
     (
@@ -26,25 +26,25 @@ const DEFINITIONS: [(&str, &str); 5] = [
     ),
     (
         "common_sigma_m",
-        "standard deviation of what all heights have in common, by the adjustment of the images; missing where nothing says it",
+        "standard deviation of the offset common to all heights, by the adjustment of the images; missing where not determined",
     ),
     (
         "mola_minus_surface",
         "radius of a footprint minus that of the model at its place, between the four nearest cells, metres; spread_sigmas is \
-         its robust spread about the median in its standard deviations: of the height, the shot, the profile, and of what the \
-         uncertain place makes of the slope",
+         its robust spread about the median in its standard deviations: of the height, the shot, the profile, and of the slope \
+         times the uncertainty of the position",
     ),
     (
         "mola_takes_part",
-        "whether MOLA controlled heights of the adjustment: then its mean difference is no independent judgement, and the \
-         spread about it still is",
+        "whether MOLA controlled heights of the adjustment: then its mean difference is not an independent test, but the \
+         spread about it is",
     ),
 ];
 
 #[derive(Serialize, JsonSchema)]
 #[schemars(
     title = "Terrain model of a site",
-    description = "surface.json of areograph: how surface.tif was made of a pair of images, what became of its cells, and the altimeter's shots against it. Metres and degrees; what is unknown is left out."
+    description = "surface.json of areograph: how surface.tif was made of a pair of images, statistics of its cells, and the altimeter's shots against it. Metres and degrees; unknown values are omitted."
 )]
 pub(super) struct Document<'a> {
     #[schemars(extend("const" = "areograph surface 1"))]

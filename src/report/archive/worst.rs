@@ -14,7 +14,7 @@ use crate::{
 /// The worst profiles in a table, each with a link to its shots.
 pub(super) fn worst_profiles(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>]) -> String {
     if worst.is_empty() {
-        return paragraph("No profile was judged.");
+        return paragraph("No profile was checked.");
     }
     let mut table = Table::new(
         "Profiles by the largest share of a limit; each links to its shots (Parquet)",
@@ -54,8 +54,8 @@ pub(super) fn worst_profiles(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>])
         table.row(profile.invalid_because.is_empty(), cells);
     }
     let words = "Mean and distance to the file's own spacecraft are without outliers. Orbits apart is the mean of the file's own \
-        spacecraft minus that of the kernels: another orbit, clock or datum shows there. The best correction of time tags is the \
-        one by which ranges spread least, be it with raw radii or with those corrected by crossovers. All profiles are in profiles.parquet and profiles.csv.";
+        spacecraft minus that of the kernels: it shows another orbit, clock or datum. The best correction of time tags is the \
+        one that minimises the spread of ranges, with raw radii or with those corrected by crossovers. All profiles are in profiles.parquet and profiles.csv.";
     table.finish() + &paragraph(words) + &commands(worst)
 }
 

@@ -53,7 +53,7 @@ pub(super) fn profiles(site: &RunDifference) -> String {
         let word = |valid: Option<bool>| match valid {
             Some(true) => "valid",
             Some(false) => "INVALID",
-            None => "not there",
+            None => "absent",
         };
         let valid = [a, b].map(|profile| profile.map(|profile| profile.valid));
         cells.push(if valid[0] == valid[1] {
@@ -159,14 +159,14 @@ pub(super) fn items(site: &RunDifference) -> String {
 /// Columns of things that differ.
 const NO_ROLES: &[Column] = &[
     Column::Text("name"),
-    Column::Text("what happened"),
+    Column::Text("change"),
     Column::Text("A"),
     Column::Text("B"),
 ];
 const ROLES: &[Column] = &[
     Column::Text("name"),
     Column::Text("role"),
-    Column::Text("what happened"),
+    Column::Text("change"),
     Column::Text("A"),
     Column::Text("B"),
 ];
@@ -218,5 +218,5 @@ pub(super) fn texts(site: &RunDifference) -> String {
             .map(|(texts, whose)| paragraph(&format!("{what} only in {whose}:")) + &list(texts))
             .collect::<String>()
     };
-    told(&site.notes, "Notes") + &told(&site.complaints, "Complaints")
+    told(&site.notes, "Notes") + &told(&site.complaints, "Problems")
 }

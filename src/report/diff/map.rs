@@ -89,10 +89,10 @@ pub(super) fn figure_of(site: &RunDifference) -> Result<String> {
         }
     }
     let words = format!(
-        "Places in A, and what moved there to B, {times} × magnified: {}. Kilometres east and north of their mean.",
+        "Positions in A and their movements to B, {times} × magnified: {}. Kilometres east and north of their mean.",
         told.join(", ")
     );
-    let title = format!("{}: what moved on the ground", site.site);
+    let title = format!("{}: movements on the ground", site.site);
     figure(&Plot {
         x,
         ..Plot::of(title, words, "east, km", vec![panel])

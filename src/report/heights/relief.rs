@@ -28,7 +28,7 @@ pub(super) fn relief(adjusted: &Adjusted, beforehand: &str) -> String {
             format!("Relief alone fixes position to {axes}; used (adjustment.relief_for_plan).");
         return paragraph(&used)
             + &profiles(
-                "Where profiles are recorded against where relief and images put them, metres",
+                "Recorded profiles against their positions by relief and images, metres",
                 &relief.profile_shifts,
             );
     }

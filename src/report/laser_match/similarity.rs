@@ -102,9 +102,9 @@ fn words(of: &LaserMatch, surface: &SimilaritySurface) -> String {
         step => format!(" A pixel is the best of {step} by {step} shifts."),
     };
     paragraph(&format!(
-        "How alike the heights of model and laser are at every shift ({}), in cells, east to the right and north up. A good match is one \
-         sharp peak. A ridge is of shots on parallel passes, and leaves open where along it the shift is. Of several peaks of one \
-         height the best is so by chance.{pixels} Without a colour the model has heights for too few shots.",
+        "Similarity of the heights of model and laser at every shift ({}), in cells, east to the right and north up. A good match is one \
+         sharp peak. Shots on parallel passes give a ridge, along which the shift is not determined. Of several peaks of equal \
+         height the best is so by chance.{pixels} Shifts without a colour have heights for too few shots.",
         of.similarity.word()
     ))
 }
@@ -176,7 +176,7 @@ fn figure(title: &str, shown: &[&Shown]) -> Result<String> {
     let pictures = shown.iter().map(|shown| shown.html());
     let pictures: String = pictures.collect::<Result<_>>()?;
     let caption = format!(
-        "Similarity over the shifts of {}, with the best one and where it is, cells east and north.",
+        "Similarity over the shifts of {}, with the best shift, cells east and north.",
         counted(shown.len(), "unit")
     );
     Ok(format!(

@@ -78,7 +78,7 @@ fn all_profiles(site: &SiteProducts) -> Plot {
         ..Panel::of("range − distance, m", series)
     };
     let caption = format!(
-        "{} profiles in their order in the tables, means from {} to {} m. The {WORST} largest are shown alone.",
+        "{} profiles in their order in the tables, means from {} to {} m. The {WORST} largest are shown separately.",
         whole(site.profiles.len()),
         metres(extreme(site, f64::min)),
         metres(extreme(site, f64::max))
