@@ -1,4 +1,4 @@
-//! What `report diff --json` answers.
+//! Answer of `report diff --json`.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::RunDifference;
 use crate::schema::DocumentSchema;
 
-/// What differs between two outputs, site by site.
+/// Differences between two outputs, site by site.
 #[derive(Debug, Serialize, JsonSchema)]
 #[schemars(
     title = "Differences between two runs",
@@ -16,17 +16,17 @@ use crate::schema::DocumentSchema;
 pub struct Answer<'a> {
     /// Sites of both.
     pub sites: Vec<SiteAnswer<'a>>,
-    /// Sites that only A has.
+    /// Sites only in A.
     pub only_in_a: &'a [String],
-    /// Sites that only B has.
+    /// Sites only in B.
     pub only_in_b: &'a [String],
 }
 
-/// What came of a site of both outputs.
+/// Result of comparing a site of both outputs.
 #[derive(Debug, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum SiteAnswer<'a> {
-    /// What differs.
+    /// The differences.
     Difference(&'a RunDifference),
     /// A site that could not be compared.
     Failed {

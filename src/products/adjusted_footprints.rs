@@ -1,4 +1,4 @@
-//! The footprints that took part in the adjustment, as Parquet.
+//! The footprints used in the adjustment, as Parquet.
 
 use std::collections::BTreeMap;
 
@@ -24,7 +24,7 @@ pub(super) static TABLE: Declaration = Declaration {
     uses: &[],
 };
 
-/// A footprint that took part, with its range.
+/// A footprint used in the adjustment, with its range.
 type Shot<'a> = (&'a CorrectedPoint, Option<&'a RangeResidual>);
 
 fn shots(adjusted: &Adjusted) -> Vec<Shot<'_>> {

@@ -1,4 +1,4 @@
-//! Adjusted orientations as SPICE kernels that are loaded after the original ones; what they hold is tabulated by
+//! Adjusted orientations as SPICE kernels that are loaded after the original ones; their contents are tabulated by
 //! [`crate::stages::tabulate_kernels`].
 
 use std::{
@@ -20,33 +20,33 @@ use crate::{
     stages::{tabulate_kernels::KernelTables, tag_times::ImageTimes},
 };
 
-/// A bias this near to the usual one is the usual one, seconds.
+/// Tolerance within which a bias is the usual one, seconds.
 const BIAS_TOLERANCE_S: f64 = 1e-9;
 
 /// Longest name of a segment.
 const SEGMENT_NAME_MAX: usize = 40;
 
-/// An image with what its adjusted kernels hold.
+/// An image with the contents of its adjusted kernels.
 #[derive(Debug, Clone, Copy)]
 pub struct AdjustedImage<'a> {
     /// Line times.
     pub times: &'a ImageTimes,
     /// States and attitudes.
     pub tables: &'a KernelTables,
-    /// The convention that they were adjusted with.
+    /// The convention of their adjustment.
     pub light_time: LightTime,
 }
 
-/// Where the kernels go and what they replace.
+/// Destination of the kernels, and the kernels that they replace.
 #[derive(Debug, Clone, Copy)]
 pub struct AdjustedKernels<'a> {
-    /// Folder that is written to.
+    /// Folder to write to.
     pub directory: &'a Path,
-    /// Folder of the site, where the files will lie in the end: paths in `adjusted.tm` count from there.
+    /// Final folder of the site: paths in `adjusted.tm` are relative to it.
     pub site_folder: &'a Path,
     /// The original kernels.
     pub originals: &'a KernelSet,
-    /// The pointing bias that readers of the kernels will apply, where it is not that of the camera.
+    /// The pointing bias that readers of the kernels will apply, if it is not that of the camera.
     pub pointing: &'a PointingConfig,
 }
 
@@ -107,7 +107,7 @@ fn of_site(of: &Context, adjustment: &AdjustmentProducts) -> Result<Vec<Written>
 /// Writes an SPK and a CK of every image, and the metakernel.
 ///
 /// # Errors
-/// [`Kind::Bug`](crate::error::Kind::Bug) for tables that no kernel takes, and for a session that is open on this
+/// [`Kind::Bug`](crate::error::Kind::Bug) for tables that no kernel can hold, and for a session that is open on this
 /// thread; [`Kind::Io`](crate::error::Kind::Io).
 pub fn write_adjusted_kernels(
     to: &AdjustedKernels,
@@ -146,7 +146,7 @@ fn written(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<Vec<Written
     Ok(written)
 }
 
-/// Path of the SPK of an image below the folder of the products, the longest that CSPICE writes there.
+/// Path of the SPK of an image below the folder of the products, the longest path that CSPICE writes there.
 #[must_use]
 pub fn position_kernel(image: &str) -> String {
     POSITION.path_of(image)
@@ -191,7 +191,7 @@ fn write_position(path: &Path, image: &AdjustedImage, comment: &str) -> Result<u
     Ok(tables.epochs.len() as u64)
 }
 
-/// What is written into the comment areas of both kernels.
+/// Text of the comment areas of both kernels.
 fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
     let times = image.times;
     let bias_s = to.pointing.bias_of(&times.instrument).seconds();
@@ -229,7 +229,7 @@ fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
     )
 }
 
-/// Who finds the adjusted positions in an SPK.
+/// Readers for which the positions in an SPK are the adjusted ones.
 const fn positions(light_time: LightTime) -> &'static str {
     match light_time {
         LightTime::Surface => {
@@ -250,7 +250,7 @@ const fn positions(light_time: LightTime) -> &'static str {
     }
 }
 
-/// The original kernels and behind them those of all images.
+/// The original kernels, followed by those of all images.
 fn metakernel(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<String> {
     let names = images.iter().flat_map(|image| {
         [

@@ -1,4 +1,4 @@
-//! What tie points, intersection and adjustment say of a site, as JSON.
+//! Results of tie points, intersection and adjustment of a site, as JSON.
 
 mod boresight;
 mod configured;
@@ -35,7 +35,7 @@ use boresight::BoresightDocument;
 use configured::AdjustmentKeys;
 use readings::OtherReadingDocument;
 
-/// What the numbers are, for readers of the file.
+/// Definitions of the numbers, for readers of the file.
 const DEFINITIONS: [(&str, &str); 12] = [
     (
         "before, after",
@@ -251,7 +251,7 @@ struct AdjustmentDocument<'a> {
     heights: Option<&'a HeightSummary>,
     #[serde(skip_serializing_if = "Option::is_none")]
     relief: Option<&'a ReliefSummary>,
-    /// Where the laser points in simultaneous images.
+    /// Pointing of the laser in simultaneous images.
     #[serde(skip_serializing_if = "Option::is_none")]
     boresight: Option<BoresightDocument<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -279,7 +279,7 @@ struct ImageDocument<'a> {
     #[schemars(extend("exclusiveMinimum" = 0))]
     line_period_s: f64,
     correction: &'a [f64; ORIENTATION_UNKNOWNS],
-    /// Where the PEDR file has the spacecraft, X, Y and Z, metres, where that is what was expected of the position.
+    /// Position of the spacecraft in the PEDR file, X, Y and Z, metres, where that was the expected position.
     #[serde(skip_serializing_if = "Option::is_none")]
     pedr_orbit_m: Option<[f64; 3]>,
     #[schemars(transform = none_negative)]

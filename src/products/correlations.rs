@@ -38,7 +38,7 @@ fn rows<'a>(adjustment: &AdjustmentProducts<'a>) -> Vec<Pair<'a>> {
         .collect()
 }
 
-/// Pairs of unknowns that are not held fixed.
+/// Pairs of unknowns that are not fixed.
 fn of_image(index: usize, image: &CorrectedImage) -> Vec<Pair<'_>> {
     let name = |coefficient| {
         Unknown::Orientation {

@@ -1,4 +1,4 @@
-//! What is generated from the declarations and kept in the repository: `docs/products.md`, `config/schema`.
+//! Files generated from the declarations and kept in the repository: `docs/products.md`, `config/schema`.
 
 use std::fmt::Write as _;
 
@@ -28,7 +28,7 @@ pub fn schemas() -> Vec<DocumentSchema> {
     schemas
 }
 
-/// What says how each of all files is built.
+/// The content declarations of all files.
 fn contents() -> impl Iterator<Item = &'static Content> {
     let of_nets = NET_PRODUCTS.iter().map(|product| &product.content);
     let of_archives = ARCHIVE_PRODUCTS.iter().map(|product| &product.content);
@@ -128,7 +128,7 @@ pub fn documentation() -> String {
     text
 }
 
-/// A product in a list of products that there is always one of.
+/// A line for a product of which exactly one is written.
 fn line_of<W>(product: &Declaration<W>) -> String {
     format!(
         "| `{}` | {} | {} | {} | {} |\n",
@@ -140,7 +140,7 @@ fn line_of<W>(product: &Declaration<W>) -> String {
     )
 }
 
-/// The columns of a table; nothing for other files.
+/// The columns of a table; empty for other files.
 fn columns_of<W>(product: &Declaration<W>, of: &str) -> String {
     let Content::Table(columns) = product.content else {
         return String::new();

@@ -175,7 +175,7 @@ fn attribute(column: &Meaning) -> Value {
 /// gigabytes.
 ///
 /// # Errors
-/// Numbers that are not finite; what the disk refuses; lines that come back different.
+/// Numbers that are not finite; errors of the disk; lines that are read back differently.
 pub(super) fn write(path: &Path, features: Features) -> Result<u64> {
     let features = Features {
         attributes: features.attributes.for_gis(),
@@ -228,7 +228,7 @@ pub(super) fn points_as_text(
 /// Writes all features, a line each but for the end of the last one.
 ///
 /// # Errors
-/// Numbers that are not finite; what the disk refuses.
+/// Numbers that are not finite; errors of the disk.
 fn write_features(file: &mut impl Write, features: &Features) -> Result<()> {
     let columns = features.attributes.columns();
     let names: Vec<&str> = columns.map(|column| column.name).collect();

@@ -100,7 +100,7 @@ use registry::PRODUCTS;
 /// Writes every product of `site` below `directory`, with `pages` (or one page as its report), and reads each of them back.
 ///
 /// # Errors
-/// [`Kind::Io`](crate::error::Kind::Io) for what the disk refuses; [`Kind::Bug`](crate::error::Kind::Bug)
+/// [`Kind::Io`](crate::error::Kind::Io) for errors of the disk; [`Kind::Bug`](crate::error::Kind::Bug)
 /// for numbers that are not finite, inputs that do not belong together and files that read back
 /// differently.
 pub fn write_products<'a>(

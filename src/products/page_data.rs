@@ -153,7 +153,7 @@ impl<'a> PageData<'a> {
     /// Reads it from its product in the folder of a site.
     ///
     /// # Errors
-    /// A file of kind input that this version did not write; the disk's refusal.
+    /// A file of kind input that this version did not write; an error of the disk.
     pub fn read(site_folder: &Path) -> Result<PageData<'static>> {
         let path = site_folder.join(PAGE_DATA);
         decoded(&read(&path)?).in_file(path)

@@ -32,7 +32,7 @@ struct Described {
 /// Writes the label of `table`, which stands in the file `described` beside it.
 ///
 /// # Errors
-/// What the disk refuses; a label that comes back different.
+/// Errors of the disk; a label that is read back differently.
 pub(super) fn write(
     path: &Path,
     described: &Path,

@@ -146,7 +146,7 @@ impl PictureFile {
     /// Adds whole lines.
     ///
     /// # Errors
-    /// The system's refusal to write.
+    /// The system's error on writing.
     pub fn write(&mut self, pixels: &[u16]) -> Result<()> {
         let bytes: Vec<u8> = match (&self.writer, self.head.is_deep) {
             (_, false) => pixels.iter().map(|pixel| pixel.to_le_bytes()[0]).collect(),

@@ -94,7 +94,7 @@ impl RowsWriter {
     /// Begins the file `path` with rows of these columns.
     ///
     /// # Errors
-    /// What the disk refuses.
+    /// Errors of the disk.
     pub fn create(path: &Path, format: RowsFormat, schema: SchemaRef) -> Result<Self> {
         let staged = StagedFile::create(path)?;
         let writer = Self::new(Box::new(staged.writer()?), format, schema).in_file(path)?;
@@ -107,7 +107,7 @@ impl RowsWriter {
     /// Begins rows of these columns that go to `out`.
     ///
     /// # Errors
-    /// What `out` refuses.
+    /// Errors of `out`.
     pub fn new(out: Out, format: RowsFormat, schema: SchemaRef) -> Result<Self> {
         let form = match format {
             RowsFormat::Parquet => {
@@ -139,7 +139,7 @@ impl RowsWriter {
     /// Appends rows.
     ///
     /// # Errors
-    /// Other columns than before; those that text cannot hold; what the disk refuses.
+    /// Other columns than before; those that text cannot hold; errors of the disk.
     pub fn write(&mut self, batch: &RecordBatch) -> Result<()> {
         let written = self.append(batch);
         match &self.staged {
@@ -179,7 +179,7 @@ impl RowsWriter {
     /// * `notes` – metadata of Parquet, text by key; members of GeoJSON, whose text is JSON; CSV has no place for them
     ///
     /// # Errors
-    /// What the disk refuses; a Parquet file that comes back with another number of rows.
+    /// Errors of the disk; a Parquet file that is read back with another number of rows.
     pub fn finish(self, notes: Vec<(&str, String)>) -> Result<u64> {
         let (is_parquet, rows) = (matches!(self.form, Form::Parquet(_)), self.rows);
         let ended = self.form.end(notes);

@@ -15,7 +15,7 @@ use crate::error::{Error, IoError, Locate, Result};
 /// Writes the columns of `table` that are no bytes, and reads them back.
 ///
 /// # Errors
-/// Numbers that are not finite; what the disk refuses; values that come back different.
+/// Numbers that are not finite; errors of the disk; values that are read back differently.
 pub(super) fn write(path: &Path, table: Table) -> Result<u64> {
     let table = table.for_text();
     let mut file = create(path)?;
@@ -110,7 +110,7 @@ fn put_quoted(text: &mut Vec<u8>, field: &[u8], columns: usize) {
     text.push(b'"');
 }
 
-/// The disk's refusal, or the library's.
+/// An error of the disk, or the library's.
 fn refused(error: csv::Error) -> Error {
     let reason = error.to_string();
     match error.into_kind() {

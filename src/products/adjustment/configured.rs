@@ -1,4 +1,4 @@
-//! What was configured for an adjustment, as its document repeats it.
+//! Configuration of an adjustment, as repeated in its document.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -10,7 +10,7 @@ use crate::{
     schema::{all_positive, none_negative},
 };
 
-/// [`AdjustmentConfig`] without what is not set.
+/// [`AdjustmentConfig`] without unset keys.
 #[derive(Serialize, JsonSchema)]
 #[allow(
     clippy::struct_excessive_bools,

@@ -1,4 +1,4 @@
-//! Every profile of the archive in a row.
+//! Profiles of the archive, one per row.
 
 use super::{ArchiveProducts, WriteArchive};
 use crate::{

@@ -100,7 +100,7 @@ fn sigmas<'a>() -> [Column<Row<'a>>; 3] {
     ]
 }
 
-/// What laser points miss.
+/// Residuals of laser points.
 fn offs<'a>() -> [Column<Row<'a>>; 3] {
     [
         column(

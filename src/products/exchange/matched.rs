@@ -1,4 +1,4 @@
-//! The tie points that areograph measured itself, as measured: a table for `ties.files` and a control network of ISIS.
+//! The tie points that areograph measured, as measured: a table for `ties.files` and a control network of ISIS.
 
 use super::{
     adjusted::isis_name,
@@ -59,7 +59,7 @@ pub(in crate::products) static NETWORK: Declaration = Declaration {
     }],
 };
 
-/// The points behind those of files.
+/// The points after those of files.
 fn matched(ties: &Ties) -> impl Iterator<Item = &TiePoint> {
     let count: usize = ties.matched_points();
     ties.points.iter().skip(ties.points.len() - count)

@@ -1,4 +1,4 @@
-//! What the files of the folder `exchange` are, and the commands that read them.
+//! Descriptions of the files in the folder `exchange`, and the commands that read them.
 
 use std::fmt::Write as _;
 
@@ -80,7 +80,7 @@ fn text(of: &Context) -> String {
     text
 }
 
-/// Which positions of cameras all files follow, and whom that suits.
+/// The convention of camera positions in all files, and the programs that it suits.
 fn light_time(site: &SiteProducts) -> String {
     if site
         .images
@@ -107,10 +107,10 @@ fn light_time(site: &SiteProducts) -> String {
     )
 }
 
-/// What was written and is not empty, each file of images once, and what will be: those declared after this text.
+/// Files written and not empty, each file of images once, and files to be written: those declared after this text.
 fn files(of: &Context) -> Vec<&'static Declaration> {
     let mut files: Vec<&Declaration> = Vec::new();
-    // An empty table is there, but no program is told to read it.
+    // An empty table exists, but no program is pointed to it.
     let used = of
         .written
         .iter()
@@ -128,7 +128,7 @@ fn files(of: &Context) -> Vec<&'static Declaration> {
     files
 }
 
-/// The line, for every image if it is of images.
+/// The line, once per image for a file of images.
 fn for_images(line: &str, of: &Context) -> Vec<String> {
     // Commands are declared for Mars.
     let line = line.replace(
@@ -144,7 +144,7 @@ fn for_images(line: &str, of: &Context) -> Vec<String> {
         .collect()
 }
 
-/// What users of a program must know before they see its commands.
+/// Notes for users of a program, before its commands.
 fn about(program: Program, body: Body) -> String {
     match program {
         Program::StereoPipeline => format!(

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{error::Result, stages::match_laser::LaserMatch};
 
-/// Everything that the products of a match are made of.
+/// Inputs of the products of a match are made of.
 #[derive(Debug, Clone, Copy)]
 pub struct MatchProducts<'a> {
     /// The match.
@@ -23,7 +23,7 @@ pub struct MatchProducts<'a> {
     pub page: &'a str,
 }
 
-/// How a product of a match is written; gives its rows.
+/// How a product of a match is written; returns its number of rows.
 pub(super) type WriteMatch = fn(&Path, &MatchProducts) -> Result<u64>;
 
 /// The products of a match, in the order in which they are written.
@@ -52,7 +52,7 @@ static REPORT: Declaration<WriteMatch> = Declaration {
 /// Writes every product of a match below `directory`, and reads each of them back.
 ///
 /// # Errors
-/// [`Kind::Io`](crate::error::Kind::Io) for what the disk refuses; [`Kind::Bug`](crate::error::Kind::Bug) for numbers that are
+/// [`Kind::Io`](crate::error::Kind::Io) for errors of the disk; [`Kind::Bug`](crate::error::Kind::Bug) for numbers that are
 /// not finite and files that read back differently.
 pub fn write_match_products(directory: &Path, of: &MatchProducts) -> Result<Vec<Product>> {
     let write = |write: &WriteMatch, path: &Path| write(path, of);
@@ -63,7 +63,7 @@ pub fn write_match_products(directory: &Path, of: &MatchProducts) -> Result<Vec<
     Ok(products)
 }
 
-/// Writes a table as Parquet with what it is about.
+/// Writes a table as Parquet with its metadata.
 fn write_parquet(path: &Path, of: &MatchProducts, table: Table) -> Result<u64> {
     let similarity = of.result.similarity.word().to_owned();
     let about = vec![

@@ -50,7 +50,7 @@ struct Document<'a> {
     method: Method,
     /// The map.
     map: MapDocument,
-    /// Whether the result is to be used.
+    /// Whether the result is usable.
     verdict: &'a Verdict,
     /// Sums of the net.
     totals: &'a Totals,

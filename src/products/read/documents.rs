@@ -97,7 +97,7 @@ impl ImageDocument {
 /// Reads `ranges.json`.
 ///
 /// # Errors
-/// The disk's refusal; a document that is not JSON or lacks a member.
+/// An error of the disk; a document that is not JSON or lacks a member.
 pub fn read_ranges(path: &Path) -> Result<RangesDocument> {
     document(path, "range statistics")
 }

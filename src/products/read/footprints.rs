@@ -58,7 +58,7 @@ impl FootprintRows {
 /// Reads `footprints.parquet`.
 ///
 /// # Errors
-/// The disk's refusal; a file that is not Parquet; a column that is missing or of another type.
+/// An error of the disk; a file that is not Parquet; a column that is missing or of another type.
 pub fn read_footprints(path: &Path) -> Result<FootprintRows> {
     let mut rows = FootprintRows::default();
     let names = [
