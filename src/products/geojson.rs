@@ -187,7 +187,7 @@ pub(super) fn write(path: &Path, features: Features) -> Result<u64> {
     Ok(features.points.len() as u64)
 }
 
-/// What stands between two features.
+/// Separator of two features.
 pub(super) const SEPARATOR: &str = ",\n";
 
 /// Calls `take` with each of these rows.
@@ -207,7 +207,7 @@ fn each(
     Ok(())
 }
 
-/// Points with attributes, a line each but for the end of the last one.
+/// Points with attributes, one line each, without the end of the last line.
 pub(super) fn points_as_text(
     names: &[&str],
     values: &[Values],
@@ -225,7 +225,7 @@ pub(super) fn points_as_text(
     Ok(text)
 }
 
-/// Writes all features, a line each but for the end of the last one.
+/// Writes all features, one line each, without the end of the last line.
 ///
 /// # Errors
 /// Numbers that are not finite; errors of the disk.

@@ -72,14 +72,14 @@ impl From<&FootprintHeight> for Heights {
 struct Compared {
     kind: &'static str,
     id: String,
-    /// Why the adjustment rejected it; empty when it did not.
+    /// Reason for rejection by the adjustment; empty if it was accepted.
     rejected: String,
     before: Option<Heights>,
     after: Option<Heights>,
 }
 
 impl Compared {
-    /// The better known of both.
+    /// The better determined of both.
     fn latest(&self) -> Option<Heights> {
         self.after.or(self.before)
     }

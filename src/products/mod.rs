@@ -1,9 +1,9 @@
-//! Rows become the files that people's tools read; every file is read back before it counts.
+//! Writes rows to the files of other tools; every file is read back before it is accepted.
 //!
 //! A product is a `Declaration` in its file and a line of the registry; the
 //! files, the manifest's entries, the STAC item, `exchange/README.txt` and `docs/products.md` follow from it.
 //!
-//! The same site gives the same bytes; nothing here looks at a clock.
+//! The same site gives the same bytes; no clock is read here.
 //!
 //! A `Declaration` has the path, the content, the readers, the sites it applies to, its columns or schema, the function
 //! that writes it, and the commands that read it. A table is a list of `column(name, unit, meaning, value of a row)`
@@ -142,7 +142,7 @@ pub fn write_products<'a>(
     Ok(written.into_iter().map(|(product, _)| product).collect())
 }
 
-/// Writes one product, of an image if it is of one.
+/// Writes one product, for an image if the product is per image.
 fn write(
     declaration: &'static Declaration,
     of: &Context,

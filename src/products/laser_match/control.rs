@@ -1,4 +1,4 @@
-//! The table of laser control that `areograph calibrate` reads: where images show what the laser knows the place of.
+//! The table of laser control that `areograph calibrate` reads: image coordinates of points with laser positions.
 
 use super::WriteMatch;
 use crate::{

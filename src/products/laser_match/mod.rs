@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{error::Result, stages::match_laser::LaserMatch};
 
-/// Inputs of the products of a match are made of.
+/// Inputs of the products of a match.
 #[derive(Debug, Clone, Copy)]
 pub struct MatchProducts<'a> {
     /// The match.
@@ -23,7 +23,7 @@ pub struct MatchProducts<'a> {
     pub page: &'a str,
 }
 
-/// How a product of a match is written; returns its number of rows.
+/// Writer of a product of a match; returns its number of rows.
 pub(super) type WriteMatch = fn(&Path, &MatchProducts) -> Result<u64>;
 
 /// The products of a match, in the order in which they are written.
@@ -35,7 +35,7 @@ pub(super) static MATCH_PRODUCTS: &[&Declaration<WriteMatch>] = &[
     &REPORT,
 ];
 
-/// Laser points in images, where there are images.
+/// Laser points in images, if there are images.
 pub(super) use control::CONTROL;
 
 static REPORT: Declaration<WriteMatch> = Declaration {

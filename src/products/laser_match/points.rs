@@ -1,4 +1,4 @@
-//! Control points: where the laser has a place, and where the model has it.
+//! Control points: positions by the laser and in the model.
 
 use super::{MatchProducts, WriteMatch, natural, write_parquet};
 use crate::{

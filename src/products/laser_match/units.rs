@@ -1,4 +1,4 @@
-//! Units of laser shots: what their search found, and why they are kept or not.
+//! Units of laser shots: results of their search, and why they are kept or not.
 
 use super::{MatchProducts, WriteMatch, natural, write_parquet};
 use crate::{
@@ -91,7 +91,7 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
     columns
 }
 
-/// Where the model has the ground, seen from where the laser has it.
+/// Offset of the model from the laser.
 fn shifts<'a>() -> [Column<Row<'a>>; 6] {
     [
         column(
@@ -133,7 +133,7 @@ fn shifts<'a>() -> [Column<Row<'a>>; 6] {
     ]
 }
 
-/// How well that is known.
+/// Precision of the offset.
 fn deviations<'a>() -> [Column<Row<'a>>; 3] {
     [
         column(

@@ -71,7 +71,7 @@ fn features<'a>(of: &NetProducts<'a>) -> Features<'a> {
     Features {
         name: &of.config.net,
         table: "points",
-        // A net has no date; the clock of the machine would give other bytes each time.
+        // A net has no date; the machine's clock would give different bytes each time.
         newest_utc: "1970-01-01T00:00:00.000",
         body: Body::Mars,
         frame: "Mars body-fixed, areocentric latitude, east longitude, in the frame in which the controls are given",

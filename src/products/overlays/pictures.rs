@@ -12,7 +12,7 @@ use crate::{
     stages::lay_overlays::{CHIP_EDGE, Chip, Mark},
 };
 
-/// Least distance of two marks, pixels: of footprints that lie closer only some are drawn.
+/// Least distance of two marks, pixels: closer footprints are thinned.
 const MARKS_APART: f64 = 18.0;
 /// Least distance of two numbers, pixels.
 const NUMBERS_APART: f64 = 60.0;
@@ -30,13 +30,13 @@ pub(crate) struct Picture {
     pub(crate) height: u32,
     /// Lines and samples of the image that are one pixel; 1 in a piece.
     pub(crate) reduction: u32,
-    /// Every how many footprints one is marked.
+    /// Interval of the marked footprints.
     pub(crate) step: usize,
     /// The file.
     pub(crate) png: Vec<u8>,
 }
 
-/// A whole image with its footprints, of at most so many pixels; `None` of an image whose pixels are not known.
+/// A whole image with its footprints, of limited size; `None` for an image without known pixels.
 ///
 /// # Errors
 /// A picture that the library refuses, which is a bug in areograph.
@@ -174,8 +174,8 @@ fn levels(pixels: &[u8]) -> [u8; 256] {
     })
 }
 
-/// Mean distance of footprints that follow each other in a profile, lines and samples of the image; a large number where none
-/// do.
+/// Mean distance of footprints that follow each other in a profile, lines and samples of the image; a large number where no
+/// footprints do.
 fn spacing(marked: &[MarkedFootprint]) -> f64 {
     let follows = |pair: &&[MarkedFootprint]| {
         pair[0].profile == pair[1].profile && pair[0].number + 1 == pair[1].number
