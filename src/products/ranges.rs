@@ -24,7 +24,7 @@ use crate::{
     },
 };
 
-/// What each residual is, for readers of the files.
+/// Definitions of the residuals, for readers of the files.
 const DEFINITIONS: [(&str, &str); 7] = [
     (
         "range_minus_distance",
@@ -63,7 +63,7 @@ const DEFINITIONS: [(&str, &str); 7] = [
     ),
 ];
 
-/// Places at which rows of footprints come for the first time.
+/// Positions at which rows of footprints occur first.
 fn each_once(rows: &[u32]) -> Vec<usize> {
     let mut seen = HashSet::with_capacity(rows.len());
     let places = rows.iter().enumerate();
@@ -137,11 +137,11 @@ struct ProfileDocument<'a> {
     valid: bool,
     invalid_because: &'a [String],
     range_minus_distance_m: Summary,
-    /// Mean without outliers: the verdict goes by this one.
+    /// Mean without outliers: the one compared with the limit.
     mean_without_outliers_m: f64,
     range_minus_distance_crossover_m: Summary,
     decoding_m: Summary,
-    /// Its mean without the same shots: the verdict goes by this one.
+    /// Its mean without the same shots: the one compared with the limit.
     decoding_without_outliers_m: f64,
     spacecraft_radial_m: Summary,
     spacecraft_along_m: Summary,
@@ -153,10 +153,10 @@ struct ProfileDocument<'a> {
     bias_scan: Option<Scan<'a>>,
 }
 
-/// A scan without the members that are not known.
+/// A scan without unknown members.
 #[derive(Serialize, JsonSchema)]
 struct Scan<'a> {
-    /// Radius of the footprints: the one with which ranges spread less.
+    /// Radius of the footprints: the one with the smaller spread of ranges.
     radius: ScannedRadius,
     correction_s: &'a [f64],
     spread_m: &'a [f64],

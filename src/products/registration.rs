@@ -1,4 +1,4 @@
-//! Registration: line and sample of every footprint in every image as Parquet, what it took as JSON.
+//! Registration: line and sample of every footprint in every image as Parquet, statistics as JSON.
 
 use std::collections::BTreeMap;
 
@@ -23,7 +23,7 @@ use crate::{
     },
 };
 
-/// What the numbers are, for readers of the files.
+/// Definitions of the numbers, for readers of the files.
 const DEFINITIONS: [(&str, &str); 7] = [
     (
         "line, sample",

@@ -1,4 +1,4 @@
-//! The terrain model of a pair of images: heights, their standard deviations, and what is told of them.
+//! The terrain model of a pair of images: heights, their standard deviations, and statistics.
 
 mod document;
 

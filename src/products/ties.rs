@@ -35,14 +35,14 @@ pub(super) static TABLE: Declaration = Declaration {
     uses: &[],
 };
 
-/// All that is known of one measurement.
+/// One measurement with its results.
 struct Measurement<'a> {
     id: &'a str,
     image: &'a str,
     line: f64,
     sample: f64,
     sigma_px: Option<[f64; 2]>,
-    /// Empty for a tie point that took part in the adjustment, else why not.
+    /// Empty for a tie point used in the adjustment, else the reason why not.
     rejected: String,
     before: Option<(&'a IntersectedPoint, &'a MeasureResidual)>,
     after: Option<(&'a IntersectedPoint, &'a MeasureResidual)>,
@@ -109,7 +109,7 @@ fn measurements<'a>(
     found
 }
 
-/// Why tie points were rejected; what the intersection says of a point comes first.
+/// Reasons for rejecting tie points; the intersection's reason comes first.
 fn reasons(geometric: &GeometricProducts) -> BTreeMap<usize, String> {
     let adjusted = geometric.adjustment.iter();
     let ties = adjusted.flat_map(|of| &of.adjusted.rejected);

@@ -21,12 +21,12 @@ use crate::{
 const PROFILES_DRAWN: usize = 3_000;
 /// Places that are drawn on the map.
 const PLACES_DRAWN: usize = 4_000;
-/// Files with complaints, and failures, that are listed.
+/// Number of listed files with problems, and of failures.
 const LISTED: usize = 30;
-/// Corrections that are known worse than this are not drawn, seconds.
+/// Corrections with larger uncertainty than this are not drawn, seconds.
 const KNOWN_S: f64 = 0.05;
 
-/// The page of an archive; paths of shots count from the folder of the products, one above the page.
+/// The page of an archive; paths of shots are relative to the folder of the products, one above the page.
 ///
 /// # Errors
 /// A plot that cannot be drawn, which is a bug in areograph.

@@ -1,4 +1,4 @@
-//! The page of a calibration: verdict, figures of every step, what ties cannot see, cameras, other orbits.
+//! The page of a calibration: verdict, figures of every step, directions not determined by ties, cameras, other orbits.
 
 use super::{
     calibration_rounds::rounds as rounds_of,
@@ -15,7 +15,7 @@ use crate::{
     },
 };
 
-/// Points that are drawn.
+/// Number of points drawn.
 const DRAWN: usize = 3_000;
 
 /// The page of a calibration.
@@ -226,7 +226,7 @@ fn sight(of: &Calibration) -> String {
     paragraph(&words) + &table.finish()
 }
 
-/// Three digits that count.
+/// Three significant digits.
 fn significant(value: f64) -> String {
     let decimals = (0..12).find(|decimals| value * 10_f64.powi(*decimals) >= 100.0);
     label(value, decimals.map_or(12, |of| of.unsigned_abs() as usize))

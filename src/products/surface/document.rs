@@ -12,7 +12,7 @@ use crate::{
     units::RADIANS_PER_DEGREE,
 };
 
-/// What each number is, for readers of the file.
+/// Definitions of the numbers, for readers of the file.
 const DEFINITIONS: [(&str, &str); 5] = [
     (
         "cells",
@@ -54,7 +54,7 @@ pub(super) struct Document<'a> {
     definitions: Vec<Definition>,
     /// Identifiers of both images.
     images: [&'a str; 2],
-    /// Whether so few cells were found that none is believed: then there is no surface.tif.
+    /// Whether too few cells matched to be significant: then there is no surface.tif.
     refused: bool,
     matching: Matching,
     cells: Cells,
@@ -82,7 +82,7 @@ struct Matching {
     height_of_pixel_m: f64,
     /// Median correlation.
     correlation: f64,
-    /// Median distance of the images across the parallax on the ground: what their orientations leave.
+    /// Median distance of the images across the parallax on the ground: the residual of their orientations.
     across_parallax_m: f64,
 }
 
@@ -100,7 +100,7 @@ struct Cells {
 
 #[derive(Serialize, JsonSchema)]
 struct Heights {
-    /// The sphere that they count from.
+    /// The sphere that they refer to.
     sphere_m: f64,
     #[schemars(range(min = 0.0))]
     sigma_m: f64,
@@ -112,7 +112,7 @@ struct Heights {
 struct Shots<'a> {
     mola_takes_part: bool,
     all: Summary,
-    /// Root mean square of the standard deviations of the differences about what they have in common.
+    /// Root mean square of the standard deviations of the differences about their common offset.
     #[schemars(range(min = 0.0))]
     sigma_m: f64,
     #[schemars(range(min = 0.0))]

@@ -1,4 +1,4 @@
-//! The worst profiles, and how to find their shots.
+//! The worst profiles, and commands that find their shots.
 
 use crate::{
     products::{WorstProfile, profile_name},
@@ -59,7 +59,7 @@ pub(super) fn worst_profiles(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>])
     table.finish() + &paragraph(words) + &commands(worst)
 }
 
-/// The profile, with a link where its shots could be written.
+/// The profile, with a link if its shots could be written.
 fn named(of: &WorstProfile<'_>) -> Cell {
     let id = of.profile.id();
     match &of.shots {
@@ -84,7 +84,7 @@ fn correction(profile: &ArchiveProfile) -> String {
     }
 }
 
-/// Command lines that give the shots of profiles.
+/// Command lines that find the shots of profiles.
 fn commands(worst: &[WorstProfile<'_>]) -> String {
     let lines: Vec<String> = worst.iter().map(command).collect();
     format!(
@@ -94,7 +94,7 @@ fn commands(worst: &[WorstProfile<'_>]) -> String {
     )
 }
 
-/// The command line that gives the shots of a profile, clouds left out.
+/// The command line that finds the shots of a profile, without clouds.
 fn command(of: &WorstProfile<'_>) -> String {
     let [start_s, stop_s] = of.profile.tags_et_s;
     let name = profile_name(of.file, of.profile);
