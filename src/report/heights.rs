@@ -1,4 +1,4 @@
-//! What MOLA says of the heights of tie points, and what may be said of their accuracy.
+//! Heights of tie points against MOLA, and statements of their accuracy.
 
 mod boresight;
 mod profile;
@@ -52,7 +52,7 @@ fn write(geometric: &GeometricProducts) -> Result<String> {
     Ok(html)
 }
 
-/// The three statements that may be made, and by whose judgement.
+/// The three statements of accuracy, and their basis.
 fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
     let mut table = Table::new(
         "Accuracy of the tie points",
@@ -118,7 +118,7 @@ fn place_says(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
     }
 }
 
-/// All that says where a site lies.
+/// All sources of a site's position.
 pub(super) fn place_by(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
     let adjusted = adjustment.adjusted;
     let by_relief = adjusted.relief.as_ref().is_some_and(|relief| relief.used);
@@ -141,7 +141,7 @@ pub(super) fn place_by(geometric: &GeometricProducts, adjustment: &AdjustmentPro
     }
 }
 
-/// What says where a site lies before the images do.
+/// A priori sources of a site's position.
 pub(super) fn known_beforehand(geometric: &GeometricProducts) -> &'static str {
     if geometric.ties.points.iter().any(|tie| tie.known.is_some()) {
         "orbit, attitude and given ground points"
@@ -170,7 +170,7 @@ const fn agreement_says(adjustment: &AdjustmentProducts) -> &'static str {
     }
 }
 
-/// What is stated of height and place after the adjustment.
+/// Statements of height and position after the adjustment.
 pub(super) fn absolute(
     geometric: &GeometricProducts,
     adjustment: &AdjustmentProducts,
@@ -218,7 +218,7 @@ pub(super) fn absolute(
     ]
 }
 
-/// Half of what the images of the worst pair disagree by along the flight before the adjustment, metres.
+/// Half of the largest along-track disagreement of a pair before the adjustment, metres.
 fn half_apart_m(geometric: &GeometricProducts) -> Option<f64> {
     let pairs = BeforeAfter::all(geometric);
     let worst = BeforeAfter::worst(&pairs)?;

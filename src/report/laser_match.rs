@@ -1,4 +1,4 @@
-//! The page of a match of laser profiles with a terrain model: verdict, map of the shifts, held-out shots, every unit and its
+//! The page of a match of laser profiles with a terrain model: verdict, map of the shifts, withheld shots, every unit and its
 //! similarities.
 
 mod similarity;
@@ -15,7 +15,7 @@ use crate::{
     units::wrap_pi,
 };
 
-/// Share of the map that the longest arrow may take.
+/// Largest share of the map for the longest arrow.
 const ARROW_SHARE: f64 = 0.15;
 
 /// The page of a match.

@@ -67,7 +67,7 @@ pub(super) fn profiles(site: &RunDifference) -> String {
     table.finish() + &paragraph(&format!("The same in both: {same}."))
 }
 
-/// A difference in as few digits as tell it.
+/// A difference in the fewest digits that show it.
 fn signed(difference: f64) -> String {
     if difference.abs() < 1e-3 {
         format!("{difference:+.1e}").replace('-', "−")
@@ -156,7 +156,7 @@ pub(super) fn items(site: &RunDifference) -> String {
     body
 }
 
-/// Columns of things that differ.
+/// Columns of differing items.
 const NO_ROLES: &[Column] = &[
     Column::Text("name"),
     Column::Text("change"),
@@ -210,7 +210,7 @@ fn item_table(what: &str, items: &Items) -> String {
     table.finish() + &paragraph(&format!("The same in both: {}{order}.", items.unchanged))
 }
 
-/// Notes and complaints of one run alone.
+/// Notes and problems of one run only.
 pub(super) fn texts(site: &RunDifference) -> String {
     let told = |texts: &Texts, what: &str| {
         let runs = [(&texts.only_in_a, "A"), (&texts.only_in_b, "B")].into_iter();

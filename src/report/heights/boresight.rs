@@ -1,4 +1,4 @@
-//! What a laser on the bus of the cameras says of the place.
+//! Position by a laser on the bus of the cameras.
 
 use super::{
     super::{
@@ -14,7 +14,7 @@ use crate::{
 
 const MRAD_PER_RADIAN: f64 = 1e3;
 
-/// Where the laser points in simultaneous images, where that was asked.
+/// Pointing of the laser in simultaneous images, if requested.
 pub(super) fn boresight(adjusted: &Adjusted) -> String {
     match &adjusted.boresight {
         None => String::new(),
