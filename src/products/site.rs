@@ -192,7 +192,7 @@ impl<'a> SiteProducts<'a> {
     }
 
     /// The spacecraft of footprints and images: those whose kernels are read, and those that support data name; if none is
-    /// named, that of the altimeter.
+    /// named, the altimeter.
     pub(super) fn spacecraft(&self) -> String {
         let supports = || self.images.iter().map(|image| &image.times.support);
         // Tables of shots do not name theirs.

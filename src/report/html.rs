@@ -338,7 +338,7 @@ impl Table {
                     escape(&text)
                 )
             }
-            // The hidden text states it only once.
+            // Nested marks count once.
             Cell::Told(cell, _) => self.cell(place, *cell, from),
         }
     }

@@ -14,13 +14,13 @@ use crate::{
     units::METRES_PER_KM,
 };
 
-/// Deviations that are listed.
+/// Number of deviations listed.
 const LISTED: usize = 25;
-/// Vectors and points that are drawn.
+/// Number of vectors and points drawn.
 const DRAWN: usize = 3_000;
-/// Pictures that are listed.
+/// Number of pictures listed.
 const PICTURES: usize = 100;
-/// Share of the map that the longest vector takes.
+/// Share of the map for the longest vector.
 const VECTOR_ROOM: f64 = 0.12;
 /// Width of the axes in a plot's own units, about: both axes are drawn to one scale.
 const AXIS_WIDTH: f64 = 880.0;
@@ -64,7 +64,7 @@ fn lead(config: &NetConfig, net: &Triangulation) -> String {
     verdict(tone, &headline, &body) + &checks::listed(&net.verdict.checks)
 }
 
-/// What was done, by the paper's names.
+/// Steps of the method, by the paper's names.
 fn way(config: &NetConfig) -> String {
     let way = &config.triangulation;
     let local = if way.local { ", LOCAL" } else { "" };
@@ -152,7 +152,7 @@ fn deviations(net: &Triangulation) -> Result<String> {
     )
 }
 
-/// Whether a measurement has a deviation within its brick, or was left out.
+/// Whether a measurement has a deviation within its brick, or was rejected.
 fn shown(of: &MeasurementResult) -> bool {
     of.in_brick.is_some() || of.removed
 }
@@ -246,7 +246,7 @@ fn bricks(net: &Triangulation) -> String {
 fn blunders(net: &Triangulation) -> String {
     let mut worst: Vec<&MeasurementResult> =
         net.measurements.iter().filter(|of| shown(of)).collect();
-    // One reference for all: what was left out has no deviation within its brick.
+    // One reference for all: rejected measurements have no deviation within their brick.
     let length_m = |of: &MeasurementResult| of.deviation.x_m.hypot(of.deviation.y_m);
     worst.sort_by(|a, b| {
         b.removed
