@@ -31,7 +31,8 @@ use crate::{
 /// The column of the bounding box of each point, and its parts: readers of GeoParquet use it to skip rows.
 const BBOX: &str = "bbox";
 const BBOX_PARTS: [&str; 4] = ["xmin", "ymin", "xmax", "ymax"];
-/// Columns that shots are selected by: a search may keep several values of each, so that GIS has them too; and their positions.
+/// Columns that shots are selected by: a search may keep several values of each, so that GIS has them too; and their
+/// positions.
 const ALSO_IN_GIS: [&str; 4] = ["channel", "class", "attitude_flag", GEOMETRY];
 /// The key of the query, and of the completeness of its answer.
 const SEARCH: &str = "areograph_search";

@@ -1,5 +1,6 @@
-//! Numbers on a grid as a cloud-optimised `GeoTIFF`: tables of all sizes first, then tiles of the smallest size to those of the
-//! whole, so that a viewer needs the beginning and the tiles that it shows. Without compression, for readers that require it.
+//! Numbers on a grid as a cloud-optimised `GeoTIFF`: tables of all sizes first, then tiles of the smallest size to
+//! those of the whole, so that a viewer needs the beginning and the tiles that it shows. Without compression, for
+//! readers that require it.
 //!
 //! The TIFF library writes tables after their data; here they precede them and are therefore written by this module.
 
@@ -121,7 +122,8 @@ impl GeoTiff<'_> {
         let place_m = [west_rad * self.parallel_rad.cos(), north_rad].map(|of| of * radius_m);
         let names = format!("Equirectangular {}|{crs}|", self.body.names().name);
         let split = names.find('|').map_or(0, |at| at + 1);
-        // Map, areas, a name; sphere, its name, degrees, both half-axes, meridian; map, its kind, metres, parallel, longitude.
+        // Map, areas, a name; sphere, its name, degrees, both half-axes, meridian; map, its kind, metres, parallel,
+        // longitude.
         let user = 32_767;
         let keys: [[usize; 4]; 16] = [
             [1, 1, 0, 15],

@@ -1,4 +1,5 @@
-//! Heights of tie points and of footprints that both images of a pair show against MOLA, before and after the adjustment, as Parquet.
+//! Heights of tie points and of footprints that both images of a pair show against MOLA, before and after the
+//! adjustment, as Parquet.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -10,8 +10,8 @@
 //!   `sample · summing + starting_detector_sample − detector_center.sample`. With the edge of the detector
 //!   at 0 the centre of the narrow angle lies at 2048 / 2 = 1024; ALE's 1023.5 with a start of 1 is off by 1.5
 //!   pixels.
-//! * The line of the detector is taken at coordinate 0 (`losToEcf`), so its centre is 0, or the value that places a line
-//!   off the boresight there.
+//! * The line of the detector is taken at coordinate 0 (`losToEcf`), so its centre is 0, or the value that places a
+//!   line off the boresight there.
 //! * `usgscsm` corrects no light time itself: positions follow the convention of the run. ALE's are those seen from the
 //!   centre of Mars; they are available with `light_time = "centre"`.
 //! * Pointing is sampled from before the first line to after the last; ALE's table starts 1.15 s late. Nodes are

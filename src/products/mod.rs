@@ -97,7 +97,8 @@ use crate::error::{Locate, Result};
 use product::{Context, Declaration, Scope, Write, Written};
 use registry::PRODUCTS;
 
-/// Writes every product of `site` below `directory`, with `pages` (or one page as its report), and reads each of them back.
+/// Writes every product of `site` below `directory`, with `pages` (or one page as its report), and reads each of them
+/// back.
 ///
 /// # Errors
 /// [`Kind::Io`](crate::error::Kind::Io) for errors of the disk; [`Kind::Bug`](crate::error::Kind::Bug)

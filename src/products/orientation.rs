@@ -54,8 +54,8 @@ struct Document<'a> {
     invalid_because: Vec<&'a str>,
     times: Times<'a>,
     conventions: [Cow<'static, str>; 6],
-    /// For the kernels' orientation: the other conventions see the boresight's ground point in the middle of the image by
-    /// these lines later, and at samples larger by these.
+    /// For the kernels' orientation: the other conventions see the boresight's ground point in the middle of the image
+    /// by these lines later, and at samples larger by these.
     light_time: &'a LightTimeEffect,
     #[schemars(range(min = 3))]
     samples: usize,

@@ -38,8 +38,8 @@ pub(super) fn write_each<W>(
     products.collect()
 }
 
-/// A product, declared once: the files, the STAC item, `exchange/README.txt` and `docs/products.md` follow. `W` is how it is
-/// written: for a site by [`Write`].
+/// A product, declared once: the files, the STAC item, `exchange/README.txt` and `docs/products.md` follow. `W` is how
+/// it is written: for a site by [`Write`].
 pub(super) struct Declaration<W = Write> {
     /// Path below the site's folder; [`IMAGE`] stands for an image's identifier.
     pub(super) path: &'static str,

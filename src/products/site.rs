@@ -79,7 +79,8 @@ pub struct SiteProducts<'a> {
 pub struct Program {
     /// Version of CSPICE as reported by it, for example `CSPICE_N0067`.
     pub cspice: String,
-    /// Stages that the run passed, with the number of their method: it is raised when a stage computes different results.
+    /// Stages that the run passed, with the number of their method: it is raised when a stage computes different
+    /// results.
     pub methods: Vec<(String, u32)>,
 }
 
@@ -191,8 +192,8 @@ impl<'a> SiteProducts<'a> {
             .collect()
     }
 
-    /// The spacecraft of footprints and images: those whose kernels are read, and those that support data name; if none is
-    /// named, the altimeter.
+    /// The spacecraft of footprints and images: those whose kernels are read, and those that support data name; if none
+    /// is named, the altimeter.
     pub(super) fn spacecraft(&self) -> String {
         let supports = || self.images.iter().map(|image| &image.times.support);
         // Tables of shots do not name theirs.

@@ -14,7 +14,8 @@ use crate::wording::Wording;
 
 /// Rows whose values are in memory at once.
 const ROWS_AT_ONCE: usize = 65_536;
-/// Rows that a thread turns into text at once, and how often in a wave: the text of a wave, 3 MB per thread, is kept in memory.
+/// Rows that a thread turns into text at once, and how often in a wave: the text of a wave, 3 MB per thread, is kept in
+/// memory.
 pub(super) const ROWS_OF_A_TASK: usize = 2_048;
 const TASKS_OF_A_THREAD: usize = 4;
 

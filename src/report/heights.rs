@@ -225,8 +225,8 @@ fn half_apart_m(geometric: &GeometricProducts) -> Option<f64> {
     Some(0.5 * worst.before.along_track_parallax_m.abs())
 }
 
-/// Whether the stated position is more certain than the images allow: it holds only if errors of both images are as likely,
-/// and half of their difference is no less open.
+/// Whether the stated position is more certain than the images allow: it holds only if errors of both images are as
+/// likely, and half of their difference is no less open.
 pub(super) fn is_open(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> bool {
     let heights = adjustment.adjusted.heights.as_ref();
     let stated = heights.map(|of| of.mean_sigma_m[0].max(of.mean_sigma_m[1]));

@@ -1,5 +1,5 @@
-//! The page of a match of laser profiles with a terrain model: verdict, map of the shifts, withheld shots, every unit and its
-//! similarities.
+//! The page of a match of laser profiles with a terrain model: verdict, map of the shifts, withheld shots, every unit
+//! and its similarities.
 
 mod similarity;
 

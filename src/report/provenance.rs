@@ -128,7 +128,7 @@ fn products(site: &SiteProducts) -> String {
     folded("Products", &table.finish())
 }
 
-/// The keys of the configuration as written, with their defaults; all others have their defaults.
+/// The written keys of the configuration beside their defaults; all other keys have the defaults.
 fn settings(site: &SiteProducts) -> String {
     if site.config.keys.is_empty() {
         return String::new();
@@ -149,7 +149,7 @@ fn settings(site: &SiteProducts) -> String {
     folded("Settings", &table.finish())
 }
 
-/// Whether a key as written is the declared one: the name of a list of tables is followed by the index of its entry.
+/// Whether a key as written is the declared one: the name of a list of tables is followed by the entry.
 fn is_of(key: &str, declared: &str) -> bool {
     let Some((table, name)) = declared.rsplit_once('.') else {
         return key == declared;

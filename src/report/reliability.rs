@@ -1,4 +1,4 @@
-//! What of the adjustment can be trusted, in the words of surveyors: absolute position, gross errors that no
+//! Reliability of the adjustment: absolute position, gross errors that no
 //! residual shows, unknowns that cannot be separated, and rejected points.
 
 use super::{
@@ -15,21 +15,21 @@ use crate::{
     stages::adjust::{Adjusted, AdjustmentSummary, PointKind, RejectionReason, ScalarResidual},
 };
 
-/// Error in standard deviations over the root of the redundancy number that Baarda's test at 3.29 finds in
+/// Error in standard deviations over the root of the redundancy number that Baarda's test at 3.29 detects in
 /// eight cases of ten.
 ///
 /// # Source
 /// Baarda 1968, A testing procedure for use in geodetic networks.
 const NON_CENTRALITY: f64 = 4.13;
-/// Below this redundancy number a residual hides the error behind it.
+/// Below this redundancy number a residual hides its error.
 const HIDDEN: f64 = 0.1;
-/// Above this one it shows the error well.
+/// Above this one it shows the error clearly.
 const SHOWN: f64 = 0.3;
-/// Pairs of unknowns, and blunders, that are listed; the rest is counted.
+/// Number of pairs of unknowns, and of blunders, listed; the rest are counted.
 const CORRELATED_SHOWN: usize = 12;
 const BLUNDERS_SHOWN: usize = 20;
 
-/// What the adjustment determines and what it does not, with numbers.
+/// Determined and undetermined quantities of the adjustment, with numbers.
 pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
     const MOVED: [&str; 3] = [
         "adjustment.json#/adjustment/summary/ties/corrections_m/0/mean",
@@ -148,7 +148,7 @@ impl Controlled {
         Summary::of(&self.redundancies).mean
     }
 
-    /// The smallest error that the test finds, with its unit.
+    /// The smallest error that the test detects, with its unit.
     fn smallest(&self) -> String {
         let error = NON_CENTRALITY * self.sigma / self.mean().sqrt();
         if error.is_finite() {
@@ -159,7 +159,7 @@ impl Controlled {
     }
 }
 
-/// Share of a gross error that its own residual shows.
+/// Share of a gross error visible in its own residual.
 pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
     let all = Controlled::all(site, adjusted);
     let mut table = Table::new(
@@ -207,7 +207,7 @@ pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
     sentences + &folded("Redundancy by kind of observation", &table)
 }
 
-/// A share; one that rounds to nothing is still there.
+/// A share; one that rounds to zero is still shown.
 fn per_cent(share: f64) -> String {
     if 0.0 < share && share < 5e-4 {
         "< 0.1 %".to_owned()

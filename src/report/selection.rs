@@ -1,4 +1,4 @@
-//! Windows and filters, and what they rejected.
+//! Windows and filters, and the shots that they rejected.
 
 use super::{
     html::{Cell, Column, Table, paragraph},

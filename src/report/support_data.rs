@@ -1,4 +1,4 @@
-//! Images by support data: what their files hold, and that nothing is applied to it.
+//! Images by support data: contents of their files, to which nothing is applied.
 
 use super::{
     html::{Column, Table, paragraph},

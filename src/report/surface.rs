@@ -1,4 +1,4 @@
-//! The terrain model of a pair of images: what it is, what MOLA says of it, and how it looks.
+//! The terrain model of a pair of images: statistics, comparison with MOLA, and pictures.
 
 mod pictures;
 
@@ -47,7 +47,7 @@ fn write(site: &SiteProducts, account: &SurfaceAccount) -> Result<String> {
     Ok(files + &table + &compared(account) + &format!("<div class=\"plots\">\n{pictures}</div>\n"))
 }
 
-/// How the model was made, and what became of its cells.
+/// Making of the model, and outcomes of its cells.
 fn made(site: &SiteProducts, account: &SurfaceAccount) -> String {
     let mut table = Table::new(
         "Terrain model of a pair of images",

@@ -58,14 +58,15 @@ struct Document<'a> {
     /// The lines of the camera.
     #[schemars(length(min = 2))]
     cameras: Vec<CameraDocument<'a>>,
-    /// Drift of the orbit from line to line, body-fixed, metres: true minus the support data that were given. The constant part
-    /// of the orbit's error is in the offset angles.
+    /// Drift of the orbit from line to line, body-fixed, metres: true minus the support data that were given. The
+    /// constant part of the orbit's error is in the offset angles.
     drift_m_per_line: [Value; 3],
     /// Offset angles as determined by ties only.
     tie_sight: TieSightDocument,
     /// Figures before, and after every step.
     steps: &'a [CalibrationStep],
-    /// The rounds of a calibration from pixels (other members are of the last); absent where points were read from tables.
+    /// The rounds of a calibration from pixels (other members are of the last); absent where points were read from
+    /// tables.
     #[serde(skip_serializing_if = "Option::is_none")]
     rounds: Option<RoundsDocument>,
     /// Results of withheld control; absent without control.
@@ -99,7 +100,8 @@ struct RoundDocument {
     round: u32,
     /// Tie points.
     ties: u64,
-    /// Their residuals in the worst line, root mean square, pixels, with the cameras that the terrain model was made with.
+    /// Their residuals in the worst line, root mean square, pixels, with the cameras that the terrain model was made
+    /// with.
     #[serde(skip_serializing_if = "Option::is_none")]
     model_tie_rms_px: Option<f64>,
     /// The same with the cameras of this round.
@@ -145,7 +147,8 @@ struct CameraDocument<'a> {
     omega_deg: Value,
     /// κ, about the axis that looks down (yaw), degrees.
     kappa_deg: Value,
-    /// Tangent across the flight: coefficients of the powers of s′, which is −1 at the first edge of the image and 1 at the last.
+    /// Tangent across the flight: coefficients of the powers of s′, which is −1 at the first edge of the image and 1 at
+    /// the last.
     m: &'a [Value],
     /// Tangent along the flight, likewise.
     n: &'a [Value],

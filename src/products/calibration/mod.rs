@@ -75,8 +75,8 @@ static REPORT: Declaration<WriteCalibration> = Declaration {
 /// Writes every product of a calibration below `directory`, and reads each of them back.
 ///
 /// # Errors
-/// [`Kind::Io`](crate::error::Kind::Io) for errors of the disk; [`Kind::Bug`](crate::error::Kind::Bug) for numbers that are
-/// not finite and files that read back differently.
+/// [`Kind::Io`](crate::error::Kind::Io) for errors of the disk; [`Kind::Bug`](crate::error::Kind::Bug) for numbers that
+/// are not finite and files that read back differently.
 pub fn write_calibration_products(
     directory: &Path,
     of: &CalibrationProducts,

@@ -68,8 +68,8 @@ pub struct NetworkMeasure<'a> {
 /// Writes `network` to `path`; returns the number of its points.
 ///
 /// # Errors
-/// [`Kind::Bug`](crate::error::Kind::Bug) for names that no quotes of the format can hold and numbers that are not finite;
-/// [`Kind::Io`](crate::error::Kind::Io).
+/// [`Kind::Bug`](crate::error::Kind::Bug) for names that no quotes of the format can hold and numbers that are not
+/// finite; [`Kind::Io`](crate::error::Kind::Io).
 pub fn write_control_network(path: &Path, network: &ControlNetwork) -> Result<u64> {
     let text = text(network).in_file(path)?;
     write_text(path, &text)?;

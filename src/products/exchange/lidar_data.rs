@@ -89,8 +89,8 @@ struct Measure<'a> {
 /// ISIS names images of its camera in another way.
 ///
 /// # Source
-/// `MgsMocSerialNumber.trn` of ISIS (spacecraft, clock, instrument, filter) and the network of M01/00115, which names that image
-/// `MGS/610472061:131/MOC-NA/BROAD_BAND`.
+/// `MgsMocSerialNumber.trn` of ISIS (spacecraft, clock, instrument, filter) and the network of M01/00115, which names
+/// that image `MGS/610472061:131/MOC-NA/BROAD_BAND`.
 #[must_use]
 pub fn isis_serial_number(image: &ImageTimes) -> Option<String> {
     let clock = image.sclk_start.as_ref()?;

@@ -1,4 +1,5 @@
-//! Products of matching laser profiles with a terrain model: units, control points, the table that calibrations read, the report.
+//! Products of matching laser profiles with a terrain model: units, control points, the table that calibrations read,
+//! the report.
 
 mod control;
 mod points;
@@ -52,8 +53,8 @@ static REPORT: Declaration<WriteMatch> = Declaration {
 /// Writes every product of a match below `directory`, and reads each of them back.
 ///
 /// # Errors
-/// [`Kind::Io`](crate::error::Kind::Io) for errors of the disk; [`Kind::Bug`](crate::error::Kind::Bug) for numbers that are
-/// not finite and files that read back differently.
+/// [`Kind::Io`](crate::error::Kind::Io) for errors of the disk; [`Kind::Bug`](crate::error::Kind::Bug) for numbers that
+/// are not finite and files that read back differently.
 pub fn write_match_products(directory: &Path, of: &MatchProducts) -> Result<Vec<Product>> {
     let write = |write: &WriteMatch, path: &Path| write(path, of);
     let mut products = write_each(directory, MATCH_PRODUCTS, write)?;

@@ -78,8 +78,8 @@ static COLUMNS: Declaration<WriteNet> = Declaration {
 /// Writes every product of a net below `directory`, and reads each of them back.
 ///
 /// # Errors
-/// [`Kind::Io`](crate::error::Kind::Io) for errors of the disk; [`Kind::Bug`](crate::error::Kind::Bug) for numbers that are
-/// not finite and files that read back differently.
+/// [`Kind::Io`](crate::error::Kind::Io) for errors of the disk; [`Kind::Bug`](crate::error::Kind::Bug) for numbers that
+/// are not finite and files that read back differently.
 pub fn write_net_products(directory: &Path, net: &NetProducts) -> Result<Vec<Product>> {
     write_each(directory, NET_PRODUCTS, |write, path| write(path, net))
 }

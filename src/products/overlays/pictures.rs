@@ -174,8 +174,8 @@ fn levels(pixels: &[u8]) -> [u8; 256] {
     })
 }
 
-/// Mean distance of footprints that follow each other in a profile, lines and samples of the image; a large number where no
-/// footprints do.
+/// Mean distance of footprints that follow each other in a profile, lines and samples of the image; a large number
+/// where no footprints do.
 fn spacing(marked: &[MarkedFootprint]) -> f64 {
     let follows = |pair: &&[MarkedFootprint]| {
         pair[0].profile == pair[1].profile && pair[0].number + 1 == pair[1].number

@@ -77,8 +77,8 @@ impl Labels {
         self.letters = letters;
     }
 
-    /// Places a name with its left edge, at half its height, at the first of `places` where it fits on the map and on no
-    /// other name; otherwise omits it and returns false.
+    /// Places a name with its left edge, at half its height, at the first of `places` where it fits on the map and on
+    /// no other name; otherwise omits it and returns false.
     pub(in crate::report) fn place(
         &mut self,
         text: &str,
@@ -163,7 +163,8 @@ fn around(text: &str, (x, y): (i32, i32), far: i32) -> [(i32, i32); 8] {
     ]
 }
 
-/// Width of a text in units of the drawing, at most: as wide as the widest of the usual sans-serif fonts has its letters.
+/// Width of a text in units of the drawing, at most: as wide as the widest of the usual sans-serif fonts has its
+/// letters.
 pub(in crate::report) fn width(text: &str) -> i32 {
     width_in(text, LETTERS)
 }

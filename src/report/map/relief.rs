@@ -233,8 +233,8 @@ impl Relief {
         super::round_length_m(wanted)
     }
 
-    /// The picture as an image of an SVG that fills `width` by `height`: colours of heights between `low` and `high`, lit
-    /// from the north-west at 45°.
+    /// The picture as an image of an SVG that fills `width` by `height`: colours of heights between `low` and `high`,
+    /// lit from the north-west at 45°.
     ///
     /// # Errors
     /// A picture that the library refuses, which is a bug in areograph.

@@ -2,8 +2,8 @@
 
 use plotters::style::RGBColor;
 
-/// Colours of series. Any two of them and of [`MARK`] are apart for readers with deuteranopia too, on white paper and, as
-/// the page's style maps them, on dark screens; all contrast with the background.
+/// Colours of series. Any two of them and of [`MARK`] are apart for readers with deuteranopia too, on white paper and,
+/// as the page's style maps them, on dark screens; all contrast with the background.
 pub(in crate::report) const COLOURS: [RGBColor; 7] = [
     RGBColor(0x0e, 0x5a, 0x99),
     RGBColor(0xff, 0x61, 0x0d),
