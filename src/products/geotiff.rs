@@ -345,7 +345,7 @@ mod tests {
             let tiff::decoder::DecodingResult::F32(tile) = decoder.read_chunk(0).unwrap() else {
                 panic!("{number}");
             };
-            // No number is none in the whole, and does not count among its means.
+            // A cell without a number stays empty in the full size, and is not counted in means.
             let expected = [NO_DATA, 0.5 * (1.0 + 1.0) * 2.0 / 3.0, 1.5];
             assert!((tile[0] - expected[number]).abs() < 0.1, "{}", tile[0]);
             // A row farther south is one more, or two, or four.

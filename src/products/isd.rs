@@ -357,7 +357,7 @@ fn provenance<'a>(
             ),
             distortion,
             format!(
-                "instrument_position: {}{}; reading programs must add none{}",
+                "instrument_position: {}{}; reading programs must not add any{}",
                 image.orientation.light_time.convention.positions(),
                 if times.support.is_some() { "" } else { ", the convention of the whole run" },
                 match round {

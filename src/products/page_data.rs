@@ -273,7 +273,7 @@ fn write(path: &Path, site: &SiteProducts) -> Result<()> {
         return Ok(());
     }
     Err(ProductError::ReadBack {
-        what: "what the report shows".to_owned(),
+        what: "the data of the report".to_owned(),
     })
     .in_file(path)
 }

@@ -69,7 +69,7 @@ fn overview(adjusted: &Adjusted) -> String {
     let [along, across] = summary.tie_components;
     let against_configured = |component: f64| {
         let words = if summary.degrees_of_freedom == 0 {
-            "nothing is redundant"
+            "no redundancy"
         } else if component < WORSE_THAN_CONFIGURED.recip() {
             "better than configured"
         } else if component <= WORSE_THAN_CONFIGURED {

@@ -39,7 +39,7 @@ fn numbers(of: &Rounds) -> String {
             Column::Number("ties"),
             Column::Number("ties, px"),
             Column::Number("units kept"),
-            Column::Number("units refused"),
+            Column::Number("units rejected"),
             Column::Number("units shifted by (median), cells"),
             Column::Number("model − laser (median), m"),
             Column::Number("control, px"),

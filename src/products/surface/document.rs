@@ -16,7 +16,7 @@ use crate::{
 const DEFINITIONS: [(&str, &str); 5] = [
     (
         "cells",
-        "of common that both images show by their orientation, filled have a height; unfilled has the others by reason: flat \
+        "common: cells that both images show by their orientation; filled: those with a height; unfilled: the others by reason: flat \
          (no texture), missing (lines or pixels), edge (of an image), unlike (no correlation), ambiguous (two heights correlate), \
          unsettled, one_way (other heights with the other image as the template), uncertain, alone (contradicted by cells around it)",
     ),
