@@ -102,7 +102,7 @@ impl RunDifference {
         told
     }
 
-    /// What changed, one sentence each, the inputs first; unchanged items are omitted.
+    /// Changes, one sentence each, the inputs first; unchanged items are omitted.
     #[must_use]
     pub fn sentences(&self) -> Vec<String> {
         let mut told = Vec::new();

@@ -342,7 +342,7 @@ fn read_back(path: &Path, head: &str, features: &Features) -> Result<()> {
     Ok(())
 }
 
-/// Makes sure that the lines of these rows hold their features.
+/// Checks that the lines of these rows hold their features.
 fn compare(
     features: &Features,
     rows: Range<usize>,

@@ -50,7 +50,7 @@ pub(super) fn geo_metadata(
     })
 }
 
-/// PROJJSON of the sphere of `body` in `IAU_2015`; [`frame`](super::coordinates::frame) describes their frame.
+/// PROJJSON of the sphere of `body` in `IAU_2015`; [`frame`](super::coordinates::frame) describes its frame.
 /// Coordinates are (longitude, latitude) all the same, as GeoParquet requires.
 ///
 /// Source: IAU coordinate systems of the OGC Planetary working group, radius of Archinal et al. 2018.

@@ -1,5 +1,5 @@
 //! Numbers on a grid as a cloud-optimised `GeoTIFF`: tables of all sizes first, then tiles of the smallest size to
-//! those of the whole, so that a viewer needs the beginning and the tiles that it shows. Without compression, for
+//! those of the whole, so that a viewer needs only the beginning and the tiles that it shows. Without compression, for
 //! readers that require it.
 //!
 //! The TIFF library writes tables after their data; here they precede them and are therefore written by this module.

@@ -12,7 +12,7 @@
 //! columns of those formats. JSON documents are types: the document and its schema in `config/schema` come from one
 //! `struct` (`schema.rs`). `tests/products/generated.rs` fails when `docs/products.md` is stale.
 //!
-//! The same input gives the same bytes, whatever the number of threads; `finished_utc` in the manifest is the
+//! The same input gives the same bytes, for any number of threads; `finished_utc` in the manifest is the
 //! exception. Formats that hold a date (`GeoPackage`, dBASE) carry that of the newest shot.
 
 mod adjusted_footprints;

@@ -171,7 +171,7 @@ impl PictureFile {
     /// Ends the picture and gives it its name.
     ///
     /// # Errors
-    /// The system's refusal to write, flush or rename; fewer lines than declared.
+    /// The system's error on writing, flushing or renaming; fewer lines than declared.
     pub fn finish(self) -> Result<()> {
         let path = self.file.path();
         match self.writer {

@@ -94,7 +94,7 @@ pub(super) enum Content {
 pub(super) enum Write {
     /// For every site.
     Site(fn(&Path, &Context) -> Result<Option<u64>>),
-    /// For a site with footprints: GIS readers refuse tables without a row, or guess their types.
+    /// For a site with footprints: GIS readers reject tables without a row, or guess their types.
     Footprints(fn(&Path, &Context) -> Result<u64>),
     /// For every image.
     Image(fn(&Path, &Context, &ImageProducts) -> Result<u64>),

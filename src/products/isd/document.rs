@@ -183,7 +183,7 @@ pub(super) struct Provenance<'a> {
     pub(super) version: &'static str,
 }
 
-/// How well the tables are interpolated, measured against the kernels.
+/// Interpolation error of the tables, measured against the kernels.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct Interpolation {
     /// 0 where the nodes come from support data, and there is nothing to compare with.

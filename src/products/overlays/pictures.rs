@@ -39,7 +39,7 @@ pub(crate) struct Picture {
 /// A whole image with its footprints, of limited size; `None` for an image without known pixels.
 ///
 /// # Errors
-/// A picture that the library refuses, which is a bug in areograph.
+/// A picture that the library rejects, which is a bug in areograph.
 pub(crate) fn strip(site: &SiteProducts, image: usize, pixels_max: u64) -> Result<Option<Picture>> {
     let Some(look) = site
         .overlays
@@ -88,7 +88,7 @@ pub(crate) fn strip(site: &SiteProducts, image: usize, pixels_max: u64) -> Resul
 /// A piece of an image with its marks.
 ///
 /// # Errors
-/// A picture that the library refuses, which is a bug in areograph.
+/// A picture that the library rejects, which is a bug in areograph.
 pub(crate) fn piece(chip: &Chip) -> Result<Picture> {
     let mut canvas = Canvas::new(&chip.pixels, EDGES, range_dn(&chip.pixels));
     for (mark, at) in &chip.marks {
@@ -100,7 +100,7 @@ pub(crate) fn piece(chip: &Chip) -> Result<Picture> {
 /// Two pieces in one picture: the first in red, the second in green and blue.
 ///
 /// # Errors
-/// A picture that the library refuses, which is a bug in areograph.
+/// A picture that the library rejects, which is a bug in areograph.
 pub(crate) fn anaglyph(first: &Chip, second: &Chip) -> Result<Picture> {
     let levels = [first, second].map(|chip| levels(&chip.pixels));
     let pixels =

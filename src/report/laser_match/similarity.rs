@@ -33,7 +33,7 @@ const MARKS: &str = "<g id=\"similarity-none\"><path d=\"M-6 0H6M0-6V6\" stroke=
 /// The pictures of all units that were searched; empty without any.
 ///
 /// # Errors
-/// A picture that the library refuses, which is a bug in areograph.
+/// A picture that the library rejects, which is a bug in areograph.
 pub(super) fn pictures(of: &LaserMatch) -> Result<String> {
     let shown = of.units.iter().filter_map(Shown::of);
     let shown: Vec<Shown> = shown.collect();

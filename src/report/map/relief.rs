@@ -237,7 +237,7 @@ impl Relief {
     /// lit from the north-west at 45°.
     ///
     /// # Errors
-    /// A picture that the library refuses, which is a bug in areograph.
+    /// A picture that the library rejects, which is a bug in areograph.
     pub(super) fn svg(&self, (low, high): (f64, f64), width: f64, height: f64) -> Result<String> {
         let mut pixels = vec![0_u8; 4 * self.shown.len()];
         for (cell, east, south) in self.slopes() {
@@ -299,7 +299,7 @@ pub(in crate::report) fn lit(channel: u8, light: f64) -> u8 {
 /// Pixels of four bytes, the last of them the opacity, as PNG.
 ///
 /// # Errors
-/// A picture that the library refuses.
+/// A picture that the library rejects.
 pub(in crate::report) fn png(
     pixels: &[u8],
     columns: u32,

@@ -73,7 +73,7 @@ pub(in crate::report) fn figure_html(
     } else {
         format!("<ul class=\"keys\">{keys}</ul>\n")
     };
-    // The drawing library says its size in pixels; the page decides that.
+    // The drawing library states its size in pixels; the page decides that.
     let svg = svg.find("viewBox").map_or_else(
         || svg.to_owned(),
         |at| {

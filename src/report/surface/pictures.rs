@@ -54,7 +54,7 @@ struct Bar {
 /// The three pictures.
 ///
 /// # Errors
-/// A picture that the library refuses, which is a bug in areograph.
+/// A picture that the library rejects, which is a bug in areograph.
 pub(super) fn figures(account: &SurfaceAccount, body: Body) -> Result<String> {
     let frame = Frame::of(&account.look);
     let exaggeration = frame.exaggeration();
