@@ -14,7 +14,7 @@ use crate::{
 const TILE: usize = 256;
 /// Value of cells without a number.
 const NO_DATA: f32 = -32_768.0;
-/// Signals GDAL that tables come first; 32 and its own bytes counted from its third line.
+/// Signals to GDAL that tables come first; 32 and its own bytes counted from its third line.
 const LAYOUT: &str = "LAYOUT=IFDS_BEFORE_DATA\nKNOWN_INCOMPATIBLE_EDITION=NO\n ";
 
 /// Types of values.
