@@ -1,4 +1,4 @@
-//! What `report diff --json` answers.
+//! Answer of `report diff --json`.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -6,27 +6,27 @@ use serde::Serialize;
 use super::RunDifference;
 use crate::schema::DocumentSchema;
 
-/// What differs between two outputs, site by site.
+/// Differences between two outputs, site by site.
 #[derive(Debug, Serialize, JsonSchema)]
 #[schemars(
     title = "Differences between two runs",
-    description = "Answer of `areograph report diff --json`: for every site of both outputs what differs, B - A. \
-                   Metres, arcseconds and seconds; what is unknown is left out."
+    description = "Answer of `areograph report diff --json`: differences of every site in both outputs, B - A. \
+                   Metres, arcseconds and seconds; unknown values are omitted."
 )]
 pub struct Answer<'a> {
     /// Sites of both.
     pub sites: Vec<SiteAnswer<'a>>,
-    /// Sites that only A has.
+    /// Sites only in A.
     pub only_in_a: &'a [String],
-    /// Sites that only B has.
+    /// Sites only in B.
     pub only_in_b: &'a [String],
 }
 
-/// What came of a site of both outputs.
+/// Result of comparing a site of both outputs.
 #[derive(Debug, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum SiteAnswer<'a> {
-    /// What differs.
+    /// The differences.
     Difference(&'a RunDifference),
     /// A site that could not be compared.
     Failed {

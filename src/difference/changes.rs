@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use crate::store::manifest::Manifest;
 
-/// Numbers that differ by less than this share of the larger one are the same but for rounding.
+/// Numbers that differ by less than this fraction of the larger one are equal except for rounding.
 const ROUNDING_SHARE: f64 = 1e-6;
 
 /// A value that differs; missing where a run does not have it.
@@ -24,7 +24,7 @@ pub struct Change {
     pub b: Option<Value>,
 }
 
-/// Texts of one run alone.
+/// Texts of one run only.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Texts {
     /// Only in the first run.
@@ -43,7 +43,7 @@ impl Change {
 }
 
 impl Change {
-    /// Whether both are numbers that are the same but for rounding.
+    /// Whether both are numbers and equal except for rounding.
     #[must_use]
     pub fn is_rounding(&self) -> bool {
         let size = |value: &Option<Value>| value.as_ref().and_then(Value::as_f64).map(f64::abs);
@@ -118,7 +118,7 @@ pub(super) fn biases(manifest: &Manifest) -> BTreeMap<&str, Value> {
     biases.map(|bias| (&*bias.name, entry(bias))).collect()
 }
 
-/// A value as people read it, fractions to six decimals or seven digits; a dash for none.
+/// A value for display, fractions to six decimals or seven digits; a dash for a missing value.
 #[must_use]
 pub fn text(value: Option<&Value>) -> String {
     match value {

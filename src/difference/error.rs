@@ -4,7 +4,7 @@ use crate::error::{Cause, Kind};
 
 #[derive(Debug, thiserror::Error)]
 pub(super) enum DifferenceError {
-    /// Neither a site's folder nor a folder of such.
+    /// Neither a site's folder nor a folder of sites.
     #[error("no manifest.json in this folder or below it; expected products of `areograph run`")]
     NoProducts,
     /// Two names of one folder.

@@ -1,4 +1,4 @@
-//! How far footprints moved.
+//! Movement of footprints.
 
 use std::{cmp::Ordering, collections::BTreeMap, path::Path};
 
@@ -24,7 +24,7 @@ pub struct FootprintsDifference {
     pub only_in_a: usize,
     /// Only in the second run.
     pub only_in_b: usize,
-    /// Of those in both; missing when there are none.
+    /// Movement of those in both; missing if none is in both.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub movement: Option<FootprintsMovement>,
 }
@@ -32,7 +32,7 @@ pub struct FootprintsDifference {
 /// Movement of the footprints that are in both runs.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct FootprintsMovement {
-    /// How many moved by more than rounding.
+    /// Number that moved by more than rounding.
     pub moved: usize,
     /// Distance between the points with raw radii.
     pub distance_m: Size,
@@ -43,7 +43,7 @@ pub struct FootprintsMovement {
     /// The shot that moved farthest, if one moved.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub farthest: Option<ShotName>,
-    /// Some of the shots.
+    /// A sample of the shots.
     #[serde(skip)]
     pub places: Vec<Moved>,
 }
@@ -64,7 +64,7 @@ pub struct ShotName {
 }
 
 impl FootprintsDifference {
-    /// Whether a footprint moved, or is there in one run only.
+    /// Whether a footprint moved, or is in one run only.
     #[must_use]
     pub fn moved(&self) -> bool {
         let moved = |movement: &FootprintsMovement| {
@@ -104,7 +104,7 @@ fn movement(a: &FootprintRows, b: &FootprintRows, pairs: &[Pair]) -> Option<Foot
     let change = |a: &[f64], b: &[f64]| {
         Component::of(pairs.iter().map(|(first, second)| b[*second] - a[*first]))
     };
-    // Of several that moved as far, the first.
+    // Of several equal movements, the first.
     let (mut farthest, mut farthest_m) = (None, ROUNDING);
     for pair in pairs {
         if distance_m(pair) > farthest_m {
@@ -142,7 +142,7 @@ fn shot_name(rows: &FootprintRows, row: usize) -> ShotName {
 /// Place of the file's name among all names, orbit, record, shot.
 type Identity = (usize, u32, u32, u32);
 
-/// Rows of shots that are in both; of shots that two files of one name share, the first with the first.
+/// Rows of shots in both; shots shared by two files of one name are paired in order.
 fn matched(a: &FootprintRows, b: &FootprintRows) -> Vec<Pair> {
     let names: BTreeMap<&str, usize> = a
         .files

@@ -1,4 +1,4 @@
-//! How far cameras moved and turned.
+//! Movement and rotation of cameras.
 
 use std::path::Path;
 
@@ -23,7 +23,7 @@ use crate::{
     units::RADIANS_PER_ARCSECOND,
 };
 
-/// Samples belong together when their lines agree to this: an ET of these years is good to 1e-8 s, which
+/// Samples are matched when their lines agree to this: an ET of these years is good to 1e-8 s, which
 /// is 2e-5 of the shortest line.
 const SAME_LINE: f64 = 1e-3;
 
@@ -32,7 +32,7 @@ const SAME_LINE: f64 = 1e-3;
 pub struct ImageDifference {
     /// Image identifier, with `, adjusted` where it is the adjusted orientation.
     pub image: String,
-    /// Whether its model is within the limits in the first run; missing when the image is not there.
+    /// Whether its model is within the limits in the first run; missing if the image is absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub valid_in_a: Option<bool>,
     /// The same in the second run.
@@ -42,17 +42,17 @@ pub struct ImageDifference {
     pub times: Vec<Change>,
     /// Statistics of the polynomial models that differ.
     pub models: Vec<Change>,
-    /// Samples that only the first run has; those of both are in the movement.
+    /// Samples only in the first run; those of both are in the movement.
     pub samples_only_in_a: usize,
-    /// Samples that only the second run has.
+    /// Samples only in the second run.
     pub samples_only_in_b: usize,
-    /// Of samples in both runs; missing when there are none.
+    /// Movement of samples in both runs; missing if there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub movement: Option<ImageMovement>,
 }
 
 impl ImageDifference {
-    /// Whether it moved or turned by more than rounding, or is not the same samples.
+    /// Whether it moved or turned by more than rounding, or has other samples.
     #[must_use]
     pub fn differs(&self) -> bool {
         let moved = |of: &ImageMovement| {
@@ -88,7 +88,7 @@ pub struct ImageMovement {
     pub about_y_arcsec: Component,
     /// Turn about the boresight.
     pub about_z_arcsec: Component,
-    /// Turn of the boresight × its range: what the turn alone does on the ground, across the line of sight.
+    /// Turn of the boresight × its range: effect of the turn on the ground, across the line of sight.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pointing_ground_m: Option<Size>,
     /// Distance between the points where the boresight meets the ellipsoid: position and turn together.
@@ -140,14 +140,14 @@ pub struct SampleMovement {
 impl ImageDifference {
     /// Whether the camera moved or turned, or cannot be compared: in one run only, or without a common line.
     ///
-    /// Samples of one run alone are no movement where others can be compared: the path was sampled at
+    /// Samples of one run only are not a movement where others can be compared: the path was sampled at
     /// other lines.
     #[must_use]
     pub fn moved(&self) -> bool {
         self.movement.as_ref().is_none_or(ImageMovement::moved)
     }
 
-    /// Whether the image is there in one run only.
+    /// Whether the image is in one run only.
     #[must_use]
     pub const fn only_in_one(&self) -> bool {
         self.valid_in_a.is_some() != self.valid_in_b.is_some()
@@ -162,11 +162,11 @@ impl ImageMovement {
     }
 }
 
-/// Orientations of an image: the name of their files, and what follows the identifier.
+/// Orientations of an image: file name, and suffix of the identifier.
 pub(super) const ORIENTATIONS: [(&str, &str); 2] =
     [("orientation", ""), ("adjusted_orientation", ", adjusted")];
 
-/// Compares one image of `body`; a document is missing where its folder does not have the image.
+/// Compares one image of `body`; a document is missing if its folder does not have the image.
 pub(super) fn between(
     image: &str,
     (orientation, which): (&str, &str),
@@ -292,7 +292,7 @@ fn boresight(from_camera: &Matrix3<f64>) -> Vector3<f64> {
     from_camera.column(2).into_owned()
 }
 
-/// The three axes of the orbit at row `index`, as columns in Mars-fixed components; there are two rows at least.
+/// The three axes of the orbit at row `index`, as columns in Mars-fixed components; there are at least two rows.
 ///
 /// The flight is seen in inertial space: in the frame of Mars itself it would lean by up to 4 degrees.
 fn orbit_axes(body: Body, rows: &[SampleRow], index: usize) -> Matrix3<f64> {

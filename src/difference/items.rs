@@ -8,7 +8,7 @@ use crate::{body::Body, store::manifest::Manifest};
 /// A named thing.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Item {
-    /// Name; a further thing of one name counts as `name (2)` and so on.
+    /// Name; repeated names are numbered `name (2)` and so on.
     pub name: String,
     /// Role of a kernel.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -18,7 +18,7 @@ pub struct Item {
     pub hash: String,
 }
 
-/// A thing that both runs have, not the same in both.
+/// A thing in both runs that differs.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct ChangedItem {
     /// Name.
@@ -34,7 +34,7 @@ pub struct ChangedItem {
     pub b: String,
 }
 
-/// How two lists of things differ.
+/// Differences between two lists of things.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Items {
     /// Only in the second run.
@@ -43,9 +43,9 @@ pub struct Items {
     pub removed: Vec<Item>,
     /// In both, with different hashes.
     pub changed: Vec<ChangedItem>,
-    /// How many are the same in both.
+    /// Number that are the same in both.
     pub unchanged: usize,
-    /// Whether those in both come in another order: of kernels that hold the same, the last one wins.
+    /// Whether those in both are in another order: of kernels with the same data, the last one wins.
     pub reordered: bool,
 }
 
@@ -150,7 +150,7 @@ pub(super) fn images(manifest: &Manifest, orientation: &str) -> Vec<String> {
         .collect()
 }
 
-/// Names of `a` in their order, then those of `b` alone.
+/// Names of `a` in their order, then those only in `b`.
 pub(super) fn united(a: &[String], b: &[String]) -> Vec<String> {
     let unmatched = b.iter().filter(|name| !a.contains(name));
     a.iter().chain(unmatched).cloned().collect()

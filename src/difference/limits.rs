@@ -1,11 +1,11 @@
-//! Movements judged by limits.
+//! Movements compared with limits.
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{Outcome, RunDifference, images::ImageDifference, movement::ROUNDING, words::quantity};
 
-/// How far things may move; without a limit everything may.
+/// Limits of movements; a missing limit allows any movement.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Limits {
     /// For footprints, perspective centres and the boresight's ground points, metres.
@@ -19,10 +19,10 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// The difference with its outcome, and what is beyond these limits.
+    /// The difference with its outcome, and the movements beyond these limits.
     ///
-    /// Footprints and samples of one run alone have no movement: at a window's edge they come and go. Where
-    /// nothing is left to compare, a limit cannot be said to be kept, and that is told as well.
+    /// Footprints and samples of one run only have no movement: at a window's edge they come and go. Where
+    /// nothing is left to compare, a limit cannot be applied, which is reported as well.
     pub(super) fn judged(&self, mut difference: RunDifference) -> RunDifference {
         let mut beyond = self.footprints(&difference);
         for image in &difference.images {
@@ -37,7 +37,7 @@ impl Limits {
         difference
     }
 
-    /// The share of a limit that a movement uses, above 1 (or NaN) beyond it; rounding uses nothing of any limit.
+    /// The share of a limit that a movement uses, above 1 (or NaN) beyond it; 0 for rounding.
     #[must_use]
     pub fn share(found: f64, limit: f64) -> f64 {
         if found <= ROUNDING {
@@ -98,7 +98,7 @@ impl Limits {
     }
 }
 
-/// The sentence for a movement beyond its limit, if there is one and it is.
+/// The sentence for a movement beyond its limit, if any.
 fn beyond(what: impl Fn() -> String, found: f64, limit: Option<f64>, unit: &str) -> Option<String> {
     let limit = limit?;
     // Written so that NaN is beyond.

@@ -1,7 +1,7 @@
-//! What differs between two runs of a site, read from their published products alone.
+//! Differences between two runs of a site, read only from their published products.
 //!
-//! `A` is the earlier run and `B` the later one, by the order in which they are named; a movement is
-//! `B − A`. What is in both is compared by identity: shots by file, orbit, record and shot number,
+//! `A` is the earlier run and `B` the later one, by the order of the arguments; a movement is
+//! `B − A`. Items in both are compared by identity: shots by file, orbit, record and shot number,
 //! samples of an image by their line, profiles, images, kernels, stages and products by name.
 //!
 //! Products are compared, not the cache: the result holds for the files in use, also for products from elsewhere. The
@@ -54,11 +54,11 @@ pub struct RunDifference {
     pub format: &'static str,
     /// Site identifier.
     pub site: String,
-    /// What came of it, in one word.
+    /// Outcome, in one word.
     pub outcome: Outcome,
-    /// Limits that movements were judged by.
+    /// Limits that were applied to movements.
     pub limits: Limits,
-    /// Movements beyond the limits, and what the limits could not be applied to, one sentence each.
+    /// Movements beyond the limits, and limits that could not be applied, one sentence each.
     pub beyond_limits: Vec<String>,
     /// The first run.
     pub a: RunEntry,
@@ -68,7 +68,7 @@ pub struct RunDifference {
     pub kernels: Items,
     /// Whether configuration keys or values differ, by the hashes of both.
     pub configuration_changed: bool,
-    /// Configuration keys whose values differ, as they are written.
+    /// Configuration keys whose values differ, as written.
     pub configuration: Vec<Change>,
     /// Time corrections that differ.
     pub biases: Vec<Change>,
@@ -78,11 +78,11 @@ pub struct RunDifference {
     pub figures: Vec<Change>,
     /// Rejected shots by reason, that differ.
     pub rejected: Vec<Change>,
-    /// Problems in the input of one run alone; manifests quote the first ones.
+    /// Problems in the input of one run only; manifests quote the first ones.
     pub complaints: Texts,
-    /// Notes of one run alone; that a list names a kernel is told by the kernels.
+    /// Notes of one run only; without those of kernels named by a list, which the kernels show.
     pub notes: Texts,
-    /// Stages by their fingerprints: what entered them, not what came out.
+    /// Stages by their fingerprints: of their inputs, not their outputs.
     pub stages: Items,
     /// Product files by content.
     pub products: Items,
@@ -97,21 +97,21 @@ pub struct RunDifference {
     pub ties: Vec<Moved>,
 }
 
-/// What came of a comparison.
+/// Outcome of a comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// Manifests are equal but for the time of publication.
+    /// Manifests are equal except for the time of publication.
     NothingChanged,
-    /// Something changed, no footprint, position or pointing among it; images may be sampled at other lines.
+    /// Something changed, but no footprint, position or pointing; images may be sampled at other lines.
     NothingMoved,
-    /// Footprints, positions or pointing moved; or footprints or images are there in one run only.
+    /// Footprints, positions or pointing moved; or footprints or images are in one run only.
     Moved,
     /// Something moved farther than a limit allows, or a limit could not be applied.
     BeyondLimit,
 }
 
-/// A run, as its manifest introduces it.
+/// A run, by its manifest.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct RunEntry {
     /// Version of the program.
@@ -123,7 +123,7 @@ pub struct RunEntry {
     /// BLAKE3 of its keys and values.
     #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
     pub configuration_blake3: String,
-    /// Whether the products keep the limits of the configuration, and which are broken.
+    /// Whether the products keep the limits of the configuration, and which are exceeded.
     pub verdict: Verdict,
 }
 
@@ -154,10 +154,10 @@ pub struct ProfileDifference {
     pub b: Option<ProfileDocument>,
 }
 
-/// Compares the products in two folders of one site; movements beyond `limits` are told.
+/// Compares the products in two folders of one site; movements beyond `limits` are reported.
 ///
 /// # Errors
-/// A folder without products, with half-made ones or with others than its manifest says; products of
+/// A folder without products, with incomplete ones or with others than its manifest states; products of
 /// two sites; products that this version cannot read.
 pub fn compare(a: &Path, b: &Path, limits: &Limits) -> Result<RunDifference> {
     let (first, second) = (read_published(a)?, read_published(b)?);
@@ -177,7 +177,7 @@ pub fn compare(a: &Path, b: &Path, limits: &Limits) -> Result<RunDifference> {
     Ok(limits.judged(read))
 }
 
-/// What manifests alone can tell.
+/// Differences between the manifests.
 fn of_manifests(a: &Manifest, b: &Manifest, limits: &Limits) -> RunDifference {
     let mut b_when_a_was_made = b.clone();
     b_when_a_was_made.finished_utc.clone_from(&a.finished_utc);
@@ -211,7 +211,7 @@ fn of_manifests(a: &Manifest, b: &Manifest, limits: &Limits) -> RunDifference {
     }
 }
 
-/// Adds what the products themselves tell.
+/// Adds the differences between the products.
 fn read_movements(
     mut difference: RunDifference,
     runs: [(&Path, &Manifest); 2],
@@ -243,7 +243,7 @@ fn read_movements(
     Ok(difference)
 }
 
-/// Profiles of both runs, in the order of the first, then those of the second alone.
+/// Profiles of both runs, in the order of the first, then those only in the second.
 fn profiles(a: Vec<ProfileDocument>, mut b: Vec<ProfileDocument>) -> Vec<ProfileDifference> {
     let mut profiles = Vec::with_capacity(a.len());
     for first in a {
@@ -266,7 +266,7 @@ fn profiles(a: Vec<ProfileDocument>, mut b: Vec<ProfileDocument>) -> Vec<Profile
 }
 
 impl RunDifference {
-    /// Whether a footprint, a position or the pointing moved, or a footprint or an image is there in one run
+    /// Whether a footprint, a position or the pointing moved, or a footprint or an image is in one run
     /// only.
     #[must_use]
     pub fn moved(&self) -> bool {
@@ -279,13 +279,13 @@ impl RunDifference {
         self.a.verdict.word() != self.b.verdict.word()
     }
 
-    /// Whether both runs published the same.
+    /// Whether both runs published the same products.
     #[must_use]
     pub fn is_unchanged(&self) -> bool {
         self.outcome == Outcome::NothingChanged
     }
 
-    /// How soon a reader must know of it: a verdict that changed before all else, the worse the sooner; then what moved.
+    /// Order of presentation: changed verdicts first, the worst at the top; then movements.
     #[must_use]
     pub fn severity(&self) -> (bool, bool, bool, Outcome) {
         let (changed, after) = (self.verdict_changed(), &self.b.verdict);

@@ -33,7 +33,7 @@ pub struct Component {
 }
 
 impl Size {
-    /// Of at least one value; zero of none.
+    /// Of at least one value; zero without values.
     pub(super) fn of(values: impl Iterator<Item = f64> + Clone) -> Self {
         Self {
             mean: mean(values.clone()),
@@ -41,14 +41,14 @@ impl Size {
         }
     }
 
-    /// Of the values that are known, if one is.
+    /// Of the known values, if any.
     pub(super) fn of_known(values: impl Iterator<Item = Option<f64>> + Clone) -> Option<Self> {
         let known = values.flatten();
         known.clone().next()?;
         Some(Self::of(known))
     }
 
-    /// Whether this is more than rounding; what is not known is.
+    /// Whether this is more than rounding; NaN counts as movement.
     #[must_use]
     pub fn moved(&self) -> bool {
         !(self.max <= ROUNDING)
@@ -56,7 +56,7 @@ impl Size {
 }
 
 impl Component {
-    /// Of at least one value; zero of none.
+    /// Of at least one value; zero without values.
     pub(super) fn of(values: impl Iterator<Item = f64> + Clone) -> Self {
         Self {
             mean: mean(values.clone()),
@@ -64,14 +64,14 @@ impl Component {
         }
     }
 
-    /// Whether this is more than rounding; what is not known is.
+    /// Whether this is more than rounding; NaN counts as movement.
     #[must_use]
     pub fn moved(&self) -> bool {
         !(self.max_abs <= ROUNDING)
     }
 }
 
-/// Zero of none.
+/// Zero without values.
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0.0_f64), |(sum, count), value| {
         (sum + value, count + 1.0)

@@ -1,4 +1,4 @@
-//! Which folders of two outputs belong together.
+//! Matching folders of two outputs.
 
 use std::{
     collections::BTreeMap,
@@ -17,13 +17,13 @@ use crate::{
 pub struct Pairs {
     /// Folders of one site in A and in B.
     pub both: Vec<(PathBuf, PathBuf)>,
-    /// Sites that only A has.
+    /// Sites only in A.
     pub only_in_a: Vec<String>,
-    /// Sites that only B has.
+    /// Sites only in B.
     pub only_in_b: Vec<String>,
 }
 
-/// What is to be compared when `a` and `b` are named: two folders of one site, or two folders of sites.
+/// The folders to compare for `a` and `b`: two folders of one site, or two folders of sites.
 ///
 /// # Errors
 /// A folder without products, the same folder twice, a site's folder beside one of several, no site in
@@ -45,7 +45,7 @@ pub fn pairs(a: &Path, b: &Path) -> Result<Pairs> {
         }),
         (false, false) => common(a, b),
         (one_in_a, _) => {
-            // The other one may hold nothing at all, which is then the better message.
+            // If the other one holds nothing at all, that is the better message.
             sites(if one_in_a { b } else { a })?;
             Err(DifferenceError::OneAndSeveral).in_file(if one_in_a { a } else { b })
         }

@@ -1,4 +1,4 @@
-//! Where on the ground things lie in both runs, for maps of what moved.
+//! Positions on the ground in both runs, for maps of movements.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -9,16 +9,16 @@ use crate::{error::Result, products::read::read_adjusted_ties};
 /// A place in the first run and in the second, IAU 2000, metres.
 pub type Moved = [Vector3<f64>; 2];
 
-/// Places that are kept of one kind.
+/// Number of places kept per kind.
 const KEPT: usize = 400;
 
-/// At most so many of `moved`, evenly chosen in their order.
+/// At most `KEPT` of `moved`, evenly chosen in their order.
 pub(super) fn some_of(moved: impl ExactSizeIterator<Item = Moved>) -> Vec<Moved> {
     let step = moved.len().div_ceil(KEPT).max(1);
     moved.step_by(step).collect()
 }
 
-/// Adjusted tie points of both runs, by their identifiers; none where a run has none.
+/// Adjusted tie points of both runs, by their identifiers; empty if a run has none.
 pub(super) fn ties(a: &Path, b: &Path) -> Result<Vec<Moved>> {
     let file = "ties.parquet";
     let files = [a, b].map(|folder| folder.join(file));

@@ -16,13 +16,13 @@ use crate::{
 /// Texts of one kind that a sentence quotes; the JSON answer has all.
 const FEW: usize = 3;
 
-/// A number with three decimals, or two digits when it is too small for them; what is rounding is 0.
+/// A number with three decimals, or two digits when it is too small for them; rounding errors are 0.
 #[must_use]
 pub fn quantity(value: f64) -> String {
     if value.abs() <= ROUNDING {
         return "0".to_owned();
     }
-    // Two digits, in decimals as far as they can be read.
+    // Two digits, in decimals where readable.
     let text = match value.abs() {
         0.01.. => format!("{value:.3}"),
         0.001.. => format!("{value:.4}"),
@@ -102,11 +102,11 @@ impl RunDifference {
         told
     }
 
-    /// What changed, one sentence each, the inputs first; nothing for what is the same.
+    /// Changes, one sentence each, the inputs first; unchanged items are omitted.
     #[must_use]
     pub fn sentences(&self) -> Vec<String> {
         let mut told = Vec::new();
-        // A verdict that changed is what a reader must know before anything else.
+        // A changed verdict comes first.
         let verdict_changed = self.verdict_changed();
         if verdict_changed {
             told.push(self.verdict_sentence());
@@ -128,7 +128,7 @@ impl RunDifference {
         told
     }
 
-    /// The same without what tables below tell, and without images that stayed where they were.
+    /// The same without the contents of the tables below, and without unmoved images.
     #[must_use]
     pub fn first_sentences(&self) -> Vec<String> {
         let mut told = self.of_inputs();
@@ -159,7 +159,7 @@ impl RunDifference {
         told
     }
 
-    /// Footprints, profiles and of images those that are `wanted`.
+    /// Footprints, profiles and the `wanted` images.
     fn of_movements(&self, wanted: fn(&ImageDifference) -> bool) -> Vec<String> {
         let mut told = vec![format!("footprints: {}", self.footprints_sentence())];
         told.extend(self.profiles_sentence());
@@ -182,18 +182,18 @@ impl RunDifference {
         let moved = stages.changed.iter().map(|stage| &*stage.name);
         let new = stages.added.iter().map(|stage| &*stage.name);
         let mut told = vec![format!(
-            "stages with other inputs: {}",
+            "stages with changed inputs: {}",
             names(moved.chain(new).collect())
         )];
         if !stages.removed.is_empty() {
             let gone = stages.removed.iter().map(|stage| &*stage.name).collect();
-            told.push(format!("gone: {}", names(gone)));
+            told.push(format!("removed: {}", names(gone)));
         }
         told.push(format!("the same: {}", stages.unchanged));
         told.join("; ")
     }
 
-    /// What of footprints moved.
+    /// Movement of footprints.
     fn footprints_moved(&self) -> Vec<String> {
         let Some(movement) = &self.footprints.movement else {
             return Vec::new();
@@ -218,7 +218,7 @@ impl RunDifference {
         told
     }
 
-    /// What is there in one run only, or cannot be compared.
+    /// Items that are in one run only, or cannot be compared.
     fn not_compared(&self) -> Vec<String> {
         let footprints = &self.footprints;
         let unmatched = unmatched(footprints.only_in_a, footprints.only_in_b, " footprints");
@@ -416,7 +416,7 @@ fn image_sentence(image: &ImageDifference) -> String {
     format!("image {name}: {}", told.join("; "))
 }
 
-/// What is in one run only.
+/// Items in one run only.
 fn unmatched(in_a: usize, in_b: usize, what: &'static str) -> impl Iterator<Item = String> {
     let runs = [(in_a, "A"), (in_b, "B")].into_iter();
     runs.filter(|(count, _)| *count > 0)

@@ -1,4 +1,4 @@
-//! The footprints that took part in the adjustment, as Parquet.
+//! The footprints used in the adjustment, as Parquet.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use crate::stages::adjust::{Adjusted, CorrectedPoint, PointKind, RangeResidual};
 
 pub(super) static TABLE: Declaration = Declaration {
     path: "adjusted_footprints.parquet",
-    what: "the footprints that took part in the adjustment",
+    what: "the footprints used in the adjustment",
     readers: "scripts",
     rows: "footprints",
     role: Role::Data,
@@ -24,7 +24,7 @@ pub(super) static TABLE: Declaration = Declaration {
     uses: &[],
 };
 
-/// A footprint that took part, with its range.
+/// A footprint used in the adjustment, with its range.
 type Shot<'a> = (&'a CorrectedPoint, Option<&'a RangeResidual>);
 
 fn shots(adjusted: &Adjusted) -> Vec<Shot<'_>> {
@@ -88,7 +88,7 @@ fn shot_columns<'a>() -> Vec<Column<Shot<'a>>> {
         range(
             "range_m",
             Unit::Metre,
-            "measured range, metres; missing when no image was exposed meanwhile",
+            "measured range, metres; missing where no image was exposed at the time",
             |range| Some(range.range_m),
         ),
         range(
@@ -106,7 +106,7 @@ fn shot_columns<'a>() -> Vec<Column<Shot<'a>>> {
         range(
             "range_standardised",
             Unit::None,
-            "residual over its own standard deviation; missing where nothing controls it",
+            "residual over its own standard deviation; missing where it is uncontrolled",
             |range| range.residual_m.standardised,
         ),
     ]);

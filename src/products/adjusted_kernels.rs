@@ -1,4 +1,4 @@
-//! Adjusted orientations as SPICE kernels that are loaded after the original ones; what they hold is tabulated by
+//! Adjusted orientations as SPICE kernels that are loaded after the original ones; their contents are tabulated by
 //! [`crate::stages::tabulate_kernels`].
 
 use std::{
@@ -20,33 +20,33 @@ use crate::{
     stages::{tabulate_kernels::KernelTables, tag_times::ImageTimes},
 };
 
-/// A bias this near to the usual one is the usual one, seconds.
+/// Tolerance within which a bias is the usual one, seconds.
 const BIAS_TOLERANCE_S: f64 = 1e-9;
 
 /// Longest name of a segment.
 const SEGMENT_NAME_MAX: usize = 40;
 
-/// An image with what its adjusted kernels hold.
+/// An image with the contents of its adjusted kernels.
 #[derive(Debug, Clone, Copy)]
 pub struct AdjustedImage<'a> {
     /// Line times.
     pub times: &'a ImageTimes,
     /// States and attitudes.
     pub tables: &'a KernelTables,
-    /// The convention that they were adjusted with.
+    /// The convention of their adjustment.
     pub light_time: LightTime,
 }
 
-/// Where the kernels go and what they replace.
+/// Destination of the kernels, and the kernels that they replace.
 #[derive(Debug, Clone, Copy)]
 pub struct AdjustedKernels<'a> {
-    /// Folder that is written to.
+    /// Folder to write to.
     pub directory: &'a Path,
-    /// Folder of the site, where the files will lie in the end: paths in `adjusted.tm` count from there.
+    /// Final folder of the site: paths in `adjusted.tm` are relative to it.
     pub site_folder: &'a Path,
     /// The original kernels.
     pub originals: &'a KernelSet,
-    /// The pointing bias that readers of the kernels will apply, where it is not that of the camera.
+    /// The pointing bias that readers of the kernels will apply, if it is not that of the camera.
     pub pointing: &'a PointingConfig,
 }
 
@@ -77,7 +77,7 @@ pub(super) static POSITION: Declaration = Declaration {
 
 pub(super) static METAKERNEL: Declaration = Declaration {
     path: "adjusted.tm",
-    what: "the kernels of the site, and then the adjusted ones",
+    what: "the kernels of the site, then the adjusted kernels",
     readers: "SPICE",
     rows: "",
     role: Role::Metadata,
@@ -107,7 +107,7 @@ fn of_site(of: &Context, adjustment: &AdjustmentProducts) -> Result<Vec<Written>
 /// Writes an SPK and a CK of every image, and the metakernel.
 ///
 /// # Errors
-/// [`Kind::Bug`](crate::error::Kind::Bug) for tables that no kernel takes, and for a session that is open on this
+/// [`Kind::Bug`](crate::error::Kind::Bug) for tables that no kernel can hold, and for a session that is open on this
 /// thread; [`Kind::Io`](crate::error::Kind::Io).
 pub fn write_adjusted_kernels(
     to: &AdjustedKernels,
@@ -146,7 +146,7 @@ fn written(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<Vec<Written
     Ok(written)
 }
 
-/// Path of the SPK of an image below the folder of the products, the longest that CSPICE writes there.
+/// Path of the SPK of an image below the folder of the products, the longest path that CSPICE writes there.
 #[must_use]
 pub fn position_kernel(image: &str) -> String {
     POSITION.path_of(image)
@@ -191,31 +191,31 @@ fn write_position(path: &Path, image: &AdjustedImage, comment: &str) -> Result<u
     Ok(tables.epochs.len() as u64)
 }
 
-/// What is written into the comment areas of both kernels.
+/// Text of the comment areas of both kernels.
 fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
     let times = image.times;
     let bias_s = to.pointing.bias_of(&times.instrument).seconds();
     let usual_s = times.instrument.pointing.ck_bias_s;
     let others = if (bias_s - usual_s).abs() < BIAS_TOLERANCE_S {
-        "ISIS and ALE read attitude there by themselves: load the file as it is.".to_owned()
+        "ISIS and ALE apply this offset: load the file as it is.".to_owned()
     } else {
         format!(
-            "ISIS and ALE read attitude {usual_s:.3} s from the exposure whatever the kernel says: this file is \n\
-             not for them."
+            "ISIS and ALE always read attitude {usual_s:.3} s from the exposure: do not use this\n\
+             file with them."
         )
     };
     format!(
         "Orientation of image {id} after an adjustment; written by areograph {version}.\n\
-         Load it after the kernels of the mission. It holds for this image alone, which was exposed over\n\
+         Load it after the kernels of the mission. It is valid only for this image, which was exposed over\n\
          {exposed}\n\
          (UTC of the first line {utc}). Where the adjustment found that lines were exposed later or earlier\n\
-         than their tags say, the orientation of a line stands at its tag, so that nothing else that\n\
-         happened meanwhile, a laser shot for one, may be placed with this file.\n\
+         than their tags, the orientation of a line is stored at its tag: do not place anything else\n\
+         observed at the time, such as a laser shot, with this file.\n\
          \n\
          Positions: {spacecraft} relative to the centre of Mars, geometric, J2000, with the rotation of Mars of the\n\
          IAU 2000 report (pck00008 to pck00010). {positions}\n\
          \n\
-         Attitudes: J2000 to {bus_frame}. The attitude of an exposure at t stands at t {sign} {size:.3} s,\n\
+         Attitudes: J2000 to {bus_frame}. The attitude of an exposure at t is stored at t {sign} {size:.3} s,\n\
          as in the kernels that this file replaces. {others}\n",
         id = times.id,
         spacecraft = times.instrument.spacecraft.name,
@@ -229,7 +229,7 @@ fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
     )
 }
 
-/// Who finds the adjusted positions in an SPK.
+/// Readers for which the positions in an SPK are the adjusted ones.
 const fn positions(light_time: LightTime) -> &'static str {
     match light_time {
         LightTime::Surface => {
@@ -250,7 +250,7 @@ const fn positions(light_time: LightTime) -> &'static str {
     }
 }
 
-/// The original kernels and behind them those of all images.
+/// The original kernels, followed by those of all images.
 fn metakernel(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<String> {
     let names = images.iter().flat_map(|image| {
         [
@@ -280,7 +280,7 @@ fn metakernel(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<String> 
     Ok(text.replacen(
         "\n\n",
         &format!(
-            "\n\nThe last ones are adjusted: each pair for its image alone, not for laser shots nor other images, and with\n\
+            "\n\nThe last ones are adjusted: each pair is valid only for its image, not for laser shots or other images, with\n\
              the pointing bias of {}.\n\n",
             biases.join(", ")
         ),

@@ -1,4 +1,4 @@
-//! What tie points, intersection and adjustment say of a site, as JSON.
+//! Results of tie points, intersection and adjustment of a site, as JSON.
 
 mod boresight;
 mod configured;
@@ -35,7 +35,7 @@ use boresight::BoresightDocument;
 use configured::AdjustmentKeys;
 use readings::OtherReadingDocument;
 
-/// What the numbers are, for readers of the file.
+/// Definitions of the numbers, for readers of the file.
 const DEFINITIONS: [(&str, &str); 12] = [
     (
         "before, after",
@@ -43,7 +43,7 @@ const DEFINITIONS: [(&str, &str); 12] = [
     ),
     (
         "focal",
-        "what an intersection leaves in the focal plane, along and across the track, pixels of the image",
+        "residual of the intersection in the focal plane, along and across the track, pixels of the image",
     ),
     (
         "reprojection",
@@ -52,16 +52,16 @@ const DEFINITIONS: [(&str, &str); 12] = [
     ),
     (
         "heights",
-        "tie points above the MOLA surface, metres: before the adjustment a test of the orientation, after it how well the \
-         adjustment meets what controls it",
+        "tie points above the MOLA surface, metres: before the adjustment a test of the orientation, after it the fit of the \
+         adjustment to its control",
     ),
     (
         "along_track_parallax_m",
-        "how far apart along the flight the two images place a tie point, mean, metres",
+        "mean distance along the flight between the two images' positions of a tie point, metres",
     ),
     (
         "footprints",
-        "where tie points say that a footprint of the first image lies in the second, minus where it is projected: \
+        "position of a footprint of the first image in the second by the tie points, minus its projected position: \
          lines and samples of the second image, metres on the ground, and distances of successive footprints. Only \
          footprints count that both images show, on a line between those of the tie points; outside are those within the \
          lines of both images that lie outside one of them. above_mola_m: heights at which the rays of these places meet, minus \
@@ -70,7 +70,7 @@ const DEFINITIONS: [(&str, &str); 12] = [
     (
         "budget",
         "eq. 5 to 9 of Shan et al. 2005; pixels are the mean line spacing of the pair. paper_average takes the average of \
-         the images' across-track residuals as the paper computes, equation_7 their sum of squares as its eq. 7 says",
+         the images' across-track residuals as the paper computes, equation_7 their sum of squares as its eq. 7 states",
     ),
     (
         "correction, sigmas",
@@ -79,32 +79,32 @@ const DEFINITIONS: [(&str, &str); 12] = [
     ),
     (
         "sigmas",
-        "a priori variances times the variance factor. In the published model they take footprints in images as measured \
-         independently, which they are not: there they say how well images agree, not how accurate heights and places are",
+        "a priori variances times the variance factor. The published model treats footprints in images as measured \
+         independently, which they are not: there they describe how well images agree, not the accuracy of heights and positions",
     ),
     (
         "other_reading",
         "where a pair disagrees by more than 100 m along the flight: the mean of the tie points by the other of two readings, \
          all images equally likely to be wrong or one offset of the attitude's clock (attitude_clock_s), minus that of the \
-         adjustment. Which is true is not measured: standard deviations hold for the reading they belong to",
+         adjustment. Which is true is not measured: standard deviations hold for their own reading",
     ),
     (
         "boresight",
-        "where adjustment.common_bus is yes: by which angles the laser points elsewhere than mounting and altimeter file say \
-         (towards X of the bus, and at right angles to that and the beam), how far each profile is recorded from where it lies, \
-         and the farthest of these from what was known, in standard deviations of the contradiction",
+        "where adjustment.common_bus is yes: angles of the laser from the direction by mounting and altimeter file \
+         (towards X of the bus, and at right angles to that and the beam), the offset of each recorded profile from its adjusted position, \
+         and the unknown farthest from its a priori value, in standard deviations of the contradiction",
     ),
     (
         "configured",
         "a standard deviation above 1e300 leaves the unknown free; without blunder_limit and height_blunder_limit all tie \
-         points stay",
+         points are kept",
     ),
 ];
 
 #[derive(Serialize, JsonSchema)]
 #[schemars(
     title = "Adjustment of a site",
-    description = "adjustment.json of areograph: tie points intersected with the orientation of the kernels and with the adjusted one, every pair of images compared, and the combined adjustment. Metres, radians, seconds, pixels of the image; what is unknown is left out."
+    description = "adjustment.json of areograph: tie points intersected with the orientation of the kernels and with the adjusted one, every pair of images compared, and the combined adjustment. Metres, radians, seconds, pixels of the image; unknown values are omitted."
 )]
 struct Document<'a> {
     #[schemars(extend("const" = "areograph adjustment 1"))]
@@ -251,7 +251,7 @@ struct AdjustmentDocument<'a> {
     heights: Option<&'a HeightSummary>,
     #[serde(skip_serializing_if = "Option::is_none")]
     relief: Option<&'a ReliefSummary>,
-    /// Where the laser points in simultaneous images.
+    /// Pointing of the laser in simultaneous images.
     #[serde(skip_serializing_if = "Option::is_none")]
     boresight: Option<BoresightDocument<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -279,7 +279,7 @@ struct ImageDocument<'a> {
     #[schemars(extend("exclusiveMinimum" = 0))]
     line_period_s: f64,
     correction: &'a [f64; ORIENTATION_UNKNOWNS],
-    /// Where the PEDR file has the spacecraft, X, Y and Z, metres, where that is what was expected of the position.
+    /// Position of the spacecraft in the PEDR file, X, Y and Z, metres, where that was the expected position.
     #[serde(skip_serializing_if = "Option::is_none")]
     pedr_orbit_m: Option<[f64; 3]>,
     #[schemars(transform = none_negative)]

@@ -1,8 +1,8 @@
-//! Degrees of people's maps.
+//! Degrees of maps.
 
 use crate::{body::Body, units::RADIANS_PER_DEGREE};
 
-/// What products say beside the CRS code, since none stands for the frame of the products.
+/// Statement of products beside the CRS code, since no code exists for the frame of the products.
 ///
 /// For Mars the differences are those of `pck00011.tpc` (IAU 2015, CSPICE N0067) from
 /// [`MARS_IAU2000`](crate::body::MARS_IAU2000), sampled daily over 1999 to 2001: −0.00184° to −0.00136° on the equator,

@@ -38,7 +38,7 @@ fn rows<'a>(adjustment: &AdjustmentProducts<'a>) -> Vec<Pair<'a>> {
         .collect()
 }
 
-/// Pairs of unknowns that are not held fixed.
+/// Pairs of unknowns that are not fixed.
 fn of_image(index: usize, image: &CorrectedImage) -> Vec<Pair<'_>> {
     let name = |coefficient| {
         Unknown::Orientation {
@@ -77,13 +77,13 @@ fn columns<'a>() -> Vec<Column<Pair<'a>>> {
         column(
             "other_unknown",
             Unit::None,
-            "another one of the same image",
+            "another unknown of the same image",
             |row: &Pair| row.unknowns[1].clone(),
         ),
         column(
             "correlation",
             Unit::None,
-            "their correlation, -1 to 1; beyond 0.95 single values must not be interpreted",
+            "their correlation, -1 to 1; beyond 0.95 do not interpret single values",
             |row: &Pair| row.correlation,
         ),
     ]

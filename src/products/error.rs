@@ -1,8 +1,8 @@
-//! What can go wrong while products are written; all of it is a bug in areograph.
+//! Errors of writing products; each is a bug in areograph.
 
 use crate::error::{Cause, Kind};
 
-/// A product that would be wrong, or came out wrong.
+/// A product that would be wrong, or is wrong.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ProductError {
     /// A value that no reader of the product could use.
@@ -15,7 +15,7 @@ pub(crate) enum ProductError {
         found: usize,
         expected: usize,
     },
-    /// The file holds something else than what was written.
+    /// The file differs from what was written.
     #[error("read back differently: {what}")]
     ReadBack { what: String },
     /// A library refused to encode or draw.

@@ -1,4 +1,4 @@
-//! Every figure of the report as a file of its own, with number, legend and caption, for slides and papers.
+//! Every figure of the report as a separate file, with number, legend and caption, for slides and papers.
 
 use std::fmt::Write as _;
 
@@ -42,14 +42,14 @@ fn write(of: &Context) -> Result<Vec<Written>> {
     written.collect()
 }
 
-/// A figure of the page; texts as they stand there, with `&amp;` and the like, which SVG has too.
+/// A figure of the page; texts are still escaped, with `&amp;` and the like, as in SVG.
 struct Figure<'a> {
     number: usize,
     id: &'a str,
     title: &'a str,
     width: f64,
     height: f64,
-    /// What the drawing holds.
+    /// Contents of the drawing.
     drawing: &'a str,
     /// Colour and label of each entry of the legend.
     keys: Vec<(&'a str, &'a str)>,
@@ -57,7 +57,7 @@ struct Figure<'a> {
 }
 
 impl<'a> Figure<'a> {
-    /// The figure from behind the quotation mark that begins its name.
+    /// The figure, parsed from the text after the quotation mark that begins its name.
     fn of(number: usize, html: &'a str) -> Option<Self> {
         let html = html.split("</figure>").next()?;
         let drawing = between(html, "<svg ", "</svg>")?;
@@ -103,7 +103,7 @@ impl<'a> Figure<'a> {
         )
     }
 
-    /// The legend, and the baseline of what follows.
+    /// The legend, and the baseline of the next text.
     fn legend(&self) -> (String, f64) {
         let (mut x, mut baseline) = (MARGIN, self.height + LINE);
         let mut legend = String::new();
@@ -127,7 +127,7 @@ impl<'a> Figure<'a> {
     }
 }
 
-/// What stands between the first `start` and the next `end`.
+/// The text between the first `start` and the next `end`.
 fn between<'a>(text: &'a str, start: &str, end: &str) -> Option<&'a str> {
     text.split_once(start)?
         .1
@@ -135,7 +135,7 @@ fn between<'a>(text: &'a str, start: &str, end: &str) -> Option<&'a str> {
         .map(|(inside, _)| inside)
 }
 
-/// Letters of escaped text: `&amp;` is one.
+/// Number of letters of escaped text: `&amp;` is one.
 fn count(text: &str) -> usize {
     let mut inside = false;
     let letters = text.chars().filter(|letter| {
@@ -150,7 +150,7 @@ fn count(text: &str) -> usize {
     letters.count()
 }
 
-/// Words on lines of at most so many letters.
+/// Words on lines of at most a given number of letters.
 fn lines(words: &str, letters: f64) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in words.split_whitespace() {

@@ -25,7 +25,7 @@ pub(super) fn create(path: &Path) -> Result<BufWriter<File>> {
     Ok(BufWriter::new(file))
 }
 
-/// Writes what is left in memory through to the disk.
+/// Writes the rest of the buffer through to the disk.
 pub(super) fn finish(path: &Path, mut file: BufWriter<File>) -> Result<()> {
     file.flush()
         .and_then(|()| file.get_ref().sync_all())
@@ -72,7 +72,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
 /// Writes `document` as indented JSON and reads it back.
 ///
 /// # Errors
-/// As [`to_value`]; what the disk refuses; a document that comes back different.
+/// As [`to_value`]; errors of the disk; a document that is read back differently.
 pub(super) fn write_json(path: &Path, document: &impl Serialize) -> Result<()> {
     let written = to_value(document).in_file(path)?;
     let text = serde_json::to_string_pretty(document)
@@ -91,11 +91,11 @@ pub(super) fn write_json(path: &Path, document: &impl Serialize) -> Result<()> {
     .in_file(path)
 }
 
-/// What `document` is in JSON.
+/// `document` as a JSON value.
 ///
 /// # Errors
-/// Numbers that are not finite, which JSON would turn into null: products have no nulls, what is
-/// unknown is left out.
+/// Numbers that are not finite, which JSON would turn into null: products have no nulls, unknown
+/// values are omitted.
 pub(super) fn to_value(document: &impl Serialize) -> std::result::Result<Value, ProductError> {
     let value = serde_json::to_value(document).map_err(ProductError::refused("encode JSON"))?;
     find_null(&value, "").map_or(Ok(value), |what| Err(ProductError::NotFinite { what }))

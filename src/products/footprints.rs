@@ -1,4 +1,4 @@
-//! Footprints: what is said of a shot, once for all formats.
+//! Footprints: the columns of a shot, declared once for all formats.
 
 use super::{
     SiteProducts,
@@ -80,7 +80,7 @@ pub(super) static GEOJSON: Declaration = Declaration {
     }],
 };
 
-/// A footprint with what it is called.
+/// A footprint with its names.
 #[derive(Clone, Copy)]
 pub(super) struct Shot<'a> {
     footprints: &'a Footprints<BodyFixed>,
@@ -88,12 +88,12 @@ pub(super) struct Shot<'a> {
     row: usize,
 }
 
-/// What footprints have beside numbers.
+/// Texts of footprints.
 pub(super) trait ShotNames: Sync {
     /// Identifiers of the windows that hold the shot in this row, separated by semicolons.
     fn windows(&self, row: usize) -> String;
 
-    /// Its UTC, where it is known.
+    /// Its UTC, if known.
     fn utc(&self, row: usize) -> String;
 }
 
@@ -170,7 +170,7 @@ pub(super) fn table<'a>(site: &'a SiteProducts<'a>) -> Table<'a> {
     Table::new(columns(), Shot::all(site)).in_words(&site.config.wording())
 }
 
-/// The footprints of a site as GIS has them.
+/// The footprints of a site for GIS.
 pub(super) fn features<'a>(site: &'a SiteProducts<'a>) -> Features<'a> {
     let body = site.config.body;
     let point = |shot: &Shot| {
@@ -231,7 +231,7 @@ pub(super) fn columns<'a>() -> Vec<Column<Shot<'a>>> {
     columns
 }
 
-/// When and where in its file a shot was taken.
+/// Time of a shot and its place in the file.
 fn identity<'a>() -> Vec<Column<Shot<'a>>> {
     vec![
         column(
@@ -284,7 +284,7 @@ fn identity<'a>() -> Vec<Column<Shot<'a>>> {
     ]
 }
 
-/// What the file says of how good a shot is, and which windows hold it.
+/// Quality flags of a shot in its file, and the windows that hold it.
 fn quality<'a>() -> Vec<Column<Shot<'a>>> {
     vec![
         column("channel", Unit::None, "trigger channel", |shot: &Shot| {
@@ -318,7 +318,7 @@ fn quality<'a>() -> Vec<Column<Shot<'a>>> {
     ]
 }
 
-/// Where the laser hit the ground.
+/// Position of the footprint.
 fn ground<'a>() -> Vec<Column<Shot<'a>>> {
     vec![
         column(
@@ -338,13 +338,13 @@ fn ground<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "latitude_areographic_deg",
             Unit::Degree,
-            "areographic latitude, degrees, IAU 2000 radii; as older maps count",
+            "areographic latitude, degrees, IAU 2000 radii; as on older maps",
             Shot::areographic_deg,
         ),
     ]
 }
 
-/// How high that is.
+/// Its height.
 fn heights<'a>() -> Vec<Column<Shot<'a>>> {
     vec![
         column(

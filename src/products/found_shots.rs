@@ -1,4 +1,4 @@
-//! Shots that a search of the archive finds, written as they come: the same columns as `footprints.parquet`.
+//! Shots found by a search of the archive, written as they arrive: the same columns as `footprints.parquet`.
 
 use std::{
     mem,
@@ -28,15 +28,16 @@ use crate::{
     stages::convert_datum::convert_at_tags,
 };
 
-/// The column of the bounding box of each point, and its parts: what readers of GeoParquet pass over rows by.
+/// The column of the bounding box of each point, and its parts: readers of GeoParquet use it to skip rows.
 const BBOX: &str = "bbox";
 const BBOX_PARTS: [&str; 4] = ["xmin", "ymin", "xmax", "ymax"];
-/// What shots are chosen by: a search may keep several values of each, so that GIS has them too; and where they lie.
+/// Columns that shots are selected by: a search may keep several values of each, so that GIS has them too; and their
+/// positions.
 const ALSO_IN_GIS: [&str; 4] = ["channel", "class", "attitude_flag", GEOMETRY];
-/// The key of what was asked for, and how complete the answer is.
+/// The key of the query, and of the completeness of its answer.
 const SEARCH: &str = "areograph_search";
 
-/// Shots that are written together: enough for all threads, little beside what a search has in memory.
+/// Shots that are written together: enough for all threads, few compared with the memory of a search.
 const ROWS_AT_ONCE: usize = 32_768;
 
 /// Some shots of a search, in their order.
@@ -68,7 +69,7 @@ impl FoundShots<'_> {
     }
 }
 
-/// What a format has of shots: no UTC, which a search without kernels does not know.
+/// Columns of shots in a format: without UTC, which is unknown in a search without kernels.
 fn table(rows: Vec<Shot<'_>>, format: RowsFormat) -> Table<'_> {
     let table = Table::new(columns(), rows).without("utc");
     match format {
@@ -78,9 +79,9 @@ fn table(rows: Vec<Shot<'_>>, format: RowsFormat) -> Table<'_> {
     }
 }
 
-/// A file of shots that is being written; it appears under its name when it is finished.
+/// A file of shots that is being written; it is renamed to its final name when finished.
 ///
-/// Parquet is GeoParquet 1.1 with bounding boxes; what was asked for stands in a file beside CSV.
+/// Parquet is GeoParquet 1.1 with bounding boxes; the query is written to a file beside CSV.
 pub struct ShotsFile {
     path: PathBuf,
     rows: RowsWriter,
@@ -95,13 +96,13 @@ pub struct ShotsFile {
 }
 
 impl ShotsFile {
-    /// Begins the file `path`.
+    /// Creates the file `path`.
     ///
     /// * `sources` – the files that shots are counted into
     /// * `window_ids` – identifiers of the windows
     ///
     /// # Errors
-    /// What the disk refuses.
+    /// Errors of the disk.
     pub fn create(
         path: &Path,
         format: RowsFormat,
@@ -128,7 +129,7 @@ impl ShotsFile {
     /// Appends shots with their windows.
     ///
     /// # Errors
-    /// Numbers that are not finite; what the disk refuses.
+    /// Numbers that are not finite; errors of the disk.
     pub fn write(&mut self, footprints: Footprints<AsRead>, windows: &WindowLists) -> Result<()> {
         self.pending.0.append(footprints);
         self.pending.1.append(windows);
@@ -144,7 +145,7 @@ impl ShotsFile {
         Ok(())
     }
 
-    /// Writes the shots that are not written yet, and leaves none.
+    /// Writes all pending shots.
     fn write_pending(&mut self) -> Result<()> {
         let empty = (Footprints::new(Vec::new()), WindowLists::default());
         let (footprints, windows) = mem::replace(&mut self.pending, empty);
@@ -178,10 +179,10 @@ impl ShotsFile {
         self.rows.write(&batch)
     }
 
-    /// Ends the file with `search`, what was asked for and how complete the answer is, and gives it its name.
+    /// Ends the file with `search`, the query and the completeness of its answer, and gives it its name.
     ///
     /// # Errors
-    /// What the disk refuses; a file that comes back with another number of rows.
+    /// Errors of the disk; a file that is read back with another number of rows.
     pub fn finish(mut self, search: &Value) -> Result<u64> {
         self.write_pending()?;
         let mut notes = vec![(SEARCH, search.to_string())];
@@ -233,7 +234,7 @@ fn with_boxes(
         .map_err(ProductError::refused("assemble columns"))
 }
 
-/// Where each row has its bounding box.
+/// Columns of the bounding box of each row.
 fn covering() -> Value {
     let covering = BBOX_PARTS.map(|part| (part.to_owned(), json!([BBOX, part])));
     let covering: serde_json::Map<String, Value> = covering.into_iter().collect();

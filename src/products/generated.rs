@@ -1,4 +1,4 @@
-//! What is generated from the declarations and kept in the repository: `docs/products.md`, `config/schema`.
+//! Files generated from the declarations and kept in the repository: `docs/products.md`, `config/schema`.
 
 use std::fmt::Write as _;
 
@@ -28,7 +28,7 @@ pub fn schemas() -> Vec<DocumentSchema> {
     schemas
 }
 
-/// What says how each of all files is built.
+/// The content declarations of all files.
 fn contents() -> impl Iterator<Item = &'static Content> {
     let of_nets = NET_PRODUCTS.iter().map(|product| &product.content);
     let of_archives = ARCHIVE_PRODUCTS.iter().map(|product| &product.content);
@@ -45,10 +45,10 @@ fn contents() -> impl Iterator<Item = &'static Content> {
 #[must_use]
 pub fn documentation() -> String {
     let mut text = "# Products\n\n\
-        Generated from the declarations in `src/products`; `tests/products/generated.rs` says when it is stale.\n\n\
-        Paths count from the site's folder, `<image>` stands for the identifier of an image. `manifest.json`, which \
-        is written last, says what all of them were made from.\n\n\
-        | file | what it is | for | there is one for | rows | schema |\n|---|---|---|---|---|---|\n"
+        Generated from the declarations in `src/products`; `tests/products/generated.rs` reports when it is stale.\n\n\
+        Paths are relative to the site's folder, `<image>` stands for the identifier of an image. `manifest.json`, which \
+        is written last, records what all of them were made from.\n\n\
+        | file | what it is | for | one for | rows | schema |\n|---|---|---|---|---|---|\n"
         .to_owned();
     for product in PRODUCTS {
         let _infallible = writeln!(
@@ -68,8 +68,8 @@ pub fn documentation() -> String {
         text += &columns_of(product, "");
     }
     text += "\n## Nets of rectified pictures\n\n\
-        Products of `areograph triangulate`, in the folder of the net; `manifest.json` comes last here too. `net:` stands \
-        before their names below.\n\n\
+        Products of `areograph triangulate`, in the folder of the net; `manifest.json` comes last here too. `net:` precedes \
+        their names below.\n\n\
         | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n";
     for product in NET_PRODUCTS {
         text += &line_of(product);
@@ -83,7 +83,7 @@ pub fn documentation() -> String {
     }
     text += "\n## Calibrations of the lines of a camera\n\n\
         Products of `areograph calibrate`, in the folder of the calibration; `manifest.json` comes last here too. \
-        `calibration:` stands before their names below, `<camera>` for a line of the camera.\n\n\
+        `calibration:` precedes their names below, `<camera>` stands for a line of the camera.\n\n\
         | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n";
     text += &line_of(&CAMERA_SUPPORT);
     for product in CALIBRATION_PRODUCTS {
@@ -96,7 +96,7 @@ pub fn documentation() -> String {
         text += &columns_of(product, "calibration: ");
     }
     text += "\n## Laser control points from terrain models\n\n\
-        Products of `areograph pedr match`, in the folder `--out`; `manifest.json` comes last here too. `match:` stands before \
+        Products of `areograph pedr match`, in the folder `--out`; `manifest.json` comes last here too. `match:` precedes \
         their names below.\n\n\
         | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n";
     text += &line_of(&CONTROL);
@@ -111,8 +111,8 @@ pub fn documentation() -> String {
         text += &columns_of(product, "match: ");
     }
     text += "\n## Archives of PEDR files\n\n\
-        Products of `areograph pedr qa`, in the folder `--out`; `manifest.json` comes last here too. `archive:` stands \
-        before their names below.\n\n\
+        Products of `areograph pedr qa`, in the folder `--out`; `manifest.json` comes last here too. `archive:` precedes \
+        their names below.\n\n\
         | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n";
     text += &line_of(&SHOTS);
     for product in ARCHIVE_PRODUCTS {
@@ -128,7 +128,7 @@ pub fn documentation() -> String {
     text
 }
 
-/// A product in a list of products that there is always one of.
+/// A line for a product of which exactly one is written.
 fn line_of<W>(product: &Declaration<W>) -> String {
     format!(
         "| `{}` | {} | {} | {} | {} |\n",
@@ -140,7 +140,7 @@ fn line_of<W>(product: &Declaration<W>) -> String {
     )
 }
 
-/// The columns of a table; nothing for other files.
+/// The columns of a table; empty for other files.
 fn columns_of<W>(product: &Declaration<W>, of: &str) -> String {
     let Content::Table(columns) = product.content else {
         return String::new();

@@ -139,7 +139,7 @@ pub(super) fn schema(title: &str, description: &str, attributes: &[Meaning]) -> 
             "name": { "type": "string" },
             "crs": closed(crs, &[]),
             "frame": {
-                "description": "The frame of the coordinates, and how far that of the CRS code is from it.",
+                "description": "The frame of the coordinates, and the offset of the CRS code's frame from it.",
                 "type": "string",
                 "minLength": 1,
             },
@@ -175,7 +175,7 @@ fn attribute(column: &Meaning) -> Value {
 /// gigabytes.
 ///
 /// # Errors
-/// Numbers that are not finite; what the disk refuses; lines that come back different.
+/// Numbers that are not finite; errors of the disk; lines that are read back differently.
 pub(super) fn write(path: &Path, features: Features) -> Result<u64> {
     let features = Features {
         attributes: features.attributes.for_gis(),
@@ -187,7 +187,7 @@ pub(super) fn write(path: &Path, features: Features) -> Result<u64> {
     Ok(features.points.len() as u64)
 }
 
-/// What stands between two features.
+/// Separator of two features.
 pub(super) const SEPARATOR: &str = ",\n";
 
 /// Calls `take` with each of these rows.
@@ -207,7 +207,7 @@ fn each(
     Ok(())
 }
 
-/// Points with attributes, a line each but for the end of the last one.
+/// Points with attributes, one line each, without the end of the last line.
 pub(super) fn points_as_text(
     names: &[&str],
     values: &[Values],
@@ -225,10 +225,10 @@ pub(super) fn points_as_text(
     Ok(text)
 }
 
-/// Writes all features, a line each but for the end of the last one.
+/// Writes all features, one line each, without the end of the last line.
 ///
 /// # Errors
-/// Numbers that are not finite; what the disk refuses.
+/// Numbers that are not finite; errors of the disk.
 fn write_features(file: &mut impl Write, features: &Features) -> Result<()> {
     let columns = features.attributes.columns();
     let names: Vec<&str> = columns.map(|column| column.name).collect();
@@ -342,7 +342,7 @@ fn read_back(path: &Path, head: &str, features: &Features) -> Result<()> {
     Ok(())
 }
 
-/// Makes sure that the lines of these rows hold their features.
+/// Checks that the lines of these rows hold their features.
 fn compare(
     features: &Features,
     rows: Range<usize>,

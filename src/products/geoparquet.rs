@@ -1,4 +1,4 @@
-//! What GeoParquet 1.1.0 asks for beside columns: geometries, and metadata that say what they are.
+//! Requirements of GeoParquet 1.1.0 beside columns: geometries, and metadata that describe them.
 
 use serde_json::{Value, json};
 
@@ -15,7 +15,7 @@ pub(super) fn well_known_binary(point: [f64; 2]) -> Vec<u8> {
     bytes
 }
 
-/// The place of such a point.
+/// The coordinates of such a point.
 pub(super) fn point_of(bytes: &[u8]) -> Option<[f64; 2]> {
     let (head, bytes) = bytes.split_at_checked(5)?;
     let (axes, _) = bytes.as_chunks();
@@ -50,8 +50,8 @@ pub(super) fn geo_metadata(
     })
 }
 
-/// PROJJSON of the sphere of `body` in `IAU_2015`; [`frame`](super::coordinates::frame) says whose longitudes these are.
-/// Coordinates are (longitude, latitude) all the same, as GeoParquet says.
+/// PROJJSON of the sphere of `body` in `IAU_2015`; [`frame`](super::coordinates::frame) describes its frame.
+/// Coordinates are (longitude, latitude) all the same, as GeoParquet requires.
 ///
 /// Source: IAU coordinate systems of the OGC Planetary working group, radius of Archinal et al. 2018.
 fn sphere(body: Body) -> Value {

@@ -1,7 +1,8 @@
-//! Numbers on a grid as a cloud-optimised `GeoTIFF`: tables of all sizes first, then tiles of the smallest size to those of the
-//! whole, so that a viewer needs the beginning and the tiles that it shows. Without compression, as many a reader wants it.
+//! Numbers on a grid as a cloud-optimised `GeoTIFF`: tables of all sizes first, then tiles of the smallest size to
+//! those of the whole, so that a viewer needs only the beginning and the tiles that it shows. Without compression, for
+//! readers that require it.
 //!
-//! The TIFF library writes tables behind what they are of; here they are in front, and therefore our own.
+//! The TIFF library writes tables after their data; here they precede them and are therefore written by this module.
 
 use crate::{
     body::{Body, MapSphere},
@@ -11,9 +12,9 @@ use crate::{
 
 /// Edge of a tile, cells.
 const TILE: usize = 256;
-/// What stands for no number.
+/// Value of cells without a number.
 const NO_DATA: f32 = -32_768.0;
-/// What tells GDAL that tables come first; 32 and its own bytes counted from its third line.
+/// Signals to GDAL that tables come first; 32 and its own bytes counted from its third line.
 const LAYOUT: &str = "LAYOUT=IFDS_BEFORE_DATA\nKNOWN_INCOMPATIBLE_EDITION=NO\n ";
 
 /// Types of values.
@@ -22,17 +23,17 @@ const SHORT: u16 = 3;
 const LONG: u16 = 4;
 const DOUBLE: u16 = 12;
 
-/// What a file is of.
+/// Contents of a file.
 pub(super) struct GeoTiff<'a> {
-    /// Cells; its heights are not what is written.
+    /// Grid of the cells; its heights are not written.
     pub(super) grid: &'a HeightGrid,
     /// Latitude at which cells are as wide as high, radians.
     pub(super) parallel_rad: f64,
     /// The body whose sphere the grid is of.
     pub(super) body: Body,
-    /// What the numbers are, in words.
+    /// Meaning of the numbers, in words.
     pub(super) what: &'a str,
-    /// Row by row, NaN where there is none.
+    /// Row by row, NaN in cells without a number.
     pub(super) numbers: &'a [f32],
 }
 
@@ -64,7 +65,7 @@ impl GeoTiff<'_> {
         bytes.extend(long(first));
         bytes.extend(head.as_bytes());
         bytes.resize(first, 0);
-        // Where tiles begin depends on how long the tables are, not the other way round.
+        // Offsets of tiles depend on the length of the tables, not the other way round.
         let nowhere: Vec<usize> = vec![0; sizes.len()];
         let tables = self.tables(&sizes, first, &nowhere);
         let mut at = first + tables.len();
@@ -96,7 +97,7 @@ impl GeoTiff<'_> {
         sizes
     }
 
-    /// Tables of all sizes, which stand from the byte `at` on.
+    /// Tables of all sizes, which begin at the byte `at`.
     fn tables(&self, sizes: &[Size], at: usize, begins: &[usize]) -> Vec<u8> {
         let mut bytes = Vec::new();
         for (number, (size, begin)) in sizes.iter().zip(begins).enumerate() {
@@ -112,7 +113,7 @@ impl GeoTiff<'_> {
         bytes
     }
 
-    /// What the file is of, and where it lies.
+    /// Description of the file's data, and its georeference.
     fn fields(&self) -> Vec<Field> {
         let MapSphere { crs, datum, .. } = self.body.map();
         let radius_m = self.grid.radius_m;
@@ -121,7 +122,8 @@ impl GeoTiff<'_> {
         let place_m = [west_rad * self.parallel_rad.cos(), north_rad].map(|of| of * radius_m);
         let names = format!("Equirectangular {}|{crs}|", self.body.names().name);
         let split = names.find('|').map_or(0, |at| at + 1);
-        // Map, areas, a name; sphere, its name, degrees, both half-axes, meridian; map, its kind, metres, parallel, longitude.
+        // Map, areas, a name; sphere, its name, degrees, both half-axes, meridian; map, its kind, metres, parallel,
+        // longitude.
         let user = 32_767;
         let keys: [[usize; 4]; 16] = [
             [1, 1, 0, 15],
@@ -170,7 +172,7 @@ impl Size {
         down * across
     }
 
-    /// How the numbers stand in the file, from the byte `begin` on.
+    /// Layout of the numbers in the file, from the byte `begin` on.
     fn fields(&self, begin: usize, is_reduced: bool) -> Vec<Field> {
         let bytes = TILE * TILE * 4;
         let begins: Vec<usize> = (0..self.tiles()).map(|tile| begin + tile * bytes).collect();
@@ -214,7 +216,7 @@ impl Size {
         }
     }
 
-    /// Means of two cells by two, of those that have a number.
+    /// Means of two by two cells, of those that have a number.
     fn halved(&self) -> Self {
         let (rows, columns) = (self.rows.div_ceil(2), self.columns.div_ceil(2));
         let mut numbers = Vec::with_capacity(rows * columns);
@@ -272,7 +274,7 @@ impl Field {
     }
 }
 
-/// A table at the byte `at`, with what does not fit into it behind it; then the next one.
+/// A table at the byte `at`, followed by values that do not fit into it; then the next one.
 fn table(fields: &[Field], at: usize, is_last: bool) -> Vec<u8> {
     let head = 2 + 12 * fields.len() + 4;
     let mut bytes = long(fields.len())[..2].to_vec();
@@ -343,7 +345,7 @@ mod tests {
             let tiff::decoder::DecodingResult::F32(tile) = decoder.read_chunk(0).unwrap() else {
                 panic!("{number}");
             };
-            // No number is none in the whole, and does not count among its means.
+            // A cell without a number stays empty in the full size, and is not counted in means.
             let expected = [NO_DATA, 0.5 * (1.0 + 1.0) * 2.0 / 3.0, 1.5];
             assert!((tile[0] - expected[number]).abs() < 0.1, "{}", tile[0]);
             // A row farther south is one more, or two, or four.

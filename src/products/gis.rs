@@ -1,9 +1,9 @@
-//! Points with attributes, as formats for GIS take them.
+//! Points with attributes, for the formats of GIS.
 
 use super::{coordinates::frame, table::Table};
 use crate::body::Body;
 
-/// The coordinate system of maps of `body` as text for GIS; [`frame`] says whose longitudes the coordinates are.
+/// The coordinate system of maps of `body` as text for GIS; [`frame`] describes the frame of the coordinates.
 pub(super) fn crs_wkt(body: Body) -> String {
     let map = body.map();
     format!(
@@ -16,12 +16,12 @@ pub(super) fn crs_wkt(body: Body) -> String {
     )
 }
 
-/// The coordinate system of maps of `body` as catalogues name it.
+/// The coordinate system of maps of `body` as named in catalogues.
 pub(super) fn crs_code(body: Body) -> String {
     format!("IAU_2015:{}", body.map().code)
 }
 
-/// What the third coordinate of footprints on `body` is.
+/// Definition of the third coordinate of footprints on `body`.
 pub(super) fn point_z_height(body: Body) -> String {
     format!(
         "z: radius after the crossover correction minus {} m, metres",
@@ -35,15 +35,15 @@ pub(super) struct Features<'a> {
     pub(super) name: &'a str,
     /// What a point is, in the plural: the table of a GeoPackage.
     pub(super) table: &'static str,
-    /// UTC of the newest, for formats that hold a date: a clock would give other bytes each time.
+    /// UTC of the newest, for formats that hold a date: a clock would give different bytes each time.
     pub(super) newest_utc: &'a str,
-    /// The body that they lie on.
+    /// The body.
     pub(super) body: Body,
-    /// Whose longitudes and latitudes these are.
+    /// Frame of longitudes and latitudes.
     pub(super) frame: &'static str,
-    /// What the third coordinate is.
+    /// Definition of the third coordinate.
     pub(super) z: String,
-    /// Longitude (-180..180), areocentric latitude, degrees, and what `z` says.
+    /// Longitude (-180..180), areocentric latitude, degrees, and `z`.
     pub(super) points: Vec<[f64; 3]>,
     /// A row per point.
     pub(super) attributes: Table<'a>,

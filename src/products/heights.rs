@@ -1,4 +1,5 @@
-//! Heights of tie points and of footprints that both images of a pair show against MOLA, before and after the adjustment, as Parquet.
+//! Heights of tie points and of footprints that both images of a pair show against MOLA, before and after the
+//! adjustment, as Parquet.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -21,7 +22,7 @@ use crate::{
 
 pub(super) static TABLE: Declaration = Declaration {
     path: "height_check.parquet",
-    what: "heights of tie points against the ground between MOLA's shots, and of footprints that both images of a pair show, \
+    what: "heights of tie points against the MOLA surface, and of footprints that both images of a pair show, \
            before and after the adjustment",
     readers: "scripts",
     rows: "tie points and footprints",
@@ -72,14 +73,14 @@ impl From<&FootprintHeight> for Heights {
 struct Compared {
     kind: &'static str,
     id: String,
-    /// Why the adjustment rejected it; empty when it did not.
+    /// Reason for rejection by the adjustment; empty if it was accepted.
     rejected: String,
     before: Option<Heights>,
     after: Option<Heights>,
 }
 
 impl Compared {
-    /// The better known of both.
+    /// The better determined of both.
     fn latest(&self) -> Option<Heights> {
         self.after.or(self.before)
     }
@@ -158,7 +159,7 @@ fn columns() -> Vec<Column<Compared>> {
         column(
             "kind",
             Unit::None,
-            "tie for a tie point, footprint for a footprint where tie points say that both images of a pair show it",
+            "tie for a tie point, footprint for a footprint that both images of a pair show by the tie points",
             |row: &Compared| row.kind.to_owned(),
         ),
         column(
@@ -176,7 +177,7 @@ fn columns() -> Vec<Column<Compared>> {
         column(
             "longitude_deg",
             Unit::Degree,
-            "east longitude, degrees: of the adjusted point, or of the intersected one where there is none",
+            "east longitude, degrees: of the adjusted point, or else of the intersected point",
             |row: &Compared| Some(degrees(row.place()?.longitude_rad)),
         ),
         column(
@@ -194,7 +195,7 @@ fn columns() -> Vec<Column<Compared>> {
         column(
             "surface_sigma_m",
             Unit::Metre,
-            "standard deviation of the MOLA surface there, metres; missing of footprints, which are its shots",
+            "standard deviation of the MOLA surface there, metres; missing for footprints, which are its shots",
             |row: &Compared| row.latest()?.surface_sigma_m,
         ),
         column(

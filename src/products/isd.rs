@@ -1,7 +1,7 @@
 //! Image support data of an image for the Community Sensor Model, as `usgscsm` reads it.
 //!
-//! Keys and nesting are those of ALE's image support data. Where ALE's file for MOC does not say what
-//! the camera does, the numbers here are those that make `usgscsm` see the right pixel at the right time:
+//! Keys and nesting are those of ALE's image support data. Where ALE's file for MOC does not describe
+//! the camera, the numbers here are those that make `usgscsm` see the right pixel at the right time:
 //!
 //! * `line_scan_rate` holds the period of an *image* line, in a row for every piece of the image. `usgscsm` computes
 //!   `t = start + rate · (line − 0.5 + 0.5)` with image lines and never multiplies by the summing
@@ -10,15 +10,15 @@
 //!   `sample · summing + starting_detector_sample − detector_center.sample`. With the edge of the detector
 //!   at 0 the centre of the narrow angle lies at 2048 / 2 = 1024; ALE's 1023.5 with a start of 1 is off by 1.5
 //!   pixels.
-//! * The line of the detector is taken at coordinate 0 (`losToEcf`), so its centre is 0, or what puts a line
-//!   that lies off the boresight there.
+//! * The line of the detector is taken at coordinate 0 (`losToEcf`), so its centre is 0, or the value that places a
+//!   line off the boresight there.
 //! * `usgscsm` corrects no light time itself: positions follow the convention of the run. ALE's are those seen from the
-//!   centre of Mars; they can be had by `light_time = "centre"`.
+//!   centre of Mars; they are available with `light_time = "centre"`.
 //! * Pointing is sampled from before the first line to after the last; ALE's table starts 1.15 s late. Nodes are
-//!   as dense as an interpolation error below 0.01 pixels wants, which is measured and stated.
-//! * Distortion of the narrow angle is zero, as the instrument kernel says. ALE repeats the pixel pitch in these
+//!   as dense as an interpolation error below 0.01 pixels requires, which is measured and stated.
+//! * Distortion of the narrow angle is zero, as the instrument kernel states. ALE repeats the pixel pitch in these
 //!   places, which `usgscsm` takes for radial coefficients per mm² and mm⁴: wrong by hundreds of pixels at the
-//!   edges. Other cameras have the three coefficients that fit the image's samples best, and what they leave.
+//!   edges. Other cameras have the three coefficients that fit the image's samples best, and their residual.
 
 mod document;
 
@@ -53,7 +53,7 @@ use document::{
 
 /// J2000 in NAIF's numbering of inertial frames.
 const NAIF_J2000: i32 = 1;
-/// Height that camera models try when they look for the ground, metres above and below the ellipsoid (ALE's).
+/// Range of heights in which camera models search for the ground, metres above and below the ellipsoid (ALE's).
 const REFERENCE_HEIGHT_M: i32 = 1_000;
 
 pub(super) static ISD: Declaration = Declaration {
@@ -255,7 +255,7 @@ fn ends(et_s: &[f64]) -> (f64, f64) {
     )
 }
 
-/// The keywords that the numbers above come from, under NAIF's names.
+/// The source keywords of the numbers above, under NAIF's names.
 fn naif_keywords(site: &SiteProducts, times: &ImageTimes) -> BTreeMap<String, Keyword> {
     let instrument = &times.instrument;
     let (model, naif) = (times.body.model(), times.body.naif());
@@ -294,7 +294,7 @@ fn naif_keywords(site: &SiteProducts, times: &ImageTimes) -> BTreeMap<String, Ke
     of_body.into_iter().chain(of_camera).collect()
 }
 
-/// Where attitudes come from, a clause for people.
+/// Source of attitudes, as a clause for readers.
 fn attitude_source(times: &ImageTimes) -> String {
     match &times.support {
         Some(support) => format!("that of the support data {}", support.name),
@@ -305,7 +305,7 @@ fn attitude_source(times: &ImageTimes) -> String {
     }
 }
 
-/// What the reader of this file should know; camera models ignore it.
+/// Notes for readers of this file; camera models ignore them.
 fn provenance<'a>(
     site: &SiteProducts<'a>,
     image: &ImageProducts<'a>,
@@ -316,13 +316,13 @@ fn provenance<'a>(
     let detector = times.detector();
     let distortion = if detector.distortion == Distortion::NONE {
         let source = times.support.as_ref();
-        let source = source.map_or("the instrument kernel says", |_| "the support data say");
+        let source = source.map_or("the instrument kernel states", |_| "the support data state");
         format!("optical_distortion: none, as {source}")
     } else {
         let fit = detector.radial_fit(&times.instrument);
         format!(
             "optical_distortion: the three radial coefficients that fit the camera best over the samples of this \
-             image; they leave {:.1e} pixels at most",
+             image; residuals are at most {:.1e} pixels",
             fit.error_max_px,
         )
     };
@@ -357,7 +357,7 @@ fn provenance<'a>(
             ),
             distortion,
             format!(
-                "instrument_position: {}{}; reading programs must add none{}",
+                "instrument_position: {}{}; reading programs must not add any{}",
                 image.orientation.light_time.convention.positions(),
                 if times.support.is_some() { "" } else { ", the convention of the whole run" },
                 match round {

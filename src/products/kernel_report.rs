@@ -53,7 +53,7 @@ fn type_of(kernel: &KernelLine) -> String {
 }
 
 /// By its key, the least of the qualities of a spacecraft's kernels of one type, in SpiceQL's words: commanded attitude
-/// is `predicted`, archived kernels are `reconstructed`, names that tell nothing give `noquality`.
+/// is `predicted`, archived kernels are `reconstructed`, other names give `noquality`.
 fn qualities(site: &SiteProducts) -> BTreeMap<String, &'static str> {
     let ids = site.spacecraft_of_kernels().into_iter();
     let ids: Vec<&str> = ids.map(|spacecraft| &*spacecraft.id).collect();
@@ -137,7 +137,7 @@ pub(super) struct KernelsByType<'a> {
     tspk: Option<Names<'a>>,
 }
 
-/// SpiceQL's words for the quality of a kernel.
+/// SpiceQL's terms for the quality of a kernel.
 const QUALITIES: [&str; 4] = ["smithed", "reconstructed", "predicted", "noquality"];
 
 /// File names of the kernels of one type, in load order.

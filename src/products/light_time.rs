@@ -1,4 +1,4 @@
-//! Which positions of cameras the products follow, for their readers.
+//! Convention of camera positions in the products, for their readers.
 
 use super::site::{ImageProducts, SiteProducts};
 use crate::geom::light_time::LightTime;
@@ -31,7 +31,7 @@ pub(super) fn convention(site: &SiteProducts) -> String {
     format!("{positions}; ranges of shots are geometric")
 }
 
-/// What Parquet files say of it beside their columns.
+/// The convention in the metadata of Parquet files.
 pub(super) fn metadata(site: &SiteProducts) -> Vec<(&'static str, String)> {
     vec![("light_time", convention(site))]
 }

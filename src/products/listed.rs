@@ -1,4 +1,4 @@
-//! What a site's products will be, before they are written: for the report, which links to them.
+//! Products that a site will have, before they are written: for the report, which links to them.
 
 use super::{
     exchange::{adjusted::LIDAR, stac::ITEM},
@@ -15,9 +15,9 @@ use crate::stages::adjust::PointKind;
 pub struct Listed {
     /// Path below the site's folder.
     pub path: String,
-    /// What the file holds.
+    /// Contents of the file.
     pub what: &'static str,
-    /// Who reads it.
+    /// Readers of it.
     pub readers: &'static str,
 }
 

@@ -1,9 +1,9 @@
-//! Rows become the files that people's tools read; every file is read back before it counts.
+//! Writes rows to the files of other tools; every file is read back before it is accepted.
 //!
 //! A product is a `Declaration` in its file and a line of the registry; the
 //! files, the manifest's entries, the STAC item, `exchange/README.txt` and `docs/products.md` follow from it.
 //!
-//! The same site gives the same bytes; nothing here looks at a clock.
+//! The same site gives the same bytes; no clock is read here.
 //!
 //! A `Declaration` has the path, the content, the readers, the sites it applies to, its columns or schema, the function
 //! that writes it, and the commands that read it. A table is a list of `column(name, unit, meaning, value of a row)`
@@ -12,7 +12,7 @@
 //! columns of those formats. JSON documents are types: the document and its schema in `config/schema` come from one
 //! `struct` (`schema.rs`). `tests/products/generated.rs` fails when `docs/products.md` is stale.
 //!
-//! The same input gives the same bytes, whatever the number of threads; `finished_utc` in the manifest is the
+//! The same input gives the same bytes, for any number of threads; `finished_utc` in the manifest is the
 //! exception. Formats that hold a date (`GeoPackage`, dBASE) carry that of the newest shot.
 
 mod adjusted_footprints;
@@ -97,10 +97,11 @@ use crate::error::{Locate, Result};
 use product::{Context, Declaration, Scope, Write, Written};
 use registry::PRODUCTS;
 
-/// Writes every product of `site` below `directory`, with `pages` (or one page as its report), and reads each of them back.
+/// Writes every product of `site` below `directory`, with `pages` (or one page as its report), and reads each of them
+/// back.
 ///
 /// # Errors
-/// [`Kind::Io`](crate::error::Kind::Io) for what the disk refuses; [`Kind::Bug`](crate::error::Kind::Bug)
+/// [`Kind::Io`](crate::error::Kind::Io) for errors of the disk; [`Kind::Bug`](crate::error::Kind::Bug)
 /// for numbers that are not finite, inputs that do not belong together and files that read back
 /// differently.
 pub fn write_products<'a>(
@@ -142,7 +143,7 @@ pub fn write_products<'a>(
     Ok(written.into_iter().map(|(product, _)| product).collect())
 }
 
-/// Writes one product, of an image if it is of one.
+/// Writes one product, for an image if the product is per image.
 fn write(
     declaration: &'static Declaration,
     of: &Context,

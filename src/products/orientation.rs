@@ -38,7 +38,7 @@ const CONVENTIONS: [&str; 6] = [
      m13 = sin phi, m23 = -sin omega cos phi, m12 = -cos phi sin kappa; radians, continuous over the image",
     "quaternions: (w, x, y, z) in SPICE's convention, camera to Mars, continuous over the image",
     "rotation vector: M(x) = exp([r(x)]x) M_reference, M from Mars to camera components; positions as in the second \
-     order; to be used near gimbal lock, where |cos phi| < 0.1 leaves omega and kappa badly determined",
+     order; to be used near gimbal lock, where |cos phi| < 0.1 leaves omega and kappa poorly determined",
 ];
 
 #[derive(Serialize, JsonSchema)]
@@ -54,8 +54,8 @@ struct Document<'a> {
     invalid_because: Vec<&'a str>,
     times: Times<'a>,
     conventions: [Cow<'static, str>; 6],
-    /// Of the kernels' orientation: others find ground that the boresight meets in the middle of the image so many
-    /// lines later, and at so many samples more.
+    /// For the kernels' orientation: the other conventions see the boresight's ground point in the middle of the image
+    /// by these lines later, and at samples larger by these.
     light_time: &'a LightTimeEffect,
     #[schemars(range(min = 3))]
     samples: usize,
@@ -82,7 +82,7 @@ struct Times<'a> {
     stop_et_s: f64,
     #[schemars(extend("exclusiveMinimum" = 0))]
     line_period_s: f64,
-    /// Where the exposure changes inside the image: its pieces, in order; `line_period_s` is their mean then.
+    /// If the exposure changes inside the image: its pieces, in order; `line_period_s` is then their mean.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     line_pieces: Vec<LinePieceDocument>,
     exposure_s: f64,
@@ -108,7 +108,7 @@ struct LinePieceDocument {
 struct Euler<'a> {
     #[schemars(range(min = 0.0))]
     position_rmse_m: f64,
-    /// Root mean square on the ellipsoid of what the residuals of the angles do there.
+    /// Root mean square effect of the angles' residuals on the ellipsoid.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
     pointing_ground_rmse_m: Option<f64>,
@@ -343,7 +343,7 @@ fn outline_deg(orientation: &Orientation) -> Option<Vec<[f64; 2]>> {
     Some(outline.iter().map(corner).collect())
 }
 
-/// The pieces of an image of several.
+/// The pieces of an image with several.
 fn line_pieces(line_times: &LineTimes) -> Vec<LinePieceDocument> {
     let pieces = line_times.pieces();
     if pieces.len() == 1 {

@@ -1,11 +1,11 @@
-//! Products that others than this room make: the report, and the metakernel.
+//! Products made elsewhere: the report, and the metakernel.
 
 use super::{
     files::write_text,
     product::{Content, Declaration, Role, Write},
 };
 
-/// Where the report lies below a site's folder.
+/// Path of the report below a site's folder.
 pub const REPORT: &str = "report/index.html";
 
 pub(super) static PAGE: Declaration = Declaration {

@@ -1,7 +1,7 @@
-//! All that the page of a site shows, unrounded, as a product: from it alone the page can be made again.
+//! All data of a site's page, unrounded, as a product: the page can be regenerated from it without other files.
 //!
 //! Tables and documents are written for their readers, with the digits and the selection that these need. The page
-//! shows more: surfaces, histograms, spans of kernels. What it is made from is therefore kept whole.
+//! shows more: surfaces, histograms, spans of kernels. Its data are therefore kept whole.
 
 use std::{
     borrow::Cow,
@@ -47,7 +47,7 @@ use crate::{
     stored::whole,
 };
 
-/// Where it lies below a site's folder.
+/// Its path below a site's folder.
 pub const PAGE_DATA: &str = "report/page.postcard";
 
 pub(super) static DATA: Declaration = Declaration {
@@ -61,10 +61,10 @@ pub(super) static DATA: Declaration = Declaration {
     uses: &[],
 };
 
-/// What a page is made from, borrowed from a run or read from its product. The file is this struct in postcard.
+/// Data of a page, borrowed from a run or read from its product. The file is this struct in postcard.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct PageData<'a> {
-    /// The configuration in TOML: postcard has no words for infinite or absent values.
+    /// The configuration in TOML: postcard cannot represent infinite or absent values.
     config: String,
     /// Names of the PEDR files, which the configuration leaves out when it is written.
     pedr_files: Vec<String>,
@@ -83,7 +83,7 @@ pub struct PageData<'a> {
     notes: Cow<'a, [String]>,
     geometric: Option<Geometric<'a>>,
     overlays: Option<Cow<'a, Overlays>>,
-    /// The page shows no more of a terrain model than what is told of it.
+    /// The page shows only the account of a terrain model.
     surface: Option<Cow<'a, SurfaceAccount>>,
     program: Cow<'a, Program>,
 }
@@ -107,7 +107,7 @@ struct Geometric<'a> {
     adjustment: Option<Adjustment<'a>>,
 }
 
-/// See [`AdjustmentProducts`], of which kernels are no part: the page shows none of them.
+/// See [`AdjustmentProducts`], without kernels, which the page does not show.
 #[derive(Debug, Serialize, Deserialize)]
 struct Adjustment<'a> {
     adjusted: Cow<'a, Adjusted>,
@@ -119,7 +119,7 @@ struct Adjustment<'a> {
 }
 
 impl<'a> PageData<'a> {
-    /// What the page of `site` is made from; of paths only file names.
+    /// Data of the page of `site`; of paths only file names.
     fn of(site: &SiteProducts<'a>) -> std::result::Result<Self, ProductError> {
         let mut config = site.config.clone();
         config.file = PathBuf::from(file_name(&config.file));
@@ -153,13 +153,13 @@ impl<'a> PageData<'a> {
     /// Reads it from its product in the folder of a site.
     ///
     /// # Errors
-    /// A file of kind input that this version did not write; the disk's refusal.
+    /// A file of kind input that this version did not write; an error of the disk.
     pub fn read(site_folder: &Path) -> Result<PageData<'static>> {
         let path = site_folder.join(PAGE_DATA);
         decoded(&read(&path)?).in_file(path)
     }
 
-    /// Calls `with` on the site as the page wants it.
+    /// Calls `with` on the site as the page needs it.
     ///
     /// # Errors
     /// A configuration or verdict that this version did not write; what `with` returns.
@@ -257,7 +257,7 @@ fn geometric(of: GeometricProducts<'_>) -> Geometric<'_> {
     }
 }
 
-/// Writes what the page of `site` is made from, and checks that it comes back.
+/// Writes the data of the page of `site`, and checks that they are read back unchanged.
 fn write(path: &Path, site: &SiteProducts) -> Result<()> {
     let mut written = Hashed::new(create(path)?);
     encode(site, &mut written).in_file(path)?;
@@ -273,12 +273,12 @@ fn write(path: &Path, site: &SiteProducts) -> Result<()> {
         return Ok(());
     }
     Err(ProductError::ReadBack {
-        what: "what the report shows".to_owned(),
+        what: "the data of the report".to_owned(),
     })
     .in_file(path)
 }
 
-/// Writes what is encoded as it comes: a site with a million shots has half a gigabyte of it.
+/// Writes data as they are encoded: a site with a million shots has half a gigabyte of them.
 fn encode(site: &SiteProducts, to: &mut Hashed<impl Write>) -> Result<()> {
     let data = PageData::of(site)?;
     let encoded = whole(|| postcard::to_io(&data, &mut *to).map(|_| ()));
@@ -288,7 +288,7 @@ fn encode(site: &SiteProducts, to: &mut Hashed<impl Write>) -> Result<()> {
     }
 }
 
-/// A writer that takes the hash of what passes, and remembers why it was refused, which postcard forgets.
+/// A writer that hashes its data, and keeps the reason of an error, which postcard discards.
 struct Hashed<W> {
     to: W,
     hash: blake3::Hasher,

@@ -21,7 +21,7 @@ use crate::error::{Error, IoError, Locate, Result};
 /// Writes `table` with `metadata` (key, value) and reads it back.
 ///
 /// # Errors
-/// Numbers that are not finite; what the disk refuses; columns and values that come back different.
+/// Numbers that are not finite; errors of the disk; columns and values that are read back differently.
 pub(super) fn write(path: &Path, table: Table, metadata: Vec<(&str, String)>) -> Result<u64> {
     let table = table.for_parquet();
     let mut file = create(path)?;
@@ -41,7 +41,7 @@ fn encode(file: impl Write + Send, table: &Table, metadata: Vec<(&str, String)>)
     file.finish(metadata).map_err(refused)
 }
 
-/// The disk's refusal, or the library's.
+/// An error of the disk, or the library's.
 pub(super) fn refused(error: ParquetError) -> Error {
     match error {
         ParquetError::External(source) => match source.downcast::<std::io::Error>() {

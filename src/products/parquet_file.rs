@@ -23,21 +23,21 @@ use arrow_array::RecordBatch;
 use arrow_schema::{DataType, Field, SchemaRef};
 use rayon::prelude::*;
 
-/// Rows of a group, whose encoded columns stand in memory until it is whole; readers pass over groups.
+/// Rows of a group, whose encoded columns are kept in memory until it is complete; readers skip groups.
 const GROUP_ROWS: usize = 1 << 18;
 
 type Result<T> = std::result::Result<T, ParquetError>;
 
-/// A file that is being written: the same bytes for the same batches.
+/// A file being written: the same bytes for the same batches.
 pub(super) struct ParquetFile<W: Write + Send> {
     schema: SchemaRef,
     file: SerializedFileWriter<W>,
     factory: ArrowRowGroupWriterFactory,
-    /// Those of the group under way, leaf by leaf.
+    /// Those of the current group, leaf by leaf.
     columns: Vec<ArrowColumnWriter>,
     /// Rows of the group so far.
     rows: usize,
-    /// Rows of a whole one.
+    /// Rows of a complete group.
     group_rows: usize,
 }
 
@@ -122,7 +122,7 @@ impl<W: Write + Send> ParquetFile<W> {
     }
 }
 
-/// Has a column written as it compresses best: measured numbers, of which hardly two are the same, byte by byte, all others
+/// Encoding by which a column compresses best: measured numbers, which rarely repeat, byte by byte, all others
 /// through a dictionary.
 fn encoded(
     properties: WriterPropertiesBuilder,
@@ -155,7 +155,7 @@ mod tests {
 
     use super::*;
 
-    /// Rows `from` to `to`: a real, a count that is missing in every third row, a name of many rows.
+    /// Rows `from` to `to`: a real, a count that is missing in every third row, a name repeated over many rows.
     fn rows(schema: &SchemaRef, from: u32, to: u32) -> RecordBatch {
         let reals = Float64Array::from_iter_values((from..to).map(|row| f64::from(row).sqrt()));
         let counts: UInt32Array = (from..to)

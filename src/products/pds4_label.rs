@@ -1,6 +1,6 @@
 //! A label in the style of PDS4 (information model 1.21) for a table of delimited text.
 //!
-//! It describes the file as PDS4 does; it is no archive product, as its identifier is not the PDS's.
+//! It describes the file as PDS4 does; it is not an archive product, as its identifier is not the PDS's.
 
 use std::{
     fmt::Write as _,
@@ -21,7 +21,7 @@ use crate::{
     error::{IoError, Locate, Result},
 };
 
-/// What the label says of the file.
+/// Entries of the label on the file.
 struct Described {
     name: String,
     bytes: u64,
@@ -29,10 +29,10 @@ struct Described {
     md5: String,
 }
 
-/// Writes the label of `table`, which stands in the file `described` beside it.
+/// Writes the label of `table`, which is in the file `described` beside it.
 ///
 /// # Errors
-/// What the disk refuses; a label that comes back different.
+/// Errors of the disk; a label that is read back differently.
 pub(super) fn write(
     path: &Path,
     described: &Path,
@@ -84,7 +84,7 @@ fn escaped(text: &str) -> String {
         .replace('>', "&gt;")
 }
 
-/// `None` for what no text has.
+/// `None` for columns of bytes.
 const fn data_type(kind: Kind) -> Option<&'static str> {
     Some(match kind {
         Kind::Real => "ASCII_Real",
@@ -95,7 +95,7 @@ const fn data_type(kind: Kind) -> Option<&'static str> {
     })
 }
 
-/// A field and its number, counted from 1; `None` for what no text has.
+/// A field and its number, counted from 1; `None` for columns of bytes.
 fn field(number: usize, column: &Meaning) -> Option<String> {
     let unit = column.unit.symbol().map_or(String::new(), |unit| {
         format!("          <unit>{unit}</unit>\n")
@@ -188,7 +188,7 @@ fn identification(site: &SiteProducts) -> String {
     )
 }
 
-/// When, with what, and of what the shots are.
+/// Time, instrument and target of the shots.
 fn observation(site: &SiteProducts) -> String {
     let utc = |text: Option<&String>| text.map_or(String::new(), |utc| format!("{utc}Z"));
     let mission = if site.config.shots.is_empty() {

@@ -1,4 +1,4 @@
-//! Pictures of one band, 8 or 16 bits, written as their lines come: PNG, and TIFF with tiles and overviews.
+//! Pictures of one band, 8 or 16 bits, written line by line: PNG, and TIFF with tiles and overviews.
 
 mod png_lines;
 mod tiff_tiles;
@@ -11,7 +11,7 @@ use crate::{
     files::StagedFile,
 };
 
-/// How a picture is written.
+/// Format of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PictureFormat {
     /// PNG, lines compressed.
@@ -20,16 +20,16 @@ pub enum PictureFormat {
     Tiff,
 }
 
-/// What a picture is.
+/// Size and contents of a picture.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PictureHead {
     /// Samples of a line.
     pub width: u32,
     /// Lines.
     pub height: u32,
-    /// Whether a pixel has 16 bits, not 8.
+    /// Whether a pixel has 16 bits instead of 8.
     pub is_deep: bool,
-    /// What it shows, one `name: text` each.
+    /// Descriptions, one `name: text` each.
     pub notes: Vec<(&'static str, String)>,
 }
 
@@ -58,7 +58,7 @@ impl Cause for PictureError {
     }
 }
 
-/// A picture that its format cannot hold.
+/// A picture too large for its format.
 #[derive(Debug, thiserror::Error)]
 #[error("{width} × {height} pixels make a TIFF of {bytes} bytes; expected at most 4294967295")]
 struct TooLarge {
@@ -98,7 +98,7 @@ impl From<tiff::TiffError> for PictureError {
     }
 }
 
-/// A picture that is being written; it has its name when it is whole.
+/// A picture being written; it gets its final name when complete.
 #[derive(Debug)]
 pub struct PictureFile {
     file: StagedFile,
@@ -113,7 +113,7 @@ enum Writer {
 }
 
 impl PictureFile {
-    /// Begins a picture beside `path`.
+    /// Creates a picture beside `path`.
     ///
     /// # Errors
     /// The folder cannot be written; a TIFF of more than 4 GiB.
@@ -146,7 +146,7 @@ impl PictureFile {
     /// Adds whole lines.
     ///
     /// # Errors
-    /// The system's refusal to write.
+    /// The system's error on writing.
     pub fn write(&mut self, pixels: &[u16]) -> Result<()> {
         let bytes: Vec<u8> = match (&self.writer, self.head.is_deep) {
             (_, false) => pixels.iter().map(|pixel| pixel.to_le_bytes()[0]).collect(),
@@ -171,7 +171,7 @@ impl PictureFile {
     /// Ends the picture and gives it its name.
     ///
     /// # Errors
-    /// The system's refusal to write, flush or rename; fewer lines than were promised.
+    /// The system's error on writing, flushing or renaming; fewer lines than declared.
     pub fn finish(self) -> Result<()> {
         let path = self.file.path();
         match self.writer {

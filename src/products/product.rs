@@ -1,4 +1,4 @@
-//! What a product is: its file, for whom, when there is one, and how it is written.
+//! Declaration of a product: its file, its readers, its conditions and its writer.
 
 use std::path::{Path, PathBuf};
 
@@ -17,11 +17,11 @@ use crate::{
 pub struct Product {
     /// Path below the site's folder, for example `images/m0402852/isd.json`.
     pub path: PathBuf,
-    /// What the file has of what it is about: shots, samples, profiles, table nodes; 0 for plain text.
+    /// Number of items in the file: shots, samples, profiles, table nodes; 0 for plain text.
     pub rows: u64,
 }
 
-/// Writes every product below `directory` by `write`, which gives its rows.
+/// Writes every product below `directory` by `write`, which returns its number of rows.
 pub(super) fn write_each<W>(
     directory: &Path,
     declarations: &[&Declaration<W>],
@@ -38,28 +38,28 @@ pub(super) fn write_each<W>(
     products.collect()
 }
 
-/// A product, declared once: the files, the STAC item, `exchange/README.txt` and `docs/products.md` follow. `W` is how it is
-/// written: for a site by [`Write`].
+/// A product, declared once: the files, the STAC item, `exchange/README.txt` and `docs/products.md` follow. `W` is how
+/// it is written: for a site by [`Write`].
 pub(super) struct Declaration<W = Write> {
     /// Path below the site's folder; [`IMAGE`] stands for an image's identifier.
     pub(super) path: &'static str,
-    /// What the file holds.
+    /// Contents of the file.
     pub(super) what: &'static str,
-    /// Who reads it.
+    /// Readers of it.
     pub(super) readers: &'static str,
-    /// What its rows are; empty for a file without rows.
+    /// Meaning of its rows; empty for a file without rows.
     pub(super) rows: &'static str,
-    /// What it is to a catalogue.
+    /// Its role in a catalogue.
     pub(super) role: Role,
     /// Columns or schema.
     pub(super) content: Content,
-    /// How it is written, for which sites.
+    /// Its writer, and the sites that have it.
     pub(super) write: W,
-    /// How other programs are told to read it.
+    /// Instructions for reading it in other programs.
     pub(super) uses: &'static [Use],
 }
 
-/// Stands for an image in paths and commands.
+/// Placeholder of an image in paths and commands.
 pub(super) const IMAGE: &str = "<image>";
 
 /// Roles of STAC assets.
@@ -80,21 +80,21 @@ impl Role {
     }
 }
 
-/// What says how a file is built.
+/// Description of the structure of a file.
 pub(super) enum Content {
     /// A table with these columns.
     Table(fn() -> Vec<Meaning>),
     /// A document of this schema.
     Document(fn() -> DocumentSchema),
-    /// A format of others.
+    /// An external format.
     Foreign,
 }
 
-/// How a product is written. The functions give its rows, or nothing where there was nothing to write.
+/// Writer of a product. The functions return its number of rows, or `None` if there was nothing to write.
 pub(super) enum Write {
     /// For every site.
     Site(fn(&Path, &Context) -> Result<Option<u64>>),
-    /// For a site with footprints: GIS readers refuse tables without a row, or guess their types.
+    /// For a site with footprints: GIS readers reject tables without a row, or guess their types.
     Footprints(fn(&Path, &Context) -> Result<u64>),
     /// For every image.
     Image(fn(&Path, &Context, &ImageProducts) -> Result<u64>),
@@ -106,7 +106,7 @@ pub(super) enum Write {
     Matched(fn(&Path, &Context, &GeometricProducts) -> Result<u64>),
     /// For a site with a terrain model.
     Surface(fn(&Path, &Context, &Surface) -> Result<u64>),
-    /// For a site with a terrain model that is believed.
+    /// For a site with a significant terrain model.
     Model(fn(&Path, &Context, &Surface) -> Result<u64>),
     /// For a site with an adjustment.
     Adjustment(fn(&Path, &Context, &GeometricProducts, &AdjustmentProducts) -> Result<Option<u64>>),
@@ -120,7 +120,7 @@ pub(super) enum Write {
     Several(fn(&Context, &AdjustmentProducts) -> Result<Vec<Written>>),
 }
 
-/// What there is a file of.
+/// Unit that has a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Scope {
     Site,
@@ -133,7 +133,7 @@ pub(super) enum Scope {
 pub struct Pages<'a> {
     /// The report.
     pub report: &'a str,
-    /// The images with footprints on them, where there are pixels.
+    /// The images with footprints on them, if there are pixels.
     pub overlays: Option<&'a str>,
 }
 
@@ -149,19 +149,19 @@ impl<'a, T: AsRef<str> + ?Sized> From<&'a T> for Pages<'a> {
 /// A file that was written, and its declaration.
 pub(super) type Written = (Product, &'static Declaration);
 
-/// What products are made of.
+/// Inputs of products.
 pub(super) struct Context<'a> {
     pub(super) site: &'a SiteProducts<'a>,
     pub(super) pages: Pages<'a>,
-    /// Where products are written.
+    /// Folder that products are written to.
     pub(super) directory: &'a Path,
     /// All declarations, in order.
     pub(super) products: &'a [&'static Declaration],
-    /// What has been written, with its declaration.
+    /// Products written so far, with their declarations.
     pub(super) written: &'a [Written],
 }
 
-/// A program, or programs of a kind, to which `exchange/README.txt` has a section.
+/// A program, or kind of program, with a section in `exchange/README.txt`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Program {
     StereoPipeline,
@@ -187,12 +187,12 @@ impl Declaration {
         }
     }
 
-    /// Whether it is written from the footprints alone, whatever other products there are.
+    /// Whether it is written only from the footprints, independent of other products.
     pub(super) const fn is_apart(&self) -> bool {
         matches!(self.write, Write::Footprints(_))
     }
 
-    /// When there is such a file, in words.
+    /// Condition for the file, in words.
     pub(super) const fn when(&self) -> &'static str {
         match self.write {
             Write::Site(_) => "every site",
@@ -217,7 +217,7 @@ impl Declaration {
 }
 
 impl<W> Declaration<W> {
-    /// Media type by the ending of the name; `None` for formats that have none.
+    /// Media type by the extension; `None` for formats without one.
     pub(super) fn media_type(&self) -> Option<&'static str> {
         Some(match self.path.rsplit_once('.')?.1 {
             "parquet" => "application/vnd.apache.parquet",

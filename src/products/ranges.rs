@@ -24,12 +24,12 @@ use crate::{
     },
 };
 
-/// What each residual is, for readers of the files.
+/// Definitions of the residuals, for readers of the files.
 const DEFINITIONS: [(&str, &str); 7] = [
     (
         "range_minus_distance",
         "measured range minus |spacecraft in the kernels - footprint with the raw radius|, \
-        both in IAU 2000; the paper's Table 3, its sign chosen here",
+        both in IAU 2000; the paper's Table 3, with the sign chosen here",
     ),
     (
         "range_minus_distance_crossover",
@@ -38,7 +38,7 @@ const DEFINITIONS: [(&str, &str); 7] = [
     (
         "decoding",
         "measured range minus |spacecraft in the PEDR file - footprint with the raw radius|: tests \
-        the reading of the file, no kernel is involved",
+        the reading of the file without kernels",
     ),
     (
         "spacecraft_radial, _along, _cross",
@@ -48,22 +48,22 @@ const DEFINITIONS: [(&str, &str); 7] = [
     (
         "trend",
         "slope of range_minus_distance over time, with its standard uncertainty from the scatter about \
-        the line, correlated neighbours counted",
+        the line, including the correlation of neighbours",
     ),
     (
         "bias_scan",
-        "spread of range_minus_distance against an assumed correction of the time tags; best_s is known \
-        as well as its scatter and the orbit allow: uncertainty_s takes the mean difference of the two \
-        orbits for what either may be off, a metre along the flight being 0.3 ms",
+        "spread of range_minus_distance against an assumed correction of the time tags; best_s is limited \
+        by its scatter and the orbit: uncertainty_s takes the mean difference of the two \
+        orbits as the error of either, a metre along the flight being 0.3 ms",
     ),
     (
         "summary",
-        "all shots of the site, each once, also when it lies in several windows; its standard deviation holds what \
-        profiles differ by, which those of the profiles do not",
+        "all shots of the site, each once, also when it lies in several windows; its standard deviation includes \
+        differences between profiles, which those of the profiles do not",
     ),
 ];
 
-/// Places at which rows of footprints come for the first time.
+/// Positions at which rows of footprints occur first.
 fn each_once(rows: &[u32]) -> Vec<usize> {
     let mut seen = HashSet::with_capacity(rows.len());
     let places = rows.iter().enumerate();
@@ -76,7 +76,7 @@ fn each_once(rows: &[u32]) -> Vec<usize> {
 #[derive(Serialize, JsonSchema)]
 #[schemars(
     title = "Range check of a site",
-    description = "ranges.json of areograph: residuals of measured ranges per profile (the paper's Table 3), their limits and verdicts. Metres and seconds; what is unknown is left out."
+    description = "ranges.json of areograph: residuals of measured ranges per profile (the paper's Table 3), their limits and verdicts. Metres and seconds; unknown values are omitted."
 )]
 struct Document<'a> {
     #[schemars(extend("const" = "areograph ranges 1"))]
@@ -137,11 +137,11 @@ struct ProfileDocument<'a> {
     valid: bool,
     invalid_because: &'a [String],
     range_minus_distance_m: Summary,
-    /// Mean without outliers: the verdict goes by this one.
+    /// Mean without outliers: the one compared with the limit.
     mean_without_outliers_m: f64,
     range_minus_distance_crossover_m: Summary,
     decoding_m: Summary,
-    /// Its mean without the same shots: the verdict goes by this one.
+    /// Its mean without the same shots: the one compared with the limit.
     decoding_without_outliers_m: f64,
     spacecraft_radial_m: Summary,
     spacecraft_along_m: Summary,
@@ -153,10 +153,10 @@ struct ProfileDocument<'a> {
     bias_scan: Option<Scan<'a>>,
 }
 
-/// A scan without the members that are not known.
+/// A scan without unknown members.
 #[derive(Serialize, JsonSchema)]
 struct Scan<'a> {
-    /// Radius of the footprints: the one with which ranges spread less.
+    /// Radius of the footprints: the one with the smaller spread of ranges.
     radius: ScannedRadius,
     correction_s: &'a [f64],
     spread_m: &'a [f64],

@@ -1,4 +1,4 @@
-//! Registration: line and sample of every footprint in every image as Parquet, what it took as JSON.
+//! Registration: line and sample of every footprint in every image as Parquet, statistics as JSON.
 
 use std::collections::BTreeMap;
 
@@ -23,7 +23,7 @@ use crate::{
     },
 };
 
-/// What the numbers are, for readers of the files.
+/// Definitions of the numbers, for readers of the files.
 const DEFINITIONS: [(&str, &str); 7] = [
     (
         "line, sample",
@@ -37,8 +37,8 @@ const DEFINITIONS: [(&str, &str); 7] = [
     ),
     (
         "light_time",
-        "which positions of the camera lines and samples belong to; the other conventions find the ground in the middle \
-        of the image so many lines later and at so many samples more",
+        "the camera positions to which lines and samples belong; for the other conventions the offset of the ground in the middle \
+        of the image, later in lines and larger in samples",
     ),
     (
         "methods",
@@ -52,7 +52,7 @@ const DEFINITIONS: [(&str, &str); 7] = [
     ),
     (
         "mean_step_lines",
-        "mean |step| of each iteration over the points with a result, a point that has ended counts as 0: \
+        "mean |step| of each iteration over the points with a result, a converged point counts as 0: \
         figure 4 of Shan et al. 2005",
     ),
     (
@@ -64,7 +64,7 @@ const DEFINITIONS: [(&str, &str); 7] = [
 #[derive(Serialize, JsonSchema)]
 #[schemars(
     title = "Registration of a site",
-    description = "registration.json of areograph: footprints in every image, what the published iterations cost on them, and what the choice of the camera model moves. Lines, samples and image pixels; what is unknown is left out."
+    description = "registration.json of areograph: footprints in every image, the cost of the published iterations, and the effect of the camera model. Lines, samples and image pixels; unknown values are omitted."
 )]
 struct Document<'a> {
     #[schemars(extend("const" = "areograph registration 1"))]
@@ -124,7 +124,7 @@ pub(super) static TABLE: Declaration = Declaration {
 
 pub(super) static DOCUMENT: Declaration = Declaration {
     path: "registration.json",
-    what: "how the published iterations converge on them, and what the choice of the camera model moves",
+    what: "convergence of the published iterations on them, and the effect of the camera model",
     readers: "scripts",
     rows: "images",
     role: Role::Data,
@@ -234,7 +234,7 @@ fn columns<'a>() -> Vec<Column<Registered<'a>>> {
         column(
             "residual_px",
             Unit::Pixel,
-            "along-track focal-plane coordinate at the solution, image pixels: what the iteration leaves",
+            "along-track focal-plane coordinate at the solution, image pixels: the residual of the iteration",
             |point: &Registered| point.get(|of| &of.residual_px),
         ),
         column(

@@ -1,4 +1,4 @@
-//! Rows as they come, in the formats that people ask for: the one writer for searches, questions and the service.
+//! Streams of rows in the requested format: the one writer for searches, queries and the service.
 
 use std::{
     fs::File,
@@ -30,14 +30,14 @@ use crate::{
 /// The column of points in well-known binary.
 pub(super) const GEOMETRY: &str = "geometry";
 
-/// How rows are written.
+/// Format of rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RowsFormat {
     /// Parquet; units and descriptions of columns are the metadata of its fields.
     Parquet,
-    /// Comma-separated values, of all columns but those of bytes.
+    /// Comma-separated values, of all columns except those of bytes.
     Csv,
-    /// GeoJSON points on Mars: those of the column `geometry` with all columns but those of bytes.
+    /// GeoJSON points on Mars: those of the column `geometry` with all columns except those of bytes.
     GeoJson,
 }
 
@@ -66,17 +66,17 @@ impl Cause for RowsError {
                 "write Parquet, which also holds lists and groups, or select other columns"
             }
             Self::NoPoints | Self::Differ => {
-                "products of another version of areograph must be made again by this version"
+                "regenerate products of another version of areograph with this version"
             }
         }
         .to_owned()
     }
 }
 
-/// Where rows go.
+/// Destination of rows.
 pub type Out = Box<dyn Write + Send>;
 
-/// Rows that are being written; a file appears under its name when it is finished.
+/// Rows being written; a file gets its final name when finished.
 pub struct RowsWriter {
     staged: Option<StagedFile>,
     form: Form,
@@ -94,7 +94,7 @@ impl RowsWriter {
     /// Begins the file `path` with rows of these columns.
     ///
     /// # Errors
-    /// What the disk refuses.
+    /// Errors of the disk.
     pub fn create(path: &Path, format: RowsFormat, schema: SchemaRef) -> Result<Self> {
         let staged = StagedFile::create(path)?;
         let writer = Self::new(Box::new(staged.writer()?), format, schema).in_file(path)?;
@@ -107,7 +107,7 @@ impl RowsWriter {
     /// Begins rows of these columns that go to `out`.
     ///
     /// # Errors
-    /// What `out` refuses.
+    /// Errors of `out`.
     pub fn new(out: Out, format: RowsFormat, schema: SchemaRef) -> Result<Self> {
         let form = match format {
             RowsFormat::Parquet => {
@@ -139,7 +139,7 @@ impl RowsWriter {
     /// Appends rows.
     ///
     /// # Errors
-    /// Other columns than before; those that text cannot hold; what the disk refuses.
+    /// Other columns than before; columns that text cannot hold; errors of the disk.
     pub fn write(&mut self, batch: &RecordBatch) -> Result<()> {
         let written = self.append(batch);
         match &self.staged {
@@ -174,12 +174,12 @@ impl RowsWriter {
         Ok(())
     }
 
-    /// Ends the rows, and gives their number.
+    /// Ends the rows, and returns their number.
     ///
-    /// * `notes` – metadata of Parquet, text by key; members of GeoJSON, whose text is JSON; CSV has no place for them
+    /// * `notes` – metadata of Parquet, text by key; members of GeoJSON, whose text is JSON; CSV cannot hold them
     ///
     /// # Errors
-    /// What the disk refuses; a Parquet file that comes back with another number of rows.
+    /// Errors of the disk; a Parquet file that is read back with another number of rows.
     pub fn finish(self, notes: Vec<(&str, String)>) -> Result<u64> {
         let (is_parquet, rows) = (matches!(self.form, Form::Parquet(_)), self.rows);
         let ended = self.form.end(notes);
@@ -215,7 +215,7 @@ fn put(out: &mut impl Write, text: impl AsRef<[u8]>) -> Result<()> {
     Ok(out.write_all(text.as_ref()).map_err(IoError::on("write"))?)
 }
 
-/// Calls `text_of` for parts of the batch with all threads.
+/// Calls `text_of` for parts of the batch on all threads.
 fn texts(
     batch: &RecordBatch,
     text_of: impl Fn(&RecordBatch) -> Result<Vec<u8>> + Sync,
@@ -227,7 +227,7 @@ fn texts(
         .collect()
 }
 
-/// Whether text has a place for the column.
+/// Whether text can hold the column.
 fn is_text(field: &FieldRef) -> bool {
     *field.data_type() != DataType::Binary
 }
@@ -248,13 +248,13 @@ fn features(batch: &RecordBatch) -> Result<Vec<u8>> {
     Ok(text?)
 }
 
-/// Names of the columns that text has a place for.
+/// Names of the columns that text can hold.
 fn names(schema: &SchemaRef) -> Vec<&str> {
     let fields = schema.fields().iter().filter(|field| is_text(field));
     fields.map(|field| &**field.name()).collect()
 }
 
-/// What these columns hold.
+/// Types of these columns.
 fn attributes(batch: &RecordBatch) -> Result<Vec<Values>> {
     let fields = batch.schema();
     let columns = fields.fields().iter().zip(batch.columns());
@@ -264,7 +264,7 @@ fn attributes(batch: &RecordBatch) -> Result<Vec<Values>> {
         .collect()
 }
 
-/// What a column holds, row by row. Only numbers with a fraction, and text, may be missing.
+/// Values of a column, row by row. Only numbers with a fraction, and text, may be missing.
 fn values_of(name: &str, array: &ArrayRef) -> Result<Values> {
     let is_whole = array.null_count() == 0;
     Ok(match array.data_type() {
@@ -298,7 +298,7 @@ fn values_of(name: &str, array: &ArrayRef) -> Result<Values> {
     })
 }
 
-/// Reads back how many rows the file has.
+/// Reads back the number of rows of the file.
 fn require_rows(file: File, rows: u64) -> Result<()> {
     let reader =
         ParquetRecordBatchReaderBuilder::try_new(file).map_err(ProductError::unreadable)?;

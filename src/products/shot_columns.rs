@@ -19,15 +19,15 @@ use crate::{
     stages::convert_datum::convert_at_tags,
 };
 
-/// What is asked of a shot, in the order of the answer.
+/// Columns queried of a shot, in the order of the answer.
 #[derive(Debug, Clone)]
 pub struct ShotColumns {
-    /// Places among all columns.
+    /// Indices among all columns.
     places: Vec<usize>,
     schema: SchemaRef,
 }
 
-/// Shots that no window was asked for, of unknown UTC.
+/// Shots without windows and of unknown UTC.
 struct Nameless;
 
 impl ShotNames for Nameless {

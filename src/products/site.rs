@@ -1,4 +1,4 @@
-//! Everything of one site that products are made of.
+//! Inputs of the products of one site.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -42,11 +42,11 @@ pub struct SiteProducts<'a> {
     pub kernels: &'a [KernelLine],
     /// Text of the metakernel that loads them again, its paths relative to the folder of the products.
     pub metakernel: &'a str,
-    /// The instants that the site asks of the kernels.
+    /// The instants at which the site needs the kernels.
     pub required: &'a RequiredCoverage,
     /// Images in the order of the configuration.
     pub images: &'a [ImageProducts<'a>],
-    /// What the conversion of the datum did, in the order of the footprints' files.
+    /// Effect of the datum conversion, in the order of the footprints' files.
     pub conversions: &'a [FileConversion],
     /// Footprints in IAU 2000.
     pub footprints: &'a Footprints<BodyFixed>,
@@ -58,32 +58,33 @@ pub struct SiteProducts<'a> {
     pub ranges: &'a RangeCheck,
     /// Rejected shots by reason.
     pub rejected: &'a BTreeMap<String, u64>,
-    /// What was wrong with skipped records, one sentence each.
+    /// Errors of skipped records, one sentence each.
     pub complaints: &'a [String],
-    /// What the reader should know, one sentence each.
+    /// Notes for the reader, one sentence each.
     pub notes: &'a [String],
     /// The verdict.
     pub verdict: &'a Verdict,
-    /// Tie points and the adjustment; nothing for a site without tie points that could be intersected.
+    /// Tie points and the adjustment; `None` for a site without tie points that could be intersected.
     pub geometric: Option<GeometricProducts<'a>>,
-    /// What images show; nothing for a site without pixels.
+    /// Contents of images; `None` for a site without pixels.
     pub overlays: Option<&'a Overlays>,
-    /// The terrain model of a pair of images; nothing for a site that asks for none.
+    /// The terrain model of a pair of images; `None` if the site does not request one.
     pub surface: Option<&'a Surface>,
-    /// What the products were computed by.
+    /// Software that computed the products.
     pub program: &'a Program,
 }
 
-/// What products are computed by, besides this version of areograph.
+/// Software that computes products, besides this version of areograph.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Program {
-    /// Version of CSPICE as that says it, for example `CSPICE_N0067`.
+    /// Version of CSPICE as reported by it, for example `CSPICE_N0067`.
     pub cspice: String,
-    /// Stages that the run passed, with the number of their method: it is raised when a stage computes something else.
+    /// Stages that the run passed, with the number of their method: it is raised when a stage computes different
+    /// results.
     pub methods: Vec<(String, u32)>,
 }
 
-/// What tie points make of a site.
+/// Results from the tie points of a site.
 #[derive(Debug, Clone, Copy)]
 pub struct GeometricProducts<'a> {
     /// The tie points.
@@ -94,16 +95,16 @@ pub struct GeometricProducts<'a> {
     pub pairs: &'a [PairComparison],
     /// Heights of these points against the MOLA surface.
     pub heights: &'a HeightCheck,
-    /// Nothing where the adjustment failed.
+    /// `None` if the adjustment failed.
     pub adjustment: Option<AdjustmentProducts<'a>>,
 }
 
-/// What the adjustment makes of a site.
+/// Results of the adjustment of a site.
 #[derive(Debug, Clone, Copy)]
 pub struct AdjustmentProducts<'a> {
-    /// The kernels that the adjusted ones follow.
+    /// The kernels that precede the adjusted ones.
     pub kernels: &'a KernelSet,
-    /// Folder of the site's products, where `adjusted.tm` will lie.
+    /// Folder of the site's products, the future location of `adjusted.tm`.
     pub folder: &'a Path,
     /// The adjustment.
     pub adjusted: &'a Adjusted,
@@ -111,7 +112,7 @@ pub struct AdjustmentProducts<'a> {
     pub heights: &'a HeightCheck,
     /// The images with their adjusted orientation, in the order of the site's.
     pub images: &'a [ImageProducts<'a>],
-    /// What their adjusted kernels hold.
+    /// Contents of their adjusted kernels.
     pub tables: &'a [&'a KernelTables],
     /// Ground points of the tie points with the adjusted orientation.
     pub intersected: &'a IntersectedTies,
@@ -143,7 +144,7 @@ impl AdjustmentProducts<'_> {
 }
 
 impl<'a> ImageProducts<'a> {
-    /// Why the image is invalid: first its orientation, then its models; empty when it is valid.
+    /// Reasons why the image is invalid: first its orientation, then its models; empty if it is valid.
     #[must_use]
     pub fn invalid_because(&self) -> Vec<&'a str> {
         let orientation = self.orientation.invalid_because.iter();
@@ -153,14 +154,14 @@ impl<'a> ImageProducts<'a> {
 }
 
 impl<'a> SiteProducts<'a> {
-    /// The pointing biases with which kernels were read; none where support data orient all images.
+    /// The pointing biases with which kernels were read; empty if support data orient all images.
     #[must_use]
     pub fn pointing_biases(&self) -> Vec<UsedBias<'a>> {
         let cameras = self.images.iter().map(|image| image.times);
         used_biases(&self.config.pointing, cameras)
     }
 
-    /// The tie points and their adjustment; nothing where there is none.
+    /// The tie points and their adjustment; `None` without an adjustment.
     pub(crate) fn adjustment(&self) -> Option<(GeometricProducts<'a>, AdjustmentProducts<'a>)> {
         let geometric = self.geometric?;
         Some((geometric, geometric.adjustment?))
@@ -178,7 +179,7 @@ impl<'a> SiteProducts<'a> {
         ids.join(";")
     }
 
-    /// The spacecraft that kernels are read of: that of the laser, where none of another one alone are needed, and others.
+    /// The spacecraft whose kernels are read: that of the laser, unless only those of another are needed, and others.
     #[must_use]
     pub fn spacecraft_of_kernels(&self) -> Vec<&'static Spacecraft> {
         let required = self.required;
@@ -191,8 +192,8 @@ impl<'a> SiteProducts<'a> {
             .collect()
     }
 
-    /// The spacecraft of footprints and images: those whose kernels are read, and those that support data name; where nothing names
-    /// any, the altimeter.
+    /// The spacecraft of footprints and images: those whose kernels are read, and those that support data name; if none
+    /// is named, the altimeter.
     pub(super) fn spacecraft(&self) -> String {
         let supports = || self.images.iter().map(|image| &image.times.support);
         // Tables of shots do not name theirs.

@@ -1,4 +1,4 @@
-//! The terrain model of a pair of images: heights, their standard deviations, and what is told of them.
+//! The terrain model of a pair of images: heights, their standard deviations, and statistics.
 
 mod document;
 
@@ -22,7 +22,7 @@ use document::Document;
 pub(super) static HEIGHTS: Declaration = Declaration {
     path: "surface.tif",
     what: "terrain model of a pair of images: heights above the sphere of the body's maps, metres, on an equirectangular map; \
-           -32768 where there is none; a cloud-optimised GeoTIFF",
+           -32768 in cells without a height; a cloud-optimised GeoTIFF",
     readers: "GIS, Ames Stereo Pipeline, `areograph pedr match`",
     rows: "cells with a height",
     role: Role::Data,
@@ -36,8 +36,8 @@ pub(super) static HEIGHTS: Declaration = Declaration {
 
 pub(super) static SIGMAS: Declaration = Declaration {
     path: "surface_sigma.tif",
-    what: "standard deviations of these heights by the matching, metres, in the same cells; surface.json has that of what all \
-           heights have in common",
+    what: "standard deviations of these heights by the matching, metres, in the same cells; surface.json has that of the offset \
+           common to all heights",
     readers: "GIS, Ames Stereo Pipeline",
     rows: "cells with a height",
     role: Role::Data,
@@ -51,7 +51,7 @@ pub(super) static SIGMAS: Declaration = Declaration {
 
 pub(super) static DOCUMENT: Declaration = Declaration {
     path: "surface.json",
-    what: "how the terrain model was made, what became of its cells, and what MOLA says of it, profile by profile",
+    what: "how the terrain model was made, statistics of its cells, and its differences from MOLA, profile by profile",
     readers: "scripts",
     rows: "profiles on it",
     role: Role::Metadata,

@@ -12,13 +12,14 @@ use rayon::prelude::*;
 use super::error::ProductError;
 use crate::wording::Wording;
 
-/// Rows whose values stand in memory at once.
+/// Rows whose values are in memory at once.
 const ROWS_AT_ONCE: usize = 65_536;
-/// Rows that a thread turns into text at once, and how often in a wave: text of a wave, 3 MB a thread, stands in memory.
+/// Rows that a thread turns into text at once, and how often in a wave: the text of a wave, 3 MB per thread, is kept in
+/// memory.
 pub(super) const ROWS_OF_A_TASK: usize = 2_048;
 const TASKS_OF_A_THREAD: usize = 4;
 
-/// What a column counts in; names of our own columns end in it.
+/// Unit of a column; names of areograph's columns end in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Unit {
     /// A name, a number without a unit, or a flag.
@@ -35,7 +36,7 @@ pub(super) enum Unit {
 }
 
 impl Unit {
-    /// The symbol, as PDS4 and people write it.
+    /// The symbol, as in PDS4 and in texts.
     pub(super) const fn symbol(self) -> Option<&'static str> {
         Some(match self {
             Self::None => return None,
@@ -62,15 +63,15 @@ pub(super) enum Kind {
     Bytes,
 }
 
-/// Which attributes of points GIS formats get.
+/// Selection of attributes of points for GIS formats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Gis {
     No,
     /// In the order of the columns.
     Yes,
-    /// Behind all others.
+    /// After all others.
     Last,
-    /// And no other format does.
+    /// Only GIS formats have it.
     Only,
 }
 
@@ -83,7 +84,7 @@ pub(super) struct DbaseField {
     pub(super) decimals: u8,
 }
 
-/// What a column is.
+/// Meaning of a column.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Meaning {
     pub(super) name: &'static str,
@@ -92,7 +93,7 @@ pub(super) struct Meaning {
     pub(super) kind: Kind,
     /// Whether rows may lack a value.
     pub(super) optional: bool,
-    /// Decimals that text formats print, for other people's readers; else as many as give the number back.
+    /// Decimals in text formats for external readers; else as many as reproduce the number.
     pub(super) decimals: Option<usize>,
     /// Least and greatest value of a count.
     pub(super) limits: Option<[u32; 2]>,
@@ -101,13 +102,13 @@ pub(super) struct Meaning {
 }
 
 impl Meaning {
-    /// Describes the column in the words of a site.
+    /// Describes the column in the terms of a site.
     pub(super) fn say(&mut self, wording: &Wording<'_>) {
         self.description = wording.of(std::mem::take(&mut self.description));
     }
 }
 
-/// Gives the values of rows.
+/// Returns the values of rows.
 type Gather<R> = dyn Fn(&[R]) -> Values + Send + Sync;
 
 /// A column of a table whose rows are `R`.
@@ -116,7 +117,7 @@ pub(super) struct Column<R> {
     values: Box<Gather<R>>,
 }
 
-/// The column `name`, whose value in a row is what `of` gives.
+/// The column `name`, whose value in a row is that of `of`.
 pub(super) fn column<R, T: Cell>(
     name: &'static str,
     unit: Unit,
@@ -140,7 +141,7 @@ pub(super) fn column<R, T: Cell>(
 }
 
 impl<R> Column<R> {
-    /// Printed with so many decimals.
+    /// Printed with a fixed number of decimals.
     pub(super) const fn decimals(mut self, decimals: usize) -> Self {
         self.meaning.decimals = Some(decimals);
         self
@@ -158,13 +159,13 @@ impl<R> Column<R> {
         self
     }
 
-    /// The same, behind the others.
+    /// The same, after the others.
     pub(super) const fn last_in_gis(mut self) -> Self {
         self.meaning.gis = Gis::Last;
         self
     }
 
-    /// An attribute of points, and no column of Parquet and CSV.
+    /// An attribute of points, but not a column of Parquet and CSV.
     pub(super) const fn only_in_gis(mut self) -> Self {
         self.meaning.gis = Gis::Only;
         self
@@ -181,7 +182,7 @@ impl<R> Column<R> {
     }
 }
 
-/// What a value of a column may be.
+/// Type of a column's values.
 pub(super) trait Cell: Sized {
     const KIND: Kind;
     const OPTIONAL: bool = false;
@@ -241,7 +242,7 @@ impl Values {
     }
 }
 
-/// Rows with what their columns are; their values are computed piece by piece.
+/// Rows with the meanings of their columns; their values are computed piece by piece.
 pub(super) struct Table<'a> {
     columns: Vec<(usize, Meaning)>,
     rows: usize,
@@ -258,7 +259,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// With descriptions in the words of a site.
+    /// With descriptions in the terms of a site.
     pub(super) fn in_words(mut self, wording: &Wording<'_>) -> Self {
         for (_, column) in &mut self.columns {
             column.say(wording);
@@ -266,17 +267,17 @@ impl<'a> Table<'a> {
         self
     }
 
-    /// With the columns of Parquet alone.
+    /// With only the columns of Parquet.
     pub(super) fn for_parquet(self) -> Self {
         self.keep(|column| column.gis != Gis::Only)
     }
 
-    /// With the columns of text formats alone.
+    /// With only the columns of text formats.
     pub(super) fn for_text(self) -> Self {
         self.keep(|column| column.gis != Gis::Only && column.kind != Kind::Bytes)
     }
 
-    /// With the attributes of GeoJSON and GeoPackage alone.
+    /// With only the attributes of GeoJSON and GeoPackage.
     pub(super) fn for_gis(mut self) -> Self {
         self.columns
             .sort_by_key(|(_, column)| column.gis == Gis::Last);
@@ -293,7 +294,7 @@ impl<'a> Table<'a> {
         self
     }
 
-    /// With the fields of dBASE alone, numbers first.
+    /// With only the fields of dBASE, numbers first.
     pub(super) fn for_dbase(mut self) -> Self {
         self.columns
             .sort_by_key(|(_, column)| column.kind == Kind::Text);
@@ -305,7 +306,7 @@ impl<'a> Table<'a> {
         self.keep(|column| column.name != name)
     }
 
-    /// With the columns at these places alone, in this order; the table must have them.
+    /// With only the columns at these indices, in this order; the table must have them.
     #[cfg(feature = "sql")]
     pub(super) fn pick(mut self, places: &[usize]) -> Self {
         self.columns = places
@@ -320,7 +321,7 @@ impl<'a> Table<'a> {
         self
     }
 
-    /// What the columns are, in order.
+    /// Meanings of the columns, in order.
     pub(super) fn columns(&self) -> impl Iterator<Item = &Meaning> {
         self.columns.iter().map(|(_, column)| column)
     }
@@ -370,14 +371,14 @@ impl<'a> Table<'a> {
     }
 }
 
-/// So many rows in pieces of at most this size.
+/// `rows` rows in pieces of at most this size.
 pub(super) fn pieces(rows: usize, size: usize) -> impl Iterator<Item = Range<usize>> {
     (0..rows)
         .step_by(size)
         .map(move |start| start..rows.min(start + size))
 }
 
-/// What columns are, whatever the rows.
+/// Meanings of columns, independent of the rows.
 pub(super) fn meanings<R>(columns: &[Column<R>]) -> Vec<Meaning> {
     columns
         .iter()
@@ -389,7 +390,7 @@ pub(super) fn meanings<R>(columns: &[Column<R>]) -> Vec<Meaning> {
 pub(super) mod tests {
     use super::*;
 
-    /// A table of numbers alone.
+    /// A table of numbers only.
     pub(in crate::products) fn numbers(name: &'static str, values: Vec<f64>) -> Table<'static> {
         Table::new(
             vec![column(name, Unit::Metre, "", |value: &f64| *value)],

@@ -1,4 +1,4 @@
-//! Tables as CSV files: shortest digits that give the same number back, or fixed decimals.
+//! Tables as CSV files: shortest digits that reproduce the number, or fixed decimals.
 
 use std::{fmt, io::Write, ops::Range, path::Path};
 
@@ -12,10 +12,10 @@ use super::{
 };
 use crate::error::{Error, IoError, Locate, Result};
 
-/// Writes the columns of `table` that are no bytes, and reads them back.
+/// Writes the columns of `table` except those of bytes, and reads them back.
 ///
 /// # Errors
-/// Numbers that are not finite; what the disk refuses; values that come back different.
+/// Numbers that are not finite; errors of the disk; values that are read back differently.
 pub(super) fn write(path: &Path, table: Table) -> Result<u64> {
     let table = table.for_text();
     let mut file = create(path)?;
@@ -93,7 +93,7 @@ pub(super) fn values_as_text(columns: &[(Option<usize>, &Values)], rows: usize) 
     text
 }
 
-/// Appends the field of a row of `columns` columns, in quotes where RFC 4180 asks for them, and where a row would be an
+/// Appends the field of a row of `columns` columns, in quotes where RFC 4180 requires them, and where a row would be an
 /// empty line.
 fn put_quoted(text: &mut Vec<u8>, field: &[u8], columns: usize) {
     let is_empty_row = columns == 1 && field.is_empty();
@@ -110,7 +110,7 @@ fn put_quoted(text: &mut Vec<u8>, field: &[u8], columns: usize) {
     text.push(b'"');
 }
 
-/// The disk's refusal, or the library's.
+/// An error of the disk, or the library's.
 fn refused(error: csv::Error) -> Error {
     let reason = error.to_string();
     match error.into_kind() {
@@ -122,7 +122,7 @@ fn refused(error: csv::Error) -> Error {
 /// Appends the text of a value.
 fn put_cell(text: &mut Vec<u8>, decimals: Option<usize>, values: &Values, row: usize) {
     let put = |text: &mut Vec<u8>, value: fmt::Arguments<'_>| {
-        // A vector refuses nothing.
+        // Writing to a vector cannot fail.
         let _infallible = text.write_fmt(value);
     };
     let number = |text: &mut Vec<u8>, value: f64| match decimals {
@@ -149,7 +149,7 @@ fn put_whole(text: &mut Vec<u8>, value: impl itoa::Integer) {
     text.extend_from_slice(itoa::Buffer::new().format(value).as_bytes());
 }
 
-/// Appends the fewest digits that give a finite number back, without an exponent: the same as in JSON.
+/// Appends the fewest digits that reproduce a finite number, without an exponent: the same as in JSON.
 fn put_shortest(text: &mut Vec<u8>, value: f64) {
     let mut buffer = zmij::Buffer::new();
     let digits = buffer.format_finite(value);
@@ -160,7 +160,7 @@ fn put_shortest(text: &mut Vec<u8>, value: f64) {
     }
 }
 
-/// Whether `text` gives the value of `row` back.
+/// Whether `text` reproduces the value of `row`.
 fn holds(column: &Meaning, values: &Values, row: usize, text: &str, cell: &mut Vec<u8>) -> bool {
     let same = |value: f64| {
         let Ok(found) = text.parse::<f64>() else {
@@ -210,7 +210,7 @@ fn read_back(path: &Path, table: &Table) -> Result<()> {
     Ok(())
 }
 
-/// Makes sure that the rows were found as they are.
+/// Checks that the rows were read back unchanged.
 fn compare(table: &Table, rows: Range<usize>, found: &[StringRecord]) -> Result<()> {
     let differs = |what: String| Err(ProductError::ReadBack { what }.into());
     let values = table.values(rows.clone())?;

@@ -35,14 +35,14 @@ pub(super) static TABLE: Declaration = Declaration {
     uses: &[],
 };
 
-/// All that is known of one measurement.
+/// One measurement with its results.
 struct Measurement<'a> {
     id: &'a str,
     image: &'a str,
     line: f64,
     sample: f64,
     sigma_px: Option<[f64; 2]>,
-    /// Empty for a tie point that took part in the adjustment, else why not.
+    /// Empty for a tie point used in the adjustment, else the reason why not.
     rejected: String,
     before: Option<(&'a IntersectedPoint, &'a MeasureResidual)>,
     after: Option<(&'a IntersectedPoint, &'a MeasureResidual)>,
@@ -109,7 +109,7 @@ fn measurements<'a>(
     found
 }
 
-/// Why tie points were rejected; what the intersection says of a point comes first.
+/// Reasons for rejecting tie points; the intersection's reason comes first.
 fn reasons(geometric: &GeometricProducts) -> BTreeMap<usize, String> {
     let adjusted = geometric.adjustment.iter();
     let ties = adjusted.flat_map(|of| &of.adjusted.rejected);
@@ -161,7 +161,7 @@ fn measured_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "sigma_line",
             Unit::Line,
-            "standard deviation of the measured line, where its file has its own",
+            "standard deviation of the measured line, where its file states it",
             |row: &Measurement| Some(row.sigma_px?[0]),
         ),
         column(
@@ -173,7 +173,7 @@ fn measured_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "rejected",
             Unit::None,
-            "why the tie point took no part in the adjustment; empty when it did, and where the adjustment failed",
+            "why the tie point was not used in the adjustment; empty if it was, and where the adjustment failed",
             |row: &Measurement| row.rejected.clone(),
         ),
     ]
@@ -196,13 +196,13 @@ fn intersected_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "convergence_deg",
             Unit::Degree,
-            "angle between the two rays that differ most, degrees",
+            "largest angle between two rays, degrees",
             |row: &Measurement| Some(degrees(row.before?.0.convergence_rad)),
         ),
         column(
             "focal_along_px",
             Unit::Pixel,
-            "what the intersection leaves in the focal plane along the track, image pixels",
+            "residual of the intersection in the focal plane along the track, image pixels",
             |row: &Measurement| Some(row.before?.1.focal_along_px),
         ),
         column(
@@ -267,7 +267,7 @@ fn adjusted_point_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "sigma_x_m",
             Unit::Metre,
-            "standard deviation of adjusted_x_m, metres; in the published model that of agreement between the images alone",
+            "standard deviation of adjusted_x_m, metres; in the published model only of the agreement between the images",
             |row: &Measurement| Some(sigma_m(row.adjusted?.0, 0)),
         ),
         column("sigma_y_m", Unit::Metre, "likewise", |row: &Measurement| {
@@ -344,7 +344,7 @@ fn residual_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "standardised_along",
             Unit::None,
-            "residual along the track over its own standard deviation; missing where nothing controls it",
+            "residual along the track over its own standard deviation; missing where it is uncontrolled",
             |row: &Measurement| row.adjusted?.1.along_px.standardised,
         ),
         column(

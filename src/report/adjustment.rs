@@ -1,4 +1,4 @@
-//! The combined adjustment: how it converged, what the observations say, corrections, reliability.
+//! The combined adjustment: convergence, observations, corrections, reliability.
 
 use super::{
     corrections, correlation,
@@ -69,7 +69,7 @@ fn overview(adjusted: &Adjusted) -> String {
     let [along, across] = summary.tie_components;
     let against_configured = |component: f64| {
         let words = if summary.degrees_of_freedom == 0 {
-            "nothing is redundant"
+            "no redundancy"
         } else if component < WORSE_THAN_CONFIGURED.recip() {
             "better than configured"
         } else if component <= WORSE_THAN_CONFIGURED {
@@ -194,7 +194,7 @@ fn observations(summary: &AdjustmentSummary) -> String {
         } else {
             "–".to_owned()
         };
-        // Where there is no redundancy, the document has zeros for what is not known.
+        // Without redundancy, the document has zeros for unknown values.
         let known = |text: String, is_known: bool, places: &str| {
             let cell = Cell::from(text);
             if is_known { cell.told(places) } else { cell }

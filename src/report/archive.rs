@@ -21,12 +21,12 @@ use crate::{
 const PROFILES_DRAWN: usize = 3_000;
 /// Places that are drawn on the map.
 const PLACES_DRAWN: usize = 4_000;
-/// Files with complaints, and failures, that are listed.
+/// Number of listed files with problems, and of failures.
 const LISTED: usize = 30;
-/// Corrections that are known worse than this are not drawn, seconds.
+/// Corrections with larger uncertainty than this are not drawn, seconds.
 const KNOWN_S: f64 = 0.05;
 
-/// The page of an archive; paths of shots count from the folder of the products, one above the page.
+/// The page of an archive; paths of shots are relative to the folder of the products, one above the page.
 ///
 /// # Errors
 /// A plot that cannot be drawn, which is a bug in areograph.
@@ -58,7 +58,7 @@ fn lead(ranges: &ArchiveRanges, judgement: &Judgement) -> String {
     );
     let words = format!(
         "{} shots were checked: measured range minus distance from the kernels' spacecraft to the footprint, time tags corrected \
-         by {} s. A profile is what one file has of one revolution.",
+         by {} s. A profile is the shots of one file in one revolution.",
         grouped(ranges.sum(|file| file.shots)),
         label(ranges.clock.correction_s(), 3),
     );
@@ -85,7 +85,7 @@ type Figure = fn(&ArchiveProfile) -> f64;
 fn over_time(ranges: &ArchiveRanges) -> Result<String> {
     let checked: Vec<&ArchiveProfile> = ranges.profiles().filter(|of| of.is_judged()).collect();
     let Some(first) = checked.first() else {
-        return Ok(paragraph("No profile was judged."));
+        return Ok(paragraph("No profile was checked."));
     };
     let start_s = first.start_et_s;
     let drawn = |keep: &dyn Fn(&ArchiveProfile) -> bool, figure: Figure| -> Vec<(f64, f64)> {
@@ -151,8 +151,8 @@ fn over_time(ranges: &ArchiveRanges) -> Result<String> {
     let scan_plot = Plot::of(
         "Clock correction over time".to_owned(),
         format!(
-            "Correction of time tags by which the ranges of a profile spread least, with raw radii or with those corrected by \
-             crossovers, where it is known to {KNOWN_S} s; the level line is the one that was used, {} s.",
+            "Correction of time tags that minimises the spread of a profile's ranges, with raw radii or with those corrected by \
+             crossovers, where it is known to {KNOWN_S} s; the horizontal line is the correction used, {} s.",
             label(used_s, 3)
         ),
         "days since the first profile",
@@ -248,7 +248,7 @@ fn map(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>]) -> Result<String> {
         .flat_map(|of| places(of.profile))
         .collect();
     let mut plot = Plot::of(
-        "Where the profiles lie".to_owned(),
+        "Locations of the profiles".to_owned(),
         "Some shots of every profile, IAU 2000, areocentric; crosses are the worst profiles beyond a limit.".to_owned(),
         "east longitude, degrees",
         vec![Panel::of(
@@ -304,13 +304,13 @@ fn not_checked(ranges: &ArchiveRanges) -> String {
         .map(|file| {
             let first = file.found.complaints.first().map_or("", String::as_str);
             format!(
-                "{} complaints, the first: {first}",
+                "{} problems, the first: {first}",
                 file.found.complaint_count
             )
         })
         .collect();
     if !complaints.is_empty() {
-        body += &paragraph("Records that contradict themselves or their neighbours were left out:");
+        body += &paragraph("Records inconsistent internally or with neighbours were rejected:");
         body += &list(&complaints);
     }
     let mut rejected = std::collections::BTreeMap::new();
@@ -323,7 +323,7 @@ fn not_checked(ranges: &ArchiveRanges) -> String {
         .collect();
     if !rejected.is_empty() {
         body += &paragraph(&format!(
-            "Shots left out by the filter: {}.",
+            "Shots rejected by the filter: {}.",
             rejected.join(", ")
         ));
     }
@@ -345,7 +345,7 @@ fn how(ranges: &ArchiveRanges) -> String {
         .collect();
     let positions = format!(
         "Positions come from tables of Chebyshev polynomials that keep within {TRAJECTORY_TOLERANCE_M} m of CSPICE; the largest \
-         distance at instants that took no part in them is {:.1e} m. States are geometric.",
+         distance at independent instants is {:.1e} m. States are geometric.",
         ranges.trajectory_error_m()
     );
     let clock = format!(

@@ -1,4 +1,4 @@
-//! The page of a calibration: verdict, figures of every step, what ties cannot see, cameras, other orbits.
+//! The page of a calibration: verdict, figures of every step, directions not determined by ties, cameras, other orbits.
 
 use super::{
     calibration_rounds::rounds as rounds_of,
@@ -15,7 +15,7 @@ use crate::{
     },
 };
 
-/// Points that are drawn.
+/// Number of points drawn.
 const DRAWN: usize = 3_000;
 
 /// The page of a calibration.
@@ -32,7 +32,7 @@ pub fn calibration_page(config: &CalibrationConfig, of: &Calibration) -> Result<
     let sections = [
         Section::new("From step to step", steps(of)),
         Section::new("Residuals", residuals(of)?),
-        Section::new("What ties cannot see", sight(of)),
+        Section::new("Not determined by ties", sight(of)),
         Section::new("The lines of the camera", cameras(of)),
         Section::new("Other orbits", validation(of)),
     ];
@@ -48,13 +48,13 @@ fn lead(config: &CalibrationConfig, of: &Calibration) -> String {
         counted(of.points.len(), "point")
     );
     let accuracy = of.held_back.as_ref().map_or_else(
-        || "Nothing tells where the camera looks: there is no laser control.".to_owned(),
+        || "Absolute pointing is not determined: no laser control.".to_owned(),
         stated,
     );
     let mode = match config.solution.mode {
         CalibrationMode::Differential => "",
         CalibrationMode::AsPublished => {
-            " Ties alone estimated all angles, as published, which can drive the camera far away: see the figures after the \
+            " All angles were estimated from ties only, as published, which can displace the camera far: see the figures after the \
              ties."
         }
     };
@@ -71,9 +71,9 @@ fn stated(of: &HeldBack) -> String {
     let times =
         |of: Option<Scattered>| of.map_or_else(|| "–".to_owned(), |of| format!("{:.2}", of.sigmas));
     format!(
-        "A tie point is known to {} in the plane and {} in height (root mean square). {} that were never used judge this: they \
-         lie {} times as far off as expected in the plane and {} times in height, and the {} of them in two lines or more {} in the \
-         plane and {} in height with the laser's own errors.",
+        "A tie point is known to {} in the plane and {} in height (root mean square). Validation by {}, withheld: they \
+         differ by {} times the expected amount in the plane and {} times in height, the {} of them in two lines or more by {} in the \
+         plane and {} in height, including the laser's own errors.",
         metres(of.accuracy_plane_m),
         metres(of.accuracy_height_m),
         counted(
@@ -138,7 +138,7 @@ fn steps(of: &Calibration) -> String {
     for step in &of.steps {
         for (kind, what) in [
             (PointKind::Control, "used"),
-            (PointKind::HeldBack, "held back"),
+            (PointKind::HeldBack, "withheld"),
         ] {
             if kind == PointKind::HeldBack && step.figures.of(kind).is_none() {
                 continue;
@@ -184,11 +184,11 @@ fn residuals(of: &Calibration) -> Result<String> {
     };
     let panels = [
         panel("ties, px", PointKind::Tie),
-        panel("held-back control, px", PointKind::HeldBack),
+        panel("withheld control, px", PointKind::HeldBack),
     ];
     let plot = Plot::of(
         "Residuals across the flight".to_owned(),
-        "Projected minus measured position. Ties show inter-line error; laser points that were held back show absolute error."
+        "Projected minus measured position. Ties show inter-line error; withheld laser points show absolute error."
             .to_owned(),
         "line",
         panels.into_iter().flatten().collect(),
@@ -199,14 +199,14 @@ fn residuals(of: &Calibration) -> Result<String> {
 fn sight(of: &Calibration) -> String {
     let unseen = usize::try_from(of.tie_sight.unseen).unwrap_or(usize::MAX);
     let words = format!(
-        "Of {} angles of the lines ties leave {} unseen: {}. What is not seen is held by what is known from elsewhere; an \
-         adjustment that frees it moves along it at no cost.",
+        "Of {} angles of the lines, ties leave {} undetermined: {}. These are constrained by a priori values; an \
+         adjustment that frees them moves along them at no cost.",
         3 * of.cameras.len(),
         counted(unseen, "combination"),
         of.tie_sight.unseen_words()
     );
     let mut table = Table::new(
-        "Combinations of the offset angles by ties alone, the least known first",
+        "Combinations of the offset angles by ties only, the least determined first",
         &[
             Column::Text("combination, with components"),
             Column::Number("standard deviation, °"),
@@ -226,7 +226,7 @@ fn sight(of: &Calibration) -> String {
     paragraph(&words) + &table.finish()
 }
 
-/// Three digits that count.
+/// Three significant digits.
 fn significant(value: f64) -> String {
     let decimals = (0..12).find(|decimals| value * 10_f64.powi(*decimals) >= 100.0);
     label(value, decimals.map_or(12, |of| of.unsigned_abs() as usize))
@@ -241,7 +241,7 @@ fn cameras(of: &Calibration) -> String {
             Column::Number("ω (pitch), °"),
             Column::Number("κ (yaw), °"),
             Column::Number("moves the image by, px"),
-            Column::Number("support data leave, px"),
+            Column::Number("support data residual, px"),
         ],
     );
     for camera in &of.cameras {
@@ -268,8 +268,8 @@ fn cameras(of: &Calibration) -> String {
     });
     let words = format!(
         "Offset angles, constant look-angle terms and constant orbit errors are nearly indistinguishable, so their individual σ \
-         are large; their combined effect is far better known. The orbit drifts by {} m a line along the body-fixed X, Y, Z. \
-         Support data hold a straight line of equal samples; what they leave is in the last column.",
+         are large; their combined effect is far better known. The orbit drifts by {} m per line along the body-fixed X, Y, Z. \
+         Support data hold a straight line of equal samples; their residual is in the last column.",
         drift.join(", ")
     );
     table.finish() + &paragraph(&words)

@@ -16,8 +16,8 @@ use crate::{
 /// A plot that cannot be drawn, which is a bug in areograph.
 pub(super) fn rounds(of: &Rounds, cameras: &[CameraResult]) -> Result<String> {
     let words = format!(
-        "A round measures tie points, makes the lines consistent by them, matches a terrain model with cells of {} m with the laser, \
-         and calibrates by both; the next one begins with its cameras. Rounds end when half of the units are shifted by less than \
+        "A round measures tie points, makes the lines consistent with them, matches a terrain model with cells of {} m to the laser, \
+         and calibrates with both; the next one begins with its cameras. Rounds end when half of the units are shifted by less than \
          half a cell and residuals of control change by less than 2 %, after {} at most.",
         label(of.cell_m, 0),
         of.rounds_max
@@ -39,12 +39,12 @@ fn numbers(of: &Rounds) -> String {
             Column::Number("ties"),
             Column::Number("ties, px"),
             Column::Number("units kept"),
-            Column::Number("units refused"),
+            Column::Number("units rejected"),
             Column::Number("units shifted by (median), cells"),
             Column::Number("model − laser (median), m"),
             Column::Number("control, px"),
-            Column::Number("control held back, px"),
-            Column::Number("held back, σ in the plane"),
+            Column::Number("withheld control, px"),
+            Column::Number("withheld, σ in the plane"),
             Column::Number("σ in height"),
         ],
     );
@@ -117,13 +117,13 @@ fn plot(of: &Rounds) -> Result<String> {
             "control, px",
             vec![
                 Series::dots("used", 0, dots(&|round| round.control.plane_px)),
-                Series::dots("held back", 1, dots(&|round| round.held_back.plane_px)),
+                Series::dots("withheld", 1, dots(&|round| round.held_back.plane_px)),
             ],
         ),
     ];
     let plot = Plot::of(
         "From round to round".to_owned(),
-        "Where the terrain model of a round lies against the laser, before that round calibrates; and what control misses after it."
+        "Offset of a round's terrain model from the laser before its calibration, and residuals of control after it."
             .to_owned(),
         "round",
         panels,

@@ -1,4 +1,4 @@
-//! The table of the first screen: every limit of the site with what uses most of it, the worst first.
+//! The table of the first screen: every limit of the site with the value that uses most of it, the worst first.
 
 use super::{
     adjustment, heights,
@@ -49,7 +49,7 @@ fn empty() -> Table {
     )
 }
 
-/// A check in a table: `what` is checked, as HTML, and the `place` where the products tell of it.
+/// A check in a table: `what` is checked, as HTML, and its `place` in the products.
 fn row(table: &mut Table, check: &Check, mut what: String, place: &str) {
     if !check.subject.is_empty() {
         what += &format!(" <small>{}</small>", escape(&check.subject));
@@ -70,12 +70,12 @@ fn row(table: &mut Table, check: &Check, mut what: String, place: &str) {
     );
 }
 
-/// Where the products tell of a check.
+/// Place of a check in the products.
 pub(super) fn place(index: usize) -> String {
     format!("manifest.json#/verdict/checks/{index}")
 }
 
-/// Where they have its value, below that: with the sign that is shown.
+/// Place of its value, below that: with the sign that is shown.
 const fn value_place(check: &Check) -> &'static str {
     if check.kind.is_signed() {
         "/value"
@@ -97,7 +97,7 @@ fn result(outcome: CheckOutcome) -> Cell {
     ))
 }
 
-/// What was found, with its unit; a dash where it is no number.
+/// The value found, with its unit; a dash if it is not a number.
 pub(super) fn value(check: &Check) -> String {
     let Some(value) = check.value else {
         return "–".to_owned();
@@ -114,7 +114,7 @@ pub(super) fn value(check: &Check) -> String {
     format!("{text} {}", check.unit)
 }
 
-/// What is allowed, with its unit; a dash where there is no number.
+/// The limit, with its unit; a dash without a number.
 pub(super) fn limit(check: &Check) -> String {
     let Some(limit) = check.limit else {
         return "–".to_owned();
@@ -133,7 +133,7 @@ pub(super) fn limit(check: &Check) -> String {
     format!("{bound} {} {}", number(limit, decimals), check.unit)
 }
 
-/// The section that tells more.
+/// The section with details.
 const fn section(kind: CheckKind) -> Option<&'static Section> {
     Some(match kind {
         CheckKind::Footprints => &selection::SECTION,
@@ -218,7 +218,7 @@ mod tests {
         assert_eq!((&*value(&count), &*limit(&count)), ("19", "≥ 20"));
         let share = check(CheckKind::TiesRejected, 12.34, 10.0);
         assert_eq!((&*value(&share), &*limit(&share)), ("12.3 %", "≤ 10 %"));
-        // The digits of a limit are its own.
+        // A limit has its own number of digits.
         let sigma = check(CheckKind::TieResidualsAlong, 0.9, 1.25);
         assert_eq!((&*value(&sigma), &*limit(&sigma)), ("0.9 σ", "≤ 1.25 σ"));
         let pointing = check(CheckKind::PointingRmse, 2.0, 0.04);

@@ -34,7 +34,7 @@ fn biases(site: &SiteProducts) -> String {
         &[
             Column::Text("bias"),
             Column::Number("correction, s"),
-            Column::Text("of what"),
+            Column::Text("applies to"),
             Column::Text("source"),
         ],
     );
@@ -126,7 +126,7 @@ fn datum(site: &SiteProducts) -> String {
                 if moved {
                     format!("through J2000 to {}", site.config.body.names().short_frame)
                 } else {
-                    "left alone".to_owned()
+                    "not transformed".to_owned()
                 }
                 .into(),
                 whole(conversion.shots).into(),

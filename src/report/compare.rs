@@ -13,29 +13,29 @@ use crate::{
     units::RADIANS_PER_ARCSECOND,
 };
 
-/// Points of a set that are drawn, over all stretches.
+/// Number of points drawn per set, over all stretches.
 const POINTS_MAX: usize = 2_000;
-/// Epochs farther apart than this, seconds, and than so many steps, are of two stretches.
+/// Epochs farther apart than this, seconds, and than this number of steps, belong to two stretches.
 const GAP_S: f64 = 3_600.0;
 const GAP_STEPS: f64 = 2.5;
-/// Most stretches that are drawn.
+/// Largest number of stretches drawn.
 const PICTURES: usize = 8;
-/// Seconds up to which time is told in seconds; beyond in hours.
+/// Seconds up to which time is given in seconds; beyond in hours.
 const SECONDS_MAX: f64 = 7_200.0;
 const SECONDS_PER_HOUR: f64 = 3_600.0;
 /// Height of one of several panels.
 const PANEL_HEIGHT: u32 = 260;
 
-/// What the page tells of.
+/// Contents of the page.
 #[derive(Debug, Clone, Copy)]
 pub struct KernelComparison<'a> {
     /// Orbits, metres.
     pub orbit: &'a Comparison,
-    /// Attitudes, unless there was nothing to compare.
+    /// Attitudes, if there were any to compare.
     pub attitude: Option<&'a AttitudeComparison>,
     /// First and last epoch in UTC.
     pub utc: &'a [String; 2],
-    /// What was left out and what else a reader must weigh, one sentence each.
+    /// Omissions and other remarks for the reader, one sentence each.
     pub remarks: &'a [String],
 }
 
@@ -66,9 +66,9 @@ fn lead(comparison: &KernelComparison) -> String {
         .collect();
     let pulled = orbit.decided_by();
     let (tone, headline) = if let [_, _] = &*orbit.deviations {
-        // By the rule two sets are equally close, whatever they are.
+        // By the rule, two sets are always equally close.
         let headline = format!(
-            "Two kernel sets, {} m apart (root mean square): which is better takes a third.",
+            "Two kernel sets, {} m apart (root mean square): a third is needed to tell which is better.",
             label(orbit.difference(0, 1).rms, 3)
         );
         (Tone::Remarks, headline)
@@ -125,7 +125,7 @@ fn lead(comparison: &KernelComparison) -> String {
     )
 }
 
-/// Stretches in which another set is closer than the one that is closest over all.
+/// Stretches in which another set is closer than the one that is closest overall.
 fn elsewhere(orbit: &Comparison) -> String {
     let stretches = stretches(&orbit.epochs);
     // Two sets are equally close to their mean everywhere.
@@ -283,7 +283,7 @@ fn figures(
     Ok(html)
 }
 
-/// How one stretch is drawn.
+/// Layout of one stretch.
 struct Over {
     stretch: Interval,
     points_max: usize,
@@ -309,7 +309,7 @@ impl Over {
         }
     }
 
-    /// Dots of every set: time may have gaps, which a line would hide.
+    /// Dots of every set: lines would hide gaps in time.
     fn panel<'a, V: Iterator<Item = f64>>(
         &self,
         label: &'static str,

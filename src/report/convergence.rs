@@ -1,4 +1,4 @@
-//! Appendix: what the published iterations from ground to image cost, figure 4 of Shan et al. 2005 for this site.
+//! Appendix: cost of the published iterations from ground to image, figure 4 of Shan et al. 2005 for this site.
 
 use super::{
     html::{Cell, Column, Table, folded, paragraph},
@@ -30,7 +30,7 @@ fn write(site: &SiteProducts) -> Result<String> {
         figures += &figure(&convergence_plot(image))?;
     }
     let html = format!("{}<div class=\"plots\">\n{figures}</div>\n", methods(site));
-    Ok(folded("What the published iterations cost", &html))
+    Ok(folded("Cost of the published iterations", &html))
 }
 
 fn name(run: &MethodRun) -> String {
@@ -48,7 +48,7 @@ const fn order(model: CameraModel) -> &'static str {
     }
 }
 
-/// What the published iterations cost on this site's footprints.
+/// Cost of the published iterations on this site's footprints.
 fn methods(site: &SiteProducts) -> String {
     let mut table = Table::new(
         "Iterations per footprint within the image's lines",
@@ -90,7 +90,7 @@ fn methods(site: &SiteProducts) -> String {
     table.finish() + &paragraph(&words)
 }
 
-/// Whether an iteration has steps to be drawn.
+/// Whether an iteration has steps to draw.
 fn converges(image: &ImageProducts) -> bool {
     let mut runs = image.registration.methods.iter();
     runs.any(|run| !run.mean_step_lines.is_empty())
@@ -98,7 +98,7 @@ fn converges(image: &ImageProducts) -> bool {
 
 /// Figure 4: the mean step of every iteration.
 fn convergence_plot(image: &ImageProducts) -> Plot {
-    // The curves of first order lie on those of second.
+    // The curves of first order coincide with those of second.
     let runs = image.registration.methods.iter();
     let second_order = runs.filter(|run| run.model == CameraModel::SecondOrder);
     let series = second_order.enumerate().map(|(colour, run)| {

@@ -1,4 +1,4 @@
-//! What the adjustment adds to each image's orientation, and what it makes of ranges and biases.
+//! Corrections of the adjustment to each image's orientation, to ranges and to biases.
 
 use std::collections::BTreeMap;
 
@@ -39,13 +39,13 @@ fn with_sigma((value, sigma): (f64, f64), decimals: usize) -> Cell {
     format!("{} ± {}", label(value, decimals), label(sigma, decimals)).into()
 }
 
-/// Where the products have the coefficient of power 0 of a quantity, and its standard deviation, in another unit.
+/// Place in the products of the coefficient of power 0 of a quantity, and its standard deviation, in another unit.
 fn place(quantity: usize, unit: &str) -> String {
     let index = 3 * quantity;
     format!("/correction/{index}{unit} /sigmas/{index}{unit}")
 }
 
-/// Where the products tell of an image.
+/// Place of an image in the products.
 fn of_image(index: usize) -> String {
     format!("adjustment.json#/adjustment/images/{index}")
 }
@@ -189,7 +189,7 @@ fn checked_ranges(site: &SiteProducts) -> BTreeMap<(usize, usize), f64> {
     (0..shots.len()).map(of_shot).collect()
 }
 
-/// What the clock of the attitude is off, where it is an unknown.
+/// Offset of the attitude's clock, if it is an unknown.
 fn attitude_clock(adjusted: &Adjusted) -> String {
     adjusted.attitude_clock_s
         .map_or_else(String::new, |(offset_s, sigma_s)| {

@@ -15,13 +15,13 @@ use crate::{
     stages::adjust::{Adjusted, CorrectedImage},
 };
 
-/// Images whose matrix is drawn; `correlations.parquet` has all.
+/// Number of images whose matrix is drawn; `correlations.parquet` has all.
 const IMAGES_SHOWN: usize = 4;
-/// Correlation from which the matrices are shown without being asked for.
+/// Correlation from which the matrices are shown unfolded.
 const OF_INTEREST: f64 = 0.95;
-/// Where the matrix begins, after the names of its rows.
+/// Start of the matrix, after the names of its rows.
 const LEFT: i32 = 520;
-/// Colours of −1, 0 and 1: apart for every colour vision, and the signs unlike in grey too.
+/// Colours of −1, 0 and 1: distinct for every colour vision, and the signs distinct in grey too.
 const COLOURS: [[f64; 3]; 3] = [
     [5.0, 48.0, 97.0],
     [247.0, 247.0, 247.0],
@@ -64,7 +64,7 @@ struct Matrix<'a> {
 }
 
 impl<'a> Matrix<'a> {
-    /// Nothing of an image with less than two unknowns.
+    /// `None` for an image with fewer than two unknowns.
     fn of(index: usize, image: &'a CorrectedImage) -> Option<Self> {
         let variance = |unknown: usize| image.covariance[(unknown, unknown)];
         let solved: Vec<usize> = (0..ORIENTATION_UNKNOWNS)
@@ -95,7 +95,7 @@ impl<'a> Matrix<'a> {
         self.names.len()
     }
 
-    /// The largest correlation of two unknowns by its size, with its place.
+    /// The largest correlation of two unknowns by absolute value, with its place.
     fn largest(&self) -> Option<(usize, f64)> {
         let count = self.count();
         let off_diagonal = (0..count * count).filter(|place| place / count < place % count);

@@ -1,20 +1,21 @@
-//! The page that sets every number of the papers beside areograph's.
+//! The page that compares every number of the papers with areograph's.
 
 use super::html::{Cell, Column, STYLE, Section, Table, escape, page, paragraph};
 
-/// The page of this version, which `tests/products/fidelity.rs` makes and checks; its style is that of all pages, by a link.
+/// The page of this version, which `tests/products/fidelity.rs` makes and checks; its style is that of all pages, by a
+/// link.
 const FIDELITY_PAGE: &str = include_str!("../../docs/fidelity.html");
 /// From `docs/` to the style of all pages.
 const LINKED_STYLE: &str = "<link rel=\"stylesheet\" href=\"../crates/base/src/style.css\">\n";
 /// File of the page, in the folder that holds the sites' folders.
 pub const FIDELITY_FILE: &str = "fidelity.html";
 
-/// What the page says.
+/// Contents of the page.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fidelity {
-    /// How the list is to be read, a paragraph each.
+    /// Introduction to the list, by paragraphs.
     pub rules: Vec<String>,
-    /// Each verdict: the word, the number of rows that have it, what it means.
+    /// Each verdict: the word, its number of rows, its meaning.
     pub verdicts: Vec<(&'static str, usize, &'static str)>,
     /// The papers.
     pub papers: Vec<FidelityPaper>,
@@ -25,32 +26,32 @@ pub struct Fidelity {
 pub struct FidelityPaper {
     /// Authors and year.
     pub name: &'static str,
-    /// What it is about, and where it stands.
+    /// Subject and reference.
     pub citation: &'static str,
-    /// What it prints, in its order.
+    /// Its printed numbers, in its order.
     pub rows: Vec<FidelityRow>,
 }
 
-/// What a paper prints in one place.
+/// Numbers that a paper prints in one place.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FidelityRow {
     /// Identifier.
     pub id: &'static str,
     /// Section or table of the paper.
     pub place: &'static str,
-    /// What is printed there.
+    /// Description of the printed numbers.
     pub what: &'static str,
     /// Its numbers, each with the printed one, ours and the tolerance in a line.
     pub numbers: Vec<String>,
-    /// What ours is computed from.
+    /// Source of ours.
     pub from: String,
     /// The verdict.
     pub verdict: &'static str,
-    /// What a reader must know.
+    /// Remarks.
     pub note: &'static str,
 }
 
-/// The page as it lies beside the page over all sites: in one file.
+/// The page for the folder of the page of all sites: in one file.
 #[must_use]
 pub fn published_fidelity_page() -> String {
     FIDELITY_PAGE.replacen(LINKED_STYLE, &embedded_style(), 1)
@@ -60,7 +61,7 @@ fn embedded_style() -> String {
     format!("<style>\n{STYLE}</style>\n")
 }
 
-/// The page as `docs/` has it.
+/// The page for `docs/`.
 #[must_use]
 pub fn fidelity_page(fidelity: &Fidelity) -> String {
     let rules: String = fidelity.rules.iter().map(|rule| paragraph(rule)).collect();
@@ -119,7 +120,7 @@ fn section(paper: &FidelityPaper) -> Section {
             ],
         );
     }
-    // On a narrow screen the cells of a row stand one below the other.
+    // On a narrow screen the cells of a row are stacked.
     let rows = format!(
         "<div class=\"stacked columns\">\n{}</div>\n",
         table.finish()
@@ -127,7 +128,7 @@ fn section(paper: &FidelityPaper) -> Section {
     Section::new(paper.name, paragraph(paper.citation) + &rows)
 }
 
-/// A cell that says what it is where no column head does.
+/// A cell with a label for layouts without column heads.
 fn labelled(label: &str, text: &str) -> Cell {
     Cell::Html(if text.is_empty() {
         String::new()

@@ -8,13 +8,13 @@ use crate::{
     units::{RADIANS_PER_DEGREE, wrap_pi, wrap_two_pi},
 };
 
-/// Steps that people read, degrees.
+/// Readable steps, degrees.
 const STEPS_DEG: [f64; 12] = [
     0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 45.0,
 ];
-/// Points of a line.
+/// Number of points of a line.
 const LINE_POINTS: u32 = 90;
-/// Points along each side of the view that tell which coordinates it holds.
+/// Points along each side of the view, from which its range of coordinates is found.
 const SIDE_POINTS: u32 = 24;
 /// Parts of the view's height between two parallels, about.
 const LINES: f64 = 5.0;
@@ -95,7 +95,7 @@ pub(super) struct GridLine {
     pub(super) is_parallel: bool,
 }
 
-/// The lines that a view shows.
+/// The lines in a view.
 pub(super) fn graticule(map: &MapProjection, view: &View) -> Vec<GridLine> {
     let shown = Shown::of(map, view);
     let height_rad = shown.height_rad(map, view);
@@ -128,7 +128,7 @@ pub(super) fn graticule(map: &MapProjection, view: &View) -> Vec<GridLine> {
         .collect()
 }
 
-/// The coordinates that a view holds.
+/// The range of coordinates of a view.
 struct Shown {
     latitude_rad: (f64, f64),
     /// East longitudes from that of the centre.
@@ -230,7 +230,7 @@ fn line(
     }
 }
 
-/// Decimals that tell multiples of a step apart.
+/// Decimals that distinguish multiples of a step.
 fn decimals(step_rad: f64) -> usize {
     let step_deg = step_rad / RADIANS_PER_DEGREE;
     if step_deg >= 0.999 {

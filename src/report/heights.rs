@@ -1,4 +1,4 @@
-//! What MOLA says of the heights of tie points, and what may be said of their accuracy.
+//! Heights of tie points against MOLA, and statements of their accuracy.
 
 mod boresight;
 mod profile;
@@ -52,7 +52,7 @@ fn write(geometric: &GeometricProducts) -> Result<String> {
     Ok(html)
 }
 
-/// The three statements that may be made, and by whose judgement.
+/// The three statements of accuracy, and their basis.
 fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
     let mut table = Table::new(
         "Accuracy of the tie points",
@@ -78,7 +78,7 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
             after.map_or_else(nothing, |after| {
                 format!("{after}; residuals {} σ", label(along, 2))
             }),
-            "how well the images agree along track; says nothing about height or position"
+            "how well the images agree along track; not a measure of height or position"
                 .to_owned(),
         ],
         [
@@ -89,7 +89,7 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
         ],
         [
             "absolute, height".to_owned(),
-            format!("a priori: what is known of {}", known_beforehand(geometric)),
+            format!("a priori, from {}", known_beforehand(geometric)),
             height,
             "standard deviation of the common offset, and of individual tie points".to_owned(),
         ],
@@ -112,13 +112,13 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
 fn place_says(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
     let (known, by) = (known_beforehand(geometric), place_by(geometric, adjustment));
     if known == by {
-        format!("a priori, not measured by images: by what is known of {known}")
+        format!("a priori, not measured by images: from {known}")
     } else {
         format!("by {by}, not measured by images")
     }
 }
 
-/// All that says where a site lies.
+/// All sources of a site's position.
 pub(super) fn place_by(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
     let adjusted = adjustment.adjusted;
     let by_relief = adjusted.relief.as_ref().is_some_and(|relief| relief.used);
@@ -141,7 +141,7 @@ pub(super) fn place_by(geometric: &GeometricProducts, adjustment: &AdjustmentPro
     }
 }
 
-/// What says where a site lies before the images do.
+/// A priori sources of a site's position.
 pub(super) fn known_beforehand(geometric: &GeometricProducts) -> &'static str {
     if geometric.ties.points.iter().any(|tie| tie.known.is_some()) {
         "orbit, attitude and given ground points"
@@ -164,13 +164,13 @@ fn agreement(check: &HeightCheck) -> String {
 
 const fn agreement_says(adjustment: &AdjustmentProducts) -> &'static str {
     if adjustment.adjusted.heights.is_some() {
-        "before: an independent test; after: how well the adjustment meets what controls it"
+        "before: an independent test; after: fit of the adjustment to its control"
     } else {
         "a test of heights: the MOLA surface did not control them"
     }
 }
 
-/// What is stated of height and place after the adjustment.
+/// Statements of height and position after the adjustment.
 pub(super) fn absolute(
     geometric: &GeometricProducts,
     adjustment: &AdjustmentProducts,
@@ -218,15 +218,15 @@ pub(super) fn absolute(
     ]
 }
 
-/// Half of what the images of the worst pair disagree by along the flight before the adjustment, metres.
+/// Half of the largest along-track disagreement of a pair before the adjustment, metres.
 fn half_apart_m(geometric: &GeometricProducts) -> Option<f64> {
     let pairs = BeforeAfter::all(geometric);
     let worst = BeforeAfter::worst(&pairs)?;
     Some(0.5 * worst.before.along_track_parallax_m.abs())
 }
 
-/// Whether the stated position is more certain than the images allow: it holds only if errors of both images are as likely,
-/// and half of their difference is no less open.
+/// Whether the stated position is more certain than the images allow: it holds only if errors of both images are as
+/// likely, and half of their difference is no less open.
 pub(super) fn is_open(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> bool {
     let heights = adjustment.adjusted.heights.as_ref();
     let stated = heights.map(|of| of.mean_sigma_m[0].max(of.mean_sigma_m[1]));
@@ -277,7 +277,7 @@ fn compared(geometric: &GeometricProducts) -> String {
             Column::Number("1.48 MAD"),
             Column::Number("mean"),
             Column::Number("standard deviation"),
-            Column::Number("σ of the mean by the surface alone"),
+            Column::Number("σ of the mean by the surface only"),
         ],
     );
     let after = geometric.adjustment.iter().map(|of| ("after", of.heights));
@@ -360,7 +360,7 @@ fn apart(check: &HeightCheck) -> String {
         "adjustment.json#/before/heights/profiles_apart/sigma_m",
     ];
     let Some(apart) = &check.apart else {
-        return paragraph("With a single profile nothing independent tests the surface.");
+        return paragraph("A single profile provides no independent test of the surface.");
     };
     let [first, second] = &apart.profiles;
     let (upper, lower) = if apart.mean_m < 0.0 {

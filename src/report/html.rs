@@ -32,7 +32,7 @@ pub(super) fn escape(text: &str) -> String {
     escaped
 }
 
-/// How good something is, for colours; words say the same.
+/// Rating, for colours; words state the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Tone {
     Good,
@@ -59,7 +59,7 @@ impl Tone {
     }
 }
 
-/// A section of a page, and what the list of contents calls it.
+/// A section of a page, and its name in the list of contents.
 pub(super) struct Section {
     /// Name in links.
     anchor: String,
@@ -83,7 +83,7 @@ impl Section {
     }
 }
 
-/// The whole page: title, what a reader must see first (HTML), then the sections that are not empty.
+/// The whole page: title, lead (HTML), then the sections that are not empty.
 pub(super) fn page(title: &str, lead: &str, sections: &[Section]) -> String {
     let title = escape(title);
     let version = env!("CARGO_PKG_VERSION");
@@ -136,7 +136,7 @@ pub(super) fn heading(text: &str) -> String {
     format!("<h3>{}</h3>\n", escape(text))
 }
 
-/// HTML that is unfolded on request, and on paper: evidence rather than result. Nothing for nothing.
+/// HTML that is unfolded on request, and on paper: evidence rather than result. Empty for empty HTML.
 pub(super) fn folded(title: &str, html: &str) -> String {
     folded_unless(false, title, html)
 }
@@ -166,7 +166,7 @@ pub(super) fn link(place: &str, text: &str) -> String {
     format!("<a href=\"{}\">{}</a>", escape(place), escape(text))
 }
 
-/// A list of texts; nothing for none.
+/// A list of texts; empty without any.
 pub(super) fn list<T: AsRef<str>>(items: &[T]) -> String {
     if items.is_empty() {
         return String::new();
@@ -197,21 +197,21 @@ pub(super) enum Column {
     Number(&'static str),
 }
 
-/// What a cell holds.
+/// Contents of a cell.
 #[derive(Debug, Clone)]
 pub(super) enum Cell {
     /// Words or a number.
     Plain(String),
-    /// A figure with a limit: the share of it that is used, above 1 (or NaN) beyond it.
+    /// A value with a limit: the used share of it, above 1 (or NaN) beyond it.
     Limited(String, f64),
     /// HTML.
     Html(String),
-    /// A cell whose numbers are told by products, see [`super::source`].
+    /// A cell whose numbers are from products, see [`super::source`].
     Told(Box<Self>, String),
 }
 
 impl Cell {
-    /// The cell with the places in the products that its numbers are from, below that of its row.
+    /// The cell with the places of its numbers in the products, below that of its row.
     pub(super) fn told(self, places: impl Into<String>) -> Self {
         Self::Told(Box::new(self), places.into())
     }
@@ -240,7 +240,7 @@ pub(super) struct Table {
     html: String,
     columns: &'static [Column],
     rows: usize,
-    /// Whether the cells say their heads themselves, for where they stand below each other.
+    /// Whether cells carry their heads, for stacked layouts.
     cards: bool,
 }
 
@@ -257,7 +257,7 @@ impl Table {
             })
             .collect();
         let caption = escape(caption);
-        // What scrolls must be reachable by keyboard, and then it needs a name.
+        // Scrolling elements must be reachable by keyboard, and then need a name.
         let html = format!(
             "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"{caption}\"><table>\n\
              <caption>{caption}</caption>\n<thead><tr>{heads}</tr></thead>\n<tbody>\n"
@@ -285,7 +285,7 @@ impl Table {
         self.row_of("", valid, cells);
     }
 
-    /// Adds a row whose cells are told by what lies at `place` of the products.
+    /// Adds a row whose cells are from `place` in the products.
     pub(super) fn row_of(
         &mut self,
         place: &str,
@@ -307,7 +307,7 @@ impl Table {
         let _ = writeln!(self.html, "<tr{class}>{cells}</tr>");
     }
 
-    /// A cell, with the attribute that says where its numbers are from.
+    /// A cell, with the attribute that gives the source of its numbers.
     fn cell(&self, place: usize, cell: Cell, from: &str) -> String {
         let class = match self.columns.get(place) {
             Some(Column::Number(_)) => "number",
@@ -327,7 +327,7 @@ impl Table {
             Cell::Limited(text, share) => limited(class, from, &text, share),
             Cell::Html(html) => format!("<{tag}{scope} class=\"{class}\"{from}>{html}</{tag}>"),
             Cell::Plain(text) => {
-                // Times and names read badly when they break; sentences must.
+                // Times and names are hard to read when broken; sentences must break.
                 let short = if text.chars().count() <= SHORT {
                     " short"
                 } else {
@@ -338,7 +338,7 @@ impl Table {
                     escape(&text)
                 )
             }
-            // Told once is told.
+            // Nested marks count once.
             Cell::Told(cell, _) => self.cell(place, *cell, from),
         }
     }
@@ -376,7 +376,7 @@ pub(super) fn from_places(places: &str) -> String {
     format!(" data-from=\"{}\"", escape(places))
 }
 
-/// The attribute of a row whose cells are told by what lies at `place`; nothing for no place.
+/// The attribute of a row whose cells are from `place`; empty without a place.
 fn within(place: &str) -> String {
     if place.is_empty() {
         return String::new();

@@ -47,7 +47,7 @@ fn write(site: &SiteProducts) -> Result<String> {
         ))
 }
 
-/// When and how the images were taken: Table 2.
+/// Times and geometry of the images: Table 2.
 fn taken(site: &SiteProducts) -> String {
     let mut table = Table::new(
         "Images (Table 2 of Shan et al. 2005)",
@@ -100,7 +100,7 @@ fn taken(site: &SiteProducts) -> String {
     table.finish()
 }
 
-/// Which positions of cameras the site follows, and how far the others are from them.
+/// The site's convention of camera positions, and the offsets of the others.
 fn light_time(site: &SiteProducts) -> String {
     let convention = site.config.orientation.light_time;
     if site
@@ -143,7 +143,7 @@ fn light_time(site: &SiteProducts) -> String {
     paragraph(&words)
 }
 
-/// The line period; where it changes inside the image every one.
+/// The line period; all of them if it changes inside the image.
 fn periods_ms(times: &ImageTimes) -> Cell {
     let periods = times
         .line_times
@@ -158,7 +158,7 @@ fn periods_ms(times: &ImageTimes) -> Cell {
     Cell::from(periods.join(", ")).told(places.join(" "))
 }
 
-/// Where the products tell of an image.
+/// Place of an image in the products.
 fn place(image: &str) -> String {
     format!("images/{image}/orientation.json#")
 }
@@ -215,13 +215,13 @@ fn models(site: &SiteProducts) -> String {
         "Limits for order 2: position {} m, pointing {}″ (largest component of the rotation vector). On the ground: RMS \
          shift of the boresight.",
         limits.position_rmse_max_m,
-        // As it was written: conversion to radians and back leaves digits of its own.
+        // As written: conversion to radians and back adds digits.
         (1e6 * limits.pointing_rmse_max_rad / RADIANS_PER_ARCSECOND).round() / 1e6
     );
     table.finish() + &paragraph(&words)
 }
 
-/// A row: image, order, six RMSE with the judged ones among them.
+/// A row: image, order, six RMSE including those with limits.
 fn row(
     image: &str,
     order: &str,
@@ -252,7 +252,7 @@ fn row(
 /// Residuals below this, millimetres, arcseconds and metres, round to zero in the caption and have no axis.
 const LEAST: f64 = 5e-4;
 
-/// Figure 3: residuals of the second-order model at every sample, and what they do on the ground.
+/// Figure 3: residuals of the second-order model at every sample, and their effect on the ground.
 fn residual_plot(image: &ImageProducts) -> Plot {
     let model = &image.model.second_order;
     let lines: Vec<f64> = image

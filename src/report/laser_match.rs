@@ -1,5 +1,5 @@
-//! The page of a match of laser profiles with a terrain model: verdict, map of the shifts, held-out shots, every unit and its
-//! similarities.
+//! The page of a match of laser profiles with a terrain model: verdict, map of the shifts, withheld shots, every unit
+//! and its similarities.
 
 mod similarity;
 
@@ -15,7 +15,7 @@ use crate::{
     units::wrap_pi,
 };
 
-/// Share of the map that the longest arrow may take.
+/// Largest share of the map for the longest arrow.
 const ARROW_SHARE: f64 = 0.15;
 
 /// The page of a match.
@@ -25,7 +25,7 @@ const ARROW_SHARE: f64 = 0.15;
 pub fn match_page(of: &LaserMatch) -> Result<String> {
     let sections = [
         Section::new("Shifts", map(of)?),
-        Section::new("Held-out shots", held_out(of)?),
+        Section::new("Withheld shots", held_out(of)?),
         Section::new("Units", units(of)),
         Section::new("Similarity", similarity::pictures(of)?),
         Section::new("Left out", list(&of.complaints)),
@@ -45,10 +45,10 @@ fn lead(of: &LaserMatch) -> String {
         of.units.len()
     );
     let judged = of.held_out.as_ref().map_or_else(
-        || "No shot that was held out judges it.".to_owned(),
+        || "No withheld shot validates it.".to_owned(),
         |held_out| {
             format!(
-                "{} that took no part in any search miss the model by {:.1} m without the shift of their unit and by {:.1} m with \
+                "{}, withheld from every search, differ from the model by {:.1} m without the shift of their unit and by {:.1} m with \
                  it (root mean square, the bias of the other shots removed).",
                 counted(held_out.shots, "shot"),
                 held_out.before_m,
@@ -64,8 +64,8 @@ fn lead(of: &LaserMatch) -> String {
     });
     let known = of.widened.map_or_else(String::new, |widened| {
         format!(
-            " Standard deviations are those of leaving out single shots, {:.1} times as large for shifts and {:.1} times for biases, as \
-             units scatter about a plane.",
+            " Standard deviations are from leaving out single shots, multiplied by {:.1} for shifts and by {:.1} for biases to match the \
+             scatter of units about a plane.",
             widened.shift, widened.bias
         )
     });
@@ -114,8 +114,8 @@ fn map(of: &LaserMatch) -> Result<String> {
         Series::dots("units that are kept", 0, dots),
     ];
     let mut plot = Plot::of(
-        "Where the model has the ground".to_owned(),
-        "From where the laser has the ground of a unit towards where the model has it.".to_owned(),
+        "Shifts of the model".to_owned(),
+        "From the position of a unit by the laser towards its position in the model.".to_owned(),
         "east longitude, degrees",
         vec![Panel::of("latitude, degrees", series)],
     );
@@ -153,7 +153,7 @@ fn held_out(of: &LaserMatch) -> Result<String> {
         Series::dots("with the shift", 0, points(true)),
     ];
     let plot = Plot::of(
-        "Model minus laser at shots that were held out".to_owned(),
+        "Model minus laser at withheld shots".to_owned(),
         "Root mean square of every fourth shot of a kept unit, about the bias of its other shots."
             .to_owned(),
         "unit",
@@ -164,7 +164,7 @@ fn held_out(of: &LaserMatch) -> Result<String> {
 
 fn units(of: &LaserMatch) -> String {
     let mut table = Table::new(
-        "Every unit; shifts are how far the model has the ground from where the laser has it",
+        "Every unit; shifts are offsets of the model from the laser",
         &[
             Column::Text("unit"),
             Column::Number("shots"),
@@ -177,7 +177,7 @@ fn units(of: &LaserMatch) -> String {
             Column::Number("σ east, m"),
             Column::Number("σ north, m"),
             Column::Number("σ bias, m"),
-            Column::Number("held out before, m"),
+            Column::Number("withheld before, m"),
             Column::Number("after, m"),
             Column::Text("not kept because"),
         ],

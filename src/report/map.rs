@@ -33,23 +33,23 @@ use crate::{
     products::SiteProducts,
 };
 
-/// Shots of a map, drawn and listed; about 140 bytes each.
+/// Largest number of shots of a map, drawn and listed; about 140 bytes each.
 const MAP_SHOTS: usize = 2_500;
 /// Tie points likewise.
 const MAP_TIES: usize = 400;
 /// Least and greatest height of the picture against its width.
 const RATIO: (f64, f64) = (0.5, 0.78);
-/// What rounding takes a point of a line off it at most, units of the drawing.
+/// Largest offset of a point from its line by rounding, units of the drawing.
 const ROUNDING: f64 = 0.75;
 /// Shots farther apart, in units of the drawing, are not joined.
 const TRACK_GAP: f64 = 60.0;
-/// Colour of shots, which the page's style leaves as it is.
+/// Colour of shots, which the page's style does not change.
 const TRACK: RGBColor = RGBColor(0x1a, 0x1a, 0x1a);
-/// Colours of image outlines and of tie points; the ground has none like them.
+/// Colours of image outlines and of tie points; the ground has no similar ones.
 const IMAGE: usize = 3;
 const TIE: usize = 1;
 
-/// The maps beyond the first, which stands in the lead.
+/// The maps after the first, which is in the lead.
 pub(super) const SECTION: Section = Section {
     title: "Further maps",
     anchor: "further-maps",
@@ -63,7 +63,7 @@ pub(super) const SECTION: Section = Section {
     },
 };
 
-/// The map of the lead; nothing of a site without windows, shots and images.
+/// The map of the lead; empty for a site without windows, shots and images.
 ///
 /// # Errors
 /// A drawing that cannot be made.
@@ -132,7 +132,7 @@ struct Sheet {
     profiles: Vec<(String, Vec<(f64, f64)>)>,
     ties_rad: Vec<(f64, f64)>,
     ellipses: Ellipses,
-    /// Lowest and highest shot, those that are not drawn included.
+    /// Lowest and highest shot, including those not drawn.
     heights_m: (f64, f64),
 }
 
@@ -211,7 +211,7 @@ impl Sheet {
         (right.round() as i32, down.round() as i32)
     }
 
-    /// Where longitude and latitude are drawn; nothing for the antipode of the centre.
+    /// Position of longitude and latitude on the drawing; `None` for the antipode of the centre.
     fn place(&self, (longitude_rad, latitude_rad): (f64, f64)) -> Option<(i32, i32)> {
         let place = self.map.project(longitude_rad, latitude_rad)?;
         Some(self.pixel(place))
@@ -309,7 +309,7 @@ fn tracks(places: &[Option<(i32, i32)>]) -> Vec<Vec<(i32, i32)>> {
     lines.filter(|line| line.len() > 1).collect()
 }
 
-/// A line without the points that rounding alone takes off it: straight edges stay straight.
+/// A line without points that are off it only by rounding: straight edges stay straight.
 fn straightened(pixels: impl Iterator<Item = (i32, i32)>) -> Vec<(i32, i32)> {
     let line: geo::LineString = pixels.map(|(x, y)| (f64::from(x), f64::from(y))).collect();
     let kept = line.simplify(ROUNDING);
@@ -318,7 +318,7 @@ fn straightened(pixels: impl Iterator<Item = (i32, i32)>) -> Vec<(i32, i32)> {
         .collect()
 }
 
-/// Orbit and places of the profiles that have shots on the sheet; of two passes of an orbit the first.
+/// Orbit and places of the profiles with shots on the sheet; for two passes of an orbit the first.
 fn profiles(
     site: &SiteProducts,
     shown: &Shown,
@@ -340,7 +340,7 @@ fn profiles(
         .collect()
 }
 
-/// Tie points, adjusted where they are, thinned.
+/// Tie points, adjusted if available, thinned.
 fn ties_rad(site: &SiteProducts) -> Vec<(f64, f64)> {
     let Some(geometric) = &site.geometric else {
         return Vec::new();

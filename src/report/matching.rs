@@ -1,4 +1,4 @@
-//! Tie points that areograph measured itself: how many places were tried, and what became of them.
+//! Tie points measured by areograph: the number of places tried, and their outcomes.
 
 use super::{
     html::{Column, Table, paragraph},

@@ -1,4 +1,4 @@
-//! Tie points, and how far footprints and tie points disagree between images: before and after the adjustment.
+//! Tie points, and disagreement of footprints and tie points between images: before and after the adjustment.
 
 mod pair;
 
@@ -24,7 +24,7 @@ use crate::{
     units::RADIANS_PER_DEGREE,
 };
 
-/// Pairs that have a sentence of their own; tables have all.
+/// Number of pairs with a sentence each; tables have all.
 const PAIRS_TOLD: usize = 6;
 
 pub(super) use pair::{BeforeAfter, by_footprints};
@@ -59,7 +59,7 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
     Ok(html)
 }
 
-/// How many tie points there are, and which say nothing.
+/// Number of tie points, and of those without information.
 fn read(geometric: &GeometricProducts) -> String {
     let ties = geometric.ties;
     let points = &geometric.intersected.points;
@@ -114,7 +114,7 @@ fn read(geometric: &GeometricProducts) -> String {
     format!("<p>{words}</p>\n") + &rejected(geometric)
 }
 
-/// Tie points by the reason that they were left out for.
+/// Tie points by the reason for their rejection.
 fn rejected(geometric: &GeometricProducts) -> String {
     let mut reasons: BTreeMap<(&str, &str), u64> = BTreeMap::new();
     for tie in &geometric.intersected.rejected {
@@ -126,7 +126,7 @@ fn rejected(geometric: &GeometricProducts) -> String {
     let ties = ties.flat_map(|of| &of.adjusted.rejected);
     for tie in ties.filter(|left| left.kind == PointKind::Tie) {
         let reason = match tie.reason {
-            // The intersection has said why.
+            // The intersection has given the reason.
             RejectionReason::NotIntersected => continue,
             RejectionReason::Undetermined => "not determined",
             RejectionReason::Blunder { .. } => "blunder: its standardised residual is too large",
@@ -151,7 +151,7 @@ fn rejected(geometric: &GeometricProducts) -> String {
     table.finish()
 }
 
-/// A reason without the numbers of a single tie point.
+/// A reason without the values of a single tie point.
 const fn rejection(reason: TieRejection) -> &'static str {
     match reason {
         TieRejection::Rays(rays) => match rays {
@@ -163,7 +163,7 @@ const fn rejection(reason: TieRejection) -> &'static str {
             Unintersected::NotConverged => "the iteration did not converge",
         },
         TieRejection::Unseen => "an image does not see the intersected point",
-        TieRejection::Duplicate => "identifier used before",
+        TieRejection::Duplicate => "duplicate identifier",
         TieRejection::TwiceInImage => "measured twice in one image",
         TieRejection::OutsideImage => "measured outside its image",
         TieRejection::NotFinite => "measurement not a finite number",
@@ -298,7 +298,7 @@ fn footprints(pairs: &[BeforeAfter]) -> String {
     table.finish() + &notes
 }
 
-/// Which footprints are not in the table.
+/// Footprints omitted from the table.
 fn not_counted(found: &FootprintsByTies) -> String {
     let none = if found.profiles.is_empty() {
         "No footprint is in both images. "
@@ -311,7 +311,7 @@ fn not_counted(found: &FootprintsByTies) -> String {
     )
 }
 
-/// Where the products have a number of a profile, and how a page writes it.
+/// Place of a number of a profile in the products, and its format on a page.
 type Quantity = (&'static str, fn(&ProfileByTies) -> Option<String>);
 
 /// A profile by its place among those of the pair, before and after.

@@ -1,7 +1,7 @@
-//! The page that a person looks at first: verdict, residuals, orientation, map and kernels of one site.
+//! The first page for a reader: verdict, residuals, orientation, map and kernels of one site.
 //!
 //! One HTML file without scripts or outside parts, for light and dark screens, phones and paper.
-//! Every plot is told in words and carries its numbers; everything that came from files is escaped.
+//! Every plot is described in words and carries its numbers; all text from files is escaped.
 
 #![allow(
     clippy::format_push_string,

@@ -1,4 +1,4 @@
-//! What the adjustment moves on the image planes: footprints, and figure 6 of Shan et al. 2005 for tie points.
+//! Effect of the adjustment on the image planes: footprints, and figure 6 of Shan et al. 2005 for tie points.
 
 use std::collections::BTreeMap;
 
@@ -15,22 +15,22 @@ use crate::{
     stages::{intersect::IntersectedTies, register::RegisteredPoints},
 };
 
-/// Dots of one series.
+/// Largest number of dots of one series.
 const DOTS_MAX: usize = 300;
-/// Vectors of all images together; each is drawn once and listed once, about 400 bytes.
+/// Largest number of vectors of all images together; each is drawn once and listed once, about 400 bytes.
 const ARROWS_ALL: usize = 4_000;
-/// Most vectors of one panel.
+/// Largest number of vectors of one panel.
 const ARROWS_MAX: usize = 250;
 /// Widths of the image on either side of it within which footprints are compared.
 const WIDTHS_BESIDE: f64 = 0.5;
-/// Lines that are shown to either side, in lengths of what footprints move by, and at least.
+/// Lines shown to either side: multiple of the movement of footprints, and minimum.
 const MOVES_BESIDE: f64 = 12.0;
 const LINES_BESIDE_MIN: f64 = 200.0;
-/// Fewer footprints there make no picture: shots of some altimeters lie a thousand lines apart.
+/// With fewer footprints there is no picture: shots of some altimeters are a thousand lines apart.
 const NEAR_MIN: usize = 3;
 /// Share of the image's lines, and of its samples, that the longest vector takes.
 const LONGEST: f64 = 0.1;
-/// Colours of what was before and after.
+/// Colours of before and after.
 const BEFORE: usize = 1;
 const AFTER: usize = 0;
 
@@ -55,8 +55,8 @@ pub(super) fn figures(site: &SiteProducts, geometric: &GeometricProducts) -> Res
     Ok(format!("<div class=\"plots\">\n{html}</div>\n"))
 }
 
-/// Footprints around the middle one with the orientation of the kernels and with the adjusted one, so near that
-/// the difference can be seen.
+/// Footprints around the middle one with the orientation of the kernels and with the adjusted one, so close that
+/// the difference is visible.
 fn footprints(before: &ImageProducts, after: &ImageProducts) -> Option<Plot> {
     let samples = f64::from(before.times.samples);
     let beside = -WIDTHS_BESIDE * samples..=(1.0 + WIDTHS_BESIDE) * samples;
@@ -120,7 +120,7 @@ fn footprints(before: &ImageProducts, after: &ImageProducts) -> Option<Plot> {
     })
 }
 
-/// What moves each footprint that is within an image's lines before and after.
+/// Movement of each footprint that is within an image's lines before and after.
 fn moves(before: &RegisteredPoints, after: &RegisteredPoints) -> Vec<Arrow> {
     let places = |points: &RegisteredPoints| -> BTreeMap<(u32, u32), (f64, f64)> {
         let own = (0..points.len()).filter(|index| !points.extrapolated[*index]);
@@ -139,7 +139,7 @@ fn moves(before: &RegisteredPoints, after: &RegisteredPoints) -> Vec<Arrow> {
     moved.collect()
 }
 
-/// Figure 6: reprojection residuals where the tie points were measured; nothing for an image without any.
+/// Figure 6: reprojection residuals at the measurements of the tie points; omitted for an image without any.
 fn vectors(
     image: &ImageProducts,
     index: usize,

@@ -14,13 +14,13 @@ use crate::{
     units::METRES_PER_KM,
 };
 
-/// Deviations that are listed.
+/// Number of deviations listed.
 const LISTED: usize = 25;
-/// Vectors and points that are drawn.
+/// Number of vectors and points drawn.
 const DRAWN: usize = 3_000;
-/// Pictures that are listed.
+/// Number of pictures listed.
 const PICTURES: usize = 100;
-/// Share of the map that the longest vector takes.
+/// Share of the map for the longest vector.
 const VECTOR_ROOM: f64 = 0.12;
 /// Width of the axes in a plot's own units, about: both axes are drawn to one scale.
 const AXIS_WIDTH: f64 = 880.0;
@@ -35,7 +35,7 @@ pub fn net_page(config: &NetConfig, net: &Triangulation) -> Result<String> {
         Section::new("Bricks", bricks(net)),
         Section::new("Blunders and largest deviations", blunders(net)),
         Section::new("Controls", controls(net)?),
-        Section::new("What is known how well", precision(config, net)),
+        Section::new("Precision and redundancy", precision(config, net)),
         Section::new("Pictures", pictures(net)),
     ];
     Ok(page(&config.net, &lead(config, net), &sections))
@@ -64,7 +64,7 @@ fn lead(config: &NetConfig, net: &Triangulation) -> String {
     verdict(tone, &headline, &body) + &checks::listed(&net.verdict.checks)
 }
 
-/// What was done, by the paper's names.
+/// Steps of the method, by the paper's names.
 fn way(config: &NetConfig) -> String {
     let way = &config.triangulation;
     let local = if way.local { ", LOCAL" } else { "" };
@@ -74,7 +74,7 @@ fn way(config: &NetConfig) -> String {
             "BRICK, EXTEND, MORTAR, SCALE{local}: bricks give way to the controls by their weights."
         ),
         Method::OneShot => {
-            "All pictures and controls at once, then SCALE; bricks tell the blunders.".to_owned()
+            "All pictures and controls at once, then SCALE; bricks identify blunders.".to_owned()
         }
     }
 }
@@ -143,7 +143,7 @@ fn deviations(net: &Triangulation) -> Result<String> {
         caption,
         vec![
             arrows("deviation in use", 0, used),
-            arrows("left out as a blunder", 1, removed),
+            arrows("rejected as a blunder", 1, removed),
         ],
         vec![
             Series::dots("points", GREY, thinned(&places, DRAWN)),
@@ -152,7 +152,7 @@ fn deviations(net: &Triangulation) -> Result<String> {
     )
 }
 
-/// Whether a measurement has a deviation within its brick, or was left out.
+/// Whether a measurement has a deviation within its brick, or was rejected.
 fn shown(of: &MeasurementResult) -> bool {
     of.in_brick.is_some() || of.removed
 }
@@ -182,7 +182,7 @@ fn bricks(net: &Triangulation) -> String {
             Column::Number("max δY, m"),
             Column::Number("rms δX, m"),
             Column::Number("rms δY, m"),
-            Column::Number("left out"),
+            Column::Number("rejected"),
             Column::Number("flagged"),
         ],
     );
@@ -246,7 +246,7 @@ fn bricks(net: &Triangulation) -> String {
 fn blunders(net: &Triangulation) -> String {
     let mut worst: Vec<&MeasurementResult> =
         net.measurements.iter().filter(|of| shown(of)).collect();
-    // One reference for all: what was left out has no deviation within its brick.
+    // One reference for all: rejected measurements have no deviation within their brick.
     let length_m = |of: &MeasurementResult| of.deviation.x_m.hypot(of.deviation.y_m);
     worst.sort_by(|a, b| {
         b.removed
@@ -254,7 +254,7 @@ fn blunders(net: &Triangulation) -> String {
             .then(length_m(b).total_cmp(&length_m(a)))
     });
     let mut table = Table::new(
-        "What was left out, then the largest deviations, from the mean of the point over all pictures; full list in deviations.csv",
+        "Rejected measurements, then the largest deviations, from the mean of the point over all pictures; full list in deviations.csv",
         &[
             Column::Text("point"),
             Column::Text("picture"),
@@ -266,7 +266,7 @@ fn blunders(net: &Triangulation) -> String {
     );
     for of in worst.iter().take(LISTED) {
         let verdict = match (of.removed, of.flagged) {
-            (true, _) => "left out",
+            (true, _) => "rejected",
             (false, true) => "flagged, in use",
             (false, false) => "in use",
         };
@@ -288,12 +288,12 @@ fn blunders(net: &Triangulation) -> String {
         of.removed && same.count() == 2
     };
     let both_go = if worst.iter().copied().any(|of| on_two(&of)) {
-        " Of a point on two pictures the two cannot be told apart, and both go."
+        " Of a point on two pictures, the wrong one cannot be identified, and both are rejected."
     } else {
         ""
     };
-    let words = "Flagged is what lies beyond 3.5 robust standard deviations (by the median) of its brick. A measurement is left \
-        out when the root mean square of the brick falls by 30 % without it, alone or with others of the same size.";
+    let words = "Flagged measurements are beyond 3.5 robust standard deviations (by the median) of their brick. One is rejected \
+        when the root mean square of the brick falls by 30 % without it, alone or with others of the same size.";
     table.finish() + &paragraph(&format!("{words}{both_go}"))
 }
 
@@ -323,7 +323,7 @@ fn controls(net: &Triangulation) -> Result<String> {
                 .into_iter()
                 .map(metres),
         );
-        cells.push(if of.kept { "kept" } else { "left out" }.into());
+        cells.push(if of.kept { "kept" } else { "rejected" }.into());
         table.row(of.kept, cells);
     }
     let vectors = |kept: bool| -> Vec<Arrow> {
@@ -337,11 +337,11 @@ fn controls(net: &Triangulation) -> Result<String> {
     let places = net.controls.iter().map(|of| km(of.given_m)).collect();
     let figure = map(
         "Vectors of residuals at the controls",
-        "Given minus computed by SCALE of the free figure. Kept and left out are judged by least median of squares over the \
-         similarities through each two controls.",
+        "Given minus computed by SCALE of the free figure. Blunders are identified by least median of squares over the \
+         similarities through each pair of controls.",
         vec![
             arrows("kept", 0, vectors(true)),
-            arrows("left out", 1, vectors(false)),
+            arrows("rejected", 1, vectors(false)),
         ],
         vec![Series::dots("controls", GREY, places)],
     )?;
@@ -352,7 +352,8 @@ fn precision(config: &NetConfig, net: &Triangulation) -> String {
     let totals = &net.totals;
     let sigma = match totals.tie_sigma_m {
         None => {
-            "Nothing tells the standard deviation of an image: there is no redundancy.".to_owned()
+            "The standard deviation of an image is not determined: there is no redundancy."
+                .to_owned()
         }
         Some(sigma_m) => {
             let source = if totals.tie_sigma_given {
@@ -361,7 +362,7 @@ fn precision(config: &NetConfig, net: &Triangulation) -> String {
                 "by the bricks' deviations"
             };
             let largest = totals.largest_sigma_m.map_or_else(String::new, |of| {
-                format!(" The least known point is known to ±{of:.1} m.")
+                format!(" The largest of a point is ±{of:.1} m.")
             });
             format!(
                 "A coordinate of an image has a standard deviation of {sigma_m:.2} m, {source}.{largest}"
@@ -377,7 +378,7 @@ fn precision(config: &NetConfig, net: &Triangulation) -> String {
     );
     let floor = format!(
         "Pictures are taken as pieces of a conformal map. An orthographic one departs from a similarity on this map by up to \
-         {:.2} m here: a systematic floor under the deviations that no adjustment goes below.",
+         {:.2} m here: a systematic lower limit of the deviations for any adjustment.",
         totals.projection_floor_m
     );
     let sigmas = if config.triangulation.method == Method::OneShot {

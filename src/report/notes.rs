@@ -1,4 +1,4 @@
-//! Notes, and complaints about input.
+//! Notes, and problems in the input.
 
 use super::{
     html::{heading, list, paragraph},
@@ -6,7 +6,7 @@ use super::{
 };
 use crate::products::SiteProducts;
 
-/// Complaints shown; the rest is counted.
+/// Number of problems shown; the rest are counted.
 const COMPLAINTS_SHOWN: usize = 50;
 
 pub(super) const SECTION: Section = Section {

@@ -1,13 +1,13 @@
-//! Numbers as pages write them: one minus sign, thousands apart, no sign on zero.
+//! Format of numbers on pages: one minus sign, grouped thousands, no sign on zero.
 
 use crate::wording::MINUS;
 
-/// What stands between thousands: narrow, and no place to break a line.
+/// Separator of thousands: narrow and non-breaking.
 const APART: char = '\u{202f}';
-/// From so many digits on thousands are set apart, as the SI brochure has it.
+/// Number of digits from which thousands are grouped, as in the SI brochure.
 const DIGITS_WHOLE: usize = 5;
 
-/// A number with so many decimals; what rounds to zero has no sign.
+/// A number with a given number of decimals; values that round to zero have no sign.
 pub(super) fn number(value: f64, decimals: usize) -> String {
     let text = format!("{:.decimals$}", value.abs());
     let zero = !text.contains(|digit| matches!(digit, '1'..='9'));
@@ -19,7 +19,7 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
     sign + &spaced(&text)
 }
 
-/// The same with a sign on what is above zero too.
+/// The same with a sign on positive values too.
 pub(super) fn signed(value: f64, decimals: usize) -> String {
     let text = number(value, decimals);
     let zero = !text.contains(|digit| matches!(digit, '1'..='9'));

@@ -7,7 +7,7 @@ use crate::{
     products::{ImageProducts, SiteProducts},
 };
 
-/// Points along the edge of a box window.
+/// Number of points along the edge of a box window.
 const EDGE_POINTS: u32 = 72;
 
 /// A named ring of (longitude, latitude), radians.
@@ -16,7 +16,7 @@ pub(super) struct Outline {
     pub(super) ring: Vec<(f64, f64)>,
 }
 
-/// Outlines of the images that see the ground with all of their edges.
+/// Outlines of the images whose whole edge is on the ground.
 pub(super) fn images(site: &SiteProducts) -> Vec<Outline> {
     let outline = |image: &ImageProducts| {
         let points = image.orientation.outline.as_ref()?.iter();
@@ -76,7 +76,7 @@ fn box_rings(west: f64, east: f64, south: f64, north: f64) -> Vec<Vec<(f64, f64)
     };
     if width > TAU - 1e-9 {
         let circles = [south, north].into_iter();
-        // A pole is no circle.
+        // A pole is not a circle.
         let circles = circles.filter(|latitude| latitude.abs() < FRAC_PI_2 - 1e-9);
         return circles.map(parallel).collect();
     }

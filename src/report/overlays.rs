@@ -1,4 +1,4 @@
-//! Images with footprints and tie points on them: a page of its own, and a section that leads there.
+//! Images with footprints and tie points on them: a separate page, and a section that links to it.
 
 use std::fmt::Write as _;
 
@@ -16,7 +16,7 @@ use crate::{
     stages::lay_overlays::{CHIP_EDGE, Mark, Overlays, Place, PlaceView, ShownImage, Subject},
 };
 
-/// Pixels of all whole images on the page: with the pieces it stays below 5 MB, whatever they show.
+/// Pixels of all whole images on the page: with the pieces it stays below 5 MB for any contents.
 const STRIP_PIXELS: u64 = 2_300_000;
 
 pub(super) const SECTION: Section = Section {
@@ -26,7 +26,7 @@ pub(super) const SECTION: Section = Section {
     write,
 };
 
-/// What the other page has, and where each image lies.
+/// Contents of the other page, and the position of each image on it.
 fn write(site: &SiteProducts) -> Result<String> {
     let Some(overlays) = site.overlays else {
         return Ok(String::new());
@@ -88,12 +88,12 @@ fn lead(site: &SiteProducts) -> String {
         "<p class=\"about\">{}</p>\n",
         link("index.html", "Report of the site")
     );
-    let mut keys = vec!["blue circle: where the orientation of the kernels has the point"];
+    let mut keys = vec!["blue circle: the point by the orientation of the kernels"];
     if site.adjustment().is_some() {
-        keys.push("orange upright cross: where the adjusted orientation has it");
-        keys.push("yellow diagonal cross: where a tie point was measured");
+        keys.push("orange upright cross: the point by the adjusted orientation");
+        keys.push("yellow diagonal cross: a measured tie point");
     } else if site.geometric.is_some() {
-        keys.push("yellow diagonal cross: where a tie point was measured");
+        keys.push("yellow diagonal cross: a measured tie point");
     }
     report
         + &list(&keys)
@@ -134,7 +134,7 @@ fn strip_figure(site: &SiteProducts, shown: &ShownImage, picture: &Picture) -> S
     let look = &shown.quick_look;
     for (lines, what) in [
         (look.lines_missing, "missing"),
-        (look.lines_suspect, "damaged or of uncertain place"),
+        (look.lines_suspect, "damaged or of uncertain position"),
     ] {
         if lines > 0 {
             let _infallible = write!(words, " {} {what}.", html::counted(lines as usize, "line"));
@@ -150,7 +150,7 @@ fn strip_figure(site: &SiteProducts, shown: &ShownImage, picture: &Picture) -> S
     )
 }
 
-/// A place in its images, side by side and on each other.
+/// A place in its images, side by side and superposed.
 fn figure(site: &SiteProducts, place: &Place) -> Result<String> {
     let id = |view: &PlaceView| &*site.images[view.image].times.id;
     let title = title(site, &place.subject);

@@ -101,7 +101,7 @@ fn methods(site: &SiteProducts) -> String {
     folded("Methods", &table.finish())
 }
 
-/// Where the rest is, from the folder of the page.
+/// Links to the other files, from the folder of the page.
 const LINKS: &str = "<p><a href=\"../manifest.json\">manifest.json</a>: verdict, checks, figures and hashes for programs. \
     <a href=\"../kernels.tm\">kernels.tm</a> loads the same kernels. \
     <a href=\"../../index.html\">All sites</a>.</p>\n";
@@ -128,7 +128,7 @@ fn products(site: &SiteProducts) -> String {
     folded("Products", &table.finish())
 }
 
-/// The keys of the configuration that were written, with what they are when left out; all others have their defaults.
+/// The written keys of the configuration beside their defaults; all other keys have the defaults.
 fn settings(site: &SiteProducts) -> String {
     if site.config.keys.is_empty() {
         return String::new();
@@ -149,7 +149,7 @@ fn settings(site: &SiteProducts) -> String {
     folded("Settings", &table.finish())
 }
 
-/// Whether a key as written is the declared one: behind the name of a list of tables stands which entry it is of.
+/// Whether a key as written is the declared one: the name of a list of tables is followed by the entry.
 fn is_of(key: &str, declared: &str) -> bool {
     let Some((table, name)) = declared.rsplit_once('.') else {
         return key == declared;
@@ -160,7 +160,7 @@ fn is_of(key: &str, declared: &str) -> bool {
     rest.is_some_and(|entry| entry.starts_with('.') && entry.ends_with('.'))
 }
 
-/// A hash in letters of one width.
+/// A hash in a monospaced font.
 fn hash(blake3: &str) -> Cell {
     Cell::Html(format!("<span class=\"hash\">{}</span>", escape(blake3)))
 }

@@ -27,10 +27,10 @@ fn write(summary: &AdjustmentSummary) -> String {
     folded("Tables 2, 3 and 4 for this site", &tables)
 }
 
-/// Where the products have the summary.
+/// Place of the summary in the products.
 const PLACE: &str = "adjustment.json#/adjustment/summary";
 
-/// Mean and standard deviation of what lies at `place` below the row's, or a dash each where there is nothing.
+/// Mean and standard deviation at `place` below the row's, or dashes for missing values.
 fn moments(of: &Summary, place: &str) -> [Cell; 2] {
     if of.n == 0 {
         return ["–".into(), "–".into()];

@@ -43,7 +43,7 @@ fn write(site: &SiteProducts) -> Result<String> {
     Ok(statistics(site) + &ways + &heading("Along the profiles") + &figures)
 }
 
-/// Millimetres are enough for ranges that come in centimetres.
+/// Millimetres suffice for ranges recorded in centimetres.
 pub(super) fn metres(value: f64) -> String {
     label(value, 3)
 }
@@ -162,7 +162,7 @@ fn statistics(site: &SiteProducts) -> String {
     table.finish()
 }
 
-/// What the table of the profiles is judged by.
+/// Limits of the table of the profiles.
 fn limits(site: &SiteProducts) -> String {
     let limits = &site.config.range_check;
     sentence(
@@ -184,7 +184,7 @@ fn limits(site: &SiteProducts) -> String {
     )
 }
 
-/// Share of a limit that may be 0: then nothing of it is used by 0, and all is beyond otherwise.
+/// Used share of a limit that may be 0: then 0 uses nothing of it, and all other values are beyond it.
 fn used_share(value: f64, limit: f64) -> f64 {
     if value <= 0.0 { 0.0 } else { value / limit }
 }
@@ -211,7 +211,7 @@ fn trend(ranges: &ProfileRanges) -> Cell {
     Cell::from(text).told("/trend_m_s/slope*1000 /trend_m_s/uncertainty*1000")
 }
 
-/// Where the products tell of a profile.
+/// Place of a profile in the products.
 pub(super) fn place(profile: usize) -> String {
     format!("ranges.json#/profiles/{profile}")
 }

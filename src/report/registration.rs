@@ -13,11 +13,11 @@ use crate::{
     stages::group_profiles::Profile,
 };
 
-/// Profiles that have a colour of their own; the others share the last, grey one.
+/// Number of profiles with separate colours; the others share the last, grey one.
 const COLOURED: usize = COLOURS.len() - 1;
-/// Dots of one series.
+/// Largest number of dots of one series.
 const DOTS_MAX: usize = 600;
-/// Widths of the image that are shown on either side of it.
+/// Widths of the image shown on either side of it.
 const WIDTHS_BESIDE: f64 = 0.15;
 
 pub(super) const SECTION: Section = Section {
@@ -42,19 +42,19 @@ fn write(site: &SiteProducts) -> Result<String> {
     let evidence = planes + &models(site, &images);
     Ok(profiles(site, &images)
         + &folded(
-            "Footprints over the lines, and what other camera models move",
+            "Footprints over the lines, and the effect of other camera models",
             &evidence,
         ))
 }
 
-/// Where the products tell of an image.
+/// Place of an image in the products.
 pub(super) fn place(site: &SiteProducts, image: &ImageProducts) -> String {
     let mut images = site.images.iter();
     let index = images.position(|other| other.times.id == image.times.id);
     format!("registration.json#/images/{}", index.unwrap_or_default())
 }
 
-/// Which profile the images show, and where.
+/// Profiles in the images, and their positions.
 fn profiles(site: &SiteProducts, images: &[&ImageProducts]) -> String {
     let mut table = Table::new(
         "Profiles in the images",
@@ -198,7 +198,7 @@ fn plane(profiles: &[Profile], image: &ImageProducts) -> Plot {
     }
 }
 
-/// What the choice of the model moves.
+/// Effect of the choice of the model.
 fn models(site: &SiteProducts, images: &[&ImageProducts]) -> String {
     let mut table = Table::new(
         "Other models against the one used, footprints within the image's lines",

@@ -1,4 +1,4 @@
-//! What of the adjustment can be trusted, in the words of surveyors: absolute position, gross errors that no
+//! Reliability of the adjustment: absolute position, gross errors that no
 //! residual shows, unknowns that cannot be separated, and rejected points.
 
 use super::{
@@ -15,21 +15,21 @@ use crate::{
     stages::adjust::{Adjusted, AdjustmentSummary, PointKind, RejectionReason, ScalarResidual},
 };
 
-/// Error in standard deviations over the root of the redundancy number that Baarda's test at 3.29 finds in
+/// Error in standard deviations over the root of the redundancy number that Baarda's test at 3.29 detects in
 /// eight cases of ten.
 ///
 /// # Source
 /// Baarda 1968, A testing procedure for use in geodetic networks.
 const NON_CENTRALITY: f64 = 4.13;
-/// Below this redundancy number a residual hides the error behind it.
+/// Below this redundancy number a residual hides its error.
 const HIDDEN: f64 = 0.1;
-/// Above this one it shows the error well.
+/// Above this one it shows the error clearly.
 const SHOWN: f64 = 0.3;
-/// Pairs of unknowns, and blunders, that are listed; the rest is counted.
+/// Number of pairs of unknowns, and of blunders, listed; the rest are counted.
 const CORRELATED_SHOWN: usize = 12;
 const BLUNDERS_SHOWN: usize = 20;
 
-/// What the adjustment determines and what it does not, with numbers.
+/// Determined and undetermined quantities of the adjustment, with numbers.
 pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
     const MOVED: [&str; 3] = [
         "adjustment.json#/adjustment/summary/ties/corrections_m/0/mean",
@@ -44,7 +44,7 @@ pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentPro
     let summary = &adjustment.adjusted.summary;
     let ties = &summary.ties;
     if ties.corrections_m[0].n == 0 {
-        return paragraph("No tie point took part.");
+        return paragraph("No tie point was used.");
     }
     let registration = if adjustment.images_agree {
         "Relative registration is corrected"
@@ -71,7 +71,7 @@ pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentPro
         }
         None => {
             numbers.push((known_beforehand(geometric).to_owned(), ""));
-            "heights and position are what was known of {} beforehand"
+            "heights and position are a priori, from {}"
         }
     };
     sentence(
@@ -148,7 +148,7 @@ impl Controlled {
         Summary::of(&self.redundancies).mean
     }
 
-    /// The smallest error that the test finds, with its unit.
+    /// The smallest error that the test detects, with its unit.
     fn smallest(&self) -> String {
         let error = NON_CENTRALITY * self.sigma / self.mean().sqrt();
         if error.is_finite() {
@@ -159,7 +159,7 @@ impl Controlled {
     }
 }
 
-/// Share of a gross error that its own residual shows.
+/// Share of a gross error visible in its own residual.
 pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
     let all = Controlled::all(site, adjusted);
     let mut table = Table::new(
@@ -170,7 +170,7 @@ pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
             Column::Number("shown, mean"),
             Column::Number("least"),
             Column::Number("most"),
-            Column::Number("smallest error that is found"),
+            Column::Number("smallest detectable error"),
         ],
     );
     let mut sentences = String::new();
@@ -179,9 +179,9 @@ pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
         let [mean, least, most] = [found.mean, found.min, found.max].map(per_cent);
         let hidden = found.mean < HIDDEN;
         let consequence = if hidden {
-            "such errors cannot be found"
+            "such errors cannot be detected"
         } else {
-            "only large ones are found"
+            "only large ones are detected"
         };
         if found.mean < SHOWN {
             sentences += &paragraph(&format!(
@@ -202,12 +202,12 @@ pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
         );
     }
     let words =
-        "Shown: the redundancy number r; found by Baarda's test (3.29, power 80 %): 4.13 σ/√r.";
+        "Shown: the redundancy number r; detectable by Baarda's test (3.29, power 80 %): 4.13 σ/√r.";
     let table = table.finish() + &paragraph(words);
     sentences + &folded("Redundancy by kind of observation", &table)
 }
 
-/// A share; one that rounds to nothing is still there.
+/// A share; one that rounds to zero is still shown.
 fn per_cent(share: f64) -> String {
     if 0.0 < share && share < 5e-4 {
         "< 0.1 %".to_owned()

@@ -1,4 +1,4 @@
-//! How residuals of tie points are distributed: by their own standard deviations, against the normal distribution.
+//! Distribution of tie point residuals, in their own standard deviations, against the normal distribution.
 
 use super::{
     html::{Column, Table},
@@ -12,12 +12,12 @@ use crate::{
     units::RADIANS_PER_ARCSECOND,
 };
 
-/// Points of a curve.
+/// Number of points of a curve.
 const POINTS: usize = 240;
-/// Standard deviations that the axis shows to both sides.
+/// Range of the axis to both sides, standard deviations.
 const SHOWN: f64 = 5.0;
 
-/// One row an image: its tie points, what is left of them, and what the adjustment adds at its middle.
+/// One row per image: its tie points, their residuals, and the correction at its middle.
 pub(super) fn images(adjusted: &Adjusted) -> String {
     let mut table = Table::new(
         "Images, one row each",
@@ -73,7 +73,7 @@ pub(super) fn images(adjusted: &Adjusted) -> String {
     table.finish()
 }
 
-/// The distribution along and across the track; nothing without residuals that another observation controls.
+/// The distribution along and across the track; empty without residuals that another observation controls.
 ///
 /// # Errors
 /// A plot that cannot be drawn.
@@ -134,7 +134,7 @@ fn standardised(adjusted: &Adjusted, of: fn(&ImageResidual) -> ScalarResidual) -
     values
 }
 
-/// The empirical distribution of sorted values, thinned to what a plot shows.
+/// The empirical distribution of sorted values, thinned for a plot.
 fn curve(sorted: &[f64]) -> Vec<(f64, f64)> {
     let step = sorted.len().div_ceil(POINTS).max(1);
     let last = sorted.len().saturating_sub(1);

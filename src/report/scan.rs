@@ -1,4 +1,4 @@
-//! What the ranges say of the MOLA clock: spread of the residuals against the assumed correction.
+//! MOLA clock by the ranges: spread of the residuals against the assumed correction.
 
 use super::{
     html::{Cell, Column, Table, folded, paragraph},

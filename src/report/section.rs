@@ -1,4 +1,4 @@
-//! What a section of a site's page declares.
+//! Declaration of a section of a site's page.
 
 use super::html;
 use crate::{error::Result, products::SiteProducts};
@@ -6,13 +6,13 @@ use crate::{error::Result, products::SiteProducts};
 /// A section of the page of one site. Its file declares it as `SECTION`; [`super::SECTIONS`] lists it once, and order
 /// and contents of the page follow.
 pub(super) struct Section {
-    /// Its heading, and what the list of contents calls it.
+    /// Its heading, and its name in the list of contents.
     pub(super) title: &'static str,
     /// Its name in links, unique on the page.
     pub(super) anchor: &'static str,
     /// Whether the page of this site has it.
     pub(super) appears: fn(&SiteProducts) -> bool,
-    /// Its body as HTML; fails with a plot that cannot be drawn.
+    /// Its body as HTML; fails if a plot cannot be drawn.
     pub(super) write: fn(&SiteProducts) -> Result<String>,
 }
 

@@ -1,4 +1,4 @@
-//! Windows and filters, and what they rejected.
+//! Windows and filters, and the shots that they rejected.
 
 use super::{
     html::{Cell, Column, Table, paragraph},
@@ -55,7 +55,7 @@ fn write(site: &SiteProducts) -> String {
 
 fn filter(site: &SiteProducts) -> String {
     if !site.config.shots.is_empty() {
-        return "Shots of tables are kept where they lie in a window; rows that repeat one count once.".to_owned();
+        return "Shots of tables are kept where they lie in a window; duplicate rows are counted once.".to_owned();
     }
     let filter = &site.config.pedr.filter;
     let join = |values: Vec<String>| values.join(", ");
@@ -121,7 +121,7 @@ fn outline(window: &WindowConfig) -> String {
         }
         WindowShape::Image { image, margin_m } => {
             format!(
-                "what image {image} sees, and {:.1} km beyond",
+                "ground seen by image {image}, and {:.1} km beyond",
                 margin_m / METRES_PER_KM
             )
         }

@@ -1,4 +1,4 @@
-//! The page over all sites of an output folder.
+//! The page of all sites in an output folder.
 
 use chrono::{DateTime, FixedOffset};
 
@@ -11,25 +11,25 @@ use super::{
 };
 use crate::{body::Body, error::Result};
 
-/// What the page says of one site.
+/// Entry of one site on the page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SiteLine {
     /// Name of the site's folder.
     pub folder: String,
-    /// Its products; `None` when it has none, because a run did not come to its end.
+    /// Its products; `None` if it has none, because a run did not finish.
     pub products: Option<SiteSummary>,
-    /// Why the last run failed, if it did; the products are then of an earlier run.
+    /// Error of the last run, if it failed; the products are then of an earlier run.
     pub failure: Option<String>,
 }
 
 /// Products of one site in one line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SiteSummary {
-    /// The verdict in words, as the program has it everywhere.
+    /// The verdict in words, the same throughout the program.
     pub verdict: &'static str,
     /// Why the site is invalid; empty when it is valid.
     pub reasons: Vec<String>,
-    /// What a reader must weigh.
+    /// Remarks for the reader.
     pub remarks: Vec<String>,
     /// Shots, profiles, images.
     pub counts: [u64; 3],
@@ -40,11 +40,11 @@ pub struct SiteSummary {
     pub images_apart_m: [Option<f64>; 2],
     /// Median height of tie points above the MOLA surface, below it negative, likewise, metres.
     pub height_off_m: [Option<f64>; 2],
-    /// The body that it lies on.
+    /// The body.
     pub body: Body,
     /// East longitude and areocentric latitude of the middle of the first window that is a box, degrees.
     pub place_deg: Option<(f64, f64)>,
-    /// What the products said that stood here before.
+    /// Results of the previous products.
     pub earlier: Option<Earlier>,
     /// When the products were published.
     pub finished_utc: String,
@@ -52,7 +52,7 @@ pub struct SiteSummary {
     pub version: String,
 }
 
-/// What the products before those of today said.
+/// Results of the previous products.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Earlier {
     /// The verdict in words.
@@ -61,11 +61,11 @@ pub struct Earlier {
     pub figures_m: [Option<f64>; 3],
     /// When they were published.
     pub finished_utc: String,
-    /// Where their manifest is, from the page.
+    /// Path of their manifest, from the page.
     pub manifest: String,
 }
 
-/// The page over `sites`, which stand in the order given.
+/// The page of `sites`, in the given order.
 ///
 /// # Errors
 /// A map that cannot be drawn, which is a bug in areograph.
@@ -111,7 +111,7 @@ pub fn sites_page(sites: &[SiteLine]) -> Result<String> {
     Ok(page("Sites", &lead.concat(), &[]))
 }
 
-/// The sites on a body of which it is known where they are.
+/// The sites on a body with a known position.
 fn places(sites: &[SiteLine], body: Body) -> Vec<Place<'_>> {
     let placed = sites.iter().filter_map(|site| {
         let products = site.products.as_ref().filter(|of| of.body == body)?;
@@ -164,7 +164,7 @@ impl SiteSummary {
         DateTime::parse_from_rfc3339(&self.finished_utc).ok()
     }
 
-    /// How much older the products are than the newest ones of all sites.
+    /// Age of the products relative to the newest ones of all sites.
     fn age(&self, newest: Option<DateTime<FixedOffset>>) -> String {
         let older = newest
             .zip(self.finished())
@@ -180,7 +180,7 @@ impl SiteSummary {
     }
 }
 
-/// What the headline number may be, and its name among the figures of a manifest.
+/// Candidates for the headline number, with their names among the figures of a manifest.
 const HEADLINES: [(&str, &str); 3] = [
     ("heights off", "adjusted_height_off_surface_m"),
     ("images apart", "adjusted_along_track_parallax_m"),
@@ -188,7 +188,7 @@ const HEADLINES: [(&str, &str); 3] = [
 ];
 
 impl SiteSummary {
-    /// How verdict and headline number moved since the products before.
+    /// Change of verdict and headline number since the previous products.
     fn trend(&self) -> Cell {
         let Some(before) = &self.earlier else {
             return dash().into();
@@ -304,7 +304,7 @@ fn moved([before, after]: [Option<f64>; 2], name: &str) -> Cell {
     }
 }
 
-/// Where a manifest has a figure, which it keeps without its sign.
+/// Place of a figure in a manifest, which keeps it without its sign.
 fn figure_place(name: &str, value: f64) -> String {
     let sign = if value < 0.0 { "*-1" } else { "" };
     format!("/figures/{name}{sign}")
@@ -318,7 +318,7 @@ fn first_line(text: &str) -> &str {
     text.lines().next().unwrap_or_default()
 }
 
-/// The first reason or remark, and how many more there are.
+/// The first reason or remark, and the number of others.
 fn because(summary: &SiteSummary) -> String {
     let mut all = summary.reasons.iter().chain(&summary.remarks);
     let Some(first) = all.next() else {
@@ -370,7 +370,7 @@ mod tests {
         assert!(page.contains("href=\"good/report/index.html\""));
         assert!(page.contains("<small>a &lt;kernel&gt; is gone</small>"));
         assert!(page.contains("261.2 → 0.0"));
-        // What changed since the products before; their own verdict stays where it is the same.
+        // Change since the previous products; their verdict is shown even if it is the same.
         let mut moved = summary("valid", &[]);
         moved.earlier = Some(Earlier {
             verdict: "INVALID",
@@ -387,7 +387,7 @@ mod tests {
         assert!(trend.contains("INVALID as before<br>"));
         assert!(trend.contains("range − distance −1.25 m"));
         assert!(trend.contains("data-from=\"/figures/range_mean_m*-1\""));
-        // All of the three ran at the same time; an older one says so.
+        // All of the three ran at the same time; an older one is marked.
         assert_eq!(page.matches("newest, areograph 1").count(), 3);
         let mut older = summary("valid", &[]);
         older.finished_utc = "2025-12-29T21:00:00Z".to_owned();

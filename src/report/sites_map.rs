@@ -1,4 +1,4 @@
-//! A body with all its sites of an output folder, by verdict, over its largest features.
+//! A map of a body with all its sites in an output folder, by verdict, over its largest features.
 
 mod features;
 
@@ -16,11 +16,11 @@ use super::{
 };
 use crate::{body::Body, error::Result};
 
-/// Room for the names of parallels at the left, and around the rest of the map for marks on its edge.
+/// Margin for the names of parallels at the left, and around the rest of the map for marks on its edge.
 const LEFT: i32 = 92;
 const RIGHT: i32 = 28;
 const TOP: i32 = 20;
-/// Room for the names of meridians.
+/// Margin for the names of meridians.
 const FOOT: i32 = 44;
 /// The map: a degree of latitude is as long as one of longitude.
 const MAP_WIDTH: i32 = WIDTH as i32 - LEFT - RIGHT;
@@ -35,11 +35,11 @@ const MARK_SIZE: i32 = 12;
 /// Colours of valid sites and of those with remarks.
 const VALID: usize = 2;
 const REMARKS: usize = 1;
-/// Size of the letters of what is not a site.
+/// Size of the letters of names other than sites.
 const SMALL: i32 = 21;
 /// Radius of the ring of a landing site.
 const RING: i32 = 4;
-/// Corners of the outline of a feature.
+/// Number of corners of the outline of a feature.
 const CORNERS: i32 = 60;
 
 /// A site on the map.
@@ -50,7 +50,7 @@ pub(super) struct Place<'a> {
     pub(super) place_deg: (f64, f64),
 }
 
-/// The map; nothing without a place.
+/// The map; empty without a place.
 ///
 /// # Errors
 /// A drawing that cannot be made.
@@ -62,7 +62,7 @@ pub(super) fn figure(body: Body, places: &[Place]) -> Result<String> {
     let (names, unnamed) = names(places, &features);
     let is_seen = |of: &&Feature| match of.kind {
         Kind::Extent(_) => true,
-        // A ring without a name tells nothing.
+        // A ring without a name has no meaning.
         Kind::Landing => names.placed.iter().any(|label| label.text == of.name),
     };
     let seen: Vec<&Feature> = features.into_iter().filter(is_seen).collect();
@@ -82,7 +82,7 @@ pub(super) fn figure(body: Body, places: &[Place]) -> Result<String> {
                      features of the ground with their extent (IAU gazetteer, whole degrees), and landing sites (rings)."
         .to_owned();
     if !unnamed.is_empty() {
-        words += &format!(" Not named for want of room: {}.", unnamed.join(", "));
+        words += &format!(" Not labelled for lack of space: {}.", unnamed.join(", "));
     }
     Ok(figure_html(
         &format!("Sites on {body}"),
@@ -93,17 +93,17 @@ pub(super) fn figure(body: Body, places: &[Place]) -> Result<String> {
     ))
 }
 
-/// A place on the map; at its edge what is beyond.
+/// A position on the map; positions beyond it are at its edge.
 fn pixel((longitude, latitude): (f64, f64)) -> (i32, i32) {
     let x = PER_DEGREE * longitude.clamp(0.0, 360.0);
     let y = PER_DEGREE * (90.0 - latitude);
     (LEFT + x.round() as i32, TOP + y.round() as i32)
 }
 
-/// Names of the sites, then of as many features as there is room for between them; and the sites without a name.
+/// Names of the sites, then of as many features as fit between them; and the sites without a name.
 fn names<'a>(places: &[Place<'a>], features: &[&Feature]) -> (Labels, Vec<&'a str>) {
     let mut names = Labels::new(WIDTH as i32 - 4, TOP + MAP_HEIGHT);
-    // The names of parallels have the left side for themselves.
+    // The left side is reserved for the names of parallels.
     for y in (TOP..TOP + MAP_HEIGHT).step_by(LETTERS as usize) {
         names.keep_off((LEFT / 2, y), LEFT / 2 - 4);
     }
@@ -129,7 +129,7 @@ fn names<'a>(places: &[Place<'a>], features: &[&Feature]) -> (Labels, Vec<&'a st
     (names, unnamed)
 }
 
-/// The name of a wide feature on it, of another one beside it, where there is room.
+/// The name of a wide feature on it, of another one beside it, if there is room.
 fn name_feature(feature: &Feature, names: &mut Labels) {
     let (x, y) = pixel(feature.place_deg);
     let wide = labels::width_in(feature.name, SMALL);
@@ -161,7 +161,7 @@ fn draw<'a>(
 ) -> Drawn<'a> {
     draw_features(features, area)?;
     draw_lines(area)?;
-    // The worst over the others, where sites lie close together.
+    // The worst above the others, where sites are close together.
     let order = [Tone::Good, Tone::Remarks, Tone::Bad];
     let sorted = order
         .into_iter()
@@ -179,7 +179,7 @@ fn draw<'a>(
     names.draw(area)
 }
 
-/// The extent of large features, as it lies on this map, and rings at landing sites.
+/// The extent of large features on this map, and rings at landing sites.
 fn draw_features<'a>(features: &[&Feature], area: &Canvas<'a>) -> Drawn<'a> {
     for feature in features {
         match feature.kind {

@@ -1,4 +1,4 @@
-//! The stereo sky plot: from where the images see the ground, and what that makes of each pair.
+//! The stereo sky plot: viewing directions of the images, and the geometry of each pair.
 
 use std::{f64::consts::TAU, fmt::Write as _};
 
@@ -22,25 +22,25 @@ use crate::{
 const HEIGHT: u32 = 720;
 const CENTRE: (i32, i32) = (520, 360);
 const RADIUS: f64 = 310.0;
-/// Circles between the zenith and the outermost.
+/// Number of circles between the zenith and the outermost.
 const CIRCLES: i32 = 3;
-/// Emission angles that the outermost circle may have, degrees.
+/// Possible emission angles of the outermost circle, degrees.
 const OUTERMOST_DEG: [f64; 8] = [3.0, 6.0, 12.0, 30.0, 45.0, 60.0, 75.0, 90.0];
-/// Pairs that the caption tells; the table has all.
+/// Number of pairs in the caption; the table has all.
 const PAIRS_TOLD: usize = 3;
 /// Radius of the dot of an image.
 const DOT: i32 = 9;
 /// Colour of the images.
 const IMAGE: usize = 3;
 
-/// Where an image is in the sky of what it shows at its middle.
+/// Position of an image in the sky of the ground at its middle.
 struct Seen<'a> {
     image: &'a str,
     azimuth_rad: f64,
     emission_rad: f64,
 }
 
-/// The plot, where there are two images or more that see the ground.
+/// The plot, if two or more images see the ground.
 ///
 /// # Errors
 /// A drawing that cannot be made.
@@ -94,7 +94,7 @@ fn words(site: &SiteProducts, images: usize, unnamed: &[&str]) -> String {
         counted(images, "image")
     );
     if !unnamed.is_empty() {
-        words += &format!(" Not named for want of room: {}.", unnamed.join(", "));
+        words += &format!(" Not labelled for lack of space: {}.", unnamed.join(", "));
     }
     let Some(geometric) = &site.geometric else {
         return words;
@@ -117,7 +117,7 @@ struct Sky<'a> {
     outermost_deg: f64,
     images: Vec<(i32, i32)>,
     names: Labels,
-    /// Images for whose names there is no room.
+    /// Images whose names do not fit.
     unnamed: Vec<&'a str>,
 }
 
@@ -167,7 +167,7 @@ impl<'a> Sky<'a> {
         (1..=CIRCLES).map(move |circle| outermost_deg * f64::from(circle) / f64::from(CIRCLES))
     }
 
-    /// The angle of each circle, on the first diagonal where there is room for it.
+    /// The angle of each circle, on the first diagonal with room for it.
     fn name_circles(&mut self) {
         for emission_deg in self.circles() {
             let text = format!("{}°", label(emission_deg, 0));

@@ -1,8 +1,8 @@
-//! Where numbers of a page come from: marks in its HTML, by which a test holds each number against its product.
+//! Sources of the numbers of a page: marks in its HTML, by which a test compares each number with its product.
 //!
 //! An element with `data-from` lists, for each number of its text in their order, a place in the products beside the
-//! page: `<document>#<JSON pointer>`, or the pointer alone, below the `data-in` of the table's row. A leading `|` stands
-//! for the size of the value, a trailing `*<factor>` for another unit. Nothing at that place is a dash.
+//! page: `<document>#<JSON pointer>`, or the pointer alone, below the `data-in` of the table's row. A leading `|`
+//! stands for the size of the value, a trailing `*<factor>` for another unit. A missing value is a dash.
 
 use super::html::{escape, from_places};
 
@@ -11,7 +11,7 @@ pub(super) fn told(text: &str, places: &str) -> String {
     format!("<span{}>{}</span>", from_places(places), escape(text))
 }
 
-/// A paragraph of `words` with a number at each `{}`, told by its place in the products; a number without a place is
+/// A paragraph of `words` with a number at each `{}`, with its place in the products; a number without a place is
 /// a word.
 pub(super) fn sentence(words: &str, numbers: &[(String, &str)]) -> String {
     format!("<p>{}</p>\n", filled(words, numbers))
@@ -31,7 +31,7 @@ pub(super) fn filled(words: &str, numbers: &[(String, &str)]) -> String {
     html
 }
 
-/// A member's name as a part of a JSON pointer; a space, which stands between places, as in addresses.
+/// A member's name as a part of a JSON pointer; a space, which separates places, is encoded as in addresses.
 pub(super) fn member(name: &str) -> String {
     name.replace('~', "~0")
         .replace('/', "~1")

@@ -1,4 +1,4 @@
-//! The first screen of a site's page: verdict, the numbers that matter, every check, the map.
+//! The first screen of a site's page: verdict, key numbers, every check, the map.
 
 use super::{
     checks,
@@ -19,10 +19,10 @@ use crate::{
     },
 };
 
-/// Reasons, and remarks, that are listed; the rest is counted.
+/// Number of reasons, and of remarks, listed; the rest are counted.
 const REASONS_SHOWN: usize = 4;
 
-/// Valid or not and why, how good by whose judgement, and where: the first lines of the page.
+/// Verdict with reasons, accuracy with its basis, and location: the first lines of the page.
 ///
 /// # Errors
 /// A map that cannot be drawn.
@@ -50,7 +50,7 @@ pub(super) fn lead(site: &SiteProducts) -> Result<String> {
         checks::table(site),
         map::first(site)?,
     );
-    // What the user wrote stays as it is.
+    // The user's text is not changed.
     Ok(about(site) + &site.config.wording().of(found))
 }
 
@@ -64,7 +64,7 @@ fn headline(site: &SiteProducts) -> String {
     }
 }
 
-/// What the page is about: description, dates of the data, how much there is.
+/// Subject of the page: description, dates of the data, counts.
 fn about(site: &SiteProducts) -> String {
     let mut parts = Vec::new();
     let days = |dates: &mut dyn Iterator<Item = &str>| {
@@ -100,7 +100,7 @@ fn about(site: &SiteProducts) -> String {
     format!("<p class=\"about\">{words}</p>\n")
 }
 
-/// A number that matters: what it is, its value, and what to know of it.
+/// A key number: its name, its value, and a note.
 struct KeyNumber {
     what: &'static str,
     /// As HTML, like the note.
@@ -108,7 +108,7 @@ struct KeyNumber {
     note: String,
 }
 
-/// The numbers that say how good the products are: by MOLA, between the images, absolutely; without tie points by
+/// The accuracy of the products: by MOLA, between the images, absolutely; without tie points by
 /// the ranges.
 fn numbers(site: &SiteProducts) -> String {
     let numbers: Vec<KeyNumber> = [
@@ -137,7 +137,7 @@ fn numbers(site: &SiteProducts) -> String {
     format!("<dl class=\"numbers\">\n{items}</dl>\n")
 }
 
-/// A check with its number, if it has one, and where the products have that.
+/// A check with its number, if it has one, and the place of that in the products.
 fn checked<'a>(site: &SiteProducts<'a>, kind: CheckKind) -> Option<(&'a Check, f64, String)> {
     let mut checks = site.verdict.checks.iter().enumerate();
     let (index, check) = checks.find(|(_, check)| check.kind == kind)?;
@@ -160,7 +160,7 @@ fn by_mola(site: &SiteProducts) -> Option<KeyNumber> {
     Some(KeyNumber {
         what: "Heights against MOLA",
         value: told(&format!("{} m", signed(after_m, 1)), &after_place),
-        // What controls a result cannot judge it: then only the number before does.
+        // Data that control a result cannot test it: then only the number before does.
         note: match site.config.adjustment.model {
             AdjustmentModel::MolaSurface => format!(
                 "median of {ties}, controlled by MOLA; {before_m} m of {all} before, independent of it"
@@ -197,7 +197,7 @@ fn between_images(site: &SiteProducts) -> Option<KeyNumber> {
     })
 }
 
-/// How far apart the same images place footprints, which are not fitted, and how well the tie points tell that.
+/// Disagreement of the same images on footprints, which are not fitted, and its precision by the tie points.
 fn at_footprints(pair: &BeforeAfter) -> String {
     let of = |state: &str, pair_of: &PairComparison| {
         let [apart_m, sigma_m] = by_footprints(pair_of)?;
@@ -215,10 +215,10 @@ fn at_footprints(pair: &BeforeAfter) -> String {
     )
 }
 
-/// Where the products tell of heights.
+/// Place of heights in the products.
 const HEIGHTS: &str = "adjustment.json#/adjustment/heights";
 
-/// What is known of the absolute place and height.
+/// Absolute accuracy of position and height.
 fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
     let (geometric, adjustment) = site.adjustment()?;
     let heights = adjustment.adjusted.heights.as_ref()?;
@@ -236,7 +236,7 @@ fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
         ),
         note: escape(&if is_open(&geometric, &adjustment) {
             format!(
-                "by {}; see accuracy for what is open",
+                "by {}; see accuracy for open points",
                 place_by(&geometric, &adjustment)
             )
         } else {
@@ -248,7 +248,7 @@ fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
     })
 }
 
-/// Ranges, where there are profiles.
+/// Ranges, if there are profiles.
 fn by_ranges(site: &SiteProducts) -> Option<KeyNumber> {
     let (check, mean_m, place) = checked(site, CheckKind::RangeMean)?;
     let profile = escape(&check.subject);
@@ -266,7 +266,7 @@ fn by_ranges(site: &SiteProducts) -> Option<KeyNumber> {
     })
 }
 
-/// As many sentences as leave the verdict on one screen; the manifest has all.
+/// As many sentences as keep the verdict on one screen; the manifest has all.
 fn first_of(sentences: &[String]) -> String {
     let shown = &sentences[..sentences.len().min(REASONS_SHOWN)];
     let mut html = list(shown);

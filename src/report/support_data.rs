@@ -1,4 +1,4 @@
-//! Images by support data: what their files hold, and that nothing is applied to it.
+//! Images by support data: contents of their files, to which nothing is applied.
 
 use super::{
     html::{Column, Table, paragraph},
@@ -44,7 +44,7 @@ fn write(site: &SiteProducts) -> String {
         );
     }
     let mut table = Table::new(
-        "What the support data hold",
+        "Contents of the support data",
         &[
             Column::Text("image"),
             Column::Text("file"),

@@ -1,4 +1,4 @@
-//! The terrain model of a pair of images: what it is, what MOLA says of it, and how it looks.
+//! The terrain model of a pair of images: statistics, comparison with MOLA, and pictures.
 
 mod pictures;
 
@@ -35,7 +35,7 @@ pub(super) const SECTION: Section = Section {
 fn write(site: &SiteProducts, account: &SurfaceAccount) -> Result<String> {
     let table = made(site, account);
     if account.is_refused {
-        let words = "So few cells were found that chance may have found them: there is no model.";
+        let words = "Too few cells matched to be significant: there is no model.";
         return Ok(paragraph(words) + &table);
     }
     let model = link("../surface.tif", "surface.tif");
@@ -47,7 +47,7 @@ fn write(site: &SiteProducts, account: &SurfaceAccount) -> Result<String> {
     Ok(files + &table + &compared(account) + &format!("<div class=\"plots\">\n{pictures}</div>\n"))
 }
 
-/// How the model was made, and what became of its cells.
+/// Making of the model, and outcomes of its cells.
 fn made(site: &SiteProducts, account: &SurfaceAccount) -> String {
     let mut table = Table::new(
         "Terrain model of a pair of images",
@@ -93,8 +93,8 @@ fn made(site: &SiteProducts, account: &SurfaceAccount) -> String {
     );
     table.finish()
         + &paragraph(
-            "σ, matching: of one cell against the others, by the residuals of its match. Errors that all heights share are stated \
-             apart (σ, common, by the adjustment). Neighbouring heights within the compared square are correlated.",
+            "σ, matching: of one cell against the others, by the residuals of its match. Errors that all heights share are stated separately \
+             (σ, common, by the adjustment). Neighbouring heights within the compared square are correlated.",
         )
 }
 
@@ -109,7 +109,7 @@ fn compared(account: &SurfaceAccount) -> String {
     } = &account.shots;
     if above_m.n == 0 {
         return paragraph(
-            "No footprint of MOLA lies on it: nothing independent judges its heights.",
+            "No footprint of MOLA is on it: there is no independent test of its heights.",
         );
     }
     let mut all = shots_table("MOLA minus the terrain model, metres");
@@ -127,10 +127,10 @@ fn compared(account: &SurfaceAccount) -> String {
         );
     }
     let words = if account.shots_take_part {
-        "MOLA takes part: it controlled heights of the adjustment, so that the mean is how well that was met; the scatter about it is \
+        "MOLA controlled heights of the adjustment: the mean shows how well that control was met; the scatter about it is \
          an independent test."
     } else {
-        "MOLA took no part in the heights: an independent test."
+        "MOLA did not control the heights: an independent test."
     };
     let spread = format!(
         "Expected about the median: {} m (σ of height, shot, profile, and of their places on its slopes); found: {} of it.",

@@ -1,4 +1,4 @@
-//! What every kernel holds against what the site asks: coverage and gaps over time.
+//! Coverage of every kernel against the required coverage of the site: gaps over time.
 
 use chrono::{DateTime, TimeDelta};
 use plotters::{prelude::*, style::text_anchor::HPos};
@@ -15,17 +15,17 @@ use crate::{
     time::{Et, Interval, Intervals},
 };
 
-/// Instants that are asked for closer together than this share a picture, seconds.
+/// Required instants closer together than this share a picture, seconds.
 const APART_S: f64 = 600.0;
-/// Most pictures; the data beside them holds all.
+/// Largest number of pictures; the data beside them hold all.
 const PICTURES: usize = 8;
 /// Height of a row: a name over a bar.
 const ROW: u32 = 62;
 const BAR_TOP: i32 = 34;
 const BAR_BOTTOM: i32 = 54;
-/// Colour of what is held.
+/// Colour of coverage.
 const HELD: usize = 2;
-/// Colour of what is asked.
+/// Colour of required coverage.
 const ASKED: usize = 0;
 
 pub(super) const SECTION: Section = Section {
@@ -64,14 +64,14 @@ fn write(site: &SiteProducts) -> Result<String> {
     Ok(paragraph(&words) + &kernels)
 }
 
-/// Time that is asked for and not covered.
+/// Required time that is not covered.
 fn missing_s(site: &SiteProducts, stretch: Interval) -> f64 {
     let rows = rows(site, stretch);
     let gaps: Vec<Interval> = rows.iter().filter(|row| row.sum).flat_map(gaps).collect();
     total_s(&gaps)
 }
 
-/// What is asked, merged where it lies close together, with room at both sides.
+/// Required intervals, merged where close together, with a margin at both sides.
 fn stretches(site: &SiteProducts) -> Vec<Interval> {
     let asked = site.required.of_all();
     let wide = asked
@@ -91,11 +91,11 @@ struct Row {
     name: String,
     held: Intervals,
     asked: Intervals,
-    /// Whether gaps in what is asked matter: they do in the sum of a kind of kernels only.
+    /// Whether gaps in required coverage matter: only for the sum of a kind of kernels.
     sum: bool,
 }
 
-/// Rows of one stretch: position and attitude as a whole, then every kernel that holds some of it.
+/// Rows of one stretch: position and attitude as a whole, then every kernel that covers some of it.
 fn rows(site: &SiteProducts, stretch: Interval) -> Vec<Row> {
     let mut rows = Vec::new();
     let [positions, attitudes] = site.required.of_all();
@@ -189,7 +189,7 @@ fn draw<'a>(rows: &[Row], stretch: Interval, area: &Canvas<'a>) -> Drawn<'a> {
     let mut top = 0;
     for row in rows {
         let bar = |interval: &Interval, from: i32, to: i32, colour: RGBColor| {
-            // What is asked may be shorter than a pixel and must still be seen.
+            // A required interval may be shorter than a pixel and must still be visible.
             let (left, right) = (at(interval.start), at(interval.stop));
             let right = right.max(left + 3);
             Rectangle::new([(left, top + from), (right, top + to)], colour.filled())
@@ -280,7 +280,7 @@ fn table(site: &SiteProducts) -> String {
     table.finish()
 }
 
-/// Share of a kernel's span that it holds, per cent; a kernel of one instant has no span.
+/// Share of a kernel's span that it covers, per cent; a kernel of one instant has no span.
 fn held_share(held_s: f64, span: Interval) -> String {
     if span.duration_s() > 0.0 {
         format!("{:.2}", 100.0 * held_s / span.duration_s())

@@ -58,7 +58,7 @@ fn budgets(pairs: &[BeforeAfter]) -> String {
     table.finish()
 }
 
-/// What orientation and footprints have of a spacing counts before the adjustment alone.
+/// Shares of orientation and footprints in a spacing apply only before the adjustment.
 fn cells(budget: &UncertaintyBudget, before: bool) -> [Cell; 6] {
     let footprints = match budget.ground {
         _ if !before => "–".into(),
@@ -88,14 +88,14 @@ fn cells(budget: &UncertaintyBudget, before: bool) -> [Cell; 6] {
     ]
 }
 
-/// Why a pair has no budget.
+/// Reason why a pair has no budget.
 fn without_budget(pair: &BeforeAfter) -> String {
     let mut html = String::new();
     for (state, found) in pair.states() {
         if let Err(reason) = &found.budget {
             let name = pair.name();
             html += &paragraph(&format!(
-                "{name}, {state} the adjustment: there is no budget, for {reason}."
+                "{name}, {state} the adjustment: there is no budget: {reason}."
             ));
         }
     }

@@ -359,7 +359,7 @@ fn the_page_opens_with_the_outcome_and_needs_nothing_from_outside() {
     assert!(page.contains("mgs_sc_scene.bc (CK) changed; 6 unchanged"));
     assert_eq!(page.matches("<svg").count(), 2); // the camera turned and did not move; a map of the ground
     // On the map only the boresight has moved, by turn times range, in kilometres.
-    let map = page::csv(&page, "case-what-moved-on-the-ground");
+    let map = page::csv(&page, "case-movements-on-the-ground");
     let moved_m: Vec<f64> = map
         .iter()
         .filter(|row| row.join(",").contains("boresights of images, B − A"))

@@ -438,7 +438,7 @@ fn budgets_that_cannot_be_are_told_in_words() {
     let page = site.page();
     let text = section(&page, SECTIONS[2]);
     assert!(text.contains(&format!(
-        "after the adjustment: there is no budget, for {fault}."
+        "after the adjustment: there is no budget: {fault}."
     )));
     let rows = table(&page, "How far apart the two footprints");
     assert_eq!(rows.len(), 1);

@@ -285,7 +285,7 @@ fn another_bias_is_kept_and_the_comment_warns_of_isis() {
     let (distance_m, turn_rad) = apart(&image.sampled_with(&set), &adjusted);
     assert!(distance_m < 1e-3 && turn_rad < 1e-9); // as with the usual bias
     let bytes = fs::read(folder.path().join("adjusted/E02-02016.bc")).unwrap();
-    assert!(String::from_utf8_lossy(&bytes).contains("not for them"));
+    assert!(String::from_utf8_lossy(&bytes).contains("file with them"));
 }
 
 #[test]

@@ -492,7 +492,7 @@ fn products_are_whole_keep_their_schemas_and_are_not_made_twice() {
     assert_keeps_schema(&json(&out.join("calibration.json")), "calibration_result");
     assert_keeps_schema(&json(&out.join("manifest.json")), "manifest");
     let page = fs::read_to_string(out.join("report/index.html")).unwrap();
-    for said in ["common roll", "held back", "i818", "joint"] {
+    for said in ["common roll", "withheld", "i818", "joint"] {
         assert!(page.contains(said), "{said}");
     }
     let points = fs::read_to_string(out.join("points.csv")).unwrap();

@@ -340,7 +340,7 @@ fn the_command_answers_with_its_verdict() {
     assert_eq!(answer["verdict"]["valid"], true);
     assert!(answer["figures"]["held_out_rms_m"].as_f64().unwrap() > 1.0);
     let page = fs::read_to_string(folder.path().join("out/report/index.html")).unwrap();
-    assert!(page.contains("Where the model has the ground"));
+    assert!(page.contains("Shifts of the model"));
     // In the letters of a picture anything may stand.
     let mut words = page
         .split("base64,")

@@ -218,7 +218,7 @@ fn products_are_whole_keep_their_schemas_and_are_not_made_twice() {
     for said in [
         "Valid with remarks",
         "brick to brick, after LOCAL",
-        "left out as a blunder",
+        "rejected as a blunder",
         "L′/L",
     ] {
         assert!(page.contains(said), "{said}");

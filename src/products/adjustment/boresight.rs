@@ -1,4 +1,4 @@
-//! Where a laser on the bus of the cameras points, as the document of an adjustment tells it.
+//! Pointing of a laser on the bus of the cameras, in the document of an adjustment.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -9,7 +9,7 @@ use crate::{
     stages::adjust::{BoresightSummary, ProfileOffset, SpotsOfImage},
 };
 
-/// [`BoresightSummary`] without what is unknown.
+/// [`BoresightSummary`] without unknown values.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct BoresightDocument<'a> {
     /// Towards X of the bus, and at right angles to that and the beam.
@@ -17,11 +17,11 @@ pub(super) struct BoresightDocument<'a> {
     #[schemars(transform = none_negative)]
     sigma_rad: [f64; 2],
     images: Vec<SpotsDocument<'a>>,
-    /// How far each profile is recorded from where it lies.
+    /// Offset of each recorded profile from its adjusted position.
     profile_shifts: &'a [ProfileOffset],
-    /// Images that were exposed during no profile.
+    /// Images without a simultaneous profile.
     without: &'a [String],
-    /// The unknown that is farthest from what was known of it, and how far, in standard deviations of the contradiction.
+    /// The unknown farthest from its a priori value, and how far, in standard deviations of the contradiction.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
     farthest: Option<&'a (String, f64)>,
@@ -31,11 +31,11 @@ pub(super) struct BoresightDocument<'a> {
 struct SpotsDocument<'a> {
     image: &'a str,
     spots: usize,
-    /// What its lines are late by against the shots, with its standard deviation, where that is unknown.
+    /// Delay of its lines against the shots, with its standard deviation, where that is an unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
     line_time_s: Option<(f64, f64)>,
-    /// Where the initial orientation sees the footprints minus where the mounting has the laser: along the track in lines,
+    /// Footprints by the initial orientation minus the laser by the mounting: along the track in lines,
     /// across it in focal-plane pixels.
     footprints_off: &'a [Summary; 2],
 }

@@ -1,4 +1,4 @@
-//! What was configured for an adjustment, as its document repeats it.
+//! Configuration of an adjustment, as repeated in its document.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -10,11 +10,11 @@ use crate::{
     schema::{all_positive, none_negative},
 };
 
-/// [`AdjustmentConfig`] without what is not set.
+/// [`AdjustmentConfig`] without unset keys.
 #[derive(Serialize, JsonSchema)]
 #[allow(
     clippy::struct_excessive_bools,
-    reason = "each is a key of the site file of its own"
+    reason = "each is a separate key of the site file"
 )]
 pub(super) struct AdjustmentKeys<'a> {
     #[schemars(transform = all_positive)]

@@ -1,4 +1,4 @@
-//! The other reading of what images disagree by, as the document of an adjustment tells it.
+//! The other reading of the disagreement of images, in the document of an adjustment.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -8,7 +8,7 @@ use crate::{
     stages::adjust::OtherReading,
 };
 
-/// Where the tie points lie by the other reading of what images disagree by.
+/// Positions of the tie points by the other reading of the disagreement of images.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct OtherReadingDocument {
     /// With its standard deviation, where this is the reading by it.

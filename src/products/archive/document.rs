@@ -21,7 +21,7 @@ use crate::{
 
 pub(super) static DOCUMENT: Declaration<WriteArchive> = Declaration {
     path: "archive.json",
-    what: "verdict, limits, files with their complaints, statistics by off-nadir angle, error of positions",
+    what: "verdict, limits, files with their problems, statistics by off-nadir angle, error of positions",
     readers: "scripts",
     rows: "files",
     role: Role::Metadata,
@@ -51,24 +51,24 @@ struct Document<'a> {
     mola_clock: &'a MolaClock,
     /// Kernels in load order.
     kernels: &'a [KernelUsed],
-    /// How spacecraft positions were taken from the kernels.
+    /// Interpolation of spacecraft positions from the kernels.
     positions: Positions,
     /// Shots of profiles within the limits by off-nadir angle, outliers left out.
     off_nadir: Vec<OffNadirDocument>,
     /// Files that were checked.
     files: Vec<FileDocument<'a>>,
-    /// Copies of these files, which do not count.
+    /// Copies of these files, which are not counted.
     copies: &'a [FileCopy],
     /// Files that could not be checked, or not read again for the products.
     failures: &'a [FileFailure],
 }
 
-/// How good tabulated positions are.
+/// Accuracy of tabulated positions.
 #[derive(Serialize, JsonSchema)]
 struct Positions {
     /// Bound that the tables keep, metres.
     tolerance_m: f64,
-    /// Largest distance from CSPICE at instants that took no part in the tables, metres.
+    /// Largest distance from CSPICE at instants not used for the tables, metres.
     #[schemars(range(min = 0.0))]
     largest_error_m: f64,
 }
@@ -107,7 +107,7 @@ struct FileDocument<'a> {
     shots: u64,
     /// Shots without a position in the kernels.
     not_covered: u64,
-    /// Complaints of records and label.
+    /// Number of problems of records and label.
     complaint_count: u64,
     /// The first of them.
     complaints: &'a [String],

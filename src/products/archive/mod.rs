@@ -1,4 +1,4 @@
-//! Products of the check of an archive: a row for every profile, shots of the worst ones, a document, the page.
+//! Products of the check of an archive: a row per profile, shots of the worst profiles, a document, the page.
 
 mod document;
 mod profiles;
@@ -20,10 +20,10 @@ use crate::{
 
 pub use shots::{profile_name, write_profile_shots};
 
-/// Everything that the products of an archive are made of.
+/// Inputs of the products of an archive.
 #[derive(Debug, Clone, Copy)]
 pub struct ArchiveProducts<'a> {
-    /// What was found.
+    /// The result.
     pub ranges: &'a ArchiveRanges,
     /// The verdict on it.
     pub verdict: &'a Verdict,
@@ -38,13 +38,13 @@ pub struct WorstProfile<'a> {
     pub file: &'a CheckedFile,
     /// The profile.
     pub profile: &'a ArchiveProfile,
-    /// Where its shots are, below the folder of the products; nothing of a file that could not be read again.
+    /// Path of its shots, below the folder of the products; `None` for a file that could not be read again.
     pub shots: Option<String>,
-    /// UTC of its first shot; nothing without leap seconds.
+    /// UTC of its first shot; `None` without leap seconds.
     pub start_utc: Option<String>,
 }
 
-/// How a product of an archive is written; gives its rows.
+/// Writer of a product of an archive; returns its number of rows.
 pub(super) type WriteArchive = fn(&Path, &ArchiveProducts) -> Result<u64>;
 
 /// The products of an archive, in the order in which they are written; shots of the worst profiles come before.
@@ -66,13 +66,13 @@ static REPORT: Declaration<WriteArchive> = Declaration {
     uses: &[],
 };
 
-/// What declares the shots of a profile.
+/// Declaration of the shots of a profile.
 pub(super) use shots::SHOTS;
 
-/// Writes every product of an archive but shots below `directory`, and reads each of them back.
+/// Writes every product of an archive except shots below `directory`, and reads each of them back.
 ///
 /// # Errors
-/// [`Kind::Io`](crate::error::Kind::Io) for what the disk refuses; [`Kind::Bug`](crate::error::Kind::Bug) for numbers that
+/// [`Kind::Io`](crate::error::Kind::Io) for errors of the disk; [`Kind::Bug`](crate::error::Kind::Bug) for numbers that
 /// are not finite and files that read back differently.
 pub fn write_archive_products(directory: &Path, archive: &ArchiveProducts) -> Result<Vec<Product>> {
     write_each(directory, ARCHIVE_PRODUCTS, |write, path| {

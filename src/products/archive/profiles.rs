@@ -1,4 +1,4 @@
-//! Every profile of the archive in a row.
+//! Profiles of the archive, one per row.
 
 use super::{ArchiveProducts, WriteArchive};
 use crate::{
@@ -14,7 +14,7 @@ use crate::{
 
 pub(super) static TABLE: Declaration<WriteArchive> = Declaration {
     path: "profiles.parquet",
-    what: "statistics of ranges against the kernels, a row for every profile: what one file has of one revolution",
+    what: "statistics of ranges against the kernels, one row per profile: the shots of one file in one revolution",
     readers: "scripts",
     rows: "profiles",
     role: Role::Data,
@@ -73,7 +73,7 @@ fn times<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         column(
             "orbit",
             Unit::None,
-            "orbit number as the file has it",
+            "orbit number in the file",
             |row: &Row| row.orbit,
         ),
         column(
@@ -85,7 +85,7 @@ fn times<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         column(
             "first_record",
             Unit::None,
-            "first record with a shot that was taken, counted from 1 with the label",
+            "first record with a selected shot, counted from 1 with the label",
             |row: &Row| row.first_record,
         ),
         column("last_record", Unit::None, "the last one", |row: &Row| {
@@ -142,7 +142,7 @@ fn ranges<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         checked(
             "mean_without_outliers_m",
             Unit::Metre,
-            "the same without outliers: this one is judged",
+            "the same without outliers: compared with the limit",
             |row| row.mean_without_outliers_m,
         ),
         checked(
@@ -187,7 +187,7 @@ fn ranges<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         checked(
             "decoding_without_outliers_m",
             Unit::Metre,
-            "the same without outliers: this one is judged",
+            "the same without outliers: compared with the limit",
             |row| row.decoding_without_outliers_m,
         ),
     ]
@@ -217,7 +217,7 @@ fn orbits<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         column(
             "best_correction_s",
             Unit::Second,
-            "correction of time tags by which ranges spread least; missing where there is no such minimum",
+            "correction of time tags that minimises the spread of ranges; missing without a minimum",
             |row: &Row| row.best_correction_s,
         ),
         column(
@@ -229,7 +229,7 @@ fn orbits<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         column(
             "best_correction_radius",
             Unit::None,
-            "radius of the footprints with which ranges spread least: raw, or corrected by crossovers",
+            "radius of the footprints that gives the least spread: raw, or corrected by crossovers",
             |row: &Row| {
                 let word = row.best_correction_s.map(|_| row.correction_radius.word());
                 word.unwrap_or_default().to_owned()
@@ -238,13 +238,13 @@ fn orbits<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         column(
             "share_of_limits",
             Unit::None,
-            "largest of the judged figures as a share of its limit: above 1 a limit is broken; missing where too few shots were checked",
+            "largest checked figure as a share of its limit: above 1 a limit is exceeded; missing where too few shots were checked",
             |row: &Row| row.share_of_limits,
         ),
         column(
             "invalid_because",
             Unit::None,
-            "limits that are broken, in words; empty where none is",
+            "limits that are exceeded, in words; empty if none is",
             |row: &Row| row.invalid_because.join("; "),
         ),
     ]

@@ -14,15 +14,15 @@ use crate::{
     units::RADIANS_PER_DEGREE,
 };
 
-/// Stands for a profile in the path.
+/// Placeholder of a profile in the path.
 const PROFILE: &str = "<profile>";
 
-/// How the shots of a profile are written; gives their rows.
+/// Writer of the shots of a profile; returns their number of rows.
 type WriteShots = fn(&Path, &ArchiveProfile, &[CheckedShot]) -> Result<u64>;
 
 pub(in crate::products) static SHOTS: Declaration<WriteShots> = Declaration {
     path: "shots/<profile>.parquet",
-    what: "every checked shot of a profile with its residuals; there is one for each of the worst profiles",
+    what: "every checked shot of a profile with its residuals; one file for each of the worst profiles",
     readers: "scripts",
     rows: "shots",
     role: Role::Data,
@@ -34,10 +34,10 @@ pub(in crate::products) static SHOTS: Declaration<WriteShots> = Declaration {
     uses: &[],
 };
 
-/// Digits of the hash of a path that tell files of the same name apart.
+/// Digits of the hash of a path that distinguish files of the same name.
 const HASH_DIGITS: usize = 8;
 
-/// The name of a profile as part of the name of a file.
+/// The name of a profile as part of a file name.
 #[must_use]
 pub fn profile_name(file: &CheckedFile, profile: &ArchiveProfile) -> String {
     let own = file_name(&file.path);
@@ -53,7 +53,7 @@ pub fn profile_name(file: &CheckedFile, profile: &ArchiveProfile) -> String {
 /// Writes the shots of a profile below `directory`, and reads them back.
 ///
 /// # Errors
-/// What the disk refuses; numbers that are not finite; a file that reads back differently.
+/// Errors of the disk; numbers that are not finite; a file that reads back differently.
 pub fn write_profile_shots(
     directory: &Path,
     file: &CheckedFile,

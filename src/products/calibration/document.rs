@@ -1,4 +1,4 @@
-//! What a calibration says of itself, as JSON.
+//! Summary of a calibration, as JSON.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -24,7 +24,7 @@ use crate::{
 
 pub(super) static DOCUMENT: Declaration<WriteCalibration> = Declaration {
     path: "calibration.json",
-    what: "parameters with standard deviations, what ties cannot see, figures after every step, of held-back control and of \
+    what: "parameters with standard deviations, what ties do not determine, figures after every step, of withheld control and of \
            other orbits, verdict",
     readers: "scripts",
     rows: "cameras",
@@ -51,27 +51,28 @@ struct Document<'a> {
     calibration: &'a str,
     /// The body that it sees, as in `config/bodies`.
     body: &'static str,
-    /// What ties estimate before there is control.
+    /// Unknowns that ties estimate before control is used.
     mode: CalibrationMode,
-    /// Whether the result is to be used.
+    /// Whether the result is usable.
     verdict: &'a Verdict,
     /// The lines of the camera.
     #[schemars(length(min = 2))]
     cameras: Vec<CameraDocument<'a>>,
-    /// Drift of the orbit from line to line, body-fixed, metres: true minus the support data that were given. What stays the same
-    /// of the orbit's error is in the offset angles.
+    /// Drift of the orbit from line to line, body-fixed, metres: true minus the support data that were given. The
+    /// constant part of the orbit's error is in the offset angles.
     drift_m_per_line: [Value; 3],
-    /// What ties alone see of the offset angles.
+    /// Offset angles as determined by ties only.
     tie_sight: TieSightDocument,
     /// Figures before, and after every step.
     steps: &'a [CalibrationStep],
-    /// The rounds of a calibration from pixels, of which all else is the last; absent where points were read from tables.
+    /// The rounds of a calibration from pixels (other members are of the last); absent where points were read from
+    /// tables.
     #[serde(skip_serializing_if = "Option::is_none")]
     rounds: Option<RoundsDocument>,
-    /// What held-back control says; absent without control.
+    /// Results of withheld control; absent without control.
     #[serde(skip_serializing_if = "Option::is_none")]
     held_back: Option<&'a HeldBack>,
-    /// What the control that was used misses over what is expected.
+    /// Residuals of the control that was used, over their expected size.
     #[serde(skip_serializing_if = "Option::is_none")]
     control_scatter: Option<Scatter>,
     /// Other orbits.
@@ -81,10 +82,10 @@ struct Document<'a> {
 /// A calibration in rounds.
 #[derive(Serialize, JsonSchema)]
 struct RoundsDocument {
-    /// Whether the last one changed nothing that matters: half of the units shifted by less than half a cell, residuals of control
+    /// Whether the rounds converged: half of the units shifted by less than half a cell, residuals of control
     /// changed by less than 2 %.
     converged: bool,
-    /// Most rounds that were allowed.
+    /// Largest number of rounds allowed.
     rounds_max: u32,
     /// Edge of a cell of the terrain models, metres.
     cell_m: f64,
@@ -99,7 +100,8 @@ struct RoundDocument {
     round: u32,
     /// Tie points.
     ties: u64,
-    /// Their residuals in the worst line, root mean square, pixels, with the cameras that the terrain model was made with.
+    /// Their residuals in the worst line, root mean square, pixels, with the cameras that the terrain model was made
+    /// with.
     #[serde(skip_serializing_if = "Option::is_none")]
     model_tie_rms_px: Option<f64>,
     /// The same with the cameras of this round.
@@ -111,7 +113,7 @@ struct RoundDocument {
     units_kept: u64,
     /// Such units that were refused.
     units_refused: u64,
-    /// Units of shots that judge.
+    /// Units of shots withheld for validation.
     judging_kept: u64,
     /// Such units that were refused.
     judging_refused: u64,
@@ -123,9 +125,9 @@ struct RoundDocument {
     bias_m: Option<f64>,
     /// Residuals of control, root mean square over all lines.
     control: PixelsAndMetres,
-    /// The same of control that was held back.
+    /// The same of withheld control.
     held_back: PixelsAndMetres,
-    /// What control that was held back misses over what is expected.
+    /// Residuals of withheld control, over their expected size.
     #[serde(skip_serializing_if = "Option::is_none")]
     held_back_scatter: Option<Scatter>,
     /// φ, ω and κ of every line, degrees, in the order of `cameras`.
@@ -145,13 +147,14 @@ struct CameraDocument<'a> {
     omega_deg: Value,
     /// κ, about the axis that looks down (yaw), degrees.
     kappa_deg: Value,
-    /// Tangent across the flight: coefficients of the powers of s′, which is −1 at the first edge of the image and 1 at the last.
+    /// Tangent across the flight: coefficients of the powers of s′, which is −1 at the first edge of the image and 1 at
+    /// the last.
     m: &'a [Value],
     /// Tangent along the flight, likewise.
     n: &'a [Value],
     /// The same of the support data that were given, across and along.
     laboratory: &'a [Vec<f64>; 2],
-    /// What these leave of the look directions of the support data that were given, at most, pixels.
+    /// Largest residual of these against the look directions of the given support data, pixels.
     #[schemars(range(min = 0.0))]
     laboratory_left_px: f64,
     /// Tangent of a pixel.
@@ -162,26 +165,26 @@ struct CameraDocument<'a> {
     /// Largest change of a look direction, pixels.
     #[schemars(range(min = 0.0))]
     moved_px: f64,
-    /// What the calibrated support data leave of the calibrated look directions, at most, pixels.
+    /// Largest residual of the calibrated support data against the calibrated look directions, pixels.
     #[schemars(range(min = 0.0))]
     isd_left_px: f64,
 }
 
-/// What ties alone see of the offset angles.
+/// Offset angles as determined by ties only.
 #[derive(Serialize, JsonSchema)]
 struct TieSightDocument {
-    /// Directions that ties do not see: they know them worse than to a degree.
+    /// Number of directions that ties do not determine: with a standard deviation above one degree.
     unseen: u32,
-    /// Which these are.
+    /// Names of these.
     unseen_directions: Vec<String>,
-    /// All directions, orthonormal, the least known first.
+    /// All directions, orthonormal, the least determined first.
     directions: Vec<DirectionDocument>,
 }
 
 /// A combination of all offset angles.
 #[derive(Serialize, JsonSchema)]
 struct DirectionDocument {
-    /// Standard deviation by ties alone, degrees; absent where they say nothing at all.
+    /// Standard deviation by ties only, degrees; absent if unbounded.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
     sigma_deg: Option<f64>,

@@ -11,9 +11,9 @@ use crate::{
 
 pub(super) static TABLE: Declaration<WriteCalibration> = Declaration {
     path: "residuals.parquet",
-    what: "every place in an image with its residuals before and after the calibration",
+    what: "every image position with its residuals before and after the calibration",
     readers: "scripts",
-    rows: "places in images",
+    rows: "image positions",
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),
     write: |path, of| write_parquet(path, of, table(of)),
@@ -24,7 +24,7 @@ pub(super) static CSV: Declaration<WriteCalibration> = Declaration {
     path: "residuals.csv",
     what: "the same as CSV",
     readers: "spreadsheets, scripts",
-    rows: "places in images",
+    rows: "image positions",
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),
     write: |path, of| write_csv(path, table(of)),
@@ -44,7 +44,7 @@ fn columns<'a>() -> Vec<Column<&'a ImageResult>> {
         column(
             "kind",
             Unit::None,
-            "tie, control (used) or held_back (control that only judges)",
+            "tie, control (used) or held_back (withheld for validation)",
             |row: &Row| row.kind.word().to_owned(),
         ),
         column("camera", Unit::None, "line of the camera", |row: &Row| {
@@ -65,13 +65,13 @@ fn columns<'a>() -> Vec<Column<&'a ImageResult>> {
         column(
             "left_out",
             Unit::None,
-            "whether the point was left out",
+            "whether the point was rejected",
             |row: &Row| row.left_out,
         ),
         column(
             "before_across_px",
             Unit::Pixel,
-            "where the uncalibrated camera sees the point (of a laser point its given place) minus the measured place, across \
+            "position by the uncalibrated camera (of a laser point: of its given coordinates) minus the measured position, across \
              the flight, pixels",
             |row: &Row| row.before_px.map(|of| of[0]),
         ),

@@ -19,10 +19,10 @@ use crate::{
     stages::calibrate::{Calibration, CameraResult},
 };
 
-/// Stands for a camera in paths.
+/// Placeholder of a camera in paths.
 const CAMERA: &str = "<camera>";
 
-/// Everything that the products of a calibration are made of.
+/// Inputs of the products of a calibration.
 #[derive(Debug, Clone, Copy)]
 pub struct CalibrationProducts<'a> {
     /// The configuration.
@@ -33,7 +33,7 @@ pub struct CalibrationProducts<'a> {
     pub page: &'a str,
 }
 
-/// How a product of a calibration is written; gives its rows.
+/// Writer of a product of a calibration; returns its number of rows.
 pub(super) type WriteCalibration = fn(&Path, &CalibrationProducts) -> Result<u64>;
 
 /// The products of a calibration, in the order in which they are written; those of cameras come first.
@@ -46,7 +46,7 @@ pub(super) static CALIBRATION_PRODUCTS: &[&Declaration<WriteCalibration>] = &[
     &REPORT,
 ];
 
-/// How a product of a camera is written.
+/// Writer of a product of a camera.
 pub(super) type WriteCamera = fn(&Path, &CameraResult) -> Result<u64>;
 
 /// Support data of a camera.
@@ -75,8 +75,8 @@ static REPORT: Declaration<WriteCalibration> = Declaration {
 /// Writes every product of a calibration below `directory`, and reads each of them back.
 ///
 /// # Errors
-/// [`Kind::Io`](crate::error::Kind::Io) for what the disk refuses; [`Kind::Bug`](crate::error::Kind::Bug) for numbers that are
-/// not finite and files that read back differently.
+/// [`Kind::Io`](crate::error::Kind::Io) for errors of the disk; [`Kind::Bug`](crate::error::Kind::Bug) for numbers that
+/// are not finite and files that read back differently.
 pub fn write_calibration_products(
     directory: &Path,
     of: &CalibrationProducts,
@@ -99,7 +99,7 @@ pub fn write_calibration_products(
     Ok(products)
 }
 
-/// Writes a table as Parquet with what it is about.
+/// Writes a table as Parquet with its metadata.
 fn write_parquet(path: &Path, of: &CalibrationProducts, table: Table) -> Result<u64> {
     let about = vec![("calibration", of.config.calibration.clone())];
     parquet::write(path, table, about)

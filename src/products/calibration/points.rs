@@ -12,7 +12,7 @@ use crate::{
 
 pub(super) static TABLE: Declaration<WriteCalibration> = Declaration {
     path: "points.parquet",
-    what: "every tie and laser point where the calibrated cameras see it, with standard deviations",
+    what: "every tie and laser point as located by the calibrated cameras, with standard deviations",
     readers: "scripts",
     rows: "points",
     role: Role::Data,
@@ -46,13 +46,13 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "kind",
             Unit::None,
-            "tie, control (used) or held_back (control that only judges)",
+            "tie, control (used) or held_back (withheld for validation)",
             |row: &Row| row.kind.word().to_owned(),
         ),
         column(
             "left_out",
             Unit::None,
-            "whether it was left out, as it does not fit",
+            "whether it was rejected",
             |row: &Row| row.left_out,
         ),
         column(
@@ -100,13 +100,13 @@ fn sigmas<'a>() -> [Column<Row<'a>>; 3] {
     ]
 }
 
-/// What laser points miss.
+/// Residuals of laser points.
 fn offs<'a>() -> [Column<Row<'a>>; 3] {
     [
         column(
             "off_east_m",
             Unit::Metre,
-            "of a laser point: intersected minus the laser's place, east, metres",
+            "of a laser point: intersected minus the laser's position, east, metres",
             |row: &Row| row.off_m.map(|of| of[0]),
         ),
         column("off_north_m", Unit::Metre, "likewise north", |row: &Row| {

@@ -21,7 +21,7 @@ use crate::{
 
 pub(in crate::products) static LIDAR: Declaration = Declaration {
     path: "exchange/lidar.json",
-    what: "shots with ranges for ISIS: a priori and adjusted points, where the adjusted images see them",
+    what: "shots with ranges for ISIS: a priori and adjusted points, with their coordinates in the adjusted images",
     readers: "ISIS",
     rows: "shots",
     role: Role::Data,
@@ -85,7 +85,7 @@ pub(super) fn adjusted(point: &CorrectedPoint) -> GroundEstimate {
     estimate(point.ground, point.covariance_m2)
 }
 
-/// Shots with a range that an adjusted image sees, where it sees them: others have no observation equation of
+/// Shots with a range and their coordinates in the adjusted images: others have no observation equation of
 /// their own in ISIS.
 fn lidar_points<'a>(
     site: &SiteProducts<'a>,
@@ -129,7 +129,7 @@ fn lidar_points<'a>(
     shots.collect()
 }
 
-/// Line and sample of the footprints that the delivered image shows, by their rows.
+/// Line and sample of the footprints in the delivered image, by their rows.
 fn places(image: &ImageProducts) -> BTreeMap<usize, [f64; 2]> {
     let points = &image.registration.points;
     (0..points.len())
@@ -143,7 +143,7 @@ fn places(image: &ImageProducts) -> BTreeMap<usize, [f64; 2]> {
         .collect()
 }
 
-/// Adjusted tie points where they were measured.
+/// Adjusted tie points with their measurements.
 fn control_points<'a>(
     site: &SiteProducts<'a>,
     ties: &'a Ties,
@@ -174,7 +174,7 @@ fn control_points<'a>(
     points.collect()
 }
 
-/// Standard deviations of line and sample of measurements whose file has none of their own, for each image, lines and
+/// Standard deviations of line and sample of measurements whose file does not state them, for each image, lines and
 /// pixels.
 pub(super) fn tie_sigmas_px(site: &SiteProducts, adjustment: &AdjustmentProducts) -> Vec<[f64; 2]> {
     let [along_px, across_px] = site.config.adjustment.tie_sigma_px;
@@ -184,7 +184,7 @@ pub(super) fn tie_sigmas_px(site: &SiteProducts, adjustment: &AdjustmentProducts
         .collect()
 }
 
-/// How many focal-plane pixels a line is, from the pairs of the image.
+/// Length of a line in focal-plane pixels, from the pairs of the image.
 fn focal_px_per_line(adjustment: &AdjustmentProducts, image: usize) -> f64 {
     let id = &adjustment.images[image].times.id;
     let mut pairs = adjustment.pairs.iter().filter_map(|pair| {

@@ -1,4 +1,4 @@
-//! Tables as jigsaw writes them: residuals, points, images. Its columns and their head lines come first, ours follow.
+//! Tables in jigsaw's format: residuals, points, images. Its columns and their head lines come first, ours follow.
 //!
 //! Source: `BundleSolutionInfo.cpp` of ISIS.
 
@@ -17,7 +17,7 @@ use crate::{
 /// Decimals of jigsaw's numbers.
 const DECIMALS: usize = 8;
 
-/// A measurement and what the adjustment leaves of it.
+/// A measurement and its residuals after the adjustment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ResidualRow<'a> {
     pub(super) point: &'a str,
@@ -27,11 +27,11 @@ pub(super) struct ResidualRow<'a> {
     pub(super) focal_mm: [f64; 2],
     /// Measured sample and line, the middle of the first pixel at 1.
     pub(super) place: [f64; 2],
-    /// Measured minus adjusted sample and line; none of a rejected point without a ground point.
+    /// Measured minus adjusted sample and line; `None` for a rejected point without a ground point.
     pub(super) residual_px: Option<[f64; 2]>,
     /// Standard deviations of sample and line.
     pub(super) sigma_px: [f64; 2],
-    /// Redundancy numbers across and along the track, and standardised residuals, of what took part.
+    /// Redundancy numbers across and along the track, and standardised residuals, of used measurements.
     pub(super) redundancy: Option<[f64; 2]>,
     pub(super) standardised: [Option<f64>; 2],
     pub(super) rejected: bool,
@@ -63,7 +63,7 @@ pub(super) struct ImageRow<'a> {
     pub(super) sigmas: &'a [f64; ORIENTATION_UNKNOWNS],
     /// Standard deviations of the camera's position in the middle of the image towards east, north and up, metres.
     pub(super) local_sigmas_m: [f64; 3],
-    /// Measurements that took part, and that were rejected.
+    /// Numbers of used and of rejected measurements.
     pub(super) measures: [usize; 2],
 }
 
@@ -75,7 +75,7 @@ fn optional(value: Option<f64>) -> String {
     value.map_or_else(String::new, number)
 }
 
-/// Writes lines of fields; what the format cannot hold is refused.
+/// Writes lines of fields; rejects values that the format cannot hold.
 fn write(path: &Path, heads: &[&str], rows: impl Iterator<Item = Vec<String>>) -> Result<u64> {
     let refused = |error: csv::Error| Error::from(ProductError::refused("encode CSV")(error));
     let mut writer = csv::WriterBuilder::new()

@@ -19,19 +19,19 @@ use crate::{
     ties::KnownGround,
 };
 
-/// Where we have the outer edge of the first pixel at 0, ISIS has its middle at 1.
+/// The outer edge of the first pixel is 0 here; ISIS has its middle at 1.
 const EDGE_TO_ISIS: f64 = 0.5;
 
-/// A network with what its head says.
+/// A network with its header.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ControlNetwork<'a> {
     /// Identifier.
     pub id: &'a str,
     /// The body that its points lie on.
     pub body: Body,
-    /// What it is.
+    /// Description.
     pub description: String,
-    /// UTC that stands for its creation, ISO 8601.
+    /// UTC given as its creation, ISO 8601.
     pub created_utc: &'a str,
     /// Its points.
     pub points: Vec<NetworkPoint<'a>>,
@@ -42,11 +42,11 @@ pub struct ControlNetwork<'a> {
 pub struct NetworkPoint<'a> {
     /// Identifier.
     pub id: &'a str,
-    /// Coordinates that it had beforehand; a network that is read again takes them as known.
+    /// A priori coordinates; a network that is read again takes them as known.
     pub known: Option<KnownGround>,
-    /// Where the adjustment started, where nothing was known.
+    /// Initial coordinates of the adjustment, where no a priori ones were known.
     pub initial_m: Option<Vector3<f64>>,
-    /// Where it is adjusted; none of a rejected point, and before an adjustment.
+    /// Adjusted coordinates; `None` for a rejected point, and before an adjustment.
     pub adjusted: Option<GroundEstimate>,
     /// Whether an adjustment rejected it.
     pub is_rejected: bool,
@@ -59,17 +59,17 @@ pub struct NetworkPoint<'a> {
 pub struct NetworkMeasure<'a> {
     /// The measurement.
     pub measure: ImageMeasure<'a>,
-    /// Standard deviations of line and sample, lines and pixels of the image, where it has its own.
+    /// Standard deviations of line and sample, lines and pixels of the image, if stated.
     pub sigma_px: Option<[f64; 2]>,
     /// Measured minus adjusted line and sample, likewise.
     pub residual_px: Option<[f64; 2]>,
 }
 
-/// Writes `network` to `path`; gives the number of its points.
+/// Writes `network` to `path`; returns the number of its points.
 ///
 /// # Errors
-/// [`Kind::Bug`](crate::error::Kind::Bug) for names that no quotes of the format can hold and numbers that are not finite;
-/// [`Kind::Io`](crate::error::Kind::Io).
+/// [`Kind::Bug`](crate::error::Kind::Bug) for names that no quotes of the format can hold and numbers that are not
+/// finite; [`Kind::Io`](crate::error::Kind::Io).
 pub fn write_control_network(path: &Path, network: &ControlNetwork) -> Result<u64> {
     let text = text(network).in_file(path)?;
     write_text(path, &text)?;
@@ -150,7 +150,7 @@ fn refused(reason: String) -> ProductError {
     }
 }
 
-/// A text in the quotes that it does not hold itself.
+/// A text in the kind of quotes that it does not contain.
 fn quoted(text: &str) -> std::result::Result<String, ProductError> {
     let quote = ['"', '\''].into_iter().find(|quote| !text.contains(*quote));
     match quote.filter(|_| !text.contains(char::is_control)) {

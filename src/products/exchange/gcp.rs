@@ -4,7 +4,7 @@
 //! file, column, row and two standard deviations. The datum is a sphere, so latitudes are areocentric and
 //! heights radii minus 3396190 m. The standard deviations belong to Mars-fixed x, y, z (not to latitude,
 //! longitude and height, as `--use-lon-lat-height-gcp-error` would have them). Columns and rows have the
-//! middle of the first pixel at 0. Numbers count from 1; the comment line before a point says whose it is.
+//! middle of the first pixel at 0. Numbers count from 1; the comment line before a point states its identifier.
 //!
 //! Source: manual of `bundle_adjust`, section on ground control points; lines beginning with `#` are skipped
 //! by its reader (`ControlNetworkLoader.cc` of Vision Workbench).
@@ -22,7 +22,7 @@ use crate::{
     units::RADIANS_PER_DEGREE,
 };
 
-/// Where we have the outer edge of the first pixel at 0, its middle is 0 for Ames Stereo Pipeline.
+/// The outer edge of the first pixel is 0 here; Ames Stereo Pipeline has its middle at 0.
 const EDGE_TO_MIDDLE: f64 = -0.5;
 /// Decimals of pixels.
 const PIXEL_DECIMALS: usize = 4;
@@ -30,11 +30,11 @@ const PIXEL_DECIMALS: usize = 4;
 /// A point with its measurements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ControlPoint<'a> {
-    /// Identifier; goes into a comment, since the format wants numbers.
+    /// Identifier; written as a comment, since the format requires numbers.
     pub id: &'a str,
-    /// Where it lies.
+    /// Position.
     pub ground: GroundEstimate,
-    /// Where images, by their files as `bundle_adjust` is given them, see it.
+    /// Measurements in images, by their files as given to `bundle_adjust`.
     pub measures: Vec<ControlMeasure<'a>>,
 }
 
@@ -47,10 +47,10 @@ pub struct ControlMeasure<'a> {
     pub sigma_px: [f64; 2],
 }
 
-/// Writes the points that were measured in any image to `path`, which must end in `.gcp`; gives their number.
+/// Writes the points that were measured in any image to `path`, which must end in `.gcp`; returns their number.
 ///
 /// # Errors
-/// [`Kind::Bug`](crate::error::Kind::Bug) for what the reader would refuse or read as something else:
+/// [`Kind::Bug`](crate::error::Kind::Bug) for values that the reader would reject or misread:
 /// standard deviations that are not above 0, numbers that are not finite, names of files with spaces or
 /// commas; [`Kind::Io`](crate::error::Kind::Io).
 pub fn write_gcp(path: &Path, body: Body, points: &[ControlPoint]) -> Result<u64> {
@@ -75,7 +75,7 @@ pub fn write_gcp(path: &Path, body: Body, points: &[ControlPoint]) -> Result<u64
     Ok(number)
 }
 
-/// An identifier that cannot begin another line.
+/// An identifier without line breaks.
 fn comment(id: &str) -> String {
     id.replace(char::is_control, " ")
 }

@@ -33,7 +33,7 @@ pub(in crate::products) static GEOPACKAGE: Declaration = Declaration {
     }],
 };
 
-/// What the standard asks for; `application_id` spells "GPKG".
+/// Tables required by the standard; `application_id` spells "GPKG".
 const LAYOUT: &str = "
     PRAGMA page_size = 4096;
     PRAGMA journal_mode = OFF;
@@ -63,7 +63,7 @@ const WGS84_WKT: &str = "GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"WGS 84\
 /// Writes the points and reads them back.
 ///
 /// # Errors
-/// Numbers that are not finite; what the disk or SQLite refuses; rows that come back different.
+/// Numbers that are not finite; errors of the disk or SQLite; rows that are read back differently.
 pub(in crate::products) fn write(path: &Path, features: Features) -> Result<u64> {
     let features = Features {
         attributes: features.attributes.for_gis(),
@@ -109,7 +109,7 @@ fn names(attributes: &Table) -> String {
         .join(", ")
 }
 
-/// A value as SQLite has it.
+/// A value for SQLite.
 fn value(values: &Values, row: usize) -> Value {
     match values {
         Values::Real(of) => Value::Real(of[row]),
@@ -135,7 +135,7 @@ fn each(features: &Features, mut take: impl FnMut(Vec<Value>) -> Result<()>) -> 
     Ok(())
 }
 
-/// The disk's refusal, or SQLite's.
+/// An error of the disk or of SQLite.
 fn refused(error: rusqlite::Error) -> Error {
     use rusqlite::ErrorCode::{CannotOpen, DiskFull, PermissionDenied, ReadOnly, SystemIoFailure};
     match error.sqlite_error_code() {

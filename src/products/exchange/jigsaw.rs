@@ -1,4 +1,4 @@
-//! What jigsaw's users look for: the adjusted network, residuals, points and images as jigsaw writes them.
+//! Files for users of jigsaw: the adjusted network, residuals, points and images in jigsaw's formats.
 
 use std::collections::BTreeMap;
 
@@ -23,7 +23,7 @@ use crate::{
     ties::{KnownGround, TieMeasure, TiePoint},
 };
 
-/// Where we have the outer edge of the first pixel at 0, ISIS has its middle at 1.
+/// The outer edge of the first pixel is 0 here; ISIS has its middle at 1.
 const EDGE_TO_ISIS: f64 = 0.5;
 
 pub(in crate::products) static NETWORK: Declaration = Declaration {
@@ -46,8 +46,8 @@ pub(in crate::products) static NETWORK: Declaration = Declaration {
 
 pub(in crate::products) static RESIDUALS: Declaration = Declaration {
     path: "exchange/residuals.csv",
-    what: "residuals of tie points as jigsaw writes them, with their standard deviations and redundancy",
-    readers: "people who know jigsaw",
+    what: "residuals of tie points in jigsaw's format, with their standard deviations and redundancy",
+    readers: "users of jigsaw",
     rows: "measurements",
     role: Role::Data,
     content: Content::Foreign,
@@ -60,8 +60,8 @@ pub(in crate::products) static RESIDUALS: Declaration = Declaration {
 
 pub(in crate::products) static POINTS: Declaration = Declaration {
     path: "exchange/bundleout_points.csv",
-    what: "adjusted tie points as jigsaw writes them; latitude, longitude and radius in metres are north, east and up",
-    readers: "people who know jigsaw",
+    what: "adjusted tie points in jigsaw's format; latitude, longitude and radius in metres are north, east and up",
+    readers: "users of jigsaw",
     rows: "tie points",
     role: Role::Data,
     content: Content::Foreign,
@@ -74,9 +74,9 @@ pub(in crate::products) static POINTS: Declaration = Declaration {
 
 pub(in crate::products) static IMAGES: Declaration = Declaration {
     path: "exchange/bundleout_images.csv",
-    what: "corrections of the orientations as jigsaw writes them over existing kernels: kilometres and degrees for powers of \
+    what: "corrections of the orientations, in jigsaw's format over existing kernels: kilometres and degrees for powers of \
            t, which is 0 in the middle of the image and 1 at its end; rotations about the camera's axes",
-    readers: "people who know jigsaw",
+    readers: "users of jigsaw",
     rows: "images",
     role: Role::Data,
     content: Content::Foreign,
@@ -87,7 +87,7 @@ pub(in crate::products) static IMAGES: Declaration = Declaration {
     uses: &[],
 };
 
-/// UTC of the newest shot, or of the first image where there is none: a clock would give other bytes each time.
+/// UTC of the newest shot, or of the first image without shots: a clock would give different bytes each time.
 pub(super) fn newest_utc<'a>(site: &SiteProducts<'a>) -> &'a str {
     let newest = site.utc.iter().max().map(String::as_str);
     let first = site.images.first();
@@ -96,7 +96,7 @@ pub(super) fn newest_utc<'a>(site: &SiteProducts<'a>) -> &'a str {
         .unwrap_or_default()
 }
 
-/// The tie points of a site with what the adjustment made of them.
+/// The tie points of a site with their adjustment.
 struct Joined<'a> {
     site: &'a SiteProducts<'a>,
     adjustment: &'a AdjustmentProducts<'a>,
@@ -231,7 +231,7 @@ impl<'a> Joined<'a> {
                 point: &self.ties[tie].id,
                 file: &self.files[image],
                 serial: &self.serials[image],
-                // Ours runs against the samples where their sense is negative, that of ISIS never does.
+                // Our coordinate runs against the samples where their sense is negative; that of ISIS never does.
                 focal_mm: [
                     pixel_mm * place_px.x,
                     pixel_mm * detector.sample_sense * place_px.y,
@@ -310,7 +310,7 @@ impl<'a> Joined<'a> {
     }
 }
 
-/// The type of a point in jigsaw's words.
+/// The type of a point in jigsaw's terms.
 const fn status(known: Option<&KnownGround>) -> &'static str {
     match known {
         None => "FREE",
@@ -322,7 +322,7 @@ const fn status(known: Option<&KnownGround>) -> &'static str {
     }
 }
 
-/// Where the camera was in the middle of an image, metres.
+/// Position of the camera in the middle of an image, metres.
 fn middle_m(image: &ImageProducts) -> Vector3<f64> {
     let samples = &image.orientation.samples;
     samples

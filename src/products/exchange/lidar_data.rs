@@ -23,15 +23,15 @@ use crate::{
     units::{METRES_PER_KM, RADIANS_PER_DEGREE},
 };
 
-/// Where we have the outer edge of the first pixel at 0, ISIS has its middle at 1.
+/// The outer edge of the first pixel is 0 here; ISIS has its middle at 1.
 const EDGE_TO_ISIS: f64 = 0.5;
 
-/// A shot whose range constrains the images that were exposed meanwhile.
+/// A shot whose range constrains the images that were exposed at the time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LidarPoint<'a> {
     /// Identifier, unique in the file.
     pub id: &'a str,
-    /// Instant of the shot as the clock of the images' lines counts it: where a shift of line times is folded
+    /// Instant of the shot by the clock of the images' lines: where a shift of line times is folded
     /// into the kernels that ISIS will use, the shot's own instant less that shift.
     pub et: Et,
     /// One-way range, metres.
@@ -40,11 +40,11 @@ pub struct LidarPoint<'a> {
     pub range_sigma_m: f64,
     /// The footprint before the adjustment.
     pub apriori: GroundEstimate,
-    /// The footprint after it, where there was one.
+    /// The footprint after it, if adjusted.
     pub adjusted: Option<GroundEstimate>,
     /// Serial numbers of the images that were exposed when the shot was fired.
     pub simultaneous_images: Vec<&'a str>,
-    /// Where images, by serial numbers, see the footprint.
+    /// Coordinates of the footprint in images, by serial numbers.
     pub measures: Vec<ImageMeasure<'a>>,
 }
 
@@ -89,8 +89,8 @@ struct Measure<'a> {
 /// ISIS names images of its camera in another way.
 ///
 /// # Source
-/// `MgsMocSerialNumber.trn` of ISIS (spacecraft, clock, instrument, filter) and the network of M01/00115, which names that image
-/// `MGS/610472061:131/MOC-NA/BROAD_BAND`.
+/// `MgsMocSerialNumber.trn` of ISIS (spacecraft, clock, instrument, filter) and the network of M01/00115, which names
+/// that image `MGS/610472061:131/MOC-NA/BROAD_BAND`.
 #[must_use]
 pub fn isis_serial_number(image: &ImageTimes) -> Option<String> {
     let clock = image.sclk_start.as_ref()?;
@@ -102,7 +102,7 @@ pub fn isis_serial_number(image: &ImageTimes) -> Option<String> {
 /// Writes `points` to `path`, which must end in `.json` for ISIS to take it, and reads it back.
 ///
 /// # Errors
-/// [`Kind::Bug`](crate::error::Kind::Bug) for what ISIS would refuse or take for something else: ranges,
+/// [`Kind::Bug`](crate::error::Kind::Bug) for values that ISIS would reject or misread: ranges,
 /// their standard deviations and variances that are not above 0, numbers that are not finite, two points of
 /// one identifier; [`Kind::Io`](crate::error::Kind::Io).
 pub fn write_lidar_data(path: &Path, points: &[LidarPoint]) -> Result<u64> {

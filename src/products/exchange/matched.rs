@@ -1,4 +1,4 @@
-//! The tie points that areograph measured itself, as measured: a table for `ties.files` and a control network of ISIS.
+//! The tie points that areograph measured, as measured: a table for `ties.files` and a control network of ISIS.
 
 use super::{
     adjusted::isis_name,
@@ -20,7 +20,7 @@ use crate::{
 
 pub(in crate::products) static TABLE: Declaration = Declaration {
     path: "exchange/matched_ties.csv",
-    what: "tie points that were matched, with the standard deviations of their measurements, as ties.files takes them",
+    what: "matched tie points, with the standard deviations of their measurements, in the format of ties.files",
     readers: "areograph, scripts",
     rows: "tie points",
     role: Role::Data,
@@ -59,7 +59,7 @@ pub(in crate::products) static NETWORK: Declaration = Declaration {
     }],
 };
 
-/// The points behind those of files.
+/// The points after those of files.
 fn matched(ties: &Ties) -> impl Iterator<Item = &TiePoint> {
     let count: usize = ties.matched_points();
     ties.points.iter().skip(ties.points.len() - count)

@@ -1,4 +1,4 @@
-//! Adjusted points as their writers take them.
+//! Adjusted points for their writers.
 
 use nalgebra::{Matrix3, RowVector3};
 
@@ -8,7 +8,7 @@ use crate::{
     products::error::ProductError,
 };
 
-/// A point on the ground and how well it is known.
+/// A point on the ground with its covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GroundEstimate {
     /// Position, IAU 2000.
@@ -17,10 +17,10 @@ pub struct GroundEstimate {
     pub covariance_m2: Matrix3<f64>,
 }
 
-/// Where an image sees a point.
+/// Coordinates of a point in an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImageMeasure<'a> {
-    /// The image as the reader of the file names it: a serial number for ISIS, a file for Ames Stereo Pipeline.
+    /// Name of the image for the reader of the file: a serial number for ISIS, a file for Ames Stereo Pipeline.
     pub image: &'a str,
     /// Line in the whole image, 0 at the outer edge of the first line and 0.5 at its middle.
     pub line: f64,
@@ -53,9 +53,9 @@ impl GroundEstimate {
     }
 }
 
-/// Refuses a value that is not above 0.
+/// Rejects a value that is not above 0.
 pub(super) fn above_zero(what: &str, value: f64) -> Result<(), ProductError> {
-    // Written so that NaN is refused too.
+    // Written so that NaN is rejected too.
     if value > 0.0 && value.is_finite() {
         return Ok(());
     }

@@ -1,4 +1,4 @@
-//! What the files of the folder `exchange` are, and the commands that read them.
+//! Descriptions of the files in the folder `exchange`, and the commands that read them.
 
 use std::fmt::Write as _;
 
@@ -17,7 +17,7 @@ use crate::{
 
 pub(in crate::products) static README: Declaration = Declaration {
     path: "exchange/README.txt",
-    what: "what the files of this folder are, and the commands that read them",
+    what: "descriptions of the files in this folder, and the commands that read them",
     readers: "people",
     rows: "",
     role: Role::Metadata,
@@ -80,7 +80,7 @@ fn text(of: &Context) -> String {
     text
 }
 
-/// Which positions of cameras all files follow, and whom that suits.
+/// The convention of camera positions in all files, and the programs that it suits.
 fn light_time(site: &SiteProducts) -> String {
     if site
         .images
@@ -91,26 +91,26 @@ fn light_time(site: &SiteProducts) -> String {
     }
     let others = match site.config.orientation.light_time {
         LightTime::Surface | LightTime::None | LightTime::Support => {
-            "ISIS and ALE see the spacecraft from the centre of Mars instead (LT+S), some 10 lines away: what they are given here, lidar\n\
-             data, ground control and adjusted kernels, fits them after a run with light_time = \"centre\"."
+            "ISIS and ALE see the spacecraft from the centre of Mars instead (LT+S), about 10 lines away: the files for them, lidar\n\
+             data, ground control and adjusted kernels, fit after a run with light_time = \"centre\"."
         }
         LightTime::Centre => {
-            "That is what ISIS and ALE do themselves; other programs see the ground some 10 lines away."
+            "ISIS and ALE do the same; other programs see the ground about 10 lines away."
         }
     };
     format!(
         "Camera models, lines and samples, ground control, lidar data and adjusted kernels follow one convention,\n{}.\n\
-         {others}\n../registration.json has the difference of the others for each image.\n\
-         Ranges of lidar data are geometric in every convention: jigsaw, which measures them from where ISIS sees the spacecraft, finds\n\
-         them up to 330 m off.\n\n",
+         {others}\n../registration.json has the differences of the others for each image.\n\
+         Ranges of lidar data are geometric in every convention: jigsaw, which measures them from ISIS's position of the spacecraft, finds\n\
+         them up to 330 m in error.\n\n",
         convention(site)
     )
 }
 
-/// What was written and is not empty, each file of images once, and what will be: those declared after this text.
+/// Files written and not empty, each file of images once, and files to be written: those declared after this text.
 fn files(of: &Context) -> Vec<&'static Declaration> {
     let mut files: Vec<&Declaration> = Vec::new();
-    // An empty table is there, but no program is told to read it.
+    // An empty table exists, but no program is pointed to it.
     let used = of
         .written
         .iter()
@@ -128,7 +128,7 @@ fn files(of: &Context) -> Vec<&'static Declaration> {
     files
 }
 
-/// The line, for every image if it is of images.
+/// The line, once per image for a file of images.
 fn for_images(line: &str, of: &Context) -> Vec<String> {
     // Commands are declared for Mars.
     let line = line.replace(
@@ -144,14 +144,14 @@ fn for_images(line: &str, of: &Context) -> Vec<String> {
         .collect()
 }
 
-/// What users of a program must know before they see its commands.
+/// Notes for users of a program, before its commands.
 fn about(program: Program, body: Body) -> String {
     match program {
         Program::StereoPipeline => format!(
             "\
             Ames Stereo Pipeline ({} is a sphere of {} m). Tables have radii instead of heights, so that the\n\
-            choice of a datum does not matter; the .json beside each names its columns, its --csv-format and what its\n\
-            radii are. The first line names the columns.",
+            choice of a datum does not matter; the .json beside each names its columns, its --csv-format and its\n\
+            radii. The first line names the columns.",
             body.map().asp_datum,
             body.map().radius_m
         ),
@@ -165,14 +165,14 @@ fn about(program: Program, body: Body) -> String {
         ),
         Program::CameraModel => "\
             Community Sensor Model (usgscsm): image support data of the cameras. They differ from the\n\
-            files of ALE where those do not say what the camera does: the time of a line includes the summing, samples\n\
+            files of ALE where those do not describe the camera: the time of a line includes the summing, samples\n\
             and the detector's centre count from the detector's edge, there is no distortion, and the pointing covers\n\
             the whole image. The member areograph.interpolation holds the measured interpolation error."
             .to_owned(),
         Program::AdjustedKernels => "\
-            The adjusted site (../adjustment.json says what was adjusted and how well).\n\
+            The adjusted site (../adjustment.json describes the adjustment and its accuracy).\n\
             ../images/<image>/adjusted_isd.json is the adjusted camera. Kernels to be loaded after the original ones,\n\
-            each pair for its image alone:"
+            each pair only for its image:"
             .to_owned(),
         Program::Catalogue => "STAC".to_owned(),
     }

@@ -1,7 +1,7 @@
 //! Points as a shapefile, three-dimensional, with a dBASE table of attributes.
 //!
 //! A shapefile is five files of one name. The table is encoded in memory: the library that encodes it hides
-//! what the disk refuses.
+//! errors of the disk.
 
 use std::{
     io::{BufReader, Cursor},
@@ -48,7 +48,7 @@ pub(in crate::products) static POINTS: Declaration = Declaration {
     }],
 };
 
-/// A file that makes `footprints.shp` a shapefile.
+/// A companion file of `footprints.shp`.
 macro_rules! part {
     ($path:literal, $what:literal, $write:expr) => {
         Declaration {
@@ -95,7 +95,7 @@ pub(in crate::products) static ENCODING: Declaration = part!(
     |path, _| write_text(path, "UTF-8")
 );
 
-/// dBASE counts the bytes of a field in one byte, of which shapefiles use this much.
+/// dBASE counts the bytes of a field in one byte; shapefiles use at most this many.
 const TEXT_MAX: usize = 254;
 /// Bytes of the head of an index, and of a record in it.
 const INDEX_BYTES: [u64; 2] = [100, 8];
@@ -107,7 +107,7 @@ fn points(features: &Features) -> Vec<PointZ> {
         .collect()
 }
 
-/// The disk's refusal, or the library's.
+/// An error of the disk or of the library.
 fn refused(error: shapefile::Error) -> Error {
     match error {
         shapefile::Error::IoError(source) => IoError::on("write")(source).into(),
@@ -176,7 +176,7 @@ impl WritableRecord for Record<'_> {
     }
 }
 
-/// A value as dBASE has it.
+/// A value for dBASE.
 enum Cell<'a> {
     Number(Option<f64>),
     Text(&'a str),
@@ -197,7 +197,7 @@ fn cell(values: &Values, row: usize) -> Cell<'_> {
 /// Writes the table of attributes and reads it back.
 ///
 /// # Errors
-/// Numbers that are not finite; what the disk or the encoder refuses; records that come back different.
+/// Numbers that are not finite; errors of the disk or the encoder; records that are read back differently.
 fn write_attributes(path: &Path, newest_utc: &str, table: &Table) -> Result<()> {
     let bytes = encode_attributes(newest_utc, table).in_file(path)?;
     write_bytes(path, &bytes)?;
@@ -237,7 +237,7 @@ fn dbase_fields(table: &Table) -> impl Iterator<Item = DbaseField> {
     table.columns().filter_map(|column| column.dbase)
 }
 
-/// Bytes of the longest text of each column of texts; `None` for the others.
+/// Bytes of the longest text of each text column; `None` for the others.
 fn text_widths(table: &Table) -> Result<Vec<Option<u8>>> {
     let mut widths = vec![None; table.columns().count()];
     for (width, column) in widths.iter_mut().zip(table.columns()) {
@@ -298,7 +298,7 @@ fn read_attributes(path: &Path, table: &Table) -> Result<()> {
     Ok(())
 }
 
-/// Whether a record holds the value, a number within half a unit of its last decimal.
+/// Whether a record holds the value; numbers within half a unit of the last decimal.
 fn holds(record: &dbase::Record, field: DbaseField, expected: &Cell) -> bool {
     match (record.get(field.name), expected) {
         (Some(FieldValue::Numeric(Some(found))), Cell::Number(Some(expected))) => {
@@ -332,7 +332,7 @@ mod tests {
         write_attributes(&path, example().newest_utc, &table()).unwrap();
         let bytes = fs::read(&path).unwrap();
         assert_eq!(bytes[1..4], [99, 8, 24]);
-        // The last digit that stands there of a longitude.
+        // The last written digit of a longitude.
         let digits = b"177.312345679";
         let at = bytes
             .windows(digits.len())
@@ -347,7 +347,7 @@ mod tests {
         );
     }
 
-    /// The library would tell a full disk as its own trouble.
+    /// The library would report a full disk as an error of its own.
     #[test]
     fn a_full_disk_is_told_as_such() {
         let full = Path::new("/dev/full");

@@ -1,4 +1,4 @@
-//! The site as a STAC Item (1.1.0): where, when, and every product with its size and hash.
+//! The site as a STAC Item (1.1.0): location, time, and every product with its size and hash.
 
 use std::path::Path;
 
@@ -28,12 +28,12 @@ const EXTENSIONS: [&str; 3] = [
 ];
 /// Code of BLAKE3 with 32 bytes in the multihash table, before the hash itself.
 const BLAKE3_MULTIHASH: &str = "1e20";
-/// Degrees (6 cm) by which the box reaches beyond its outermost points, so that one point has an area too.
+/// Degrees (6 cm) by which the box reaches beyond its outermost points, so that a single point has an area too.
 const MARGIN_DEG: f64 = 1e-6;
 
 pub(in crate::products) static ITEM: Declaration = Declaration {
     path: "exchange/stac_item.json",
-    what: "the site for STAC catalogues: where, when, files with sizes and hashes; none where nothing says where it lies",
+    what: "the site for STAC catalogues: location, time, files with sizes and hashes; not written without a known location",
     readers: "STAC catalogues",
     rows: "",
     role: Role::Metadata,
@@ -49,10 +49,10 @@ pub(in crate::products) static ITEM: Declaration = Declaration {
     }],
 };
 
-/// The item; `None` when nothing says where the site is.
+/// The item; `None` without a known location of the site.
 ///
 /// # Errors
-/// A product that cannot be read; a time that is no ISO 8601.
+/// A product that cannot be read; a time that is not ISO 8601.
 fn item(of: &Context) -> Result<Option<Value>> {
     let site = of.site;
     let mut points = points_deg(site);
@@ -187,7 +187,7 @@ fn instant(utc: &str) -> Result<NaiveDateTime> {
         .map_err(ProductError::refused("read a UTC string"))?)
 }
 
-/// The products by their paths, with what a reader needs to fetch and check them.
+/// The products by their paths, with the data needed to fetch and check them.
 fn assets(of: &Context) -> Result<Value> {
     let files = of.written.par_iter();
     let hashes: Vec<(String, u64)> = files

@@ -105,23 +105,23 @@ const LOLA_LIKE_RADIUS: &str = "column 4 is the distance from the centre of Mars
      the range of column 5 belongs to the radius before it, column 6: for range constraints; \
      column 6 the same before it; no column is a height";
 const ODE_RADIUS: &str = "column 5 is the distance from the centre of Mars after the crossover correction, metres; \
-     column 3 is that minus the radius of the areoid, no height above a sphere";
+     column 3 is that minus the radius of the areoid, not a height above a sphere";
 
-/// What the readers of a CSV file must be told.
+/// Description of a CSV file for its readers.
 #[derive(Serialize, JsonSchema)]
 #[schemars(title = "Columns of a CSV file")]
 struct Sidecar {
     /// The file that is described.
     file: &'static str,
-    /// What `pc_align` of Ames Stereo Pipeline must be told.
+    /// Options for `pc_align` of Ames Stereo Pipeline.
     csv_format: &'static str,
     #[schemars(extend("enum" = ["D_MARS", "D_MOON"]))]
     datum: &'static str,
     #[schemars(extend("exclusiveMinimum" = 0))]
     datum_radius_m: f64,
-    /// What its radii are.
+    /// Definition of its radii.
     radius: Cow<'static, str>,
-    /// Whose longitudes and latitudes these are.
+    /// Frame of its longitudes and latitudes.
     frame: &'static str,
     #[schemars(extend("const" = "east, 0..360"))]
     longitudes: &'static str,
@@ -177,7 +177,7 @@ fn table<'a>(site: &'a SiteProducts<'a>, columns: Vec<Column<Shot<'a>>>) -> Tabl
     Table::new(columns, Shot::all(site)).in_words(&site.config.wording())
 }
 
-/// Columns 1 to 5 as ISIS `lrolola2isis` reads them.
+/// Columns 1 to 5, in the order that ISIS `lrolola2isis` reads.
 fn lola_like<'a>() -> Vec<Column<Shot<'a>>> {
     vec![
         column(

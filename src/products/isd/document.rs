@@ -51,7 +51,7 @@ pub(super) struct Isd<'a> {
     pub(super) radii: Radii,
     pub(super) body_rotation: Rotation,
     pub(super) instrument_pointing: InstrumentPointing,
-    /// What the numbers come from, under NAIF's names.
+    /// Sources of the numbers, under NAIF's names.
     pub(super) naif_keywords: BTreeMap<String, Keyword>,
     #[schemars(range(min = 1))]
     pub(super) detector_sample_summing: u32,
@@ -71,7 +71,7 @@ pub(super) struct Isd<'a> {
     pub(super) areograph: Provenance<'a>,
 }
 
-/// Heights between which camera models look for the ground.
+/// Heights between which camera models search for the ground.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct ReferenceHeight {
     pub(super) maxheight: i32,
@@ -162,7 +162,7 @@ pub(super) struct Positions {
     pub(super) reference_frame: i32,
 }
 
-/// What the reader of the file should know; camera models ignore it.
+/// Notes for readers of the file; camera models ignore them.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct Provenance<'a> {
     #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
@@ -172,7 +172,7 @@ pub(super) struct Provenance<'a> {
     /// All kernels in load order.
     #[schemars(length(min = 1))]
     pub(super) kernels: Vec<KernelName<'a>>,
-    /// Which positions these are, and how far others would place the image, by the kernels' orientation.
+    /// Convention of the positions, and offsets of the image by the others, with the kernels' orientation.
     pub(super) light_time: &'a LightTimeEffect,
     pub(super) line_period_s: f64,
     pub(super) lines_header: u32,
@@ -183,10 +183,10 @@ pub(super) struct Provenance<'a> {
     pub(super) version: &'static str,
 }
 
-/// How well the tables are interpolated, measured against the kernels.
+/// Interpolation error of the tables, measured against the kernels.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct Interpolation {
-    /// 0 where the nodes come from support data, and are all that is known.
+    /// 0 where the nodes come from support data, and there is nothing to compare with.
     pub(super) epochs_compared_with_kernels: usize,
     #[schemars(range(min = 0.0))]
     pub(super) error_max_px: f64,

@@ -1,4 +1,4 @@
-//! The table of laser control that `areograph calibrate` reads: where images show what the laser knows the place of.
+//! The table of laser control that `areograph calibrate` reads: image coordinates of points with laser positions.
 
 use super::WriteMatch;
 use crate::{
@@ -16,7 +16,7 @@ pub(in crate::products) static CONTROL: Declaration<WriteMatch> = Declaration {
     path: "control.csv",
     what: "the control points in the images given with `--isd`, for `[control] files` of a calibration",
     readers: "areograph calibrate",
-    rows: "places in images",
+    rows: "image positions",
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),
     write: |path, of| text_table::write(path, Table::new(columns(), rows(of.result))),
@@ -55,7 +55,7 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "line",
             Unit::Line,
-            "line at which the image has the model's place, 0 at the outer edge of the first",
+            "image line of the position in the model, 0 at the outer edge of the first",
             |row: &Row| row.place[0],
         ),
         column("sample", Unit::Pixel, "sample, likewise", |row: &Row| {

@@ -1,4 +1,5 @@
-//! Products of matching laser profiles with a terrain model: units, control points, the table that calibrations read, the report.
+//! Products of matching laser profiles with a terrain model: units, control points, the table that calibrations read,
+//! the report.
 
 mod control;
 mod points;
@@ -14,7 +15,7 @@ use super::{
 };
 use crate::{error::Result, stages::match_laser::LaserMatch};
 
-/// Everything that the products of a match are made of.
+/// Inputs of the products of a match.
 #[derive(Debug, Clone, Copy)]
 pub struct MatchProducts<'a> {
     /// The match.
@@ -23,7 +24,7 @@ pub struct MatchProducts<'a> {
     pub page: &'a str,
 }
 
-/// How a product of a match is written; gives its rows.
+/// Writer of a product of a match; returns its number of rows.
 pub(super) type WriteMatch = fn(&Path, &MatchProducts) -> Result<u64>;
 
 /// The products of a match, in the order in which they are written.
@@ -35,7 +36,7 @@ pub(super) static MATCH_PRODUCTS: &[&Declaration<WriteMatch>] = &[
     &REPORT,
 ];
 
-/// Laser points in images, where there are images.
+/// Laser points in images, if there are images.
 pub(super) use control::CONTROL;
 
 static REPORT: Declaration<WriteMatch> = Declaration {
@@ -52,8 +53,8 @@ static REPORT: Declaration<WriteMatch> = Declaration {
 /// Writes every product of a match below `directory`, and reads each of them back.
 ///
 /// # Errors
-/// [`Kind::Io`](crate::error::Kind::Io) for what the disk refuses; [`Kind::Bug`](crate::error::Kind::Bug) for numbers that are
-/// not finite and files that read back differently.
+/// [`Kind::Io`](crate::error::Kind::Io) for errors of the disk; [`Kind::Bug`](crate::error::Kind::Bug) for numbers that
+/// are not finite and files that read back differently.
 pub fn write_match_products(directory: &Path, of: &MatchProducts) -> Result<Vec<Product>> {
     let write = |write: &WriteMatch, path: &Path| write(path, of);
     let mut products = write_each(directory, MATCH_PRODUCTS, write)?;
@@ -63,7 +64,7 @@ pub fn write_match_products(directory: &Path, of: &MatchProducts) -> Result<Vec<
     Ok(products)
 }
 
-/// Writes a table as Parquet with what it is about.
+/// Writes a table as Parquet with its metadata.
 fn write_parquet(path: &Path, of: &MatchProducts, table: Table) -> Result<u64> {
     let similarity = of.result.similarity.word().to_owned();
     let about = vec![

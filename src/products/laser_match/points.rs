@@ -1,4 +1,4 @@
-//! Control points: where the laser has a place, and where the model has it.
+//! Control points: positions by the laser and in the model.
 
 use super::{MatchProducts, WriteMatch, natural, write_parquet};
 use crate::{
@@ -14,7 +14,7 @@ use crate::{
 
 pub(super) static TABLE: Declaration<WriteMatch> = Declaration {
     path: "control_points.parquet",
-    what: "a laser control point of every unit that is kept: its place by the laser and in the model",
+    what: "a laser control point of every unit that is kept: its position by the laser and in the model",
     readers: "scripts",
     rows: "points",
     role: Role::Data,
@@ -45,7 +45,7 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "point",
             Unit::None,
-            "PEDR file, record and shot: of the shots of a unit that were used the one nearest to their bias",
+            "PEDR file, record and shot of the used shot of the unit that is nearest to the bias",
             |row: &Row| row.name.clone(),
         ),
         column("unit", Unit::None, "number of its unit", |row: &Row| {
@@ -72,7 +72,7 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "model_longitude_deg",
             Unit::Degree,
-            "east longitude of the same ground in the model: the laser's place and the shift of the unit",
+            "east longitude of the same ground in the model: the laser's position and the shift of the unit",
             |row: &Row| signed_longitude_deg(wrap_two_pi(row.model[0])),
         ),
         column(
@@ -90,7 +90,7 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "sigma_east_m",
             Unit::Metre,
-            "standard deviation of model minus laser towards the east, by the matching alone, metres",
+            "standard deviation of model minus laser towards the east, by the matching only, metres",
             |row: &Row| row.sigma_m[0],
         ),
         column(

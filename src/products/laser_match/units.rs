@@ -1,4 +1,4 @@
-//! Units of laser shots: what their search found, and why they are kept or not.
+//! Units of laser shots: results of their search, and why they are kept or not.
 
 use super::{MatchProducts, WriteMatch, natural, write_parquet};
 use crate::{
@@ -14,7 +14,7 @@ use crate::{
 
 pub(super) static TABLE: Declaration<WriteMatch> = Declaration {
     path: "units.parquet",
-    what: "every unit of laser shots: its shift, what held-out shots say of it, whether it is kept and why not",
+    what: "every unit of laser shots: its shift, its validation by withheld shots, whether it is kept and why not",
     readers: "scripts",
     rows: "units",
     role: Role::Data,
@@ -63,13 +63,13 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
             "areocentric latitude of that, degrees",
             |row: &Row| degrees(row.place_rad[1]),
         ),
-        column("shots", Unit::None, "its shots", |row: &Row| {
+        column("shots", Unit::None, "number of shots", |row: &Row| {
             natural(row.shots)
         }),
         column(
             "strips",
             Unit::None,
-            "passes that they are of",
+            "number of passes of its shots",
             |row: &Row| natural(row.strips),
         ),
         column(
@@ -91,13 +91,13 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
     columns
 }
 
-/// Where the model has the ground, seen from where the laser has it.
+/// Offset of the model from the laser.
 fn shifts<'a>() -> [Column<Row<'a>>; 6] {
     [
         column(
             "shift_east_cells",
             Unit::None,
-            "how far the model has its ground to the east of where the laser has it, cells",
+            "eastward offset of the model from the laser, cells",
             |row: &Row| row.found.map(|of| of.shift_cells[0]),
         ),
         column(
@@ -133,7 +133,7 @@ fn shifts<'a>() -> [Column<Row<'a>>; 6] {
     ]
 }
 
-/// How well that is known.
+/// Precision of the offset.
 fn deviations<'a>() -> [Column<Row<'a>>; 3] {
     [
         column(
@@ -162,13 +162,13 @@ fn judged<'a>() -> [Column<Row<'a>>; 7] {
         column(
             "score",
             Unit::None,
-            "similarity at the best whole cells, by the measure that the page names",
+            "similarity at the best whole-cell shift, by the measure stated on the page",
             |row: &Row| row.found.map(|of| of.score),
         ),
         column(
             "contrast",
             Unit::None,
-            "that over the mean of all similarities above 0",
+            "ratio of that to the mean of all similarities above 0",
             |row: &Row| row.found.map(|of| of.contrast),
         ),
         column(
@@ -180,7 +180,7 @@ fn judged<'a>() -> [Column<Row<'a>>; 7] {
         column(
             "held_out_shots",
             Unit::None,
-            "shots that took no part in the search, 0 where the model has too few heights for them",
+            "shots withheld from the search, 0 where the model has too few heights for them",
             |row: &Row| row.held_out.map_or(0, |of| natural(of.shots)),
         ),
         column(
@@ -198,7 +198,7 @@ fn judged<'a>() -> [Column<Row<'a>>; 7] {
         column(
             "refused_because",
             Unit::None,
-            "why it is not kept; empty where it is",
+            "why it is not kept; empty if it is",
             |row: &Row| row.refused_because.clone(),
         ),
     ]

@@ -62,7 +62,7 @@ fn columns<'a>() -> Vec<Column<&'a ControlResult>> {
         column(
             "scale_dx_m",
             Unit::Metre,
-            "given minus computed by SCALE of the free figure, east, metres: gross errors are told from these",
+            "given minus computed by SCALE of the free figure, east, metres: gross errors are detected from these",
             |row: &Row| row.scale_residual_m[0],
         ),
         column("scale_dy_m", Unit::Metre, "likewise north", |row: &Row| {
@@ -71,7 +71,7 @@ fn columns<'a>() -> Vec<Column<&'a ControlResult>> {
         column(
             "sigma_m",
             Unit::Metre,
-            "standard deviation of a coordinate with which it was used, metres",
+            "a priori standard deviation of a coordinate, metres",
             |row: &Row| row.sigma_m,
         ),
         column("kept", Unit::None, "whether it was kept", |row: &Row| {

@@ -79,7 +79,7 @@ fn columns<'a>() -> Vec<Column<&'a MeasurementResult>> {
         column(
             "removed",
             Unit::None,
-            "whether it was left out as a blunder",
+            "whether it was rejected as a blunder",
             |row: &Row| row.removed,
         ),
         column(
@@ -94,7 +94,7 @@ fn columns<'a>() -> Vec<Column<&'a MeasurementResult>> {
         column(
             "picture_x",
             Unit::None,
-            "measured place, film corrected, units of the picture",
+            "measured position, film corrected, units of the picture",
             |row: &Row| row.at[0],
         ),
         column("picture_y", Unit::None, "likewise upwards", |row: &Row| {

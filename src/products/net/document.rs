@@ -1,4 +1,4 @@
-//! What a triangulation says of itself, as JSON.
+//! Summary of a triangulation, as JSON.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -45,18 +45,18 @@ struct Document<'a> {
     format: &'static str,
     /// Identifier of the net.
     net: &'a str,
-    /// What put the pictures on the map: `scale`, `mortar` or `one_shot`.
+    /// Method of placing the pictures on the map: `scale`, `mortar` or `one_shot`.
     #[schemars(with = "String")]
     method: Method,
     /// The map.
     map: MapDocument,
-    /// Whether the result is to be used.
+    /// Whether the result is usable.
     verdict: &'a Verdict,
     /// Sums of the net.
     totals: &'a Totals,
     /// The bricks.
     bricks: &'a [BrickResult],
-    /// What lies between them; absent for a single one.
+    /// Seams between them; absent for a single brick.
     #[serde(skip_serializing_if = "Option::is_none")]
     seams: Option<&'a Seams>,
 }

@@ -22,7 +22,7 @@ use crate::{
     config::NetConfig, error::Result, schema::DocumentSchema, stages::triangulate::Triangulation,
 };
 
-/// Everything that the products of a net are made of.
+/// Inputs of the products of a net.
 #[derive(Debug, Clone, Copy)]
 pub struct NetProducts<'a> {
     /// The configuration.
@@ -33,7 +33,7 @@ pub struct NetProducts<'a> {
     pub page: &'a str,
 }
 
-/// How a product of a net is written; gives its rows.
+/// Writer of a product of a net; returns its number of rows.
 pub(super) type WriteNet = fn(&Path, &NetProducts) -> Result<u64>;
 
 /// The products of a net, in the order in which they are written.
@@ -78,13 +78,13 @@ static COLUMNS: Declaration<WriteNet> = Declaration {
 /// Writes every product of a net below `directory`, and reads each of them back.
 ///
 /// # Errors
-/// [`Kind::Io`](crate::error::Kind::Io) for what the disk refuses; [`Kind::Bug`](crate::error::Kind::Bug) for numbers that are
-/// not finite and files that read back differently.
+/// [`Kind::Io`](crate::error::Kind::Io) for errors of the disk; [`Kind::Bug`](crate::error::Kind::Bug) for numbers that
+/// are not finite and files that read back differently.
 pub fn write_net_products(directory: &Path, net: &NetProducts) -> Result<Vec<Product>> {
     write_each(directory, NET_PRODUCTS, |write, path| write(path, net))
 }
 
-/// Writes a table as Parquet with what it is about.
+/// Writes a table as Parquet with its metadata.
 fn write_parquet(path: &Path, net: &NetProducts, table: Table) -> Result<u64> {
     parquet::write(path, table, vec![("net", net.config.net.clone())])
 }
@@ -106,7 +106,7 @@ struct ColumnsDocument {
 struct TableColumns {
     /// The file.
     file: &'static str,
-    /// What a row is.
+    /// Meaning of a row.
     rows: &'static str,
     /// Its columns in order.
     columns: Vec<ColumnOfTable>,
@@ -120,9 +120,9 @@ struct ColumnOfTable {
     /// Its unit; absent where it has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     unit: Option<&'static str>,
-    /// What its values are.
+    /// Meaning of its values.
     meaning: Cow<'static, str>,
-    /// Whether a row may lack it.
+    /// Whether rows may lack a value.
     optional: bool,
 }
 

@@ -120,7 +120,7 @@ fn columns<'a>() -> Vec<Column<&'a PictureResult>> {
         column(
             "projection_floor_m",
             Unit::Metre,
-            "what an orthographic picture of its size departs from a similarity on this map, metres: no adjustment goes below",
+            "departure of an orthographic picture of its size from a similarity on this map, metres: a lower limit for any adjustment",
             |row: &Row| row.projection_floor_m,
         ),
     ]

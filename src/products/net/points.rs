@@ -71,7 +71,7 @@ fn features<'a>(of: &NetProducts<'a>) -> Features<'a> {
     Features {
         name: &of.config.net,
         table: "points",
-        // A net has no date; the clock of the machine would give other bytes each time.
+        // A net has no date; the machine's clock would give different bytes each time.
         newest_utc: "1970-01-01T00:00:00.000",
         body: Body::Mars,
         frame: "Mars body-fixed, areocentric latitude, east longitude, in the frame in which the controls are given",
@@ -104,7 +104,7 @@ fn columns<'a>() -> Vec<Column<&'a PointResult>> {
         column(
             "pictures",
             Unit::None,
-            "pictures from which its place is taken",
+            "pictures that determine its position",
             |row: &&PointResult| row.pictures,
         )
         .in_gis(),
@@ -126,7 +126,7 @@ fn columns<'a>() -> Vec<Column<&'a PointResult>> {
         column(
             "sigma_m",
             Unit::Metre,
-            "standard deviation of x_m, and of y_m, metres on the map; missing where nothing tells it",
+            "standard deviation of x_m, and of y_m, metres on the map; missing where it is not determined",
             |row: &&PointResult| row.sigma_m,
         )
         .in_gis(),

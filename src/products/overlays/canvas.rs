@@ -4,7 +4,7 @@ use crate::stages::lay_overlays::Mark;
 
 /// Greys of the palette, from black to white.
 const GREYS: u8 = 248;
-/// Colours behind the greys: what surrounds marks, the three marks, numbers, and where the image shows nothing.
+/// Colours after the greys: surroundings of marks, the three marks, numbers, and missing parts of the image.
 const COLOURS: [[u8; 3]; 6] = [
     [0, 0, 0],
     [0x56, 0xB4, 0xE9],
@@ -34,7 +34,7 @@ const DIGITS: [[u8; 5]; 10] = [
 /// Columns from one digit to the next.
 const ADVANCE: i64 = 4 * DOT;
 
-/// A picture that is drawn on.
+/// A picture to draw on.
 #[derive(Debug)]
 pub(super) struct Canvas {
     pub(super) width: u32,
@@ -44,7 +44,7 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
-    /// A picture of numbers, of which those of `range_dn` are shown as black and white; 0 is where there is nothing.
+    /// A picture of numbers, with the limits `range_dn` shown as black and white; 0 is missing.
     pub(super) fn new(numbers: &[u8], [width, height]: [u32; 2], range_dn: [u8; 2]) -> Self {
         let grey = greys(range_dn);
         Self {
@@ -68,7 +68,7 @@ impl Canvas {
         self.stamp(&shape(mark), [column, row].map(whole), ink);
     }
 
-    /// Writes a number beside a place: to its right, or to its left if that is wanted or there is no room.
+    /// Writes a number beside a place: to its right, or to its left on request or without room.
     pub(super) fn number(&mut self, number: usize, [column, row]: [f64; 2], to_left: bool) {
         let text = number.to_string();
         let digits = text.bytes().map(|digit| usize::from(digit - b'0'));
@@ -149,7 +149,7 @@ fn greys([black, white]: [u8; 2]) -> [u8; 256] {
     })
 }
 
-/// The pixel in which a place lies.
+/// The pixel that contains a place.
 #[allow(
     clippy::cast_possible_truncation,
     reason = "casts of floats saturate, and what lies outside is not drawn"

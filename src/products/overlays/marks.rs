@@ -1,4 +1,4 @@
-//! Where an image has the footprints, before the adjustment and after it.
+//! Positions of footprints in an image, before the adjustment and after it.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ use crate::{
 pub(super) struct MarkedFootprint {
     /// Index of the profile.
     pub(super) profile: usize,
-    /// Which shot of the profile, counted from 1.
+    /// Number of the shot in the profile, from 1.
     pub(super) number: usize,
     /// Row of the footprint.
     pub(super) row: u32,

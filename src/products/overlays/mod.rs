@@ -1,4 +1,4 @@
-//! Images with footprints on them: pictures for people, and the marks as points for programs.
+//! Images with footprints on them: pictures for readers, and the marks as points for programs.
 //!
 //! Marks are drawn into a palette of greys and colours, and the report embeds the same pictures. Bounds on pixels and
 //! places keep `report/overlays.html` below 5 MB.
@@ -71,7 +71,7 @@ pub(super) static MARKS: Declaration = Declaration {
     uses: &[],
 };
 
-/// Every mark as a point with what it stands for.
+/// Every mark as a point with its meaning.
 fn features(of: &Context, image: usize) -> Vec<Value> {
     let site = of.site;
     let mut features = Vec::new();

@@ -12,7 +12,7 @@ use crate::{
     stages::lay_overlays::{CHIP_EDGE, Chip, Mark},
 };
 
-/// Least distance of two marks, pixels: of footprints that lie closer only some are drawn.
+/// Least distance of two marks, pixels: closer footprints are thinned.
 const MARKS_APART: f64 = 18.0;
 /// Least distance of two numbers, pixels.
 const NUMBERS_APART: f64 = 60.0;
@@ -30,16 +30,16 @@ pub(crate) struct Picture {
     pub(crate) height: u32,
     /// Lines and samples of the image that are one pixel; 1 in a piece.
     pub(crate) reduction: u32,
-    /// Every how many footprints one is marked.
+    /// Interval of the marked footprints.
     pub(crate) step: usize,
     /// The file.
     pub(crate) png: Vec<u8>,
 }
 
-/// A whole image with its footprints, of at most so many pixels; `None` of an image whose pixels are not known.
+/// A whole image with its footprints, of limited size; `None` for an image without known pixels.
 ///
 /// # Errors
-/// A picture that the library refuses, which is a bug in areograph.
+/// A picture that the library rejects, which is a bug in areograph.
 pub(crate) fn strip(site: &SiteProducts, image: usize, pixels_max: u64) -> Result<Option<Picture>> {
     let Some(look) = site
         .overlays
@@ -88,7 +88,7 @@ pub(crate) fn strip(site: &SiteProducts, image: usize, pixels_max: u64) -> Resul
 /// A piece of an image with its marks.
 ///
 /// # Errors
-/// A picture that the library refuses, which is a bug in areograph.
+/// A picture that the library rejects, which is a bug in areograph.
 pub(crate) fn piece(chip: &Chip) -> Result<Picture> {
     let mut canvas = Canvas::new(&chip.pixels, EDGES, range_dn(&chip.pixels));
     for (mark, at) in &chip.marks {
@@ -100,7 +100,7 @@ pub(crate) fn piece(chip: &Chip) -> Result<Picture> {
 /// Two pieces in one picture: the first in red, the second in green and blue.
 ///
 /// # Errors
-/// A picture that the library refuses, which is a bug in areograph.
+/// A picture that the library rejects, which is a bug in areograph.
 pub(crate) fn anaglyph(first: &Chip, second: &Chip) -> Result<Picture> {
     let levels = [first, second].map(|chip| levels(&chip.pixels));
     let pixels =
@@ -174,8 +174,8 @@ fn levels(pixels: &[u8]) -> [u8; 256] {
     })
 }
 
-/// Mean distance of footprints that follow each other in a profile, lines and samples of the image; a large number where none
-/// do.
+/// Mean distance of footprints that follow each other in a profile, lines and samples of the image; a large number
+/// where no footprints do.
 fn spacing(marked: &[MarkedFootprint]) -> f64 {
     let follows = |pair: &&[MarkedFootprint]| {
         pair[0].profile == pair[1].profile && pair[0].number + 1 == pair[1].number

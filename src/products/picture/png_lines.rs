@@ -1,4 +1,4 @@
-//! PNG, compressed as lines come.
+//! PNG, compressed line by line.
 
 use std::{
     fs::File,

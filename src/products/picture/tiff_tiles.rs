@@ -1,4 +1,4 @@
-//! TIFF with tiles, and overviews that viewers take when they show the whole of a long image.
+//! TIFF with tiles, and overviews that viewers use to show the whole of a long image.
 //!
 //! Lines are kept in an unnamed file until all of them are there; each overview is made from the one before it, so that
 //! memory holds a row of tiles only.
@@ -71,10 +71,10 @@ impl TiffTiles {
     }
 }
 
-/// Room for what stands in a file beside its pixels: notes and tables of tiles, 8 bytes each of these.
+/// Room for the other contents of a file: notes and tables of tiles, 8 bytes per tile.
 const TABLES_BYTES: u64 = 1 << 16;
 
-/// Bytes of the file, a little more than it will have.
+/// Upper estimate of the bytes of the file.
 pub(super) fn bytes_of(head: &PictureHead) -> u64 {
     let tile = TILE as u64;
     let of_tile = tile * tile * head.bytes_of_pixel() as u64 + 8;
@@ -167,7 +167,7 @@ fn deep(bytes: &[u8]) -> Vec<u16> {
         .collect()
 }
 
-/// Lines and samples two by two, their means rounded; an odd last one stands for both.
+/// Lines and samples two by two, their means rounded; an odd last one counts for both.
 fn halved(band: &[u8], width: usize, bytes_of_pixel: usize) -> Vec<u8> {
     let pixels: Vec<u16> = if bytes_of_pixel == 2 {
         deep(band)
@@ -207,7 +207,7 @@ mod tests {
             TABLES_BYTES + 9 * (65_536 + 8)
         );
         assert_eq!(bytes_of(&head(1, 1, true)), TABLES_BYTES + 131_072 + 8);
-        // The largest that headers can tell of.
+        // The largest size that headers can hold.
         assert!(bytes_of(&head(4080, 65_535 * 16, false)) > u64::from(u32::MAX));
     }
 

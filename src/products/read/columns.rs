@@ -11,10 +11,10 @@ use crate::{
     products::files::open,
 };
 
-/// What files are read as, for messages.
+/// Name of the contents of files, for messages.
 const PARQUET: &str = "Parquet";
 
-/// Calls `take` with batch after batch of the columns `names`; columns that are not there are left out.
+/// Calls `take` with batch after batch of the columns `names`; missing columns are left out.
 pub(super) fn read(
     path: &Path,
     names: &[&str],
@@ -44,7 +44,7 @@ pub(super) fn read(
     Ok(())
 }
 
-/// Some rows of the columns asked for.
+/// Some rows of the selected columns.
 pub(super) struct Batch {
     columns: RecordBatch,
     /// Rows of the file before these.
@@ -88,7 +88,7 @@ impl Batch {
         self.finite(name, false)
     }
 
-    /// A column of finite numbers, some perhaps missing.
+    /// A column of finite numbers, some possibly missing.
     pub(super) fn optional_numbers(
         &self,
         name: &'static str,

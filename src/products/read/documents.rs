@@ -1,4 +1,4 @@
-//! What `ranges.json` and `orientation.json` say.
+//! Contents of `ranges.json` and `orientation.json`.
 
 use std::path::Path;
 
@@ -38,17 +38,17 @@ pub struct ProfileDocument {
 pub struct ImageDocument {
     /// Whether the model is within the limits.
     pub valid: bool,
-    /// When and how the image was taken, by key.
+    /// Times and camera of the image, by key.
     pub times: Value,
     /// Model of first order.
     pub first_order: OrientationModel,
     /// Model of second order.
     pub second_order: OrientationModel,
-    /// Whether ω and κ are badly determined.
+    /// Whether ω and κ are poorly determined.
     pub near_gimbal_lock: bool,
 }
 
-/// How well polynomials of one order follow the samples.
+/// Fit of the polynomials of one order to the samples.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OrientationModel {
     /// RMSE of the position (norm of x, y, z), metres.
@@ -97,7 +97,7 @@ impl ImageDocument {
 /// Reads `ranges.json`.
 ///
 /// # Errors
-/// The disk's refusal; a document that is not JSON or lacks a member.
+/// An error of the disk; a document that is not JSON or lacks a member.
 pub fn read_ranges(path: &Path) -> Result<RangesDocument> {
     document(path, "range statistics")
 }

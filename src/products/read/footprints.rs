@@ -1,11 +1,11 @@
-//! Which shots a site has, and where they hit the ground.
+//! Shots of a site and their footprints.
 
 use std::path::Path;
 
 use super::columns;
 use crate::error::Result;
 
-/// Columns of `footprints.parquet` that say which shot a row is and where it hit the ground.
+/// Columns of `footprints.parquet` that identify the shot of a row and its footprint.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FootprintRows {
     /// Names of PEDR files, in order of appearance.
@@ -58,7 +58,7 @@ impl FootprintRows {
 /// Reads `footprints.parquet`.
 ///
 /// # Errors
-/// The disk's refusal; a file that is not Parquet; a column that is missing or of another type.
+/// An error of the disk; a file that is not Parquet; a column that is missing or of another type.
 pub fn read_footprints(path: &Path) -> Result<FootprintRows> {
     let mut rows = FootprintRows::default();
     let names = [

@@ -1,6 +1,6 @@
-//! Published products read back into typed values, without the configuration or the run that made them.
+//! Reads published products into typed values, without the configuration or the run that made them.
 //!
-//! Only what comparing needs is read. Lengths are metres, times ET seconds, as in the files.
+//! Only data needed for comparisons are read. Lengths are metres, times ET seconds, as in the files.
 
 mod columns;
 mod documents;
@@ -18,13 +18,13 @@ pub use ties::read_adjusted_ties;
 
 use crate::error::{Cause, Kind};
 
-/// A product that is whole, but not what this program writes.
+/// A complete product, but not in the form that this version writes.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum ReadError {
     /// Not Parquet, or not the document.
     #[error("cannot be read as {what}: {reason}")]
     Unreadable { what: &'static str, reason: String },
-    /// A path of the camera needs two ends.
+    /// A path of the camera needs at least two samples.
     #[error("has {found} samples; expected 2 or more")]
     TooFew { found: usize },
     /// A column is missing or of another type.
@@ -52,6 +52,6 @@ impl Cause for ReadError {
     }
 
     fn advice(&self) -> String {
-        "products of another version of areograph must be made again by this version".to_owned()
+        "regenerate products of another version of areograph with this version".to_owned()
     }
 }

@@ -1,4 +1,4 @@
-//! Where the adjustment puts tie points.
+//! Adjusted positions of tie points.
 
 use std::path::Path;
 

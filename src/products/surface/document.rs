@@ -12,12 +12,12 @@ use crate::{
     units::RADIANS_PER_DEGREE,
 };
 
-/// What each number is, for readers of the file.
+/// Definitions of the numbers, for readers of the file.
 const DEFINITIONS: [(&str, &str); 5] = [
     (
         "cells",
-        "of common that both images show by their orientation, filled have a height; unfilled has the others by reason: flat \
-         (no texture), missing (lines or pixels), edge (of an image), unlike (nothing correlates), ambiguous (two heights do), \
+        "common: cells that both images show by their orientation; filled: those with a height; unfilled: the others by reason: flat \
+         (no texture), missing (lines or pixels), edge (of an image), unlike (no correlation), ambiguous (two heights correlate), \
          unsettled, one_way (other heights with the other image as the template), uncertain, alone (contradicted by cells around it)",
     ),
     (
@@ -26,25 +26,25 @@ const DEFINITIONS: [(&str, &str); 5] = [
     ),
     (
         "common_sigma_m",
-        "standard deviation of what all heights have in common, by the adjustment of the images; missing where nothing says it",
+        "standard deviation of the offset common to all heights, by the adjustment of the images; missing where not determined",
     ),
     (
         "mola_minus_surface",
         "radius of a footprint minus that of the model at its place, between the four nearest cells, metres; spread_sigmas is \
-         its robust spread about the median in its standard deviations: of the height, the shot, the profile, and of what the \
-         uncertain place makes of the slope",
+         its robust spread about the median in its standard deviations: of the height, the shot, the profile, and of the slope \
+         times the uncertainty of the position",
     ),
     (
         "mola_takes_part",
-        "whether MOLA controlled heights of the adjustment: then its mean difference is no independent judgement, and the \
-         spread about it still is",
+        "whether MOLA controlled heights of the adjustment: then its mean difference is not an independent test, but the \
+         spread about it is",
     ),
 ];
 
 #[derive(Serialize, JsonSchema)]
 #[schemars(
     title = "Terrain model of a site",
-    description = "surface.json of areograph: how surface.tif was made of a pair of images, what became of its cells, and the altimeter's shots against it. Metres and degrees; what is unknown is left out."
+    description = "surface.json of areograph: how surface.tif was made of a pair of images, statistics of its cells, and the altimeter's shots against it. Metres and degrees; unknown values are omitted."
 )]
 pub(super) struct Document<'a> {
     #[schemars(extend("const" = "areograph surface 1"))]
@@ -54,7 +54,7 @@ pub(super) struct Document<'a> {
     definitions: Vec<Definition>,
     /// Identifiers of both images.
     images: [&'a str; 2],
-    /// Whether so few cells were found that none is believed: then there is no surface.tif.
+    /// Whether too few cells matched to be significant: then there is no surface.tif.
     refused: bool,
     matching: Matching,
     cells: Cells,
@@ -82,7 +82,7 @@ struct Matching {
     height_of_pixel_m: f64,
     /// Median correlation.
     correlation: f64,
-    /// Median distance of the images across the parallax on the ground: what their orientations leave.
+    /// Median distance of the images across the parallax on the ground: the residual of their orientations.
     across_parallax_m: f64,
 }
 
@@ -100,7 +100,7 @@ struct Cells {
 
 #[derive(Serialize, JsonSchema)]
 struct Heights {
-    /// The sphere that they count from.
+    /// The sphere that they refer to.
     sphere_m: f64,
     #[schemars(range(min = 0.0))]
     sigma_m: f64,
@@ -112,7 +112,7 @@ struct Heights {
 struct Shots<'a> {
     mola_takes_part: bool,
     all: Summary,
-    /// Root mean square of the standard deviations of the differences about what they have in common.
+    /// Root mean square of the standard deviations of the differences about their common offset.
     #[schemars(range(min = 0.0))]
     sigma_m: f64,
     #[schemars(range(min = 0.0))]

@@ -1,4 +1,4 @@
-//! The worst profiles, and how to find their shots.
+//! The worst profiles, and commands that find their shots.
 
 use crate::{
     products::{WorstProfile, profile_name},
@@ -14,7 +14,7 @@ use crate::{
 /// The worst profiles in a table, each with a link to its shots.
 pub(super) fn worst_profiles(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>]) -> String {
     if worst.is_empty() {
-        return paragraph("No profile was judged.");
+        return paragraph("No profile was checked.");
     }
     let mut table = Table::new(
         "Profiles by the largest share of a limit; each links to its shots (Parquet)",
@@ -54,12 +54,12 @@ pub(super) fn worst_profiles(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>])
         table.row(profile.invalid_because.is_empty(), cells);
     }
     let words = "Mean and distance to the file's own spacecraft are without outliers. Orbits apart is the mean of the file's own \
-        spacecraft minus that of the kernels: another orbit, clock or datum shows there. The best correction of time tags is the \
-        one by which ranges spread least, be it with raw radii or with those corrected by crossovers. All profiles are in profiles.parquet and profiles.csv.";
+        spacecraft minus that of the kernels: it shows another orbit, clock or datum. The best correction of time tags is the \
+        one that minimises the spread of ranges, with raw radii or with those corrected by crossovers. All profiles are in profiles.parquet and profiles.csv.";
     table.finish() + &paragraph(words) + &commands(worst)
 }
 
-/// The profile, with a link where its shots could be written.
+/// The profile, with a link if its shots could be written.
 fn named(of: &WorstProfile<'_>) -> Cell {
     let id = of.profile.id();
     match &of.shots {
@@ -84,7 +84,7 @@ fn correction(profile: &ArchiveProfile) -> String {
     }
 }
 
-/// Command lines that give the shots of profiles.
+/// Command lines that find the shots of profiles.
 fn commands(worst: &[WorstProfile<'_>]) -> String {
     let lines: Vec<String> = worst.iter().map(command).collect();
     format!(
@@ -94,7 +94,7 @@ fn commands(worst: &[WorstProfile<'_>]) -> String {
     )
 }
 
-/// The command line that gives the shots of a profile, clouds left out.
+/// The command line that finds the shots of a profile, without clouds.
 fn command(of: &WorstProfile<'_>) -> String {
     let [start_s, stop_s] = of.profile.tags_et_s;
     let name = profile_name(of.file, of.profile);

@@ -9,10 +9,10 @@ use crate::{
     stages::judge::{Check, CheckOutcome},
 };
 
-/// The table; nothing where every check came out the same.
+/// The table; empty if no outcome changed.
 pub(super) fn changed(site: &RunDifference) -> String {
     let (a, b) = (&site.a.verdict.checks, &site.b.verdict.checks);
-    // Products of versions without checks say nothing of them.
+    // Products of older versions have no checks.
     if a.is_empty() || b.is_empty() {
         return String::new();
     }
@@ -40,7 +40,7 @@ pub(super) fn changed(site: &RunDifference) -> String {
     table.finish()
 }
 
-/// Outcome, value and limit of a check as pages write them, and what it is told of.
+/// Outcome, value and limit of a check in the form of pages, and its subject.
 fn told(check: &Check) -> String {
     let word = match check.outcome {
         CheckOutcome::Fail => "fail",

@@ -53,7 +53,7 @@ pub(super) fn profiles(site: &RunDifference) -> String {
         let word = |valid: Option<bool>| match valid {
             Some(true) => "valid",
             Some(false) => "INVALID",
-            None => "not there",
+            None => "absent",
         };
         let valid = [a, b].map(|profile| profile.map(|profile| profile.valid));
         cells.push(if valid[0] == valid[1] {
@@ -67,7 +67,7 @@ pub(super) fn profiles(site: &RunDifference) -> String {
     table.finish() + &paragraph(&format!("The same in both: {same}."))
 }
 
-/// A difference in as few digits as tell it.
+/// A difference in the fewest digits that show it.
 fn signed(difference: f64) -> String {
     if difference.abs() < 1e-3 {
         format!("{difference:+.1e}").replace('-', "−")
@@ -156,17 +156,17 @@ pub(super) fn items(site: &RunDifference) -> String {
     body
 }
 
-/// Columns of things that differ.
+/// Columns of differing items.
 const NO_ROLES: &[Column] = &[
     Column::Text("name"),
-    Column::Text("what happened"),
+    Column::Text("change"),
     Column::Text("A"),
     Column::Text("B"),
 ];
 const ROLES: &[Column] = &[
     Column::Text("name"),
     Column::Text("role"),
-    Column::Text("what happened"),
+    Column::Text("change"),
     Column::Text("A"),
     Column::Text("B"),
 ];
@@ -210,7 +210,7 @@ fn item_table(what: &str, items: &Items) -> String {
     table.finish() + &paragraph(&format!("The same in both: {}{order}.", items.unchanged))
 }
 
-/// Notes and complaints of one run alone.
+/// Notes and problems of one run only.
 pub(super) fn texts(site: &RunDifference) -> String {
     let told = |texts: &Texts, what: &str| {
         let runs = [(&texts.only_in_a, "A"), (&texts.only_in_b, "B")].into_iter();
@@ -218,5 +218,5 @@ pub(super) fn texts(site: &RunDifference) -> String {
             .map(|(texts, whose)| paragraph(&format!("{what} only in {whose}:")) + &list(texts))
             .collect::<String>()
     };
-    told(&site.notes, "Notes") + &told(&site.complaints, "Complaints")
+    told(&site.notes, "Notes") + &told(&site.complaints, "Problems")
 }

@@ -1,4 +1,4 @@
-//! A map of what moved on the ground: footprints, tie points and boresights, each from A to B.
+//! A map of movements on the ground: footprints, tie points and boresights, each from A to B.
 
 use nalgebra::Vector3;
 
@@ -13,15 +13,15 @@ use crate::{
     units::METRES_PER_KM,
 };
 
-/// Movements below this are not drawn, metres: less than any kernel is good to.
+/// Movements below this are not drawn, metres: below the accuracy of any kernel.
 const DRAWN_FROM_M: f64 = 1e-3;
 /// Share of the map's side that the longest vector takes.
 const LONGEST: f64 = 0.12;
-/// What of a plot's width is beside its panel, and the heights that a map may have, in the plot's own units.
+/// Part of a plot's width beside its panel, and the range of heights of a map, in the plot's own units.
 const BESIDE: u32 = 190;
 const HEIGHTS: [f64; 2] = [300.0, 1_000.0];
 
-/// The map; nothing where nothing moved on the ground.
+/// The map; empty if nothing moved on the ground.
 ///
 /// # Errors
 /// A plot that cannot be drawn, which is a bug in areograph.
@@ -89,17 +89,17 @@ pub(super) fn figure_of(site: &RunDifference) -> Result<String> {
         }
     }
     let words = format!(
-        "Places in A, and what moved there to B, {times} × magnified: {}. Kilometres east and north of their mean.",
+        "Positions in A and their movements to B, {times} × magnified: {}. Kilometres east and north of their mean.",
         told.join(", ")
     );
-    let title = format!("{}: what moved on the ground", site.site);
+    let title = format!("{}: movements on the ground", site.site);
     figure(&Plot {
         x,
         ..Plot::of(title, words, "east, km", vec![panel])
     })
 }
 
-/// What is in both runs, by kind.
+/// Items in both runs, by kind.
 fn kinds(site: &RunDifference) -> [(&'static str, Vec<Moved>); 3] {
     let footprints = site.footprints.movement.as_ref();
     let images = site
@@ -127,7 +127,7 @@ fn sheet(places: impl Iterator<Item = (f64, f64)> + Clone) -> (Extent, Extent, u
     let wide = f64::from(WIDTH - BESIDE);
     let (width_km, height_km) = (x.high - x.low, y.high - y.low);
     let height = (wide * height_km / width_km).clamp(HEIGHTS[0], HEIGHTS[1]);
-    // Where the height is not that of one scale, the shorter axis shows more.
+    // If the height does not give one scale, the shorter axis is extended.
     let per_km = (wide / width_km).min(height / height_km);
     let about = |axis: Extent, length: f64| {
         let middle = f64::midpoint(axis.low, axis.high);

@@ -1,4 +1,4 @@
-//! The page of a comparison: what moved and how far, first; then what it may come from.
+//! The page of a comparison: movements first, then their possible causes.
 
 mod checks;
 mod inputs;
@@ -13,7 +13,7 @@ use crate::{
     error::Result,
 };
 
-/// The differences of one or several sites as one HTML page; `not_compared` tells why others are not here.
+/// The differences of one or several sites as one HTML page; `not_compared` gives the reasons for omitted sites.
 ///
 /// # Errors
 /// A plot that cannot be drawn, which is a bug in areograph.
@@ -42,14 +42,14 @@ pub fn difference_page(sites: &[&RunDifference], not_compared: &[String]) -> Res
         of_each("Kernels, stages and products", sites, |site| {
             Ok(inputs::items(site))
         })?,
-        of_each("Notes and complaints", sites, |site| {
+        of_each("Notes and problems", sites, |site| {
             Ok(inputs::texts(site))
         })?,
     ];
     Ok(html::page(&title, &(lead + &list(not_compared)), &sections))
 }
 
-/// A section with the part of every site that has one, under the site's name when there are several.
+/// A section with the part of every site that has one, under the site's name if there are several.
 fn of_each(
     name: &'static str,
     sites: &[&RunDifference],
@@ -66,7 +66,7 @@ fn of_each(
     Ok(Section::new(name, body))
 }
 
-/// Verdicts that changed, alone and first; then what moved; of several sites those in which nothing changed in one line.
+/// Changed verdicts first, on their own; then movements; of several sites the unchanged ones in one line.
 fn lead(sites: &[&RunDifference]) -> String {
     let verdicts = sites.iter().map(|site| changed_verdict(site));
     if let [one] = sites {

@@ -35,7 +35,7 @@ fn unknown() -> Cell {
     "–".into()
 }
 
-/// A figure that a limit may be set for.
+/// A value for which a limit may be set.
 fn limited(value: f64, limit: Option<f64>) -> Cell {
     match limit {
         None => quantity(value).into(),

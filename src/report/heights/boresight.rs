@@ -1,4 +1,4 @@
-//! What a laser on the bus of the cameras says of the place.
+//! Position by a laser on the bus of the cameras.
 
 use super::{
     super::{
@@ -14,14 +14,13 @@ use crate::{
 
 const MRAD_PER_RADIAN: f64 = 1e3;
 
-/// Where the laser points in simultaneous images, where that was asked.
+/// Pointing of the laser in simultaneous images, if requested.
 pub(super) fn boresight(adjusted: &Adjusted) -> String {
     match &adjusted.boresight {
         None => String::new(),
         Some(Err(reason)) => paragraph(&format!("adjustment.common_bus did nothing: {reason}.")),
         Some(Ok(found)) => {
-            let caption =
-                "Where profiles are recorded against where laser and images put them, metres";
+            let caption = "Recorded profiles against their positions by laser and images, metres";
             words(found) + &table(&found.images) + &profiles(caption, &found.profile_shifts)
         }
     }
@@ -40,7 +39,7 @@ fn words(found: &BoresightSummary) -> String {
         )
     });
     paragraph(&format!(
-        "Camera and laser share a bus: in a simultaneous image the mounting places each shot, whatever the attitude \
+        "Camera and laser share a bus: in a simultaneous image the mounting places each shot, independent of the attitude \
          (adjustment.common_bus). The laser points {} towards X and {} towards Y of the bus from its nominal direction.{}",
         angle(0),
         angle(1),
@@ -50,7 +49,7 @@ fn words(found: &BoresightSummary) -> String {
 
 fn table(images: &[SpotsOfImage]) -> String {
     let mut table = Table::new(
-        "Shots in simultaneous images: where the kernels have the footprints, minus where the mounting has the laser",
+        "Shots in simultaneous images: footprints by the kernels minus laser by the mounting",
         &[
             Column::Text("image"),
             Column::Number("shots"),

@@ -8,11 +8,11 @@ use crate::{
     units::METRES_PER_KM,
 };
 
-/// Tie points that are drawn.
+/// Number of tie points drawn.
 const POINTS_SHOWN: usize = 400;
-/// One value in so many may lie beyond each end of the axis of differences.
+/// One value in this many may be beyond each end of the axis of differences.
 const OUTERMOST: usize = 60;
-/// Colours of the surface, of what was before and after.
+/// Colours of the surface, of points before and after.
 const SURFACE: usize = super::super::plots::GREY;
 const BEFORE: usize = 1;
 const AFTER: usize = 0;
@@ -20,7 +20,7 @@ const AFTER: usize = 0;
 /// Heights above the ellipsoid, and below them above the surface.
 pub(super) fn plot(geometric: &GeometricProducts) -> Plot {
     let after = geometric.adjustment.map(|of| of.heights);
-    // What is drawn of the surface stands under the points that are controlled by it.
+    // The surface is drawn below the points that it controls.
     let latest = after.unwrap_or(geometric.heights);
     let axes = middle_axes(geometric.heights);
     let north_km = |tie: &TieHeight| axes.row(1).transpose().dot(&tie.ground.xyz_m) / METRES_PER_KM;
@@ -69,7 +69,7 @@ pub(super) fn plot(geometric: &GeometricProducts) -> Plot {
     Plot::of(title, words(geometric), "north of the middle, km", panels)
 }
 
-/// An axis for all but the outermost values, which are drawn at its edge.
+/// An axis for all except the outermost values, which are drawn at its edge.
 fn without_extremes(series: &[Series]) -> Extent {
     let mut values: Vec<f64> = series
         .iter()

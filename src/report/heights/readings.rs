@@ -1,4 +1,4 @@
-//! Two readings of what images disagree by along the flight, and where each puts the tie points.
+//! Two readings of the along-track disagreement of images, and the positions of tie points by each.
 
 use super::super::{
     html::{Cell, Column, Table, paragraph},
@@ -6,7 +6,7 @@ use super::super::{
 };
 use crate::stages::adjust::{Adjusted, OtherReading};
 
-/// Both readings side by side, where the images disagree by so much that it matters.
+/// Both readings side by side, if the images disagree significantly.
 pub(super) fn two_readings(adjusted: &Adjusted) -> String {
     match &adjusted.other_reading {
         None => String::new(),
@@ -56,7 +56,7 @@ fn table(adjusted: &Adjusted, other: &OtherReading) -> String {
         let mut cells: Vec<Cell> = vec![reading(clock_s).into(), products.into()];
         let axes = [0, 1, 2];
         cells.extend(axes.map(|axis| {
-            // What the products follow is where the others are counted from.
+            // Differences are from the reading that the products follow.
             let metres = moved_m.map_or_else(|| "–".to_owned(), |of| label(of[axis], 1));
             Cell::from(metres).told(format!("/moved_m/{axis}"))
         }));

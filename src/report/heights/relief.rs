@@ -1,4 +1,4 @@
-//! What relief says of the place.
+//! Position by relief.
 
 use super::super::{
     html::{Cell, Column, Table, paragraph},
@@ -6,12 +6,12 @@ use super::super::{
 };
 use crate::stages::adjust::{Adjusted, HeightSummary, ProfileOffset};
 
-/// Of use where relief knows the place to less than this share of what is known beforehand.
+/// Relief is useful if its standard deviation of position is below this fraction of the a priori one.
 const SHARE_OF_USE: f64 = 0.5;
-/// Beyond this relief says nothing of the place, metres.
+/// Beyond this standard deviation relief does not determine the position, metres.
 const BEYOND_USE_M: f64 = 1e3;
 
-/// To what relief tells the place, whether that is worth using, and what became of it where it is used.
+/// Precision of the position by relief, whether it is useful, and the result if it is used.
 pub(super) fn relief(adjusted: &Adjusted, beforehand: &str) -> String {
     let Some(heights) = &adjusted.heights else {
         return String::new();
@@ -28,7 +28,7 @@ pub(super) fn relief(adjusted: &Adjusted, beforehand: &str) -> String {
             format!("Relief alone fixes position to {axes}; used (adjustment.relief_for_plan).");
         return paragraph(&used)
             + &profiles(
-                "Where profiles are recorded against where relief and images put them, metres",
+                "Recorded profiles against their positions by relief and images, metres",
                 &relief.profile_shifts,
             );
     }
@@ -46,14 +46,14 @@ pub(super) fn relief(adjusted: &Adjusted, beforehand: &str) -> String {
     ))
 }
 
-/// Whether relief knows the place so well that it should be used.
+/// Whether relief is precise enough to be used.
 fn is_of_use(relief_m: [f64; 2], heights: &HeightSummary) -> bool {
     let [east_m, north_m, _] = heights.mean_sigma_m;
     let is_of_use = |relief_m: f64, known_m: f64| relief_m < SHARE_OF_USE * known_m;
     is_of_use(relief_m[0], east_m) && is_of_use(relief_m[1], north_m)
 }
 
-/// Shifts of profiles; nothing where there are none.
+/// Shifts of profiles; empty without any.
 pub(super) fn profiles(caption: &str, offsets: &[ProfileOffset]) -> String {
     if offsets.is_empty() {
         return String::new();

@@ -1,4 +1,4 @@
-//! How alike the heights of every unit are over the shifts, as small pictures of one scale.
+//! Similarity of heights of every unit over the shifts, as small pictures at one scale.
 
 use base64::{Engine as _, engine::general_purpose::STANDARD};
 use png::{BitDepth, ColorType, Encoder, EncodingError};
@@ -15,25 +15,25 @@ use crate::{
     stages::match_laser::{LaserMatch, SimilaritySurface, UnitMatch, UnitResult},
 };
 
-/// Edge of a picture, where its corner is, and the size of the drawing with its axes, units of the drawing.
+/// Edge of a picture, its corner, and the size of the drawing with its axes, units of the drawing.
 const EDGE: f64 = 140.0;
 const LEFT: f64 = 30.0;
 const TOP: f64 = 6.0;
 const SIZE: [f64; 2] = [LEFT + EDGE + 9.0, TOP + EDGE + 18.0];
 /// Width and height of the bar of colours with its words, units of its own drawing.
 const BAR: [u32; 2] = [600, 130];
-/// Colours: more would show nothing, and make pages larger.
+/// Number of colours: more would not be visible, and would make pages larger.
 const COLOURS: u8 = 51;
-/// Marks, which stand out from any colour: white on black.
+/// Marks, distinct from any colour: white on black.
 const MARKS: &str = "<g id=\"similarity-none\"><path d=\"M-6 0H6M0-6V6\" stroke=\"#000\" stroke-width=\"4\"/>\
      <path d=\"M-5 0H5M0-5V5\" stroke=\"#fff\" stroke-width=\"2\"/></g>\n\
      <g id=\"similarity-best\"><circle r=\"6\" fill=\"none\" stroke=\"#000\" stroke-width=\"4\"/>\
      <circle r=\"6\" fill=\"none\" stroke=\"#fff\" stroke-width=\"2\"/></g>\n";
 
-/// The pictures of all units that were searched; nothing without any.
+/// The pictures of all units that were searched; empty without any.
 ///
 /// # Errors
-/// A picture that the library refuses, which is a bug in areograph.
+/// A picture that the library rejects, which is a bug in areograph.
 pub(super) fn pictures(of: &LaserMatch) -> Result<String> {
     let shown = of.units.iter().filter_map(Shown::of);
     let shown: Vec<Shown> = shown.collect();
@@ -74,7 +74,7 @@ impl<'a> Shown<'a> {
         format!("Unit {}, {kept}", self.unit.unit)
     }
 
-    /// The picture with its name above it, and below it what was found, and why it is not kept.
+    /// The picture with its name above it, and below it the result, and why it is not kept.
     fn html(&self) -> Result<String> {
         let png = png(self.surface).map_err(ProductError::refused("draw similarities"))?;
         let [east, north] = self.found.shift_cells;
@@ -95,16 +95,16 @@ impl<'a> Shown<'a> {
     }
 }
 
-/// What is to be seen.
+/// The caption.
 fn words(of: &LaserMatch, surface: &SimilaritySurface) -> String {
     let pixels = match surface.step_cells {
         1 => String::new(),
         step => format!(" A pixel is the best of {step} by {step} shifts."),
     };
     paragraph(&format!(
-        "How alike the heights of model and laser are at every shift ({}), in cells, east to the right and north up. A good match is one \
-         sharp peak. A ridge is of shots on parallel passes, and leaves open where along it the shift is. Of several peaks of one \
-         height the best is so by chance.{pixels} Without a colour the model has heights for too few shots.",
+        "Similarity of the heights of model and laser at every shift ({}), in cells, east to the right and north up. A good match is one \
+         sharp peak. Shots on parallel passes give a ridge, along which the shift is not determined. Of several peaks of equal \
+         height the best is so by chance.{pixels} Shifts without a colour have heights for too few shots.",
         of.similarity.word()
     ))
 }
@@ -118,7 +118,7 @@ fn place(surface: &SimilaritySurface, [east, north]: [f64; 2]) -> [f64; 2] {
     ]
 }
 
-/// What all pictures have: axes, and the marks. All searches of a match reach equally far.
+/// Common parts of all pictures: axes and marks. All searches of a match have the same range.
 fn definitions(surface: &SimilaritySurface) -> String {
     let reach = f64::from(surface.reach * surface.step_cells);
     let [middle_x, middle_y] = place(surface, [0.0; 2]);
@@ -143,7 +143,7 @@ fn definitions(surface: &SimilaritySurface) -> String {
     )
 }
 
-/// The colours of all pictures, and what marks mean.
+/// The colours of all pictures, and the meaning of marks.
 fn bar() -> Result<String> {
     let [width, height] = BAR;
     let svg = drawn(height, |area| {
@@ -176,7 +176,7 @@ fn figure(title: &str, shown: &[&Shown]) -> Result<String> {
     let pictures = shown.iter().map(|shown| shown.html());
     let pictures: String = pictures.collect::<Result<_>>()?;
     let caption = format!(
-        "Similarity over the shifts of {}, with the best one and where it is, cells east and north.",
+        "Similarity over the shifts of {}, with the best shift, cells east and north.",
         counted(shown.len(), "unit")
     );
     Ok(format!(
@@ -187,7 +187,7 @@ fn figure(title: &str, shown: &[&Shown]) -> Result<String> {
     ))
 }
 
-/// A surface as a picture; the first place of its palette is no colour.
+/// A surface as a picture; the first entry of its palette is transparent.
 fn png(surface: &SimilaritySurface) -> std::result::Result<Vec<u8>, EncodingError> {
     let mut file = Vec::new();
     let mut encoder = Encoder::new(&mut file, surface.side(), surface.side());

@@ -1,4 +1,4 @@
-//! How well the places of tie points are known: ellipses of one standard deviation, magnified.
+//! Precision of tie points: ellipses of one standard deviation, magnified.
 
 use std::f64::consts::TAU;
 
@@ -7,11 +7,11 @@ use nalgebra::{Matrix2, Matrix3, SymmetricEigen, Vector3};
 use super::super::plots::{Arrow, label, magnification, thinned};
 use crate::{geom::ellipsoid::local_axes, stages::adjust::CorrectedPoint};
 
-/// Tie points that have an ellipse on the map: more would hide the ground.
+/// Largest number of ellipses on the map: more would hide the ground.
 const ELLIPSES: usize = 12;
-/// Points of an ellipse.
+/// Number of points of an ellipse.
 const STEPS: u32 = 40;
-/// Share of the width of the map that the largest semi-axis may take.
+/// Largest share of the map's width for the largest semi-axis.
 const LONGEST: f64 = 0.05;
 
 /// Ellipses on a map.
@@ -19,14 +19,14 @@ const LONGEST: f64 = 0.05;
 pub(super) struct Ellipses {
     /// Points of each, Mars-fixed, metres.
     pub(super) rings_m: Vec<Vec<Vector3<f64>>>,
-    /// How many times larger than true they are drawn.
+    /// Their magnification.
     magnification: f64,
-    /// Largest semi-axis of them all as it is, metres.
+    /// Largest true semi-axis of all, metres.
     largest_m: f64,
 }
 
 impl Ellipses {
-    /// Those of adjusted tie points, some of them, for a map of this width.
+    /// Those of a selection of adjusted tie points, for a map of this width.
     pub(super) fn of<'a>(ties: impl Iterator<Item = &'a CorrectedPoint>, width_m: f64) -> Self {
         let ties: Vec<&CorrectedPoint> = ties.collect();
         let axes: Vec<(Vector3<f64>, [Vector3<f64>; 2])> = thinned(&ties, ELLIPSES)
@@ -59,7 +59,7 @@ impl Ellipses {
         }
     }
 
-    /// The entry of the legend; none without ellipses.
+    /// The entry of the legend; `None` without ellipses.
     pub(super) fn key(&self) -> Option<String> {
         let times = label(self.magnification, 0);
         (!self.rings_m.is_empty()).then(|| format!("1 σ of tie points in plan, × {times}"))

@@ -40,7 +40,7 @@ pub(in crate::report) struct ColourBar<'b> {
     pub(in crate::report) ends: (i32, i32),
     /// Its upper edge.
     pub(in crate::report) top: i32,
-    /// What the numbers are.
+    /// Meaning of the numbers.
     pub(in crate::report) words: &'b str,
     /// Numbers of the first and the last colour.
     pub(in crate::report) numbers: [f64; 2],
@@ -57,7 +57,7 @@ impl ColourBar<'_> {
         for place in 0..steps {
             let [red, green, blue] = (self.colour)((f64::from(place) + 0.5) / f64::from(steps));
             let x = left + place * STEP;
-            // One unit into the next step, so that no paper shows between them.
+            // One unit into the next step, so that no gap shows between them.
             let corners = [(x, top), (x + STEP + 1, bottom)];
             area.draw(&Rectangle::new(
                 corners,

@@ -1,4 +1,4 @@
-//! Names on a map that do not lie on each other.
+//! Names on a map without overlaps.
 
 use plotters::{
     prelude::*,
@@ -10,11 +10,11 @@ use super::super::plots::{Canvas, Drawn, INK};
 /// Size of the letters of maps, in units of the drawing.
 pub(in crate::report) const LETTERS: i32 = 28;
 
-/// Distances of a name from its mark that are tried, and from which on a line joins them.
+/// Distances of a name from its mark to try, and the distance from which a line joins them.
 const BESIDE: [i32; 7] = [14, 24, 40, 60, 90, 130, 180];
 const LEADER_FROM: f64 = 34.0;
 
-/// Words on a map, in its size.
+/// Words on a map, in the standard size.
 pub(in crate::report) fn write<'a>(
     area: &Canvas<'a>,
     text: &str,
@@ -39,7 +39,7 @@ fn write_in<'a>(
     area.draw_text(text, &style, at)
 }
 
-/// A name in its place.
+/// A placed name.
 pub(in crate::report) struct Label {
     pub(in crate::report) text: String,
     pub(in crate::report) at: (i32, i32),
@@ -51,16 +51,16 @@ pub(in crate::report) struct Label {
 pub(in crate::report) struct Labels {
     width: i32,
     height: i32,
-    /// Size of the letters of names to come.
+    /// Size of the letters of the next names.
     letters: i32,
     taken: Vec<[i32; 4]>,
-    /// From a mark to a name that does not stand beside it.
+    /// Lines from marks to names that are not beside them.
     leaders: Vec<[(i32, i32); 2]>,
     pub(in crate::report) placed: Vec<Label>,
 }
 
 impl Labels {
-    /// No names on a map of this size.
+    /// A map of this size without names.
     pub(in crate::report) const fn new(width: i32, height: i32) -> Self {
         Self {
             width,
@@ -72,13 +72,13 @@ impl Labels {
         }
     }
 
-    /// Names to come have letters of another size.
+    /// Sets the size of the letters of the next names.
     pub(in crate::report) const fn set_letters(&mut self, letters: i32) {
         self.letters = letters;
     }
 
-    /// Puts a name with its left edge, at half its height, at the first of `places` where it fits on the map and on no
-    /// other name; leaves it out, and says so, where there is none.
+    /// Places a name with its left edge, at half its height, at the first of `places` where it fits on the map and on
+    /// no other name; otherwise omits it and returns false.
     pub(in crate::report) fn place(
         &mut self,
         text: &str,
@@ -103,7 +103,7 @@ impl Labels {
         false
     }
 
-    /// Names a mark: beside it, or farther off at the end of a line; leaves the name out, and says so, where there is no
+    /// Names a mark: beside it, or farther off at the end of a line; omits the name and returns false if there is no
     /// room at all.
     pub(in crate::report) fn place_around(
         &mut self,
@@ -125,7 +125,7 @@ impl Labels {
         placed
     }
 
-    /// Keeps names off what is drawn at most so far from a place.
+    /// Keeps names away from a drawn object of a given size at a place.
     pub(in crate::report) fn keep_off(&mut self, (x, y): (i32, i32), by: i32) {
         self.taken.push([x - by, y - by, x + by, y + by]);
     }
@@ -146,7 +146,7 @@ impl Labels {
     }
 }
 
-/// Places of a name so far from a mark: right, left, above, below, and between these.
+/// Places of a name at a distance from a mark: right, left, above, below, and between these.
 fn around(text: &str, (x, y): (i32, i32), far: i32) -> [(i32, i32); 8] {
     let wide = width(text);
     let (up, aside) = (far + LETTERS / 2, far * 7 / 10);
@@ -163,7 +163,8 @@ fn around(text: &str, (x, y): (i32, i32), far: i32) -> [(i32, i32); 8] {
     ]
 }
 
-/// Width of a text in units of the drawing, at most: as wide as the widest of the usual sans-serif fonts has its letters.
+/// Width of a text in units of the drawing, at most: as wide as the widest of the usual sans-serif fonts has its
+/// letters.
 pub(in crate::report) fn width(text: &str) -> i32 {
     width_in(text, LETTERS)
 }
@@ -184,7 +185,7 @@ fn overlap(one: &[i32; 4], other: &[i32; 4]) -> bool {
     one[0] < other[2] && other[0] < one[2] && one[1] < other[3] && other[1] < one[3]
 }
 
-/// Colour of names that belong to nothing drawn in a colour.
+/// Colour of names without a coloured object.
 pub(in crate::report) const PLAIN: RGBColor = INK;
 
 #[cfg(test)]

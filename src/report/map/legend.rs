@@ -1,4 +1,4 @@
-//! The strip below a map: its scale, its colours of heights, and where on Mars it lies.
+//! The strip below a map: its scale, its colours of heights, and its location on Mars.
 
 use std::f64::consts::{PI, TAU};
 
@@ -25,7 +25,7 @@ const GLOBE: f64 = 76.0;
 pub(super) struct Legend<'a> {
     pub(super) top: i32,
     pub(super) view: &'a View,
-    /// Heights of the first and last colour, metres; nothing without shots.
+    /// Heights of the first and last colour, metres; `None` without shots.
     pub(super) heights_m: Option<(f64, f64)>,
     /// East longitude and areocentric latitude of the map's centre, radians.
     pub(super) centre_rad: (f64, f64),
@@ -104,7 +104,7 @@ struct Globe {
 }
 
 impl Globe {
-    /// Where a place is drawn; nothing behind the limb.
+    /// Position of a place on the drawing; `None` behind the limb.
     ///
     /// # Source
     /// Snyder 1987, eq. 20-3 to 20-5.

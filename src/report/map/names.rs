@@ -1,4 +1,4 @@
-//! Where the names on a map stand.
+//! Placement of names on a map.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -12,8 +12,8 @@ use super::{
 };
 
 impl Sheet {
-    /// Names of images first, then of the graticule, then of as many profiles as there is room for; and how many images
-    /// and profiles are left without.
+    /// Names of images first, then of the graticule, then of as many profiles as fit; and the number of images
+    /// and profiles without a name.
     pub(super) fn names(&self, lines: &[GridLine]) -> (Labels, usize) {
         let mut unnamed = 0;
         let mut labels = Labels::new(WIDTH as i32, self.height());
@@ -50,8 +50,8 @@ impl Sheet {
         (labels, unnamed)
     }
 
-    /// Where a line of the graticule may have its name: a parallel at the left or right edge, a meridian at the lower or
-    /// upper one, and where meridians run together in a pole, where they leave the sheet.
+    /// Places for the name of a line of the graticule: a parallel at the left or right edge, a meridian at the lower or
+    /// upper one, and where meridians run together in a pole, at the edge of the sheet.
     fn places_of(&self, line: &GridLine) -> Vec<(i32, i32)> {
         let (width, height) = (WIDTH as i32, self.height());
         let wide = labels::width(&line.name);
@@ -87,7 +87,7 @@ impl Sheet {
         places.into_iter().map(held).collect()
     }
 
-    /// Whether a pole lies on the sheet.
+    /// Whether a pole is on the sheet.
     fn pole(&self) -> bool {
         [FRAC_PI_2, -FRAC_PI_2].into_iter().any(|pole| {
             let place = self.map.project(0.0, pole);

@@ -1,6 +1,6 @@
-//! The ground of a map as a shaded picture: heights of all shots, laid as a membrane over a grid.
+//! The ground of a map as a shaded picture: heights of all shots, fitted by a membrane on a grid.
 //!
-//! A picture to look at, not a surface to measure on: what judges heights is kriged ([`crate::geom::surface`]).
+//! A picture for display, not for measurement: heights are tested against a kriged surface ([`crate::geom::surface`]).
 
 use base64::{Engine as _, engine::general_purpose::STANDARD};
 
@@ -11,14 +11,14 @@ use crate::{error::Result, products::error::ProductError};
 const CELLS: usize = 240;
 /// Cells farther from every shot than this share of the longer side stay empty.
 const REACH: f64 = 0.09;
-/// Sweeps of each level of the grid, and how firmly shots hold it there against its four neighbours.
+/// Sweeps of each level of the grid, and the weight of shots against the four neighbours of a cell.
 const SWEEPS: usize = 12;
 const FIRMNESS: f64 = 4.0;
-/// Root mean square slope that shading is made for: lower relief is exaggerated up to it.
+/// Root mean square slope for shading: lower relief is exaggerated up to it.
 const SLOPE: f64 = 0.35;
-/// Most that heights are exaggerated.
+/// Largest exaggeration of heights.
 const EXAGGERATION_MAX: f64 = 100.0;
-/// Colours of heights, the lowest first; lightness rises all the way, which any eye and any printer can tell.
+/// Colours of heights, the lowest first; lightness rises throughout, for any colour vision and any printer.
 pub(super) const COLOURS: [[f64; 3]; 7] = [
     [38.0, 56.0, 102.0],
     [44.0, 92.0, 126.0],
@@ -60,13 +60,13 @@ impl Grid {
         }
     }
 
-    /// The value of a cell; beyond the edge that of the edge.
+    /// The value of a cell; beyond the edge that of the nearest edge cell.
     fn at(&self, column: isize, row: isize) -> f64 {
         let held = |place: isize, count: usize| place.clamp(0, count as isize - 1) as usize;
         self.values[held(row, self.rows) * self.columns + held(column, self.columns)]
     }
 
-    /// Sums of two cells by two.
+    /// Sums of two by two cells.
     fn halved(&self) -> Self {
         let mut half = Self::of(self.columns.div_ceil(2), self.rows.div_ceil(2));
         for row in 0..self.rows {
@@ -129,14 +129,14 @@ fn membrane(sums: &Grid, counts: &Grid) -> Grid {
     surface
 }
 
-/// How much of each cell is seen: all near a known one, nothing beyond `reach` cells, less and less before that.
+/// Opacity of each cell: 1 near a known one, 0 beyond `reach` cells, decreasing in between.
 fn within_reach(counts: &Grid, reach: f64) -> Vec<f64> {
     let (columns, rows) = (counts.columns, counts.rows);
     let known = counts.values.iter().map(|count| *count > 0.0);
     let mut far: Vec<f64> = known
         .map(|known| if known { 0.0 } else { f64::INFINITY })
         .collect();
-    // Steps to neighbours that a forward and a backward pass have seen (Borgefors 1986).
+    // Steps to neighbours visited in a forward and a backward pass (Borgefors 1986).
     let diagonal = std::f64::consts::SQRT_2;
     let steps = [
         (-1, 0, 1.0),
@@ -169,15 +169,15 @@ fn within_reach(counts: &Grid, reach: f64) -> Vec<f64> {
 /// The ground of a sheet, shaded.
 pub(super) struct Relief {
     surface: Grid,
-    /// How much of each cell is seen, 0 to 1.
+    /// Opacity of each cell, 0 to 1.
     shown: Vec<f64>,
     cell_m: f64,
-    /// How many times heights are exaggerated for the shading.
+    /// Exaggeration of heights for the shading.
     pub(super) exaggeration: f64,
 }
 
 impl Relief {
-    /// The ground of `view` by shots: place on the map, and height, metres. Nothing without a shot on it.
+    /// The ground of `view` by shots: place on the map, and height, metres. `None` without a shot on it.
     pub(super) fn of(view: &View, shots: impl Iterator<Item = ((f64, f64), f64)>) -> Option<Self> {
         let cell_m = view.width_m().max(view.height_m()) / CELLS as f64;
         let cells = |length_m: f64| ((length_m / cell_m).round() as usize).max(3);
@@ -221,7 +221,7 @@ impl Relief {
         })
     }
 
-    /// 1, 2 or 5 times a power of ten that brings the slopes up to what shading shows.
+    /// 1, 2 or 5 times a power of ten that brings the slopes up to the slope for shading.
     fn suitable_exaggeration(&self) -> f64 {
         let (mut squares, mut count) = (0.0, 0.0);
         for (_, east, south) in self.slopes() {
@@ -233,11 +233,11 @@ impl Relief {
         super::round_length_m(wanted)
     }
 
-    /// The picture as an image of an SVG that fills `width` by `height`: colours of heights between `low` and `high`, lit
-    /// from the north-west at 45°.
+    /// The picture as an image of an SVG that fills `width` by `height`: colours of heights between `low` and `high`,
+    /// lit from the north-west at 45°.
     ///
     /// # Errors
-    /// A picture that the library refuses, which is a bug in areograph.
+    /// A picture that the library rejects, which is a bug in areograph.
     pub(super) fn svg(&self, (low, high): (f64, f64), width: f64, height: f64) -> Result<String> {
         let mut pixels = vec![0_u8; 4 * self.shown.len()];
         for (cell, east, south) in self.slopes() {
@@ -261,7 +261,7 @@ impl Relief {
     }
 }
 
-/// Means of three cells by three, the middle weighted most.
+/// Means of three by three cells, the middle weighted most.
 fn smooth(surface: &Grid) -> Vec<f64> {
     let mut values = Vec::with_capacity(surface.values.len());
     for row in 0..surface.rows {
@@ -296,10 +296,10 @@ pub(in crate::report) fn lit(channel: u8, light: f64) -> u8 {
     lit.round() as u8
 }
 
-/// Pixels of four bytes, the last of them how much is seen, as PNG.
+/// Pixels of four bytes, the last of them the opacity, as PNG.
 ///
 /// # Errors
-/// A picture that the library refuses.
+/// A picture that the library rejects.
 pub(in crate::report) fn png(
     pixels: &[u8],
     columns: u32,

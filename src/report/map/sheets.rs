@@ -1,14 +1,14 @@
-//! What goes on which sheet: windows far apart have a map each.
+//! Division of a site into sheets: windows far apart have separate maps.
 
 use nalgebra::Vector3;
 
 use super::super::outlines::{Outline, images, windows};
 use crate::{geom::ellipsoid::spherical_to_xyz_m, products::SiteProducts};
 
-/// Windows farther apart than this many of their radii have maps of their own.
+/// Windows farther apart than this many of their radii have separate maps.
 const APART_RADII: f64 = 4.0;
 
-/// What one map shows.
+/// Contents of one map.
 pub(super) struct Shown {
     pub(super) windows: Vec<Outline>,
     pub(super) images: Vec<Outline>,
@@ -16,7 +16,7 @@ pub(super) struct Shown {
     pub(super) rows: Vec<usize>,
 }
 
-/// A ring on the sphere: its middle as a direction, and how far its points lie from it, radians.
+/// A ring on the sphere: its middle as a direction, and the distance of its points from it, radians.
 struct Extent {
     middle: Vector3<f64>,
     radius_rad: f64,
@@ -87,7 +87,7 @@ pub(super) fn sheets(site: &SiteProducts) -> Vec<Shown> {
     sheets
 }
 
-/// The sheet of each window: those that are near each other share one.
+/// The sheet of each window: neighbouring windows share one.
 fn grouped(extents: &[Extent]) -> Vec<usize> {
     let mut sheet_of: Vec<usize> = Vec::with_capacity(extents.len());
     for (index, extent) in extents.iter().enumerate() {

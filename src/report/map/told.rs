@@ -56,7 +56,7 @@ impl Sheet {
         let lines = graticule(&self.map, &self.view);
         let (_, unnamed) = self.names(&lines);
         if unnamed > 0 {
-            words += &format!("Without room for {}. ", counted(unnamed, "name"));
+            words += &format!("No space for {}. ", counted(unnamed, "name"));
         }
         let south = self.map.latitude_rad() < 0.0;
         words

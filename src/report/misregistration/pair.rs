@@ -3,11 +3,11 @@
 use super::super::{html::Cell, numbers::whole, plots::label};
 use crate::{products::GeometricProducts, stages::compare_pairs::PairComparison};
 
-/// A pair of images before the adjustment and, where tie points still join it, after.
+/// A pair of images before the adjustment and, if tie points still join it, after.
 pub(in crate::report) struct BeforeAfter<'a> {
     pub(in crate::report) before: &'a PairComparison,
     pub(in crate::report) after: Option<&'a PairComparison>,
-    /// Places of both among the pairs of their state.
+    /// Indices of both among the pairs of their state.
     places: [usize; 2],
     /// Whether there is an adjustment.
     adjusted: bool,
@@ -30,7 +30,7 @@ impl<'a> BeforeAfter<'a> {
         geometric.pairs.iter().enumerate().map(of).collect()
     }
 
-    /// The pair whose images place their tie points farthest apart along the flight before the adjustment.
+    /// The pair with the largest along-track parallax of its tie points before the adjustment.
     pub(in crate::report) fn worst(pairs: &[Self]) -> Option<&Self> {
         let size = |pair: &&Self| pair.before.along_track_parallax_m.abs();
         pairs.iter().max_by(|a, b| size(a).total_cmp(&size(b)))
@@ -41,7 +41,7 @@ impl<'a> BeforeAfter<'a> {
         self.before.images.join(" and ")
     }
 
-    /// Where the products tell of a state; they do where there is an adjustment.
+    /// Place of a state in the products, which have it if there is an adjustment.
     pub(in crate::report) fn place(&self, state: &str) -> String {
         let [before, after] = self.places;
         let index = if state == "after" { after } else { before };
@@ -75,7 +75,7 @@ impl<'a> BeforeAfter<'a> {
         vec![self.name().into(), state.into(), ties]
     }
 
-    /// How far apart the two images place the same thing, before and after.
+    /// Disagreement of the two images on one position, before and after.
     pub(in crate::report) fn sentence(&self) -> String {
         let (before, after) = (
             self.apart(self.before),
@@ -104,12 +104,12 @@ impl<'a> BeforeAfter<'a> {
         )
     }
 
-    /// Whether footprints tell how far apart the images are, before and after alike; otherwise tie points do.
+    /// Whether footprints give the disagreement of the images, before and after alike; otherwise tie points do.
     fn by_footprints(&self) -> bool {
         self.states().all(|(_, pair)| by_footprints(pair).is_some())
     }
 
-    /// How far apart the images of `pair`, one of the states, place the same thing.
+    /// Disagreement of the images of `pair`, one of the states.
     fn apart(&self, pair: &PairComparison) -> Apart {
         let by_footprints = by_footprints(pair).filter(|_| self.by_footprints());
         let metres = by_footprints.map_or(pair.along_track_parallax_m, |[metres, _]| metres);
@@ -121,11 +121,11 @@ impl<'a> BeforeAfter<'a> {
     }
 }
 
-/// How far apart along the flight two images place the same thing.
+/// Along-track disagreement of two images.
 struct Apart {
     /// Metres on the ground, without sign.
     metres: f64,
-    /// Its standard deviation; `None` where tie points tell.
+    /// Its standard deviation; `None` if by tie points.
     sigma_m: Option<f64>,
     /// The same in distances of successive footprints.
     spacings: Option<f64>,
@@ -148,7 +148,7 @@ impl Apart {
     }
 }
 
-/// How far apart two images place their footprints, and the standard deviation of that, metres.
+/// Disagreement of two images on their footprints, and its standard deviation, metres.
 pub(in crate::report) fn by_footprints(pair: &PairComparison) -> Option<[f64; 2]> {
     let found = pair.footprints.as_ref()?;
     Some([found.apart_m?, found.apart_sigma_m?])

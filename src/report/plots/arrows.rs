@@ -1,4 +1,4 @@
-//! Vectors on a plot, such as residuals where they were measured, magnified.
+//! Vectors on a plot, such as residuals at their measurements, magnified.
 
 use std::fmt::Write as _;
 
@@ -19,11 +19,11 @@ const BARB: f64 = 9.0;
 /// Vectors of one kind.
 #[derive(Debug)]
 pub(in crate::report) struct Arrows {
-    /// Name in the CSV, and in the legend, which adds the magnification.
+    /// Name in the CSV and, with the magnification, in the legend.
     pub(in crate::report) label: String,
-    /// Index into the colours, taken round.
+    /// Index into the colours, cyclic.
     pub(in crate::report) colour: usize,
-    /// How many times as long as on the axes they are drawn.
+    /// Magnification of their length against the axes.
     pub(in crate::report) magnification: f64,
     pub(in crate::report) each: Vec<Arrow>,
 }
@@ -50,7 +50,7 @@ impl Arrows {
         self.magnification.to_string()
     }
 
-    /// Where an arrow ends as it is drawn.
+    /// End of an arrow as drawn.
     pub(in crate::report) fn tip(&self, arrow: &Arrow) -> (f64, f64) {
         (
             arrow.from.0 + self.magnification * arrow.by.0,
@@ -86,7 +86,7 @@ pub(super) fn draw_arrows<'a>(
         let [from, end] = frame.clip(arrow.from, tip)?;
         let [start, stop] = [from, end].map(|place| chart.backend_coord(&place));
         let by = (stop.0 - start.0, stop.1 - start.1);
-        // What is cut has no point: it goes on.
+        // A cut arrow has no tip.
         let line = if frame.contains(tip) {
             outline(by)
         } else {

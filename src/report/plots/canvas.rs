@@ -1,4 +1,4 @@
-//! What is drawn on: the drawing library's canvas, and words and numbers on it.
+//! The drawing library's canvas, and words and numbers on it.
 
 use plotters::{
     coord::{Shift, types::RangedCoordf64},
@@ -11,7 +11,7 @@ use crate::{error::Result, products::error::ProductError};
 
 /// A drawing in progress.
 pub(in crate::report) type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-/// Whether a piece could be drawn.
+/// Result of drawing a piece.
 pub(in crate::report) type Drawn<'a> =
     std::result::Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>>;
 pub(super) type Chart<'a, 'b> =
@@ -20,7 +20,7 @@ pub(super) type Chart<'a, 'b> =
 /// SVG of the given height, filled by `with`.
 ///
 /// # Errors
-/// A drawing that the library refuses, which is a bug in areograph.
+/// A drawing that the library rejects, which is a bug in areograph.
 pub(in crate::report) fn drawn(
     height: u32,
     with: impl for<'a> FnOnce(&Canvas<'a>) -> Drawn<'a>,

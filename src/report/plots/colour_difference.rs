@@ -1,4 +1,4 @@
-//! How different two colours look.
+//! Visible difference of two colours.
 
 /// The CIEDE2000 difference of two colours in CIELAB.
 ///
@@ -6,7 +6,7 @@
 /// Sharma, Wu and Dalal 2005, Color Res. Appl. 30, eq. 2 to 22.
 pub(super) fn ciede2000(one: [f64; 3], other: [f64; 3]) -> f64 {
     let chroma = |[_, a, b]: [f64; 3]| f64::hypot(a, b);
-    // Share of a chroma that is large against 25.
+    // Weight of chromas that are large against 25.
     let large = |chroma: f64| (chroma.powi(7) / (chroma.powi(7) + 25.0_f64.powi(7))).sqrt();
     let stretch = 1.5 - 0.5 * large(f64::midpoint(chroma(one), chroma(other)));
     let polar = |[lightness, a, b]: [f64; 3]| {

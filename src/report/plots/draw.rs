@@ -18,7 +18,7 @@ const X_LABELS: usize = 6;
 const SIDE: u32 = 176;
 /// Width of the bars at the right side.
 const BARS: u32 = 150;
-/// Labels with so many decimals have no room beside the name of their axis.
+/// Labels with this many decimals do not fit beside the name of their axis.
 const DECIMALS_MANY: usize = 5;
 /// Number of bars over the range of a panel.
 const BAR_COUNT: usize = 24;
@@ -84,7 +84,7 @@ fn draw_panel<'a>(plot: &Plot, panel: &Panel, lowest: bool, area: &Canvas<'a>) -
     Ok(())
 }
 
-/// The name of an axis, what its labels are multiplied by, and their decimals: many zeros go into the unit.
+/// The name of an axis, the factor of its labels, and their decimals: many zeros go into the unit.
 fn scaled(name: &str, decimals: usize) -> (String, f64, usize) {
     let (power, written) = match decimals {
         0..DECIMALS_MANY => return (name.to_owned(), 1.0, decimals),
@@ -161,7 +161,7 @@ fn draw_series<'a>(frame: &Frame, series: &Series, chart: &mut Chart<'a, '_>) ->
     Ok(())
 }
 
-/// How many dots lie at each height, as bars to the right.
+/// Histogram of the dots' heights, as bars to the right.
 fn draw_histogram<'a>(panel: &Panel, foot: u32, area: &Canvas<'a>) -> Drawn<'a> {
     let counts = histogram(panel);
     let most = counts.iter().copied().max().unwrap_or(0).max(1);
@@ -196,7 +196,7 @@ fn draw_histogram<'a>(panel: &Panel, foot: u32, area: &Canvas<'a>) -> Drawn<'a> 
     Ok(())
 }
 
-/// Dots of a panel in equal steps of its range, points beyond it left out.
+/// Numbers of dots of a panel in equal steps of its range, without points beyond it.
 fn histogram(panel: &Panel) -> Vec<u32> {
     let mut counts = vec![0_u32; BAR_COUNT];
     let dots = panel

@@ -1,4 +1,4 @@
-//! A figure of a page: heading, picture, legend, caption, and its numbers to take away.
+//! A figure of a page: heading, picture, legend, caption, and its data for download.
 
 use plotters::style::RGBColor;
 
@@ -49,7 +49,7 @@ impl Key {
             "" => format!("style=\"background:{colour}\""),
             class => format!("class=\"{class}\""),
         };
-        // What is read from the page to draw the figure alone.
+        // Read from the page to draw the figure separately.
         format!("<li><i {look} data-colour=\"{colour}\"></i>{label}</li>")
     }
 }
@@ -73,11 +73,11 @@ pub(in crate::report) fn figure_html(
     } else {
         format!("<ul class=\"keys\">{keys}</ul>\n")
     };
-    // The drawing library says its size in pixels; the page decides that.
+    // The drawing library states its size in pixels; the page decides that.
     let svg = svg.find("viewBox").map_or_else(
         || svg.to_owned(),
         |at| {
-            // What every element says of itself although it is the rule.
+            // Attributes that every element repeats although they are the default.
             let drawing = svg[at..]
                 .replace(" opacity=\"1\"", "")
                 .replace(" stroke=\"none\" stroke-width=\"1\"", "");
@@ -93,7 +93,7 @@ pub(in crate::report) fn figure_html(
     )
 }
 
-/// The page with a link to the file of every figure, which the products have beside it.
+/// The page with a link to the file of every figure, which the products contain beside it.
 pub(in crate::report) fn with_files(page: &str) -> String {
     let mut figures = page.split("<figure id=\"");
     let mut linked = figures.next().unwrap_or_default().to_owned();
@@ -106,7 +106,7 @@ pub(in crate::report) fn with_files(page: &str) -> String {
     linked
 }
 
-/// A link that hands out `csv` as `<name>.csv` from inside the page.
+/// A link that downloads `csv` as `<name>.csv` from inside the page.
 pub(in crate::report) fn data_link(name: &str, csv: &str) -> String {
     let mut encoded = String::with_capacity(csv.len() + csv.len() / 8);
     for byte in csv.bytes() {

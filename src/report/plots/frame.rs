@@ -1,4 +1,4 @@
-//! What of a plot lies inside its axes, and what does not.
+//! Parts of a plot inside and outside its axes.
 
 use super::{Extent, Panel, Plot, Style};
 
@@ -42,7 +42,7 @@ impl Frame {
             }
         }
         let at = |share: f64| (from.0 + share * dx, from.1 + share * dy);
-        // An end that is inside stays what it was, to the last digit.
+        // An end inside is unchanged, to the last digit.
         let end = if leave < 1.0 { at(leave) } else { to };
         (enter < leave).then(|| [at(enter), end])
     }
@@ -69,7 +69,7 @@ impl Plot {
         self.panels.iter().filter(|panel| panel.idle().is_none())
     }
 
-    /// What the caption says, and what of the data cannot be seen as it is.
+    /// The caption, with the data that are not visible as they are.
     pub(super) fn told(&self) -> String {
         let mut words = self.caption.clone();
         let idle: Vec<String> = self
@@ -107,7 +107,7 @@ impl Plot {
 }
 
 impl Panel {
-    /// Why there is nothing to draw.
+    /// Reason why there is nothing to draw.
     fn idle(&self) -> Option<String> {
         let mut values = self.series.iter().flat_map(|series| &series.points);
         if self.log || !self.arrows.is_empty() || self.limits.iter().any(|at| self.y.contains(*at))
@@ -225,7 +225,7 @@ mod tests {
                 ..Panel::of("ground, m", line(-3e-4))
             },
             Panel::of("nothing, m", Vec::new()),
-            // Far below a thousandth, and yet values of their own.
+            // Far below a thousandth, and yet distinct values.
             Panel::of("strain", line(1e-6)),
         ];
         let plot = plot(panels);

@@ -1,4 +1,4 @@
-//! Plots: panels over one axis, drawn as inline SVG, told in words and given as CSV.
+//! Plots: panels over one axis, drawn as inline SVG, described in words and given as CSV.
 
 mod arrows;
 mod canvas;
@@ -29,12 +29,12 @@ use crate::error::Result;
 pub(super) const WIDTH: u32 = 1040;
 /// Size of letters in the same units.
 pub(super) const LETTERS: u32 = 34;
-/// Values below this are what rounding leaves of zero.
+/// Values below this are zero with rounding errors.
 const ROUNDING: f64 = 1e-9;
 /// The shortest axis: labels have at most nine decimals.
 const SHORTEST: f64 = 1e-7;
 
-/// How a series is drawn.
+/// Style of a series.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Style {
     Dots,
@@ -51,7 +51,7 @@ pub(super) struct Series {
     /// Entry of the legend, and name in the CSV.
     pub(super) label: String,
     pub(super) style: Style,
-    /// Index into the colours, taken round.
+    /// Index into the colours, cyclic.
     pub(super) colour: usize,
     pub(super) points: Vec<(f64, f64)>,
 }
@@ -105,7 +105,7 @@ pub(super) struct Panel {
     pub(super) limits: Vec<f64>,
     /// Whether the dots are counted in bars at the right side.
     pub(super) histogram: bool,
-    /// What is smaller than this everywhere is said in the caption instead.
+    /// Panels smaller than this everywhere are stated in the caption instead.
     pub(super) least: f64,
     /// Whether the points hold logarithms to base 10 of the values; axis and data have the values.
     pub(super) log: bool,
@@ -135,7 +135,7 @@ impl Panel {
 pub(super) struct Plot {
     /// Heading, unique on its page.
     pub(super) title: String,
-    /// What it shows, for those who see it and those who do not.
+    /// Description, for sighted and blind readers.
     pub(super) caption: String,
     pub(super) x_label: &'static str,
     pub(super) x: Extent,
@@ -223,10 +223,10 @@ pub(super) fn quoted(text: &str) -> String {
     }
 }
 
-/// The plot as a figure; in words alone where there is nothing to draw.
+/// The plot as a figure; in words only if there is nothing to draw.
 ///
 /// # Errors
-/// A plot that the library refuses, which is a bug in areograph.
+/// A plot that the library rejects, which is a bug in areograph.
 pub(super) fn figure(plot: &Plot) -> Result<String> {
     if plot.drawn().next().is_none() {
         return Ok(paragraph(&format!("{}: {}", plot.title, plot.told())));
@@ -278,7 +278,7 @@ impl Extent {
         }
     }
 
-    /// The same, longer where that takes to hold `values` too, with a margin.
+    /// The same, extended to include `values`, with a margin.
     pub(super) fn with(self, values: impl Iterator<Item = f64>) -> Self {
         let beyond: Vec<f64> = values.filter(|value| !self.contains(*value)).collect();
         if beyond.is_empty() {
@@ -299,21 +299,21 @@ impl Extent {
         self.low..self.high
     }
 
-    /// Decimals that write the labels of an axis with about so many in full.
+    /// Decimals that write the labels of an axis with about `labels` of them in full.
     pub(super) fn decimals(self, labels: usize) -> usize {
         let places = RangedCoordf64::from(self.range()).key_points(labels);
         let step = (self.high - self.low) / labels as f64;
         let is_whole = |decimals: &usize| {
             let unit = 10_f64.powi(-(*decimals as i32));
             let off = |place: &f64| (place / unit - (place / unit).round()).abs() * unit;
-            // What a double cannot hold of a label.
+            // Part of a label beyond the precision of a double.
             places.iter().all(|place| off(place) < 1e-3 * step)
         };
         (0..9).find(is_whole).unwrap_or(9)
     }
 }
 
-/// Every so many points, so that at most `limit` remain; the first always does.
+/// Every *n*-th point, so that at most `limit` remain; the first always does.
 pub(super) fn thinned<T: Copy>(points: &[T], limit: usize) -> Vec<T> {
     let step = points.len().div_ceil(limit.max(1)).max(1);
     points.iter().step_by(step).copied().collect()
@@ -359,7 +359,7 @@ mod tests {
         let length = extent.high - extent.low;
         assert!((length / 2.2e-5 - 1.0).abs() < 1e-9, "{length}"); // rounding
         assert_eq!(extent.decimals(6), 6);
-        // A single value shows where zero is not.
+        // A single value on an axis without zero.
         let extent = Extent::of(std::iter::once(2e-5));
         assert!(extent.low > 0.0 && extent.high < 1e-4);
     }

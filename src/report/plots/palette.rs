@@ -2,8 +2,8 @@
 
 use plotters::style::RGBColor;
 
-/// Colours of series. Any two of them and of [`MARK`] are apart for readers with deuteranopia too, on white paper and, as
-/// the page's style maps them, on dark screens; all stand out from the ground they are drawn on.
+/// Colours of series. Any two of them and of [`MARK`] are apart for readers with deuteranopia too, on white paper and,
+/// as the page's style maps them, on dark screens; all contrast with the background.
 pub(in crate::report) const COLOURS: [RGBColor; 7] = [
     RGBColor(0x0e, 0x5a, 0x99),
     RGBColor(0xff, 0x61, 0x0d),
@@ -13,13 +13,13 @@ pub(in crate::report) const COLOURS: [RGBColor; 7] = [
     RGBColor(0x01, 0x8d, 0xff),
     RGBColor(0x51, 0x51, 0x51),
 ];
-/// Index of the grey among the colours.
+/// Index of grey among the colours.
 pub(in crate::report) const GREY: usize = 6;
 /// Marks, limits and outliers.
 pub(in crate::report) const MARK: RGBColor = RGBColor(0xc1, 0x00, 0x19);
 /// Letters and axes.
 pub(in crate::report) const INK: RGBColor = RGBColor(0x22, 0x22, 0x22);
-/// Names that are not about the data.
+/// Names unrelated to the data.
 pub(in crate::report) const SOFT: RGBColor = RGBColor(0x55, 0x55, 0x55);
 /// Grid lines.
 pub(in crate::report) const GRID: RGBColor = RGBColor(0xe2, 0xe2, 0xe2);
@@ -29,7 +29,7 @@ mod tests {
     use super::{super::colour_difference::ciede2000, *};
     use crate::report::STYLE;
 
-    /// Least CIEDE2000 difference of two colours, whoever sees them: one is what an eye tells apart side by side.
+    /// Least CIEDE2000 difference of two colours, for any colour vision: 1 is just noticeable side by side.
     const APART: f64 = 20.0;
     /// Least contrast of a line or mark with the page (WCAG 2.2, 1.4.11).
     const CONTRAST: f64 = 3.0;

@@ -1,4 +1,5 @@
-//! Residuals along the profiles, figure 2 of Shan et al. 2005: of every profile, or of all together and the worst alone.
+//! Residuals along the profiles, figure 2 of Shan et al. 2005: of every profile, or of all together and the worst
+//! separately.
 
 use super::{
     super::{
@@ -13,21 +14,21 @@ use crate::{
     units::RADIANS_PER_DEGREE,
 };
 
-/// Points of all residual plots together; each is drawn twice and listed once, about 300 bytes.
+/// Largest number of points of all residual plots; each is drawn twice and listed once, about 300 bytes.
 const RESIDUAL_POINTS: usize = 5_000;
-/// Most points of one profile, about one per pixel of the plot's width.
+/// Largest number of points of one profile, about one per pixel of the plot's width.
 const PROFILE_POINTS: usize = 500;
-/// Up to so many profiles have a plot each.
+/// Number of profiles up to which each has a plot.
 const PROFILES_ALONE: usize = 12;
-/// Of more profiles so many have one: those with the largest means.
+/// Of more profiles, this number have one: those with the largest means.
 const WORST: usize = 6;
 
-/// Whether a site has so many profiles that they share a plot and a row.
+/// Whether a site has too many profiles for a plot and a row each.
 pub(in crate::report) fn many(site: &SiteProducts) -> bool {
     site.profiles.len() > PROFILES_ALONE
 }
 
-/// Profiles that have plots of their own, by index, in their order.
+/// Profiles with separate plots, by index, in their order.
 pub(in crate::report) fn plotted(site: &SiteProducts) -> Vec<usize> {
     let measured = |index: &usize| site.ranges.profiles[*index].measured() > 0;
     let mut indices: Vec<usize> = (0..site.profiles.len()).filter(measured).collect();
@@ -78,7 +79,7 @@ fn all_profiles(site: &SiteProducts) -> Plot {
         ..Panel::of("range − distance, m", series)
     };
     let caption = format!(
-        "{} profiles in their order in the tables, means from {} to {} m. The {WORST} largest are shown alone.",
+        "{} profiles in their order in the tables, means from {} to {} m. The {WORST} largest are shown separately.",
         whole(site.profiles.len()),
         metres(extreme(site, f64::min)),
         metres(extreme(site, f64::max))
@@ -150,12 +151,12 @@ fn profile_plot(site: &SiteProducts, index: usize, limit: usize) -> Plot {
     Plot::of(title, caption, x, vec![panel, angle_panel])
 }
 
-/// Profiles that never look farther off nadir than this have no axis of it.
+/// Profiles with smaller off-nadir angles than this have no axis of them.
 const NADIR_DEG: f64 = 0.05;
-/// The axis of off-nadir angles reaches this at least: below, nothing is worth an axis.
+/// Least upper end of the axis of off-nadir angles.
 const OFF_NADIR_LEAST_DEG: f64 = 1.0;
 
-/// What the plot of one profile shows.
+/// Contents of the plot of one profile.
 fn words(ranges: &ProfileRanges) -> String {
     let main = &ranges.range_minus_distance_m;
     let trend = ranges.trend_m_s.map_or_else(String::new, |trend| {

@@ -1,4 +1,4 @@
-//! What readers know of a body, to tell from where on it a site lies.
+//! Well-known features of a body, for orientation on the map of sites.
 
 use crate::body::Body;
 
@@ -40,7 +40,7 @@ const fn landing(body: Body, name: &'static str, place_deg: (f64, f64)) -> Featu
     }
 }
 
-/// Features in the order in which they are named where there is room, to whole degrees.
+/// Features in the order in which they are named if there is room, to whole degrees.
 ///
 /// # Source
 /// IAU Gazetteer of Planetary Nomenclature, centres and diameters; landing sites as the agencies that landed give them.

@@ -26,13 +26,13 @@ const HEIGHT_MAX: f64 = 1_300.0;
 const STRIP: i32 = 130;
 /// Left and right end of the bar of colours.
 const BAR: (i32, i32) = (460, 1_000);
-/// Shots that are drawn.
+/// Largest number of shots drawn.
 const SHOTS: usize = 1_500;
 /// Radius of a shot.
 const SHOT: i32 = 6;
-/// Share of the numbers beyond either end of their colours.
+/// Share of the numbers beyond each end of their colours.
 const CLIPPED: f64 = 0.02;
-/// Slope that shading is made for: lower relief is exaggerated up to it.
+/// Slope for shading: lower relief is exaggerated up to it.
 const SLOPE: f64 = 0.35;
 const EXAGGERATION_MAX: f64 = 100.0;
 /// Colours of differences below 0, of 0 and above.
@@ -44,7 +44,7 @@ const DIFFERENCES: [[f64; 3]; 3] = [
 /// Grey of level ground below shots.
 const GROUND: u8 = 190;
 
-/// Numbers of the first and the last colour, what they are, and the colours by their share.
+/// Numbers of the first and the last colour, their meaning, and the colours by their share.
 struct Bar {
     ends: [f64; 2],
     words: &'static str,
@@ -54,7 +54,7 @@ struct Bar {
 /// The three pictures.
 ///
 /// # Errors
-/// A picture that the library refuses, which is a bug in areograph.
+/// A picture that the library rejects, which is a bug in areograph.
 pub(super) fn figures(account: &SurfaceAccount, body: Body) -> Result<String> {
     let frame = Frame::of(&account.look);
     let exaggeration = frame.exaggeration();
@@ -125,7 +125,7 @@ pub(super) fn figures(account: &SurfaceAccount, body: Body) -> Result<String> {
     Ok(shaded + &of_sigmas + &compared)
 }
 
-/// Where a model is drawn.
+/// Placement of a model on the drawing.
 struct Frame<'a> {
     look: &'a SurfaceLook,
     left: f64,
@@ -177,7 +177,7 @@ impl<'a> Frame<'a> {
         ]
     }
 
-    /// 1, 2 or 5 times a power of ten that brings slopes up to what shading shows.
+    /// 1, 2 or 5 times a power of ten that brings slopes up to the slope for shading.
     fn exaggeration(&self) -> f64 {
         let known = (0..self.look.heights.heights_m.len())
             .filter(|at| !self.look.heights.heights_m[*at].is_nan());
@@ -286,7 +286,7 @@ impl Bar {
     }
 }
 
-/// Numbers that almost all lie between.
+/// Range that contains almost all numbers.
 fn ends(numbers: &[f32]) -> [f64; 2] {
     let mut known: Vec<f32> = numbers.iter().copied().filter(|of| !of.is_nan()).collect();
     known.sort_by(f32::total_cmp);
@@ -301,7 +301,7 @@ fn lit(colour: [u8; 3], light: f64) -> [u8; 3] {
     colour.map(|channel| relief::lit(channel, light))
 }
 
-/// The colour of a difference by its share of the range, 0.5 for none.
+/// The colour of a difference by its share of the range, 0.5 for no difference.
 fn difference(share: f64) -> [u8; 3] {
     let place = 2.0 * share.clamp(0.0, 1.0);
     let below = usize::from(place >= 1.0);
