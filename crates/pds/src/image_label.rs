@@ -87,7 +87,7 @@ pub(super) fn as_taken(label: &Label) -> Result<(), LabelError> {
         Some(entry) => Err(other_image(
             "OBJECT",
             &entry.group,
-            "the image as its camera took it, which no map projection describes",
+            "the image as taken by the camera, with no map projection",
         )),
         None => Ok(()),
     }

@@ -114,7 +114,7 @@ impl Cause for LabelError {
                 "determine which of the two values is correct, and keep only that one in the label"
             }
             Self::OtherImage { .. } => {
-                "give the label of an image that the camera's spacecraft took of Mars, as the camera took it"
+                "give the label of an image of Mars that the camera's spacecraft took, without a map projection"
             }
             Self::Value { .. } => {
                 "correct the label, or write the key in the image's table of the configuration"

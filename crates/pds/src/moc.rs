@@ -153,8 +153,8 @@ mod tests {
             ),
             (
                 "OBJECT = IMAGE_MAP_PROJECTION\nMAP_SCALE = 1\nEND_OBJECT",
-                "OBJECT is \"IMAGE_MAP_PROJECTION\"; expected the image as its camera took it, which no map \
-                 projection describes",
+                "OBJECT is \"IMAGE_MAP_PROJECTION\"; expected the image as taken by the camera, with no \
+                 map projection",
             ),
             (
                 "EDIT_MODE_ID = \"-1\"",

@@ -67,7 +67,7 @@ enum ShotTableError {
     },
     #[error("the table cannot be read: {0}")]
     Table(String),
-    #[error("none of its {rows} rows is a shot; line {}: {}", first.line, first.text)]
+    #[error("none of its {rows} rows is a valid shot; line {}: {}", first.line, first.text)]
     Unreadable { rows: u64, first: RowComplaint },
     #[error("it has no rows")]
     Empty,

@@ -53,7 +53,7 @@ pub fn rebuild(state: &Path, products: &Path, now_ms: i64) -> Result<Rebuilt> {
         for path in tidy(folder)? {
             match read_run(&path) {
                 Ok(run) => published.push(run),
-                Err(failure) => tracing::warn!("a run that is left out: {failure}"),
+                Err(failure) => tracing::warn!("a run is left out: {failure}"),
             }
         }
         rebuilt.runs += published.len();

@@ -34,10 +34,10 @@ impl Cause for Question {
     fn advice(&self) -> String {
         match self.0.find_root() {
             DataFusionError::ResourcesExhausted(_) => {
-                "ask for fewer columns, or for less to be sorted and grouped at once"
+                "select fewer columns, or sort and group fewer rows in one query"
             }
-            DataFusionError::IoError(_) => "check the disk of temporary files, then ask again",
-            _ => "\"describe shots\" lists the columns; text stands in 'single quotes'",
+            DataFusionError::IoError(_) => "check the disk of temporary files, then repeat the query",
+            _ => "\"describe shots\" lists the columns; text is written in 'single quotes'",
         }
         .to_owned()
     }

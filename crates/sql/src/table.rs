@@ -73,7 +73,7 @@ pub struct Tally {
 
 /// Two files hold the same shots.
 #[derive(Debug, thiserror::Error)]
-#[error("record {record} has a shot that {other} holds as well: it would count twice")]
+#[error("record {record} has a shot that is also in {other}: it would be counted twice")]
 struct Overlap {
     record: u32,
     other: String,
@@ -85,7 +85,7 @@ impl Cause for Overlap {
     }
 
     fn advice(&self) -> String {
-        "if both files hold the same orbits, name only one of them, or ask for one source_file"
+        "if both files hold the same orbits, name only one of them, or select one source_file"
             .to_owned()
     }
 }

@@ -37,7 +37,7 @@ pub(super) fn image_label(label: &Label, cameras: &[Instrument]) -> Result<Image
     if let Some(entry) = either(label, DETECTOR[0], DETECTOR[1])?
         && entry.value.eq_ignore_ascii_case(FRAME_CAMERA)
     {
-        let expected = "one of the nine lines; the frame camera beside them is not modelled";
+        let expected = "one of the nine lines; the frame camera (SRC) is not supported";
         return Err(other_image(&entry.key, &entry.value, expected));
     }
     let instrument = camera(label, cameras, DETECTOR)?;
@@ -52,7 +52,7 @@ pub(super) fn image_label(label: &Label, cameras: &[Instrument]) -> Result<Image
         .only("PROCESSING_LEVEL_ID")?
         .filter(|entry| known(entry));
     if let Some(entry) = level.filter(|entry| entry.value != LEVEL) {
-        let expected = "2, the image as its camera took it (h…2.IMG); levels above are maps";
+        let expected = "2, the image as taken by the camera (h…2.IMG); higher levels are maps";
         return Err(other_image(&entry.key, &entry.value, expected));
     }
     as_taken(label)?;

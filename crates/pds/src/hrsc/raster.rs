@@ -209,7 +209,7 @@ impl Raster {
             }
             _ => (stated.rough > ROUGHER * other.rough).then(|| {
                 let times = stated.rough / other.rough.max(f64::MIN_POSITIVE);
-                format!("neighbouring samples are {times:.0} times more alike in the other byte order")
+                format!("adjacent samples differ {times:.0} times less in the other byte order")
             }),
         };
         match because {
@@ -281,7 +281,7 @@ fn number(label: &Label) -> std::result::Result<(Number, bool), HrscError> {
         (16, "LSB_UNSIGNED_INTEGER") => Ok((Number::Unsigned, true)),
         _ => {
             let expected =
-                format!("MSB_INTEGER, LSB_INTEGER or UNSIGNED_INTEGER that goes with {bits} bits");
+                format!("MSB_INTEGER, LSB_INTEGER or UNSIGNED_INTEGER with {bits} bits");
             Err(refused("SAMPLE_TYPE", entry, &expected))
         }
     }

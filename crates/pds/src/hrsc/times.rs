@@ -72,7 +72,7 @@ impl Rows {
         let period_s = prefixes.iter().enumerate().map(|(row, prefix)| {
             if prefix.period_s.is_none() && prefix.start_s.is_some() {
                 damaged.push(format!(
-                    "line {row}: its prefix has no exposure; that of the lines beside it is taken"
+                    "line {row}: no exposure in its prefix; that of an adjacent line is used"
                 ));
             }
             before_s = prefix.period_s.unwrap_or(before_s);
@@ -136,7 +136,7 @@ impl Rows {
                 }
             }
             self.damaged.push(format!(
-                "lines {first} to {}: their prefixes have no time; those of the lines beside them are continued",
+                "lines {first} to {}: no times in their prefixes; their times follow from the adjacent lines",
                 row - 1
             ));
         }
@@ -180,7 +180,7 @@ impl Rows {
         } else {
             let pause_s = step_s - period_s;
             self.lacking.push(format!(
-                "before line {next} nothing was exposed for {pause_s:.4} s, {:.1} lines, which did not come down",
+                "before line {next}: a gap of {pause_s:.4} s, {:.1} lines that are not in the file",
                 pause_s / period_s
             ));
             return Ok(true);
@@ -217,14 +217,14 @@ impl Rows {
     fn time_is(&mut self, row: usize, start_s: f64) {
         let apart_s = self.start_s[row] - start_s;
         self.damaged.push(format!(
-            "line {row}: the time in its prefix lies {apart_s:.6} s from what the lines beside it tell, which is taken"
+            "line {row}: the time in its prefix differs by {apart_s:.6} s from the adjacent lines, whose time is used"
         ));
         self.start_s[row] = start_s;
     }
 
     fn exposure_is(&mut self, row: usize, period_s: f64) {
         self.damaged.push(format!(
-            "line {row}: the exposure in its prefix, {:.6} ms, is not what the times beside it tell, {:.6} ms, which is taken",
+            "line {row}: the exposure in its prefix is {:.6} ms; the adjacent times give {:.6} ms, which is used",
             1e3 * self.period_s[row],
             1e3 * period_s
         ));
@@ -333,7 +333,7 @@ mod tests {
         assert_eq!(
             times.remarks,
             [
-                "before line 100 nothing was exposed for 0.0926 s, 7.0 lines, which did not come down"
+                "before line 100: a gap of 0.0926 s, 7.0 lines that are not in the file"
             ]
         );
     }

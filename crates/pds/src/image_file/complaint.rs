@@ -111,7 +111,7 @@ impl fmt::Display for Fault {
                 fragment,
             } => write!(
                 formatter,
-                "the label says {key} = {label}; the fragments say {fragment}"
+                "the label states {key} = {label}; the fragments state {fragment}"
             ),
             Self::FragmentChecksum => {
                 formatter.write_str("the checksum byte is wrong; its lines may be wrong too")
@@ -120,14 +120,14 @@ impl fmt::Display for Fault {
                 formatter,
                 "no fragment header of this image; {skipped} bytes were skipped"
             ),
-            Self::Lost { fragments: 1 } => formatter.write_str("the fragment before it is lost"),
+            Self::Lost { fragments: 1 } => formatter.write_str("the preceding fragment is missing"),
             Self::Lost { fragments } => {
-                write!(formatter, "the {fragments} fragments before it are lost")
+                write!(formatter, "the {fragments} preceding fragments are missing")
             }
             Self::Repeated => formatter.write_str("this fragment is a duplicate; it is ignored"),
             Self::CutOff { lacking } => write!(
                 formatter,
-                "the file ends within the fragment; {lacking} bytes are lacking"
+                "the file ends within the fragment; {lacking} bytes are missing"
             ),
             Self::NoLast => {
                 formatter.write_str("the file ends here, and no fragment is marked as the last")
@@ -149,9 +149,9 @@ impl fmt::Display for Fault {
             }
             Self::Group => formatter
                 .write_str("a block of a group that does not exist; the fragment is ignored"),
-            Self::Short => formatter.write_str("the data end before the blocks do"),
+            Self::Short => formatter.write_str("the data end before the last block"),
             Self::Lines { found, header } => {
-                write!(formatter, "{found} of the {header} lines of the header")
+                write!(formatter, "{found} lines found; the header states {header}")
             }
         }
     }

@@ -74,7 +74,7 @@ impl Core<'_> {
             .parse()
             .ok()
             .filter(|count| (1..=most).contains(count));
-        count.ok_or_else(|| refused(key, value, "a count from 1 that an image has"))
+        count.ok_or_else(|| refused(key, value, "a count from 1, as an image can have"))
     }
 
     fn number(&self, key: &'static str, usual: f64) -> std::result::Result<f64, PixelFileError> {

@@ -143,7 +143,7 @@ fn a_plain_raster_is_read_from_where_its_label_points() {
     assert_eq!(found, pixels[..48 * 7]);
     assert_eq!(
         complaints,
-        ["byte 1560, line 7: 7 of the 20 lines of the header"]
+        ["byte 1560, line 7: 7 lines found; the header states 20"]
     );
 }
 

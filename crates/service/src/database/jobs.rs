@@ -245,7 +245,7 @@ pub fn give_back(
         return advance(transaction, now_ms, id, to, moved);
     };
     let taken_in = Moved {
-        outcome: Some(json!({ "text": format!("taken in by job {id}"), "job": id })),
+        outcome: Some(json!({ "text": format!("merged into job {id}"), "job": id })),
         ..Moved::default()
     };
     advance(

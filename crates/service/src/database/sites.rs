@@ -69,7 +69,7 @@ pub fn put_site(transaction: &Transaction<'_>, name: &str, file: &str) -> Stored
 /// # Errors
 /// SQLite's own.
 pub fn disable_site(transaction: &Transaction<'_>, name: &str) -> Stored<()> {
-    let note = "its site file is gone";
+    let note = "its site file was removed";
     transaction.execute(
         "UPDATE site SET enabled = 0, last_note = ?2, stale_since_ms = NULL, stale_because = NULL WHERE name = ?1",
         params![name, note],

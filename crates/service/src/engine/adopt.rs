@@ -108,7 +108,7 @@ fn adopt_runs<W: Workers>(core: &Core<W>, site: &SiteRow) -> Result<()> {
         }
         match read_run(&path) {
             Ok(published) => note(core, &published).in_file(&path)?,
-            Err(failure) => tracing::warn!("a run that is not used: {failure}"),
+            Err(failure) => tracing::warn!("a run is not adopted: {failure}"),
         }
     }
     let Some(linked) = linked.filter(|linked| site.current_run.as_ref() != Some(linked)) else {

@@ -123,7 +123,7 @@ impl<W: Workers> Core<W> {
         match ended {
             Some(Ok(ended)) => ended,
             Some(Err(panicked)) => {
-                tracing::error!("work for {subject}: {panicked}");
+                tracing::error!("work for {subject} failed: {panicked}");
                 silent()
             }
             None => silent(),

@@ -86,7 +86,7 @@ pub fn finish<W: Workers>(
         }
         let (state, moved) = match &fruit {
             Fruit::Run(run) => after_run(transaction, now_ms, run)?,
-            Fruit::Unchanged => (JobState::Unchanged, text("nothing had to be made")),
+            Fruit::Unchanged => (JobState::Unchanged, text("the products are up to date")),
             Fruit::None(ended) => {
                 let fruitless = Fruitless {
                     job: &job,

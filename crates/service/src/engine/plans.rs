@@ -295,7 +295,7 @@ impl Context<'_> {
         };
         let version = env!("CARGO_PKG_VERSION");
         if let Some(current) = current.filter(|current| current.version != version) {
-            let text = format!("areograph {} became {version}", current.version);
+            let text = format!("areograph {} was replaced by {version}", current.version);
             causes.push(CauseRow::plain(CauseKind::ToolChanged, &text, self.now_ms));
         }
         Ok(causes)
@@ -312,7 +312,7 @@ impl Context<'_> {
             }
             _ => (
                 CauseKind::RetryOf,
-                "an earlier job ended without products of its inputs",
+                "an earlier job ended without products from its inputs",
             ),
         })
     }
@@ -406,7 +406,7 @@ fn differences(before: &[SiteInput], now: &[SiteInput], at_ms: i64) -> Vec<Cause
         let name = areograph_store::files::file_name(Path::new(path));
         let what = match (&old_blake3, &new_blake3) {
             (None, _) => "is new",
-            (_, None) => "is gone, or no longer read",
+            (_, None) => "was removed, or is no longer read",
             _ => "changed",
         };
         causes.push(CauseRow {

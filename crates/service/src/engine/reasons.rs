@@ -47,7 +47,7 @@ pub fn change_text(cause: &CauseRow, answer: &PlanAnswer) -> String {
         return format!("{}{stages}", cause.detail);
     }
     let meets = if cause.kind == "kernel_changed" {
-        "its coverage meets"
+        "its coverage overlaps"
     } else {
         "it belongs to"
     };
@@ -132,7 +132,7 @@ mod tests {
         cause.path = Some("/mirror/ck/mgs_sc_ext1.bc".to_owned());
         assert_eq!(
             change_text(&cause, &answer),
-            "`mgs_sc_ext1.bc` changed; its coverage meets image E02-01453; stages sample_orientation, publish run"
+            "`mgs_sc_ext1.bc` changed; its coverage overlaps image E02-01453; stages sample_orientation, publish run"
         );
         let also = CauseRow::plain(CauseKind::KernelChanged, "`mgs_clock.tsc` changed", 0);
         assert_eq!(

@@ -114,7 +114,7 @@ async fn sweep<W: Workers>(core: &Arc<Core<W>>, folders: &[Folder]) -> Stored<Ve
             // A service that ends has ended its workers: that says nothing of the folder.
             Ok(_) if core.shared.ending.is_cancelled() => {}
             Ok((folder, listing)) => settled.extend(note_sweep(core, &folder, &listing)?),
-            Err(panicked) => tracing::error!("listing a folder: {panicked}"),
+            Err(panicked) => tracing::error!("listing a folder failed: {panicked}"),
         }
     }
     settled.sort_by(|one: &FileRow, other| one.path.cmp(&other.path));
@@ -282,14 +282,14 @@ async fn plan_all<W: Workers>(
                 return;
             }
             if let Err(error) = plan(&core, candidate, round, purpose.night, &folders).await {
-                tracing::error!(site = name, "the plan could not be noted: {error}");
+                tracing::error!(site = name, "the plan could not be recorded: {error}");
             }
             core.shared.wake.notify_one();
         });
     }
     while let Some(done) = plans.join_next().await {
         if let Err(panicked) = done {
-            tracing::error!("planning a site: {panicked}");
+            tracing::error!("planning a site failed: {panicked}");
         }
     }
 }

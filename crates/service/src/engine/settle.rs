@@ -41,7 +41,7 @@ pub async fn settle<W: Workers>(
     let (missing, there): (Vec<FileRow>, Vec<FileRow>) = settled.into_iter().partition(is_missing);
     core.shared.write(|transaction| {
         for file in missing {
-            tracing::info!("{} is gone", file.path);
+            tracing::info!("{} was removed", file.path);
             let gone = FileRow {
                 state: FileState::Gone,
                 detail: String::new(),
@@ -67,7 +67,7 @@ pub async fn settle<W: Workers>(
     while let Some(done) = parts.join_next().await {
         match done {
             Ok(done) => done?,
-            Err(panicked) => tracing::error!("reading files: {panicked}"),
+            Err(panicked) => tracing::error!("reading files failed: {panicked}"),
         }
     }
     Ok(())

@@ -74,7 +74,7 @@ pub fn compare(sweep: &Sweep<'_>) -> Swept {
             let count = waiting.len() + news.len();
             let until = utc_text(from_ms.max(sweep.now_ms));
             let files = if count == 1 { "file" } else { "files" };
-            let detail = format!("{count} {files} changed; waiting for quiet period until {until}");
+            let detail = format!("{count} {files} changed; waiting for the quiet period until {until}");
             (RootState::Settling, Vec::new(), detail)
         }
     };
@@ -97,7 +97,7 @@ fn unavailable<'a>(sweep: &Sweep<'a>) -> Result<&'a BTreeMap<String, Identity>, 
     let lost = sweep.known.values().filter(is_lost).count();
     if lost as f64 > sweep.max_loss * known as f64 {
         return Err(format!(
-            "{lost} of {known} files are gone, more than changes.max_loss = {} allows; if this is intended, raise it until the \
+            "{lost} of {known} files are missing, more than changes.max_loss = {} allows; if this is intended, raise it until the \
              next sweep",
             sweep.max_loss
         ));
@@ -301,7 +301,7 @@ mod tests {
         folder.files = files.clone();
         folder.files.retain(|path, _| path.as_str() >= "/k/021.bc");
         assert_eq!(folder.sweep(QUIET_MS + 4, Ok(())), (0, 0));
-        assert!(folder.root.detail.contains("21 of 100 files are gone"));
+        assert!(folder.root.detail.contains("21 of 100 files are missing"));
         assert_eq!(folder.root.since_ms, QUIET_MS + 2);
         assert_eq!(folder.known, known);
         // Back as it was: nothing happened.

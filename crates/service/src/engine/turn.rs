@@ -253,7 +253,7 @@ impl<W: Workers> Engine<W> {
         let compares = move |core: Arc<Core<W>>| async move {
             let done = round(&core, &mut *book.lock().await, purpose).await;
             if let Err(error) = &done {
-                tracing::error!("a round of comparisons: {error}");
+                tracing::error!("a round of comparisons failed: {error}");
             }
             let settles = core.shared.read(any_settling).unwrap_or(false);
             (done.is_ok(), settles, core.now_ms())
@@ -303,7 +303,7 @@ impl<W: Workers> Engine<W> {
         let agenda = Arc::clone(&self.agenda);
         let keeps = move |core: Arc<Core<W>>| async move {
             if let Err(error) = upkeep(&core, trims).await {
-                tracing::error!("upkeep: {error}");
+                tracing::error!("upkeep failed: {error}");
             }
         };
         self.spawn(keeps, move |_| lock(&agenda).upkeep = false);
@@ -351,7 +351,7 @@ impl<W: Workers> Engine<W> {
         let agenda = Arc::clone(&self.agenda);
         let delivers = |core: Arc<Core<W>>| async move {
             if let Err(error) = deliver(&core).await {
-                tracing::error!("hooks: {error}");
+                tracing::error!("hooks failed: {error}");
             }
         };
         self.spawn(delivers, move |_| lock(&agenda).letters = false);
@@ -386,7 +386,7 @@ impl<W: Workers> Engine<W> {
 
 async fn compare_runs<W: Workers>(core: Arc<Core<W>>) {
     if let Err(error) = compare_all(&core).await {
-        tracing::error!("comparing runs: {error}");
+        tracing::error!("comparing runs failed: {error}");
     }
 }
 

@@ -99,7 +99,7 @@ pub(super) async fn by_token(app: &App, text: &str, remote: IpAddr) -> Result<Ca
             retry_after_s: Some(wait_s),
             ..Problem::new(
                 StatusCode::TOO_MANY_REQUESTS,
-                "Too many tokens from this address were refused. Wait.",
+                "Too many tokens from this address were refused. Try again later.",
             )
         });
     }
@@ -219,7 +219,7 @@ impl FromRequestParts<Arc<App>> for Operator {
         if !caller.operates() {
             return Err(Problem::new(
                 StatusCode::FORBIDDEN,
-                "This token may read only. Changes need one with the role operate.",
+                "This token may only read. Changes require a token with the role operate.",
             ));
         }
         Ok(Self(caller))

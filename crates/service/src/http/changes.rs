@@ -123,7 +123,7 @@ pub(super) async fn retry(app: &Arc<App>, caller: Caller, id: i64) -> Result<Job
                 }
             };
             let who = caller.name();
-            let detail = format!("job {id} is tried again");
+            let detail = format!("job {id} is retried");
             let wish = Ask {
                 site: &found.site,
                 priority: Priority::Asked,

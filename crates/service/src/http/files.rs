@@ -100,7 +100,7 @@ fn manifest_bytes(products: &Path, run: &Run) -> Result<Vec<u8>, Problem> {
         ));
     }
     let file = open_below(products, &run_folder(run).join(MANIFEST))?;
-    let file = file.ok_or_else(|| Problem::not_found("The products of this run are not there."))?;
+    let file = file.ok_or_else(|| Problem::not_found("The products of this run are missing."))?;
     let mut bytes = Vec::new();
     file.take(MANIFEST_MAX)
         .read_to_end(&mut bytes)
@@ -115,7 +115,7 @@ fn manifest_bytes(products: &Path, run: &Run) -> Result<Vec<u8>, Problem> {
 
 /// A product that the manifest of a run names, or the manifest itself.
 pub(super) fn product(products: &Path, run: &Run, path: &str) -> Result<Product, Problem> {
-    let no_product = || Problem::not_found("The manifest of this run names no such product.");
+    let no_product = || Problem::not_found("The manifest of this run lists no such product.");
     let entry = if path == MANIFEST {
         let bytes = manifest_bytes(products, run)?;
         ProductEntry {

@@ -71,7 +71,7 @@ fn check_host(app: &App, headers: &HeaderMap, uri: &Uri) -> Result<bool, Problem
     let wrong = || {
         Problem::new(
             StatusCode::MISDIRECTED_REQUEST,
-            "This service does not answer for this host. Use its own address, or the public_url of its configuration.",
+            "This service does not serve this host. Use its own address, or the public_url of its configuration.",
         )
     };
     let mut hosts = headers.get_all(header::HOST).iter();
@@ -190,7 +190,7 @@ fn limit(app: &App, caller: &Caller, reads: bool) -> Result<(), Problem> {
         .take(key, rate, Instant::now())
         .map_err(|wait_s| Problem {
             retry_after_s: Some(wait_s),
-            ..Problem::new(StatusCode::TOO_MANY_REQUESTS, "Too many requests. Wait.")
+            ..Problem::new(StatusCode::TOO_MANY_REQUESTS, "Too many requests. Try again later.")
         })
 }
 

@@ -64,24 +64,24 @@ fn a_label_of_the_real_image_that_is_changed_contradicts_its_fragments() {
         (
             "SPACECRAFT_CLOCK_START_COUNT",
             "669321585:006",
-            "the fragments say 610472061:131",
+            "the fragments state 610472061:131",
         ),
         (
             "PRODUCT_ID",
             "M01/00999",
-            "M01/00999; the fragments say image 115",
+            "M01/00999; the fragments state image 115",
         ),
-        ("LINES", "4096", "4096; the fragments say 4864 lines"),
+        ("LINES", "4096", "4096; the fragments state 4864 lines"),
         (
             "LINE_EXPOSURE_DURATION",
             "0.5821",
-            "0.5821 ms; the fragments say 0.4821 ms",
+            "0.5821 ms; the fragments state 0.4821 ms",
         ),
         // A unit of the line clock is the rounding of what is printed.
         (
             "LINE_EXPOSURE_DURATION",
             "0.4823",
-            "0.4823 ms; the fragments say 0.4821 ms",
+            "0.4823 ms; the fragments state 0.4821 ms",
         ),
     ] {
         let (complaints, contradictions) = told(&edited(&bytes, key, value));
@@ -89,7 +89,7 @@ fn a_label_of_the_real_image_that_is_changed_contradicts_its_fragments() {
         let [only] = &contradictions[..] else {
             panic!("{key}: {contradictions:?}");
         };
-        let start = format!("fragment 0, byte 2048: the label says {key} = ");
+        let start = format!("fragment 0, byte 2048: the label states {key} = ");
         assert!(only.starts_with(&start) && only.ends_with(said), "{only}");
     }
     let rounded = edited(&bytes, "LINE_EXPOSURE_DURATION", "0.4822");
@@ -109,12 +109,12 @@ fn fragments_behind_the_label_of_another_image_are_noticed() {
     let mixed = [&own[..LABEL], &other[LABEL..]].concat();
     let (_, contradictions) = told(&mixed);
     let expected = [
-        "SPACECRAFT_CLOCK_START_COUNT = 610472061:131; the fragments say 610480000:007",
-        "PRODUCT_ID = M01/00123; the fragments say image 200",
-        "LINES = 1344; the fragments say 1360 lines",
-        "EDIT_MODE_ID = 0; the fragments say 16 as first detector",
+        "SPACECRAFT_CLOCK_START_COUNT = 610472061:131; the fragments state 610480000:007",
+        "PRODUCT_ID = M01/00123; the fragments state image 200",
+        "LINES = 1344; the fragments state 1360 lines",
+        "EDIT_MODE_ID = 0; the fragments state 16 as first detector",
     ];
-    let expected = expected.map(|of| format!("fragment 0, byte 2048: the label says {of}"));
+    let expected = expected.map(|of| format!("fragment 0, byte 2048: the label states {of}"));
     assert_eq!(contradictions, expected);
 }
 

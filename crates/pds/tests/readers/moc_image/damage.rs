@@ -184,7 +184,7 @@ fn a_lost_fragment_leaves_its_lines_out_and_the_others_in_their_places() {
                 }
             }
             let expected = format!(
-                "fragment {}, byte {}: the fragment before it is lost",
+                "fragment {}, byte {}: the preceding fragment is missing",
                 lost + 1,
                 fragments(&whole)[lost]
             );
@@ -250,7 +250,7 @@ fn a_cut_file_gives_the_lines_that_are_there() {
             assert!(
                 complaints
                     .iter()
-                    .any(|text| text.contains("1344 lines of the header")),
+                    .any(|text| text.contains("the header states 1344")),
                 "{complaints:?}"
             );
             assert!(

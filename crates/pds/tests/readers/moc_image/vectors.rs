@@ -127,7 +127,7 @@ fn transformed_pixels_are_those_of_the_decompressor() {
         let (short, statistics, complaints) = read(&path);
         assert_eq!(
             complaints,
-            ["fragment 0, byte 2048, line 0: the data end before the blocks do"]
+            ["fragment 0, byte 2048, line 0: the data end before the last block"]
         );
         assert_eq!(
             (statistics.lines_suspect, &short[16..32]),

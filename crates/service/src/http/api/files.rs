@@ -38,7 +38,7 @@ const SHOWN: [&str; 4] = [
 ), responses(
     (status = 200, content_type = "application/octet-stream", body = Vec<u8>),
     (status = 206, content_type = "application/octet-stream", body = Vec<u8>),
-    (status = 304, description = "The client has it"),
+    (status = 304, description = "The client has this content"),
     (status = "4XX", body = ProblemDocument, content_type = "application/problem+json"),
 ))]
 pub(super) async fn of_run(

@@ -131,10 +131,10 @@ pub(super) async fn metrics(_: Reader, State(app): State<Arc<App>>) -> Result<Re
         ),
         plain(
             "runs_kept",
-            "Runs whose products are there",
+            "Runs whose products are available",
             totals.runs as f64,
         ),
-        plain("sites", "Sites that are to be run", sites.0 as f64),
+        plain("sites", "Sites that are enabled", sites.0 as f64),
         plain(
             "sites_stale",
             "Sites whose inputs are newer than their products",
@@ -147,7 +147,7 @@ pub(super) async fn metrics(_: Reader, State(app): State<Arc<App>>) -> Result<Re
         ),
         plain(
             "alerts_undelivered",
-            "Alerts that no hook has taken yet",
+            "Alerts that no hook has accepted yet",
             totals.undelivered as f64,
         ),
         plain(

@@ -95,8 +95,8 @@ struct JobsMade {
     ("Idempotency-Key" = Option<String>, Header, description = "1 to 100 letters, digits, `_` and `-`, chosen by the client",
      pattern = "^[A-Za-z0-9_-]{1,100}$"),
 ), request_body = JobsAsked, responses(
-    (status = 202, body = JobsMade, description = "Jobs were made"),
-    (status = 200, body = JobsMade, description = "The jobs were there already"),
+    (status = 202, body = JobsMade, description = "Jobs were created"),
+    (status = 200, body = JobsMade, description = "The jobs already existed"),
     (status = "4XX", body = ProblemDocument, content_type = "application/problem+json"),
 ))]
 pub(super) async fn create(

@@ -198,7 +198,7 @@ async fn search(
         Ok(_) => return Err(Problem::internal("the worker sent an unexpected answer")),
         Err(failure) if failure.code == 2 => {
             return Err(Problem::bad_request(
-                "This region has no inside: its sides must not cross.",
+                "This region encloses no area: its sides must not cross.",
             ));
         }
         Err(failure) => return Err(Problem::internal(failure.text)),

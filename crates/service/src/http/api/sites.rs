@@ -73,7 +73,7 @@ pub(super) async fn current(
         .all(|byte| byte.is_ascii_graphic() && !b"%?#\\".contains(&byte))
         || path.contains("..")
     {
-        return Err(Problem::not_found("No manifest names such a product."));
+        return Err(Problem::not_found("No manifest lists such a product."));
     }
     Ok(Redirect::temporary(&format!("/api/v1/runs/{run}/files/{path}")).into_response())
 }

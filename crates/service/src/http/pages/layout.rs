@@ -98,7 +98,7 @@ pub(super) fn operator(caller: Caller, form_token: &str) -> Result<Caller, Probl
     if !caller.operates() {
         return Err(Problem::new(
             StatusCode::FORBIDDEN,
-            "Your token may read only. Changes need one with the role operate.",
+            "Your token may only read. Changes require a token with the role operate.",
         ));
     }
     Ok(caller)

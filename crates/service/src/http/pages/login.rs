@@ -43,7 +43,7 @@ pub(super) async fn form(
             input id="areograph-token" name="token" type="password" required autocomplete="current-password" spellcheck="false" maxlength="128";
             button type="submit" { "Log in" }
         }
-        p { "Tokens are made on the command line: " code { "areograph service token add" } ". A session ends after an hour without use, and after twelve hours in all." }
+        p { "Tokens are created on the command line: " code { "areograph service token add" } ". A session ends after an hour without use, and after twelve hours in all." }
     };
     Ok(Page {
         title: "Log in",

@@ -47,7 +47,7 @@ pub(super) async fn list(
     let next = shown.last().filter(|_| found.len() > shown.len());
     let schedule = &app.config().schedule;
     let body = html! {
-        p { "Every site is compared with its inputs by the schedule " code { (schedule.cron) } " in " (schedule.zone) ", whether \
+        p { "Every site is compared with its inputs on the schedule " code { (schedule.cron) } " in " (schedule.zone) ", whether \
             or not a change was detected." }
         div id="nights" data-live="" { (night_table(shown, &times)) }
         (more(next.map(|night| format!("/nights?after={}", night.id))))

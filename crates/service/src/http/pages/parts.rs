@@ -152,7 +152,7 @@ pub(super) fn said(sentences: &[String]) -> Markup {
 
 /// The link to the next piece of a list.
 pub(super) fn more(address: Option<String>) -> Markup {
-    html! { @if let Some(address) = address { p { a href=(address) rel="next" { "Older ones" } } } }
+    html! { @if let Some(address) = address { p { a href=(address) rel="next" { "Older" } } } }
 }
 
 /// A number of things.

@@ -94,7 +94,7 @@ fn run_lead(run: &Run, causes: &[CauseRow], manifest: Option<&Manifest>, times: 
             p {
                 "Site " a href={ "/sites/" (run.site) } { (run.site) } ", published " (times.at(run.published_utc))
                 " by " a href={ "/jobs/" (run.job) } { "job " (run.job) } ", attempt " (run.attempt) ", areograph " (run.version) "."
-                @if let Some(before) = &run.predecessor { " Before it: " a href={ "/runs/" (before) } { (before) } "." }
+                @if let Some(before) = &run.predecessor { " Previous run: " a href={ "/runs/" (before) } { (before) } "." }
                 @if let Some(removed) = run.removed_utc { " Its products were removed " (times.at(removed)) "." }
             }
             (said(&sentences(&run.reasons)))

@@ -152,7 +152,7 @@ fn standing(sites: &[Site], roots: &[RootFolder], problem: Option<&str>, times: 
         &html! {
             ul {
                 @for root in &away { li { "The folder " code { (root.path) } " is not available since " (times.at(root.since_utc)) ": " (root.detail) ". Its sites are held; nothing is lost." } }
-                @if let Some(problem) = problem { li { "The changed configuration was refused, the old one stays in force: " (problem) } }
+                @if let Some(problem) = problem { li { "The changed configuration was rejected; the old one remains in force: " (problem) } }
                 @for site in &wrong { li { a href={ "/sites/" (site.name) } { (site.name) } ": " (site.problem.as_deref().unwrap_or_default()) } }
                 @if refused > 0 { li { "The newest run of " (counted(refused, "site")) " is not valid; earlier products stay current." } }
                 @if count("remarks") > 0 { li { (count("remarks")) " valid with remarks." } }
@@ -192,7 +192,7 @@ fn site_table(sites: &[Site], times: &Times) -> Markup {
 /// Fresh, or stale since when and why.
 fn freshness(site: &Site, times: &Times) -> Markup {
     html! {
-        @if !site.enabled { "Not run: its site file is gone or disables it." }
+        @if !site.enabled { "Not run: its site file was removed or disables it." }
         @else if let Some(problem) = &site.problem { "Not run: " (problem) }
         @else if let Some(since) = site.stale_since_utc {
             "Stale since " (times.at(since)) ": " (prose(site.stale_because.as_deref().unwrap_or("its inputs changed")))
@@ -283,7 +283,7 @@ fn site_lead(site: &Site, newest: Option<&Run>, times: &Times) -> Markup {
             p { (freshness(site, times)) }
             @if let Some(run) = &site.current_run {
                 p {
-                    "Current is run " a href={ "/runs/" (run) } { (run) } " of " (times.maybe(site.current_since_utc)) ". "
+                    "The current run is " a href={ "/runs/" (run) } { (run) } " of " (times.maybe(site.current_since_utc)) ". "
                     a href={ "/api/v1/sites/" (site.name) "/current/report/index.html" } { "Report" }
                 }
             }
@@ -359,7 +359,7 @@ pub(super) async fn run_now(
         sites: vec![name(&site)?.to_owned()],
         force: form.force,
         reason: if reason.is_empty() {
-            "asked on its page".to_owned()
+            "requested on its page".to_owned()
         } else {
             reason
         },

@@ -64,12 +64,12 @@ pub(super) fn timeline(rows: &[Row]) -> Markup {
             }
             ul class="keys" { li { i class="k0" {} "positions" } li { i class="k1" {} "attitude" } }
             figcaption {
-                "Times are TDB, a minute ahead of UTC. Empty intervals are gaps; gaps too narrow to be seen are in the "
+                "Times are TDB, about a minute ahead of UTC. Empty intervals are gaps; gaps too narrow to be seen are in the "
                 a href="/api/v1/kernels" { "interface for programs" } "."
             }
         }
         details {
-            summary { "Coverage in words" }
+            summary { "Coverage as text" }
             ul {
                 @for row in rows {
                     li {

@@ -90,7 +90,7 @@ pub(super) fn trends(runs: &[Run], times: &Times) -> Markup {
     let all: Vec<BTreeMap<String, f64>> = oldest_first.iter().map(|run| figures(run)).collect();
     let names: BTreeSet<&String> = all.iter().flat_map(BTreeMap::keys).collect();
     html! {
-        @if runs.len() < 2 { p { "Plots begin with the second run." } }
+        @if runs.len() < 2 { p { "Plots require at least two runs." } }
         @else {
             div class="plots" {
                 @for name in names {
