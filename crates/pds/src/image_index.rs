@@ -130,7 +130,7 @@ const ROW_BYTES_MAX: u64 = 1 << 16;
 /// Reads an index, with the label beside it if there is one.
 ///
 /// # Errors
-/// The system's refusal to read; a label without the columns that are needed; no row that is an image.
+/// The file cannot be read; a label without the columns that are needed; no row that is an image.
 pub fn read_index(path: &Path) -> Result<ImageIndex> {
     let labelled = label_beside(path)
         .map(|label| read_columns(&label))

@@ -112,7 +112,7 @@ impl PixelFile {
     /// Opens a file by what stands in it: a cube, a TIFF, a PNG, or an image of the archive by one of `cameras`.
     ///
     /// # Errors
-    /// The system's refusal to read; those of [`ImageFile::open`] and of [`read_label`](super::read_label()); [`PixelFileError`].
+    /// The file cannot be read; those of [`ImageFile::open`] and of [`read_label`](super::read_label()); [`PixelFileError`].
     pub fn open(path: &Path, cameras: &[Instrument]) -> Result<Self> {
         let labelled = Labelled::open(path)?;
         let start = &labelled.start;
@@ -231,7 +231,7 @@ impl PixelFile {
     /// The image from its first line on, strip by strip.
     ///
     /// # Errors
-    /// The system's refusal to read; pictures that their libraries refuse.
+    /// The file cannot be read; pictures that their libraries refuse.
     pub fn strips(&self) -> Result<PixelStrips> {
         let source = match self {
             Self::Archive(image) => Source::Archive(Box::new(image.strips()?)),
@@ -254,7 +254,7 @@ impl PixelFile {
 /// The lines of a TIFF as numbers, from the first one on.
 ///
 /// # Errors
-/// The system's refusal to read; a picture that is not of one band of grey, or that its library refuses.
+/// The file cannot be read; a picture that is not of one band of grey, or that its library refuses.
 pub(super) fn tiff_rows(path: &Path) -> Result<Box<dyn Rows>> {
     Picture::Tiff.rows(path)
 }
@@ -308,10 +308,10 @@ enum Source {
 }
 
 impl PixelStrips {
-    /// The next lines; `None` behind the last one that is there.
+    /// The next lines; `None` after the last one.
     ///
     /// # Errors
-    /// The system's refusal to read; a picture that its library refuses.
+    /// The file cannot be read; a picture that its library refuses.
     pub fn next_strip(&mut self) -> Result<Option<Strip>> {
         match &mut self.source {
             Source::Archive(strips) => {

@@ -79,7 +79,7 @@ pub struct TickRow {
 /// Reads a table of measurements.
 ///
 /// # Errors
-/// The system's refusal to read; columns that are missing; a table of which no row can be read.
+/// The file cannot be read; columns that are missing; a table of which no row can be read.
 pub fn read_measurements(path: &Path) -> Result<Rows<MeasurementRow>> {
     const COLUMNS: &str =
         "picture, point, x, y or x_upper_right, y_upper_right, x_lower_left, y_lower_left";

@@ -30,7 +30,7 @@ impl Labelled {
     /// Opens a file and reads its start.
     ///
     /// # Errors
-    /// The system's refusal to read.
+    /// The file cannot be read.
     pub(super) fn open(path: &Path) -> Result<Self> {
         let mut file = File::open(path)
             .map_err(IoError::on("open"))
@@ -61,7 +61,7 @@ impl Labelled {
 /// times of their own these too.
 ///
 /// # Errors
-/// The system's refusal to read; no label, or a cut one; an instrument that is not among `cameras`, or none; an image of
+/// The file cannot be read; no label, or a cut one; an instrument that is not among `cameras`, or none; an image of
 /// another spacecraft or target, or one that is map-projected; a value that is not of its kind, or two values under one
 /// keyword; rows that are not those of the label, or whose times contradict each other.
 pub fn read_label(path: &Path, cameras: &[Instrument]) -> Result<ImageLabel> {

@@ -99,7 +99,7 @@ impl Cause for ShotTableError {
 /// * `utc` – the instant of a time in UTC
 ///
 /// # Errors
-/// The system's refusal to read; a column that is not there; a table of which no row is a shot; what `take` returns.
+/// The file cannot be read; a column that is not there; a table of which no row is a shot; what `take` returns.
 pub fn read_shot_table(
     path: &Path,
     columns: &ShotColumns,
@@ -195,7 +195,7 @@ fn agrees(row: &ShotRow) -> std::result::Result<(), String> {
     let spacecraft_m = spherical_to_xyz_m(longitude_rad, latitude_rad, radius_m);
     let distance_m = (spacecraft_m - ground_m).norm();
     let limit_m = RANGE_SHARE * row.range_m + RANGE_BESIDE_M;
-    // Written so that NaN is refused too.
+    // Written so that NaN is rejected too.
     if (distance_m - row.range_m).abs() <= limit_m {
         return Ok(());
     }

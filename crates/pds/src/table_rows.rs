@@ -68,7 +68,7 @@ impl Cause for Refused {
 /// `example` is the file that tells the columns.
 ///
 /// # Errors
-/// The system's refusal to read; columns that are missing; a table of which no row can be read.
+/// The file cannot be read; columns that are missing; a table of which no row can be read.
 pub(super) fn read_rows<T, F>(
     path: &Path,
     example: &'static str,

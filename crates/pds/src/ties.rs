@@ -81,7 +81,7 @@ impl Cause for TieError {
 /// Reads tie points; a file whose name ends in `.csv` is a table, any other a control network.
 ///
 /// # Errors
-/// The system's refusal to read; a binary network; no network; columns that are missing; records of which none
+/// The file cannot be read; a binary network; no network; columns that are missing; records of which none
 /// can be read.
 pub fn read_ties(path: &Path) -> Result<TieFile> {
     let bytes = fs::read(path).map_err(IoError::on("read")).in_file(path)?;

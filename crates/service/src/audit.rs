@@ -17,10 +17,10 @@ pub struct Change<'a> {
     pub remote: &'a str,
 }
 
-/// Notes a change together with the change itself.
+/// Records a change together with the change itself.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn note_change(transaction: &Transaction<'_>, now_ms: i64, change: Change<'_>) -> Stored<()> {
     let Change {
         who,

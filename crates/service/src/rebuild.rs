@@ -30,7 +30,7 @@ pub struct Rebuilt {
 /// switched on by the next sweep that finds their files.
 ///
 /// # Errors
-/// The disk's refusal.
+/// A disk error.
 pub fn rebuild(state: &Path, products: &Path, now_ms: i64) -> Result<Rebuilt> {
     for ending in ["", "-wal", "-shm"] {
         let path = state.join(format!("{DATABASE}{ending}"));

@@ -53,7 +53,7 @@ impl Session {
 /// Opens a session and gives its reference, for the only time. Sessions that have ended are removed.
 ///
 /// # Errors
-/// SQLite's own; the system has no random numbers.
+/// SQLite errors; the system has no random numbers.
 pub fn open_session(transaction: &Transaction<'_>, now_ms: i64, token: &str) -> Stored<String> {
     transaction.execute(
         "DELETE FROM session WHERE seen_ms <= ?1 - ?2 OR created_ms <= ?1 - ?3",
@@ -70,7 +70,7 @@ pub fn open_session(transaction: &Transaction<'_>, now_ms: i64, token: &str) -> 
 /// The session with this reference, if it is open and its token still valid.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn find_session(
     connection: &Connection,
     now_ms: i64,
@@ -95,10 +95,10 @@ pub fn find_session(
     Ok(found.optional()?)
 }
 
-/// Notes that a session was used.
+/// Records that a session was used.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn note_session(transaction: &Transaction<'_>, now_ms: i64, session: &Session) -> Stored<()> {
     let note = "UPDATE session SET seen_ms = ?2 WHERE sha256 = ?1";
     transaction.execute(note, params![session.sha256, now_ms])?;
@@ -108,7 +108,7 @@ pub fn note_session(transaction: &Transaction<'_>, now_ms: i64, session: &Sessio
 /// Ends a session.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn close_session(transaction: &Transaction<'_>, session: &Session) -> Stored<()> {
     transaction.execute("DELETE FROM session WHERE sha256 = ?1", [&session.sha256])?;
     Ok(())
@@ -117,7 +117,7 @@ pub fn close_session(transaction: &Transaction<'_>, session: &Session) -> Stored
 /// Whether a token is still valid and, of a session, whether that is open: for what lasts longer than a request.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn still_open(
     connection: &Connection,
     now_ms: i64,

@@ -76,7 +76,7 @@ impl Shared {
         problem.clone()
     }
 
-    /// Notes why the configuration of the file was not taken.
+    /// Records why the configuration of the file was not taken.
     pub fn set_problem(&self, problem: Option<String>) {
         *self.problem.write().unwrap_or_else(PoisonError::into_inner) = problem;
     }
@@ -96,7 +96,7 @@ impl Shared {
     /// Does `look` on one state of the database.
     ///
     /// # Errors
-    /// What `look` gives, or SQLite's own.
+    /// What `look` gives, or SQLite errors.
     pub fn read<T>(&self, look: impl FnOnce(&Connection) -> Stored<T>) -> Stored<T> {
         self.database.read(look)
     }
@@ -104,7 +104,7 @@ impl Shared {
     /// Does `work` as one transaction and tells those who follow the events.
     ///
     /// # Errors
-    /// What `work` gives, and then nothing is written; or SQLite's own.
+    /// What `work` gives, and then nothing is written; or SQLite errors.
     pub fn write<T>(&self, work: impl FnOnce(&Transaction<'_>) -> Stored<T>) -> Stored<T> {
         let (done, newest) = self.database.write(|transaction| {
             let done = work(transaction)?;

@@ -88,7 +88,7 @@ pub fn configuration(
 /// Begins a service: `command` is what others are told that runs.
 ///
 /// # Errors
-/// Another service runs on the same folder of state; the database is damaged or newer; the disk's refusal.
+/// Another service runs on the same folder of state; the database is damaged or newer; a disk error.
 pub fn start(config: ServiceConfig, command: &str, clock: Clock) -> Result<Started> {
     let state = config.outputs.state.clone();
     let owner = Owner {
@@ -135,7 +135,7 @@ fn seen(connection: &Connection, config: &ServiceConfig) -> Stored<Result<()>> {
 /// Says where the service listens: in its lock and in the database.
 ///
 /// # Errors
-/// The disk's refusal.
+/// A disk error.
 pub fn tell_address(
     lock: &ServiceLock,
     owner: &Owner,

@@ -88,7 +88,7 @@ impl Token {
 /// Makes a token and gives it whole, for the only time.
 ///
 /// # Errors
-/// SQLite's own; the system has no random numbers.
+/// SQLite errors; the system has no random numbers.
 pub fn add_token(
     transaction: &Transaction<'_>,
     now_ms: i64,
@@ -107,17 +107,17 @@ pub fn add_token(
 /// All tokens, also those that have ended, oldest first.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn tokens(connection: &Connection) -> Stored<Vec<Token>> {
     let mut query = connection.prepare_cached("SELECT * FROM token ORDER BY created_ms, id")?;
     let found = query.query_map([], read)?;
     Ok(found.collect::<Result<_, _>>()?)
 }
 
-/// Ends a token and the sessions that it began. Says whether there was such a token.
+/// Ends a token and the sessions that it began. Returns whether there was such a token.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn revoke_token(transaction: &Transaction<'_>, now_ms: i64, id: &str) -> Stored<bool> {
     transaction.execute("DELETE FROM session WHERE token = ?1", [id])?;
     let revoked = transaction.execute(
@@ -130,7 +130,7 @@ pub fn revoke_token(transaction: &Transaction<'_>, now_ms: i64, id: &str) -> Sto
 /// The token whose text somebody shows, if it is one of ours and still valid. Takes the same work for one that is unknown.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn find_token(connection: &Connection, now_ms: i64, text: &str) -> Stored<Option<Token>> {
     let (id, secret) = split(text).unwrap_or_default();
     let mut query = connection.prepare_cached("SELECT * FROM token WHERE id = ?1")?;
@@ -143,10 +143,10 @@ pub fn find_token(connection: &Connection, now_ms: i64, text: &str) -> Stored<Op
     Ok(token.filter(|token| same && token.is_valid(now_ms)))
 }
 
-/// Notes that a token was used, at most once a minute.
+/// Records that a token was used, at most once a minute.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn note_use(transaction: &Transaction<'_>, now_ms: i64, id: &str) -> Stored<()> {
     transaction.execute(
         "UPDATE token SET used_ms = ?2 WHERE id = ?1 AND coalesce(used_ms, 0) < ?2 - 60000",

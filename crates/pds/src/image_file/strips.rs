@@ -95,10 +95,10 @@ impl Strips {
         })
     }
 
-    /// The next lines; `None` behind the last one that is there.
+    /// The next lines; `None` after the last one.
     ///
     /// # Errors
-    /// The system's refusal to read.
+    /// The file cannot be read.
     pub fn next_strip(&mut self) -> io::Result<Option<Strip>> {
         while !self.is_done {
             let strip = match &mut self.source {

@@ -94,7 +94,7 @@ pub struct SupportTables {
 /// Reads the support data of a line scanner.
 ///
 /// # Errors
-/// The system's refusal to read; what is no JSON; another kind of camera, or a distortion that is not known; a key that
+/// The file cannot be read; what is no JSON; another kind of camera, or a distortion that is not known; a key that
 /// is missing or holds what it cannot; tables that do not reach over the image.
 pub fn read_isd(path: &Path) -> Result<ImageSupport> {
     let bytes = fs::metadata(path)
@@ -205,7 +205,7 @@ fn line_times(document: &Object<'_>) -> Result<LineTimes> {
     }
     let times = LineTimes::of_pieces(lines, &pieces)?;
     let late_s = times.start().seconds() - start_s;
-    // Written so that NaN is refused too.
+    // Written so that NaN is rejected too.
     if !(late_s.abs() <= times.mean_period_s()) {
         let expected = format!(
             "the time of the first line by line_scan_rate and center_ephemeris_time, {:.6}, within a line",

@@ -25,7 +25,7 @@ pub struct StraightCamera {
 /// The support data of `path` with another camera, and with `shift_m` added to positions: J2000 metres at an ET.
 ///
 /// # Errors
-/// The system's refusal to read; what is no JSON of support data.
+/// The file cannot be read; what is no JSON of support data.
 pub fn rewrite_isd(
     path: &Path,
     camera: &StraightCamera,

@@ -118,7 +118,7 @@ impl Rotations {
                 .map(|part| part * part)
                 .sum::<f64>()
                 .sqrt();
-            // Written so that NaN is refused too.
+            // Written so that NaN is rejected too.
             if !((length - 1.0).abs() <= UNIT_TOLERANCE) {
                 let expected =
                     format!("unit quaternions (w, x, y, z); that of row {row} has length {length}");
@@ -160,7 +160,7 @@ fn constant(table: &Object<'_>) -> Result<Matrix3<f64>, IsdError> {
     let skew = (matrix * matrix.transpose() - Matrix3::identity())
         .abs()
         .max();
-    // Written so that NaN is refused too.
+    // Written so that NaN is rejected too.
     if !(skew <= ROTATION_TOLERANCE && matrix.determinant() > 0.0) {
         return Err(table.refused(KEY, "a rotation matrix, row by row"));
     }

@@ -124,7 +124,7 @@ impl Reader {
     /// Reads some rows, counted from 0, into `buffer`; those that are not there are left out.
     ///
     /// # Errors
-    /// What the disk refuses; a file that has become shorter.
+    /// A read error; a file that has become shorter.
     pub fn stretch(&self, rows: Range<usize>, buffer: Vec<u8>) -> Result<Stretch> {
         let chronology = if self.reaches_all(&rows) {
             None
@@ -138,7 +138,7 @@ impl Reader {
     /// stretches of the file.
     ///
     /// # Errors
-    /// What the disk refuses; a file that has become shorter.
+    /// A read error; a file that has become shorter.
     pub fn prepare(&self, rows: &Range<usize>) -> Result<()> {
         if !self.reaches_all(rows) {
             self.chronology()?;
@@ -218,7 +218,7 @@ impl Reader {
     /// Reads all of the file.
     ///
     /// # Errors
-    /// What the disk refuses; a file that has become shorter, has changed or lost its name.
+    /// A read error; a file that has become shorter, has changed or lost its name.
     fn whole(&self) -> Result<File> {
         let path = self.head.path();
         let length = usize::try_from(self.identity.bytes).unwrap_or(usize::MAX);
@@ -241,7 +241,7 @@ impl Reader {
     /// Makes sure that the file is what it was when it was opened, and still has a name.
     ///
     /// # Errors
-    /// It is not.
+    /// The file has changed.
     pub fn unchanged(&self) -> Result<()> {
         let path = self.head.path();
         let metadata = self.handle.metadata();
@@ -286,7 +286,7 @@ impl Reader {
     /// The bytes after the last whole record.
     ///
     /// # Errors
-    /// What the disk refuses; a file that has become shorter.
+    /// A read error; a file that has become shorter.
     pub fn trailing_bytes(&self) -> Result<Vec<u8>> {
         let from = (self.head.label_length() + self.head.record_count() * RECORD_BYTES) as u64;
         let length = self.identity.bytes.saturating_sub(from);

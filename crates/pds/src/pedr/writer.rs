@@ -130,7 +130,7 @@ impl PedrWriter {
     /// Appends one record.
     ///
     /// # Errors
-    /// The system's refusal to write.
+    /// The file cannot be written.
     pub fn write_record(&mut self, record: &Record) -> Result<()> {
         self.write(&record.to_bytes())?;
         self.records += 1;
@@ -140,7 +140,7 @@ impl PedrWriter {
     /// Writes what is left in memory to the disk; returns the number of data records.
     ///
     /// # Errors
-    /// The system's refusal to write.
+    /// The file cannot be written.
     pub fn finish(mut self) -> Result<u32> {
         self.file
             .flush()

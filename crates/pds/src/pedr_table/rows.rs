@@ -75,7 +75,7 @@ impl Table {
     /// The headings, where they are wanted.
     ///
     /// # Errors
-    /// The system's refusal to write.
+    /// The file cannot be written.
     pub fn write_headings(&self, out: &mut dyn Write) -> io::Result<()> {
         if !self.preferences.headings {
             return Ok(());
@@ -87,7 +87,7 @@ impl Table {
     /// Writes the lines of a file; returns what was left out as bad, nothing by the program's rules.
     ///
     /// # Errors
-    /// The system's refusal to write.
+    /// The file cannot be written.
     pub fn write(&mut self, file: &File, out: &mut dyn Write) -> io::Result<Vec<Complaint>> {
         match self.rules {
             Rules::Program => self.write_by_program(file, out).map(|()| Vec::new()),

@@ -188,7 +188,7 @@ impl Cube {
     /// The lines from the first one on.
     ///
     /// # Errors
-    /// The system's refusal to read.
+    /// The file cannot be read.
     pub(super) fn rows(&self, path: &Path) -> Result<Box<dyn Rows>> {
         let file = File::open(path).map_err(IoError::on("open"))?;
         Ok(Box::new(CubeRows {

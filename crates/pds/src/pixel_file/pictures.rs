@@ -53,7 +53,7 @@ impl Picture {
     /// The lines from the first one on.
     ///
     /// # Errors
-    /// The system's refusal to read; a picture that is not of one band of grey, or that its library refuses.
+    /// The file cannot be read; a picture that is not of one band of grey, or that its library refuses.
     pub(super) fn rows(self, path: &Path) -> Result<Box<dyn Rows>> {
         let file = BufReader::new(File::open(path).map_err(IoError::on("open"))?);
         Ok(match self {

@@ -27,7 +27,7 @@ pub(super) fn description(raster: &Raster) -> String {
 /// The lines from the first one on; a sample of 0 is none, and a line of these alone did not come down.
 ///
 /// # Errors
-/// The system's refusal to read.
+/// The file cannot be read.
 pub(super) fn rows(raster: &Raster, path: &Path) -> Result<Box<dyn Rows>> {
     let file = File::open(path).map_err(IoError::on("open"))?;
     let (raster, line) = (*raster, 0);

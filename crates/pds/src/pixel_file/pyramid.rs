@@ -38,7 +38,7 @@ impl Pyramid {
     /// them.
     ///
     /// # Errors
-    /// The system's refusal to read the image, or to write a temporary file.
+    /// The image cannot be read, or a temporary file cannot be written.
     pub fn of(image: &PixelFile) -> Result<Self> {
         let mut strips = image.strips()?;
         let size = [image.lines() as usize, image.samples() as usize];
@@ -129,7 +129,7 @@ impl Pyramid {
     /// nothing is left, or where lines or pixels of it are missing.
     ///
     /// # Errors
-    /// The system's refusal to read the temporary file.
+    /// The temporary file cannot be read.
     pub fn window(&self, level: usize, first: [i64; 2], size: [usize; 2]) -> Result<Option<Patch>> {
         let level = &self.levels[level.min(self.halvings())];
         let span = |axis: usize| -> Option<(usize, usize)> {
@@ -158,7 +158,7 @@ impl Pyramid {
     /// These lines and samples of a level, with NaN where lines or pixels are missing.
     ///
     /// # Errors
-    /// The system's refusal to read the temporary file.
+    /// The temporary file cannot be read.
     pub fn window_with_gaps(&self, level: usize, spans: [&Range<usize>; 2]) -> Result<Patch> {
         let level = &self.levels[level.min(self.halvings())];
         let [lines, samples] = [0, 1].map(|axis| {

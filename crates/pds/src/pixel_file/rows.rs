@@ -2,7 +2,7 @@
 
 use areograph_base::error::Result;
 
-/// Largest size of a line that is believed, samples: the largest line of any camera here has 5184.
+/// Largest accepted size of a line, samples: the largest line of any camera here has 5184.
 pub(super) const SAMPLES_MAX: u32 = 65_536;
 /// The same of an image, lines.
 pub(super) const LINES_MAX: u32 = 10_000_000;
@@ -23,10 +23,10 @@ pub(crate) trait Rows: std::fmt::Debug {
     /// Whether all numbers are whole, from 0 to 255.
     fn is_bytes(&self) -> bool;
 
-    /// Whole lines that follow those before; NaN where there is no number. `None` behind the last line.
+    /// Whole lines that follow those before; NaN where there is no number. `None` after the last line.
     ///
     /// # Errors
-    /// The system's refusal to read; a picture that its library refuses.
+    /// The file cannot be read; a picture that its library refuses.
     fn next_rows(&mut self) -> Result<Option<Vec<f64>>>;
 }
 

@@ -107,7 +107,7 @@ impl GeoKeys {
             Some(inverse) if inverse > 0.0 => major_m * (1.0 - inverse.recip()),
             _ => self.get(SEMI_MINOR).unwrap_or(major_m),
         };
-        // Written so that NaN is refused too.
+        // Written so that NaN is rejected too.
         if !((major_m - minor_m).abs() <= SPHERE_M) {
             return Err(refused(
                 "GeogSemiMajorAxis and GeogSemiMinorAxis",

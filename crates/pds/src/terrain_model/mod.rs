@@ -132,7 +132,7 @@ impl Cause for TerrainModelError {
 /// Reads a terrain model of `body` into memory.
 ///
 /// # Errors
-/// The system's refusal to read; what is no such `GeoTIFF`; no radius of the sphere, or two; no height.
+/// The file cannot be read; what is no such `GeoTIFF`; no radius of the sphere, or two; no height.
 pub fn read_terrain_model(path: &Path, body: Body, above: HeightsAbove) -> Result<HeightGrid> {
     let tags = Tags::read(path)?;
     tags.grid(path, body, above).in_file(path)
@@ -231,7 +231,7 @@ impl Tags {
         else {
             return Err(of_scale(&[]));
         };
-        // Written so that NaN is refused too.
+        // Written so that NaN is rejected too.
         let are_sizes = [width, height]
             .iter()
             .all(|of| **of > 0.0 && of.is_finite());

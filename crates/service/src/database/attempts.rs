@@ -22,10 +22,10 @@ pub struct Attempt {
     pub ended_ms: Option<i64>,
 }
 
-/// Notes that an attempt begins; its log is a path below the folder of the state.
+/// Records that an attempt begins; its log is a path below the folder of the state.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn begin_attempt(
     transaction: &Transaction<'_>,
     now_ms: i64,
@@ -40,10 +40,10 @@ pub fn begin_attempt(
     Ok(())
 }
 
-/// Notes the process of an attempt.
+/// Records the process of an attempt.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_process(
     transaction: &Transaction<'_>,
     (job, n): (i64, i64),
@@ -57,10 +57,10 @@ pub fn put_process(
     Ok(())
 }
 
-/// Notes a sign of life.
+/// Records a sign of life.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_beat(
     transaction: &Transaction<'_>,
     now_ms: i64,
@@ -79,7 +79,7 @@ pub fn put_beat(
 /// How an attempt ended.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct AttemptEnd<'a> {
-    /// In words.
+    /// As text.
     pub how: &'a str,
     /// Exit code.
     pub exit: Option<i32>,
@@ -87,10 +87,10 @@ pub struct AttemptEnd<'a> {
     pub signal: Option<i32>,
 }
 
-/// Notes how an attempt ended; the first note stays. Says whether this is the first.
+/// Records how an attempt ended; the first note stays. Returns whether this is the first.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn end_attempt(
     transaction: &Transaction<'_>,
     now_ms: i64,
@@ -107,7 +107,7 @@ pub fn end_attempt(
 /// Attempts of a job, in their order.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn attempts(connection: &Connection, job: i64) -> Stored<Vec<Attempt>> {
     let mut query = connection.prepare_cached("SELECT * FROM attempt WHERE job = ?1 ORDER BY n")?;
     let found = query.query_map([job], attempt_row)?;

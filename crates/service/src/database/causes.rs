@@ -59,7 +59,7 @@ pub struct CauseRow {
     pub old_blake3: Option<String>,
     /// BLAKE3 of its content now.
     pub new_blake3: Option<String>,
-    /// In words.
+    /// As text.
     pub detail: String,
     /// When, milliseconds of UTC since 1970.
     pub at_ms: i64,
@@ -83,7 +83,7 @@ impl CauseRow {
 /// Adds a cause to a job, unless the same file stands there with the same content.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn add_cause(transaction: &Transaction<'_>, job: i64, cause: &CauseRow) -> Stored<()> {
     transaction.execute(
         "INSERT INTO cause (job, kind, path, old_blake3, new_blake3, detail, at_ms)
@@ -99,7 +99,7 @@ pub fn add_cause(transaction: &Transaction<'_>, job: i64, cause: &CauseRow) -> S
 /// Why a job is there, in the order in which the causes came.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn causes(connection: &Connection, job: i64) -> Stored<Vec<CauseRow>> {
     let mut query =
         connection.prepare_cached("SELECT * FROM cause WHERE job = ?1 ORDER BY rowid")?;

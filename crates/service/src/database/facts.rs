@@ -16,7 +16,7 @@ pub const INTENDED_MS: &str = "intended_ms";
 /// A fact.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn fact(connection: &Connection, name: &str) -> Stored<Option<String>> {
     let mut query = connection.prepare_cached("SELECT value FROM fact WHERE name = ?1")?;
     Ok(query.query_row([name], |row| row.get(0)).optional()?)
@@ -25,15 +25,15 @@ pub fn fact(connection: &Connection, name: &str) -> Stored<Option<String>> {
 /// A fact that is a whole number.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn number(connection: &Connection, name: &str) -> Stored<Option<i64>> {
     Ok(fact(connection, name)?.and_then(|text| text.parse().ok()))
 }
 
-/// Notes a fact.
+/// Records a fact.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn note(transaction: &Transaction<'_>, name: &str, value: &str) -> Stored<()> {
     transaction.execute(
         "INSERT INTO fact (name, value) VALUES (?1, ?2) ON CONFLICT (name) DO UPDATE SET value = ?2",

@@ -125,7 +125,7 @@ pub struct RootRow {
 /// Files known below `folder`, by path.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn files_below(connection: &Connection, folder: &str) -> Stored<BTreeMap<String, FileRow>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM file_version WHERE path > ?1 || '/' AND path < ?1 || '0' ORDER BY path",
@@ -138,7 +138,7 @@ pub fn files_below(connection: &Connection, folder: &str) -> Stored<BTreeMap<Str
 /// A file by its path.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn file(connection: &Connection, path: &str) -> Stored<Option<FileRow>> {
     let mut query = connection.prepare_cached("SELECT * FROM file_version WHERE path = ?1")?;
     Ok(query.query_row([path], file_row).optional()?)
@@ -147,7 +147,7 @@ pub fn file(connection: &Connection, path: &str) -> Stored<Option<FileRow>> {
 /// Ready files whose content was found after a round, with the round that found it.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn files_since(connection: &Connection, round: i64) -> Stored<Vec<(String, i64)>> {
     let mut query = connection.prepare_cached(
         "SELECT path, round FROM file_version WHERE round > ?1 AND state = 'ready' ORDER BY path",
@@ -159,7 +159,7 @@ pub fn files_since(connection: &Connection, round: i64) -> Stored<Vec<(String, i
 /// Ready files whose content was read longest ago, before `before_ms`.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn oldest_checked(connection: &Connection, before_ms: i64, limit: u32) -> Stored<Vec<FileRow>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM file_version WHERE state = 'ready' AND checked_ms < ?1 ORDER BY checked_ms, path LIMIT ?2",
@@ -168,10 +168,10 @@ pub fn oldest_checked(connection: &Connection, before_ms: i64, limit: u32) -> St
     Ok(found.collect::<Result<_, _>>()?)
 }
 
-/// Notes a file.
+/// Records a file.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_file(transaction: &Transaction<'_>, file: &FileRow) -> Stored<()> {
     let mut put = transaction.prepare_cached(
         "INSERT OR REPLACE INTO file_version
@@ -200,7 +200,7 @@ pub fn put_file(transaction: &Transaction<'_>, file: &FileRow) -> Stored<()> {
 /// All folders of inputs.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn roots(connection: &Connection) -> Stored<Vec<RootRow>> {
     let mut query = connection.prepare_cached("SELECT * FROM root ORDER BY path")?;
     let found = query.query_map([], |row| {
@@ -225,16 +225,16 @@ pub fn roots(connection: &Connection) -> Stored<Vec<RootRow>> {
 /// Whether a folder of inputs has changed a short time ago.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn any_settling(connection: &Connection) -> Stored<bool> {
     let all = roots(connection)?;
     Ok(all.iter().any(|root| root.state == RootState::Settling))
 }
 
-/// Notes a folder of inputs.
+/// Records a folder of inputs.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_root(transaction: &Transaction<'_>, root: &RootRow) -> Stored<()> {
     transaction.execute(
         "INSERT OR REPLACE INTO root (path, kind, files, state, since_ms, detail) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
@@ -248,7 +248,7 @@ pub fn put_root(transaction: &Transaction<'_>, root: &RootRow) -> Stored<()> {
 /// Forgets the folders that are no longer configured, and the files below them.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn keep_roots(transaction: &Transaction<'_>, configured: &[String]) -> Stored<()> {
     for root in roots(transaction)? {
         if configured.contains(&root.path) {
@@ -273,7 +273,7 @@ pub fn is_below(path: &str, folder: &str) -> bool {
 /// What a kernel covers, by its content.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_coverage(
     transaction: &Transaction<'_>,
     blake3: &str,
@@ -289,7 +289,7 @@ pub fn put_coverage(
 /// Whether it is known what a kernel with this content covers.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn knows_coverage(connection: &Connection, blake3: &str) -> Stored<bool> {
     let mut query = connection.prepare_cached("SELECT 1 FROM kernel_coverage WHERE blake3 = ?1")?;
     Ok(query.exists([blake3])?)

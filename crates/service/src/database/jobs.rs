@@ -127,7 +127,7 @@ pub struct Moved {
 /// changed.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn ask(transaction: &Transaction<'_>, now_ms: i64, ask: &Ask<'_>) -> Stored<Asked> {
     let state = if ask.ready {
         JobState::Queued
@@ -190,7 +190,7 @@ fn join(
 /// Moves a job to another state and notes the event.
 ///
 /// # Errors
-/// [`WrongTransition`] when the table of states has no such way; SQLite's own.
+/// [`WrongTransition`] when the table of states has no such way; SQLite errors.
 pub fn advance(
     transaction: &Transaction<'_>,
     now_ms: i64,
@@ -289,7 +289,7 @@ fn tell(
 /// a job that is not there.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn ask_cancel(transaction: &Transaction<'_>, now_ms: i64, id: i64) -> Stored<Option<JobState>> {
     let Some(found) = job(transaction, id)? else {
         return Ok(None);
@@ -311,7 +311,7 @@ pub fn ask_cancel(transaction: &Transaction<'_>, now_ms: i64, id: i64) -> Stored
 /// The queued job to be taken next: by class, which rises with every hour of waiting, then by age.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn next_queued(connection: &Connection, now_ms: i64, backfill: bool) -> Stored<Option<Job>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM job WHERE state = 'queued' AND not_before_ms <= ?1 AND (priority > 0 OR ?2)
@@ -326,7 +326,7 @@ pub fn next_queued(connection: &Connection, now_ms: i64, backfill: bool) -> Stor
 /// A job by its number.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn job(connection: &Connection, id: i64) -> Stored<Option<Job>> {
     let mut query = connection.prepare_cached("SELECT * FROM job WHERE id = ?1")?;
     Ok(query.query_row([id], read).optional()?)
@@ -335,7 +335,7 @@ pub fn job(connection: &Connection, id: i64) -> Stored<Option<Job>> {
 /// Jobs in one state, the oldest first.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn jobs_in(connection: &Connection, state: JobState) -> Stored<Vec<Job>> {
     let mut query = connection.prepare_cached("SELECT * FROM job WHERE state = ?1 ORDER BY id")?;
     let found = query.query_map([state.name()], read)?;
@@ -345,7 +345,7 @@ pub fn jobs_in(connection: &Connection, state: JobState) -> Stored<Vec<Job>> {
 /// Jobs that have waited for long enough.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn due_waiting(connection: &Connection, now_ms: i64) -> Stored<Vec<Job>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM job WHERE state = 'waiting' AND not_before_ms <= ?1 ORDER BY id",
@@ -357,7 +357,7 @@ pub fn due_waiting(connection: &Connection, now_ms: i64) -> Stored<Vec<Job>> {
 /// The job of a site that a worker is, or may be, at.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn active_job(connection: &Connection, site: &str) -> Stored<Option<Job>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM job WHERE site = ?1 AND state IN ('starting', 'running', 'cancelling')",
@@ -368,7 +368,7 @@ pub fn active_job(connection: &Connection, site: &str) -> Stored<Option<Job>> {
 /// The job of a site that waits for its turn.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn pending_job(connection: &Connection, site: &str) -> Stored<Option<Job>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM job WHERE site = ?1 AND state IN ('held', 'queued', 'waiting', 'blocked')",
@@ -390,7 +390,7 @@ pub struct JobFilter<'a> {
 /// At most `limit` jobs, the newest first.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn jobs(connection: &Connection, filter: &JobFilter<'_>, limit: u32) -> Stored<Vec<Job>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM job WHERE (?1 IS NULL OR site = ?1) AND (?2 IS NULL OR state = ?2) AND (?3 IS NULL OR id < ?3)

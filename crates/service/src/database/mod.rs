@@ -140,7 +140,7 @@ impl Database {
     /// Does `work` as one transaction, on the disk when this returns.
     ///
     /// # Errors
-    /// What `work` gives, and then nothing is written; or SQLite's own.
+    /// What `work` gives, and then nothing is written; or SQLite errors.
     pub fn write<T>(&self, work: impl FnOnce(&Transaction<'_>) -> Stored<T>) -> Stored<T> {
         let mut writer = lock(&self.writer);
         let transaction = writer.transaction_with_behavior(TransactionBehavior::Immediate)?;
@@ -152,7 +152,7 @@ impl Database {
     /// Does `look` on one state of the database.
     ///
     /// # Errors
-    /// What `look` gives, or SQLite's own.
+    /// What `look` gives, or SQLite errors.
     pub fn read<T>(&self, look: impl FnOnce(&Connection) -> Stored<T>) -> Stored<T> {
         let idle = lock(&self.readers).pop();
         let mut reader = match idle {
@@ -172,7 +172,7 @@ impl Database {
     /// Writes the log of the database back into it and shortens the log; readers at work may keep a part of it.
     ///
     /// # Errors
-    /// SQLite's own.
+    /// SQLite errors.
     pub fn checkpoint(&self) -> Stored<()> {
         let writer = lock(&self.writer);
         writer.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()))?;
@@ -182,7 +182,7 @@ impl Database {
     /// Copies the database, as it is at one instant, to `path`, where nothing may be.
     ///
     /// # Errors
-    /// SQLite's own.
+    /// SQLite errors.
     pub fn copy_to(&self, path: &Path) -> Stored<()> {
         copy(&lock(&self.writer), path)
     }

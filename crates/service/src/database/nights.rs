@@ -65,10 +65,10 @@ impl Night {
     }
 }
 
-/// Notes a night; of two with the same instant the first stays, and then there is no number.
+/// Records a night; of two with the same instant the first stays, and then there is no number.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_night(
     transaction: &Transaction<'_>,
     due_ms: i64,
@@ -86,7 +86,7 @@ pub fn put_night(
 /// The night that has begun and is not over.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn open_night(connection: &Connection) -> Stored<Option<Night>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM night WHERE started_ms IS NOT NULL AND ended_ms IS NULL ORDER BY id DESC LIMIT 1",
@@ -97,16 +97,16 @@ pub fn open_night(connection: &Connection) -> Stored<Option<Night>> {
 /// A night by its number.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn night(connection: &Connection, id: i64) -> Stored<Option<Night>> {
     let mut query = connection.prepare_cached("SELECT * FROM night WHERE id = ?1")?;
     Ok(query.query_row([id], night_row).optional()?)
 }
 
-/// Notes how many sites were compared in a night.
+/// Records how many sites were compared in a night.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_night_checked(transaction: &Transaction<'_>, id: i64, sites: usize) -> Stored<()> {
     transaction.execute(
         "UPDATE night SET sites_checked = ?2 WHERE id = ?1",
@@ -118,7 +118,7 @@ pub fn put_night_checked(transaction: &Transaction<'_>, id: i64, sites: usize) -
 /// Whether jobs of a night are still to be done.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn night_at_work(connection: &Connection, id: i64) -> Stored<bool> {
     let mut query = connection.prepare_cached(
         "SELECT 1 FROM job WHERE night = ?1 AND state IN ('queued', 'starting', 'running', 'cancelling', 'waiting')",
@@ -129,7 +129,7 @@ pub fn night_at_work(connection: &Connection, id: i64) -> Stored<bool> {
 /// Ends a night and counts what came of it.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn end_night(transaction: &Transaction<'_>, id: i64, now_ms: i64) -> Stored<Option<Night>> {
     transaction.execute(
         "UPDATE night SET ended_ms = ?2,

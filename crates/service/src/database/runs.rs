@@ -49,7 +49,7 @@ pub struct RunRow {
 /// Whether a run of the site has this manifest, by its BLAKE3.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn is_run(connection: &Connection, site: &str, manifest_blake3: &str) -> Stored<bool> {
     let mut query = connection.prepare_cached(
         "SELECT EXISTS (SELECT 1 FROM run WHERE site = ?1 AND manifest_blake3 = ?2)",
@@ -57,10 +57,10 @@ pub fn is_run(connection: &Connection, site: &str, manifest_blake3: &str) -> Sto
     Ok(query.query_row([site, manifest_blake3], |row| row.get(0))?)
 }
 
-/// Notes a run; one that is known stays as it is.
+/// Records a run; one that is known stays as it is.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_run(transaction: &Transaction<'_>, run: &RunRow) -> Stored<()> {
     transaction.execute(
         "INSERT OR IGNORE INTO run
@@ -90,10 +90,10 @@ pub fn put_run(transaction: &Transaction<'_>, run: &RunRow) -> Stored<()> {
     Ok(())
 }
 
-/// Notes which run readers of a site get.
+/// Records which run readers of a site get.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_current(
     transaction: &Transaction<'_>,
     site: &str,
@@ -107,10 +107,10 @@ pub fn put_current(
     Ok(())
 }
 
-/// Notes what a comparison with the predecessor found.
+/// Records what a comparison with the predecessor found.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_moved(transaction: &Transaction<'_>, run: &str, moved: &Value) -> Stored<()> {
     transaction.execute(
         "UPDATE run SET moved = ?2 WHERE id = ?1",
@@ -119,10 +119,10 @@ pub fn put_moved(transaction: &Transaction<'_>, run: &str, moved: &Value) -> Sto
     Ok(())
 }
 
-/// Notes that the products of a run were removed.
+/// Records that the products of a run were removed.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_removed(transaction: &Transaction<'_>, run: &str, now_ms: i64) -> Stored<()> {
     transaction.execute(
         "UPDATE run SET removed_ms = ?2 WHERE id = ?1",
@@ -134,7 +134,7 @@ pub fn put_removed(transaction: &Transaction<'_>, run: &str, now_ms: i64) -> Sto
 /// A run by its identifier.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn run(connection: &Connection, id: &str) -> Stored<Option<RunRow>> {
     let mut query = connection.prepare_cached("SELECT * FROM run WHERE id = ?1")?;
     Ok(query.query_row([id], run_row).optional()?)
@@ -143,7 +143,7 @@ pub fn run(connection: &Connection, id: &str) -> Stored<Option<RunRow>> {
 /// Runs of a site whose products are there, the newest first.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn kept_runs(connection: &Connection, site: &str) -> Stored<Vec<RunRow>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM run WHERE site = ?1 AND removed_ms IS NULL ORDER BY published_ms DESC, id DESC",
@@ -155,7 +155,7 @@ pub fn kept_runs(connection: &Connection, site: &str) -> Stored<Vec<RunRow>> {
 /// Runs that have a predecessor and were not compared with it.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn uncompared_runs(connection: &Connection) -> Stored<Vec<RunRow>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM run WHERE moved IS NULL AND valid AND removed_ms IS NULL AND predecessor IS NOT NULL ORDER BY id",

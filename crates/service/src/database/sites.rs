@@ -34,7 +34,7 @@ pub struct SiteRow {
 /// All sites, by name.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn sites(connection: &Connection) -> Stored<Vec<SiteRow>> {
     let mut query = connection.prepare_cached("SELECT * FROM site ORDER BY name")?;
     let found = query.query_map([], site_row)?;
@@ -44,16 +44,16 @@ pub fn sites(connection: &Connection) -> Stored<Vec<SiteRow>> {
 /// A site by its name.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn site(connection: &Connection, name: &str) -> Stored<Option<SiteRow>> {
     let mut query = connection.prepare_cached("SELECT * FROM site WHERE name = ?1")?;
     Ok(query.query_row([name], site_row).optional()?)
 }
 
-/// Notes that a site has this file; a site that was switched off is planned anew.
+/// Records that a site has this file; a site that was switched off is planned anew.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_site(transaction: &Transaction<'_>, name: &str, file: &str) -> Stored<()> {
     transaction.execute(
         "INSERT INTO site (name, file, config_blake3, enabled) VALUES (?1, ?2, '', 1)
@@ -64,10 +64,10 @@ pub fn put_site(transaction: &Transaction<'_>, name: &str, file: &str) -> Stored
     Ok(())
 }
 
-/// Notes that a site has no file any more.
+/// Records that a site has no file any more.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn disable_site(transaction: &Transaction<'_>, name: &str) -> Stored<()> {
     let note = "its site file was removed";
     transaction.execute(
@@ -90,14 +90,14 @@ pub struct Checked<'a> {
     pub bounds_deg: Option<[f64; 4]>,
     /// Why it cannot be planned.
     pub problem: Option<&'a str>,
-    /// In words.
+    /// As text.
     pub note: &'a str,
 }
 
-/// Notes what was found of a site.
+/// Records what was found of a site.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_checked(transaction: &Transaction<'_>, name: &str, checked: &Checked<'_>) -> Stored<()> {
     let bounds = checked.bounds_deg;
     let bound = |index: usize| bounds.map(|bounds| bounds[index]);
@@ -121,10 +121,10 @@ pub fn put_checked(transaction: &Transaction<'_>, name: &str, checked: &Checked<
     Ok(())
 }
 
-/// Notes that sites were compared and need no plan.
+/// Records that sites were compared and need no plan.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_unchanged(
     transaction: &Transaction<'_>,
     names: &[&str],
@@ -140,10 +140,10 @@ pub fn put_unchanged(
     Ok(())
 }
 
-/// Notes since when and why a site's products are not those of its inputs; the first instant stays.
+/// Records since when and why a site's products are not those of its inputs; the first instant stays.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_stale(
     transaction: &Transaction<'_>,
     name: &str,
@@ -158,10 +158,10 @@ pub fn put_stale(
     Ok(())
 }
 
-/// Notes that a site's products are those of its inputs.
+/// Records that a site's products are those of its inputs.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_fresh(transaction: &Transaction<'_>, name: &str) -> Stored<()> {
     transaction.execute(
         "UPDATE site SET stale_since_ms = NULL, stale_because = NULL, problem = NULL WHERE name = ?1",
@@ -184,7 +184,7 @@ pub struct SiteInput {
 /// Files that each site reads, by site.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn inputs_by_site(connection: &Connection) -> Stored<BTreeMap<String, Vec<SiteInput>>> {
     let mut query = connection.prepare_cached("SELECT * FROM site_input ORDER BY site, path")?;
     let mut rows = query.query([])?;
@@ -201,7 +201,7 @@ pub fn inputs_by_site(connection: &Connection) -> Stored<BTreeMap<String, Vec<Si
 /// Files that one site reads.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn inputs_of(connection: &Connection, site: &str) -> Stored<Vec<SiteInput>> {
     let mut query =
         connection.prepare_cached("SELECT * FROM site_input WHERE site = ?1 ORDER BY path")?;
@@ -209,10 +209,10 @@ pub fn inputs_of(connection: &Connection, site: &str) -> Stored<Vec<SiteInput>> 
     Ok(found.collect::<Result<_, _>>()?)
 }
 
-/// Notes which files a site reads.
+/// Records which files a site reads.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_inputs(transaction: &Transaction<'_>, site: &str, inputs: &[SiteInput]) -> Stored<()> {
     transaction.execute("DELETE FROM site_input WHERE site = ?1", [site])?;
     let mut put = transaction.prepare_cached(
@@ -227,7 +227,7 @@ pub fn put_inputs(transaction: &Transaction<'_>, site: &str, inputs: &[SiteInput
 /// Sites of which a file has another content than they were planned with, or has gone, with these files.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn changed_inputs(connection: &Connection) -> Stored<BTreeMap<String, Vec<String>>> {
     let mut query = connection.prepare_cached(
         "SELECT i.site, i.path FROM file_version f JOIN site_input i ON i.path = f.path

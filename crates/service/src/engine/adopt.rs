@@ -142,7 +142,7 @@ fn note<W: Workers>(core: &Core<W>, published: &Published) -> Stored<()> {
 /// Numbers of jobs that runs on the disk bear are not given again.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn after_job(transaction: &Transaction<'_>, job: i64) -> Stored<()> {
     transaction.execute(
         "INSERT INTO sqlite_sequence (name, seq) SELECT 'job', 0 WHERE NOT EXISTS (SELECT 1 FROM sqlite_sequence WHERE name = 'job')",

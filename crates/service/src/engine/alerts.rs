@@ -22,14 +22,14 @@ pub struct Alert<'a> {
     pub site: Option<&'a str>,
     /// The run that it concerns.
     pub run: Option<&'a str>,
-    /// In words.
+    /// As text.
     pub text: &'a str,
 }
 
 /// Tells people: as an event, and by a letter to each hook that wants this kind.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn tell(
     transaction: &Transaction<'_>,
     config: &ServiceConfig,
@@ -84,7 +84,7 @@ pub enum Standing {
 /// Tells of a site when it stands otherwise than before.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn tell_standing(
     transaction: &Transaction<'_>,
     config: &ServiceConfig,
@@ -117,7 +117,7 @@ pub fn tell_standing(
 /// Tells that something is wrong, or with another kind that it is well again, when it was otherwise before.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn tell_edge(
     transaction: &Transaction<'_>,
     config: &ServiceConfig,

@@ -246,7 +246,7 @@ pub async fn follow<W: Workers>(core: Arc<Core<W>>, taken: Taken) -> Option<RunR
     }
 }
 
-/// Notes what a worker says; a line that cannot be noted is lost, its work is not.
+/// Records what a worker says; a line that cannot be noted is lost, its work is not.
 fn hear<W: Workers>(core: &Core<W>, attempt: &mut Attempt, heard: Heard<'_>) {
     let now_ms = core.now_ms();
     let at = (attempt.job, attempt.n);

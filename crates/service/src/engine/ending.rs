@@ -223,7 +223,7 @@ fn noted<W: Workers>(
     ))
 }
 
-/// Notes a run; the state and outcome of its job.
+/// Records a run; the state and outcome of its job.
 fn after_run(
     transaction: &Transaction<'_>,
     now_ms: i64,

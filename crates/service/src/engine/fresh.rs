@@ -21,10 +21,10 @@ use crate::{
 };
 use areograph_config::{AlertKind, ServiceConfig};
 
-/// Notes of one site, or of all, whether it is fresh.
+/// Records of one site, or of all, whether it is fresh.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn refresh(transaction: &Transaction<'_>, now_ms: i64, only: Option<&str>) -> Stored<()> {
     let sites = match only {
         Some(name) => site(transaction, name)?.into_iter().collect(),
@@ -115,7 +115,7 @@ fn hours_ms(hours: f64) -> i64 {
 /// Tells, once, of sites that have been stale, or were not compared, for too long.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn tell_stale(
     transaction: &Transaction<'_>,
     config: &ServiceConfig,

@@ -40,7 +40,7 @@ impl NotReady {
 /// Looks at all sites.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn not_ready(connection: &Connection) -> Stored<NotReady> {
     let mut found = NotReady::default();
     let mut query = connection.prepare_cached(
@@ -98,7 +98,7 @@ fn changed_below(connection: &Connection, site: &str, root: &str) -> Stored<Opti
 /// Holds a queued job.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn hold(transaction: &Transaction<'_>, now_ms: i64, job: &Job, why: &str) -> Stored<()> {
     tracing::info!(site = job.site, job = job.id, "held: {why}");
     let moved = Moved {
@@ -111,7 +111,7 @@ pub fn hold(transaction: &Transaction<'_>, now_ms: i64, job: &Job, why: &str) ->
 /// Holds queued jobs whose inputs cannot be used, and releases those that can go on.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn hold_and_release(
     transaction: &Transaction<'_>,
     now_ms: i64,
@@ -141,7 +141,7 @@ pub fn hold_and_release(
 /// and none of their inputs has changed. So do those whose inputs are not known.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn wake_blocked(transaction: &Transaction<'_>, now_ms: i64, root: &str) -> Stored<()> {
     let mut query = transaction.prepare_cached(
         "SELECT NOT EXISTS (SELECT 1 FROM site_input WHERE site = ?1) OR EXISTS (SELECT 1 FROM site_input

@@ -19,7 +19,7 @@ const UNFINISHED: [&str; 5] = [".part", ".partial", ".tmp", ".filepart", ".crdow
 /// Files below a folder by path; those that are being transferred are left out.
 ///
 /// # Errors
-/// Why the folder could not be listed whole, in words.
+/// Why the folder could not be listed whole, as text.
 pub fn read_list(
     list: &Path,
     root: &Path,

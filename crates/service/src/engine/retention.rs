@@ -63,7 +63,7 @@ pub fn superfluous<'a>(
     superfluous
 }
 
-/// Removes a few runs that need not be kept. Says whether there are more.
+/// Removes a few runs that need not be kept. Returns whether there are more.
 ///
 /// # Errors
 /// The database cannot be written.

@@ -62,7 +62,7 @@ impl Cause for Foreign {
 /// Reads a run, every product checked against its manifest.
 ///
 /// # Errors
-/// It is not whole, or is another one's; the disk's refusal.
+/// It is not whole, or is another one's; a disk error.
 pub fn read_run(folder: &Path) -> Result<Published> {
     let path = folder.join(RUN_RECORD);
     let read = |path: &Path| fs::read(path).map_err(IoError::on("read")).in_file(path);
@@ -99,7 +99,7 @@ pub fn current(site_folder: &Path) -> Option<String> {
 /// Makes a run the one that readers get: at every instant there is the old one or the new one.
 ///
 /// # Errors
-/// The disk's refusal.
+/// A disk error.
 pub fn make_current(site_folder: &Path, run: &str) -> Result<()> {
     let fresh = site_folder.join(format!(".{CURRENT}-{run}"));
     let _ = fs::remove_file(&fresh);
@@ -157,7 +157,7 @@ pub fn finished_ms(manifest: &Manifest) -> Option<i64> {
 /// Folders of runs of a site that were published, by name; of those that were not, nothing is left.
 ///
 /// # Errors
-/// The disk's refusal.
+/// A disk error.
 pub fn tidy(site_folder: &Path) -> Result<Vec<PathBuf>> {
     let runs = site_folder.join("runs");
     let mut published = Vec::new();

@@ -28,7 +28,7 @@ const KERNELS: [&str; 10] = [
     "bc", "bsp", "bpc", "tls", "tsc", "tpc", "tf", "ti", "bds", "tk",
 ];
 
-/// Reads files that have settled, and notes what they are. Those that cannot be read now stay as they are.
+/// Reads files that have settled, and records what they are. Those that cannot be read now stay as they are.
 ///
 /// # Errors
 /// The database cannot be written.
@@ -202,7 +202,7 @@ async fn probe_together<W: Workers>(
     Ok(problems)
 }
 
-/// Has kernels opened, and notes what they cover; why each cannot be used, or why there is no answer.
+/// Has kernels opened, and records what they cover; why each cannot be used, or why there is no answer.
 async fn probe<W: Workers>(
     core: &Arc<Core<W>>,
     number: usize,

@@ -145,7 +145,7 @@ impl SiteBook {
 /// Brings the sites of the database in line with the site files below `roots`.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn bring_in_line(
     transaction: &Transaction<'_>,
     now_ms: i64,

@@ -144,7 +144,7 @@ impl<W: Workers> Engine<W> {
         self.tasks.is_empty()
     }
 
-    /// Begins a night now, whatever the schedule says, and gives its number. Files that settle are waited for: there is no later
+    /// Begins a night now, whatever the schedule says, and returns its number. Files that settle are waited for: there is no later
     /// sweep.
     ///
     /// # Errors

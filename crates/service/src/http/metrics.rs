@@ -49,7 +49,7 @@ impl Metrics {
         }
     }
 
-    /// Notes a request; `route` is one of ours, with its parameters by name.
+    /// Records a request; `route` is one of ours, with its parameters by name.
     pub(super) fn note(&self, method: &'static str, route: &str, status: u16, took: Duration) {
         let labels = Labels {
             method,

@@ -57,7 +57,7 @@ pub fn newest(runs: &Path) -> Option<PathBuf> {
 /// Removes a run, or what there is of one.
 ///
 /// # Errors
-/// The disk's refusal.
+/// A disk error.
 pub fn remove(run_folder: &Path) -> Result<()> {
     make(run_folder, WRITABLE)?;
     fs::remove_dir_all(run_folder)
@@ -70,7 +70,7 @@ pub fn remove(run_folder: &Path) -> Result<()> {
 /// Returns the BLAKE3 of the manifest, and whether there is a new run: none when the newest holds just this manifest.
 ///
 /// # Errors
-/// Another run is at work in the site's folder, or has published; the disk's refusal. Nothing stands under the name then.
+/// Another run is at work in the site's folder, or has published; a disk error. Nothing stands under the name then.
 pub fn keep(
     site_folder: &Path,
     manifest: &Manifest,

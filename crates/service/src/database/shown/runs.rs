@@ -54,7 +54,7 @@ pub struct Run {
 /// A run by its identifier.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn run(connection: &Connection, id: &str) -> Stored<Option<Run>> {
     let mut query = connection.prepare_cached("SELECT * FROM run WHERE id = ?1")?;
     Ok(query.query_row([id], read).optional()?)
@@ -63,7 +63,7 @@ pub fn run(connection: &Connection, id: &str) -> Stored<Option<Run>> {
 /// At most `limit` runs of a site, the newest first, published before the run `before` where one is named.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn runs_of_site(
     connection: &Connection,
     site: &str,
@@ -82,7 +82,7 @@ pub fn runs_of_site(
 /// At most `limit` runs that jobs of a night published.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn runs_of_night(connection: &Connection, night: i64, limit: u32) -> Stored<Vec<Run>> {
     let mut query = connection.prepare_cached(
         "SELECT run.* FROM job JOIN run ON run.job = job.id WHERE job.night = ?1 ORDER BY run.site LIMIT ?2",
@@ -94,7 +94,7 @@ pub fn runs_of_night(connection: &Connection, night: i64, limit: u32) -> Stored<
 /// At most `limit` runs that a job published.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn runs_of_job(connection: &Connection, job: i64, limit: u32) -> Stored<Vec<Run>> {
     let mut query = connection
         .prepare_cached("SELECT * FROM run WHERE job = ?1 ORDER BY attempt DESC LIMIT ?2")?;
@@ -102,10 +102,10 @@ pub fn runs_of_job(connection: &Connection, job: i64, limit: u32) -> Stored<Vec<
     Ok(found.collect::<Result<_, _>>()?)
 }
 
-/// Keeps a run for good, or no longer. Says whether there is such a run.
+/// Keeps a run for good, or no longer. Returns whether there is such a run.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn pin_run(transaction: &Transaction<'_>, id: &str, pinned: bool) -> Stored<bool> {
     let change = "UPDATE run SET pinned = ?2 WHERE id = ?1";
     Ok(transaction.execute(change, params![id, pinned])? > 0)

@@ -54,7 +54,7 @@ const SELECT: &str = "
 /// At most `limit` sites after the one named `after`, by name.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn sites(connection: &Connection, after: &str, limit: u32) -> Stored<Vec<Site>> {
     let mut query = connection.prepare_cached(&format!(
         "{SELECT} WHERE s.name > ?1 ORDER BY s.name LIMIT ?2"
@@ -66,7 +66,7 @@ pub fn sites(connection: &Connection, after: &str, limit: u32) -> Stored<Vec<Sit
 /// A site by its name.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn site(connection: &Connection, name: &str) -> Stored<Option<Site>> {
     let mut query = connection.prepare_cached(&format!("{SELECT} WHERE s.name = ?1"))?;
     Ok(query.query_row([name], read).optional()?)
@@ -75,7 +75,7 @@ pub fn site(connection: &Connection, name: &str) -> Stored<Option<Site>> {
 /// How many sites there are, and how many of them are stale.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn count_sites(connection: &Connection) -> Stored<(i64, i64)> {
     let counts = "SELECT count(*), count(stale_since_ms) FROM site WHERE enabled";
     Ok(connection.query_row(counts, [], |row| Ok((row.get(0)?, row.get(1)?)))?)
@@ -118,7 +118,7 @@ fn read(row: &Row<'_>) -> rusqlite::Result<Site> {
 /// The site file of a site.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn site_file(connection: &Connection, name: &str) -> Stored<Option<String>> {
     let mut query = connection.prepare_cached("SELECT file FROM site WHERE name = ?1")?;
     Ok(query.query_row([name], |row| row.get(0)).optional()?)
@@ -127,7 +127,7 @@ pub fn site_file(connection: &Connection, name: &str) -> Stored<Option<String>> 
 /// Sites with the runs that are current.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn current_runs(connection: &Connection) -> Stored<Vec<(String, String)>> {
     let mut query = connection.prepare_cached(
         "SELECT name, current_run FROM site WHERE current_run IS NOT NULL ORDER BY name",

@@ -45,7 +45,7 @@ pub struct Attempt {
 /// The attempts of a job, at most the newest `limit`, the newest first.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn attempts(connection: &Connection, job: i64, limit: u32) -> Stored<Vec<Attempt>> {
     let mut query = connection
         .prepare_cached("SELECT * FROM attempt WHERE job = ?1 ORDER BY n DESC LIMIT ?2")?;
@@ -72,7 +72,7 @@ pub fn attempts(connection: &Connection, job: i64, limit: u32) -> Stored<Vec<Att
 /// At most `limit` jobs of a night.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn jobs_of_night(connection: &Connection, night: i64, limit: u32) -> Stored<Vec<Job>> {
     let mut query = connection
         .prepare_cached("SELECT id FROM job WHERE night = ?1 ORDER BY site, id LIMIT ?2")?;
@@ -98,7 +98,7 @@ pub struct Totals {
 /// Counts jobs, runs and alerts.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn totals(connection: &Connection) -> Stored<Totals> {
     let mut query = connection.prepare_cached("SELECT state, count(*) FROM job GROUP BY state")?;
     let found = query.query_map([], |row| Ok((row.get::<_, String>(0)?, row.get(1)?)))?;
@@ -119,7 +119,7 @@ pub fn totals(connection: &Connection) -> Stored<Totals> {
 /// When the last night that was not missed ended.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn last_complete_night_ms(connection: &Connection) -> Stored<Option<i64>> {
     let newest = "SELECT ended_ms FROM night WHERE ended_ms IS NOT NULL AND how != 'missed' ORDER BY id DESC LIMIT 1";
     Ok(connection

@@ -143,7 +143,7 @@ struct JobCause {
     old_blake3: Option<String>,
     /// BLAKE3 of its content now.
     new_blake3: Option<String>,
-    /// In words.
+    /// As text.
     detail: String,
     /// When.
     at_utc: Instant,

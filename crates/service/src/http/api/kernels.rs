@@ -33,7 +33,7 @@ struct Kernel {
     blake3: Option<String>,
     /// `settling`, `ready`, `bad` or `gone`.
     state: String,
-    /// Why, in words.
+    /// Why, as text.
     detail: String,
     /// When it was first seen.
     first_seen_utc: Instant,
