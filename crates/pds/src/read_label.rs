@@ -1,4 +1,4 @@
-//! Labels of images of all cameras that are known: each is read by the rules of its mission.
+//! Labels of images of all known cameras: each is read by the rules of its mission.
 
 use std::{
     fs::File,
@@ -57,8 +57,8 @@ impl Labelled {
     }
 }
 
-/// Reads a PDS3 label (attached or detached) or an ISIS label of an image by one of `cameras`; of a file whose rows have
-/// times of their own these too.
+/// Reads a PDS3 label (attached or detached) or an ISIS label of an image by one of `cameras`; also the line times of a
+/// file whose rows contain them.
 ///
 /// # Errors
 /// The file cannot be read; no label, or a cut one; an instrument that is not among `cameras`, or none; an image of
@@ -81,8 +81,8 @@ pub fn read_label(path: &Path, cameras: &[Instrument]) -> Result<ImageLabel> {
     }
 }
 
-/// The product that a name begins with: `E0202855` of `E02-02855`, `H5270_0000_IR2` of `h5270_0000_ir2.img`; `None` for a
-/// name that names no product.
+/// The product at the start of a name: `E0202855` of `E02-02855`, `H5270_0000_IR2` of `h5270_0000_ir2.img`; `None` if
+/// the name contains no product.
 #[must_use]
 pub fn product_named(name: &str) -> Option<String> {
     hrsc::product_named(name).or_else(|| moc::product_named(name))

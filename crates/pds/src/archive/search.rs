@@ -294,7 +294,7 @@ impl Search<'_> {
         failures
     }
 
-    /// Reads the pieces; those of failed files are skipped.
+    /// Reads the pieces; `None` for those of failed files.
     fn read(
         &mut self,
         pieces: &[Piece],

@@ -1,4 +1,4 @@
-//! Rows that are shots, and every way in which one is none.
+//! Valid rows, and every kind of invalid row.
 
 use std::{fs::File, io::Write as _};
 
