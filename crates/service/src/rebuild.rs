@@ -17,7 +17,7 @@ use super::{
 };
 use areograph_base::error::{IoError, Locate as _, Result};
 
-/// What was found.
+/// The runs found.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Rebuilt {
     /// Sites with runs.
@@ -26,8 +26,8 @@ pub struct Rebuilt {
     pub runs: usize,
 }
 
-/// Moves the database in `state` aside and makes a new one, with the runs of every site below `products`. Jobs, events and tokens are lost; sites are
-/// switched on by the next sweep that finds their files.
+/// Moves the database in `state` aside and creates a new one, with the runs of every site below `products`. Jobs,
+/// events and tokens are lost; the next sweep that finds the files of sites enables them.
 ///
 /// # Errors
 /// A disk error.

@@ -1,4 +1,4 @@
-//! Tokens of people and programs: `areo_<id>_<secret>`, of which the database keeps the hash of the secret alone.
+//! Tokens of people and programs: `areo_<id>_<secret>`, of which the database stores only the hash of the secret.
 
 use std::{fmt, str::FromStr};
 
@@ -10,18 +10,18 @@ use utoipa::ToSchema;
 
 use super::database::{DatabaseError, Stored};
 
-/// How every token begins.
+/// Start of every token.
 pub const PREFIX: &str = "areo_";
 const ID_BYTES: usize = 4;
 const SECRET_BYTES: usize = 32;
 
-/// What the bearer of a token may do.
+/// Permissions of a token's bearer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
-    /// Look.
+    /// Read.
     Read,
-    /// Look, start and cancel jobs, pin runs.
+    /// Read, start and cancel jobs, pin runs.
     Operate,
 }
 
@@ -42,7 +42,7 @@ impl fmt::Display for Role {
     }
 }
 
-/// A word that names no role.
+/// An unknown name of a role.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("unknown role {0}; expected read or operate")]
 pub struct UnknownRole(String);
@@ -63,13 +63,13 @@ impl FromStr for Role {
 pub struct Token {
     /// Its public part.
     pub id: String,
-    /// What its bearer may do.
+    /// Role of its bearer.
     pub role: Role,
-    /// What it is for.
+    /// Its purpose.
     pub note: String,
-    /// When it was made, milliseconds of UTC since 1970.
+    /// When it was created, milliseconds of UTC since 1970.
     pub created_ms: i64,
-    /// When it ends.
+    /// When it expires.
     pub expires_ms: Option<i64>,
     /// When it was revoked.
     pub revoked_ms: Option<i64>,
@@ -78,14 +78,14 @@ pub struct Token {
 }
 
 impl Token {
-    /// Whether it still opens anything.
+    /// Whether it is still valid.
     #[must_use]
     pub fn is_valid(&self, now_ms: i64) -> bool {
         self.revoked_ms.is_none() && self.expires_ms.is_none_or(|end| now_ms < end)
     }
 }
 
-/// Makes a token and gives it whole, for the only time.
+/// Creates a token and returns it with its secret, the only time that it is available.
 ///
 /// # Errors
 /// SQLite errors; the system has no random numbers.
@@ -104,7 +104,7 @@ pub fn add_token(
     Ok(format!("{PREFIX}{id}_{secret}"))
 }
 
-/// All tokens, also those that have ended, oldest first.
+/// All tokens, including expired and revoked ones, oldest first.
 ///
 /// # Errors
 /// SQLite errors.
@@ -114,7 +114,7 @@ pub fn tokens(connection: &Connection) -> Stored<Vec<Token>> {
     Ok(found.collect::<Result<_, _>>()?)
 }
 
-/// Ends a token and the sessions that it began. Returns whether there was such a token.
+/// Revokes a token and ends the sessions that it opened. Returns whether the token exists.
 ///
 /// # Errors
 /// SQLite errors.
@@ -127,7 +127,7 @@ pub fn revoke_token(transaction: &Transaction<'_>, now_ms: i64, id: &str) -> Sto
     Ok(revoked > 0)
 }
 
-/// The token whose text somebody shows, if it is one of ours and still valid. Takes the same work for one that is unknown.
+/// The token with this text, if it is known and still valid. An unknown token takes the same time.
 ///
 /// # Errors
 /// SQLite errors.
@@ -215,7 +215,7 @@ mod tests {
         assert_eq!(token.role, Role::Operate);
         assert!(find(DAY_MS - 1, &short).is_some());
         assert!(find(DAY_MS, &short).is_none());
-        // One secret under another's name, a digit less, none at all.
+        // One secret under another's identifier, a missing digit, no secret.
         let (id, secret) = split(&text).unwrap();
         let forged = format!("{PREFIX}{}_{secret}", split(&short).unwrap().0);
         let unknown = format!("{PREFIX}00000000_{secret}");

@@ -1,5 +1,5 @@
-//! Bounds on position, time and file of shots from the conditions of a query. They never exclude a row that the query
-//! accepts, since the query tests every row again.
+//! Bounds on position, time and file of shots from the conditions of a query. They are never narrower than the
+//! conditions; the query tests every row again.
 
 use std::{collections::BTreeSet, iter};
 

@@ -1,10 +1,10 @@
-//! What people are told: edges, and letters to hooks that are not delivered yet.
+//! Alerts: state changes, and undelivered letters to hooks.
 
 use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
 
 use super::Stored;
 
-/// Records the state of a subject, and gives the former one where it was another; none for a subject that is new.
+/// Records the state of a subject, and returns the former one if it differs; `None` for a new subject.
 ///
 /// # Errors
 /// SQLite errors.
@@ -31,14 +31,14 @@ pub fn put_alert_state(
     Ok(before.map_or(Edge::First, Edge::From))
 }
 
-/// How a subject came to its state.
+/// The transition of a subject to its state.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Edge {
-    /// It was in it before.
+    /// It was already in this state.
     None,
-    /// Nothing was known of it.
+    /// It had no recorded state.
     First,
-    /// It was in this one.
+    /// It was in this other state.
     From(String),
 }
 
@@ -51,7 +51,7 @@ pub struct Letter {
     pub hook: i64,
     /// JSON.
     pub body: String,
-    /// Times that it was tried.
+    /// Number of delivery attempts.
     pub tries: i64,
 }
 
@@ -104,7 +104,7 @@ pub fn put_delivered(transaction: &Transaction<'_>, id: i64, now_ms: i64) -> Sto
     Ok(())
 }
 
-/// Records that a letter could not be delivered, and when it is tried again.
+/// Records that a letter could not be delivered, and the time of the next attempt.
 ///
 /// # Errors
 /// SQLite errors.

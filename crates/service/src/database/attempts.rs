@@ -1,4 +1,4 @@
-//! Attempts: worker processes, one after the other, of a job.
+//! Attempts: the worker processes of a job, one after the other.
 
 use rusqlite::{Connection, Row, Transaction, params};
 
@@ -12,9 +12,9 @@ pub struct Attempt {
     pub job: i64,
     /// Its number in the job, from 1.
     pub n: i64,
-    /// Its process, once that was started.
+    /// Its process, once started.
     pub process: Option<ProcessIdentity>,
-    /// The stage at work when last heard.
+    /// The last reported stage.
     pub stage: Option<String>,
     /// When it began, milliseconds of UTC since 1970.
     pub started_ms: i64,
@@ -22,7 +22,7 @@ pub struct Attempt {
     pub ended_ms: Option<i64>,
 }
 
-/// Records that an attempt begins; its log is a path below the folder of the state.
+/// Records the start of an attempt; its log is a path below the state folder.
 ///
 /// # Errors
 /// SQLite errors.
@@ -57,7 +57,7 @@ pub fn put_process(
     Ok(())
 }
 
-/// Records a sign of life.
+/// Records a heartbeat.
 ///
 /// # Errors
 /// SQLite errors.
@@ -87,7 +87,7 @@ pub struct AttemptEnd<'a> {
     pub signal: Option<i32>,
 }
 
-/// Records how an attempt ended; the first note stays. Returns whether this is the first.
+/// Records how an attempt ended; the first record stays. Returns whether this is the first.
 ///
 /// # Errors
 /// SQLite errors.
@@ -104,7 +104,7 @@ pub fn end_attempt(
     Ok(noted > 0)
 }
 
-/// Attempts of a job, in their order.
+/// Attempts of a job, in order.
 ///
 /// # Errors
 /// SQLite errors.

@@ -1,4 +1,4 @@
-//! What happened, in order.
+//! Events, in order.
 
 use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
 use serde::Serialize;
@@ -7,7 +7,7 @@ use utoipa::ToSchema;
 
 use super::Stored;
 
-/// Something that happened.
+/// An event.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Event {
     /// Its number; later events have larger ones.
@@ -22,11 +22,11 @@ pub struct Event {
     pub job: Option<i64>,
     /// The run that it concerns.
     pub run: Option<String>,
-    /// More, by its kind.
+    /// Further data, by its kind.
     pub data: Value,
 }
 
-/// What an event concerns.
+/// Subject of an event.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct About<'a> {
     /// The site.

@@ -1,4 +1,4 @@
-//! Small facts by name.
+//! Named values.
 
 use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
 
@@ -6,14 +6,14 @@ use super::Stored;
 
 /// Number of the newest round of comparisons.
 pub const ROUND: &str = "round";
-/// Version of areograph that wrote last.
+/// Version of areograph of the last writer.
 pub const TOOL_VERSION: &str = "version";
-/// Cron fields and zone that the last intended instant belongs to.
+/// Cron fields and zone of the last intended instant.
 pub const SCHEDULE: &str = "schedule";
 /// The last instant at which a night was intended, milliseconds of UTC since 1970.
 pub const INTENDED_MS: &str = "intended_ms";
 
-/// A fact.
+/// A value.
 ///
 /// # Errors
 /// SQLite errors.
@@ -22,7 +22,7 @@ pub fn fact(connection: &Connection, name: &str) -> Stored<Option<String>> {
     Ok(query.query_row([name], |row| row.get(0)).optional()?)
 }
 
-/// A fact that is a whole number.
+/// A whole number.
 ///
 /// # Errors
 /// SQLite errors.
@@ -30,7 +30,7 @@ pub fn number(connection: &Connection, name: &str) -> Stored<Option<i64>> {
     Ok(fact(connection, name)?.and_then(|text| text.parse().ok()))
 }
 
-/// Records a fact.
+/// Records a value.
 ///
 /// # Errors
 /// SQLite errors.

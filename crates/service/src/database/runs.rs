@@ -1,4 +1,4 @@
-//! Runs: what attempts published.
+//! Runs: publications of attempts.
 
 use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
 use serde_json::Value;
@@ -26,7 +26,7 @@ pub struct RunRow {
     pub verdict: String,
     /// Why the products are not valid: sentences.
     pub reasons: Value,
-    /// Why it ran: sentences.
+    /// Causes of the run: sentences.
     pub because: Value,
     /// Stages that ran, with their reasons.
     pub stages: Value,
@@ -36,11 +36,11 @@ pub struct RunRow {
     pub figures: Value,
     /// Name, role and hash of every kernel.
     pub kernels: Value,
-    /// The run that was current before.
+    /// The previous current run.
     pub predecessor: Option<String>,
     /// When it was published, milliseconds of UTC since 1970.
     pub published_ms: i64,
-    /// Whether it is kept for ever.
+    /// Whether it is kept permanently.
     pub pinned: bool,
     /// When its products were removed.
     pub removed_ms: Option<i64>,
@@ -57,7 +57,7 @@ pub fn is_run(connection: &Connection, site: &str, manifest_blake3: &str) -> Sto
     Ok(query.query_row([site, manifest_blake3], |row| row.get(0))?)
 }
 
-/// Records a run; one that is known stays as it is.
+/// Records a run; a known one is unchanged.
 ///
 /// # Errors
 /// SQLite errors.
@@ -90,7 +90,7 @@ pub fn put_run(transaction: &Transaction<'_>, run: &RunRow) -> Stored<()> {
     Ok(())
 }
 
-/// Records which run readers of a site get.
+/// Records the current run of a site.
 ///
 /// # Errors
 /// SQLite errors.
@@ -107,7 +107,7 @@ pub fn put_current(
     Ok(())
 }
 
-/// Records what a comparison with the predecessor found.
+/// Records the result of the comparison with the predecessor.
 ///
 /// # Errors
 /// SQLite errors.
@@ -140,7 +140,7 @@ pub fn run(connection: &Connection, id: &str) -> Stored<Option<RunRow>> {
     Ok(query.query_row([id], run_row).optional()?)
 }
 
-/// Runs of a site whose products are there, the newest first.
+/// Runs of a site whose products exist, the newest first.
 ///
 /// # Errors
 /// SQLite errors.
@@ -152,7 +152,7 @@ pub fn kept_runs(connection: &Connection, site: &str) -> Stored<Vec<RunRow>> {
     Ok(found.collect::<Result<_, _>>()?)
 }
 
-/// Runs that have a predecessor and were not compared with it.
+/// Runs with a predecessor to which they have not been compared.
 ///
 /// # Errors
 /// SQLite errors.

@@ -1,11 +1,11 @@
-//! The service that runs, for whoever looks into the database.
+//! The running service, for other readers of the database.
 
 use rusqlite::{Transaction, params};
 
 use super::Stored;
 use crate::worker::process::ProcessIdentity;
 
-/// Records the service that begins.
+/// Records the start of the service.
 ///
 /// # Errors
 /// SQLite errors.
@@ -22,7 +22,7 @@ pub fn put_service(
     Ok(())
 }
 
-/// Records that it is alive.
+/// Records a heartbeat of the service.
 ///
 /// # Errors
 /// SQLite errors.

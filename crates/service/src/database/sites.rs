@@ -1,4 +1,4 @@
-//! Sites, and which files each reads.
+//! Sites, and the files that each reads.
 
 use std::collections::BTreeMap;
 
@@ -6,28 +6,28 @@ use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
 
 use super::Stored;
 
-/// What is known of a site.
+/// State of a site.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SiteRow {
     /// Its name.
     pub name: String,
     /// Its file.
     pub file: String,
-    /// BLAKE3 of its keys as last planned, empty before.
+    /// BLAKE3 of its keys in the last plan, empty before.
     pub config_blake3: String,
-    /// Whether its file is there.
+    /// Whether its file exists.
     pub enabled: bool,
-    /// Why it cannot be run.
+    /// The reason for which it cannot be run.
     pub problem: Option<String>,
-    /// The run that readers get.
+    /// The current run.
     pub current_run: Option<String>,
-    /// When all that it reads was last compared, milliseconds of UTC since 1970.
+    /// When all its inputs were last compared, milliseconds of UTC since 1970.
     pub checked_ms: Option<i64>,
-    /// Since when its products have not been those of its inputs.
+    /// Since when its products do not match its inputs.
     pub stale_since_ms: Option<i64>,
-    /// Why.
+    /// The reason.
     pub stale_because: Option<String>,
-    /// The round of that comparison; 0: it is to be planned.
+    /// The round of that comparison; 0: a plan is required.
     pub round: i64,
 }
 
@@ -50,7 +50,7 @@ pub fn site(connection: &Connection, name: &str) -> Stored<Option<SiteRow>> {
     Ok(query.query_row([name], site_row).optional()?)
 }
 
-/// Records that a site has this file; a site that was switched off is planned anew.
+/// Records the file of a site; a disabled site is planned again.
 ///
 /// # Errors
 /// SQLite errors.
@@ -64,7 +64,7 @@ pub fn put_site(transaction: &Transaction<'_>, name: &str, file: &str) -> Stored
     Ok(())
 }
 
-/// Records that a site has no file any more.
+/// Records that a site has no file.
 ///
 /// # Errors
 /// SQLite errors.
@@ -77,24 +77,24 @@ pub fn disable_site(transaction: &Transaction<'_>, name: &str) -> Stored<()> {
     Ok(())
 }
 
-/// What a comparison or a plan found of a site.
+/// The result of a comparison or plan of a site.
 #[derive(Debug, Clone, Default)]
 pub struct Checked<'a> {
     /// The round of the comparison.
     pub round: i64,
     /// When, milliseconds of UTC since 1970.
     pub at_ms: i64,
-    /// BLAKE3 of its keys, where it was planned.
+    /// BLAKE3 of its keys, if it was planned.
     pub config_blake3: Option<&'a str>,
-    /// What its windows span, degrees, where it was planned.
+    /// Extent of its windows, degrees, if it was planned.
     pub bounds_deg: Option<[f64; 4]>,
-    /// Why it cannot be planned.
+    /// The reason for which it cannot be planned.
     pub problem: Option<&'a str>,
     /// As text.
     pub note: &'a str,
 }
 
-/// Records what was found of a site.
+/// Records the result for a site.
 ///
 /// # Errors
 /// SQLite errors.
@@ -140,7 +140,7 @@ pub fn put_unchanged(
     Ok(())
 }
 
-/// Records since when and why a site's products are not those of its inputs; the first instant stays.
+/// Records since when and why a site's products do not match its inputs; the first instant is kept.
 ///
 /// # Errors
 /// SQLite errors.
@@ -158,7 +158,7 @@ pub fn put_stale(
     Ok(())
 }
 
-/// Records that a site's products are those of its inputs.
+/// Records that a site's products match its inputs.
 ///
 /// # Errors
 /// SQLite errors.
@@ -177,7 +177,7 @@ pub struct SiteInput {
     pub path: String,
     /// `site`, `kernel` or `data`.
     pub role: String,
-    /// BLAKE3 of the content that was last planned with; none of a file that was not there.
+    /// BLAKE3 of the content in the last plan; `None` for a file that did not exist.
     pub blake3: Option<String>,
 }
 
@@ -224,7 +224,7 @@ pub fn put_inputs(transaction: &Transaction<'_>, site: &str, inputs: &[SiteInput
     Ok(())
 }
 
-/// Sites of which a file has another content than they were planned with, or has gone, with these files.
+/// Sites with files that were removed or whose content differs from that in their plan, with these files.
 ///
 /// # Errors
 /// SQLite errors.

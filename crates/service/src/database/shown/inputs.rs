@@ -19,9 +19,9 @@ pub struct RootFolder {
     pub files: i64,
     /// `available`, `settling` or `unavailable`.
     pub state: String,
-    /// Since when.
+    /// Start of that state.
     pub since_utc: Instant,
-    /// Why, as text.
+    /// The reason, as text.
     pub detail: String,
 }
 
@@ -38,13 +38,13 @@ pub struct KernelFile {
     pub blake3: Option<String>,
     /// `settling`, `ready`, `bad` or `gone`.
     pub state: String,
-    /// Why, as text.
+    /// The reason, as text.
     pub detail: String,
     /// When it was first seen.
     pub first_seen_utc: Instant,
     /// When it last changed.
     pub changed_utc: Instant,
-    /// What it covers: arrays `position` and `attitude` of intervals, seconds of ephemeris time past J2000.
+    /// Its coverage: arrays `position` and `attitude` of intervals, seconds of ephemeris time past J2000.
     pub coverage: Value,
 }
 

@@ -1,4 +1,4 @@
-//! Runs: what was published, why, and what it moved.
+//! Runs: publications, their causes and changes.
 
 use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
 use serde::Serialize;
@@ -15,7 +15,7 @@ pub struct Run {
     pub id: String,
     /// Its site.
     pub site: String,
-    /// The job that made it.
+    /// The job of the run.
     pub job: i64,
     /// The attempt of that job.
     pub attempt: i64,
@@ -29,25 +29,25 @@ pub struct Run {
     pub verdict: String,
     /// Why its products are not valid.
     pub reasons: Value,
-    /// Why it was made.
+    /// Causes of the run.
     pub because: Value,
     /// Stages that ran or were kept, each with its reason.
     pub stages: Value,
-    /// Things counted, by name.
+    /// Counts, by name.
     pub counts: Value,
     /// The largest figures of the site, by name, in the unit that ends the name.
     pub figures: Value,
     /// Kernels in load order with role and BLAKE3.
     pub kernels: Value,
-    /// The run that was current before.
+    /// The previous current run.
     pub predecessor: Option<String>,
-    /// What moved since the predecessor: headline, sentences, whether a limit was passed.
+    /// Changes since the predecessor: headline, sentences, whether a limit was exceeded.
     pub moved: Value,
     /// When it was published.
     pub published_utc: Instant,
-    /// Whether it is kept for good.
+    /// Whether it is kept permanently.
     pub pinned: bool,
-    /// When its products were removed, since they were too old to be kept.
+    /// When its products were removed because of their age.
     pub removed_utc: Option<Instant>,
 }
 
@@ -102,7 +102,7 @@ pub fn runs_of_job(connection: &Connection, job: i64, limit: u32) -> Stored<Vec<
     Ok(found.collect::<Result<_, _>>()?)
 }
 
-/// Keeps a run for good, or no longer. Returns whether there is such a run.
+/// Keeps a run permanently, or releases it. Returns whether the run exists.
 ///
 /// # Errors
 /// SQLite errors.

@@ -1,4 +1,4 @@
-//! Attempts of jobs, and jobs counted.
+//! Attempts of jobs, and totals.
 
 use rusqlite::{Connection, OptionalExtension as _, params};
 use serde::Serialize;
@@ -17,17 +17,17 @@ pub struct Attempt {
     pub n: i64,
     /// When it began.
     pub started_utc: Instant,
-    /// Its last sign of life.
+    /// Its last heartbeat.
     pub beat_utc: Instant,
     /// Memory in use, kibibytes.
     pub rss_kib: Option<i64>,
-    /// Stage that it was last in.
+    /// Last reported stage.
     pub stage: Option<String>,
     /// Progress in that stage.
     pub done: Option<i64>,
-    /// Of so many.
+    /// Total of that progress.
     pub of: Option<i64>,
-    /// What is counted.
+    /// Unit of the progress.
     pub unit: Option<String>,
     /// When it ended.
     pub ended_utc: Option<Instant>,
@@ -37,7 +37,7 @@ pub struct Attempt {
     pub exit: Option<i64>,
     /// Signal that ended it.
     pub signal: Option<i64>,
-    /// Where its log lies.
+    /// Path of its log.
     #[serde(skip)]
     pub log: String,
 }
@@ -82,16 +82,16 @@ pub fn jobs_of_night(connection: &Connection, night: i64, limit: u32) -> Stored<
     jobs.filter_map(Stored::transpose).collect()
 }
 
-/// Things counted for metrics.
+/// Totals for metrics.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Totals {
     /// Jobs by state.
     pub jobs: Vec<(JobState, i64)>,
     /// Runs that are kept.
     pub runs: i64,
-    /// When the oldest queued job was made.
+    /// When the oldest queued job was created.
     pub oldest_queued_ms: Option<i64>,
-    /// Alerts that no hook has taken yet.
+    /// Alerts that no hook has accepted yet.
     pub undelivered: i64,
 }
 

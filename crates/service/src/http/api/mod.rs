@@ -40,7 +40,7 @@ use super::{app::App, problem::ProblemDocument};
 )]
 struct Api;
 
-/// Every operation takes a token.
+/// Every operation accepts a token.
 struct Tokens;
 
 impl Modify for Tokens {
@@ -58,7 +58,7 @@ impl Modify for Tokens {
 /// All routes for programs.
 pub(super) fn routes() -> Router<Arc<App>> {
     let (router, mut description) = described().split_for_parts();
-    // The router's mark of a parameter that may contain `/`.
+    // The router's notation for a parameter that may contain `/`.
     let paths = std::mem::take(&mut description.paths.paths);
     let named = paths
         .into_iter()

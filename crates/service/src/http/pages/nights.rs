@@ -1,4 +1,4 @@
-//! Nights, and the page of one.
+//! Nights, and the page of a night.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ const NIGHTS: u32 = 60;
 /// Jobs and runs on the page of a night.
 const MOST: u32 = 500;
 
-/// Where a list goes on.
+/// Start of the next page of a list.
 #[derive(Debug, Deserialize)]
 pub(super) struct From {
     after: Option<i64>,
@@ -79,7 +79,7 @@ fn night_table(nights: &[Night], times: &Times) -> Markup {
     }
 }
 
-/// One night: what it looked at, and what came of it.
+/// One night: its comparisons and results.
 pub(super) async fn one(
     Reader(caller): Reader,
     State(app): State<Arc<App>>,

@@ -1,4 +1,4 @@
-//! The first page, and the page of a site.
+//! The start page, and the page of a site.
 
 use std::sync::Arc;
 
@@ -41,7 +41,7 @@ const TREND: u32 = 120;
 /// Runs in the table.
 const RUNS: usize = 30;
 
-/// Where a list goes on.
+/// Start of the next page of a list.
 #[derive(Debug, Deserialize)]
 pub(super) struct From {
     after: Option<String>,
@@ -189,7 +189,7 @@ fn site_table(sites: &[Site], times: &Times) -> Markup {
     )
 }
 
-/// Fresh, or stale since when and why.
+/// Fresh, or since when and why stale.
 fn freshness(site: &Site, times: &Times) -> Markup {
     html! {
         @if !site.enabled { "Not run: its site file was removed or disables it." }
@@ -202,7 +202,7 @@ fn freshness(site: &Site, times: &Times) -> Markup {
     }
 }
 
-/// What the last night did.
+/// Summary of the last night.
 fn last_night(night: Option<&Night>, times: &Times) -> Markup {
     html! {
         @match night {
@@ -221,7 +221,7 @@ fn last_night(night: Option<&Night>, times: &Times) -> Markup {
     }
 }
 
-/// One site: how it stands, its trends, its runs.
+/// One site: its state, its trends, its runs.
 pub(super) async fn one(
     Reader(caller): Reader,
     State(app): State<Arc<App>>,
@@ -332,7 +332,7 @@ fn run_table(site: &Site, runs: &[Run], times: &Times) -> Markup {
     }
 }
 
-/// What the buttons of a site send.
+/// Form data of the buttons of a site.
 #[derive(Debug, Deserialize)]
 pub(super) struct RunForm {
     form_token: String,
@@ -341,7 +341,7 @@ pub(super) struct RunForm {
     force: bool,
 }
 
-/// Asks for a job of a site.
+/// Requests a job of a site.
 pub(super) async fn run_now(
     Reader(caller): Reader,
     State(app): State<Arc<App>>,
