@@ -93,7 +93,7 @@ fn by_job(
     };
     let why = match job.state {
         JobState::Succeeded | JobState::Unchanged | JobState::Superseded => return Ok(None),
-        // It ended without products: those of the preceding run remain, if they ever were out of date.
+        // A cancelled job leaves the products of the preceding run, which were not stale.
         JobState::Cancelled if site.stale_since_ms.is_none() => return Ok(None),
         JobState::Queued | JobState::Starting | JobState::Running | JobState::Cancelling => {
             let causes = causes(connection, job.id)?;
