@@ -17,7 +17,7 @@ use areograph_base::{
     instruments::Instrument,
 };
 
-/// A file as far as its label goes.
+/// A file with its label.
 #[derive(Debug)]
 pub(super) struct Labelled {
     pub(super) path: PathBuf,

@@ -103,7 +103,7 @@ impl SupportTables {
             return None;
         }
         Some(format!(
-            "the support data {name} rotate {body} by {:.1} m at the equator relative to {}; positions refer to their frame",
+            "the support data {name} rotate {body} by {:.1} m at the equator against {}; positions are in their frame",
             turn_rad * body.model().equatorial_radius_m,
             body.names().short_frame
         ))

@@ -112,7 +112,7 @@ impl PedrWriter {
     /// Creates `path`, or empties it, and writes the label.
     ///
     /// # Errors
-    /// A label that does not fit its format; the system's refusal.
+    /// A label that does not fit its format; the file cannot be created.
     pub fn create(path: &Path, label: &LabelInfo) -> Result<Self> {
         let bytes = label.to_bytes().in_file(path)?;
         let file = File::create(path)

@@ -140,7 +140,8 @@ fn real(item: &Item) -> Option<f64> {
     numeric.then(|| plain.parse().ok()).flatten()
 }
 
-/// The records of the file. A read statement begins with the next one, and goes on to further ones until it has its values.
+/// The records of the file. A read statement starts with the next record, and continues with further ones until it has
+/// its values.
 struct Lines<'a> {
     lines: std::str::Lines<'a>,
     /// Number of the record that was read last.

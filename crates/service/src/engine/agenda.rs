@@ -6,7 +6,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 #[derive(Debug, Default)]
 #[allow(
     clippy::struct_excessive_bools,
-    reason = "each is about a task of its own"
+    reason = "each describes its own task"
 )]
 pub(super) struct Agenda {
     pub(super) round: bool,
