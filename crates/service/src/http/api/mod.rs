@@ -33,7 +33,7 @@ use super::{app::App, problem::ProblemDocument};
     info(
         title = "areograph",
         description = "Sites, runs, jobs, kernels and shots of an areograph service. Errors are problem documents \
-                       (RFC 9457). Lists come in pages: `next` of a page is `after` of the next one. Instants are RFC 3339 in UTC.",
+                       (RFC 9457). Lists come in pages: `next` of one is `after` of the next one. Instants are RFC 3339 in UTC.",
     ),
     components(schemas(ProblemDocument)),
     modifiers(&Tokens),
