@@ -36,7 +36,7 @@ impl Cause for Question {
             DataFusionError::ResourcesExhausted(_) => {
                 "select fewer columns, or sort and group fewer rows in one query"
             }
-            DataFusionError::IoError(_) => "check the disk of temporary files, then repeat the query",
+            DataFusionError::IoError(_) => "check the disk of temporary files, then retry",
             _ => "\"describe shots\" lists the columns; text is written in 'single quotes'",
         }
         .to_owned()

@@ -282,7 +282,7 @@ fn number(label: &Label) -> std::result::Result<(Number, bool), HrscError> {
         (16, "LSB_UNSIGNED_INTEGER") => Ok((Number::Unsigned, true)),
         _ => {
             let expected =
-                format!("MSB_INTEGER, LSB_INTEGER or UNSIGNED_INTEGER with {bits} bits");
+                format!("MSB_INTEGER, LSB_INTEGER or UNSIGNED_INTEGER for samples of {bits} bits");
             Err(refused("SAMPLE_TYPE", entry, &expected))
         }
     }

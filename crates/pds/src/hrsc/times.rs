@@ -335,9 +335,7 @@ mod tests {
         assert!(apart_s(&times, &cut) < 2e-7); // seconds, rounding of ET
         assert_eq!(
             times.remarks,
-            [
-                "before line 100: a gap of 0.0926 s, 7.0 lines that are not in the file"
-            ]
+            ["before line 100: a gap of 0.0926 s, 7.0 lines that are not in the file"]
         );
     }
 

@@ -6,7 +6,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 #[derive(Debug, Default)]
 #[allow(
     clippy::struct_excessive_bools,
-    reason = "each describes its own task"
+    reason = "each entry describes its own task"
 )]
 pub(super) struct Agenda {
     pub(super) round: bool,

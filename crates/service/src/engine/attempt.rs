@@ -236,7 +236,7 @@ pub async fn follow<W: Workers>(core: Arc<Core<W>>, taken: Taken) -> Option<RunR
         // A full disk: the outcome is kept until it can be recorded.
         match finish(&core, &attempt, &ended, why) {
             Ok(run) => return run,
-            Err(error) => tracing::error!(job = job.id, "the end of an attempt is not recorded: {error}"),
+            Err(error) => tracing::error!(job = job.id, "unrecorded end of an attempt: {error}"),
         }
         if core.shared.ending.is_cancelled() {
             // The next service finds the run on the disk.
@@ -299,6 +299,6 @@ fn hear<W: Workers>(core: &Core<W>, attempt: &mut Attempt, heard: Heard<'_>) {
 
 fn told(noted: Stored<()>, attempt: &Attempt) {
     if let Err(error) = noted {
-        tracing::warn!(job = attempt.job, "a line of a worker is not recorded: {error}");
+        tracing::warn!(job = attempt.job, "unrecorded line of a worker: {error}");
     }
 }

@@ -74,7 +74,7 @@ pub fn compare(sweep: &Sweep<'_>) -> Swept {
             let count = waiting.len() + news.len();
             let until = utc_text(from_ms.max(sweep.now_ms));
             let files = if count == 1 { "file" } else { "files" };
-            let detail = format!("{count} {files} changed; waiting for the quiet period until {until}");
+            let detail = format!("{count} {files} changed; waiting for quiet period until {until}");
             (RootState::Settling, Vec::new(), detail)
         }
     };

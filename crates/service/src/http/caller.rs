@@ -99,7 +99,7 @@ pub(super) async fn by_token(app: &App, text: &str, remote: IpAddr) -> Result<Ca
             retry_after_s: Some(wait_s),
             ..Problem::new(
                 StatusCode::TOO_MANY_REQUESTS,
-                "Too many tokens from this address were refused. Try again later.",
+                "Too many tokens from this address were refused. Wait.",
             )
         });
     }

@@ -190,7 +190,7 @@ fn limit(app: &App, caller: &Caller, reads: bool) -> Result<(), Problem> {
         .take(key, rate, Instant::now())
         .map_err(|wait_s| Problem {
             retry_after_s: Some(wait_s),
-            ..Problem::new(StatusCode::TOO_MANY_REQUESTS, "Too many requests. Try again later.")
+            ..Problem::new(StatusCode::TOO_MANY_REQUESTS, "Too many requests. Wait.")
         })
 }
 

@@ -70,7 +70,7 @@ fn only_the_sites_that_read_a_changed_kernel_run_and_the_reason_is_kept() {
     let stale = life.ask("SELECT stale_because FROM site WHERE name = 'a'");
     assert!(
         stale[0].contains("`a.bsp` changed")
-            && stale[0].contains("waiting for the quiet period until 2026-05-01T13:20:00"),
+            && stale[0].contains("waiting for quiet period until 2026-05-01T13:20:00"),
         "{stale:?}"
     );
     life.go_on(&world, 60, 2);

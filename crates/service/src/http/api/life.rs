@@ -56,7 +56,7 @@ struct Readiness {
 /// Whether the service is operational: database, disks, folders of inputs, configuration.
 #[utoipa::path(get, path = "/readyz", tag = "life", security(()), responses(
     (status = 200, body = Readiness),
-    (status = 503, body = Readiness, description = "It does not"),
+    (status = 503, body = Readiness, description = "The service is not operational"),
 ))]
 pub(super) async fn ready(State(app): State<Arc<App>>) -> Result<Response, Problem> {
     let found = app.read(roots).await;
