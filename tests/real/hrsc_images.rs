@@ -586,7 +586,7 @@ fn damaged_and_exchanged_files_are_told() {
         // The time and the exposure of a line.
         (
             &|bytes: &mut Vec<u8>| bytes[row(100) + 4] ^= 0x10,
-            "line 100: the time in its prefix lies",
+            "line 100: the time in its prefix differs",
         ),
         (
             &|bytes: &mut Vec<u8>| bytes[row(100) + 10] ^= 0x10,
@@ -594,7 +594,7 @@ fn damaged_and_exchanged_files_are_told() {
         ),
         (
             &|bytes: &mut Vec<u8>| bytes[row(100)..row(100) + 8].fill(0),
-            "lines 100 to 100: their prefixes have no time",
+            "lines 100 to 100: no times in their prefixes",
         ),
         // Rows that do not begin where the label has them.
         (

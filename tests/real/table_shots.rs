@@ -317,7 +317,7 @@ fn rows_that_are_no_shots_are_told_and_rows_that_repeat_count_once() {
     let told = case.outcome(case.run());
     assert!(told.starts_with("exit 3"), "{told}");
     assert!(
-        told.contains("shots.csv: none of its 106 rows is a shot; line 1: radius_m"),
+        told.contains("shots.csv: none of its 106 rows is a valid shot; line 1: radius_m"),
         "{told}"
     );
 }

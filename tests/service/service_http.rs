@@ -607,7 +607,7 @@ fn pages_are_whole_without_a_script() {
         (
             "/jobs/4",
             &[
-                "its coverage meets image E02-01453",
+                "its coverage overlaps image E02-01453",
                 "7 of 20",
                 "&lt;script&gt;alert(1)",
                 "<progress",
@@ -686,7 +686,7 @@ fn a_service_that_cannot_work_says_so() {
         world
             .get("/")
             .text()
-            .contains("The changed configuration was refused")
+            .contains("The changed configuration was rejected")
     );
     assert_eq!(world.get("/healthz").status, 200);
 }

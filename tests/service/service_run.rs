@@ -258,7 +258,7 @@ fn changes_of_files_run_the_sites_that_they_touch() {
     mission.several_sweeps();
     assert_eq!(mission.ask("SELECT site FROM job WHERE id > 2"), ["isidis"]);
     let why = mission.ask("SELECT detail FROM cause WHERE job = 3");
-    let expected = "`mgs_sc_isidis.bc` changed; its coverage meets images E02-01301, E02-02016; stages sample_orientation, ";
+    let expected = "`mgs_sc_isidis.bc` changed; its coverage overlaps images E02-01301, E02-02016; stages sample_orientation, ";
     assert!(why.len() == 1 && why[0].starts_with(expected), "{why:?}");
     let ran = mission.ask(
         "SELECT DISTINCT json_extract(value, '$.stage') FROM run, json_each(stages) WHERE job = 3",

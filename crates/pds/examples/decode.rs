@@ -1,5 +1,5 @@
-//! Decodes an image of the Mars Orbiter Camera (`.imq`) into a portable grey map (PGM) on standard output. Lines that
-//! are missing are black.
+//! Decodes an image of the Mars Orbiter Camera (`.imq`) into a portable grey map (PGM) on standard output. Missing
+//! lines are black.
 //!
 //! `cargo run --package areograph-pds --example decode -- m0100115.imq >m0100115.pgm`
 #![allow(clippy::print_stderr, reason = "an example prints")]

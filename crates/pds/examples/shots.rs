@@ -1,4 +1,4 @@
-//! Prints the shots of a PEDR file: instant, place in the datum of the file, and range.
+//! Prints the shots of a PEDR file: time, position in the datum of the file, and range.
 //!
 //! `cargo run --package areograph-pds --example shots -- ap19117l.b`
 #![allow(

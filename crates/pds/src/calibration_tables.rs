@@ -6,13 +6,13 @@ use super::table_rows::{Rows, TableError, columns, name, numbers, read_rows};
 use areograph_base::constants::{CONTROL_SIGMA_MAX_M, SIGMA_MIN};
 use areograph_base::error::Result;
 
-/// Where the columns are told.
+/// File that describes the columns.
 const EXAMPLE: &str = "config/calibrations/example.toml";
 /// Largest standard deviation of a line or sample, pixels: the range of the key.
 const SIGMA_MAX_PX: f64 = 100.0;
-/// What every row names.
+/// Names required in every row.
 const NAMED: &str = "a point and a camera must have names";
-/// Radii that a point of a planet can have, metres; heights above a sphere are below.
+/// Possible radii of a point on a planet, metres; heights above a sphere are smaller.
 const RADIUS_M: [f64; 2] = [100_000.0, 1e9];
 
 /// A point in an image of a line of the camera.
@@ -33,7 +33,7 @@ pub struct ImageRow {
 /// A laser point in such an image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ControlRow {
-    /// Where the image shows it.
+    /// Image point.
     pub image: ImageRow,
     /// East longitude and areocentric latitude, degrees.
     pub longitude_deg: f64,
@@ -43,14 +43,14 @@ pub struct ControlRow {
     pub radius_m: f64,
     /// Standard deviations of a horizontal coordinate and of the radius, where the table has them, metres.
     pub sigma_m: [Option<f64>; 2],
-    /// What finding the point in the image adds to these, where the table has that, metres.
+    /// Additional standard deviations of finding the point in the image, where the table has them, metres.
     pub matching_m: [Option<f64>; 2],
 }
 
 /// Reads a table of tie points.
 ///
 /// # Errors
-/// The system's refusal to read; columns that are missing; a table of which no row can be read.
+/// The file cannot be read; columns that are missing; a table of which no row can be read.
 pub fn read_ties(path: &Path) -> Result<Rows<ImageRow>> {
     read_rows(path, EXAMPLE, |header| {
         let image = ImageColumns::of(header, "point, camera, line, sample")?;
@@ -100,7 +100,7 @@ pub fn read_control(path: &Path) -> Result<Rows<ControlRow>> {
     })
 }
 
-/// Where the columns of a place in an image are.
+/// Positions of the columns of an image point.
 #[derive(Clone, Copy)]
 struct ImageColumns {
     names: [usize; 2],
@@ -136,7 +136,7 @@ fn optional(header: &csv::StringRecord, name: &str) -> Option<usize> {
     header.iter().position(|of| of == name)
 }
 
-/// Standard deviations of columns that a table may lack, and a row may leave empty.
+/// Standard deviations of optional columns, which may be empty in a row.
 fn deviations(
     row: &csv::StringRecord,
     of: [Option<usize>; 2],

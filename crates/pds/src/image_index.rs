@@ -1,7 +1,7 @@
 //! The cumulative index of the camera: one row for every image of the mission, with corners and angles.
 //!
-//! Rows are quoted CSV. Names and places of the columns come from the label beside the table (`.lbl`); without one they
-//! are those of the mapping mission.
+//! Rows are quoted CSV. Names and positions of the columns come from the label beside the table (`.lbl`); without one
+//! they are those of the mapping mission.
 
 mod columns;
 
@@ -31,15 +31,16 @@ pub struct IndexedImage {
     pub utc_start: String,
     /// Mission phase, and number of the orbit in it.
     pub orbit: Option<(String, u32)>,
-    /// Instrument and filter, as labels name them; empty where the index does not say. The narrow-angle camera has no filter.
+    /// Instrument and filter, as labels name them; empty where the index does not state them. The narrow-angle camera
+    /// has no filter.
     pub instrument: [String; 2],
-    /// Object that it shows, where the index says.
+    /// Target, where the index states it.
     pub target: Option<String>,
     /// Spacecraft clock at the start of the first line.
     pub sclk_start: Option<String>,
     /// Samples of a line, and lines.
     pub size: [u32; 2],
-    /// Pixels summed across and along the track, where the index says.
+    /// Pixels summed across and along the track, where the index states them.
     pub summing: [Option<u32>; 2],
     /// Exposure of one detector line, seconds.
     pub exposure_s: Option<f64>,
@@ -53,8 +54,8 @@ pub struct IndexedImage {
     pub centre_rad: Option<[f64; 2]>,
     /// Corners in their order round the image: first line, first and last sample; last line, last and first sample.
     pub corners_rad: [Option<[f64; 2]>; 4],
-    /// Width and height on the ground, metres: where the index does not say, by the pixels, which are square if it does not
-    /// say that either.
+    /// Width and height on the ground, metres: where the index does not state them, from the pixels, which are assumed
+    /// square if it does not state their shape either.
     pub extent_m: [Option<f64>; 2],
     /// Height of the spacecraft, metres.
     pub altitude_m: Option<f64>,
@@ -66,12 +67,12 @@ pub struct IndexedImage {
     pub solar_longitude_rad: Option<f64>,
     /// Free text of the camera's team.
     pub rationale: String,
-    /// `OK` or `ERRORS`; empty where the index does not say.
+    /// `OK` or `ERRORS`; empty where the index does not state it.
     pub quality: String,
 }
 
 impl IndexedImage {
-    /// The start of the first line, if that is a time.
+    /// The start of the first line, if it is a valid time.
     #[must_use]
     pub fn utc(&self) -> Option<NaiveDateTime> {
         let text = self.utc_start.trim_end_matches('Z');
@@ -82,7 +83,7 @@ impl IndexedImage {
     }
 }
 
-/// A row that is no image.
+/// An invalid row.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BadRow {
     /// Line of the file, counted from 1.
@@ -91,18 +92,18 @@ pub struct BadRow {
     pub text: String,
 }
 
-/// An index that was read.
+/// A parsed index.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ImageIndex {
     /// Its images in the order of the file.
     pub images: Vec<IndexedImage>,
     /// Rows that were left out.
     pub bad_rows: Vec<BadRow>,
-    /// Whether names of columns came from a label.
+    /// Whether the column names come from a label.
     pub has_label: bool,
 }
 
-/// A file that is no index.
+/// A file that is not an index.
 #[derive(Debug, thiserror::Error)]
 enum NoIndex {
     #[error("the label has no column {0}")]
@@ -124,13 +125,13 @@ impl Cause for NoIndex {
     }
 }
 
-/// Longest row that is looked at; those of the archive have about 520 bytes.
+/// Longest accepted row; those of the archive have about 520 bytes.
 const ROW_BYTES_MAX: u64 = 1 << 16;
 
-/// Reads an index, with the label beside it if there is one.
+/// Reads an index, with the label beside it if one exists.
 ///
 /// # Errors
-/// The system's refusal to read; a label without the columns that are needed; no row that is an image.
+/// The file cannot be read; a label without required columns; no row that describes an image.
 pub fn read_index(path: &Path) -> Result<ImageIndex> {
     let labelled = label_beside(path)
         .map(|label| read_columns(&label))
@@ -177,7 +178,7 @@ pub fn read_index(path: &Path) -> Result<ImageIndex> {
     }
 }
 
-/// The label beside a table, its ending written in the same way.
+/// The label beside a table, its ending in the same case.
 fn label_beside(path: &Path) -> Option<std::path::PathBuf> {
     let endings = ["lbl", "LBL"].into_iter();
     endings

@@ -1,4 +1,4 @@
-//! What labels of images have in common, whichever camera took them: what is read of one, and how its values are.
+//! Fields and value formats that labels of all cameras share.
 
 use super::label::{Entry, Label, LabelError};
 use areograph_base::{
@@ -8,7 +8,7 @@ use areograph_base::{
     line_times::LinePiece,
 };
 
-/// What the label of an image says.
+/// Fields of the label of an image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImageLabel {
     /// Product, for example `M04/02852` or `H5270_0000_IR2.IMG`.
@@ -19,23 +19,23 @@ pub struct ImageLabel {
     pub fields: ImageFields,
     /// UTC of the end of the last line.
     pub utc_stop: Option<String>,
-    /// Times of the lines, where each row of the file has its own.
+    /// Line times, where each row of the file has its own.
     pub lines: Option<RowTimes>,
 }
 
-/// Times of the lines of an image as its rows have them.
+/// Line times of an image from its rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RowTimes {
     /// Number of lines.
     pub lines: u32,
-    /// Pieces of one line period each, in order; between two of them may be a gap. None where the rows tell no times.
+    /// Pieces with one line period each, in order; gaps may separate them. Empty where the rows contain no times.
     pub pieces: Vec<LinePiece>,
-    /// What is wrong with some of them, one sentence each.
+    /// Faults of these times, one sentence each.
     pub remarks: Vec<String>,
 }
 
-/// The first of `cameras` whose names the label has, the filter under its PDS3 keyword or its ISIS keyword; a camera that
-/// is known without a filter takes any.
+/// The first of `cameras` whose names the label has, the filter under its PDS3 or its ISIS keyword; a camera that is
+/// known without a filter matches any.
 pub(super) fn camera<'a>(
     label: &Label,
     cameras: &'a [Instrument],
@@ -61,7 +61,8 @@ pub(super) fn camera<'a>(
     })
 }
 
-/// Positions, attitudes and the shape of the target are those of this spacecraft, whose keywords are given, and Mars.
+/// Checks that the image is of Mars, by this spacecraft, whose keywords are given: positions, attitudes and the
+/// target's shape are theirs.
 pub(super) fn of_mars(
     label: &Label,
     spacecraft: [&str; 2],
@@ -81,19 +82,19 @@ pub(super) fn of_mars(
     Ok(())
 }
 
-/// Lines and samples of a map are no places on a detector.
+/// Rejects map-projected images: lines and samples of a map are not places on a detector.
 pub(super) fn as_taken(label: &Label) -> Result<(), LabelError> {
     match projection(label) {
         Some(entry) => Err(other_image(
             "OBJECT",
             &entry.group,
-            "the image as its camera took it, which no map projection describes",
+            "the image as taken by the camera, with no map projection",
         )),
         None => Ok(()),
     }
 }
 
-/// Something of the map projection of an image that has one.
+/// An entry of the map projection of an image, if it has one.
 pub(super) fn projection(label: &Label) -> Option<&Entry> {
     let mut entries = label.entries.iter();
     entries.find(|entry| ["IMAGE_MAP_PROJECTION", "MAPPING"].contains(&&*entry.group))
@@ -107,7 +108,7 @@ pub(super) fn other_image(key: &str, value: &str, expected: &'static str) -> Lab
     }
 }
 
-/// The entry under its PDS3 keyword or its ISIS keyword, unless it says that the value is not known.
+/// The entry under its PDS3 or its ISIS keyword, unless its value is marked as unknown.
 pub(super) fn either<'a>(
     label: &'a Label,
     pds: &str,
@@ -120,7 +121,7 @@ pub(super) fn either<'a>(
     Ok(entry.filter(|entry| known(entry)))
 }
 
-/// Whether the entry has a value and not one of the words for "none".
+/// Whether the entry has a value other than the words for unknown values.
 pub(super) fn known(entry: &Entry) -> bool {
     !matches!(
         entry.value.to_ascii_uppercase().as_str(),

@@ -1,31 +1,31 @@
 //! Labels in the Object Description Language of PDS3 and its PVL dialect of ISIS: `KEY = value`,
 //! `OBJECT = …`/`END_OBJECT`, `GROUP = …`/`END_GROUP`, `END`.
 //!
-//! The parser is tolerant: what is no assignment is skipped, so that a label can stand before binary
-//! data and a damaged one still gives what it holds.
+//! The parser is tolerant: text that is not an assignment is skipped, so that binary data may follow a label and the
+//! valid part of a damaged one is kept.
 
 use areograph_base::error::{Cause, Kind};
 
-/// Bytes of a file that are looked at; labels are a few kilobytes.
+/// Bytes of a file that are parsed; labels have a few kilobytes.
 pub const LABEL_BYTES_MAX: usize = 1 << 20;
 
 /// One `KEY = value` of a label.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Entry {
-    /// Name of the object or group that it stands in, upper case; empty outside of any.
+    /// Name of the enclosing object or group, upper case; empty outside of any.
     pub group: String,
     /// Number of that object or group, counted from 1 in the order of their openings; 0 outside of any.
     pub block: usize,
     /// The keyword in upper case.
     pub key: String,
-    /// The value without quotes and unit, white space over line ends made one blank.
+    /// The value without quotes and unit, white space across line ends reduced to one blank.
     pub value: String,
-    /// The unit that stood in `<>`, lower case.
+    /// The unit in `<>`, lower case.
     pub unit: Option<String>,
 }
 
 impl Entry {
-    /// The value with its unit, as it was written.
+    /// The value with its unit, as written.
     #[must_use]
     pub fn written(&self) -> String {
         match &self.unit {
@@ -40,24 +40,24 @@ impl Entry {
 pub struct Label {
     /// The assignments in the order of the file.
     pub entries: Vec<Entry>,
-    /// Whether the statement `END` was found behind them.
+    /// Whether the statement `END` follows them.
     pub ended: bool,
 }
 
-/// A label is not what it should be.
+/// An invalid label.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LabelError {
-    /// No assignment at all.
+    /// No assignment.
     #[error("no label found: expected lines KEY = value in the first {LABEL_BYTES_MAX} bytes")]
     NoLabel,
-    /// A value that is not of its kind.
+    /// An invalid value.
     #[error("{key} is {value:?}; expected {expected}")]
     Value {
         /// The keyword.
         key: String,
         /// Its value.
         value: String,
-        /// What it should be.
+        /// Expected value.
         expected: &'static str,
     },
     /// No statement marks the end of the label.
@@ -73,17 +73,17 @@ pub enum LabelError {
         /// The first one that differs from it.
         second: String,
     },
-    /// The image of another mission, of something else than Mars, or no longer as the camera took it.
+    /// An image of another mission or target, or one that is map-projected.
     #[error("{key} is {value:?}; expected {expected}")]
     OtherImage {
         /// The keyword.
         key: String,
         /// Its value.
         value: String,
-        /// What it should be.
+        /// Expected value.
         expected: &'static str,
     },
-    /// Two values that are those of two images.
+    /// Two values that belong to different images.
     #[error("{} is {:?}, but {} is {:?}; expected values of one image", .keys[0], .values[0], .keys[1], .values[1])]
     Contradiction {
         /// Their keywords.
@@ -96,7 +96,7 @@ pub enum LabelError {
     Instrument {
         /// Instrument and filter of the label.
         found: String,
-        /// Those of the cameras that are known.
+        /// Instruments of the known cameras.
         known: Vec<String>,
     },
 }
@@ -114,7 +114,7 @@ impl Cause for LabelError {
                 "determine which of the two values is correct, and keep only that one in the label"
             }
             Self::OtherImage { .. } => {
-                "give the label of an image that the camera's spacecraft took of Mars, as the camera took it"
+                "give the label of an image of Mars that the camera's spacecraft took, without a map projection"
             }
             Self::Value { .. } => {
                 "correct the label, or write the key in the image's table of the configuration"
@@ -141,7 +141,7 @@ fn listed(words: &[String]) -> String {
     }
 }
 
-/// The label at the start of `bytes`; at most [`LABEL_BYTES_MAX`] of them are looked at.
+/// The label at the start of `bytes`, of which at most [`LABEL_BYTES_MAX`] are parsed.
 ///
 /// # Errors
 /// [`LabelError::NoLabel`] when there is no assignment.
@@ -172,7 +172,7 @@ pub fn parse_whole(bytes: &[u8]) -> Result<Label, LabelError> {
                 "END_OBJECT" | "END_GROUP" | "ENDOBJECT" | "ENDGROUP" => drop(groups.pop()),
                 _ => {}
             }
-            // The rest of the line is no assignment either: the mark of an SFDU, or junk.
+            // The rest of the line is no assignment either: the mark of an SFDU, or invalid text.
             scanner.at = after_word;
             scanner.skip_line();
             continue;
@@ -180,7 +180,7 @@ pub fn parse_whole(bytes: &[u8]) -> Result<Label, LabelError> {
         let (value, unit) = scanner.value();
         match key.as_str() {
             "OBJECT" | "GROUP" | "BEGIN_OBJECT" | "BEGIN_GROUP" => {
-                // Every entry repeats its group's name, so junk must not make it long.
+                // Every entry repeats its group's name, so invalid text must not lengthen it.
                 let name: String = value.chars().take(64).collect();
                 blocks += 1;
                 groups.push((name.to_ascii_uppercase(), blocks));
@@ -205,13 +205,13 @@ pub fn parse_whole(bytes: &[u8]) -> Result<Label, LabelError> {
 }
 
 impl Label {
-    /// The first entry with this keyword (upper case), wherever it stands.
+    /// The first entry with this keyword (upper case), in any object.
     #[must_use]
     pub fn find(&self, key: &str) -> Option<&Entry> {
         self.entries.iter().find(|entry| entry.key == key)
     }
 
-    /// The one value with this keyword (upper case), wherever it stands; it may stand there several times.
+    /// The only value with this keyword (upper case), in any object; it may occur several times.
     ///
     /// # Errors
     /// [`LabelError::Twice`] for another value under the same keyword.
@@ -244,7 +244,7 @@ fn only<'a>(mut entries: impl Iterator<Item = &'a Entry>) -> Result<Option<&'a E
     }
 }
 
-/// Walks over the bytes of a label; every step moves forward.
+/// Scans the bytes of a label; every step advances.
 struct Scanner<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -270,7 +270,7 @@ impl Scanner<'_> {
             .unwrap_or(rest.len());
     }
 
-    /// Over white space, `/* … */` and `# …` comments.
+    /// Skips white space, `/* … */` and `# …` comments.
     fn skip_space(&mut self) {
         while let Some(byte) = self.peek() {
             if byte.is_ascii_whitespace() || byte == 0 {
@@ -294,7 +294,7 @@ impl Scanner<'_> {
         self.skip_space();
         let rest = self.bytes.get(self.at..).filter(|rest| !rest.is_empty())?;
         let stops = |byte: &u8| byte.is_ascii_whitespace() || *byte == b'=';
-        // A lone "=" is a word of its own, so that junk cannot stop the walk.
+        // A lone "=" is a word, so that invalid text cannot stop the scan.
         let length = rest.iter().position(stops).unwrap_or(rest.len()).max(1);
         self.at += length;
         Some(String::from_utf8_lossy(&rest[..length]).into_owned())
@@ -317,7 +317,7 @@ impl Scanner<'_> {
         (value, unit)
     }
 
-    /// What stands between the byte here and the next `close`, which may be lines away.
+    /// The text between the byte here and the next `close`, which may be on a later line.
     fn enclosed(&mut self, close: u8) -> String {
         let rest = &self.bytes[self.at + 1..];
         let length = rest.iter().position(|byte| *byte == close);

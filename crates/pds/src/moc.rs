@@ -14,9 +14,9 @@ use areograph_base::{
     units::SECONDS_PER_MS,
 };
 
-/// The fields of a parsed label; what it does not say stays `None`.
+/// The fields of a parsed label; missing ones are `None`.
 ///
-/// `lines_delivered` is never set: image data are compressed, so their length in bytes says nothing.
+/// `lines_delivered` is never set: image data are compressed, so their length in bytes does not determine it.
 ///
 /// # Errors
 /// An instrument that is not among `cameras`, or none; an image of another spacecraft or target, or one that is
@@ -62,8 +62,8 @@ pub fn image_label(label: &Label, cameras: &[Instrument]) -> Result<ImageLabel, 
     })
 }
 
-/// The MOC product that a name begins with, in capitals and without what stands between its parts: `E0202855` of
-/// `E02-02855`, `E02/02855`, `e0202855.imq` and `E02_02855-nadir`; `None` for a name that names no product.
+/// The MOC product at the start of a name, in capitals and without separators: `E0202855` of `E02-02855`, `E02/02855`,
+/// `e0202855.imq` and `E02_02855-nadir`; `None` if the name contains no product.
 #[must_use]
 pub fn product_named(name: &str) -> Option<String> {
     const LENGTH: usize = 8;
@@ -86,7 +86,7 @@ pub fn product_named(name: &str) -> Option<String> {
     is_product.then_some(product)
 }
 
-/// Mission phases that product identifiers do not count by months (as `M04`, `E02`).
+/// Mission phases whose product identifiers are not counted by months (as `M04`, `E02`).
 const PHASES: [&str; 5] = ["AB1", "SP1", "SP2", "FHA", "CAL"];
 
 fn clock(entry: &Entry) -> Result<String, LabelError> {
@@ -153,8 +153,8 @@ mod tests {
             ),
             (
                 "OBJECT = IMAGE_MAP_PROJECTION\nMAP_SCALE = 1\nEND_OBJECT",
-                "OBJECT is \"IMAGE_MAP_PROJECTION\"; expected the image as its camera took it, which no map \
-                 projection describes",
+                "OBJECT is \"IMAGE_MAP_PROJECTION\"; expected the image as taken by the camera, with no \
+                 map projection",
             ),
             (
                 "EDIT_MODE_ID = \"-1\"",

@@ -1,7 +1,7 @@
-//! Files of pixels: images as the archive has them, MOC's and HRSC's, and what stands in for them: ISIS cubes, TIFF and PNG of
-//! one band of grey.
+//! Pixel files: images as archived, of MOC and HRSC, and their substitutes: ISIS cubes, TIFF and PNG of one greyscale
+//! band.
 //!
-//! All of them are read strip by strip, in 8 bits. Numbers of other kinds are shown between the least and the largest one.
+//! All of them are read strip by strip, in 8 bits. Other number types are scaled between their minimum and maximum.
 
 mod cube;
 mod pictures;
@@ -30,16 +30,16 @@ use areograph_base::{
     instruments::Instrument,
 };
 
-/// A file of pixels that is opened.
+/// An open pixel file.
 #[derive(Debug)]
 pub enum PixelFile {
-    /// An image as the archive has it.
+    /// An archived image.
     Archive(Box<ImageFile>),
     /// Anything else.
     Other(Box<OtherFile>),
 }
 
-/// A cube, a picture, or an image whose rows are samples as they are.
+/// A cube, a picture, or an image with uncompressed rows.
 #[derive(Debug)]
 pub struct OtherFile {
     path: PathBuf,
@@ -68,7 +68,7 @@ pub enum PixelFileError {
         key: &'static str,
         /// Its value.
         value: String,
-        /// What it should be.
+        /// Expected value.
         expected: &'static str,
     },
     /// A cube whose pixels end before their last line.
@@ -76,10 +76,10 @@ pub enum PixelFileError {
     Short {
         /// Bytes of the file.
         found: u64,
-        /// Bytes that the label tells.
+        /// Bytes by the label.
         expected: u64,
     },
-    /// A picture that its library refuses, or of another kind.
+    /// A picture that its library rejects, or of another kind.
     #[error("{format}: {reason}")]
     Picture {
         /// Its format.
@@ -109,10 +109,11 @@ impl Cause for PixelFileError {
 }
 
 impl PixelFile {
-    /// Opens a file by what stands in it: a cube, a TIFF, a PNG, or an image of the archive by one of `cameras`.
+    /// Opens a file by its content: a cube, a TIFF, a PNG, or an archived image by one of `cameras`.
     ///
     /// # Errors
-    /// The system's refusal to read; those of [`ImageFile::open`] and of [`read_label`](super::read_label()); [`PixelFileError`].
+    /// The file cannot be read; errors of [`ImageFile::open`], of [`read_label`](super::read_label()), and
+    /// [`PixelFileError`].
     pub fn open(path: &Path, cameras: &[Instrument]) -> Result<Self> {
         let labelled = Labelled::open(path)?;
         let start = &labelled.start;
@@ -139,7 +140,7 @@ impl PixelFile {
             size: cube.size(),
             kind: OtherKind::Cube(cube),
             is_projected: projection(&label).is_some(),
-            // A cube need not be of a camera that is known.
+            // The camera of a cube may be unknown.
             label: image_label(&label, cameras).ok(),
         })))
     }
@@ -161,7 +162,7 @@ impl PixelFile {
         })))
     }
 
-    /// Where the file is.
+    /// Path of the file.
     #[must_use]
     pub fn path(&self) -> &Path {
         match self {
@@ -188,7 +189,7 @@ impl PixelFile {
         }
     }
 
-    /// What the label says of times, size and camera; a picture has none.
+    /// Times, size and camera from the label; `None` for a picture.
     #[must_use]
     pub fn label(&self) -> Option<&ImageLabel> {
         match self {
@@ -197,7 +198,7 @@ impl PixelFile {
         }
     }
 
-    /// Whether these are no pixels as the camera took them, but those of a map.
+    /// Whether the pixels are map-projected.
     #[must_use]
     pub fn is_projected(&self) -> bool {
         match self {
@@ -206,7 +207,7 @@ impl PixelFile {
         }
     }
 
-    /// The image as the archive has it, if it is one.
+    /// The archived image, if it is one.
     #[must_use]
     pub fn archive(&self) -> Option<&ImageFile> {
         match self {
@@ -215,7 +216,7 @@ impl PixelFile {
         }
     }
 
-    /// What kind of pixels a file has that is not as the archive has it.
+    /// The kind of pixels of a file that is not an archived image.
     #[must_use]
     pub fn other_kind(&self) -> Option<String> {
         match self {
@@ -228,10 +229,10 @@ impl PixelFile {
         }
     }
 
-    /// The image from its first line on, strip by strip.
+    /// The image from its first line on, in strips.
     ///
     /// # Errors
-    /// The system's refusal to read; pictures that their libraries refuse.
+    /// The file cannot be read; pictures that their libraries reject.
     pub fn strips(&self) -> Result<PixelStrips> {
         let source = match self {
             Self::Archive(image) => Source::Archive(Box::new(image.strips()?)),
@@ -254,12 +255,12 @@ impl PixelFile {
 /// The lines of a TIFF as numbers, from the first one on.
 ///
 /// # Errors
-/// The system's refusal to read; a picture that is not of one band of grey, or that its library refuses.
+/// The file cannot be read; a picture that is not of one greyscale band, or that its library rejects.
 pub(super) fn tiff_rows(path: &Path) -> Result<Box<dyn Rows>> {
     Picture::Tiff.rows(path)
 }
 
-/// Whether the label describes pixels as ISIS has them.
+/// Whether the label describes pixels of an ISIS cube.
 fn is_cube(label: &Label) -> bool {
     label.entries.iter().any(|entry| entry.group == "CORE")
 }
@@ -274,7 +275,7 @@ impl OtherFile {
         .in_file(&self.path)
     }
 
-    /// How numbers become bytes: as they are where they are bytes.
+    /// Conversion of numbers to bytes: unchanged if they are bytes.
     fn scale(&self) -> Result<Scale> {
         let mut rows = self.rows()?;
         if rows.is_bytes() {
@@ -308,10 +309,10 @@ enum Source {
 }
 
 impl PixelStrips {
-    /// The next lines; `None` behind the last one that is there.
+    /// The next lines; `None` after the last one.
     ///
     /// # Errors
-    /// The system's refusal to read; a picture that its library refuses.
+    /// The file cannot be read; a picture that its library rejects.
     pub fn next_strip(&mut self) -> Result<Option<Strip>> {
         match &mut self.source {
             Source::Archive(strips) => {
@@ -330,7 +331,7 @@ impl PixelStrips {
         }
     }
 
-    /// What was found wrong while decoding so far, and how much that is in all.
+    /// Faults found while decoding so far, and their total number.
     #[must_use]
     pub fn complaints(&self) -> (&[Complaint], u64) {
         match &self.source {
@@ -339,7 +340,7 @@ impl PixelStrips {
         }
     }
 
-    /// The numbers that are 1 and 255 here, of a file whose numbers are not bytes.
+    /// The numbers that become 1 and 255, for a file whose numbers are not bytes.
     #[must_use]
     pub const fn range(&self) -> Option<[f64; 2]> {
         match self.source {
@@ -352,7 +353,7 @@ impl PixelStrips {
     }
 }
 
-/// Numbers as bytes; a line without a number is missing.
+/// Numbers as bytes; a line without valid numbers is missing.
 fn strip(numbers: &[f64], scale: Scale, first_line: u32, samples: u32) -> Strip {
     let state = |line: &[f64]| {
         if line.iter().any(|number| number.is_finite()) {

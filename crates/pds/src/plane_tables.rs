@@ -1,4 +1,4 @@
-//! Tables of a net of rectified pictures: measurements, controls, pictures, ticks of the film.
+//! Tables of a net of rectified pictures: measurements, controls, pictures, film ticks.
 
 use std::path::Path;
 
@@ -6,14 +6,14 @@ use super::table_rows::{Rows, TableError, columns, name, numbers, read_rows};
 use areograph_base::{error::Result, units::METRES_PER_KM};
 use areograph_geom::plane::{Place, box_centre};
 
-/// Where the columns are told.
+/// File that describes the columns.
 const EXAMPLE: &str = "config/nets/example.toml";
-/// What every row names.
+/// Names required in every row.
 const NAMED: &str = "a picture and a point must have names";
 
 /// Ticks at the corners of a picture, in the order in which [`TickRow::tick`] counts them.
 pub const CORNER_TICKS: [&str; 4] = ["lower_left", "lower_right", "upper_right", "upper_left"];
-/// Ticks at the middles of its edges, which follow.
+/// Ticks at the middles of its edges, counted after the corners.
 pub const EDGE_TICKS: [&str; 4] = ["lower", "upper", "left", "right"];
 
 /// A point in a picture.
@@ -23,7 +23,7 @@ pub struct MeasurementRow {
     pub picture: String,
     /// Name of the point.
     pub point: String,
-    /// Where, in the units of the picture; of a boxed crater the middle.
+    /// Position, in the units of the picture; the middle of a boxed crater.
     pub at: Place,
 }
 
@@ -32,7 +32,7 @@ pub struct MeasurementRow {
 pub struct ControlRow {
     /// Name of the point.
     pub point: String,
-    /// Where.
+    /// Its position.
     pub at: ControlPlace,
     /// Standard deviation of a coordinate, metres.
     pub sigma_m: Option<f64>,
@@ -57,7 +57,7 @@ pub enum ControlPlace {
 pub struct PictureRow {
     /// Its name.
     pub picture: String,
-    /// Name of its brick, empty where it is put into one by areograph.
+    /// Name of its brick; empty where areograph assigns it.
     pub brick: String,
     /// Size of a unit on the ground.
     pub metres_per_unit: Option<f64>,
@@ -72,14 +72,14 @@ pub struct TickRow {
     pub tick: usize,
     /// Measured place.
     pub measured: Place,
-    /// Where it is known to be.
+    /// Known place.
     pub known: Place,
 }
 
 /// Reads a table of measurements.
 ///
 /// # Errors
-/// The system's refusal to read; columns that are missing; a table of which no row can be read.
+/// The file cannot be read; missing columns; a table without a readable row.
 pub fn read_measurements(path: &Path) -> Result<Rows<MeasurementRow>> {
     const COLUMNS: &str =
         "picture, point, x, y or x_upper_right, y_upper_right, x_lower_left, y_lower_left";

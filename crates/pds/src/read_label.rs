@@ -1,4 +1,4 @@
-//! Labels of images of all cameras that are known: each is read by the rules of its mission.
+//! Labels of images of all known cameras: each is read by the rules of its mission.
 
 use std::{
     fs::File,
@@ -17,7 +17,7 @@ use areograph_base::{
     instruments::Instrument,
 };
 
-/// A file as far as its label goes.
+/// A file with its label.
 #[derive(Debug)]
 pub(super) struct Labelled {
     pub(super) path: PathBuf,
@@ -30,7 +30,7 @@ impl Labelled {
     /// Opens a file and reads its start.
     ///
     /// # Errors
-    /// The system's refusal to read.
+    /// The file cannot be read.
     pub(super) fn open(path: &Path) -> Result<Self> {
         let mut file = File::open(path)
             .map_err(IoError::on("open"))
@@ -57,11 +57,11 @@ impl Labelled {
     }
 }
 
-/// Reads a PDS3 label (attached or detached) or an ISIS label of an image by one of `cameras`; of a file whose rows have
-/// times of their own these too.
+/// Reads a PDS3 label (attached or detached) or an ISIS label of an image by one of `cameras`; also the line times of a
+/// file whose rows contain them.
 ///
 /// # Errors
-/// The system's refusal to read; no label, or a cut one; an instrument that is not among `cameras`, or none; an image of
+/// The file cannot be read; no label, or a cut one; an instrument that is not among `cameras`, or none; an image of
 /// another spacecraft or target, or one that is map-projected; a value that is not of its kind, or two values under one
 /// keyword; rows that are not those of the label, or whose times contradict each other.
 pub fn read_label(path: &Path, cameras: &[Instrument]) -> Result<ImageLabel> {
@@ -81,8 +81,8 @@ pub fn read_label(path: &Path, cameras: &[Instrument]) -> Result<ImageLabel> {
     }
 }
 
-/// The product that a name begins with: `E0202855` of `E02-02855`, `H5270_0000_IR2` of `h5270_0000_ir2.img`; `None` for a
-/// name that names no product.
+/// The product at the start of a name: `E0202855` of `E02-02855`, `H5270_0000_IR2` of `h5270_0000_ir2.img`; `None` if
+/// the name contains no product.
 #[must_use]
 pub fn product_named(name: &str) -> Option<String> {
     hrsc::product_named(name).or_else(|| moc::product_named(name))

@@ -1,4 +1,4 @@
-//! Tables of laser shots: text with commas, a row a shot, whose columns somebody says.
+//! Tables of laser shots: comma-separated text with one shot per row, whose columns are configured.
 
 mod columns;
 
@@ -15,12 +15,12 @@ use areograph_base::{
 };
 use areograph_geom::ellipsoid::spherical_to_xyz_m;
 
-/// A footprint nearer to the ellipsoid than this share of its radius is on the body.
+/// Largest distance of a footprint from the ellipsoid, as a share of its radius.
 const RELIEF: f64 = 0.05;
-/// Longest range, metres: beyond every orbit that a laser reaches the ground from.
+/// Longest range, metres: beyond every orbit from which a laser reaches the ground.
 const RANGE_MAX_M: f64 = 1e7;
-/// Range and distance of spacecraft and footprint agree within this share of the range, and this beside it, metres: clocks,
-/// orbits and datums leave less, another unit or column far more.
+/// Tolerance between range and distance of spacecraft and footprint: a share of the range, plus a constant, metres.
+/// Clocks, orbits and datums leave less, another unit or column far more.
 const RANGE_SHARE: f64 = 0.01;
 const RANGE_BESIDE_M: f64 = 1_000.0;
 /// Ephemeris times, seconds: five centuries around J2000.
@@ -33,7 +33,7 @@ pub struct ShotRow {
     pub line: u32,
     /// Time, ET seconds.
     pub et_s: f64,
-    /// East longitude of the footprint, radians, not folded.
+    /// East longitude of the footprint, radians, not wrapped.
     pub longitude_rad: f64,
     /// Latitude of its direction, radians.
     pub latitude_rad: f64,
@@ -47,16 +47,16 @@ pub struct ShotRow {
     pub orbit: u32,
 }
 
-/// A row that is no shot.
+/// An invalid row.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RowComplaint {
     /// Line of the file, from 1.
     pub line: u32,
-    /// What was found, and what was expected.
+    /// The value found and the value expected.
     pub text: String,
 }
 
-/// A table of which no shot can be read.
+/// A table without a readable shot.
 #[derive(Debug, thiserror::Error)]
 enum ShotTableError {
     #[error("no column is called \"{name}\" (shots.columns.{key}); the first row has {}", found.join(", "))]
@@ -67,7 +67,7 @@ enum ShotTableError {
     },
     #[error("the table cannot be read: {0}")]
     Table(String),
-    #[error("none of its {rows} rows is a shot; line {}: {}", first.line, first.text)]
+    #[error("none of its {rows} rows is a valid shot; line {}: {}", first.line, first.text)]
     Unreadable { rows: u64, first: RowComplaint },
     #[error("it has no rows")]
     Empty,
@@ -91,15 +91,15 @@ impl Cause for ShotTableError {
     }
 }
 
-/// Reads the table at `path` and hands every shot, or what is wrong with its row, to `take`, in their order.
+/// Reads the table at `path` and passes every shot, or the fault of its row, to `take`, in order.
 ///
-/// A first row without a number in the columns that are asked for is a header.
+/// A first row without a number in the configured columns is a header.
 ///
-/// * `body` – whose ground the shots met
+/// * `body` – the body of the footprints
 /// * `utc` – the instant of a time in UTC
 ///
 /// # Errors
-/// The system's refusal to read; a column that is not there; a table of which no row is a shot; what `take` returns.
+/// The file cannot be read; a missing column; a table without a valid shot; errors of `take`.
 pub fn read_shot_table(
     path: &Path,
     columns: &ShotColumns,
@@ -138,7 +138,7 @@ pub fn read_shot_table(
         };
         rows += 1;
         let line = record.position().map_or(0, csv::Position::line);
-        // Tables of more lines than this are none.
+        // Longer tables are not shot tables.
         let line = u32::try_from(line).unwrap_or(u32::MAX);
         let row = shot(known, &record, line, body, utc).map_err(|text| RowComplaint { line, text });
         match &row {
@@ -155,7 +155,7 @@ pub fn read_shot_table(
     }
 }
 
-/// The shot of a row, or what is wrong with it.
+/// The shot of a row, or its fault.
 fn shot(
     fields: &Fields,
     record: &StringRecord,
@@ -188,14 +188,14 @@ fn shot(
     Ok(row)
 }
 
-/// The range is about the distance of spacecraft and footprint.
+/// Checks that the range is about the distance of spacecraft and footprint.
 fn agrees(row: &ShotRow) -> std::result::Result<(), String> {
     let ground_m = spherical_to_xyz_m(row.longitude_rad, row.latitude_rad, row.radius_m);
     let [longitude_rad, latitude_rad, radius_m] = row.spacecraft;
     let spacecraft_m = spherical_to_xyz_m(longitude_rad, latitude_rad, radius_m);
     let distance_m = (spacecraft_m - ground_m).norm();
     let limit_m = RANGE_SHARE * row.range_m + RANGE_BESIDE_M;
-    // Written so that NaN is refused too.
+    // Written so that NaN is rejected too.
     if (distance_m - row.range_m).abs() <= limit_m {
         return Ok(());
     }

@@ -1,19 +1,19 @@
-//! Comma-separated tables with a header line: rows that are taken, and complaints of those that are not.
+//! Comma-separated tables with a header line: valid rows, and complaints about the others.
 
 use std::{fs, path::Path};
 
 use areograph_base::error::{Cause, IoError, Kind, Locate, Result};
 
-/// Rows of a file, and what was not taken.
+/// Rows of a file, and complaints about the rejected ones.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rows<T> {
     /// Rows in order.
     pub rows: Vec<T>,
-    /// Rows that are not what they should be: line of the file from 1, and what was expected.
+    /// Invalid rows: line of the file from 1, and the expected content.
     pub complaints: Vec<(u64, String)>,
 }
 
-/// A file that is no such table.
+/// A file that is not such a table.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(super) enum TableError {
     #[error("column {column} is missing; expected the columns {expected}")]
@@ -36,7 +36,7 @@ pub(super) enum TableError {
     },
 }
 
-/// The same, with the file that tells the columns.
+/// The same, with the file that describes the columns.
 #[derive(Debug, thiserror::Error)]
 #[error("{error}")]
 struct Refused {
@@ -63,12 +63,12 @@ impl Cause for Refused {
     }
 }
 
-/// Reads a table whose rows `take`, made from the header, turns into values.
+/// Reads a table whose rows `take`, made from the header, converts to values.
 ///
-/// `example` is the file that tells the columns.
+/// `example` is the file that describes the columns.
 ///
 /// # Errors
-/// The system's refusal to read; columns that are missing; a table of which no row can be read.
+/// The file cannot be read; missing columns; a table without a readable row.
 pub(super) fn read_rows<T, F>(
     path: &Path,
     example: &'static str,
@@ -119,7 +119,7 @@ where
     }
 }
 
-/// Where the header has these columns.
+/// Positions of these columns in the header.
 pub(super) fn columns<const N: usize>(
     header: &csv::StringRecord,
     names: [&'static str; N],
@@ -133,7 +133,7 @@ pub(super) fn columns<const N: usize>(
     Ok(places)
 }
 
-/// The text of a column that every row must have, or `expected`.
+/// The text of a required column, or `expected`.
 pub(super) fn name(
     row: &csv::StringRecord,
     column: usize,

@@ -13,17 +13,17 @@ use areograph_base::{
 };
 use network::parse_network;
 
-/// Where ISIS has the middle of the first pixel, we have its outer edge at 0.
+/// ISIS counts the middle of the first pixel as 1; here its outer edge is 0.
 pub const ISIS_TO_EDGE: f64 = -0.5;
 
-/// Tie points of a file, and what was not taken.
+/// Tie points of a file, and complaints about the rejected records.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TieFile {
     /// Points in the order of their first measurement, also those measured once.
     pub ties: Vec<TiePoint<String>>,
-    /// Measurements and points that the network itself says to ignore.
+    /// Measurements and points that the network marks as ignored.
     pub ignored: usize,
-    /// Records that are not what they should be.
+    /// Invalid records.
     pub complaints: Vec<TieComplaint>,
 }
 
@@ -32,11 +32,11 @@ pub struct TieFile {
 pub struct TieComplaint {
     /// Line of a table, or number of the object or group in a network, both from 1.
     pub record: u64,
-    /// What was found, and what was expected.
+    /// The value found and the value expected.
     pub text: String,
 }
 
-/// A file that holds no tie points.
+/// A file without tie points.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 enum TieError {
     #[error("this is a binary control network; expected its text form (PVL)")]
@@ -81,8 +81,7 @@ impl Cause for TieError {
 /// Reads tie points; a file whose name ends in `.csv` is a table, any other a control network.
 ///
 /// # Errors
-/// The system's refusal to read; a binary network; no network; columns that are missing; records of which none
-/// can be read.
+/// The file cannot be read; a binary network; no network; missing columns; no readable record.
 pub fn read_ties(path: &Path) -> Result<TieFile> {
     let bytes = fs::read(path).map_err(IoError::on("read")).in_file(path)?;
     let table = path
@@ -96,7 +95,7 @@ pub fn read_ties(path: &Path) -> Result<TieFile> {
     ties.and_then(readable).in_file(path)
 }
 
-/// A file of which nothing was taken says why.
+/// Rejects a file without a valid record.
 fn readable(file: TieFile) -> std::result::Result<TieFile, TieError> {
     match file.complaints.first() {
         Some(first) if file.ties.is_empty() => Err(TieError::Unreadable {
@@ -108,8 +107,8 @@ fn readable(file: TieFile) -> std::result::Result<TieFile, TieError> {
     }
 }
 
-/// The table of some tie points, as [`read_ties`] reads it; places to a ten-thousandth of a pixel. It has columns for
-/// standard deviations where a measurement has its own.
+/// Formats tie points as a table that [`read_ties`] reads; coordinates to a ten-thousandth of a pixel. It has columns
+/// for standard deviations where a measurement has them.
 #[must_use]
 pub fn ties_table(ties: &[TiePoint<String>]) -> String {
     let mut table = csv::Writer::from_writer(Vec::new());
@@ -136,12 +135,12 @@ pub fn ties_table(ties: &[TiePoint<String>]) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// Columns of a table; others are left alone.
+/// Required columns of a table; others are ignored.
 const COLUMNS: [&str; 4] = ["point_id", "serial_number", "sample", "line"];
-/// Columns that a table may have: standard deviations of a measurement; an empty field is none.
+/// Optional columns of a table: standard deviations of a measurement; an empty field is missing.
 const SIGMA_COLUMNS: [&str; 2] = ["line_sigma_px", "sample_sigma_px"];
 
-/// Where a table has its columns.
+/// Positions of the columns of a table.
 struct Places {
     required: [usize; 4],
     sigmas: [Option<usize>; 2],
@@ -163,10 +162,10 @@ impl Places {
     }
 }
 
-/// Standard deviations of line and sample as a file writes them; both, or none where both are missing.
+/// Standard deviations of line and sample from a file; both, or `None` where both are missing.
 ///
 /// # Errors
-/// What was found instead of two positive numbers.
+/// The values found instead of two positive numbers.
 fn sigmas(written: [Option<&str>; 2]) -> std::result::Result<Option<[f64; 2]>, String> {
     if written == [None, None] {
         return Ok(None);
@@ -193,7 +192,7 @@ struct Gathered {
 }
 
 impl Gathered {
-    /// The point of this identifier, new where there was none.
+    /// The point with this identifier, created if necessary.
     fn point(&mut self, id: String) -> &mut TiePoint<String> {
         let ties = &mut self.file.ties;
         let at = *self.index.entry(id).or_insert_with_key(|id| {
@@ -207,7 +206,7 @@ impl Gathered {
         &mut ties[at]
     }
 
-    /// Adds a measurement whose place is counted as ISIS does.
+    /// Adds a measurement in ISIS coordinates.
     fn add(&mut self, id: String, known: Option<KnownGround>, measure: TieMeasure<String>) {
         let point = self.point(id);
         point.known = point.known.or(known);
@@ -249,7 +248,7 @@ fn parse_table(bytes: &[u8]) -> std::result::Result<TieFile, TieError> {
     Ok(gathered.file)
 }
 
-/// The measurement of a record with the identifier of its point; otherwise what it lacks.
+/// The measurement of a record with the identifier of its point, or the fault.
 fn measurement(
     places: &Places,
     record: &csv::StringRecord,
@@ -274,7 +273,7 @@ fn measurement(
     Ok((id.to_owned(), measure))
 }
 
-/// Why a record is none, without the place that is told with it.
+/// The fault of an unreadable record, without its location, which is reported with it.
 fn unreadable_record(error: &csv::Error) -> String {
     match error.kind() {
         csv::ErrorKind::UnequalLengths {

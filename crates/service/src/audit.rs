@@ -1,26 +1,26 @@
-//! Who changed what.
+//! The log of changes and their authors.
 
 use rusqlite::{Transaction, params};
 
 use super::database::Stored;
 
-/// A change that somebody asked for.
+/// A change requested by a caller.
 #[derive(Debug, Clone, Copy)]
 pub struct Change<'a> {
     /// Identifier of the token.
     pub who: &'a str,
-    /// What was asked for, as in `cancel`.
+    /// The requested action, as in `cancel`.
     pub action: &'a str,
-    /// What it concerns, as in `job 7`.
+    /// The target, as in `job 7`.
     pub target: &'a str,
-    /// Address that it came from.
+    /// Remote address of the request.
     pub remote: &'a str,
 }
 
-/// Notes a change together with the change itself.
+/// Records a change in the same transaction as the change itself.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn note_change(transaction: &Transaction<'_>, now_ms: i64, change: Change<'_>) -> Stored<()> {
     let Change {
         who,

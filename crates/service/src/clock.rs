@@ -1,4 +1,4 @@
-//! What time it is; tests say it themselves.
+//! The current time; tests set it.
 
 use std::sync::{
     Arc,
@@ -7,15 +7,15 @@ use std::sync::{
 
 use chrono::{DateTime, SecondsFormat, Utc};
 
-/// Tells the time; copies tell the same.
+/// The clock; copies show the same time.
 #[derive(Debug, Clone, Default)]
 pub struct Clock {
-    /// Milliseconds of UTC since 1970, where they do not come from the system.
+    /// Milliseconds of UTC since 1970, if not from the system.
     set: Option<Arc<AtomicI64>>,
 }
 
 impl Clock {
-    /// A clock that shows what it is set to.
+    /// A clock that shows the time to which it is set.
     #[must_use]
     pub fn set_to(utc_ms: i64) -> Self {
         Self {
@@ -23,7 +23,7 @@ impl Clock {
         }
     }
 
-    /// Sets a clock that was made by [`Self::set_to`].
+    /// Sets a clock created by [`Self::set_to`].
     pub fn set(&self, utc_ms: i64) {
         if let Some(set) = &self.set {
             set.store(utc_ms, Ordering::SeqCst);

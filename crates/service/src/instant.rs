@@ -1,4 +1,4 @@
-//! Instants as programs outside read them.
+//! Instants in external form.
 
 use rusqlite::types::{FromSql, FromSqlResult, ValueRef};
 use serde::{Serialize, Serializer};

@@ -1,14 +1,14 @@
-//! The service: sites are run again when what they read changes, one worker process a site.
+//! The service: sites are run again when their inputs change, one worker process per site.
 //!
-//! Truth about products is on the disk, in their manifests; the database remembers and is compared with the disk at
-//! start. Files are listed, not watched. A job brings one site up to date, an attempt is one worker process, a run is what
-//! one attempt published.
+//! Manifests on the disk are authoritative for products; the database is compared with the disk at every start. Files
+//! are listed, not watched. A job brings one site up to date, an attempt is one worker process, a run is the
+//! publication of one attempt.
 //!
-//! The service does not know the pipeline: worker processes speak with it in lines of JSON ([`worker::protocol`]).
+//! The service is independent of the pipeline: it exchanges lines of JSON with worker processes ([`worker::protocol`]).
 //!
-//! `engine` finds changes, affected sites, jobs, nights and what is kept; `database` is its memory; `worker` sees
-//! worker processes from outside; `http` has pages and interface. Only this crate uses axum, the network of tokio, and
-//! SQLite for the service.
+//! `engine` detects changes and manages affected sites, jobs, nights and retention; `database` stores its state;
+//! `worker` controls worker processes from outside; `http` has pages and interface. Only this crate uses axum, the
+//! network of tokio, and SQLite for the service.
 //!
 //! ```
 //! use areograph_service::worker::protocol::{Line, PROTOCOL};

@@ -1,4 +1,4 @@
-//! One service at a time has a folder of state.
+//! A lock: one service at a time uses a state folder.
 
 use std::{
     fs::{self, File, TryLockError},
@@ -11,10 +11,10 @@ use serde::{Deserialize, Serialize};
 use super::clock::utc_text;
 use areograph_base::error::{Cause, IoError, Kind, Locate as _, Result};
 
-/// Name of the lock in the folder of the state.
+/// Name of the lock in the state folder.
 const LOCK: &str = "service.lock";
 
-/// Types of file systems on which neither locks nor the database can be trusted.
+/// Types of file systems on which neither locks nor the database are reliable.
 const NETWORK: [(i64, &str); 5] = [
     (0x6969, "NFS"),
     (0x517b, "SMB"),
@@ -23,20 +23,20 @@ const NETWORK: [(i64, &str); 5] = [
     (0x0002_3c37, "Coda"),
 ];
 
-/// Held while a service runs; the system frees it when the process ends, however it ends.
+/// Held while a service runs; the system releases it at the end of the process, however it ends.
 #[derive(Debug)]
 pub struct ServiceLock {
     file: File,
 }
 
-/// Who holds the lock.
+/// The holder of the lock.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Owner {
     /// Process.
     pub pid: u32,
-    /// What runs: `serve`, `nightly` or another command.
+    /// Its command: `serve`, `nightly` or another.
     pub command: String,
-    /// Address of its pages; empty without.
+    /// Address of its pages; empty without pages.
     pub address: String,
     /// When it began, milliseconds of UTC since 1970.
     pub started_ms: i64,
@@ -78,7 +78,7 @@ impl Owner {
 }
 
 impl ServiceLock {
-    /// Takes the lock of `folder`, which is made if need be, and says who has it now.
+    /// Takes the lock of `folder`, created if necessary, and records its owner.
     ///
     /// # Errors
     /// Another process holds it; the folder is on a network file system, or cannot be written.
@@ -115,7 +115,7 @@ impl ServiceLock {
         Ok(lock)
     }
 
-    /// Says who has the lock, for whoever meets it.
+    /// Records the owner of the lock, for other processes.
     ///
     /// # Errors
     /// The file cannot be written.

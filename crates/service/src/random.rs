@@ -1,9 +1,9 @@
-//! Random numbers of the service; tests say them themselves.
+//! Random numbers of the service; tests set them.
 
 /// Random numbers from 0 up to 1.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Random {
-    /// The number, where it does not come from the system.
+    /// The number, if not from the system.
     always: Option<f64>,
 }
 
@@ -16,11 +16,11 @@ impl Random {
         }
     }
 
-    /// A number of even distribution from 0 up to, but not, 1.
+    /// A uniformly distributed number from 0 to below 1.
     #[must_use]
     pub fn unit(self) -> f64 {
         self.always.unwrap_or_else(|| {
-            // Without random numbers of the system retries are merely not spread.
+            // Without random numbers from the system retries are merely not spread.
             let bits = getrandom::u32().unwrap_or_default();
             f64::from(bits) / 2_f64.powi(32)
         })
@@ -35,7 +35,7 @@ mod tests {
     fn numbers_spread_over_the_unit_interval() {
         let drawn: Vec<f64> = (0..1000).map(|_| Random::default().unit()).collect();
         assert!(drawn.iter().all(|number| (0.0..1.0).contains(number)));
-        // Standard deviation of the mean of 1000 even numbers: 0.009.
+        // Standard deviation of the mean of 1000 uniform numbers: 0.009.
         let mean = drawn.iter().sum::<f64>() / 1000.0;
         assert!((mean - 0.5).abs() < 0.09, "{mean}");
     }

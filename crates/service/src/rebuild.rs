@@ -17,7 +17,7 @@ use super::{
 };
 use areograph_base::error::{IoError, Locate as _, Result};
 
-/// What was found.
+/// The runs found.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Rebuilt {
     /// Sites with runs.
@@ -26,11 +26,11 @@ pub struct Rebuilt {
     pub runs: usize,
 }
 
-/// Moves the database in `state` aside and makes a new one, with the runs of every site below `products`. Jobs, events and tokens are lost; sites are
-/// switched on by the next sweep that finds their files.
+/// Moves the database in `state` aside and creates a new one, with the runs of every site below `products`. Jobs,
+/// events and tokens are lost; the next sweep that finds the files of sites enables them.
 ///
 /// # Errors
-/// The disk's refusal.
+/// A disk error.
 pub fn rebuild(state: &Path, products: &Path, now_ms: i64) -> Result<Rebuilt> {
     for ending in ["", "-wal", "-shm"] {
         let path = state.join(format!("{DATABASE}{ending}"));
@@ -53,7 +53,7 @@ pub fn rebuild(state: &Path, products: &Path, now_ms: i64) -> Result<Rebuilt> {
         for path in tidy(folder)? {
             match read_run(&path) {
                 Ok(run) => published.push(run),
-                Err(failure) => tracing::warn!("a run that is left out: {failure}"),
+                Err(failure) => tracing::warn!("a run is left out: {failure}"),
             }
         }
         rebuilt.runs += published.len();

@@ -1,4 +1,4 @@
-//! Sessions of browsers: a token exchanged for a random reference, of which the database keeps the hash alone.
+//! Browser sessions: a token exchanged for a random reference, of which the database stores only the hash.
 
 use std::fmt::Write as _;
 
@@ -11,11 +11,11 @@ use super::{
     tokens::Role,
 };
 
-/// A session ends when nothing was asked for so long.
+/// A session ends after this time without a request.
 pub const IDLE_MS: i64 = 3_600_000;
-/// A session ends so long after it began.
+/// Longest duration of a session.
 pub const LIFE_MS: i64 = 12 * 3_600_000;
-/// A session is noted as used at most so often.
+/// Shortest time between two records of a session's use.
 const NOTE_MS: i64 = 60_000;
 
 /// A session that is open.
@@ -23,13 +23,13 @@ const NOTE_MS: i64 = 60_000;
 pub struct Session {
     /// Hash of its reference.
     pub sha256: Vec<u8>,
-    /// The token that it was opened with.
+    /// Its token.
     pub token: String,
-    /// What that token allows.
+    /// The role of that token.
     pub role: Role,
-    /// What every form of its pages carries.
+    /// The token in every form of its pages.
     pub form_token: String,
-    /// When it was last noted as used.
+    /// Its last recorded use.
     pub seen_ms: i64,
 }
 
@@ -43,17 +43,17 @@ impl Session {
             .into()
     }
 
-    /// Whether its use should be noted now.
+    /// Whether its use should be recorded now.
     #[must_use]
     pub fn note_is_due(&self, now_ms: i64) -> bool {
         now_ms - self.seen_ms > NOTE_MS
     }
 }
 
-/// Opens a session and gives its reference, for the only time. Sessions that have ended are removed.
+/// Opens a session and returns its reference, the only time that it is available. Ended sessions are removed.
 ///
 /// # Errors
-/// SQLite's own; the system has no random numbers.
+/// SQLite errors; the system has no random numbers.
 pub fn open_session(transaction: &Transaction<'_>, now_ms: i64, token: &str) -> Stored<String> {
     transaction.execute(
         "DELETE FROM session WHERE seen_ms <= ?1 - ?2 OR created_ms <= ?1 - ?3",
@@ -70,7 +70,7 @@ pub fn open_session(transaction: &Transaction<'_>, now_ms: i64, token: &str) -> 
 /// The session with this reference, if it is open and its token still valid.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn find_session(
     connection: &Connection,
     now_ms: i64,
@@ -95,10 +95,10 @@ pub fn find_session(
     Ok(found.optional()?)
 }
 
-/// Notes that a session was used.
+/// Records that a session was used.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn note_session(transaction: &Transaction<'_>, now_ms: i64, session: &Session) -> Stored<()> {
     let note = "UPDATE session SET seen_ms = ?2 WHERE sha256 = ?1";
     transaction.execute(note, params![session.sha256, now_ms])?;
@@ -108,16 +108,16 @@ pub fn note_session(transaction: &Transaction<'_>, now_ms: i64, session: &Sessio
 /// Ends a session.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn close_session(transaction: &Transaction<'_>, session: &Session) -> Stored<()> {
     transaction.execute("DELETE FROM session WHERE sha256 = ?1", [&session.sha256])?;
     Ok(())
 }
 
-/// Whether a token is still valid and, of a session, whether that is open: for what lasts longer than a request.
+/// Whether a token is still valid and, for a session, whether it is open; for operations that outlast a request.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn still_open(
     connection: &Connection,
     now_ms: i64,
@@ -132,7 +132,7 @@ pub fn still_open(
     Ok(query.query_row(params![token, now_ms, sha256, LIFE_MS], |row| row.get(0))?)
 }
 
-/// The reference has 256 random bits: looking for its hash tells nothing by the time that it takes.
+/// The reference has 256 random bits: the time of a search for its hash reveals nothing.
 fn hash(reference: &str) -> Vec<u8> {
     Sha256::digest(reference.as_bytes()).to_vec()
 }

@@ -1,4 +1,4 @@
-//! What the engine and the HTTP service share.
+//! State shared by the engine and the HTTP service.
 
 use std::{
     path::PathBuf,
@@ -22,13 +22,13 @@ pub struct Shared {
     problem: RwLock<Option<String>>,
     database: Database,
     newest: watch::Sender<i64>,
-    /// What time it is.
+    /// The clock.
     pub clock: Clock,
-    /// The program that workers are started from: this one.
+    /// The program of the workers: this one.
     pub program: PathBuf,
-    /// The engine looks at once whether there is something to do.
+    /// Wakes the engine.
     pub wake: Notify,
-    /// The service ends: no job is taken, streams of events end.
+    /// Set when the service ends: no job is taken, streams of events end.
     pub ending: CancellationToken,
 }
 
@@ -63,48 +63,48 @@ impl Shared {
         Arc::clone(&config)
     }
 
-    /// Puts another configuration in force.
+    /// Sets another configuration in force.
     pub fn set_config(&self, config: ServiceConfig) {
         *self.config.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(config);
         self.set_problem(None);
     }
 
-    /// Why the configuration in force is not the one of the file.
+    /// The reason for which the configuration in force differs from that of the file.
     #[must_use]
     pub fn problem(&self) -> Option<String> {
         let problem = self.problem.read().unwrap_or_else(PoisonError::into_inner);
         problem.clone()
     }
 
-    /// Notes why the configuration of the file was not taken.
+    /// Records why the configuration of the file was rejected.
     pub fn set_problem(&self, problem: Option<String>) {
         *self.problem.write().unwrap_or_else(PoisonError::into_inner) = problem;
     }
 
-    /// The time, milliseconds of UTC since 1970.
+    /// The current time, milliseconds of UTC since 1970.
     #[must_use]
     pub fn now_ms(&self) -> i64 {
         self.clock.now_ms()
     }
 
-    /// The database; what writes events goes through [`Self::write`].
+    /// The database; writes with events use [`Self::write`].
     #[must_use]
     pub fn database(&self) -> &Database {
         &self.database
     }
 
-    /// Does `look` on one state of the database.
+    /// Performs `look` on one state of the database.
     ///
     /// # Errors
-    /// What `look` gives, or SQLite's own.
+    /// An error of `look`, or an SQLite error.
     pub fn read<T>(&self, look: impl FnOnce(&Connection) -> Stored<T>) -> Stored<T> {
         self.database.read(look)
     }
 
-    /// Does `work` as one transaction and tells those who follow the events.
+    /// Performs `work` as one transaction and notifies those who follow the events.
     ///
     /// # Errors
-    /// What `work` gives, and then nothing is written; or SQLite's own.
+    /// An error of `work`, in which case nothing is written; or an SQLite error.
     pub fn write<T>(&self, work: impl FnOnce(&Transaction<'_>) -> Stored<T>) -> Stored<T> {
         let (done, newest) = self.database.write(|transaction| {
             let done = work(transaction)?;

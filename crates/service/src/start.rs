@@ -1,4 +1,4 @@
-//! A service begins: configuration, lock, database, all checked; and takes another configuration while it runs.
+//! Start of a service: configuration, lock, database, all checked; and reloading of its configuration.
 
 use std::{net::SocketAddr, path::Path, process};
 
@@ -16,18 +16,18 @@ use super::{
 use areograph_base::error::{Cause, IoError, Kind, Locate as _, Result};
 use areograph_config::{ServiceConfig, load_service};
 
-/// A service that has begun; its folder of state is its own as long as this lives.
+/// A started service, which owns its state folder for the lifetime of this value.
 #[derive(Debug)]
 pub struct Started {
     /// The service.
     pub shared: Shared,
     /// Its lock.
     pub lock: ServiceLock,
-    /// Who it is.
+    /// Its owner entry.
     pub owner: Owner,
 }
 
-/// An address, or a change, that a service does not take.
+/// An address, or a change, that a service rejects.
 #[derive(Debug, thiserror::Error)]
 enum Refused {
     #[error("{0} is not a loopback address")]
@@ -57,10 +57,10 @@ impl Cause for Refused {
     }
 }
 
-/// Reads and checks the configuration `file`, with another address if one is given.
+/// Reads and checks the configuration `file`, with another address if one is stated.
 ///
 /// # Errors
-/// Everything that is wrong with it.
+/// All faults of the configuration.
 pub fn configuration(
     file: &Path,
     listen: Option<SocketAddr>,
@@ -85,10 +85,10 @@ pub fn configuration(
     Ok(config)
 }
 
-/// Begins a service: `command` is what others are told that runs.
+/// Starts a service; `command` is the name shown to other processes.
 ///
 /// # Errors
-/// Another service runs on the same folder of state; the database is damaged or newer; the disk's refusal.
+/// Another service uses the same state folder; the database is damaged or newer; a disk error.
 pub fn start(config: ServiceConfig, command: &str, clock: Clock) -> Result<Started> {
     let state = config.outputs.state.clone();
     let owner = Owner {
@@ -118,7 +118,8 @@ pub fn start(config: ServiceConfig, command: &str, clock: Clock) -> Result<Start
     })
 }
 
-/// Every folder of inputs was seen by the service, or is there. A known one is not looked at: its mount may be dead.
+/// Checks that every folder of inputs is known to the service, or exists. A known one is not accessed: its mount may be
+/// unresponsive.
 fn seen(connection: &Connection, config: &ServiceConfig) -> Stored<Result<()>> {
     let known = roots(connection)?;
     let unseen = folders(&config.inputs)?.into_iter().find(|folder| {
@@ -132,10 +133,10 @@ fn seen(connection: &Connection, config: &ServiceConfig) -> Stored<Result<()>> {
     })
 }
 
-/// Says where the service listens: in its lock and in the database.
+/// Records the address of the service in its lock and in the database.
 ///
 /// # Errors
-/// The disk's refusal.
+/// A disk error.
 pub fn tell_address(
     lock: &ServiceLock,
     owner: &Owner,
@@ -158,7 +159,7 @@ pub fn tell_address(
     Ok(())
 }
 
-/// Takes the configuration of the file again. One that is not valid changes nothing, and is told on the pages.
+/// Reloads the configuration of the file. An invalid one has no effect, and is reported on the pages.
 ///
 /// # Errors
 /// The database cannot be written.
@@ -194,7 +195,7 @@ pub fn reload(shared: &Shared, listen: Option<SocketAddr>) -> Stored<()> {
     })
 }
 
-/// What cannot change while the service runs.
+/// Settings that cannot change while the service runs.
 fn unchangeable(before: &ServiceConfig, after: &ServiceConfig) -> Result<()> {
     let what = if before.outputs != after.outputs {
         "a folder of outputs"

@@ -1,11 +1,11 @@
-//! The states of a job, and the only ways from one to another.
+//! The states of a job, and its transitions.
 
 use std::{fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// Where a job stands.
+/// State of a job.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, ToSchema,
 )]
@@ -15,27 +15,28 @@ pub enum JobState {
     Held,
     /// Ready to be taken.
     Queued,
-    /// Taken; its worker has not said hello.
+    /// Taken; its worker has not sent a hello.
     Starting,
-    /// Its worker is at work.
+    /// Its worker is active.
     Running,
     /// Its worker has been asked to stop.
     Cancelling,
-    /// To be tried again later.
+    /// Waits for a retry.
     Waiting,
-    /// Failed by configuration, input or coverage: tried again when one of its inputs changes or a person asks.
+    /// Failed because of configuration, input or coverage: retried when one of its inputs changes or a person requests
+    /// it.
     Blocked,
-    /// Ended: products were published and are valid.
+    /// Ended: valid products were published.
     Succeeded,
-    /// Ended: nothing had to be made.
+    /// Ended: the products were up to date.
     Unchanged,
-    /// Ended: products were made that are not valid; they did not become current.
+    /// Ended: the products are invalid and did not become current.
     Invalid,
-    /// Ended: it cannot be done.
+    /// Ended: it failed permanently.
     Failed,
-    /// Ended: a person did not want it.
+    /// Ended: a person cancelled it.
     Cancelled,
-    /// Ended: its inputs went back to what they were.
+    /// Ended: its inputs reverted to their earlier state.
     Superseded,
 }
 
@@ -57,7 +58,7 @@ impl JobState {
         Self::Superseded,
     ];
 
-    /// The states that may follow this one: the whole table of transitions.
+    /// The states that may follow this one: the complete table of transitions.
     #[must_use]
     pub const fn next(self) -> &'static [Self] {
         use JobState::{
@@ -67,7 +68,7 @@ impl JobState {
         match self {
             Held => &[Queued, Cancelled, Superseded],
             Queued => &[Starting, Held, Cancelled, Superseded],
-            // A worker that never said hello may have published all the same: what is on the disk wins.
+            // A worker that never sent a hello may have published nevertheless: the disk takes precedence.
             Starting => &[
                 Running, Waiting, Queued, Cancelling, Succeeded, Invalid, Failed,
             ],
@@ -80,13 +81,13 @@ impl JobState {
         }
     }
 
-    /// Whether nothing follows.
+    /// Whether the state is final.
     #[must_use]
     pub const fn is_final(self) -> bool {
         self.next().is_empty()
     }
 
-    /// Whether a worker is, or may be, at work.
+    /// Whether a worker is, or may be, active.
     #[must_use]
     pub const fn is_active(self) -> bool {
         matches!(self, Self::Starting | Self::Running | Self::Cancelling)
@@ -119,7 +120,7 @@ impl fmt::Display for JobState {
     }
 }
 
-/// A word that names no state.
+/// An unknown name of a state.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("unknown job state {0}")]
 pub struct UnknownState(String);

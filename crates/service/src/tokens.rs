@@ -1,4 +1,4 @@
-//! Tokens of people and programs: `areo_<id>_<secret>`, of which the database keeps the hash of the secret alone.
+//! Tokens of people and programs: `areo_<id>_<secret>`, of which the database stores only the hash of the secret.
 
 use std::{fmt, str::FromStr};
 
@@ -10,18 +10,18 @@ use utoipa::ToSchema;
 
 use super::database::{DatabaseError, Stored};
 
-/// How every token begins.
+/// Start of every token.
 pub const PREFIX: &str = "areo_";
 const ID_BYTES: usize = 4;
 const SECRET_BYTES: usize = 32;
 
-/// What the bearer of a token may do.
+/// Permissions of a token's bearer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
-    /// Look.
+    /// Read.
     Read,
-    /// Look, start and cancel jobs, pin runs.
+    /// Read, start and cancel jobs, pin runs.
     Operate,
 }
 
@@ -42,7 +42,7 @@ impl fmt::Display for Role {
     }
 }
 
-/// A word that names no role.
+/// An unknown name of a role.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("unknown role {0}; expected read or operate")]
 pub struct UnknownRole(String);
@@ -63,13 +63,13 @@ impl FromStr for Role {
 pub struct Token {
     /// Its public part.
     pub id: String,
-    /// What its bearer may do.
+    /// Role of its bearer.
     pub role: Role,
-    /// What it is for.
+    /// Its purpose.
     pub note: String,
-    /// When it was made, milliseconds of UTC since 1970.
+    /// When it was created, milliseconds of UTC since 1970.
     pub created_ms: i64,
-    /// When it ends.
+    /// When it expires.
     pub expires_ms: Option<i64>,
     /// When it was revoked.
     pub revoked_ms: Option<i64>,
@@ -78,17 +78,17 @@ pub struct Token {
 }
 
 impl Token {
-    /// Whether it still opens anything.
+    /// Whether it is still valid.
     #[must_use]
     pub fn is_valid(&self, now_ms: i64) -> bool {
         self.revoked_ms.is_none() && self.expires_ms.is_none_or(|end| now_ms < end)
     }
 }
 
-/// Makes a token and gives it whole, for the only time.
+/// Creates a token and returns it with its secret, the only time that it is available.
 ///
 /// # Errors
-/// SQLite's own; the system has no random numbers.
+/// SQLite errors; the system has no random numbers.
 pub fn add_token(
     transaction: &Transaction<'_>,
     now_ms: i64,
@@ -104,20 +104,20 @@ pub fn add_token(
     Ok(format!("{PREFIX}{id}_{secret}"))
 }
 
-/// All tokens, also those that have ended, oldest first.
+/// All tokens, including expired and revoked ones, oldest first.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn tokens(connection: &Connection) -> Stored<Vec<Token>> {
     let mut query = connection.prepare_cached("SELECT * FROM token ORDER BY created_ms, id")?;
     let found = query.query_map([], read)?;
     Ok(found.collect::<Result<_, _>>()?)
 }
 
-/// Ends a token and the sessions that it began. Says whether there was such a token.
+/// Revokes a token and ends the sessions that it opened. Returns whether the token exists.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn revoke_token(transaction: &Transaction<'_>, now_ms: i64, id: &str) -> Stored<bool> {
     transaction.execute("DELETE FROM session WHERE token = ?1", [id])?;
     let revoked = transaction.execute(
@@ -127,10 +127,10 @@ pub fn revoke_token(transaction: &Transaction<'_>, now_ms: i64, id: &str) -> Sto
     Ok(revoked > 0)
 }
 
-/// The token whose text somebody shows, if it is one of ours and still valid. Takes the same work for one that is unknown.
+/// The token with this text, if it is known and still valid. An unknown token takes the same time.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn find_token(connection: &Connection, now_ms: i64, text: &str) -> Stored<Option<Token>> {
     let (id, secret) = split(text).unwrap_or_default();
     let mut query = connection.prepare_cached("SELECT * FROM token WHERE id = ?1")?;
@@ -143,10 +143,10 @@ pub fn find_token(connection: &Connection, now_ms: i64, text: &str) -> Stored<Op
     Ok(token.filter(|token| same && token.is_valid(now_ms)))
 }
 
-/// Notes that a token was used, at most once a minute.
+/// Records that a token was used, at most once a minute.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn note_use(transaction: &Transaction<'_>, now_ms: i64, id: &str) -> Stored<()> {
     transaction.execute(
         "UPDATE token SET used_ms = ?2 WHERE id = ?1 AND coalesce(used_ms, 0) < ?2 - 60000",
@@ -215,7 +215,7 @@ mod tests {
         assert_eq!(token.role, Role::Operate);
         assert!(find(DAY_MS - 1, &short).is_some());
         assert!(find(DAY_MS, &short).is_none());
-        // One secret under another's name, a digit less, none at all.
+        // One secret under another's identifier, a missing digit, no secret.
         let (id, secret) = split(&text).unwrap();
         let forged = format!("{PREFIX}{}_{secret}", split(&short).unwrap().0);
         let unknown = format!("{PREFIX}00000000_{secret}");

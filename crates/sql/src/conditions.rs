@@ -1,5 +1,5 @@
-//! What conditions of a query say of the place, the time and the file of shots: never less than they allow, since the
-//! query judges every row again.
+//! Bounds on position, time and file of shots from the conditions of a query. They are never narrower than the
+//! conditions; the query tests every row again.
 
 use std::{collections::BTreeSet, iter};
 
@@ -14,14 +14,14 @@ use areograph_base::{
 };
 use areograph_geom::window::{Region, WindowShape};
 
-/// Alternatives that are told apart; more of them are taken together.
+/// Alternatives kept separate; further ones are merged.
 const ALTERNATIVES_MAX: usize = 64;
-/// Windows are wider by this than conditions say, degrees: far above the rounding of a longitude, far below a footprint.
+/// Margin of windows around the conditions, degrees: far above the rounding of a longitude, far below a footprint.
 const ROUNDING_DEG: f64 = 1e-7;
-/// And intervals by this, seconds.
+/// Margin of intervals, seconds.
 const ROUNDING_S: f64 = 1e-6;
 
-/// Columns that conditions are read of.
+/// Columns whose conditions are evaluated.
 const LONGITUDE: &str = "longitude_deg";
 const LATITUDE: &str = "latitude_deg";
 const TIMES: [&str; 2] = ["et_tag_s", "et_s"];
@@ -43,13 +43,13 @@ impl Span {
     }
 }
 
-/// What one alternative allows.
+/// Bounds of one alternative.
 #[derive(Debug, Clone, PartialEq)]
 struct Allowed {
     longitude_deg: Span,
     latitude_deg: Span,
     time_s: Span,
-    /// None allows every file.
+    /// `None` allows every file.
     files: Option<BTreeSet<String>>,
 }
 
@@ -88,7 +88,7 @@ impl Allowed {
         }
     }
 
-    /// The window of longitudes and latitudes; none where no shot can be.
+    /// The window of longitudes and latitudes; `None` if it is empty.
     fn region(&self) -> Option<Region> {
         let within = |span: Span, least: f64, greatest: f64| {
             let wider = Span(span.0 - ROUNDING_DEG, span.1 + ROUNDING_DEG);
@@ -106,12 +106,12 @@ impl Allowed {
     }
 }
 
-/// What conditions that all must hold allow: alternatives of which a shot needs to meet one.
+/// Bounds from conditions that must all hold: alternatives, of which a shot must meet one.
 #[derive(Debug, Clone)]
 pub(super) struct Conditions(Vec<Allowed>);
 
 impl Conditions {
-    /// Those of a query.
+    /// Bounds from the conditions of a query.
     pub(super) fn of(conditions: &[Expr]) -> Self {
         let all = iter::once(Allowed::ALL).collect();
         Self(conditions.iter().fold(all, |allowed, condition| {
@@ -119,17 +119,17 @@ impl Conditions {
         }))
     }
 
-    /// Whether a condition says anything that a search can use.
+    /// Whether a search can use a condition.
     pub(super) fn can_use(condition: &Expr) -> bool {
         alternatives(condition) != [Allowed::ALL]
     }
 
-    /// The windows in which shots may be.
+    /// The windows that may contain shots.
     pub(super) fn regions(&self) -> Vec<Region> {
         self.0.iter().filter_map(Allowed::region).collect()
     }
 
-    /// The time tags that shots may have; none when any.
+    /// The allowed time tags; `None` for any.
     pub(super) fn time(&self) -> Option<Interval> {
         let span = self.0.iter().map(|allowed| allowed.time_s);
         let Span(start, stop) = span.reduce(Span::hull)?;
@@ -138,7 +138,7 @@ impl Conditions {
             .then(|| Interval::new(at(start - ROUNDING_S), at(stop + ROUNDING_S)))
     }
 
-    /// Whether shots may be of the file of this name.
+    /// Whether the file of this name is allowed.
     pub(super) fn allow_file(&self, name: &str) -> bool {
         let allows =
             |allowed: &Allowed| (allowed.files.as_ref()).is_none_or(|files| files.contains(name));
@@ -153,7 +153,7 @@ fn both(some: &[Allowed], others: &[Allowed]) -> Vec<Allowed> {
     few(pairs.collect())
 }
 
-/// Many alternatives taken together.
+/// Merges numerous alternatives.
 fn few(alternatives: Vec<Allowed>) -> Vec<Allowed> {
     if alternatives.len() <= ALTERNATIVES_MAX {
         return alternatives;
@@ -162,7 +162,7 @@ fn few(alternatives: Vec<Allowed>) -> Vec<Allowed> {
     hull.into_iter().collect()
 }
 
-/// What a condition allows.
+/// The alternatives that a condition allows.
 fn alternatives(condition: &Expr) -> Vec<Allowed> {
     match condition {
         Expr::BinaryExpr(BinaryExpr { left, op, right }) => match op {
@@ -216,7 +216,7 @@ fn alternatives(condition: &Expr) -> Vec<Allowed> {
     }
 }
 
-/// What `column op value` allows, where that says something.
+/// The bounds of `column op value`, if it implies any.
 fn compare(column: &Column, op: Operator, value: &ScalarValue) -> Option<Allowed> {
     let mut allowed = Allowed::ALL;
     let name = column.name();

@@ -1,9 +1,9 @@
-//! Shots of an archive as a table of `DataFusion`: asked for columns, with conditions of place and time, it reads only the
-//! blocks of records that an index, or the records' mid-points, say may have them.
+//! Shots of an archive as a table of `DataFusion`: a query with conditions on position and time reads only the blocks
+//! of records that may match, by an index or the records' mid-points.
 //!
-//! The program hands in the [`Columns`] of its products; nothing else of it is known here.
+//! The program supplies the [`Columns`] of its products; this crate has no other dependency on it.
 //!
-//! The crate is built with the feature `sql` alone (decision 0022).
+//! The crate is built only with the feature `sql` (decision 0022).
 
 mod conditions;
 mod question;

@@ -1,4 +1,4 @@
-//! A question in SQL about the shots of an archive.
+//! A SQL query of the shots of an archive.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ const MEMORY_BYTES: usize = 128 << 20;
 /// The name of the table.
 const TABLE: &str = "shots";
 
-/// A question that has no answer.
+/// A query that failed.
 #[derive(Debug, thiserror::Error)]
 #[error("{}", .0.strip_backtrace())]
 pub struct Question(#[from] DataFusionError);
@@ -34,19 +34,20 @@ impl Cause for Question {
     fn advice(&self) -> String {
         match self.0.find_root() {
             DataFusionError::ResourcesExhausted(_) => {
-                "ask for fewer columns, or for less to be sorted and grouped at once"
+                "select fewer columns, or sort and group fewer rows in one query"
             }
-            DataFusionError::IoError(_) => "check the disk of temporary files, then ask again",
-            _ => "\"describe shots\" lists the columns; text stands in 'single quotes'",
+            DataFusionError::IoError(_) => "check the disk of temporary files, then retry",
+            _ => "\"describe shots\" lists the columns; text is written in 'single quotes'",
         }
         .to_owned()
     }
 }
 
-/// The rows of the answer, one thread after the search: their order is that of the search, or the one that was asked for.
+/// The rows of the answer in the order of the search, or as the query orders them; one thread processes the search
+/// results.
 ///
 /// # Errors
-/// A question that cannot be understood, or that would change a table.
+/// An invalid query, or one that would change a table.
 pub async fn ask(table: ShotsTable, question: &str) -> Result<SendableRecordBatchStream, Question> {
     let memory =
         RuntimeEnvBuilder::new().with_memory_pool(Arc::new(FairSpillPool::new(MEMORY_BYTES)));

@@ -1,4 +1,4 @@
-//! The table, and the search that a query makes of it.
+//! The table, and the search behind its queries.
 
 use std::{
     collections::BTreeMap,
@@ -38,34 +38,34 @@ use areograph_pds::{
     pedr::Reason,
 };
 
-/// Pieces of an answer that wait for the query: a megabyte or so each.
+/// Batches that wait for the query: about a megabyte each.
 const PIECES_WAITING: usize = 2;
 
-/// The columns of the table, and how they are made of shots.
+/// The columns of the table, and their computation from shots.
 pub trait Columns: fmt::Debug + Send + Sync {
-    /// Names and types; units and descriptions are the fields' metadata.
+    /// Names and types; units and descriptions are in the fields' metadata.
     fn schema(&self) -> SchemaRef;
 
-    /// Those at these places alone, counted from 0, in this order.
+    /// The columns at these indices, counted from 0, in this order.
     fn pick(&self, places: &[usize]) -> Arc<dyn Columns>;
 
     /// The values of these shots, in IAU 2000 at their time tags.
     ///
-    /// * `files` – the files that the column `file` counts into
+    /// * `files` – the files to which the column `file` refers
     ///
     /// # Errors
     /// A number that is not finite.
     fn batch(&self, shots: Footprints<AsRead>, files: &[SourceFile]) -> Result<RecordBatch>;
 }
 
-/// What queries met beside rows.
+/// Results of queries besides rows.
 #[derive(Debug, Default)]
 pub struct Tally {
-    /// Complaints of records that were judged, by reason; their shots are no rows.
+    /// Complaints about checked records, by reason; their shots are not rows.
     pub complaints: BTreeMap<Reason, u64>,
-    /// Why a query has no answer, if it got as far as that.
+    /// The failure of a query that reached the search.
     pub failure: Option<Error>,
-    /// Records looked at.
+    /// Records examined.
     pub frames_read: u64,
     /// Shots whose own position was tested.
     pub shots_read: u64,
@@ -73,7 +73,7 @@ pub struct Tally {
 
 /// Two files hold the same shots.
 #[derive(Debug, thiserror::Error)]
-#[error("record {record} has a shot that {other} holds as well: it would count twice")]
+#[error("record {record} has a shot that is also in {other}: it would be counted twice")]
 struct Overlap {
     record: u32,
     other: String,
@@ -85,17 +85,17 @@ impl Cause for Overlap {
     }
 
     fn advice(&self) -> String {
-        "if both files hold the same orbits, name only one of them, or ask for one source_file"
+        "if both files hold the same orbits, name only one of them, or select one source_file"
             .to_owned()
     }
 }
 
 /// The shots of an archive with a return, of every class, channel and attitude, in the order of files and records: the
-/// columns of `footprints.parquet` but `windows`, in IAU 2000.
+/// columns of `footprints.parquet` except `windows`, in IAU 2000.
 ///
-/// A query of it fails when one of its files does, or two of them hold the same shots, before it has all its rows, so that no
-/// answer is silently incomplete. Its rows do not depend on the number of threads, which the search uses by itself: the table
-/// has one partition.
+/// A query fails if one of its files fails, or if two of them contain the same shots, before it delivers all its rows,
+/// so that no answer is silently incomplete. Rows do not depend on the number of threads. The search itself is
+/// parallel: the table has one partition.
 #[derive(Debug)]
 pub struct ShotsTable {
     sources: Arc<[Source]>,
@@ -106,7 +106,7 @@ pub struct ShotsTable {
 }
 
 impl ShotsTable {
-    /// The table of these files, at most 65,535; queries of it fail once `stop` is set.
+    /// The table of these files, at most 65,535; queries fail once `stop` is set.
     #[must_use]
     pub fn new(sources: Vec<Source>, columns: Arc<dyn Columns>, stop: Arc<AtomicBool>) -> Self {
         Self {
@@ -118,7 +118,7 @@ impl ShotsTable {
         }
     }
 
-    /// What the queries so far met beside rows.
+    /// Results, besides rows, of the queries so far.
     #[must_use]
     pub fn tally(&self) -> Arc<Mutex<Tally>> {
         Arc::clone(&self.tally)
@@ -177,7 +177,7 @@ impl TableProvider for ShotsTable {
     }
 }
 
-/// The shots that a query asks for.
+/// The shots requested by a query.
 #[derive(Debug)]
 struct Shots {
     sources: Arc<[Source]>,
@@ -189,7 +189,7 @@ struct Shots {
     stop: Arc<AtomicBool>,
 }
 
-/// Ends the search when the stream of its rows goes away, such as after the last row of a limit.
+/// Ends the search when the stream of its rows is dropped, such as after the last row of a limit.
 struct EndOfStream(Arc<AtomicBool>);
 
 impl Drop for EndOfStream {
@@ -239,7 +239,7 @@ impl PartitionStream for Shots {
     }
 }
 
-/// Gives rows to the query as they come.
+/// Passes rows to the query as they arrive.
 struct HandOn {
     paths: Vec<PathBuf>,
     files: Vec<SourceFile>,
@@ -251,7 +251,7 @@ struct HandOn {
 }
 
 impl HandOn {
-    /// Keeps a failure for those who asked, and has it follow the rows: a query that wants no more of them does not meet it.
+    /// Keeps a failure for the caller, and sends it after the rows: a query that needs no more of them does not see it.
     fn end(&self, failure: Error) {
         if self.rows.is_closed() {
             return;
@@ -261,11 +261,11 @@ impl HandOn {
             let mut tally = self.tally.lock().unwrap_or_else(PoisonError::into_inner);
             tally.failure.get_or_insert(failure);
         }
-        // Nobody asks any more by now: nobody misses it.
+        // The receiver was dropped and does not need the result.
         let _ = self.rows.blocking_send(Err(told));
     }
 
-    /// Makes sure that no file before holds one of these shots, which are in these records.
+    /// Checks that no earlier file contains one of these shots, which are in these records.
     fn require_distinct(&mut self, file: usize, tags_s: &[f64], records: &[u32]) -> Result<()> {
         let Some((row, other)) = self.seen.take_all(file, tags_s) else {
             return Ok(());

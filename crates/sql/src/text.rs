@@ -1,4 +1,4 @@
-//! Answers as text, whatever the types of their columns.
+//! Answers as text, for columns of any type.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ pub fn as_text_schema(schema: &SchemaRef) -> SchemaRef {
     Arc::new(Schema::new(fields))
 }
 
-/// Rows whose columns are text, in the words of Arrow; empty where there is no value. Lists and groups stay what they are.
+/// Rows whose columns are text, as formatted by Arrow; empty where there is no value. Lists and groups are unchanged.
 ///
 /// # Errors
 /// A value that Arrow cannot print.
@@ -47,7 +47,7 @@ pub fn as_text(batch: &RecordBatch) -> Result<RecordBatch, ArrowError> {
     RecordBatch::try_new(as_text_schema(&batch.schema()), columns)
 }
 
-/// Rows as a table with lines around its cells.
+/// Rows as a table with borders.
 ///
 /// # Errors
 /// A value that Arrow cannot print.

@@ -258,7 +258,7 @@ fn a_label_and_fragments_of_two_images_are_refused() {
     let mixed = [other.as_bytes(), &own[2048..]].concat();
     let told = folder.refusal(&mixed, &times("M01-00124"));
     assert!(
-        told.contains("fragment 0, byte 2048: the label says PRODUCT_ID = M01/00124; the fragments say image 123"),
+        told.contains("fragment 0, byte 2048: the label states PRODUCT_ID = M01/00124; the fragments state image 123"),
         "{told}"
     );
 }

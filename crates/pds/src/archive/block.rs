@@ -1,4 +1,4 @@
-//! What an index knows of successive records of a file: where and when they are.
+//! Index entry of a block of successive records of a file: its extent in place and time.
 
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +21,7 @@ pub(super) struct Block {
     width: u32,
     south: i32,
     north: i32,
-    /// No shot is farther from its mid-point than this.
+    /// Largest distance of a shot from its mid-point.
     reach: u32,
     /// First and last time tag, ET seconds.
     first_s: f64,
@@ -47,7 +47,7 @@ impl Block {
         for record in records {
             block.include(record);
             let next = i64::from(record.ground_longitude_microdegrees.get());
-            // The shorter way from the record before.
+            // The shorter way from the preceding record.
             let next = longitude.map_or(next, |before: i64| {
                 before + (next - before + TURN / 2).rem_euclid(TURN) - TURN / 2
             });
@@ -78,7 +78,7 @@ impl Block {
             self.is_everywhere = true;
         }
         let time_s = record.time_s.get();
-        // A time that is no number may be any time.
+        // A time that is not finite matches any interval.
         let [first_s, last_s] = if time_s.is_finite() {
             [time_s; 2]
         } else {
@@ -88,7 +88,7 @@ impl Block {
         self.last_s = self.last_s.max(last_s);
     }
 
-    /// Whether a record of the block may have a shot that is asked for; see [`Query::may_matter`].
+    /// Whether a record of the block may contain a requested shot; see [`Query::may_matter`].
     pub(super) fn may_matter(&self, query: &Query<'_>, datum: Datum) -> bool {
         let radians = |microdegrees: i32| f64::from(microdegrees) * RADIANS_PER_MICRODEGREE;
         let whole = |microdegrees: u32| f64::from(microdegrees) * RADIANS_PER_MICRODEGREE;

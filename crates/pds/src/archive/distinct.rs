@@ -1,10 +1,10 @@
-//! Every shot counts once: which files hold the same shots, and which are copies of others.
+//! Duplicate shots: which files contain the same shots, and which files are copies of others.
 //!
-//! This is the only place that knows when two shots of different files are one. Within a file, its chronology
+//! Only this module decides whether shots of two files are the same shot. Within a file, its chronology
 //! (`pedr/chronology.rs`) withholds records that repeat others.
 //!
-//! Two files with the same shots are refused unless one is a copy of the other; `pedr search` marks rows out of order.
-//! Within a file, the longest chain of frames without a shot in common is kept.
+//! Two files with common shots are rejected unless one is a copy of the other; `pedr search` marks rows out of order.
+//! Within a file, the longest chain of frames without a common shot is kept.
 
 #[cfg(test)]
 mod cases;
@@ -13,20 +13,21 @@ use std::collections::BTreeMap;
 
 use areograph_base::body::Datum;
 
-/// Shots of two files at most this far apart are one shot, seconds: half the 0.1 s between two shots of the laser, and half
-/// the microsecond in which PEDR states a time.
+/// Shots of two files at most this far apart are the same shot, seconds: half the 0.1 s between two shots of the laser,
+/// plus half the microsecond resolution of PEDR times.
 ///
-/// Half itself counts as the same. It is nearer to no other shot, and a user can answer a refusal, but does not see a shot
-/// that counts twice. The half microsecond keeps this independent of how the difference of two tags rounds. Successive
-/// shots of a file never meet the limit: frames of the archive lie 2 s apart to a microsecond, and the clock that parts
-/// their shots is right to 5e-4. A later version of a file may have moved a tag a little.
+/// A distance of exactly half counts as the same shot: it is not nearer to any other shot, and a user can resolve a
+/// rejection but cannot see a shot that is counted twice. The half microsecond makes the result independent of the
+/// rounding of tag differences. Successive shots of a file never meet the limit: frames of the archive are 2 s apart to
+/// within a microsecond, and the clock that separates their shots is accurate to 5e-4. A later version of a file may
+/// have slightly shifted tags.
 pub const SAME_SHOT_S: f64 = 0.050_000_5;
 
-/// Longest pause inside a span, seconds: a whole missing frame of 2 s leaves 2.1 s between two shots. Shots that are missing
-/// within a frame had no return or were not asked for; another version of that frame may have them.
+/// Longest pause within a span, seconds: one missing frame of 2 s leaves 2.1 s between two shots. Shots missing within
+/// a frame had no return or were not requested; another version of that frame may contain them.
 const PAUSE_S: f64 = 2.05;
 
-/// Successive shots of a file without a missing frame between them; of a single shot both ends are its tag.
+/// Successive shots of a file without a missing frame between them; for a single shot both ends are its tag.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Span {
     /// Number of the file.
@@ -38,7 +39,7 @@ pub struct Span {
 }
 
 impl Span {
-    /// A shot by itself.
+    /// A span of a single shot.
     ///
     /// * `tag_s` – its time tag, ET seconds
     #[must_use]
@@ -50,7 +51,7 @@ impl Span {
         }
     }
 
-    /// Takes the next shot of the file, unless a frame is missing before it.
+    /// Appends the next shot of the file, unless a frame is missing before it.
     ///
     /// * `tag_s` – its time tag, ET seconds
     fn extend(&mut self, tag_s: f64) -> bool {
@@ -76,17 +77,17 @@ pub fn spans(file: usize, tags_s: impl IntoIterator<Item = f64>) -> Vec<Span> {
     spans
 }
 
-/// The shots of the files so far, as spans: some per revolution, however many shots there are.
+/// Spans of all shots so far: a few per revolution, independent of the number of shots.
 #[derive(Debug, Clone, Default)]
 pub struct Seen {
-    /// In the order of time; those of different files hold no common shot.
+    /// In order of time; spans of different files have no common shot.
     spans: Vec<Span>,
-    /// The span of the last shot.
+    /// Index of the span of the last shot.
     at: usize,
 }
 
 impl Seen {
-    /// The file that holds a shot of `span` as well; of several the one whose shots are the earliest.
+    /// The file that also contains a shot of `span`; of several, the one with the earliest shots.
     #[must_use]
     pub fn holder(&self, span: &Span) -> Option<usize> {
         let end = (self.spans).partition_point(|of| of.first_s - span.last_s <= SAME_SHOT_S);
@@ -103,11 +104,11 @@ impl Seen {
         self.spans.insert(self.at, span);
     }
 
-    /// Takes the next shot, file by file, and gives the earlier file that holds it as well.
+    /// Appends the next shot, file by file, and returns the earlier file that also contains it.
     ///
     /// * `tag_s` – its time tag, ET seconds
     pub fn take(&mut self, file: usize, tag_s: f64) -> Option<usize> {
-        // Nearly every shot goes on where the one before ends.
+        // Nearly every shot continues the current span.
         let next_s = (self.spans.get(self.at + 1)).map_or(f64::INFINITY, |next| next.first_s);
         if let Some(last) = self.spans.get_mut(self.at)
             && last.file == file
@@ -124,7 +125,7 @@ impl Seen {
         let after = (self.spans).partition_point(|of| of.first_s <= tag_s);
         let own = after.checked_sub(1).filter(|at| {
             let before = &mut self.spans[*at];
-            // Files whose records are not in the order of time come back to earlier spans.
+            // Files whose records are out of order return to earlier spans.
             before.file == file && (tag_s <= before.last_s || before.extend(tag_s))
         });
         match own {
@@ -134,7 +135,8 @@ impl Seen {
         None
     }
 
-    /// Takes the next shots of a file until an earlier file holds one of them as well: its row, counted from 0, and that file.
+    /// Appends the next shots of a file until an earlier file also contains one of them; returns its row, counted from
+    /// 0, and that file.
     ///
     /// * `tags_s` – their time tags, ET seconds
     pub fn take_all(&mut self, file: usize, tags_s: &[f64]) -> Option<(usize, usize)> {
@@ -143,7 +145,7 @@ impl Seen {
     }
 }
 
-/// The earliest file with the same bytes, understood alike.
+/// The earliest file with the same bytes and the same datum.
 #[derive(Debug, Clone, Default)]
 pub struct Copies(BTreeMap<(String, Datum), usize>);
 
@@ -151,7 +153,7 @@ impl Copies {
     /// The earlier file that file `index` is a copy of.
     ///
     /// * `blake3` – hash of its bytes, hexadecimal
-    /// * `datum` – what its coordinates are understood as
+    /// * `datum` – datum of its coordinates
     pub fn original_of(&mut self, index: usize, blake3: &str, datum: Datum) -> Option<usize> {
         let first = *(self.0.entry((blake3.to_owned(), datum))).or_insert(index);
         (first != index).then_some(first)

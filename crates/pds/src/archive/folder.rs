@@ -11,15 +11,15 @@ use std::{
 
 use areograph_base::error::{Cause, Error, IoError, Kind, Locate as _, Result};
 
-/// Endings that programs for compression put behind a name.
+/// Suffixes that compression programs append to a file name.
 const COMPRESSED: [&str; 7] = ["gz", "z", "zip", "bz2", "xz", "zst", "7z"];
 
-/// Files of which a search of folders is made: `paths` in the order of their names, and what could not be looked into.
+/// Result of a search of folders: `paths` in order of their names, and the entries that could not be read.
 #[derive(Debug, Default)]
 pub struct Listing {
     /// PEDR files.
     pub paths: Vec<PathBuf>,
-    /// Folders that the system refuses to list, links that lead nowhere, compressed PEDR files.
+    /// Folders that the system refuses to list, broken links, compressed PEDR files.
     pub failures: Vec<Error>,
 }
 
@@ -39,15 +39,15 @@ impl Cause for Compressed {
 }
 
 impl Listing {
-    /// The files with the ending `.b`, in upper or lower case, in and below `folder`, links followed: each folder once,
-    /// under its own name where it has one below `folder`.
+    /// The files with the ending `.b`, in upper or lower case, in and below `folder`, links followed. Each folder is
+    /// searched once, under its own name where it has one below `folder`.
     #[must_use]
     pub fn below(folder: &Path) -> Self {
         let mut walk = Walk {
             linked: VecDeque::from([folder.to_owned()]),
             ..Walk::default()
         };
-        // What a link leads to may lie below the folder as well: its own name comes first.
+        // The target of a link may also be below the folder: its own name comes first.
         while let Some(folder) = walk.linked.pop_front() {
             if let Err(failure) = walk.enter(&folder) {
                 walk.listing.failures.push(failure);
@@ -57,7 +57,7 @@ impl Listing {
         walk.listing
     }
 
-    /// The files among `paths`, and those in and below the folders among them: each once, whatever its names.
+    /// The files among `paths` and those in and below the folders among them; a file with several names is listed once.
     #[must_use]
     pub fn of(paths: &[PathBuf]) -> Self {
         let mut all = Self::default();
@@ -70,12 +70,12 @@ impl Listing {
                 all.paths.push(path.clone());
             }
         }
-        // A file's own name comes before links to it.
+        // The file's own name comes before links to it.
         all.paths
             .sort_by_cached_key(|path| (path.is_symlink(), path.clone()));
         all.paths.dedup();
         let mut seen = BTreeSet::new();
-        // Whoever opens a file that cannot be looked at says why.
+        // Opening such a file reports the reason.
         let is_first = |path: &PathBuf| fs::metadata(path).map_or(true, |of| seen.insert(id(&of)));
         all.paths.retain(is_first);
         all.paths.sort();
@@ -92,7 +92,7 @@ fn id(metadata: &Metadata) -> (u64, u64) {
 #[derive(Default)]
 struct Walk {
     listing: Listing,
-    /// Folders that were entered: links may lead in circles.
+    /// Folders already entered: links may form cycles.
     entered: BTreeSet<(u64, u64)>,
     /// Links to folders that are still to be followed.
     linked: VecDeque<PathBuf>,
@@ -122,7 +122,7 @@ impl Walk {
         Ok(())
     }
 
-    /// Takes an entry of a folder with these names.
+    /// Processes an entry of a folder with these names.
     fn take(&mut self, entry: &DirEntry, names: &BTreeSet<OsString>) -> Result<()> {
         let path = entry.path();
         let refused = |error: io::Error| Error::from(IoError::on("open")(error)).in_file(&path);
@@ -131,7 +131,7 @@ impl Walk {
             return self.enter(&path);
         }
         if own.is_symlink() || is_pedr(&path) {
-            // A link that leads nowhere may have led to a volume.
+            // A broken link may have pointed to a volume.
             let metadata = fs::metadata(&path).map_err(refused)?;
             if metadata.is_dir() {
                 self.linked.push_back(path);
@@ -153,7 +153,7 @@ fn is_pedr(path: &Path) -> bool {
     ending.is_some_and(|ending| ending.eq_ignore_ascii_case("b"))
 }
 
-/// The name that a compressed PEDR file has without compression; nothing of any other file.
+/// The name of a compressed PEDR file without its compression suffix; `None` for any other file.
 fn decompressed(path: &Path) -> Option<OsString> {
     let ending = path.extension()?.to_str()?;
     let stem = path.file_stem()?;

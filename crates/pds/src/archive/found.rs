@@ -1,4 +1,4 @@
-//! What a search gives.
+//! Results of a search.
 
 use std::{collections::BTreeMap, fmt};
 
@@ -10,7 +10,7 @@ use areograph_base::{
     footprints::{AsRead, Footprint, Footprints},
 };
 
-/// Why a shot inside a window was rejected; the first that applies counts.
+/// Reason for the rejection of a shot inside a window; the first that applies counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ShotRejection {
@@ -29,14 +29,15 @@ pub enum ShotRejection {
 }
 
 impl ShotRejection {
-    /// Why a shot is rejected by what is spoiled in its frame, or by `filter`; none takes every shot with a return.
+    /// Rejection of a shot because of spoiled values in its frame, or by `filter`; without a filter every shot with a
+    /// return is accepted.
     #[must_use]
     pub fn of(
         shot: &Footprint,
         spoiled: &SpoiledShots,
         filter: Option<&ShotFilter>,
     ) -> Option<Self> {
-        // Written so that a range that is no number counts as none.
+        // Written so that a NaN range counts as no return.
         if !(shot.range_m > 0.0) {
             return Some(Self::NoReturn);
         }
@@ -71,16 +72,16 @@ impl fmt::Display for ShotRejection {
     }
 }
 
-/// The windows of every shot, however many windows there are.
+/// Window indices of every shot, for any number of windows.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct WindowLists {
-    /// Where the list of each shot ends in `windows`.
+    /// End of the list of each shot in `windows`.
     ends: Vec<usize>,
     windows: Vec<u32>,
 }
 
 impl WindowLists {
-    /// The windows of the shot in row `row`, in ascending order; none of a row that is not there.
+    /// The windows of the shot in row `row`, in ascending order; empty for a row that does not exist.
     #[must_use]
     pub fn of(&self, row: usize) -> &[u32] {
         let end = |row: usize| self.ends.get(row).map_or(0, |end| *end);
@@ -100,7 +101,7 @@ impl WindowLists {
         self.ends.extend(other.ends.iter().map(|end| before + end));
     }
 
-    /// Takes the lists from row `row` on away.
+    /// Splits off the lists from row `row` on.
     #[must_use]
     pub fn split_off(&mut self, row: usize) -> Self {
         let ends = self.ends.split_off(row.min(self.ends.len()));
@@ -112,7 +113,7 @@ impl WindowLists {
     }
 }
 
-/// What a stretch of a file gave.
+/// Results from a stretch of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
     /// Shots in the windows, ordered by record and shot, in the coordinates of their file; `windows` has bits for the
@@ -120,13 +121,13 @@ pub struct Found {
     pub footprints: Footprints<AsRead>,
     /// The windows of every shot.
     pub windows: WindowLists,
-    /// What is wrong with the records that were judged.
+    /// Faults of the records that were checked.
     pub complaints: Vec<Complaint>,
     /// Complaints by reason.
     pub complaint_counts: BTreeMap<Reason, u64>,
     /// Rejected shots inside a window, by reason.
     pub rejected: BTreeMap<ShotRejection, u64>,
-    /// Records looked at, be it by what an index says of them.
+    /// Records examined, including those decided by an index.
     pub frames_read: u64,
     /// Shots whose own position was tested, those of frames near a window.
     pub shots_read: u64,

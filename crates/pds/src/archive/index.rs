@@ -1,7 +1,8 @@
-//! The index of an archive: of every file where and when its records are, so that a search reads only what may matter.
+//! The index of an archive: extents in place and time of the records of every file, so that a search reads only
+//! candidate records.
 //!
-//! An index saves time and nothing else. What it says of a file counts as long as the file system says that the file is
-//! what it was; an index of another version, or one that is damaged, is as good as none.
+//! An index only saves time. An entry is trusted as long as the file system reports the file as unchanged; an index of
+//! another version, or a damaged one, is ignored.
 
 use std::{
     collections::BTreeMap,
@@ -23,33 +24,34 @@ use areograph_store::files::Identity;
 
 /// Name of the index in a folder of the archive.
 pub const INDEX: &str = "areograph-pedr.index";
-/// How the file begins: what it is, and the form of its entries. BLAKE3 of the rest follows, then the rest in postcard.
+/// Start of the index file: type and format version. The BLAKE3 of the remainder follows, then the remainder in
+/// postcard.
 const HEADER: &[u8] = b"areograph pedr index 1\n";
 const HASH_SIZE: usize = 32;
 /// Largest index that is read, bytes: far more than the mission's archive takes.
 const BYTES_MAX: u64 = 1 << 30;
-/// Folders above that of a file in which its index may lie.
+/// Levels of parent folders that are searched for the index of a file.
 const FOLDERS_ABOVE: usize = 4;
 
-/// What an index says of a file.
+/// Index entry of a file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct IndexedFile {
     /// Path below the folder of the index.
     pub(super) path: PathBuf,
-    /// What the file system said of it.
+    /// Its identity in the file system.
     pub(super) identity: Identity,
     /// BLAKE3 of its bytes.
     pub(super) blake3: [u8; 32],
-    /// What is wrong with its records, in their order.
+    /// Faults of its records, in order.
     pub(super) complaints: Vec<Complaint>,
-    /// Where they are; none of a file that is read as a whole, because too much is wrong with it.
+    /// Extents of its blocks; `None` for a file with too many faults, which is read as a whole.
     pub(super) blocks: Option<Vec<Block>>,
 }
 
 /// The form of the index in its file.
 #[derive(Serialize, Deserialize)]
 struct Stored {
-    /// Rules by which records were judged.
+    /// Version of the rules by which records were checked.
     rules: u32,
     files: Vec<IndexedFile>,
 }
@@ -73,18 +75,19 @@ impl IndexedFile {
         blake3::Hash::from_bytes(self.blake3).to_hex().to_string()
     }
 
-    /// The blocks of a file of so many records.
+    /// The blocks of a file with this number of records.
     fn blocks_of(&self, records: usize) -> Option<&[Block]> {
         let blocks = self.blocks.as_deref();
         blocks.filter(|blocks| blocks.len() == records.div_ceil(BLOCK_RECORDS))
     }
 
-    /// Whether it tells where the records of the file are, and what is wrong with them.
+    /// Whether the entry holds the extents of the file's records and their faults.
     pub(super) fn has_blocks(&self, records: usize) -> bool {
         self.blocks_of(records).is_some()
     }
 
-    /// Rows of the file, of which it has so many, that may have shots that are asked for; none when the index cannot tell.
+    /// Rows of the file, out of its number of rows, that may contain requested shots; `None` if the index cannot
+    /// decide.
     pub(super) fn rows(
         &self,
         query: &Query<'_>,
@@ -118,7 +121,7 @@ impl FromIterator<IndexedFile> for Index {
 }
 
 impl Index {
-    /// The index in these bytes; none when they are damaged, or of another version.
+    /// Decodes the index; `None` if the bytes are damaged or of another version.
     #[must_use]
     pub fn decode(bytes: &[u8]) -> Option<Self> {
         let (hash, rest) = bytes.strip_prefix(HEADER)?.split_at_checked(HASH_SIZE)?;
@@ -129,7 +132,7 @@ impl Index {
         (stored.rules == RULES).then(|| stored.files.into_iter().collect())
     }
 
-    /// The index in the file `path`; none when there is no such file, or none that can be used.
+    /// Reads the index from the file `path`; `None` if it does not exist or cannot be used.
     #[must_use]
     pub fn read(path: &Path) -> Option<Self> {
         let metadata = fs::metadata(path).ok()?;
@@ -138,7 +141,7 @@ impl Index {
         Self::decode(&bytes.ok()?)
     }
 
-    /// The bytes of the index; none when they cannot be made.
+    /// Encodes the index; `None` if that fails.
     #[must_use]
     pub fn encode(&self) -> Option<Vec<u8>> {
         let files = self.files.values().map(|file| IndexedFile::clone(file));
@@ -156,7 +159,7 @@ impl Index {
         self.files.values().map(AsRef::as_ref)
     }
 
-    /// What it says of the file with this path below its folder, if the file still is what it was.
+    /// The entry of the file with this path below its folder, if the file is unchanged.
     #[must_use]
     pub fn find(&self, path: &Path, identity: &Identity) -> Option<Arc<IndexedFile>> {
         let found = self.files.get(path);
@@ -170,14 +173,14 @@ impl Index {
 #[derive(Debug, Default)]
 pub struct Indexes {
     by_folder: BTreeMap<PathBuf, Index>,
-    /// For the folder of each file the folder of its index.
+    /// The folder of the index for the folder of each file.
     folders: BTreeMap<PathBuf, PathBuf>,
 }
 
 impl Indexes {
-    /// Those of the folders of these files, and of some folders above; of several the nearest to a file counts.
+    /// The indexes in the folders of these files and in folders above them; of several, the nearest to a file is used.
     ///
-    /// * `read` – the index in the file with that path, if there is one
+    /// * `read` – reads the index from the file with that path, if it exists
     #[must_use]
     pub fn beside(paths: &[PathBuf], read: impl Fn(&Path) -> Option<Index>) -> Self {
         let mut indexes = Self::default();
@@ -207,7 +210,7 @@ impl Indexes {
         indexes
     }
 
-    /// What is known of a file with this identity.
+    /// The entry of the file with this identity.
     #[must_use]
     pub fn find(&self, path: &Path, identity: &Identity) -> Option<Arc<IndexedFile>> {
         let folder = self.folders.get(path.parent()?)?;

@@ -1,4 +1,4 @@
-//! Making an index: every record of a file is read once, hashed, judged, and its place noted.
+//! Building an index: every record of a file is read once, hashed, checked and located.
 
 use std::{ops::Range, path::Path, sync::atomic::AtomicBool};
 
@@ -12,13 +12,13 @@ use super::{
 use crate::pedr::{Complaint, FieldGuard, Reader, Stretch};
 use areograph_base::error::{Result, Stopped};
 
-/// Most complaints of a file that an index repeats; a file with more is always read as a whole.
+/// Maximum number of a file's complaints in an index; a file with more is always read as a whole.
 const COMPLAINTS_MAX: usize = 100;
 impl IndexedFile {
-    /// What the file `path` holds, which is `below` the folder of the index. `stop` is looked at before every piece.
+    /// Index entry of the file `path`, which is `below` the folder of the index. `stop` is checked before every piece.
     ///
     /// # Errors
-    /// A file that cannot be read, holds no good record, or changes while it is read; [`Stopped`].
+    /// A file that cannot be read, contains no valid record, or changes while it is read; [`Stopped`].
     pub fn of(path: &Path, below: &Path, stop: &AtomicBool) -> Result<Self> {
         let reader = Reader::open(path)?;
         reader.require_steady()?;
@@ -60,7 +60,7 @@ impl IndexedFile {
     }
 }
 
-/// The blocks of the stretch, each with what is wrong with its records.
+/// The blocks of the stretch, each with the faults of its records.
 fn judge(stretch: &Stretch, rows: Range<usize>, guard: FieldGuard) -> Vec<(Block, Vec<Complaint>)> {
     let starts: Vec<usize> = rows.clone().step_by(BLOCK_RECORDS).collect();
     let block = |start: usize| {

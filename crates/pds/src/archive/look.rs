@@ -1,4 +1,4 @@
-//! The first look at a file without an index: which rows may matter, told by a few fields of each record.
+//! First pass over a file without an index: a few fields of each record identify the candidate rows.
 
 use std::{mem, ops::Range, sync::atomic::AtomicBool};
 
@@ -8,16 +8,16 @@ use super::{Query, Source};
 use crate::pedr::Stretch;
 use areograph_base::error::{Result, Stopped};
 
-/// Records that a thread looks at at once: 0.4 MB, which stay in its processor's own cache.
+/// Records that a thread examines at a time: 0.4 MB, which fit into the cache of a processor core.
 const LOOK_RECORDS: usize = 512;
-/// Rows that lie no farther apart than this are read together.
+/// Rows at most this far apart are read together.
 const GAP_RECORDS: usize = 64;
 
 impl Source {
-    /// The rows that may have shots that are asked for, and few others; `stop` is looked at before every piece.
+    /// The rows that may contain requested shots, and few others; `stop` is checked before every piece.
     ///
     /// # Errors
-    /// What the disk refuses; a file that has changed; [`Stopped`].
+    /// A read error; a file that has changed; [`Stopped`].
     pub(super) fn look(&self, query: &Query<'_>, stop: &AtomicBool) -> Result<Vec<Range<usize>>> {
         let reader = self.reopen()?;
         let starts: Vec<usize> = (0..self.records()).step_by(LOOK_RECORDS).collect();
@@ -46,7 +46,7 @@ impl Source {
         Ok(rows)
     }
 
-    /// Those rows that may matter.
+    /// The candidate rows among these.
     fn near(&self, stretch: &Stretch, rows: Range<usize>, query: &Query<'_>) -> Vec<Range<usize>> {
         let mut near = Vec::new();
         for (row, record) in stretch.records(rows) {
@@ -58,13 +58,13 @@ impl Source {
     }
 }
 
-/// What a piece of a file tells.
+/// Result for a piece of a file.
 struct Looked {
     near: Vec<Range<usize>>,
     is_in_order: bool,
 }
 
-/// Puts rows behind others, together with those that are not far before.
+/// Appends rows to others, merged with those shortly before them.
 fn join(rows: &mut Vec<Range<usize>>, next: Range<usize>) {
     match rows.last_mut() {
         Some(last) if next.start - last.end <= GAP_RECORDS => last.end = next.end,

@@ -1,17 +1,17 @@
-//! Many PEDR files, searched for the shots in windows: files side by side and piece by piece, all windows at once, in
-//! little memory, with the same rows in the same order whatever the number of threads.
+//! Search of many PEDR files for the shots in windows: several files and pieces in parallel, all windows at once, in
+//! little memory. Rows and their order do not depend on the number of threads.
 //!
-//! A record far from every window is passed over by a few of its fields; near one, every shot is judged by its own
-//! position in IAU 2000. An index of the archive spares the search to look at most records; what it finds is the same.
+//! A few fields of a record decide whether it is far from every window; near a window, every shot is tested by its own
+//! position in IAU 2000. With an index of the archive, most records are not examined; the result is the same.
 //!
 //! Files are read by `pread`, at most 51 MB at a time, with all threads on one file, and never mapped: a file that
-//! shrinks, changes or vanishes is a failure of that file (decision 0020). Records are passed over by
-//! `pedr/mid_point.rs` where no window lies in their cell of `geom/window/grid.rs`. The position of a shot is its own,
-//! in the frame of the products, never that of its PEDR frame.
+//! shrinks, changes or vanishes is a failure of that file (decision 0020). `pedr/mid_point.rs` skips records in cells
+//! of `geom/window/grid.rs` without a window. The position of a shot is its own, in the frame of the products, never
+//! that of its PEDR frame.
 //!
-//! The index (`index.rs`) has the extents of 128 records each, complaints, and identity and hash of each file. It is
-//! trusted only for files that the file system reports as unchanged, and for records judged by the same rules
-//! (`pedr::RULES`), so that no result depends on it.
+//! The index (`index.rs`) holds the extents of blocks of 128 records, complaints, and identity and hash of each file.
+//! It is trusted only for unchanged files, and for records checked by the same rules (`pedr::RULES`), so that results
+//! do not depend on it.
 
 mod block;
 mod distinct;

@@ -1,4 +1,4 @@
-//! The files that a user names, opened for a search.
+//! Files named by the user, opened for a search.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use areograph_base::{
     error::{Cause, Error, Kind, Result},
 };
 
-/// Not as many files as a search can number.
+/// A number of files beyond the range of a search.
 #[derive(Debug, thiserror::Error)]
 #[error("{0} PEDR files; expected 1 to 65535")]
 struct FileCount(usize);
@@ -25,21 +25,21 @@ impl Cause for FileCount {
     }
 }
 
-/// Files of an archive that can be searched, and those that cannot.
+/// Files of an archive that can be searched, and failures of the others.
 #[derive(Debug, Default)]
 pub struct Opened {
     /// Files in the order of their first records.
     pub sources: Vec<Source>,
-    /// Folders that cannot be listed, files that cannot be opened or hold no good record.
+    /// Folders that cannot be listed, files that cannot be opened or contain no valid record.
     pub failures: Vec<Error>,
 }
 
 impl Opened {
-    /// Opens these files, and those with the ending `.b` in and below these folders, each once, with the indexes that lie
-    /// beside them.
+    /// Opens these files, and those with the ending `.b` in and below these folders, each once, with the indexes beside
+    /// them.
     ///
     /// # Errors
-    /// No file, and why if something in its place cannot be read; more than 65,535.
+    /// No files, with the reason if an entry cannot be read; more than 65,535 files.
     pub fn all(paths: &[PathBuf]) -> Result<Self> {
         let Listing {
             paths: files,

@@ -1,4 +1,4 @@
-//! What is searched for.
+//! Search criteria.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -8,28 +8,28 @@ use areograph_base::{
 };
 use areograph_geom::window::{Region, WindowGrid};
 
-/// No two of the known datums are turned against each other by more than this, radians: 0.271° and
-/// 0.003° per decade, and pole differences of 0.0006°.
+/// Largest rotation between two of the known datums, radians: 0.271° and 0.003° per decade, and pole differences of
+/// 0.0006°.
 const DATUM_MARGIN_RAD: f64 = 0.3 * RADIANS_PER_DEGREE;
-/// No shot is farther from its frame's mid-point than this, seconds: 9.5 shots of a clock that is one per cent off.
+/// Largest time from a shot to its frame's mid-point, seconds: 9.5 shots with a clock error of one per cent.
 const FRAME_MARGIN_S: f64 = 1.0;
 
-/// Which records are judged, and complained of when they are bad.
+/// Which records are checked and reported when invalid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Judged {
     /// All of them.
     All,
-    /// Those that may have a shot in a window; of the others only the mid-point is looked at.
+    /// Those that may contain a shot in a window; of the others only the mid-point is examined.
     Near,
 }
 
-/// Windows and what else shots must be.
+/// Windows and further conditions on shots.
 #[derive(Debug)]
 pub struct Query<'a> {
     pub(super) windows: WindowGrid,
-    /// Shots to keep; none keeps all with a return.
+    /// Shots to keep; without a filter all with a return.
     pub(super) filter: Option<&'a ShotFilter>,
-    /// Times of shots to keep, corrected; none keeps all.
+    /// Corrected times of shots to keep; without an interval all.
     pub(super) time: Option<Interval>,
     /// Seconds to add to time tags.
     pub(super) correction_s: f64,
@@ -67,13 +67,13 @@ impl<'a> Query<'a> {
         }
     }
 
-    /// The same for shots of an interval alone, by their corrected time.
+    /// The same query, limited to shots within an interval of corrected time.
     #[must_use]
     pub fn within(self, time: Option<Interval>) -> Self {
         Self { time, ..self }
     }
 
-    /// How much farther than in the coordinates of its file a direction may be from a window, radians.
+    /// Margin around a window for directions in the coordinates of a file, radians.
     pub(super) fn margin_rad(datum: Datum) -> f64 {
         if datum == Datum::Iau2000 {
             0.0
@@ -82,7 +82,7 @@ impl<'a> Query<'a> {
         }
     }
 
-    /// Whether a record may have a shot that is asked for; in doubt, and when its place is impossible, it may.
+    /// Whether a record may contain a requested shot; records in doubt, or with an impossible position, are included.
     pub(super) fn may_matter(&self, record: &Record, datum: Datum) -> bool {
         let mid = record.mid_point();
         let margin_rad = mid.reach_rad + Self::margin_rad(datum);
@@ -91,13 +91,13 @@ impl<'a> Query<'a> {
                 .windows
                 .any_within(mid.longitude_rad, mid.latitude_rad, margin_rad);
         may_be_inside && {
-            // Most records have been passed over without a look at their time.
+            // Most records have already been skipped without a test of their time.
             let tag_s = record.time_s.get();
             self.may_have_time(tag_s, tag_s)
         }
     }
 
-    /// Whether shots of frames with these tags may be of the time that is asked for; tags that are no numbers may.
+    /// Whether shots of frames with these tags may be within the requested time; tags that are not finite are included.
     pub(super) fn may_have_time(&self, first_tag_s: f64, last_tag_s: f64) -> bool {
         self.time.is_none_or(|time| {
             let time = time.padded(FRAME_MARGIN_S);

@@ -1,4 +1,4 @@
-//! Some rows of a file: records near a window, and their shots in it.
+//! Scan of some rows of a file: records near a window, and their shots in it.
 
 use std::ops::Range;
 
@@ -14,15 +14,15 @@ use areograph_geom::{
     ellipsoid::{Spherical, spherical_to_xyz_m},
 };
 
-/// A file with what is searched for in it.
+/// A file and the query that is applied to it.
 pub(super) struct Scan<'a> {
     pub(super) source: &'a Source,
-    /// Which file of the search it is.
+    /// Index of the file within the search.
     pub(super) index: u16,
     pub(super) query: &'a Query<'a>,
 }
 
-/// Windows near a frame and around a shot, kept so that memory is asked for once a stretch.
+/// Windows near a frame and around a shot; the buffers are allocated once per stretch.
 #[derive(Default)]
 struct Windows {
     near: Vec<u32>,
@@ -118,7 +118,7 @@ impl Scan<'_> {
     }
 }
 
-/// Successive rows, counted from the first, that are to be judged.
+/// Runs of successive rows, counted from the first, that are to be checked.
 fn runs(matters: &[bool], judges_all: bool) -> Vec<Range<usize>> {
     let mut start = 0;
     let mut runs = Vec::new();

@@ -1,4 +1,4 @@
-//! The search: a load of pieces is read, then searched by all threads in waves, whose results are handed on in order.
+//! The search: a load of pieces is read, then scanned by all threads in waves, whose results are delivered in order.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -13,23 +13,23 @@ use super::{Found, Query, Source, scan::Scan};
 use crate::pedr::{Complaint, RECORD_BYTES, Reader, Stretch};
 use areograph_base::error::{Cause, Error, Kind, Result, Stopped};
 
-/// Records in memory at once: 51 MB, more than any day of the mission takes.
+/// Records in memory at once: 51 MB, more than any day of the mission.
 pub(super) const LOAD_RECORDS: usize = 1 << 16;
-/// Pieces of a load: each may be of another file, which is open meanwhile.
+/// Pieces of a load: each may belong to another file, which is open meanwhile.
 const PIECES_MAX: usize = 256;
 /// Records of a task: 0.4 MB, and at most 1.5 MB of shots.
 const TASK_RECORDS: usize = 512;
-/// Tasks of a wave for each thread, and the most of a wave: what they find stands in memory at once.
+/// Tasks per thread in a wave, and the maximum of a wave: their results are in memory at once.
 const TASKS_PER_THREAD: usize = 16;
 const TASKS_MAX: usize = 64;
 
-/// Records that cannot be used: more than so many and `UNUSABLE_SHARE_MAX` of a file are damage of the file and not of some
-/// records. Files of the archive have none, or a few.
+/// Unusable records: more than this number and more than `UNUSABLE_SHARE_MAX` of a file indicate a damaged file rather
+/// than damaged records. Files of the archive have few or none.
 pub const UNUSABLE_MAX: u64 = 10;
-/// The same of a file.
+/// The corresponding share of the file's records.
 pub const UNUSABLE_SHARE_MAX: f64 = 0.01;
 
-/// A file that has lost more than some records.
+/// A file with more than isolated damaged records.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "{unusable} of {records} records cannot be used; expected at most {UNUSABLE_MAX} and one in a hundred. The first: {first}"
@@ -50,7 +50,7 @@ impl Cause for Damaged {
     }
 }
 
-/// Records of a file that cannot be used.
+/// Unusable records of a file.
 #[derive(Default)]
 struct Unusable {
     count: u64,
@@ -65,7 +65,7 @@ impl Unusable {
         }
     }
 
-    /// Why a file with so many of them is not to be used.
+    /// The reason for which a file with these records is not used.
     fn failure(self, records: u64) -> Option<Damaged> {
         let allowed = UNUSABLE_SHARE_MAX * records as f64 + UNUSABLE_MAX as f64;
         let first = self.first.filter(|_| self.count as f64 > allowed)?;
@@ -77,27 +77,27 @@ impl Unusable {
     }
 }
 
-/// Takes what a search gives, in the order of files, records and shots.
+/// Receives the results of a search, in order of files, records and shots.
 pub trait Sink {
-    /// Takes what a stretch of file `file` gave.
+    /// Receives the results from a stretch of file `file`.
     ///
     /// # Errors
-    /// One that ends the search.
+    /// An error that ends the search.
     fn found(&mut self, file: usize, found: Found) -> Result<()>;
 
-    /// Takes the failure of file `file`: nothing more comes of it, and what came may be incomplete.
+    /// Receives the failure of file `file`: no more results follow, and those delivered may be incomplete.
     ///
     /// # Errors
-    /// One that ends the search.
+    /// An error that ends the search.
     fn failed(&mut self, file: usize, failure: Error) -> Result<()>;
 }
 
-/// Searches the files for shots that are asked for, and gives them to `sink`; `stop` is looked at before every piece.
+/// Searches the files for requested shots and passes them to `sink`; `stop` is checked before every piece.
 ///
-/// What comes does not depend on the number of threads. There may be at most 65,535 files.
+/// Results do not depend on the number of threads. At most 65,535 files are supported.
 ///
 /// # Errors
-/// What `sink` gives; [`Stopped`].
+/// An error of `sink`; [`Stopped`].
 pub fn search(
     sources: &[Source],
     query: &Query<'_>,
@@ -136,7 +136,7 @@ pub fn search(
 struct Piece {
     file: usize,
     rows: Range<usize>,
-    /// Where the piece before ends.
+    /// End of the preceding piece.
     after: usize,
     is_first: bool,
     is_last: bool,
@@ -178,7 +178,7 @@ fn pieces_of(file: usize, rows: &[Range<usize>]) -> Vec<Piece> {
     pieces
 }
 
-/// How many of the pieces, from the first on, fit into memory together; each does so by itself.
+/// Number of pieces, from the first on, that fit into memory together; each one fits on its own.
 fn next_load(pieces: &[Piece]) -> usize {
     let mut records = 0;
     let fit = pieces.iter().take(PIECES_MAX).take_while(|piece| {
@@ -188,17 +188,17 @@ fn next_load(pieces: &[Piece]) -> usize {
     fit.count()
 }
 
-/// A search under way.
+/// A search in progress.
 struct Search<'a> {
     sources: &'a [Source],
     query: &'a Query<'a>,
     stop: &'a AtomicBool,
     sink: &'a mut dyn Sink,
-    /// Files that pieces in memory are of.
+    /// Files of the pieces in memory.
     readers: BTreeMap<usize, Reader>,
     failed: BTreeSet<usize>,
     unusable: BTreeMap<usize, Unusable>,
-    /// Memory of earlier pieces, for the next ones: fresh memory costs as much as reading.
+    /// Buffers of earlier pieces, reused: fresh memory costs as much as reading.
     buffers: Vec<Vec<u8>>,
 }
 
@@ -206,16 +206,16 @@ struct Search<'a> {
 struct Task {
     piece: usize,
     rows: Range<usize>,
-    /// Where the task before ends.
+    /// End of the preceding task.
     after: usize,
     is_first: bool,
     is_last: bool,
 }
 
 impl Search<'_> {
-    /// Reads and searches pieces, one load after the other, until few enough are left.
+    /// Reads and scans pieces, one load after the other, until few enough are left.
     ///
-    /// * `left` – records that may be left, to be read with what comes next
+    /// * `left` – number of records that may be left, to be read with the next pieces
     fn load_all(&mut self, pieces: &mut Vec<Piece>, left: usize) -> Result<()> {
         let are_few = |pieces: &[Piece]| {
             let records: usize = pieces.iter().map(|piece| piece.rows.len()).sum();
@@ -229,7 +229,7 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Reads and searches pieces that fit into memory together.
+    /// Reads and scans pieces that fit into memory together.
     fn load(&mut self, pieces: &[Piece]) -> Result<()> {
         Stopped::check(self.stop)?;
         let mut failures = self.open(pieces);
@@ -270,9 +270,9 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Opens the files of these pieces, but those that failed, and closes others. Gives the failures.
+    /// Opens the files of these pieces, except failed ones, and closes others. Returns the failures.
     fn open(&mut self, pieces: &[Piece]) -> BTreeMap<usize, Error> {
-        // By file, some rows of it.
+        // Some rows of each file.
         let read = pieces.iter().filter(|piece| !piece.rows.is_empty());
         let files: BTreeMap<usize, &Range<usize>> =
             read.map(|piece| (piece.file, &piece.rows)).collect();
@@ -294,7 +294,7 @@ impl Search<'_> {
         failures
     }
 
-    /// Reads the pieces; none of a file that failed.
+    /// Reads the pieces; `None` for those of failed files.
     fn read(
         &mut self,
         pieces: &[Piece],
@@ -325,7 +325,7 @@ impl Search<'_> {
         .collect()
     }
 
-    /// Gives what was found to the sink, unless the file has failed.
+    /// Passes results to the sink, unless the file has failed.
     fn hand_on(
         &mut self,
         file: usize,
@@ -376,7 +376,7 @@ fn scan(
     if let Some(stretch) = stretch {
         let scan = Scan {
             source,
-            // The number of files was checked.
+            // The number of files was checked before.
             index: u16::try_from(file).unwrap_or(u16::MAX),
             query,
         };

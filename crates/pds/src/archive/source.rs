@@ -1,4 +1,4 @@
-//! A file of the archive as a search sees it before it reads records.
+//! A file of the archive before its records are searched.
 
 use std::{
     iter,
@@ -17,7 +17,7 @@ use areograph_base::{
 };
 use areograph_store::files::{Identity, file_name};
 
-/// A file, and how its records are understood.
+/// A file and the interpretation of its records.
 #[derive(Debug, Clone)]
 pub struct Source {
     path: PathBuf,
@@ -32,15 +32,15 @@ pub struct Source {
     head_complaints: Vec<Complaint>,
     trailing_complaint: Option<Complaint>,
     indexed: Option<Arc<IndexedFile>>,
-    /// Set once all records were seen to follow each other in time.
+    /// Set once all records are known to be in order of time.
     in_order: OnceLock<()>,
 }
 
 impl Source {
-    /// Looks at the label of a file, and for its first good record.
+    /// Reads the label of a file and searches its first valid record.
     ///
     /// # Errors
-    /// A file that cannot be read, holds no good record, or whose datum cannot be told.
+    /// A file that cannot be read, contains no valid record, or whose datum is unknown.
     pub fn open(path: &Path, choice: DatumChoice, indexes: &Indexes) -> Result<Self> {
         let reader = Reader::open(path)?;
         let indexed = indexes.find(path, &reader.identity());
@@ -63,13 +63,13 @@ impl Source {
         })
     }
 
-    /// Where the file lies.
+    /// Path of the file.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What footprints say of it; a search does not know its hash.
+    /// The file as footprints refer to it; its hash is unknown to a search.
     #[must_use]
     pub fn file(&self) -> SourceFile {
         SourceFile {
@@ -104,19 +104,19 @@ impl Source {
         self.records
     }
 
-    /// Time tag of its first good record, ET seconds.
+    /// Time tag of its first valid record, ET seconds.
     #[must_use]
     pub const fn first_s(&self) -> f64 {
         self.first_s
     }
 
-    /// What its complaints of the label say.
+    /// Complaints about its label.
     #[must_use]
     pub fn label_complaints(&self) -> &[Complaint] {
         &self.head_complaints
     }
 
-    /// Opens the file for its records: still the one that was looked at before.
+    /// Reopens the file for its records, if it is unchanged.
     pub(super) fn reopen(&self) -> Result<Reader> {
         let reader = Reader::open(&self.path)?;
         reader.require_identity(&self.identity)?;
@@ -128,16 +128,16 @@ impl Source {
         Ok(reader)
     }
 
-    /// Has later readers of the file know that its records follow each other in time.
+    /// Marks the file as in order of time for later readers.
     pub(super) fn set_in_order(&self) {
         let _known_before = self.in_order.set(());
     }
 
-    /// Has the system read the file ahead, if it will be read as a whole.
+    /// Requests read-ahead for the file, if it will be read as a whole.
     pub(super) fn announce(&self) {
         let indexed = self.indexed.as_ref();
         let is_read = !indexed.is_some_and(|indexed| indexed.has_blocks(self.records));
-        // A file that cannot be opened is complained of when its turn comes.
+        // A file that cannot be opened is reported when its turn comes.
         if is_read && let Ok(reader) = self.reopen() {
             reader.announce();
         }
@@ -147,10 +147,10 @@ impl Source {
         FieldGuard::new(self.label.software_version)
     }
 
-    /// The rows that may have shots that are asked for, or must be judged all the same.
+    /// The rows that may contain requested shots, or must be checked in any case.
     ///
     /// # Errors
-    /// What the disk refuses; a file that has changed; [`Stopped`](areograph_base::error::Stopped).
+    /// A read error; a file that has changed; [`Stopped`](areograph_base::error::Stopped).
     pub(super) fn rows_to_read(
         &self,
         query: &Query<'_>,
@@ -165,21 +165,21 @@ impl Source {
         }
     }
 
-    /// Whether an index tells all complaints that are asked for.
+    /// Whether an index holds all requested complaints.
     pub(super) fn complaints_known(&self, query: &Query<'_>) -> bool {
         let indexed = self.indexed.as_ref();
         query.judged == Judged::All
             && indexed.is_some_and(|indexed| indexed.has_blocks(self.records))
     }
 
-    /// Complains of what is wrong with the head of the file.
+    /// Reports faults of the head of the file.
     pub(super) fn tell_of_head(&self, found: &mut Found) {
         for complaint in &self.head_complaints {
             found.complain(complaint.clone());
         }
     }
 
-    /// Complains of what an index knows of these rows, in order with what was found in them.
+    /// Reports faults that an index holds for these rows, merged in order with those found in them.
     pub(super) fn tell_known(&self, query: &Query<'_>, rows: Range<usize>, found: &mut Found) {
         let Some(indexed) = (self.indexed.as_ref()).filter(|_| self.complaints_known(query)) else {
             return;
@@ -195,7 +195,7 @@ impl Source {
         found.complaints.sort_by_key(|complaint| complaint.record);
     }
 
-    /// Complains of what is wrong with the end of the file.
+    /// Reports faults of the end of the file.
     pub(super) fn tell_of_end(&self, found: &mut Found) {
         if let Some(complaint) = &self.trailing_complaint {
             found.complain(complaint.clone());

@@ -1,8 +1,8 @@
-//! What keeps the rows of an image from being read.
+//! Errors that prevent the rows of an image from being read.
 
 use areograph_base::error::{Cause, Kind};
 
-/// A file whose rows cannot be read, or are not those of its label.
+/// A file whose rows cannot be read, or do not match its label.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum HrscError {
     #[error("the file holds a label only; expected the rows of the image after it")]

@@ -1,4 +1,4 @@
-//! Labels of images, as archived by PDS and as ISIS writes them.
+//! Labels of HRSC images, as archived by PDS and as ISIS writes them.
 
 use crate::{
     image_label::{
@@ -9,14 +9,14 @@ use crate::{
 };
 use areograph_base::{constants::Spacecraft, image::ImageFields, instruments::Instrument};
 
-/// The detector that is no line: the Super Resolution Channel takes frames.
+/// The detector that is not a line: the Super Resolution Channel takes frames.
 const FRAME_CAMERA: &str = "MEX_HRSC_SRC";
-/// The level of calibrated images as the camera took them.
+/// Processing level of calibrated images that are not map-projected.
 const LEVEL: &str = "2";
-/// Detector lines and pixels that the camera can sum to one.
+/// Macropixel sizes: detector lines and pixels that the camera can sum.
 const MACRO_PIXELS: [&str; 4] = ["1", "2", "4", "8"];
 
-/// Whether this is the label of an image by the camera, whichever of its lines.
+/// Whether this is the label of an HRSC image, of any line.
 pub(crate) fn is_hrsc(label: &Label) -> bool {
     let mut entries = label.entries.iter();
     entries.any(|entry| {
@@ -25,19 +25,19 @@ pub(crate) fn is_hrsc(label: &Label) -> bool {
     })
 }
 
-/// What a parsed label says of an image by one of `cameras`; what it does not say stays `None`, the times of its lines among it.
+/// The fields of a parsed label of an image by one of `cameras`; missing values are `None`, among them the line times.
 ///
-/// Clock counts are left out: they lie seconds from the clock kernels (`labels_tell_clock` of the spacecraft).
+/// Clock counts are left out: they differ by seconds from the clock kernels (`labels_tell_clock` of the spacecraft).
 ///
 /// # Errors
 /// A frame of the Super Resolution Channel; a line that is not among `cameras`; an image of another spacecraft or target,
-/// of another level, or one that is map-projected; a value that is not of its kind, or two values under one keyword.
+/// of another level, or one that is map-projected; an invalid value, or two values under one keyword.
 pub(super) fn image_label(label: &Label, cameras: &[Instrument]) -> Result<ImageLabel, LabelError> {
     const DETECTOR: [&str; 2] = ["DETECTOR_ID", "DETECTORID"];
     if let Some(entry) = either(label, DETECTOR[0], DETECTOR[1])?
         && entry.value.eq_ignore_ascii_case(FRAME_CAMERA)
     {
-        let expected = "one of the nine lines; the frame camera beside them is not modelled";
+        let expected = "one of the nine lines; the frame camera (SRC) is not supported";
         return Err(other_image(&entry.key, &entry.value, expected));
     }
     let instrument = camera(label, cameras, DETECTOR)?;
@@ -52,7 +52,7 @@ pub(super) fn image_label(label: &Label, cameras: &[Instrument]) -> Result<Image
         .only("PROCESSING_LEVEL_ID")?
         .filter(|entry| known(entry));
     if let Some(entry) = level.filter(|entry| entry.value != LEVEL) {
-        let expected = "2, the image as its camera took it (h…2.IMG); levels above are maps";
+        let expected = "2, the image as taken by the camera (h…2.IMG); higher levels are maps";
         return Err(other_image(&entry.key, &entry.value, expected));
     }
     as_taken(label)?;
@@ -67,7 +67,7 @@ pub(super) fn image_label(label: &Label, cameras: &[Instrument]) -> Result<Image
         found => optional_count(found, 1),
     };
     let samples = size("LINE_SAMPLES", "SAMPLES")?;
-    // SAMPLE_FIRST_PIXEL counts pixels that are not those of the kernels: 76 of a line that has all 5184.
+    // SAMPLE_FIRST_PIXEL counts pixels differently from the kernels: it is 76 for a line that has all 5184.
     let is_whole = summing
         .zip(samples)
         .is_some_and(|(summing, samples)| summing * samples == instrument.detector.pixels);
@@ -117,10 +117,10 @@ mod tests {
             ..ImageFields::default()
         };
         assert_eq!(label.fields, expected);
-        // A part of the line, of which nothing says where it begins.
+        // A part of the line whose start is not stated.
         let part = read(&GOOD.replace("2592", "2584")).unwrap();
         assert_eq!(part.fields.first_detector, None);
-        // Values that are not known are left out, whatever their keyword.
+        // Unknown values are left out, whatever their keyword.
         for (from, to) in [
             ("START_TIME = 2008-02-08T12:08:53.843Z", "START_TIME = UNK"),
             ("MACROPIXEL_SIZE = 2", "MACROPIXEL_SIZE = UNK"),

@@ -1,5 +1,5 @@
-//! Images of the High Resolution Stereo Camera on Mars Express as the archive has them at level 2: a PDS3 label, mostly a
-//! VICAR label behind it, and rows of samples, each with a prefix that holds the time of its line.
+//! Images of the High Resolution Stereo Camera on Mars Express as archived at level 2: a PDS3 label, usually followed
+//! by a VICAR label, and rows of samples, each with a prefix that contains the time of its line.
 //!
 //! # Source
 //! Labels and files of data set MEX-M-HRSC-3-RDR; `hrsc2isis` of ISIS for the prefixes.
@@ -33,19 +33,19 @@ use areograph_store::files::file_name;
 /// A file with the label of an image.
 #[derive(Debug)]
 pub(super) struct HrscFile {
-    /// What the label says, and the times of the rows behind it.
+    /// The fields of the label and the times of the rows.
     pub(super) label: ImageLabel,
-    /// The rows; none behind a label that stands alone.
+    /// The rows; `None` for a detached label.
     pub(super) raster: Option<Raster>,
-    /// Why the rows tell no times, if they do not: their samples can be used all the same.
+    /// The reason for which the rows have no times; their samples can be used nevertheless.
     pub(super) timeless: Option<HrscError>,
 }
 
 impl HrscFile {
-    /// The image whose `label` stands at the `start` of a file.
+    /// The image whose `label` is at the `start` of a file.
     ///
     /// # Errors
-    /// The system's refusal to read; a label of another image or camera; rows that are not those of the label.
+    /// The file cannot be read; a label of another image or camera; rows that do not match the label.
     pub(super) fn of(
         path: &Path,
         file: &File,
@@ -82,7 +82,7 @@ impl HrscFile {
     /// The rows.
     ///
     /// # Errors
-    /// A label that stands alone.
+    /// A detached label.
     pub(super) fn rows(&self) -> Result<Raster> {
         Ok(self.raster.ok_or(HrscError::NoRows)?)
     }

@@ -1,11 +1,11 @@
-//! Names of products, which tell orbit, image and line of the camera: `H5270_0000_IR2.IMG`.
+//! Product names, which identify orbit, image and line of the camera: `H5270_0000_IR2.IMG`.
 
 use crate::{
     image_label::{either, known},
     label::{Entry, Label, LabelError},
 };
 
-/// Lines of the camera in names of products, and in `DETECTOR_ID`.
+/// Lines of the camera in product names, and in `DETECTOR_ID`.
 const DETECTORS: [(&str, &str); 10] = [
     ("ND", "MEX_HRSC_NADIR"),
     ("S1", "MEX_HRSC_S1"),
@@ -19,8 +19,8 @@ const DETECTORS: [(&str, &str); 10] = [
     ("SR", "MEX_HRSC_SRC"),
 ];
 
-/// The product that a name begins with, in capitals and with underscores: `H5270_0000_IR2` of `h5270_0000_ir2.img` and
-/// `h5270-0000-ir2`; `None` for a name that names no product.
+/// The product at the start of a name, in capitals and with underscores: `H5270_0000_IR2` of `h5270_0000_ir2.img` and
+/// `h5270-0000-ir2`; `None` if the name contains no product.
 #[must_use]
 pub(crate) fn product_named(name: &str) -> Option<String> {
     const LENGTH: usize = 14;
@@ -41,7 +41,7 @@ pub(crate) fn product_named(name: &str) -> Option<String> {
     (is_orbit && is_number(image) && is_line && !goes_on).then_some(head)
 }
 
-/// Product, name of the file in the label, detector and the name that the file has must be those of one image.
+/// Checks that product, file name in the label, detector and the actual file name belong to one image.
 ///
 /// # Errors
 /// [`LabelError::Contradiction`] with the two that differ; two values under one keyword.

@@ -1,4 +1,4 @@
-//! Where the rows of an image lie in its file, and how their samples are stored.
+//! Location of the rows of an image in its file, and the storage of their samples.
 
 use std::{fs::File, io, os::unix::fs::FileExt as _};
 
@@ -9,20 +9,20 @@ use crate::{
 };
 use areograph_base::error::{IoError, Result};
 
-/// Bytes of a prefix that are read: the time of the line and its exposure.
+/// Bytes of a prefix that are read: time and exposure of the line.
 pub(super) const PREFIX_BYTES_MIN: usize = 12;
-/// Largest prefix that is believed; the archive has 68 bytes.
+/// Largest accepted prefix; the archive has 68 bytes.
 const PREFIX_BYTES_MAX: u64 = 4_096;
-/// Largest size of a line that is believed: the pixels of the detector, those that are covered included.
+/// Largest accepted number of samples: the pixels of the detector, including the covered ones.
 const SAMPLES_MAX: u64 = 5_272;
-/// The most lines that are believed, as of all images.
+/// Largest accepted number of lines, as for all images.
 const LINES_MAX: u64 = 1_000_000;
-/// Rows over which the order of bytes is confirmed, at most.
+/// Largest number of rows by which the byte order is confirmed.
 const ROWS_COMPARED: u32 = 32;
-/// Neighbouring samples that differ so many times more than in the other order of bytes are in the wrong one.
+/// The byte order is wrong if adjacent samples differ this many times more than in the other order.
 const ROUGHER: f64 = 4.0;
 
-/// How a sample is stored.
+/// Storage type of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Number {
     /// 8 bits.
@@ -51,20 +51,21 @@ pub(crate) struct Raster {
     pub(crate) lines: u32,
     pub(crate) samples: u32,
     pub(crate) number: Number,
-    /// Whether the least significant byte of a sample is its first one; that of a prefix always is.
+    /// Whether samples have their least significant byte first; prefixes always do.
     pub(crate) is_lsb: bool,
 }
 
 impl Raster {
-    /// The rows behind a label, in a file of so many bytes; none where the label stands alone, or points to another file.
+    /// The rows after a label, in a file of this number of bytes; `None` for a detached label, or one that points to
+    /// another file.
     ///
     /// # Errors
-    /// What the label lacks; values that are not those of such rows; a file that is shorter or longer than they say.
+    /// Missing keywords; values that do not describe such rows; a file that is shorter or longer than they state.
     pub(super) fn of(label: &Label, bytes: u64) -> std::result::Result<Option<Self>, HrscError> {
         let Some(pointer) = label.find("^IMAGE") else {
             return Ok(None);
         };
-        // Of another file.
+        // Rows of another file.
         if !pointer
             .value
             .starts_with(|first: char| first.is_ascii_digit())
@@ -137,15 +138,15 @@ impl Raster {
         self.prefix_bytes
     }
 
-    /// First byte of a row, that is of its prefix.
+    /// First byte of a row, which is the first of its prefix.
     pub(super) fn row(&self, line: u32) -> u64 {
         self.start + u64::from(line) * self.row_bytes()
     }
 
-    /// The samples of so many lines.
+    /// The samples of these lines.
     ///
     /// # Errors
-    /// The system's refusal to read.
+    /// The file cannot be read.
     pub(crate) fn samples_of(
         &self,
         file: &File,
@@ -174,11 +175,11 @@ impl Raster {
         }
     }
 
-    /// Makes sure that samples of 16 bits are in the order of bytes that the label states: by the least and the largest of
-    /// them, where the label has these and they tell; else since neighbouring samples are alike.
+    /// Checks that samples of 16 bits are in the byte order that the label states: by their minimum and maximum, where
+    /// the label has these and they are decisive; otherwise by the similarity of adjacent samples.
     ///
     /// # Errors
-    /// The system's refusal to read; samples in the other order.
+    /// The file cannot be read; samples in the other order.
     pub(super) fn confirm_byte_order(&self, label: &Label, file: &File) -> Result<()> {
         if self.number == Number::Byte {
             return Ok(());
@@ -209,7 +210,7 @@ impl Raster {
             }
             _ => (stated.rough > ROUGHER * other.rough).then(|| {
                 let times = stated.rough / other.rough.max(f64::MIN_POSITIVE);
-                format!("neighbouring samples are {times:.0} times more alike in the other byte order")
+                format!("adjacent samples differ {times:.0} times less in the other byte order")
             }),
         };
         match because {
@@ -223,7 +224,7 @@ impl Raster {
     }
 }
 
-/// What samples look like in an order of their bytes; those that are 0 are none.
+/// Statistics of samples in a byte order; zero samples are ignored.
 #[derive(Debug, Default, Clone, Copy)]
 struct Order {
     /// Samples outside of the label's range.
@@ -248,7 +249,7 @@ impl Order {
     }
 }
 
-/// Byte of the file where the rows begin.
+/// First byte of the rows in the file.
 fn start(pointer: &Entry, record_bytes: u64, bytes: u64) -> std::result::Result<u64, HrscError> {
     let unit = match pointer.unit.as_deref() {
         Some("bytes") => 1,
@@ -264,7 +265,7 @@ fn start(pointer: &Entry, record_bytes: u64, bytes: u64) -> std::result::Result<
         })
 }
 
-/// How samples are stored, and whether their least significant byte stands first.
+/// Storage type of samples, and whether their least significant byte comes first.
 fn number(label: &Label) -> std::result::Result<(Number, bool), HrscError> {
     let bits = whole(label, "SAMPLE_BITS", [8, 16], "8 or 16")?;
     let entry = of_rows(label, "SAMPLE_TYPE").ok_or(HrscError::Lacking {
@@ -281,7 +282,7 @@ fn number(label: &Label) -> std::result::Result<(Number, bool), HrscError> {
         (16, "LSB_UNSIGNED_INTEGER") => Ok((Number::Unsigned, true)),
         _ => {
             let expected =
-                format!("MSB_INTEGER, LSB_INTEGER or UNSIGNED_INTEGER that goes with {bits} bits");
+                format!("MSB_INTEGER, LSB_INTEGER or UNSIGNED_INTEGER for samples of {bits} bits");
             Err(refused("SAMPLE_TYPE", entry, &expected))
         }
     }
@@ -295,13 +296,13 @@ fn refused(key: &'static str, entry: &Entry, expected: &str) -> HrscError {
     }
 }
 
-/// What a label says of the rows: in the object of the image, or outside of all.
+/// A keyword of the rows: in the object of the image, or outside of all objects.
 fn of_rows<'a>(label: &'a Label, key: &str) -> Option<&'a Entry> {
     let mut entries = label.entries.iter();
     entries.find(|entry| matches!(&*entry.group, "" | "IMAGE") && entry.key == key)
 }
 
-/// A whole number within both ends.
+/// A whole number between two limits, inclusive.
 fn whole(
     label: &Label,
     key: &'static str,
@@ -317,7 +318,7 @@ fn whole(
         .ok_or_else(|| refused(key, entry, expected))
 }
 
-/// A number that was found to be small.
+/// Conversion of a number that was checked to be small.
 fn short(number: u64) -> u32 {
     u32::try_from(number).unwrap_or(u32::MAX)
 }

@@ -1,30 +1,31 @@
-//! Times of lines: those that the prefixes of rows hold, what is damaged among them found by their regularity, as pieces of one
-//! line period each.
+//! Line times from the prefixes of rows, as pieces with one line period each; damaged prefixes are identified by the
+//! regularity of times.
 //!
-//! A line begins when the exposure of the one before it ends, but for lines that did not come down and have no row. The time of
-//! a row that contradicts both its neighbours, which agree with each other, is replaced; whatever cannot be settled so is
-//! an error. Exposures say where pieces begin; how long a line takes is told by the times, since a line in which the exposure
-//! changes takes neither that in its prefix nor that of its neighbours.
+//! A line begins when the exposure of the preceding one ends, except after lines that were not transmitted and have no
+//! row. The time of a row that contradicts both its neighbours, which agree with each other, is replaced; any other
+//! contradiction is an error. Exposures define where pieces begin, but times define the line period: a line in which
+//! the exposure changes has neither the period in its prefix nor that of its neighbours.
 
 use super::{error::HrscError, prefixes::Prefix};
 use crate::image_label::RowTimes;
 use areograph_base::{line_times::LinePiece, time::Et};
 
-/// A time and the exposures before it that lie farther apart contradict each other, seconds: twice what all exposures of 6664
-/// lines of `h5270_0000_ir2` add up to, and 2 % of the shortest line of the camera.
+/// Tolerance between a time and the preceding exposures, seconds: twice the accumulated difference over the 6664 lines
+/// of `h5270_0000_ir2`, and 2 % of the shortest line of the camera.
 const REGULAR_S: f64 = 5e-5;
 /// Share of rows whose prefixes must have a time and an exposure.
 const KNOWN_SHARE_MIN: f64 = 0.9;
-/// Rows without a time at either end of an image that are continued by their exposures: a change of these would be told by no time.
+/// Most rows without a time at either end of an image that are extrapolated by their exposures: no time would show a
+/// change of these.
 const CONTINUED_MAX: usize = 10;
-/// Remarks of one kind that are told one by one.
+/// Remarks of one kind that are reported individually.
 const REMARKS_MAX: usize = 5;
 
-/// The pieces of line times that prefixes tell.
+/// The pieces of line times from prefixes.
 ///
 /// # Errors
-/// [`HrscError::NoTimes`] where they hold none, [`HrscError::TimeGap`] and [`HrscError::Overlap`] where they contradict
-/// each other and no one of them can be said to be wrong.
+/// [`HrscError::NoTimes`] where there are none, [`HrscError::TimeGap`] and [`HrscError::Overlap`] where they contradict
+/// each other and the wrong one cannot be identified.
 pub(super) fn row_times(prefixes: &[Prefix]) -> Result<RowTimes, HrscError> {
     let mut rows = Rows::of(prefixes)?;
     rows.fill_times()?;
@@ -47,7 +48,7 @@ pub(super) fn row_times(prefixes: &[Prefix]) -> Result<RowTimes, HrscError> {
     })
 }
 
-/// Times and exposures of all rows, seconds, as they are put right.
+/// Times and exposures of all rows, seconds, corrected in place.
 struct Rows {
     start_s: Vec<f64>,
     period_s: Vec<f64>,
@@ -59,7 +60,7 @@ struct Rows {
 }
 
 impl Rows {
-    /// The times as they are; exposures that are none are those of the row before, or of the first one that has one.
+    /// Times as they are; an invalid exposure is replaced by that of the preceding row, or by the first valid one.
     fn of(prefixes: &[Prefix]) -> Result<Self, HrscError> {
         let whole = |prefix: &&Prefix| prefix.start_s.is_some() && prefix.period_s.is_some();
         let (known, lines) = (prefixes.iter().filter(whole).count(), prefixes.len());
@@ -72,7 +73,7 @@ impl Rows {
         let period_s = prefixes.iter().enumerate().map(|(row, prefix)| {
             if prefix.period_s.is_none() && prefix.start_s.is_some() {
                 damaged.push(format!(
-                    "line {row}: its prefix has no exposure; that of the lines beside it is taken"
+                    "line {row}: no exposure in its prefix; that of an adjacent line is used"
                 ));
             }
             before_s = prefix.period_s.unwrap_or(before_s);
@@ -94,7 +95,7 @@ impl Rows {
         })
     }
 
-    /// Gives rows without a time that of the rows beside them, which must agree over them.
+    /// Fills in missing times from the adjacent rows, which must agree across the gap.
     fn fill_times(&mut self) -> Result<(), HrscError> {
         let lines = self.start_s.len();
         let mut row = 0;
@@ -128,7 +129,7 @@ impl Rows {
                         let last = row - 1;
                         return Err(HrscError::TimeGap { first, last });
                     }
-                    // Exposures add up to a little more or less than the times between.
+                    // Accumulated exposures differ slightly from the times between.
                     for filled in first..row {
                         let share = (filled - before) as f64 / (row - before) as f64;
                         self.start_s[filled] += share * apart_s;
@@ -136,20 +137,20 @@ impl Rows {
                 }
             }
             self.damaged.push(format!(
-                "lines {first} to {}: their prefixes have no time; those of the lines beside them are continued",
+                "lines {first} to {}: no times in their prefixes; their times follow from the adjacent lines",
                 row - 1
             ));
         }
         Ok(())
     }
 
-    /// Whether `later` begins as the exposures from `row` on say.
+    /// Whether `later` begins as predicted by the exposures from `row` on.
     fn agrees(&self, row: usize, later: usize) -> bool {
         let exposed_s: f64 = self.period_s[row..later].iter().sum();
         (self.start_s[later] - self.start_s[row] - exposed_s).abs() <= REGULAR_S
     }
 
-    /// Puts the step from a row to the next one right; whether a new piece begins behind it.
+    /// Corrects the step from a row to the next one; returns whether a new piece begins after it.
     fn settle(&mut self, row: usize) -> Result<bool, HrscError> {
         let (next, lines) = (row + 1, self.start_s.len());
         let step_s = self.start_s[next] - self.start_s[row];
@@ -162,7 +163,7 @@ impl Rows {
             .iter()
             .any(|beside_s| (0.5 * beside_s..1.5 * beside_s).contains(&step_s) && !is_whole);
         if self.agrees(row, next) {
-            // As it should be.
+            // Regular.
         } else if next + 1 < lines && self.agrees(row, next + 1) {
             self.time_is(next, self.start_s[row] + period_s);
         } else if self.is_change(row, step_s) {
@@ -180,13 +181,13 @@ impl Rows {
         } else {
             let pause_s = step_s - period_s;
             self.lacking.push(format!(
-                "before line {next} nothing was exposed for {pause_s:.4} s, {:.1} lines, which did not come down",
+                "before line {next}: a gap of {pause_s:.4} s, {:.1} lines that are not in the file",
                 pause_s / period_s
             ));
             return Ok(true);
         }
         let changes = self.period_s[next].to_bits() != self.period_s[row].to_bits();
-        // The exposure of the last line is confirmed by none.
+        // No later time confirms the exposure of the last line.
         if changes && next == lines - 1 {
             self.exposure_is(next, self.period_s[row]);
             return Ok(false);
@@ -194,20 +195,21 @@ impl Rows {
         Ok(changes)
     }
 
-    /// Whether the exposure changes at a row, so that some of its detector lines have the old one and some the new one: the mean
-    /// that stands in its prefix is off by a third of the change in `h5270_0000_ir2`.
+    /// Whether the exposure changes at a row, so that some of its detector lines have the old one and some the new one:
+    /// the mean in its prefix is wrong by a third of the change in `h5270_0000_ir2`.
     fn is_change(&self, row: usize, step_s: f64) -> bool {
         let [before_s, next_s] =
             [row.saturating_sub(1), row + 1].map(|beside| self.period_s[beside]);
         let (least_s, largest_s) = (before_s.min(next_s), before_s.max(next_s));
-        // Of the first line nothing says what the exposure was before.
+        // The exposure before the first line is unknown.
         row > 0
             && least_s < largest_s
             && (least_s..=largest_s).contains(&self.period_s[row])
             && (least_s - REGULAR_S..=largest_s + REGULAR_S).contains(&step_s)
     }
 
-    /// Whether the steps before a row and behind the next one are what their exposures say, so that both times are right.
+    /// Whether the steps before a row and after the next one agree with their exposures, so that both times are
+    /// correct.
     fn is_regular_beside(&self, row: usize) -> bool {
         let before = row.checked_sub(1);
         before.is_none_or(|before| self.agrees(before, row))
@@ -217,23 +219,24 @@ impl Rows {
     fn time_is(&mut self, row: usize, start_s: f64) {
         let apart_s = self.start_s[row] - start_s;
         self.damaged.push(format!(
-            "line {row}: the time in its prefix lies {apart_s:.6} s from what the lines beside it tell, which is taken"
+            "line {row}: the time in its prefix differs by {apart_s:.6} s from the adjacent lines, whose time is used"
         ));
         self.start_s[row] = start_s;
     }
 
     fn exposure_is(&mut self, row: usize, period_s: f64) {
         self.damaged.push(format!(
-            "line {row}: the exposure in its prefix, {:.6} ms, is not what the times beside it tell, {:.6} ms, which is taken",
+            "line {row}: the exposure in its prefix is {:.6} ms; the adjacent times give {:.6} ms, which is used",
             1e3 * self.period_s[row],
             1e3 * period_s
         ));
         self.period_s[row] = period_s;
     }
 
-    /// The rows from `first` to before `end` as pieces that their times do not leave by more than [`REGULAR_S`]: mostly one.
+    /// Pieces of the rows from `first` to before `end`, whose times deviate from them by at most [`REGULAR_S`]: usually
+    /// one.
     fn straight_pieces(&self, first: usize, end: usize, pieces: &mut Vec<LinePiece>) {
-        // To where the next piece begins, if it follows at once.
+        // Up to the start of the next piece, if it follows without a gap.
         let follows = end < self.start_s.len() && self.agrees(end - 1, end);
         let last = if follows { end } else { end - 1 };
         let mut from = first;
@@ -262,7 +265,7 @@ impl Rows {
         }
     }
 
-    /// All remarks; of many of a kind the first ones, and how many more there are.
+    /// All remarks: the first ones of each kind, and the number of further ones.
     fn told(self) -> Vec<String> {
         let kinds = [self.damaged, self.lacking].into_iter();
         let told = kinds.flat_map(|mut remarks| {
@@ -281,7 +284,7 @@ mod tests {
     use areograph_base::line_times::LineTimes;
 
     const START_S: f64 = 255_744_599.027_481_65;
-    /// Lines and exposures of the pieces, milliseconds, as floats have them; one of them has a single line.
+    /// Lines and exposures of the pieces, milliseconds, as floats; one of them has a single line.
     const PIECES: [(usize, f32); 3] = [(60, 12.800_79), (1, 12.907_45), (79, 13.227_428)];
 
     fn prefixes() -> Vec<Prefix> {
@@ -295,7 +298,7 @@ mod tests {
                 start_s: Some(START_S + after_s),
                 period_s: Some(period_s),
             };
-            // The clock of the camera runs a little otherwise than the exposures say.
+            // The clock of the camera differs slightly from the exposures.
             after_s += period_s + 4e-9;
             prefix
         });
@@ -332,9 +335,7 @@ mod tests {
         assert!(apart_s(&times, &cut) < 2e-7); // seconds, rounding of ET
         assert_eq!(
             times.remarks,
-            [
-                "before line 100 nothing was exposed for 0.0926 s, 7.0 lines, which did not come down"
-            ]
+            ["before line 100: a gap of 0.0926 s, 7.0 lines that are not in the file"]
         );
     }
 
@@ -367,7 +368,7 @@ mod tests {
                 };
                 silent += usize::from(times.remarks.is_empty());
                 let apart_s = apart_s(&times, &good);
-                // Seconds: what prefixes may depart from regular ones.
+                // Seconds: possible deviation of prefixes from regular ones.
                 let is_harmless = apart_s < 1.1 * REGULAR_S;
                 assert!(
                     is_harmless || !times.remarks.is_empty(),
@@ -375,7 +376,7 @@ mod tests {
                 );
             }
         }
-        // Of 64 bits the last eleven are worth less than 5e-5 s each.
+        // Of 64 bits the last eleven are each worth less than 5e-5 s.
         assert!(silent <= 9 * 11, "{silent}");
     }
 
@@ -407,7 +408,7 @@ mod tests {
             assert!(apart_s(&times, &prefixes()) < 1e-6); // seconds: of exposures alone
             assert_eq!(times.remarks.len(), 1);
         }
-        // Where the exposure changes meanwhile.
+        // Where the exposure changes within the gap.
         let mut damaged = prefixes();
         damaged[55..64].fill(nothing);
         let failure = row_times(&damaged).unwrap_err();
@@ -418,7 +419,7 @@ mod tests {
                 last: 63
             }
         ));
-        // More rows than are continued without a time behind them.
+        // More rows than are extrapolated.
         let mut damaged = prefixes();
         damaged[129..].fill(nothing);
         let failure = row_times(&damaged).unwrap_err();

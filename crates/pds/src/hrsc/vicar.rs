@@ -1,9 +1,9 @@
-//! The VICAR label between the PDS label and the rows, `KEY=value` one after the other: its sizes must be those of the rows.
+//! The VICAR label between the PDS label and the rows, a sequence of `KEY=value`: its sizes must match the rows.
 
 use super::{error::HrscError, raster::Raster};
 use crate::label::Label;
 
-/// Makes sure that a VICAR label that stands where `^IMAGE_HEADER` points describes the same rows; a file need not have one.
+/// Checks that the VICAR label at `^IMAGE_HEADER`, if the file has one, describes the same rows.
 ///
 /// # Errors
 /// The first of its sizes that contradicts them.

@@ -1,6 +1,6 @@
 //! Bits of a byte from the least significant one up, as all coders of the camera pack them.
 
-/// Reads bits one after the other; behind the end there are zeros.
+/// Reads bits in sequence; zeros follow the end.
 #[derive(Debug, Clone)]
 pub(super) struct Bits<'a> {
     bytes: &'a [u8],
@@ -13,7 +13,7 @@ impl<'a> Bits<'a> {
         Self { bytes, at: 0 }
     }
 
-    /// The next bits without taking them, 57 at least.
+    /// The next bits, at least 57, without consuming them.
     #[inline]
     pub(super) fn peek(&self) -> u64 {
         let byte = self.at >> 3;
@@ -48,22 +48,22 @@ impl<'a> Bits<'a> {
         value as u16
     }
 
-    /// Bytes that have been begun.
+    /// Bytes consumed, including the current one.
     pub(super) const fn bytes_used(&self) -> usize {
         self.at.div_ceil(8)
     }
 
-    /// Whether more bits were taken than there are.
+    /// Whether more bits were consumed than exist.
     pub(super) const fn is_beyond_end(&self) -> bool {
         self.at > self.bytes.len() * 8
     }
 }
 
-/// Writes bits the way [`Bits`] reads them.
+/// Writes bits in the order in which [`Bits`] reads them.
 #[derive(Debug, Default)]
 pub(super) struct BitWriter {
     bytes: Vec<u8>,
-    /// Bits that are not yet in `bytes`, and how many they are.
+    /// Bits not yet in `bytes`, and their number.
     pending: (u64, u32),
 }
 

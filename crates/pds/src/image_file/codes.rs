@@ -1,12 +1,12 @@
-//! Prefix codes of the coders: which bits stand for which residual or coefficient.
+//! Prefix codes of the coders: code words of residuals and coefficients.
 
 use std::{collections::BTreeMap, sync::LazyLock};
 
 use super::bits::Bits;
 
-/// In place of a value of the transform coder: 15 bits of a large negative one follow.
+/// Escape of the transform coder: 15 bits of a large negative value follow.
 pub(super) const LARGE_NEGATIVE: i16 = i16::MIN;
-/// In place of a value of the transform coder: 15 bits of a large positive one follow.
+/// Escape of the transform coder: 15 bits of a large positive value follow.
 pub(super) const LARGE_POSITIVE: i16 = i16::MAX;
 
 /// Bits that are looked up at once.
@@ -14,16 +14,16 @@ const SHORT: u32 = 10;
 /// Bits of the longest code word.
 const LONGEST: u32 = 24;
 
-/// What a few bits say.
+/// Entry of the lookup table.
 #[derive(Debug, Clone, Copy)]
 enum Short {
-    /// A value, and the length of its word.
+    /// A value and the length of its code word.
     Value(i16, u32),
-    /// The word goes on at this node.
+    /// The code word continues at this node.
     Longer(usize),
 }
 
-/// What a bit says.
+/// Branch of the code tree for one bit.
 #[derive(Debug, Clone, Copy)]
 enum Branch {
     Node(usize),
@@ -33,11 +33,11 @@ enum Branch {
 /// A complete prefix code.
 #[derive(Debug)]
 pub(super) struct Code {
-    /// By the next [`SHORT`] bits.
+    /// Indexed by the next [`SHORT`] bits.
     short: Vec<Short>,
-    /// By the next bit.
+    /// Indexed by the next bit.
     nodes: Vec<[Branch; 2]>,
-    /// By value: its word, first bit least significant, and the length of that.
+    /// Code word of each value, first bit least significant, and its length.
     words: BTreeMap<i16, (u32, u32)>,
 }
 
@@ -56,8 +56,8 @@ pub(super) static RESIDUALS: LazyLock<Vec<Code>> = LazyLock::new(|| {
 pub(super) static COEFFICIENTS: LazyLock<Vec<Code>> =
     LazyLock::new(|| written(include_str!("coefficient_codes.txt")));
 
-/// The codes of a table: `name:` begins one, `[n]` says how long the words of the following values are, and words follow
-/// each other as binary fractions do.
+/// Parses the codes of a table: `name:` begins a code, `[n]` gives the word length of the following values, and words
+/// are consecutive binary fractions.
 fn written(table: &str) -> Vec<Code> {
     let codes = table.split(':').skip(1).map(|text| {
         let (mut fraction, mut length, mut words) = (0_u32, 0, Vec::new());
@@ -153,7 +153,7 @@ impl Code {
         0
     }
 
-    /// The word of a value, first bit least significant, and its length; `None` for a value that has none.
+    /// Code word of a value, first bit least significant, and its length; `None` for a value without one.
     pub(super) fn word(&self, value: i16) -> Option<(u32, u32)> {
         self.words.get(&value).copied()
     }
@@ -164,7 +164,7 @@ mod tests {
     use super::*;
     use crate::image_file::bits::BitWriter;
 
-    /// All codes with how many values each has.
+    /// All codes with their numbers of values.
     fn codes() -> Vec<(&'static Code, usize)> {
         let residuals = RESIDUALS.iter().zip([256, 256, 256, 256, 256, 256, 256, 7]);
         let coefficients = [25, 47, 69, 109, 169, 247, 395, 609];

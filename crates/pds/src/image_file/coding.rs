@@ -1,29 +1,29 @@
-//! How pixels are coded.
+//! Coding of pixels.
 
-/// How the first header says that pixels are coded.
+/// Coding of pixels, as stated in the first header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Coding {
     /// One byte a pixel.
     Raw,
-    /// Residuals from a predicted pixel, in a prefix code.
+    /// Residuals from a predicted pixel, as prefix codes.
     Predictive {
-        /// What predicts a pixel.
+        /// Predictor of a pixel.
         predictor: Predictor,
         /// Code of the residuals, 0 to 7.
         table: u8,
     },
     /// Quantised coefficients of blocks of 16 × 16 pixels.
     Transform {
-        /// Which transform.
+        /// Type of transform.
         transform: Transform,
-        /// Groups of blocks with tables of their own, 1 to 8.
+        /// Groups of blocks, each with its own tables, 1 to 8.
         groups: u8,
         /// Step of the quantiser.
         spacing: u16,
     },
 }
 
-/// What predicts a pixel.
+/// Predictor of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Predictor {
     /// The pixel to its left.
@@ -50,7 +50,8 @@ impl Coding {
             Self::Raw => 1,
             // A bit a pixel.
             Self::Predictive { .. } => 8,
-            // A block of 256 pixels in 3 bits of its group and 8 for its mean and for the length of the rest each.
+            // A block of 256 pixels takes at least 3 bits for its group, and 8 each for its mean and the length of the
+            // rest.
             Self::Transform { .. } => 256 * 8 / 19,
         }
     }

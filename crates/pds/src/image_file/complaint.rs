@@ -1,86 +1,86 @@
-//! What is wrong with an image file, and where.
+//! Faults of an image file, with their location.
 
 use std::fmt;
 
-/// One thing that is wrong; the rest of the image is read all the same.
+/// A fault; the rest of the image is read nevertheless.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Complaint {
-    /// Number of the fragment, counted from 0 as its header does; none of a label or a plain raster.
+    /// Number of the fragment, counted from 0 as in its header; `None` for a label or a plain raster.
     pub fragment: Option<u16>,
     /// Byte of the file, counted from 0.
     pub offset: u64,
-    /// First image line that it concerns, counted from 0, where that is known.
+    /// First affected image line, counted from 0, if known.
     pub line: Option<u32>,
-    /// What it is.
+    /// The fault.
     pub what: Fault,
 }
 
-/// What can be wrong.
+/// Kinds of faults.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Fault {
-    /// Bytes of the object do not add up to the label's CHECKSUM.
+    /// The sum of the object's bytes differs from the label's CHECKSUM.
     LabelChecksum {
-        /// What the label says.
+        /// Value in the label.
         label: u32,
         /// Their sum, each byte unsigned.
         sum: u32,
     },
-    /// Label and fragments do not say the same: the label is of another image, or the fragments are.
+    /// Label and fragments disagree: one of them belongs to another image.
     Contradiction {
         /// Keyword of the label.
         key: &'static str,
-        /// What the label says.
+        /// Value in the label.
         label: String,
-        /// What the fragments say.
+        /// Value in the fragments.
         fragment: String,
     },
-    /// Header, data and checksum byte of a fragment do not add up.
+    /// The checksum of header, data and checksum byte of a fragment is wrong.
     FragmentChecksum,
-    /// A header that is none, or of another image.
+    /// An invalid header, or one of another image.
     Header {
-        /// Bytes up to the next header that is one.
+        /// Bytes up to the next valid header.
         skipped: u64,
     },
-    /// Fragments that are not in the file.
+    /// Fragments missing in the file.
     Lost {
         /// How many.
         fragments: u16,
     },
-    /// A fragment that stood in the file before.
+    /// A duplicate of an earlier fragment.
     Repeated,
     /// The file ends within the fragment.
     CutOff {
-        /// Data bytes that are not there.
+        /// Missing data bytes.
         lacking: u64,
     },
-    /// No fragment says that it is the last.
+    /// No fragment is marked as the last.
     NoLast,
-    /// The line that should stand here uncompressed does not.
+    /// The uncompressed line expected here is missing.
     LostSync {
-        /// Byte of the file where the next one was found; none when there is none.
+        /// Byte of the file where the next one was found; `None` if there is none.
         next: Option<u64>,
     },
-    /// More fragments than their numbers can count.
+    /// More fragments than 16-bit numbers can count.
     TooMany,
-    /// More lines than what is there can be a part of.
+    /// More lines than the data can belong to.
     TooManyLines {
-        /// Lines of the header.
+        /// Lines stated in the header.
         header: u32,
-        /// Lines that are believed.
+        /// Lines used.
         possible: u32,
     },
-    /// The header of a fragment tells of more pixels than its data can hold.
+    /// The header of a fragment states more pixels than its data can hold.
     TooLarge,
-    /// A block of the transform coder of a group that there is not.
+    /// A block of the transform coder in an undefined group.
     Group,
-    /// The data of a transform fragment end before its blocks do.
+    /// The data of a transform fragment end before its last block.
     Short,
-    /// Fewer lines than the header tells.
+    /// Fewer lines than the header states.
     Lines {
         /// Lines found.
         found: u32,
-        /// Lines of the header.
+        /// Lines stated in the header.
         header: u32,
     },
 }
@@ -111,7 +111,7 @@ impl fmt::Display for Fault {
                 fragment,
             } => write!(
                 formatter,
-                "the label says {key} = {label}; the fragments say {fragment}"
+                "the label states {key} = {label}; the fragments state {fragment}"
             ),
             Self::FragmentChecksum => {
                 formatter.write_str("the checksum byte is wrong; its lines may be wrong too")
@@ -120,14 +120,14 @@ impl fmt::Display for Fault {
                 formatter,
                 "no fragment header of this image; {skipped} bytes were skipped"
             ),
-            Self::Lost { fragments: 1 } => formatter.write_str("the fragment before it is lost"),
+            Self::Lost { fragments: 1 } => formatter.write_str("the preceding fragment is missing"),
             Self::Lost { fragments } => {
-                write!(formatter, "the {fragments} fragments before it are lost")
+                write!(formatter, "the {fragments} preceding fragments are missing")
             }
             Self::Repeated => formatter.write_str("this fragment is a duplicate; it is ignored"),
             Self::CutOff { lacking } => write!(
                 formatter,
-                "the file ends within the fragment; {lacking} bytes are lacking"
+                "the file ends within the fragment; {lacking} bytes are missing"
             ),
             Self::NoLast => {
                 formatter.write_str("the file ends here, and no fragment is marked as the last")
@@ -149,18 +149,18 @@ impl fmt::Display for Fault {
             }
             Self::Group => formatter
                 .write_str("a block of a group that does not exist; the fragment is ignored"),
-            Self::Short => formatter.write_str("the data end before the blocks do"),
+            Self::Short => formatter.write_str("the data end before the last block"),
             Self::Lines { found, header } => {
-                write!(formatter, "{found} of the {header} lines of the header")
+                write!(formatter, "{found} lines found; the header states {header}")
             }
         }
     }
 }
 
-/// Complaints that are kept with their place; all are counted.
+/// Complaints kept with their location; all are counted.
 const KEPT: usize = 1_000;
 
-/// Complaints of a file, as many as anybody reads.
+/// Complaints about a file; the first thousand are kept.
 #[derive(Debug, Clone, Default)]
 pub struct Complaints {
     kept: Vec<Complaint>,
@@ -175,13 +175,13 @@ impl Complaints {
         }
     }
 
-    /// The first thousand.
+    /// The first thousand complaints.
     #[must_use]
     pub fn kept(&self) -> &[Complaint] {
         &self.kept
     }
 
-    /// How many there are in all.
+    /// Total number of complaints.
     #[must_use]
     pub const fn count(&self) -> u64 {
         self.count

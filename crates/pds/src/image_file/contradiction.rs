@@ -1,4 +1,4 @@
-//! What a label and the fragments behind it both say of an image, and where they contradict each other.
+//! Contradictions between a label and the fragments that follow it.
 
 use super::{
     complaint::{Complaint, Fault},
@@ -7,16 +7,17 @@ use super::{
 };
 use crate::{image_label::ImageLabel, moc::product_named};
 
-/// The camera whose line clock has a unit that is known, as labels name it.
+/// Name, in labels, of the only camera whose line-clock unit is known.
 const NARROW_ANGLE: &str = "MOC-NA";
 /// Unit of that line clock, seconds.
 const LINE_CLOCK_S: f64 = 1e-7;
-/// Line clock and label may differ so much, units: labels print exposures to a unit, and either may be rounded or cut off.
+/// Tolerance between line clock and label, units: labels print exposures to a unit, and either may be rounded or
+/// truncated.
 const LINE_CLOCKS_APART_MAX: f64 = 1.0;
 
-/// Every contradiction, with the fragment that was asked; nothing when no fragment is sound.
+/// Every contradiction, with the fragment used for comparison; empty when no fragment is sound.
 ///
-/// Gain and offset are left to the label: they may change within an image.
+/// Gain and offset are not compared: they may change within an image.
 pub(super) fn contradictions(label: &ImageLabel, fragments: &Fragments) -> Vec<Complaint> {
     let Some(witness) = fragments.witness else {
         return Vec::new();
@@ -49,7 +50,7 @@ pub(super) fn contradictions(label: &ImageLabel, fragments: &Fragments) -> Vec<C
     found.into_iter().flatten().map(complaint).collect()
 }
 
-/// The one is a copy of the other, to 1/256 s.
+/// Label and header have the same clock string, to 1/256 s.
 fn clock(label: &ImageLabel, header: &Header) -> Option<Fault> {
     let written = label.fields.sclk_start.as_ref()?;
     let [ticks, seconds @ ..] = header.clock();
@@ -60,7 +61,7 @@ fn clock(label: &ImageLabel, header: &Header) -> Option<Fault> {
     })
 }
 
-/// The number of the image within its month; those of other phases are counted otherwise.
+/// The number of the image within its month; other phases number images differently.
 fn product(label: &ImageLabel, header: &Header) -> Option<Fault> {
     let written = label.product_id.as_ref()?;
     let product = product_named(written)?;
@@ -75,7 +76,7 @@ fn product(label: &ImageLabel, header: &Header) -> Option<Fault> {
     })
 }
 
-/// Fewer lines in the label may be those that came down; of an image that is complete all did.
+/// The label may count only the lines transmitted; for a complete image these are all lines.
 fn lines(label: &ImageLabel, header: &Header, are_complete: bool) -> Option<Fault> {
     let written = label.fields.lines_header?;
     let is_possible = written < header.total_lines() && !are_complete;
@@ -97,7 +98,7 @@ fn exposure(label: &ImageLabel, header: &Header) -> Option<Fault> {
     let units = header.line_clock();
     let is_known = label.instrument.label.instrument == NARROW_ANGLE && units > 0;
     let apart = (written_s / LINE_CLOCK_S - f64::from(units)).abs();
-    // A millionth of a unit for the division.
+    // The tolerance of a millionth of a unit covers the division.
     let is_other = is_known && apart > LINE_CLOCKS_APART_MAX + 1e-6;
     let in_ms = |seconds: f64| format!("{:.4} ms", seconds * 1e3);
     is_other.then(|| Fault::Contradiction {
@@ -107,7 +108,7 @@ fn exposure(label: &ImageLabel, header: &Header) -> Option<Fault> {
     })
 }
 
-/// A clock string as headers have it: ticks, then seconds from their least significant byte on.
+/// A clock string in header format: ticks, then seconds from the least significant byte on.
 pub(super) fn clock_bytes(clock: &str) -> Option<[u8; 5]> {
     let count = clock.split_once('/').map_or(clock, |(_, count)| count);
     let (seconds, ticks) = count.split_once([':', '.'])?;

@@ -1,4 +1,4 @@
-//! Writes images as the archive has them: label, fragments, checksums. The synthetic mission does so.
+//! Encoder of images as archived: label, fragments, checksums; used by the synthetic mission.
 
 use std::fmt::Write as _;
 
@@ -38,7 +38,7 @@ pub struct NewImage<'a> {
     pub samples: u32,
     /// Line by line.
     pub pixels: &'a [u8],
-    /// How they are coded.
+    /// Coding of the pixels.
     pub coding: Coding,
 }
 
@@ -46,7 +46,7 @@ pub struct NewImage<'a> {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EncodeError {
-    /// A size that headers cannot tell.
+    /// A size that headers cannot represent.
     #[error(
         "{samples} samples of {pixels} pixels; expected whole lines, both multiples of 16, at most 4080 samples and 65535 × 16 lines"
     )]
@@ -56,7 +56,7 @@ pub enum EncodeError {
         /// Pixels in all.
         pixels: usize,
     },
-    /// A coding that is only read.
+    /// A coding that is supported for reading only.
     #[error(
         "{0:?} can only be read; expected raw, prediction with a table from 0 to 6, or cosines"
     )]
@@ -112,7 +112,7 @@ pub fn encode(image: &NewImage<'_>) -> Result<Encoded, EncodeError> {
         body.extend(header(image, lines_16, number, piece, number == last));
         body.extend_from_slice(&piece.data);
         let sum: u64 = body[from..].iter().map(|byte| u64::from(*byte)).sum();
-        // All ones in the end: what lacks of 255 in the sum with its carries.
+        // The checksum byte completes the end-around-carry sum to 255.
         body.push(255 - ((sum + 254) % 255 + 1).to_le_bytes()[0]);
     }
     body.resize(body.len().next_multiple_of(RECORD), 0);
@@ -122,7 +122,7 @@ pub fn encode(image: &NewImage<'_>) -> Result<Encoded, EncodeError> {
     Ok(file)
 }
 
-/// As many bytes as a full fragment has.
+/// Data bytes of a full fragment.
 const FULL_BYTES: usize = 245_760;
 const _: () = assert!(FULL_BYTES as u64 == FULL);
 
@@ -133,7 +133,7 @@ struct Piece {
     data: Vec<u8>,
 }
 
-/// A stream in full fragments, with the nominal lines that their headers tell.
+/// Cuts a stream into full fragments, with the nominal lines that their headers state.
 fn cut(stream: &[u8], width: usize) -> Vec<Piece> {
     let pieces = stream.chunks(FULL_BYTES).enumerate();
     let cut = pieces.map(|(number, data)| Piece {
@@ -180,7 +180,7 @@ fn predicted(pixels: &[u8], width: usize, predictor: Predictor, table: u8) -> Ve
     out.finish()
 }
 
-/// What stands before an uncompressed line, and at the end: at an even byte.
+/// Writes the mark before an uncompressed line, and at the end, at an even byte.
 fn mark(out: &mut BitWriter) {
     out.align();
     let bytes = out.bytes();

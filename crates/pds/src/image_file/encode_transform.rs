@@ -1,4 +1,4 @@
-//! The transform coder the other way: blocks of pixels to quantised coefficients of cosines.
+//! Encoder of the transform coder: blocks of pixels to quantised cosine coefficients.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use super::{
     transform::{AREA, COSINES, EDGE, ORDER},
 };
 
-/// Bits behind the word of a coefficient that has none of its own.
+/// Bits after the escape word of a coefficient without a code word.
 const ESCAPED: u32 = 15;
 
 /// A block: its mean in units of the first coefficient, the others in steps of the quantiser in the order of the stream.
@@ -45,7 +45,7 @@ pub(super) fn encode_blocks(pixels: &[u8], width: usize, groups: u8, spacing: u1
     out.finish()
 }
 
-/// Blocks of like activity share a group.
+/// Groups blocks of similar activity.
 fn grouped(blocks: &[Block], groups: usize) -> Vec<u8> {
     let activity = |block: &Block| {
         block.steps[1..]
@@ -92,7 +92,7 @@ fn encode_group(blocks: &[&Block], out: &mut BitWriter) {
     }
 }
 
-/// The code that takes the fewest bits for a coefficient of these blocks.
+/// The code with the fewest bits for a coefficient of these blocks.
 fn shortest(blocks: &[&Block], number: usize) -> usize {
     let mut counts: BTreeMap<i32, u32> = BTreeMap::new();
     for block in blocks {
@@ -108,7 +108,7 @@ fn shortest(blocks: &[&Block], number: usize) -> usize {
     (0..COEFFICIENTS.len()).min_by_key(bits).unwrap_or_default()
 }
 
-/// The word of a step, or the escape and what follows it.
+/// The code word of a step, or the escape and its bits.
 fn words(code: &Code, step: i32) -> [Option<(u32, u32)>; 2] {
     let own = i16::try_from(step).ok().and_then(|step| code.word(step));
     if own.is_some() {

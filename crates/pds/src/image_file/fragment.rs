@@ -1,4 +1,4 @@
-//! On-board fragments of a `.imq` file: their headers, and what is left of them in a damaged file.
+//! On-board fragments of a `.imq` file: their headers, and the remaining ones in a damaged file.
 
 use std::{fs::File, io};
 
@@ -9,33 +9,34 @@ use super::{
     walk::{HEADER, Walk},
 };
 
-/// Data bytes of a full fragment: the on-board buffer is cut so.
+/// Data bytes of a full fragment, the size of the on-board buffer.
 pub(super) const FULL: u64 = 245_760;
-/// An image is believed to be this many times larger than what is left of it can be: one of the archive has some 50 fragments
-/// at most.
+/// Largest accepted ratio of the size of an image to that of its remaining data: an archived image has at most about 50
+/// fragments.
 const LOST_MAX: u64 = 64;
 /// Fragments that their 16-bit numbers can count.
 const MOST: usize = 1 << 16;
-/// Most data bytes of a fragment that are believed: those of the archive have 245,760.
+/// Largest accepted number of data bytes of a fragment; archived ones have 245,760.
 const DATA_BYTES_MAX: u64 = 1 << 22;
 
 /// Size and coding of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
-    /// Lines that were exposed, as the first header says if its data can be a part of so many; of a plain raster those of the
-    /// label.
+    /// Exposed lines, as stated in the first header if its data can belong to that many; for a plain raster those of
+    /// the label.
     pub lines: u32,
     /// Samples of a line.
     pub samples: u32,
-    /// How pixels are coded; none of a plain raster without fragments.
+    /// Coding of the pixels; `None` for a plain raster without fragments.
     pub coding: Option<Coding>,
     /// Fragments in the file.
     pub fragments: u32,
-    /// Changes of gain and offset within the image, as the first header says; 0 of a plain raster, which does not say.
+    /// Changes of gain and offset within the image, as stated in the first header; 0 for a plain raster, which does not
+    /// state them.
     pub gain_changes: u16,
 }
 
-/// What the label tells of the headers.
+/// Header values expected from the label.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Expected {
     /// Start of the image: ticks, and seconds least significant byte first.
@@ -59,14 +60,14 @@ pub(super) struct Fragment {
     pub(super) number: u16,
     /// Byte of the file where its header begins.
     pub(super) at: u64,
-    /// Data bytes behind the header, those that are there.
+    /// Data bytes after the header that are in the file.
     pub(super) data_bytes: u64,
-    /// First line and number of lines, true of transform fragments.
+    /// First line and number of lines; valid for transform fragments.
     pub(super) first_line: u32,
     pub(super) lines: u32,
-    /// Whether everything adds up.
+    /// Whether its checksum is correct.
     pub(super) is_sound: bool,
-    /// Fragments that are lost before it.
+    /// Missing fragments before it.
     pub(super) lost_before: u16,
 }
 
@@ -75,14 +76,14 @@ pub(super) struct Fragment {
 pub(super) struct Fragments {
     pub(super) first: Header,
     pub(super) all: Vec<Fragment>,
-    /// Whether the last one is there.
+    /// Whether the last fragment is in the file.
     pub(super) has_last: bool,
-    /// The first one that is sound.
+    /// The first sound header.
     pub(super) witness: Option<Witness>,
 }
 
 impl Fragments {
-    /// Walks through the fragments between bytes `start` and `end`; `None` when there is not even one.
+    /// Walks through the fragments between bytes `start` and `end`; `None` without any fragment.
     pub(super) fn find(
         file: &File,
         [start, end]: [u64; 2],
@@ -152,7 +153,7 @@ impl Fragments {
         Ok(())
     }
 
-    /// Takes the fragment at `at`; where the next one begins, and whether this is the last.
+    /// Reads the fragment at `at`; returns the start of the next one, and whether this is the last.
     fn take(
         &mut self,
         walk: &mut Walk<'_>,
@@ -168,7 +169,7 @@ impl Fragments {
             .map_or(0, |before| before.number.wrapping_add(1));
         let is_whole = data + stated < walk.end();
         let mut next = data + stated + 1;
-        // A sum alone is right by chance once in 255 times. It comes last: nothing that was added up is read again.
+        // A sum is correct by chance once in 255 times. It is tested last, so that summed bytes are not read again.
         let ends_well = stated <= DATA_BYTES_MAX && may_end(walk, next, &self.first)?;
         let is_sound = is_whole && ends_well && walk.adds_up(at, HEADER as u64 + stated + 1)?;
         let mut number = header.number();
@@ -221,8 +222,8 @@ impl Fragments {
         Ok((next, is_last && is_whole))
     }
 
-    /// Lines that these fragments can be a part of, when all but one in [`LOST_MAX`] were lost; none if it has as many as its
-    /// header says.
+    /// Lines to which these fragments can belong if all but one in [`LOST_MAX`] were lost; `None` if that includes the
+    /// number in the header.
     pub(super) fn lines_possible(&self) -> Option<u32> {
         let bytes: u64 = self.all.iter().map(|fragment| fragment.data_bytes).sum();
         let of_byte = self.first.coding().map_or(1, Coding::pixels_of_byte);
@@ -233,18 +234,18 @@ impl Fragments {
         lines.filter(|lines| *lines < self.first.total_lines())
     }
 
-    /// Whether each of them is there.
+    /// Whether no fragment is missing.
     pub(super) fn are_complete(&self) -> bool {
         self.has_last && self.all.iter().all(|fragment| fragment.lost_before == 0)
     }
 
-    /// Whether anything is wrong with them.
+    /// Whether all fragments are sound.
     pub(super) fn are_sound(&self) -> bool {
         self.are_complete() && self.all.iter().all(|fragment| fragment.is_sound)
     }
 }
 
-/// Whether a fragment that ends at `at` may end there.
+/// Whether a fragment can end at `at`.
 fn may_end(walk: &Walk<'_>, at: u64, first: &Header) -> io::Result<bool> {
     Ok(match header(walk, at)? {
         Some(next) => next.is_of_image(first) || next.bytes == [0; HEADER],
@@ -256,7 +257,7 @@ fn header(walk: &Walk<'_>, at: u64) -> io::Result<Option<Header>> {
     Ok(walk.header(at)?.map(Header::new))
 }
 
-/// Where the first header stands that can be believed.
+/// Location of the first plausible header.
 fn first(walk: &mut Walk<'_>, start: u64, expected: Expected) -> io::Result<Option<u64>> {
     if let Some(header) = header(walk, start)?
         && header.is_possible()

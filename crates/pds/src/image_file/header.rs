@@ -5,13 +5,13 @@ use super::{
     walk::HEADER,
 };
 
-/// What a header says.
+/// Contents of a header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Header {
     pub(super) bytes: [u8; HEADER],
 }
 
-/// A sound header of the image, and where it stands.
+/// A sound header of the image, and its location.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Witness {
     pub(super) number: u16,
@@ -92,7 +92,7 @@ impl Header {
         ])
     }
 
-    /// `None` for a predictor and a transform at once, or a transform that there is not.
+    /// Coding; `None` for a predictor combined with a transform, or an undefined transform.
     pub(super) const fn coding(&self) -> Option<Coding> {
         let (kind, table) = (self.bytes[44], self.bytes[45]);
         let predictor = match kind & 3 {
@@ -129,7 +129,7 @@ impl Header {
             && self.coding().is_some()
     }
 
-    /// What all fragments of an image have in common: identifier, clock, size and coding.
+    /// Whether identifier, clock, size and coding, which all fragments of an image share, agree.
     pub(super) fn is_of_image(&self, first: &Self) -> bool {
         [0..2, 8..13, 40..50]
             .into_iter()

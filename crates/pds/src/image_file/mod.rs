@@ -1,13 +1,13 @@
-//! Images of the Mars Orbiter Camera as the archive has them: `.imq` files with the fragments that the spacecraft
-//! sent, coded by prediction or by a transform of blocks, and `.img` files with one byte a pixel.
+//! Images of the Mars Orbiter Camera as archived: `.imq` files with the fragments that the spacecraft sent, coded by
+//! prediction or by a transform of blocks, and `.img` files with one byte a pixel.
 //!
-//! An image is read strip by strip; what is damaged or lost is marked by line, with a complaint that names fragment and byte.
-//! Memory is bounded by a strip, whatever a file says of itself.
+//! An image is read strip by strip; damaged or missing data are marked by line, with a complaint that names fragment
+//! and byte. Memory is bounded by a strip, whatever sizes a file states.
 //!
 //! Fragments are found first, without decoding (`fragment.rs`), and form one stream of which a window is in memory
-//! (`stream.rs`). A header is trusted only as far as its data reach. In a damaged predictive image a first pass finds
-//! where lines are missing (`placed.rs`); lines that cannot be placed are marked. The tables of the coders are text
-//! files beside the code. Rows of HRSC (`hrsc`: label, prefixes, line times), cubes, TIFF and PNG pass through the same
+//! (`stream.rs`). A header is trusted only as far as its data extend. In a damaged predictive image a first pass
+//! locates missing lines (`placed.rs`); lines that cannot be placed are marked. The tables of the coders are text files
+//! beside the code. Rows of HRSC (`hrsc`: label, prefixes, line times), cubes, TIFF and PNG pass through the same
 //! strips (`pixel_file`), at most 16 million numbers at a time.
 
 mod bits;

@@ -1,4 +1,4 @@
-//! An image file that is opened: its label, where its pixels are, how they are coded.
+//! An open image file: its label, location and coding of its pixels.
 
 use std::{
     fs::File,
@@ -23,17 +23,17 @@ use areograph_base::{
     instruments::Instrument,
 };
 
-/// A file whose image cannot be read at all.
+/// A file without a readable image.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageFileError {
-    /// A label alone, or of something else.
+    /// A label without an image, or of another object.
     #[error("the label describes no image in this file: {lacking} is missing")]
     NoImage {
-        /// What an image has.
+        /// The missing part.
         lacking: &'static str,
     },
-    /// A pointer that leads nowhere.
+    /// A pointer beyond the file.
     #[error(
         "^IMAGE is {pointer:?}; expected a record or byte of this file, which has {bytes} bytes"
     )]
@@ -50,13 +50,13 @@ pub enum ImageFileError {
         key: &'static str,
         /// Its value.
         value: String,
-        /// What it should be.
+        /// Expected value.
         expected: &'static str,
     },
-    /// No fragment at all.
+    /// No fragment.
     #[error("no fragment of this image at byte {offset} or later")]
     NoFragment {
-        /// Where the first one should be.
+        /// Expected location of the first one.
         offset: u64,
     },
 }
@@ -98,8 +98,8 @@ impl ImageFile {
     /// Opens a `.imq` or `.img` file of one of `cameras`.
     ///
     /// # Errors
-    /// The system's refusal to read; a label that is none, cut, of another instrument, or of no image in this file;
-    /// not one fragment.
+    /// The file cannot be read; a label that is missing, truncated, of another instrument, or without an image in this
+    /// file; no fragment.
     pub fn open(path: &Path, cameras: &[Instrument]) -> Result<Self> {
         let mut file = File::open(path)
             .map_err(IoError::on("open"))
@@ -175,19 +175,19 @@ impl ImageFile {
         Ok(())
     }
 
-    /// Where the file is.
+    /// Path of the file.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What the label says of times, size and camera.
+    /// Times, size and camera from the label.
     #[must_use]
     pub const fn label(&self) -> &ImageLabel {
         &self.label
     }
 
-    /// The value under a keyword (upper case) of the label, wherever it stands.
+    /// The value of a keyword (upper case) of the label, in any object.
     #[must_use]
     pub fn value(&self, key: &str) -> Option<&str> {
         self.entries.find(key).map(|entry| entry.value.as_str())
@@ -199,28 +199,28 @@ impl ImageFile {
         self.layout
     }
 
-    /// Where label and fragments contradict each other; these are complaints as well.
+    /// Contradictions between label and fragments; these are also complaints.
     #[must_use]
     pub fn contradictions(&self) -> &[Complaint] {
         &self.contradictions
     }
 
-    /// Whether it has fragments, and each of them is there, damaged or not.
+    /// Whether the file has fragments and none of them is missing; they may be damaged.
     #[must_use]
     pub fn is_complete(&self) -> bool {
         self.fragments.as_ref().is_some_and(Fragments::are_complete)
     }
 
-    /// What was found wrong so far, before any pixel was decoded.
+    /// Faults found before any pixel was decoded.
     #[must_use]
     pub const fn complaints(&self) -> &Complaints {
         &self.complaints
     }
 
-    /// The image from its first line on, strip by strip.
+    /// The image from its first line on, in strips.
     ///
     /// # Errors
-    /// The system's refusal to read.
+    /// The file cannot be read.
     pub fn strips(&self) -> Result<Strips> {
         let open = || {
             let file = File::open(&self.path).map_err(IoError::on("open"))?;
@@ -258,7 +258,7 @@ fn start_of_image(label: &Label, end: u64) -> std::result::Result<u64, ImageFile
         .ok_or_else(wrong)
 }
 
-/// The size that the label tells, and that its pixels are bytes.
+/// The size in the label; checks that pixels are bytes.
 fn plain_layout(label: &Label, image: &ImageLabel) -> std::result::Result<Layout, ImageFileError> {
     for (key, is_right, expected) in [
         ("SAMPLE_BITS", "8", "8"),
@@ -286,7 +286,8 @@ fn plain_layout(label: &Label, image: &ImageLabel) -> std::result::Result<Layout
     })
 }
 
-/// Compares the bytes of the image with the label's CHECKSUM: their sum modulo 2^32, each byte signed or (in elder labels) not.
+/// Compares the bytes of the image with the label's CHECKSUM: their sum modulo 2^32, each byte signed or (in older
+/// labels) unsigned.
 fn check_sum(
     file: &File,
     label: &Label,
@@ -301,7 +302,7 @@ fn check_sum(
         return Ok(());
     };
     let (sum, high) = byte_sum(file, start, end - start)?;
-    // A byte of 128 or more counts 256 less as a signed one.
+    // As a signed number, a byte of 128 or more is 256 less.
     let signed = sum.wrapping_sub(high << 8);
     let low = |sum: u64| u32::try_from(sum & 0xFFFF_FFFF).unwrap_or_default();
     if stated != low(sum) && stated != low(signed) {

@@ -1,4 +1,4 @@
-//! Blocks of the predictive coder in their places, where some of the image may be missing.
+//! Places of blocks of the predictive coder in an image that may lack data.
 
 use std::{collections::VecDeque, io, ops::Range};
 
@@ -15,18 +15,18 @@ use super::{
 #[derive(Debug)]
 pub(super) struct Placed {
     blocks: Blocks,
-    /// A block that is decoded, while what follows decides how far it is to be believed.
+    /// A decoded block whose reliability depends on what follows.
     waiting: Option<Block>,
-    /// Lines that are missing before the block of this number.
+    /// Number of lines missing before the block with this number.
     missing: Option<(usize, u32)>,
-    /// Numbers of blocks whose place is not known.
+    /// Numbers of blocks whose place is unknown.
     adrift: Range<usize>,
     /// Number of the next block.
     number: usize,
 }
 
 impl Placed {
-    /// The blocks of a stream, of fragments that may be damaged or lost.
+    /// The blocks of a stream whose fragments may be damaged or missing.
     pub(super) fn new(
         stream: &mut Stream,
         fragments: &Fragments,
@@ -49,9 +49,9 @@ impl Placed {
         Ok(placed)
     }
 
-    /// Decodes the whole image once to learn where lines are missing.
+    /// Decodes the whole image once to locate missing lines.
     ///
-    /// The last fragment tells how many there should be; where they are missing is known when there is one gap.
+    /// The last fragment gives the number of lines; missing ones can be located if there is one gap.
     fn find_places(
         &mut self,
         stream: &mut Stream,
@@ -61,19 +61,20 @@ impl Placed {
         let (mut breaks, mut found, mut number) = (Vec::new(), 0, 0_usize);
         let mut gaps = Gaps::new(fragments);
         while let Some(block) = self.blocks.next(stream)? {
-            // Both are asked: a gap that is told of is not told of again.
+            // Both are evaluated, so that a gap is reported once.
             if gaps.is_before(block.mark) | block.due.is_some() {
                 breaks.push(number);
             }
             number += 1;
             found += u32::try_from(block.ends.len()).unwrap_or_default();
         }
-        // A gap in the last block that was found.
+        // A gap in the last block found.
         if gaps.is_before(u64::MAX) {
             breaks.push(number);
         }
         let missing = lines - found;
-        // Lines are counted only where the image ends as it was sent: its last fragment is there, and nothing is left over.
+        // Lines are counted only if the end of the image is complete: its last fragment exists, and no data are left
+        // over.
         let last = fragments.all.last().filter(|_| fragments.has_last);
         let is_counted = last.is_some_and(|last| last.is_sound)
             && lines == fragments.first.total_lines()
@@ -115,7 +116,7 @@ impl Placed {
             None => ((!self.blocks.are_all()).then(|| self.blocks.due()), None),
         };
         let lines = u32::try_from(block.ends.len()).unwrap_or(BLOCK_LINES);
-        // At the end of the data nothing is due any more, but for the mark that ends the image.
+        // At the end of the data only the final mark is due.
         let is_broken = due.is_some_and(|due| next.is_some() || due + 2 < stream.len());
         if is_broken && let Some(due) = due {
             let (fragment, offset) = stream.locate(due);
@@ -147,8 +148,8 @@ impl Placed {
     }
 }
 
-/// States of a block's lines by the fragments that they come from: a damaged one, or another one than follows on board, spoils
-/// the rest of the block.
+/// States of a block's lines by the fragments that contain them: a damaged fragment, or one out of sequence, spoils the
+/// rest of the block.
 fn states(block: &Block, stream: &Stream) -> Vec<LineState> {
     let end = block.ends.last().copied().unwrap_or(block.mark);
     let mut good_until = u64::MAX;
@@ -174,10 +175,10 @@ fn states(block: &Block, stream: &Stream) -> Vec<LineState> {
     block.ends.iter().map(state).collect()
 }
 
-/// Bytes behind the last line of an image: one to an even place, and a mark.
+/// Bytes after the last line of an image: one for alignment to an even position, and a mark.
 const END_BYTES: u64 = 3;
 
-/// Places in the stream before which fragments are lost.
+/// Positions in the stream before which fragments are missing.
 struct Gaps {
     places: VecDeque<u64>,
 }
@@ -194,7 +195,7 @@ impl Gaps {
         Self { places }
     }
 
-    /// Whether there is a gap before `at` that was not told of yet; it and others before `at` are told of now.
+    /// Whether there is an unreported gap before `at`; it and all gaps before `at` then count as reported.
     fn is_before(&mut self, at: u64) -> bool {
         let mut found = false;
         while self.places.front().is_some_and(|gap| *gap <= at) {

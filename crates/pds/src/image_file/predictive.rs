@@ -1,4 +1,4 @@
-//! The predictive coder: blocks of 128 lines, the first of each uncompressed behind a mark.
+//! The predictive coder: blocks of 128 lines, the first of each uncompressed after a mark.
 
 use std::io;
 
@@ -11,11 +11,11 @@ use super::{
 
 /// Lines of a block.
 pub(super) const BLOCK_LINES: u32 = 128;
-/// What stands before an uncompressed line.
+/// Mark before an uncompressed line.
 pub(super) const MARK: [u8; 2] = [0xCA, 0xF0];
-/// Neighbouring pixels of an uncompressed line differ by no more, where it is searched for ...
+/// Largest difference between adjacent pixels of an uncompressed line in a search ...
 const STEP_MAX: u8 = 64;
-/// ... over so many pixels.
+/// ... over this number of pixels.
 const STEPS: usize = 31;
 /// Bits of the longest code word.
 const WORD_BITS: usize = 15;
@@ -29,9 +29,9 @@ pub(super) struct Blocks {
     lines_max: u32,
     /// Lines decoded so far.
     lines: u32,
-    /// Where the next mark is due.
+    /// Position where the next mark is due.
     due: u64,
-    /// Where the last mark was.
+    /// Position of the last mark.
     last: Option<u64>,
 }
 
@@ -39,9 +39,9 @@ pub(super) struct Blocks {
 #[derive(Debug)]
 pub(super) struct Block {
     pub(super) pixels: Vec<u8>,
-    /// Where in the stream each line ends.
+    /// Position in the stream where each line ends.
     pub(super) ends: Vec<u64>,
-    /// Where its mark stands, and where that was due when it was searched for.
+    /// Position of its mark, and the position where it was due when it was searched for.
     pub(super) mark: u64,
     pub(super) due: Option<u64>,
 }
@@ -59,12 +59,12 @@ impl Blocks {
         }
     }
 
-    /// Where a mark was due that neither stands there nor anywhere later.
+    /// Position where a mark was due that is neither there nor anywhere later.
     pub(super) const fn due(&self) -> u64 {
         self.due
     }
 
-    /// Whether all lines were decoded that the header tells of.
+    /// Whether all lines stated in the header were decoded.
     pub(super) const fn are_all(&self) -> bool {
         self.lines == self.lines_max
     }
@@ -112,7 +112,7 @@ impl Blocks {
         Ok(Some(block))
     }
 
-    /// Appends a line, predicted by the last one of `pixels`.
+    /// Appends a line, predicted from the last one of `pixels`.
     fn line(&self, bits: &mut Bits<'_>, pixels: &mut Vec<u8>) {
         let from = pixels.len();
         pixels.resize(from + self.width, 0);
@@ -142,7 +142,7 @@ impl Blocks {
         }
     }
 
-    /// The next mark with a line behind it that looks like one.
+    /// The next mark followed by a plausible line.
     fn search(&self, stream: &mut Stream, from: u64) -> io::Result<Option<u64>> {
         const STRIDE: usize = 1 << 16;
         let behind = (2 + self.width).max(2 + STEPS + 1);

@@ -1,8 +1,8 @@
-//! From numbers to relative radiance, and the noise of odd and even detectors.
+//! Conversion of numbers to relative radiance, and the noise of odd and even detectors.
 //!
 //! The model is that of the camera's calibration report of 1997 (M. Malin et al., as ISIS applies it):
-//! `dn = a (r t + dc t + g) + z − offset`, with gain `a`, exposure `t` and radiance `r`. Of the narrow-angle and the blue
-//! wide-angle camera neither `z`, `dc` nor `g` is public: with 0 in their place radiance is known but for a constant.
+//! `dn = a (r t + dc t + g) + z − offset`, with gain `a`, exposure `t` and radiance `r`. Neither `z`, `dc` nor `g` of
+//! the narrow-angle and the blue wide-angle camera is public: with 0 in their place radiance is known up to a constant.
 
 use super::{
     opened::ImageFile,
@@ -61,10 +61,10 @@ const WIDE: [(&str, f64); 20] = [
 const OFFSET_DN: f64 = 5.0;
 /// Zero level, dark current and its offset of the red wide-angle camera, from the labels of calibrated cubes.
 const RED: [f64; 3] = [27.676_58, 0.001_336_91, 0.123_262];
-/// Until then summed pixels of the narrow-angle camera were added up, not averaged (UTC).
+/// Until this date (UTC), summed pixels of the narrow-angle camera were added up, not averaged.
 const MAPPING_BEGAN: &str = "1999-04-03T01:00:40.441";
 
-/// An image that does not tell how its numbers came of radiance.
+/// An image that does not state its radiometric parameters.
 #[derive(Debug, thiserror::Error)]
 enum NotCalibrated {
     #[error("{key} is {value:?}; expected {expected}")]
@@ -89,7 +89,7 @@ impl Cause for NotCalibrated {
     }
 }
 
-/// How the numbers of an image came of radiance.
+/// Radiometric parameters of an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Radiometry {
     gain: f64,
@@ -98,15 +98,15 @@ pub struct Radiometry {
     zero_dn: f64,
     dark_dn_per_ms: f64,
     dark_dn: f64,
-    /// Whether the zero level is known: else radiance lacks a constant.
+    /// Whether the zero level is known; otherwise radiance lacks a constant.
     pub knows_zero: bool,
 }
 
 impl Radiometry {
-    /// By the gain, offset and exposure in an image's label.
+    /// From the gain, offset and exposure in an image's label.
     ///
     /// # Errors
-    /// A value that is lacking or not of the camera; gain and offset that change within the image.
+    /// A value that is missing or unknown for the camera; gain and offset that change within the image.
     pub fn of(image: &ImageFile) -> Result<Self> {
         let changes = image.layout().gain_changes;
         if changes > 0 {
@@ -163,7 +163,7 @@ impl Radiometry {
         })
     }
 
-    /// Radiance of a number, in numbers a millisecond at gain 1.
+    /// Radiance of a number, in numbers per millisecond at gain 1.
     #[must_use]
     pub fn dn_per_ms(&self, dn: f64) -> f64 {
         let exposed = (dn - self.zero_dn + self.offset_dn) / self.gain - self.dark_dn;
@@ -171,7 +171,7 @@ impl Radiometry {
     }
 }
 
-/// What lies between odd and even samples, gathered over an image.
+/// Difference between odd and even samples, accumulated over an image.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct OddEven {
     /// Sum and count of the odd and of the even samples, counted from 1.
@@ -194,7 +194,8 @@ impl OddEven {
         }
     }
 
-    /// What to add to odd samples (counted from 1) and to take from even ones; none of an image without good lines.
+    /// Correction to add to odd samples (counted from 1) and to subtract from even ones; `None` for an image without
+    /// good lines.
     #[must_use]
     pub fn correction_dn(&self) -> Option<f64> {
         let [odd, even] = self

@@ -2,7 +2,7 @@
 
 use super::strip::{LineState, Strip};
 
-/// Gathers pixels strip by strip.
+/// Accumulates pixels strip by strip.
 #[derive(Debug)]
 pub struct Statistics {
     counts: [u64; 256],
@@ -11,30 +11,30 @@ pub struct Statistics {
     lines: [u32; 3],
 }
 
-/// What the decoded pixels are; those of missing lines do not count.
+/// Statistics of the decoded pixels, without those of missing lines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PixelStatistics {
-    /// Lines that are as they were sent.
+    /// Lines as transmitted.
     pub lines_good: u32,
     /// Lines that may be damaged.
     pub lines_suspect: u32,
     /// Lines that are missing.
     pub lines_missing: u32,
-    /// Least value; none of an image without a line, as for all that follow.
+    /// Minimum; `None`, as all that follow, for an image without lines.
     pub minimum: Option<u8>,
-    /// Largest value.
+    /// Maximum.
     pub maximum: Option<u8>,
     /// Mean.
     pub mean: Option<f64>,
     /// Standard deviation of all pixels (not of a sample).
     pub standard_deviation: Option<f64>,
-    /// The value in the middle, the lower one of two.
+    /// Median, the lower of two middle values.
     pub median: Option<u8>,
     /// Sum of all values.
     pub sum: u64,
-    /// How many values occur.
+    /// Number of different values.
     pub distinct: usize,
-    /// Pixels of value 0, which occurs in deep shadow and does not mean that something is missing.
+    /// Pixels of value 0, which occur in deep shadow and do not indicate missing data.
     pub zeros: u64,
     /// BLAKE3 of the decoded pixels in the order of the file.
     pub blake3: String,
@@ -51,7 +51,7 @@ impl Default for Statistics {
 }
 
 impl Statistics {
-    /// Adds the lines of a strip that are there.
+    /// Adds the existing lines of a strip.
     pub fn add(&mut self, strip: &Strip) {
         for (line, state) in strip.lines() {
             self.lines[*state as usize] += 1;
@@ -64,7 +64,7 @@ impl Statistics {
         }
     }
 
-    /// What they are.
+    /// The statistics.
     #[must_use]
     pub fn finish(&self) -> PixelStatistics {
         let pixels: u64 = self.counts.iter().sum();

@@ -5,23 +5,23 @@ use std::{fs::File, io, os::unix::fs::FileExt as _};
 /// A stretch of the stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Piece {
-    /// Where in the file it begins; none for bytes that are lost, which are read as zeros.
+    /// Its position in the file; `None` for missing bytes, which are read as zeros.
     pub(super) at: Option<u64>,
     pub(super) bytes: u64,
     /// Number of its fragment.
     pub(super) fragment: Option<u16>,
-    /// Whether it is as it was sent.
+    /// Whether it is as transmitted.
     pub(super) is_sound: bool,
 }
 
-/// Bytes in one order, wherever they stand in the file.
+/// Bytes in stream order, at any position in the file.
 #[derive(Debug)]
 pub(super) struct Stream {
     file: File,
-    /// With the place in the stream where each begins.
+    /// Pieces with their starting positions in the stream.
     pieces: Vec<(u64, Piece)>,
     length: u64,
-    /// Place of the first byte of `held`.
+    /// Position of the first byte of `held`.
     start: u64,
     held: Vec<u8>,
 }
@@ -91,7 +91,7 @@ impl Stream {
         after.saturating_sub(1)
     }
 
-    /// The fragment of a byte, and the byte's place in the file.
+    /// The fragment of a byte, and the byte's position in the file.
     pub(super) fn locate(&self, at: u64) -> (Option<u16>, u64) {
         self.pieces
             .get(self.number(at))
@@ -100,7 +100,7 @@ impl Stream {
             })
     }
 
-    /// The pieces that bytes from `from` up to `until` lie in, each with the place where it begins.
+    /// The pieces with bytes from `from` up to `until`, each with its starting position.
     pub(super) fn pieces(&self, from: u64, until: u64) -> impl Iterator<Item = &(u64, Piece)> {
         let pieces = self.pieces.get(self.number(from)..).unwrap_or_default();
         let within = move |(start, _): &&(u64, Piece)| *start < until.max(from + 1);
@@ -117,7 +117,7 @@ impl Stream {
     }
 }
 
-/// Places within a window, which is in memory.
+/// Position within the window in memory.
 fn index(bytes: u64) -> usize {
     usize::try_from(bytes).unwrap_or(usize::MAX)
 }

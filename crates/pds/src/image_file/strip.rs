@@ -1,17 +1,17 @@
-//! Some lines of an image that follow each other.
+//! Successive lines of an image.
 
-/// What is known of a line.
+/// State of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LineState {
-    /// As it was sent.
+    /// As transmitted.
     Good,
-    /// Decoded from damaged data, or of an uncertain place: its pixels may be wrong.
+    /// Decoded from damaged data, or at an uncertain place: its pixels may be wrong.
     Suspect,
     /// Not in the file; its pixels are 0.
     Missing,
 }
 
-/// Lines that follow each other.
+/// Successive lines.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Strip {
     /// Number of the first line, counted from 0.
@@ -20,7 +20,7 @@ pub struct Strip {
     pub samples: u32,
     /// Line by line.
     pub pixels: Vec<u8>,
-    /// One of each line.
+    /// State of each line.
     pub states: Vec<LineState>,
 }
 
@@ -32,7 +32,7 @@ impl Strip {
             .zip(&self.states)
     }
 
-    /// Lines that are not there.
+    /// Missing lines.
     pub(super) fn missing(first_line: u32, lines: u32, samples: u32) -> Self {
         Self {
             first_line,

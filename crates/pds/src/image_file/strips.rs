@@ -14,12 +14,12 @@ use super::{
     walk::HEADER,
 };
 
-/// Most blocks of a transform fragment that are believed: on board there were at most 1024.
+/// Largest accepted number of blocks in a transform fragment: on board there were at most 1024.
 const TRANSFORM_BLOCKS_MAX: usize = 1 << 14;
-/// Most data bytes of a transform fragment that are believed.
+/// Largest accepted number of data bytes of a transform fragment.
 const TRANSFORM_BYTES_MAX: u64 = 1 << 22;
 
-/// What is decoded, and how.
+/// Source and coding of the data.
 #[derive(Debug)]
 enum Source {
     /// One byte a pixel.
@@ -95,10 +95,10 @@ impl Strips {
         })
     }
 
-    /// The next lines; `None` behind the last one that is there.
+    /// The next lines; `None` after the last one.
     ///
     /// # Errors
-    /// The system's refusal to read.
+    /// The file cannot be read.
     pub fn next_strip(&mut self) -> io::Result<Option<Strip>> {
         while !self.is_done {
             let strip = match &mut self.source {
@@ -148,14 +148,15 @@ impl Strips {
         Ok(None)
     }
 
-    /// What was found wrong while decoding so far.
+    /// Faults found while decoding so far.
     #[must_use]
     pub const fn complaints(&self) -> &Complaints {
         &self.complaints
     }
 }
 
-/// The data of fragments as stretches of a stream. Of a raster every byte has its place, so that zeros stand for what is lost.
+/// The data of fragments as pieces of a stream. Every byte of a raster has a fixed place, so zeros replace missing
+/// data.
 fn pieces(fragments: &[Fragment], is_raster: bool) -> Vec<Piece> {
     let lost = |bytes| Piece {
         at: None,
@@ -215,7 +216,7 @@ fn rows(stream: &mut Stream, layout: Layout, line: u32) -> io::Result<Option<Str
     }))
 }
 
-/// The lines of the next fragment, or some of those that are lost before it.
+/// The lines of the next fragment, or some of the missing lines before it.
 fn transformed(
     stream: &mut Stream,
     coder: &TransformCoder,
@@ -227,7 +228,7 @@ fn transformed(
         return Ok(None);
     };
     let samples = u32::try_from(coder.width).unwrap_or_default();
-    // A damaged header does not tell where its lines are.
+    // A damaged header does not identify its lines.
     if (fragment.is_sound || fragment.lost_before > 0) && fragment.first_line > line {
         let lines = BLOCK_LINES.min(fragment.first_line - line);
         return Ok(Some(Strip::missing(line, lines, samples)));
@@ -241,14 +242,14 @@ fn transformed(
             what,
         });
     };
-    // Nor how many they are: a sound one behind it does.
+    // Nor their number, which a sound header after it determines.
     let next = fragments
         .front()
         .filter(|next| !fragment.is_sound && next.is_sound);
     let room = next.map_or(u32::MAX, |next| next.first_line.saturating_sub(line));
     let lines = fragment.lines.min(room) as usize;
     let blocks = coder.width * lines / AREA;
-    // A block has three bits at least.
+    // A block takes at least three bits.
     let bytes_min = (blocks * 3 / 8) as u64;
     if blocks > TRANSFORM_BLOCKS_MAX
         || fragment.data_bytes > TRANSFORM_BYTES_MAX

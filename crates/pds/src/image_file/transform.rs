@@ -13,7 +13,7 @@ pub(super) const EDGE: usize = 16;
 /// Pixels or coefficients of a block.
 pub(super) const AREA: usize = EDGE * EDGE;
 
-/// Number in the stream of each coefficient, by vertical and then horizontal frequency.
+/// Position in the stream of each coefficient, by vertical and then horizontal frequency.
 pub(super) static ORDER: LazyLock<Vec<usize>> = LazyLock::new(|| {
     let numbers = include_str!("coefficient_order.txt").split_whitespace();
     numbers.filter_map(|number| number.parse().ok()).collect()
@@ -32,7 +32,7 @@ pub(super) static COSINES: LazyLock<[[f64; EDGE]; EDGE]> = LazyLock::new(|| {
     cosines
 });
 
-/// Walsh functions in the order of their changes of sign, by that and place.
+/// Walsh functions ordered by their number of sign changes, by that and place.
 static WALSH: LazyLock<[[i32; EDGE]; EDGE]> = LazyLock::new(|| {
     let mut functions = [[1; EDGE]; EDGE];
     for (changes, row) in (0_u8..).zip(&mut functions) {
@@ -58,9 +58,9 @@ pub(super) struct TransformCoder {
 /// A decoded fragment.
 #[derive(Debug)]
 pub(super) enum Fragment {
-    /// Its pixels, line by line; whether the data held all of them.
+    /// Its pixels, line by line, and whether the data contained all of them.
     Pixels(Vec<u8>, bool),
-    /// A block of a group that there is not.
+    /// A block of an undefined group.
     WrongGroup,
 }
 
@@ -111,7 +111,7 @@ impl TransformCoder {
                 LARGE_POSITIVE => i32::from(bits.number(15)),
                 small => i32::from(small),
             };
-            // On board these are numbers of 16 bits.
+            // The on-board software used 16-bit numbers.
             let product = step.wrapping_mul(i32::from(self.spacing)).to_le_bytes();
             *value = i32::from(i16::from_le_bytes([product[0], product[1]]));
         }
@@ -126,9 +126,9 @@ impl TransformCoder {
     }
 }
 
-/// What blocks of a group have in common.
+/// Parameters shared by the blocks of a group.
 struct Group {
-    /// Least and largest mean of a block.
+    /// Minimum and maximum mean of a block.
     means: [u16; 2],
     /// Code of each coefficient.
     tables: [usize; AREA],
@@ -144,7 +144,7 @@ impl Group {
         Self { means, tables }
     }
 
-    /// The mean that is coded as a number from 0 to 255, in units of the first coefficient.
+    /// The mean from its coded value of 0 to 255, in units of the first coefficient.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,

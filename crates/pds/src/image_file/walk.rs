@@ -1,4 +1,4 @@
-//! A file in which headers of fragments are looked for.
+//! A file that is searched for fragment headers.
 
 use std::{fs::File, io, os::unix::fs::FileExt as _};
 
@@ -7,12 +7,12 @@ pub(super) const HEADER: usize = 62;
 /// Bytes read at a time.
 const CHUNK: usize = 1 << 16;
 
-/// A file that is walked through.
+/// The file of a search.
 #[derive(Debug)]
 pub(super) struct Walk<'a> {
     file: &'a File,
     end: u64,
-    /// What was read last while a header was searched, and where it stands: headers close to each other cost one reading.
+    /// The bytes last read during a search for headers, and their position: adjacent headers take one read.
     window: Vec<u8>,
     window_at: u64,
 }
@@ -28,12 +28,12 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Where the file ends.
+    /// End of the file.
     pub(super) const fn end(&self) -> u64 {
         self.end
     }
 
-    /// The header that begins at `at`, if the file has so many bytes.
+    /// The header at `at`, if the file has enough bytes.
     pub(super) fn header(&self, at: u64) -> io::Result<Option<[u8; HEADER]>> {
         let mut bytes = [0; HEADER];
         if at.saturating_add(HEADER as u64) > self.end {
@@ -43,7 +43,7 @@ impl<'a> Walk<'a> {
         Ok(Some(bytes))
     }
 
-    /// What of the window lies from `at` on; a header at least, if the file has one there.
+    /// The window from `at` on; at least a header, if the file has one there.
     fn window(&mut self, at: u64) -> io::Result<&[u8]> {
         let within = at
             .checked_sub(self.window_at)
@@ -61,7 +61,7 @@ impl<'a> Walk<'a> {
         Ok(&self.window[from..])
     }
 
-    /// The first header from `from` on that is as wanted.
+    /// The first header from `from` on that meets the condition.
     pub(super) fn find(
         &mut self,
         from: u64,
@@ -72,7 +72,7 @@ impl<'a> Walk<'a> {
             let bytes = self.window(at)?;
             let mut places = bytes.windows(HEADER);
             let is_wanted = |window: &[u8]| {
-                // No image has clock seconds of zero: padding is passed over quickly.
+                // No image has zero clock seconds: padding is skipped quickly.
                 window[9..13] != [0; 4] && <&[u8; HEADER]>::try_from(window).is_ok_and(wanted)
             };
             if let Some(place) = places.position(is_wanted) {
@@ -83,14 +83,14 @@ impl<'a> Walk<'a> {
         Ok(None)
     }
 
-    /// Whether `bytes` from `at` on add up to all ones, carries added at the low end.
+    /// Whether the end-around-carry sum of `bytes` from `at` on is all ones.
     pub(super) fn adds_up(&self, at: u64, bytes: u64) -> io::Result<bool> {
         let (sum, _) = byte_sum(self.file, at, bytes)?;
         Ok(sum > 0 && sum % 255 == 0)
     }
 }
 
-/// The sum of bytes, each unsigned, and how many are 128 or more.
+/// The sum of bytes, each unsigned, and the number of bytes of 128 or more.
 pub(super) fn byte_sum(file: &File, at: u64, bytes: u64) -> io::Result<(u64, u64)> {
     let mut chunk = vec![0; CHUNK];
     let (mut sum, mut high, mut done) = (0, 0, 0);

@@ -64,7 +64,7 @@ pub(super) const COLUMNS: [&str; 53] = [
 /// The fields of a row by the names of its columns.
 pub(super) type Fields<'a> = BTreeMap<&'a str, Cow<'a, str>>;
 
-/// A column: its name, and where its bytes stand in a row, where the label tells.
+/// A column: its name and, where the label states it, its position in a row.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Column {
     pub(super) name: String,
@@ -116,7 +116,7 @@ pub(super) fn fields<'a>(row: &'a [u8], columns: &'a [Column]) -> Result<Fields<
         let names = columns.iter().map(|column| &*column.name);
         return Ok(names.zip(separated).collect());
     }
-    // A quote within a text hides separators: where the label tells places, they help.
+    // A quote within a text hides separators: column positions from the label resolve this.
     let by_place = columns
         .iter()
         .map(|column| Some((&*column.name, at_place(row, column.bytes?)?.into())));
@@ -128,7 +128,7 @@ pub(super) fn fields<'a>(row: &'a [u8], columns: &'a [Column]) -> Result<Fields<
         })
 }
 
-/// What a field says that stands within quotes, or has none.
+/// Content of a field that is quoted or contains no quotes.
 fn unquoted(field: &str) -> Cow<'_, str> {
     let within = field
         .strip_prefix('"')
@@ -141,7 +141,7 @@ fn unquoted(field: &str) -> Cow<'_, str> {
     }
 }
 
-/// The field at a place of the row, if it stands between separators there.
+/// The field at a position of the row, if separators enclose it.
 fn at_place(row: &str, (start, length): (usize, usize)) -> Option<&str> {
     let end = start.checked_add(length)?;
     let field = row.get(start..end)?;
@@ -162,7 +162,7 @@ fn separated(row: &str) -> Vec<&str> {
     fields.map(str::trim).collect()
 }
 
-/// Whether a field is within quotes or has none.
+/// Whether a field is quoted or contains no quotes.
 fn is_whole(field: &str) -> bool {
     !field.contains('"') || (field.len() > 1 && field.starts_with('"') && field.ends_with('"'))
 }
@@ -212,11 +212,11 @@ mod tests {
 
     #[test]
     fn places_without_separators_are_not_believed() {
-        // A row one byte off the places of its label is read by its separators.
+        // A row shifted by a byte against its label is split by its separators.
         let columns = label_of([(2, 4), (8, 3)]);
         let expected = BTreeMap::from([("PRODUCT_ID", "abc".into()), ("LINES", "127".into())]);
         assert_eq!(fields(br#""abc",127"#, &columns), Ok(expected));
-        // And with a quote too many there is nothing to read it by.
+        // With an extra quote as well, the row cannot be split.
         let refused = Err("1 fields; expected 2".to_owned());
         assert_eq!(fields(br#""abx"c",127"#, &columns), refused);
         let endless = label_of([(2, usize::MAX), (8, 3)]);

@@ -1,4 +1,5 @@
-//! The camera of support data: its focal plane, turned about the boresight so that the detector line lies along an axis.
+//! The camera of support data: its focal plane, rotated about the boresight so that the detector line is parallel to an
+//! axis.
 //!
 //! Pixels of the detector follow from focal-plane millimetres by `line = L0 + L1 x + L2 y + centre`, samples alike
 //! (`focal2pixel_lines`, `focal2pixel_samples`, `detector_center`). The line of a scanner is detector line 0. A sensor may
@@ -18,12 +19,12 @@ use areograph_geom::{
     attitude::OmegaPhiKappa, body_rotation::frame_rotation_3, pushbroom::Distortion,
 };
 
-/// Focal lengths, millimetres, and what a millimetre of the focal plane has of pixels at most.
+/// Focal lengths, millimetres, and largest number of pixels per millimetre of the focal plane.
 const FOCAL_LENGTH_MM: [f64; 2] = [0.1, 1e6];
 const PIXELS_PER_MM_MAX: f64 = 1e5;
 /// Detector coordinates.
 const DETECTOR_PX: [f64; 2] = [-1e6, 1e6];
-/// A distortion that knows x from y needs a line along one of them: sine of the angle between.
+/// A distortion that distinguishes x from y requires a line along one of them: sine of the angle between.
 const ALONG_AXIS: f64 = 1e-3;
 
 /// Samples of an image on the detector.
@@ -70,7 +71,7 @@ impl FocalLine {
     }
 }
 
-/// The same line along Y of the camera's own axes.
+/// The same line along Y of the camera frame.
 struct PlacedLine {
     /// About the boresight, from the sensor's axes to the camera's.
     turn_rad: f64,
@@ -81,7 +82,7 @@ struct PlacedLine {
 }
 
 impl PlacedLine {
-    /// Of the two ways to turn a line into the Y axis the shorter one.
+    /// Of the two rotations of a line into the Y axis, the smaller one.
     fn of(line: &FocalLine) -> Self {
         let pitch_mm = line.step_mm.norm();
         let (samples_along, up_mm) = if line.step_mm.y < 0.0 {
@@ -152,7 +153,7 @@ pub(super) fn camera(
     }
 }
 
-/// Numbers of the camera and of the bus, from the chain of frames between J2000 and the camera.
+/// NAIF codes of the camera and of the bus, from the chain of frames between J2000 and the camera.
 fn naif_names(document: &Object<'_>, frame: String) -> Result<NaifNames, IsdError> {
     let platform = document.text("name_platform")?;
     let pointing = document.object("instrument_pointing")?;
@@ -179,8 +180,8 @@ fn naif_names(document: &Object<'_>, frame: String) -> Result<NaifNames, IsdErro
     })
 }
 
-/// The spacecraft of this name; of one that is not known nothing is read but its support data, and it is filed under the
-/// usual one.
+/// The spacecraft with this name; for an unknown one only its support data are used, and products are filed under the
+/// default one.
 fn spacecraft(platform: &str) -> &'static Spacecraft {
     let named = |one: &&Spacecraft| one.label_name.eq_ignore_ascii_case(platform);
     Spacecraft::all().iter().find(named).unwrap_or(&SPACECRAFT)
@@ -207,7 +208,7 @@ fn frame_name(sensor: &str, turned_rad: f64) -> String {
     }
 }
 
-/// A name in small letters, digits and underscores.
+/// A name in lower case, digits and underscores.
 fn identifier(name: &str) -> String {
     let words = name.split(|letter: char| !letter.is_ascii_alphanumeric());
     let words: Vec<String> = words
@@ -217,7 +218,7 @@ fn identifier(name: &str) -> String {
     words.join("_")
 }
 
-/// The law of distortion, by the name that usgscsm knows it under.
+/// The distortion model, by its name in usgscsm.
 fn distortion(document: &Object<'_>, turned_rad: f64) -> Result<DistortionModel, IsdError> {
     const KEY: &str = "optical_distortion";
     const KNOWN: &str = "one of the distortions radial, lrolrocnac; areograph supports no others";

@@ -6,10 +6,10 @@ use serde_json::Value;
 
 use areograph_base::error::{Cause, Kind};
 
-/// Most characters of a value that a message shows.
+/// Maximum number of characters of a value in a message.
 const SHOWN: usize = 60;
 
-/// Support data that are not what they should be.
+/// Invalid support data.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(super) enum IsdError {
     #[error("not image support data: {0}; expected a JSON document of one object")]
@@ -38,14 +38,14 @@ impl Cause for IsdError {
     }
 }
 
-/// An object of a JSON document, and where it stands.
+/// An object of a JSON document, and its location.
 #[derive(Debug, Clone)]
 pub(super) struct Object<'a> {
     value: &'a Value,
     path: String,
 }
 
-/// A value, and where it stands.
+/// A value, and its location.
 struct Found<'a> {
     value: &'a Value,
     key: String,
@@ -130,7 +130,7 @@ impl<'a> Object<'a> {
         }
     }
 
-    /// That `key` is not what was expected.
+    /// The error that `key` differs from the expected value.
     pub(super) fn refused(&self, key: &str, expected: impl fmt::Display) -> IsdError {
         match self.find(key, &expected) {
             Ok(found) => found.refused(expected),
@@ -166,7 +166,7 @@ impl<'a> Object<'a> {
         text.ok_or_else(|| found.refused("a text"))
     }
 
-    /// A number between two, ends included.
+    /// A number between two limits, inclusive.
     pub(super) fn number(&self, key: &str, [low, high]: [f64; 2]) -> Result<f64, IsdError> {
         let expected = format!("a number from {low} to {high}");
         let found = self.find(key, &expected)?;
@@ -178,7 +178,7 @@ impl<'a> Object<'a> {
         }
     }
 
-    /// A whole number between two, ends included.
+    /// A whole number between two limits, inclusive.
     pub(super) fn whole(&self, key: &str, [low, high]: [u32; 2]) -> Result<u32, IsdError> {
         let expected = format!("a whole number from {low} to {high}");
         let found = self.find(key, &expected)?;
@@ -199,7 +199,7 @@ impl<'a> Object<'a> {
         self.find(key, format!("{N} finite numbers"))?.row()
     }
 
-    /// So many numbers as there are, at most `max`.
+    /// A list of numbers, at most `max`.
     pub(super) fn list(&self, key: &str, max: usize) -> Result<Vec<f64>, IsdError> {
         let expected = format!("1 to {max} finite numbers");
         let found = self.find(key, &expected)?;

@@ -1,7 +1,7 @@
 //! Image support data (ISD) of the Community Sensor Model, as ALE writes and usgscsm reads them: camera, line times and
 //! tables of positions and rotations of a line scanner.
 //!
-//! Numbers mean what usgscsm makes of them. The first line and the first sample have their centres at 0.5; a row
+//! Numbers are interpreted as in usgscsm. The first line and the first sample have their centres at 0.5; a row
 //! `[line, time, period]` of `line_scan_rate` holds from that line coordinate on, and there
 //! `t = centre + time + period · (coordinate − line + 0.5)`.
 //!
@@ -40,37 +40,38 @@ use areograph_base::{
     units::METRES_PER_KM,
 };
 
-/// Largest file that is read: a node for each of 52 000 lines makes 20 MB, and a document in memory is ten times its file.
+/// Largest accepted file: a node for each of 52 000 lines gives 20 MB, and a document takes ten times its file size in
+/// memory.
 const BYTES_MAX: u64 = 1 << 26;
 /// Limits of line and sample numbers, beyond every camera.
 const LINES_MAX: u32 = 10_000_000;
 const SAMPLES_MAX: u32 = 1_000_000;
 const SUMMING_MAX: u32 = 1_000;
-/// Line scanners, the cameras that are read.
+/// Line scanners, the only supported cameras.
 const LINE_SCANNER: &str = "USGS_ASTRO_LINE_SCANNER_SENSOR_MODEL";
 /// Ephemeris times, seconds: five centuries around J2000.
 const ET_S: [f64; 2] = [-1e10, 1e10];
 /// Radii of a target, kilometres.
 const RADIUS_KM: [f64; 2] = [0.1, 1e6];
 
-/// What the support data of a line scanner say.
+/// Contents of the support data of a line scanner.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImageSupport {
-    /// The camera, its axes turned about the boresight where the line would not lie along Y.
+    /// The camera, its axes rotated about the boresight where the line would not be parallel to Y.
     pub instrument: Instrument,
-    /// When lines were exposed.
+    /// Exposure times of lines.
     pub line_times: LineTimes,
     /// Samples in a line.
     pub samples: u32,
     /// First detector pixel, counted from 0.
     pub first_detector: u32,
-    /// Detector lines in a line.
+    /// Detector lines summed into a line.
     pub downtrack_summing: u32,
-    /// Detector pixels in a sample.
+    /// Detector pixels summed into a sample.
     pub crosstrack_summing: u32,
     /// Equatorial and polar radius of the target, metres.
     pub radii_m: [f64; 2],
-    /// Number of the target in NAIF's kernels, where it is told.
+    /// NAIF code of the target, where it is stated.
     pub target: Option<i64>,
     /// Name of the spacecraft.
     pub platform: String,
@@ -78,14 +79,14 @@ pub struct ImageSupport {
     pub tables: SupportTables,
 }
 
-/// Where the spacecraft was and how it looked, over the time of an image.
+/// Positions and attitudes of the spacecraft over the time of an image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SupportTables {
     /// The spacecraft.
     pub position: States,
     /// The Sun.
     pub sun: States,
-    /// Attitude of the bus; what stays leads to the camera.
+    /// Attitude of the bus; the constant rotation leads to the camera.
     pub pointing: Rotations,
     /// Rotation of the target.
     pub body_rotation: Rotations,
@@ -94,8 +95,8 @@ pub struct SupportTables {
 /// Reads the support data of a line scanner.
 ///
 /// # Errors
-/// The system's refusal to read; what is no JSON; another kind of camera, or a distortion that is not known; a key that
-/// is missing or holds what it cannot; tables that do not reach over the image.
+/// The file cannot be read; invalid JSON; another kind of camera, or an unknown distortion; a key that is missing or
+/// has an invalid value; tables that do not cover the image.
 pub fn read_isd(path: &Path) -> Result<ImageSupport> {
     let bytes = fs::metadata(path)
         .map_err(IoError::on("read"))
@@ -111,7 +112,7 @@ pub fn read_isd(path: &Path) -> Result<ImageSupport> {
 
 fn parse(text: &[u8]) -> Result<ImageSupport> {
     let value: Value = serde_json::from_slice(text).map_err(|error| {
-        // Positions in the text say more than the kind of what was not expected.
+        // A position in the text is more specific than the kind of the unexpected value.
         IsdError::NotJson(error.to_string())
     })?;
     let document = Object::document(&value)?;
@@ -166,7 +167,7 @@ fn radii_m(document: &Object<'_>) -> std::result::Result<[f64; 2], IsdError> {
     Ok([equatorial * metres, polar * metres])
 }
 
-/// NAIF's number of the target, which ALE writes beside the camera.
+/// NAIF code of the target, which ALE writes beside the camera.
 fn target(document: &Object<'_>) -> std::result::Result<Option<i64>, IsdError> {
     const KEY: &str = "BODY_CODE";
     if !document.has("naif_keywords") {
@@ -205,7 +206,7 @@ fn line_times(document: &Object<'_>) -> Result<LineTimes> {
     }
     let times = LineTimes::of_pieces(lines, &pieces)?;
     let late_s = times.start().seconds() - start_s;
-    // Written so that NaN is refused too.
+    // Written so that NaN is rejected too.
     if !(late_s.abs() <= times.mean_period_s()) {
         let expected = format!(
             "the time of the first line by line_scan_rate and center_ephemeris_time, {:.6}, within a line",
@@ -224,7 +225,7 @@ fn line_times(document: &Object<'_>) -> Result<LineTimes> {
 }
 
 impl SupportTables {
-    /// Makes sure that every table reaches over the image, to a line at both ends.
+    /// Checks that every table covers the image, extended by a line at both ends.
     fn reach_over(
         &self,
         document: &Object<'_>,
@@ -251,7 +252,7 @@ impl SupportTables {
         Ok(())
     }
 
-    /// First and last instant that positions and attitudes are both tabulated for.
+    /// First and last instant with both positions and attitudes.
     #[must_use]
     pub fn span(&self) -> Interval {
         let [position, pointing] =

@@ -1,4 +1,4 @@
-//! Support data with another camera and other positions, everything else as it stands.
+//! Support data with another camera and other positions; everything else is unchanged.
 
 use std::{fs, path::Path};
 
@@ -11,21 +11,21 @@ use areograph_base::{
     units::METRES_PER_KM,
 };
 
-/// A camera that support data can hold exactly: a straight line of equal samples, without distortion.
+/// A camera that support data represent exactly: a straight line of equal samples, without distortion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StraightCamera {
     /// From the bus to the camera: z along the boresight, y along the samples.
     pub bus_to_camera: Matrix3<f64>,
     /// Sample of the boresight, 0 at the outer edge of the first.
     pub boresight_sample: f64,
-    /// Tangent between two samples.
+    /// Tangent of the angle between two samples.
     pub tangent_per_sample: f64,
 }
 
 /// The support data of `path` with another camera, and with `shift_m` added to positions: J2000 metres at an ET.
 ///
 /// # Errors
-/// The system's refusal to read; what is no JSON of support data.
+/// The file cannot be read; JSON that is not support data.
 pub fn rewrite_isd(
     path: &Path,
     camera: &StraightCamera,
@@ -53,7 +53,7 @@ fn rewritten(
     let (positions, velocities) = states(&document, shift_m)?;
     let pixels_per_mm = summing / (camera.tangent_per_sample * focal_mm);
     let boresight_px = first + camera.boresight_sample * summing;
-    // Row by row, as the transpose's columns are.
+    // Row by row, which are the columns of the transpose.
     let mounting = camera.bus_to_camera.transpose();
     value["instrument_pointing"]["constant_rotation"] = json!(mounting.as_slice());
     value["focal2pixel_lines"] = json!([0.0, pixels_per_mm, 0.0]);
@@ -67,7 +67,7 @@ fn rewritten(
     Ok(text + "\n")
 }
 
-/// Positions and velocities of the spacecraft with something added.
+/// Positions and velocities of the spacecraft plus a shift.
 fn states(
     document: &Object<'_>,
     shift_m: impl Fn(f64) -> Vector3<f64>,

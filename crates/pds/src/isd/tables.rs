@@ -1,4 +1,4 @@
-//! Tables of support data: positions and rotations from J2000 at epochs, and what lies between them.
+//! Tables of support data: positions and rotations from J2000 at epochs, and their interpolation.
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -9,14 +9,14 @@ use areograph_geom::attitude::{
     matrix_of_rotation_vector, matrix_of_spice_quaternion, rotation_vector,
 };
 
-/// NAIF's number of J2000, in which all tables are.
+/// NAIF code of J2000, the frame of all tables.
 const NAIF_J2000: i64 = 1;
-/// A quaternion has unit length within this: files have fifteen digits, and what is damaged is far off.
+/// Tolerance of the length of a unit quaternion: files have fifteen digits, and damaged values differ widely.
 const UNIT_TOLERANCE: f64 = 1e-6;
-/// The same of the rows of a rotation matrix.
+/// The same for the rows of a rotation matrix.
 const ROTATION_TOLERANCE: f64 = 1e-6;
 
-/// Positions and velocities of a body from the centre of the target, J2000.
+/// Positions and velocities of a body relative to the centre of the target, J2000.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct States {
     /// Epochs, increasing, ET seconds.
@@ -27,12 +27,12 @@ pub struct States {
     pub velocity_m_s: Vec<Vector3<f64>>,
 }
 
-/// Rotations from J2000 at epochs, followed by one that stays.
+/// Rotations from J2000 at epochs, followed by a constant one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Rotations {
     /// Epochs, increasing, ET seconds.
     pub et_s: Vec<f64>,
-    /// J2000 to the frame that turns.
+    /// J2000 to the rotating frame.
     pub turning: Vec<Matrix3<f64>>,
     /// Angular velocities of that frame, J2000, radians per second.
     pub rate_rad_s: Vec<Vector3<f64>>,
@@ -40,8 +40,8 @@ pub struct Rotations {
     pub constant: Matrix3<f64>,
 }
 
-/// The row before an instant and the share of the way to the next one; before the first and behind the last row the
-/// same interval goes on.
+/// The row before an instant and the fraction of the way to the next one; before the first and after the last row the
+/// same interval is extrapolated.
 fn between(et_s: &[f64], at_s: f64) -> (usize, f64) {
     let after = et_s.partition_point(|row| *row <= at_s);
     let before = after.clamp(1, et_s.len() - 1) - 1;
@@ -49,13 +49,13 @@ fn between(et_s: &[f64], at_s: f64) -> (usize, f64) {
     (before, (at_s - et_s[before]) / step_s)
 }
 
-/// The interval of a table in words.
+/// The interval of a table as text.
 pub(super) fn span(et_s: &[f64]) -> [f64; 2] {
     [et_s[0], et_s[et_s.len() - 1]]
 }
 
 impl States {
-    /// The table under `key`; positions are not nearer to the centre than `least_m`.
+    /// The table under `key`; positions must be at least `least_m` from the centre.
     pub(super) fn of(document: &Object<'_>, key: &str, least_m: f64) -> Result<Self, IsdError> {
         let table = document.object(key)?;
         is_inertial(&table)?;
@@ -118,7 +118,7 @@ impl Rotations {
                 .map(|part| part * part)
                 .sum::<f64>()
                 .sqrt();
-            // Written so that NaN is refused too.
+            // Written so that NaN is rejected too.
             if !((length - 1.0).abs() <= UNIT_TOLERANCE) {
                 let expected =
                     format!("unit quaternions (w, x, y, z); that of row {row} has length {length}");
@@ -138,7 +138,7 @@ impl Rotations {
         })
     }
 
-    /// From J2000 to the frame that turns at an instant, on the arc between two rows, and its angular velocity.
+    /// Rotation from J2000 to the rotating frame at an instant, on the arc between two rows, and its angular velocity.
     #[must_use]
     pub fn at(&self, et_s: f64) -> (Matrix3<f64>, Vector3<f64>) {
         let (row, share) = between(&self.et_s, et_s);
@@ -150,7 +150,7 @@ impl Rotations {
     }
 }
 
-/// The rotation that stays; none where the file has none.
+/// The constant rotation; the identity where the file has none.
 fn constant(table: &Object<'_>) -> Result<Matrix3<f64>, IsdError> {
     const KEY: &str = "constant_rotation";
     if !table.has(KEY) {
@@ -160,7 +160,7 @@ fn constant(table: &Object<'_>) -> Result<Matrix3<f64>, IsdError> {
     let skew = (matrix * matrix.transpose() - Matrix3::identity())
         .abs()
         .max();
-    // Written so that NaN is refused too.
+    // Written so that NaN is rejected too.
     if !(skew <= ROTATION_TOLERANCE && matrix.determinant() > 0.0) {
         return Err(table.refused(KEY, "a rotation matrix, row by row"));
     }

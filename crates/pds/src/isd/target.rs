@@ -1,4 +1,4 @@
-//! Whether support data are of a body, and in its frame.
+//! Checks that support data belong to a body, and to its frame.
 
 use super::{ImageSupport, SupportTables};
 use areograph_base::{
@@ -9,13 +9,13 @@ use areograph_base::{
 };
 use areograph_geom::{attitude::rotation_vector, body_rotation::body_rotation};
 
-/// Radii within this are those of the products' frame, metres: files are written to ten metres.
+/// Tolerance of radii against those of the products' frame, metres: files round them to ten metres.
 const RADIUS_TOLERANCE_M: f64 = 10.0;
 
 /// Support data of another body.
 #[derive(Debug, thiserror::Error)]
 pub enum ForeignBody {
-    /// By its number.
+    /// Identified by its code.
     #[error(
         "image {image}: naif_keywords.BODY_CODE is {code}; expected {}, {}",
         .body.naif().body,
@@ -26,10 +26,10 @@ pub enum ForeignBody {
         image: String,
         /// The body that was expected.
         body: Body,
-        /// The number of another one in NAIF's kernels.
+        /// NAIF code of the other body.
         code: i64,
     },
-    /// By its radii.
+    /// Identified by its radii.
     #[error(
         "image {image}: radii are {:.2} and {:.2} km; expected {:.2} and {:.2} km, those of {body} in {}",
         .radii_m[0] / METRES_PER_KM,
@@ -43,7 +43,7 @@ pub enum ForeignBody {
         image: String,
         /// The body that was expected.
         body: Body,
-        /// Equatorial and polar radius of another one, metres.
+        /// Equatorial and polar radius of the other body, metres.
         radii_m: [f64; 2],
     },
 }
@@ -63,7 +63,7 @@ impl Cause for ForeignBody {
 }
 
 impl ImageSupport {
-    /// Whether an image, known as `image`, sees `body`.
+    /// Checks that an image, known as `image`, shows `body`.
     ///
     /// # Errors
     /// [`ForeignBody`], with the number or the radii that are not the body's.
@@ -91,7 +91,7 @@ impl ImageSupport {
 }
 
 impl SupportTables {
-    /// What does not agree with the frame of products on `body` at the instant `at`, of the file `name`.
+    /// The remark if the rotation in the file `name` at the instant `at` differs from the frame of products on `body`.
     #[must_use]
     pub fn frame_remark(&self, body: Body, name: &str, at: Et) -> Option<String> {
         let rotation = &self.body_rotation;
@@ -103,7 +103,7 @@ impl SupportTables {
             return None;
         }
         Some(format!(
-            "the support data {name} turn {body} by {:.1} m on the equator against {}; positions are taken in their frame",
+            "the support data {name} rotate {body} by {:.1} m at the equator against {}; positions are in their frame",
             turn_rad * body.model().equatorial_radius_m,
             body.names().short_frame
         ))

@@ -1,4 +1,4 @@
-//! Impossible values: what no record of a healthy file holds, whatever stands around it.
+//! Impossible values: those that no valid record contains, independent of its neighbours.
 
 use zerocopy::byteorder::big_endian::I32;
 
@@ -16,14 +16,14 @@ use areograph_base::{
 };
 
 impl Record {
-    /// Whether shot `shot` (0 to 19) came back.
+    /// Whether shot `shot` (0 to 19) has a return.
     #[must_use]
     pub fn returned(&self, shot: usize) -> bool {
         self.range_cm[shot].get() > 0
     }
 
-    /// Whether laser shot `shot` (0 to 19) and the mid-point that its parallax counts from have radii
-    /// that a return can have.
+    /// Whether laser shot `shot` (0 to 19) and the mid-point to which its parallax refers have possible radii of a
+    /// return.
     #[must_use]
     pub fn radius_is_possible(&self, shot: usize) -> bool {
         [self.shot_radius_cm[shot], self.mid_radius_cm]
@@ -31,7 +31,7 @@ impl Record {
             .all(|radius_cm| RADIUS_CM.contains(&radius_cm.get()))
     }
 
-    /// Checks what makes the whole frame unusable when wrong.
+    /// Checks values that make the whole frame unusable if wrong.
     ///
     /// # Errors
     /// The first impossible value.
@@ -143,7 +143,7 @@ impl Record {
             let [east_rad, north_rad] =
                 changes.map(|change| f64::from(change) * RADIANS_PER_MICRODEGREE);
             let latitude_rad = f64::from(latitude.get()) * RADIANS_PER_MICRODEGREE;
-            // On the parallel that is nearest to the pole over the frame, the way is shortest.
+            // The displacement is shortest on the parallel nearest to the pole over the frame.
             let parallel = (latitude_rad.abs() + 0.5 * north_rad.abs()).cos().max(0.0);
             let metres = radius_m * (east_rad * parallel).hypot(north_rad);
             let [longitude_microdegrees, latitude_microdegrees] = changes;
@@ -224,7 +224,7 @@ mod tests {
         .unwrap()
     }
 
-    /// Spoils a good record and returns what is said of it.
+    /// Damages a valid record and returns the resulting message.
     fn said(spoil: impl Fn(&mut Record)) -> (Reason, String) {
         let mut record = good();
         spoil(&mut record);

@@ -1,13 +1,13 @@
-//! Frames in the order of time, each shot once: wild times, repeated blocks, resumed downloads.
+//! Frames in order of time, each shot once: outlying times, repeated blocks, resumed downloads.
 
 use std::collections::BTreeMap;
 
 use super::bounds::APART_S;
 
-/// As many successive records that go on in time are a block at the wrong place, not wild times.
+/// This many successive records with continuous times are a misplaced block rather than outlying times.
 const BLOCK: usize = 4;
 
-/// What is wrong with the place of a record.
+/// Fault in the position of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Misplaced {
     /// Its time does not fit those around it.
@@ -16,7 +16,7 @@ pub(super) enum Misplaced {
     Repeats(usize),
 }
 
-/// Whether these frames follow each other without sharing a shot: then none of them is misplaced.
+/// Whether these frames are in order of time without common shots; then none of them is misplaced.
 pub(super) fn in_order(times_s: impl IntoIterator<Item = f64>) -> bool {
     let mut last_s = f64::NEG_INFINITY;
     times_s.into_iter().all(|time_s| {
@@ -26,10 +26,10 @@ pub(super) fn in_order(times_s: impl IntoIterator<Item = f64>) -> bool {
     })
 }
 
-/// The rows whose times do not fit into the chronology of the file; `None`: a record without a time that counts.
+/// The rows whose times do not fit into the chronology of the file; `None` stands for a record without a valid time.
 ///
-/// What stays is the longest chain of frames that follow each other without sharing a shot. Of a block at the wrong
-/// place that repeats nothing only the first record is told: the others are good ones.
+/// The longest chain of successive frames without common shots is kept. Of a misplaced block without repeated shots
+/// only the first record is reported: the others are valid.
 pub(super) fn misplaced(times_s: &[Option<f64>]) -> BTreeMap<usize, Misplaced> {
     let sound: Vec<(usize, f64)> = times_s
         .iter()
@@ -47,7 +47,7 @@ pub(super) fn misplaced(times_s: &[Option<f64>]) -> BTreeMap<usize, Misplaced> {
             tell(&mut found, &mut block);
             continue;
         }
-        // Those kept are in order of time: the first one that could share a shot.
+        // Kept frames are in order of time: the first one that could share a shot.
         let at = kept.partition_point(|kept| sound[*kept].1 <= time_s - APART_S);
         match kept.get(at).map(|kept| sound[*kept]) {
             Some((first, kept_s)) if kept_s < time_s + APART_S => {
@@ -69,7 +69,7 @@ pub(super) fn misplaced(times_s: &[Option<f64>]) -> BTreeMap<usize, Misplaced> {
     found
 }
 
-/// Enters records that are out of order and follow each other, and forgets them.
+/// Enters successive records that are out of order, and clears them.
 fn tell(found: &mut BTreeMap<usize, Misplaced>, block: &mut Vec<(usize, f64)>) {
     let told = if block.len() < BLOCK { block.len() } else { 1 };
     found.extend(
@@ -81,10 +81,10 @@ fn tell(found: &mut BTreeMap<usize, Misplaced>, block: &mut Vec<(usize, f64)>) {
     block.clear();
 }
 
-/// Indices of a longest chain of times of which each is `APART_S` or more after the one before; of several chains the
-/// one whose records come first.
+/// Indices of a longest chain of times that are `APART_S` or more apart; of several chains, the one with the earliest
+/// records.
 fn longest_chain(sound: &[(usize, f64)]) -> Vec<usize> {
-    // By length of chain, the index that ends one earliest; and for every index the one before it in its chain.
+    // By length of chain, the index that ends one earliest; and for every index, its predecessor in its chain.
     let mut ends: Vec<usize> = Vec::new();
     let mut before: Vec<Option<usize>> = Vec::with_capacity(sound.len());
     for (index, (_, time_s)) in sound.iter().enumerate() {
@@ -111,7 +111,7 @@ mod tests {
     use super::*;
     use Misplaced::{Order, Repeats};
 
-    /// What is said of frames at these multiples of 2 s.
+    /// Faults of frames at these multiples of 2 s.
     fn said(frames: &[f64]) -> Vec<(usize, Misplaced)> {
         let times_s: Vec<Option<f64>> = frames.iter().map(|frame| Some(2.0 * frame)).collect();
         misplaced(&times_s).into_iter().collect()
@@ -139,7 +139,7 @@ mod tests {
         // A download that was resumed two frames too early.
         let resumed = [1.0, 2.0, 3.0, 4.0, 3.0, 4.0, 5.0, 6.0];
         assert_eq!(said(&resumed), [(4, Repeats(2)), (5, Repeats(3))]);
-        // A block twice, and one that was written over another.
+        // A duplicate block, and one that overwrote another.
         assert_eq!(said(&[1.0, 2.0, 1.0, 2.0, 3.0]).len(), 2);
         assert_eq!(
             said(&[1.0, 2.0, 3.0, 1.0, 2.0, 6.0, 7.0]),

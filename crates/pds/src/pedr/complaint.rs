@@ -1,4 +1,4 @@
-//! What is wrong with a file but does not stop it from being read.
+//! Faults of a file that do not prevent it from being read.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Reason;
 
-/// One finding in a file; the rest of the file is kept.
+/// A fault in a file; the rest of the file is kept.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Complaint {
     /// Name of the file, without folders.
@@ -15,18 +15,18 @@ pub struct Complaint {
     pub record: Option<u32>,
     /// Reason code, for counts.
     pub reason: Reason,
-    /// What was found and what was expected.
+    /// The value found and the value expected.
     pub text: String,
 }
 
 impl Complaint {
-    /// Whether it depends on more records than the few around it, so that a stretch of the file cannot tell.
+    /// Whether it depends on more records than the adjacent ones, so that a stretch of the file cannot determine it.
     #[must_use]
     pub const fn is_of_many_records(&self) -> bool {
         matches!(self.reason, Reason::TimeOrder | Reason::Repeated)
     }
 
-    /// Whether shots of a record are left out for it that are nowhere else.
+    /// Whether shots of a record are left out that no other record contains.
     #[must_use]
     pub fn leaves_out(&self) -> bool {
         self.record.is_some() && !self.is_of_many_records()

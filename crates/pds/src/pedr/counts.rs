@@ -1,4 +1,4 @@
-//! What the shots of a file are, in numbers, and whether its ranges are those of its own positions.
+//! Statistics of the shots of a file, and the agreement of its ranges with its own positions.
 
 use std::collections::BTreeMap;
 
@@ -7,19 +7,19 @@ use serde::Serialize;
 use super::{Complaint, FieldGuard, File, SHOTS};
 use areograph_geom::statistics::Summary;
 
-/// Attitude flags below this one stand for a footprint where the beam went.
+/// Below this attitude flag the footprint is where the beam pointed.
 const NO_ATTITUDE: u16 = 2;
 
-/// Counts of a file. Those by class, channel, flag and model are of returned shots that nothing is wrong with.
+/// Counts of a file. Those by class, channel, flag and model include valid returned shots only.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Counts {
     /// Records.
     pub records: u64,
-    /// Records that nothing is wrong with as a whole.
+    /// Records without a fault of the whole frame.
     pub good_records: u64,
     /// Shots of good records.
     pub shots: u64,
-    /// Shots of good records that did not come back.
+    /// Shots of good records without a return.
     pub without_return: u64,
     /// Returned shots of good records whose values contradict each other.
     pub spoiled_shots: u64,
@@ -43,10 +43,10 @@ pub struct Counts {
 }
 
 impl File {
-    /// Counts the shots of the file, and tells everything that is wrong with it, in the order of records.
+    /// Counts the shots of the file, and reports all faults in order of records.
     #[must_use]
     pub fn count(&self) -> (Counts, Vec<Complaint>) {
-        /// Records that are judged at a time.
+        /// Records checked at a time.
         const STEP: usize = 4_096;
         let guard = FieldGuard::new(self.label().software_version);
         let mut complaints = self.label_complaints().to_vec();

@@ -1,4 +1,4 @@
-//! Physical values of a frame to a record.
+//! Conversion of the physical values of a frame to a record.
 
 use zerocopy::{
     FromZeros,
@@ -14,7 +14,7 @@ const RADIANS_PER_ANGLE_COUNT: f64 = 1e-4;
 const TURN_MICRODEGREES: i32 = 360_000_000;
 
 impl Record {
-    /// The record of these values; unknown bytes and instrument settings are zero.
+    /// The record of these values; undocumented bytes and instrument settings are zero.
     ///
     /// Quantisation: 1e-6° (0.06 m on the ground), 0.01 m, 1e-6 s in the integer times.
     ///
@@ -177,7 +177,7 @@ fn fault(field: &'static str, value: f64, expected: String) -> EncodeError {
     }
 }
 
-/// `value / unit` rounded, when it lies within `least..=most`.
+/// `value / unit` rounded, if it is within `least..=most`.
 fn counts(
     field: &'static str,
     value: f64,
@@ -254,7 +254,7 @@ fn microdegrees(field: &'static str, angle_rad: f64) -> Result<I32, EncodeError>
     scaled_i32(field, angle_rad, RADIANS_PER_MICRODEGREE).map(I32::new)
 }
 
-/// East longitude, brought into `0..360` degrees.
+/// East longitude, wrapped into `0..360` degrees.
 fn longitude(field: &'static str, longitude_rad: f64) -> Result<I32, EncodeError> {
     let microdegrees = scaled_i32(field, longitude_rad, RADIANS_PER_MICRODEGREE)?;
     Ok(I32::new(microdegrees.rem_euclid(TURN_MICRODEGREES)))

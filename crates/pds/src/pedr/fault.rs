@@ -1,10 +1,10 @@
-//! What can be wrong with a record, with its value and what was expected.
+//! Faults of a record, with the value found and the value expected.
 
 use serde::{Deserialize, Serialize};
 
 use super::{bounds, quantity::Quantity};
 
-/// Why a file or record is complained of.
+/// Reason code of a complaint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reason {
@@ -12,55 +12,55 @@ pub enum Reason {
     TruncatedLabel,
     /// The label cannot be read.
     UnreadableLabel,
-    /// The label lacks what every PEDR says, or says something else.
+    /// A keyword of the label is missing, or differs from that of every PEDR.
     LabelKeyword,
-    /// The label states another number of records than the file holds.
+    /// The label states a number of records that differs from the file's.
     RecordCount,
     /// The file ends within a record.
     TrailingBytes,
-    /// A time is no number, outside the mission, or the two times of the record disagree.
+    /// A time is not finite, outside the mission, or the two times of the record disagree.
     Time,
     /// Times do not increase.
     TimeOrder,
-    /// The shots of another record once more.
+    /// The record repeats the shots of another record.
     Repeated,
     /// The clock frequency is far from 100 MHz.
     Frequency,
     /// A latitude lies beyond a pole.
     Latitude,
-    /// A longitude is of no turn that the format has.
+    /// A longitude is outside the turns that the format has.
     Longitude,
-    /// The ground track or the spacecraft is faster than it can be.
+    /// The ground track or the spacecraft is faster than possible.
     Track,
-    /// The spacecraft is inside Mars or far away.
+    /// The spacecraft is inside Mars or far from it.
     SpacecraftRadius,
     /// A return comes from deep inside or high above Mars.
     Radius,
-    /// The range is not the distance from the spacecraft to the footprint.
+    /// The range differs from the distance between spacecraft and footprint.
     Distance,
-    /// Parallax does not go along the beam.
+    /// Parallax does not follow the beam.
     Parallax,
-    /// The crossover residual is larger than orbits are wrong.
+    /// The crossover residual exceeds any orbit error.
     Crossover,
-    /// The areoid, or its slope, is not that of Mars.
+    /// The areoid, or its slope, is impossible on Mars.
     Areoid,
     /// The off-nadir angle points away from Mars.
     OffNadir,
-    /// The orbit or its model is not that of the neighbouring records.
+    /// The orbit or its model differs from that of the neighbouring records.
     Orbit,
-    /// The record does not lie between its neighbours.
+    /// The record does not fit between its neighbours.
     Neighbours,
-    /// The row of a table is no shot.
+    /// The row of a table is not a shot.
     Row,
 }
 
 /// An impossible value in a record.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum RecordError {
-    /// The double is no number.
+    /// The double is not finite.
     #[error("time is {0}; expected seconds past J2000")]
     NoTime(f64),
-    /// The spacecraft was not at Mars then.
+    /// The spacecraft was not at Mars at this time.
     #[error(
         "time is ET {} s; expected {} to {} s, the mission at Mars",
         legible(*.0), bounds::MISSION_S.start(), bounds::MISSION_S.end()
@@ -74,10 +74,10 @@ pub enum RecordError {
         /// From the two integers, ET seconds.
         integers_s: f64,
     },
-    /// The record is not between its neighbours.
+    /// The record is out of order with its neighbours.
     #[error("time is {} s, out of order with the neighbouring records", legible(*.0))]
     Order(f64),
-    /// The same shots stand in another record of the file.
+    /// Another record of the file contains the same shots.
     #[error(
         "time is {time_s} s, which repeats the shots of record {record}; expected every shot once, frames {} s or more apart",
         bounds::APART_S
@@ -85,7 +85,7 @@ pub enum RecordError {
     Repeated {
         /// Mid-point, ET seconds.
         time_s: f64,
-        /// The record that has them first, counted as in complaints.
+        /// The record that contains them first, counted as in complaints.
         record: u32,
     },
     /// Clock frequency, hertz.
@@ -107,7 +107,7 @@ pub enum RecordError {
         /// The value of the record.
         microdegrees: i32,
     },
-    /// Way of the ground track or of the spacecraft over the frame.
+    /// Displacement of the ground track or of the spacecraft over the frame.
     #[error(
         "{whose} moves by {longitude_microdegrees} microdegrees of longitude and {latitude_microdegrees} of latitude \
          over the frame, {metres:.0} m; expected at most {limit_m} m"
@@ -119,9 +119,9 @@ pub enum RecordError {
         longitude_microdegrees: i32,
         /// Change of latitude.
         latitude_microdegrees: i32,
-        /// Length of the way, metres.
+        /// Length of the displacement, metres.
         metres: f64,
-        /// Longest possible way, metres.
+        /// Longest possible displacement, metres.
         limit_m: f64,
     },
     /// Distance of the spacecraft, centimetres.
@@ -143,7 +143,7 @@ pub enum RecordError {
         /// The value of the record.
         centimetres: i32,
     },
-    /// The radius that parallax counts from lies far from every return.
+    /// The radius to which parallax refers differs widely from every return.
     #[error(
         "radius of the mid-point is {centimetres} cm, {apart_m:.0} m from that of the nearest return; expected at most \
          {} m",
@@ -216,19 +216,19 @@ pub enum RecordError {
         /// That of its neighbours.
         expected: u32,
     },
-    /// A value that does not continue that of a neighbour.
+    /// A value that is not continuous with that of a neighbour.
     #[error(
         "{} is {value} {}, {apart:.1} {} from the extrapolation of record {record}; expected at most {limit:.1} {}",
         .quantity.name(), .quantity.unit(), .quantity.step_unit(), .quantity.step_unit()
     )]
     Neighbours {
-        /// What does not continue.
+        /// The discontinuous quantity.
         quantity: Quantity,
         /// The value of the record.
         value: f64,
-        /// How far it is off.
+        /// Deviation from the extrapolation.
         apart: f64,
-        /// How far it can be off.
+        /// Largest possible deviation.
         limit: f64,
         /// The neighbour, counted as in complaints.
         record: u32,
@@ -236,7 +236,7 @@ pub enum RecordError {
 }
 
 impl RecordError {
-    /// The code under which it is counted.
+    /// The reason code under which it is counted.
     #[must_use]
     pub const fn reason(&self) -> Reason {
         match self {
@@ -260,7 +260,8 @@ impl RecordError {
     }
 }
 
-/// The number, in powers of ten where no clock of ours counts so far or so finely: a spoiled double has 300 digits.
+/// Seconds as text, in powers of ten where they exceed the range or resolution of the clocks: a damaged double has 300
+/// digits.
 fn legible(seconds: f64) -> String {
     if matches!(seconds.abs(), 0.0 | 1e-9..1e12) {
         seconds.to_string()

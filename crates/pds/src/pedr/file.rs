@@ -1,4 +1,4 @@
-//! A PEDR file: its label, its records, and what is wrong with it.
+//! A PEDR file: its label, its records, and their faults.
 
 use std::{
     collections::BTreeMap,
@@ -21,11 +21,11 @@ use areograph_store::files::file_name;
 #[derive(Debug)]
 pub struct File {
     path: PathBuf,
-    /// The label's bytes and then those of records.
+    /// The bytes of the label, followed by those of records.
     bytes: Vec<u8>,
-    /// Bytes that the whole file has.
+    /// Length of the whole file, bytes.
     length: u64,
-    /// Row of the file that is the first in memory.
+    /// Row of the file that is the first one in memory.
     first_row: usize,
     name: Option<FileName>,
     label: PedrLabel,
@@ -36,7 +36,7 @@ pub struct File {
     misplaced: OnceLock<Chronology>,
 }
 
-/// A bad record, and what is wrong with it.
+/// An invalid record, and its fault.
 #[derive(Debug)]
 pub(super) struct Bad {
     row: usize,
@@ -44,13 +44,13 @@ pub(super) struct Bad {
     error: RecordError,
 }
 
-/// Records that are judged at a time.
+/// Records checked at a time.
 const STEP: usize = 1_024;
 
 /// Rows of a file that do not fit into its chronology.
 pub(super) type Chronology = Arc<BTreeMap<usize, Misplaced>>;
 
-/// The path names something that cannot hold records.
+/// A path that does not name a regular file.
 #[derive(Debug, thiserror::Error)]
 #[error("not a regular file")]
 struct NotAFile;
@@ -65,7 +65,7 @@ impl Cause for NotAFile {
     }
 }
 
-/// A file without a single good record.
+/// A file without a valid record.
 #[derive(Debug, thiserror::Error)]
 #[error("no valid record: {why}")]
 struct NoGoodRecord {
@@ -88,9 +88,9 @@ impl Cause for NoGoodRecord {
     }
 }
 
-/// Opens a file that can hold records.
+/// Opens a regular file.
 pub(super) fn open_regular(path: &Path) -> Result<fs::File> {
-    // Asked before opening: opening a pipe would wait for its writer.
+    // Checked before opening: opening a pipe would wait for its writer.
     let metadata = fs::metadata(path)
         .map_err(IoError::on("open"))
         .in_file(path)?;
@@ -110,7 +110,7 @@ impl File {
         Self::of_length(bytes, length, name.to_owned())
     }
 
-    /// A file of `length` bytes of which these are the first: at least those of the label, or all.
+    /// A file of `length` bytes whose first bytes are given: at least those of the label, or all.
     pub(super) fn of_length(bytes: Vec<u8>, length: u64, path: PathBuf) -> Self {
         let mut file = Self {
             name: FileName::parse(&path),
@@ -127,8 +127,8 @@ impl File {
         file
     }
 
-    /// The same file with the records from row `first_row` on in memory: `bytes` holds them after as many bytes as the
-    /// label has. What does not fit into the chronology is told by the records in memory, unless `misplaced` says it.
+    /// The same file with the records from row `first_row` on in memory: `bytes` contains them after as many bytes as
+    /// the label has. The chronology is `misplaced`, or else that of the records in memory.
     pub(super) fn with_records(
         &self,
         first_row: usize,
@@ -148,7 +148,7 @@ impl File {
         }
     }
 
-    /// The bytes of the label, as many as the file has of them.
+    /// The bytes of the label, as far as the file contains them.
     #[must_use]
     pub fn label_bytes(&self) -> &[u8] {
         &self.bytes[..self.bytes.len().min(self.label_length())]
@@ -216,26 +216,26 @@ impl File {
         &self.label
     }
 
-    /// Complaints of the label: they come before those of records.
+    /// Complaints about the label, which precede those about records.
     #[must_use]
     pub fn label_complaints(&self) -> &[Complaint] {
         &self.label_complaints
     }
 
-    /// Where the file lies.
+    /// Path of the file.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Data records of the whole file, as many as its size has room for, whatever the label says.
+    /// Number of data records of the whole file by its size, independent of the label.
     #[must_use]
     pub fn record_count(&self) -> usize {
         let data = self.length.saturating_sub(self.label_length() as u64);
         usize::try_from(data / RECORD_BYTES as u64).unwrap_or(usize::MAX)
     }
 
-    /// The complaint of bytes after the last whole record, if there are any.
+    /// The complaint about bytes after the last whole record, if any.
     #[must_use]
     pub fn trailing_complaint(&self) -> Option<Complaint> {
         let data = self.length.checked_sub(self.label_length() as u64)?;
@@ -251,7 +251,7 @@ impl File {
         })
     }
 
-    /// The complaint of the record in row `row`, counted from 0.
+    /// The complaint about the record in row `row`, counted from 0.
     #[must_use]
     pub fn record_complaint(&self, row: usize, error: &RecordError) -> Complaint {
         self.complaint(
@@ -261,7 +261,7 @@ impl File {
         )
     }
 
-    /// The data records in memory, as many as there is room for, whatever the label says.
+    /// The data records in memory.
     #[must_use]
     pub fn records(&self) -> &[Record] {
         Record::slice_of(self.bytes.get(self.label_length()..).unwrap_or_default())
@@ -278,10 +278,10 @@ impl File {
         &self.records()[row - self.first_row]
     }
 
-    /// Makes sure that there is at least one good record in memory; a file of another kind holds none.
+    /// Checks that at least one valid record is in memory; a file of another kind contains none.
     ///
     /// # Errors
-    /// Of what kind the file is instead, what is wrong with the label, else with the first record.
+    /// The actual kind of the file, or the fault of the label, or else of the first record.
     pub fn require_records(&self) -> Result<()> {
         let mut first = None;
         for row in self.rows().step_by(STEP) {
@@ -292,7 +292,7 @@ impl File {
         Err(self.no_good_record(first))
     }
 
-    /// The first good record of these rows; without one, `first` is the first bad one of all that were looked at.
+    /// The first valid record of these rows; without one, `first` is the first invalid one of all examined.
     pub(super) fn good_record(
         &self,
         rows: Range<usize>,
@@ -314,7 +314,7 @@ impl File {
         None
     }
 
-    /// The failure of a file without a good record, of which this is the first, with what is wrong with it.
+    /// The failure of a file without a valid record, with its first invalid record and the fault.
     pub(super) fn no_good_record(&self, first: Option<Bad>) -> Error {
         let record = first.as_ref().map(|bad| &bad.record);
         let foreign = Foreign::of(&self.bytes, record);
@@ -339,7 +339,7 @@ impl File {
     /// Rows that do not fit into the chronology of the file.
     pub(super) fn misplaced(&self) -> &BTreeMap<usize, Misplaced> {
         self.misplaced.get_or_init(|| {
-            // Told faster, and true of nearly every file.
+            // A faster test, which nearly every file passes.
             if in_order(self.records().iter().map(|record| record.time_s.get())) {
                 return Chronology::default();
             }

@@ -1,22 +1,22 @@
-//! Files that are not what a PEDR is, though near to it: compressed, swapped, text; and where records begin.
+//! Files that resemble a PEDR: compressed, byte-swapped, text; and the start of records.
 
 use std::fmt;
 
 use super::{FieldGuard, LABEL_RECORDS, RECORD_BYTES, Record};
 
-/// What a file without a good record is instead.
+/// Actual kind of a file without a valid record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Foreign {
     /// Compressed by gzip.
     Gzip,
     /// Integers with the least significant byte first.
     LittleEndian,
-    /// Text where records should be.
+    /// Text in place of records.
     Text,
 }
 
 impl Foreign {
-    /// What a file is by its first bytes and its first data record.
+    /// The kind of a file by its first bytes and its first data record.
     pub(super) fn of(bytes: &[u8], first: Option<&Record>) -> Option<Self> {
         if bytes.starts_with(&[0x1f, 0x8b]) {
             return Some(Self::Gzip);
@@ -30,7 +30,7 @@ impl Foreign {
         (bytes.iter().all(text) && !blank).then_some(Self::Text)
     }
 
-    /// What to do with it.
+    /// Advice for the user.
     pub(super) const fn advice(self) -> &'static str {
         match self {
             Self::Gzip => "decompress it (gunzip), and name the resulting file",
@@ -52,7 +52,7 @@ impl fmt::Display for Foreign {
     }
 }
 
-/// Whether both times and the clock frequency of a record make sense with their bytes swapped.
+/// Whether both times and the clock frequency of a record are plausible with swapped bytes.
 fn is_swapped(bytes: &[u8; RECORD_BYTES]) -> bool {
     let field = |at: usize| {
         let mut four = [0; 4];
@@ -71,7 +71,7 @@ fn is_swapped(bytes: &[u8; RECORD_BYTES]) -> bool {
     swapped.check_time().is_ok()
 }
 
-/// Records that the label takes: ten, unless sound records begin earlier, where the label says so or at once.
+/// Records of the label: ten, unless valid records begin earlier, where the label states or at the start.
 pub(super) fn label_records(
     bytes: &[u8],
     stated: Option<usize>,

@@ -15,7 +15,7 @@ const CYCLES_PER_SHOT: f64 = 1e7;
 /// Middle of the shots counted from 0: the mid-point of the frame.
 const MIDDLE: f64 = 9.5;
 
-/// Whether the fields that came with later software versions hold what their names say.
+/// Whether fields introduced by later software versions contain the values that their names state.
 ///
 /// # Source
 /// `pedr2tab`: no crossover residual below version 7.125; parallax and crossover only with an orbit
@@ -26,7 +26,7 @@ pub struct FieldGuard {
 }
 
 impl FieldGuard {
-    /// The guard of a software version; one that is not known counts as new, like every version-L file.
+    /// The guard of a software version; an unknown version counts as new, as in every version-L file.
     #[must_use]
     pub fn new(software_version: Option<f64>) -> Self {
         Self {
@@ -84,10 +84,10 @@ pub struct Frame<'a> {
 impl<'a> Frame<'a> {
     /// The frame of a record that passed its checks.
     ///
-    /// A frame without a residual is not corrected at all, whatever stands before it.
+    /// A frame without a residual is not corrected, whatever precedes it.
     ///
-    /// * `crossover_before_m` – residual of the frame before, metres; for the first frame of a file that of the
-    ///   mirrored next one; `None` when there is none, which takes the residual as constant
+    /// * `crossover_before_m` – residual of the preceding frame, metres; for the first frame of a file that of the
+    ///   mirrored next one; `None` if there is none, in which case the residual is constant
     #[must_use]
     pub fn new(record: &'a Record, guard: FieldGuard, crossover_before_m: Option<f64>) -> Self {
         let parallax = |field: I32| {
@@ -140,7 +140,7 @@ impl<'a> Frame<'a> {
         self.crossover.change
     }
 
-    /// Change of longitude and latitude with radius, radians per metre; `None` in records that lack it.
+    /// Change of longitude and latitude with radius, radians per metre; `None` in records without parallax.
     pub(super) fn parallax_rad_per_m(&self) -> Option<[f64; 2]> {
         let parallax = [
             self.parallax_longitude_rad_per_m,
@@ -149,9 +149,9 @@ impl<'a> Frame<'a> {
         self.has_parallax.then_some(parallax)
     }
 
-    /// No shot lies farther from the mid-point than this, radians of great circle.
+    /// Largest great-circle distance of a shot from the mid-point, radians.
     ///
-    /// A step in latitude and one in longitude are together never shorter than the great circle.
+    /// The sum of the steps in latitude and longitude is never shorter than the great circle.
     #[must_use]
     pub fn reach_rad(&self) -> f64 {
         let relief_m = (0..SHOTS)
@@ -162,8 +162,8 @@ impl<'a> Frame<'a> {
                 * (self.parallax_longitude_rad_per_m.abs() + self.parallax_latitude_rad_per_m.abs())
     }
 
-    /// Height of a returned shot (counted from 0) above the radius that parallax counts from, metres;
-    /// 0 for one that did not return, or has an impossible radius.
+    /// Height of a returned shot (counted from 0) above the radius to which parallax refers, metres; 0 for a shot
+    /// without a return or with an impossible radius.
     fn relief_m(&self, shot: usize) -> f64 {
         if self.record.returned(shot) && self.record.radius_is_possible(shot) {
             metres(self.record.shot_radius_cm[shot]) - self.mid_radius_m
@@ -174,7 +174,7 @@ impl<'a> Frame<'a> {
 
     /// Shot `shot`, counted from 1 to 20; `None` outside.
     ///
-    /// Its `file`, `record` and `windows` are 0 and its `et_s` is the tag: they are the caller's.
+    /// Its `file`, `record` and `windows` are 0 and its `et_s` is the tag; the caller sets them.
     #[must_use]
     pub fn shot(&self, shot: u8) -> Option<Footprint> {
         let index = usize::from(shot)
@@ -232,7 +232,7 @@ fn metres(centimetres: I32) -> f64 {
     f64::from(centimetres.get()) * METRES_PER_CM
 }
 
-/// The same direction with longitude in `0..2π`, a latitude beyond a pole brought down its other side.
+/// The same direction with longitude in `0..2π`; a latitude beyond a pole is folded back.
 fn on_the_sphere(longitude_rad: f64, latitude_rad: f64) -> (f64, f64) {
     if latitude_rad.abs() <= FRAC_PI_2 {
         return (wrap_two_pi(longitude_rad), latitude_rad);

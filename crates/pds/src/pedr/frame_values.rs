@@ -1,4 +1,4 @@
-//! Physical values of a frame, as a writer knows them.
+//! Physical values of a frame, as input of a writer.
 
 use super::SHOTS;
 use areograph_base::error::{Cause, Kind};
@@ -11,7 +11,7 @@ pub struct EncodeError {
     pub field: &'static str,
     /// Its value in SI units.
     pub value: f64,
-    /// What the field can hold.
+    /// Expected value.
     pub expected: String,
 }
 
@@ -29,7 +29,7 @@ impl Cause for EncodeError {
 /// A frame in metres, radians and seconds, for [`super::Record::from_frame`].
 ///
 /// `*_change*` is the change over the whole frame of 20 shots; arrays run over shots 1 to 20.
-/// What is left at its default becomes zero in the record.
+/// Fields left at their defaults become zero in the record.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FrameValues {
     /// Mid-point of the frame, ET seconds.
@@ -68,7 +68,7 @@ pub struct FrameValues {
     pub areoid_radius_change_m: f64,
     /// Crossover residual at mid-point, metres, to be subtracted from radii.
     pub crossover_residual_m: f64,
-    /// Planetary radius at mid-point, metres; parallax counts from it.
+    /// Planetary radius at mid-point, metres; parallax refers to it.
     pub mid_radius_m: f64,
     /// Range at mid-point, metres.
     pub mid_range_m: f64,
@@ -88,7 +88,7 @@ pub struct FrameValues {
     pub packet: u16,
     /// 3: no attitude, 2: partly, 0: attitude known.
     pub attitude_flag: u16,
-    /// 0: orbit from JPL; 1 or more: MOLA team; parallax and crossover count from 3 on whatever the version.
+    /// 0: orbit from JPL; 1 or more: MOLA team; from 3 on parallax and crossover are valid in every version.
     pub orbit_quality: u16,
     /// Off-nadir angle of the laser, radians.
     pub off_nadir_rad: f64,

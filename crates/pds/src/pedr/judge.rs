@@ -1,8 +1,9 @@
-//! The records of a file judged: by themselves, by the file's chronology, by their neighbours.
+//! Checks of the records of a file: each on its own, by the file's chronology, and by its neighbours.
 //!
-//! A record is judged here and nowhere else: by itself (`check`), by the chronology of the file, and by its neighbours;
-//! `spoiled_shots` marks single shots of a good frame. A bad record is a complaint with file and record, counted in the
-//! manifest, and good records are kept. `docs/records.md` has the bounds, and the errors that they cannot detect.
+//! Records are checked only here: individually (`check`), by the chronology of the file, and by their neighbours;
+//! `spoiled_shots` marks single shots of a valid frame. An invalid record becomes a complaint with file and record,
+//! counted in the manifest; valid records are kept. `docs/records.md` has the bounds, and the errors that they cannot
+//! detect.
 
 use std::ops::Range;
 
@@ -12,14 +13,14 @@ use super::{
     neighbours::{Comparison, NEIGHBOURS},
 };
 
-/// Frames that follow each other begin at most this much apart, seconds: else one is missing between them.
+/// Largest time between the starts of adjoining frames, seconds; beyond it a frame is missing.
 const ADJOINING_S: f64 = 3.0;
 
 impl File {
-    /// The frames of some rows of the file, counted from 0, each with its row and decoded with its neighbours in
-    /// the file, or with the impossible value that spoils it. Rows that are not in memory are left out.
+    /// The frames of some rows of the file, counted from 0, each with its row and decoded with its neighbours in the
+    /// file, or with the impossible value that invalidates it. Rows that are not in memory are left out.
     ///
-    /// Of a good frame single shots may still be spoiled: [`Frame::spoiled_shots`].
+    /// Single shots of a valid frame may still be spoiled: [`Frame::spoiled_shots`].
     pub fn frames(
         &self,
         rows: Range<usize>,
@@ -41,7 +42,7 @@ impl File {
         })
     }
 
-    /// What is wrong with the records of some rows.
+    /// Faults of the records in some rows.
     fn judge(&self, rows: Range<usize>, guard: FieldGuard) -> Vec<Option<RecordError>> {
         let comparison = Comparison {
             guard,
@@ -77,7 +78,7 @@ impl File {
         errors
     }
 
-    /// Times of the records in memory, of those without an impossible value.
+    /// Times of the records in memory without impossible values.
     pub(super) fn sound_times(&self) -> impl Iterator<Item = Option<f64>> {
         let (mapping, guard) = (self.is_mapping(), self.guard());
         let records = self.records().iter();
@@ -87,9 +88,9 @@ impl File {
         })
     }
 
-    /// Crossover residual of the frame before row `row`, metres, when that frame is good and adjoins.
+    /// Crossover residual of the frame before row `row`, metres, if that frame is valid and adjoins.
     ///
-    /// Before the first frame stands its next one mirrored, `x₁ − (x₂ − x₁)`, as in `pedr2tab`.
+    /// The first frame is preceded by its next one mirrored, `x₁ − (x₂ − x₁)`, as in `pedr2tab`.
     fn crossover_before_m(
         &self,
         row: usize,

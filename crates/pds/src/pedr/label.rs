@@ -1,4 +1,4 @@
-//! What a PEDR file's name and label say, and which datum follows from them.
+//! Name and label of a PEDR file, and the datum that follows from them.
 
 use std::path::Path;
 
@@ -45,7 +45,7 @@ impl FileName {
     }
 }
 
-/// What the attached label says; anything may be missing.
+/// Contents of the attached label; any may be missing.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PedrLabel {
     /// Version of the software that made the file.
@@ -54,21 +54,21 @@ pub struct PedrLabel {
     pub product_id: Option<String>,
     /// Data set.
     pub data_set_id: Option<String>,
-    /// The datum that the label names, when it names one and no other.
+    /// The datum named in the label, if it names only one.
     pub datum: Option<Datum>,
-    /// Records of the file with those of the label; the archive often writes `UNK`.
+    /// Records of the file including those of the label; the archive often writes `UNK`.
     pub file_records: Option<u64>,
-    /// Records that the label says it takes.
+    /// Records of the label, as the label states.
     pub label_records: Option<usize>,
-    /// What it says of the form of records: `RECORD_TYPE` and `RECORD_BYTES`.
+    /// Record format in the label: `RECORD_TYPE` and `RECORD_BYTES`.
     record_form: [Option<String>; 2],
     /// Whether it begins with the marker of the archive's files.
     has_marker: bool,
 }
 
-/// With these bytes every PEDR begins.
+/// Start of every PEDR.
 const MARKER: &[u8] = b"CCSD3ZF0";
-/// So the data set of every PEDR begins.
+/// Start of the data set identifier of every PEDR.
 const DATA_SET: &str = "MGS-M-MOLA-3-PEDR-L1A";
 
 impl PedrLabel {
@@ -98,7 +98,7 @@ impl PedrLabel {
         self.has_marker
     }
 
-    /// What the label of a PEDR would say otherwise, one sentence each; nothing of a label that says nothing at all.
+    /// Deviations from the label of a PEDR, one sentence each; none for an empty label.
     pub(super) fn departures(&self) -> Vec<String> {
         if *self == Self::default() {
             return Vec::new();
@@ -170,7 +170,7 @@ fn named_datum(label: &Label) -> Option<Datum> {
     only("COORDINATE").or_else(|| only(""))
 }
 
-/// The datums that a text names, written as `IAU1991`, `IAU 1991`, `IAU_1991` or the like.
+/// The datums named in a text, written as `IAU1991`, `IAU 1991`, `IAU_1991` or similar.
 fn datums_in(text: &str) -> Vec<Datum> {
     let letters: String = text.chars().filter(char::is_ascii_alphanumeric).collect();
     let letters = letters.to_ascii_uppercase();
@@ -180,10 +180,10 @@ fn datums_in(text: &str) -> Vec<Datum> {
         .collect()
 }
 
-/// The datum of a file cannot be told, or its sources contradict each other.
+/// The datum of a file is unknown, or its sources contradict each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum DatumError {
-    /// Neither name nor label tell.
+    /// Neither name nor label state it.
     #[error(
         "the datum is unknown: the file name has no version letter A to L and the label names no datum"
     )]
@@ -193,16 +193,16 @@ pub enum DatumError {
     Contradiction {
         /// One source.
         first: DatumSource,
-        /// What it says.
+        /// Datum of that source.
         first_datum: Datum,
         /// The other source.
         second: DatumSource,
-        /// What it says.
+        /// Datum of that source.
         second_datum: Datum,
     },
 }
 
-/// Where a datum is taken from.
+/// Source of a datum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DatumSource {
     /// The version letter of the file name.
@@ -243,11 +243,11 @@ impl Cause for DatumError {
 
 /// The datum of a file's longitudes and latitudes, from its version letter, its label and the configuration.
 ///
-/// Version L is IAU 2000, earlier letters IAU 1991; a label or a stated datum may say IAU 1994 of them,
-/// the other report that "IAU 1991" is taken for. All sources that speak must agree.
+/// Version L is IAU 2000, earlier letters IAU 1991; a label or a configured datum may instead state IAU 1994, which is
+/// also referred to as "IAU 1991". All sources must agree.
 ///
 /// # Errors
-/// No source speaks, or two contradict each other.
+/// No source states a datum, or two contradict each other.
 pub fn decide_datum(
     choice: DatumChoice,
     version: Option<char>,
@@ -281,7 +281,7 @@ pub fn decide_datum(
             }
         }
     }
-    // The later sources are the more exact ones.
+    // Later sources are more specific.
     said.last()
         .map(|(_, datum)| *datum)
         .ok_or(DatumError::Undecided)

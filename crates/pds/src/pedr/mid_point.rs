@@ -1,19 +1,19 @@
-//! Where a frame is, told from a few of its fields: enough to see that it lies far from every window.
+//! Approximate position of a frame from a few of its fields, sufficient to exclude it from distant windows.
 
 use zerocopy::byteorder::big_endian::I32;
 
 use super::{PARALLAX_UNIT_RAD_PER_M, Record, bounds::RELIEF_MAX_M};
 use areograph_base::units::RADIANS_PER_MICRODEGREE;
 
-/// The ground at the mid-point of a frame, and what is around it.
+/// The ground at the mid-point of a frame, and its extent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MidPoint {
     /// East longitude, radians of any turn.
     pub longitude_rad: f64,
     /// Areocentric latitude, radians; beyond a pole in a damaged record.
     pub latitude_rad: f64,
-    /// No shot lies farther from the mid-point than this, radians of great circle: never less than
-    /// [`Frame::reach_rad`](super::Frame::reach_rad), and told without looking at the shots.
+    /// Largest great-circle distance of a shot from the mid-point, radians: at least
+    /// [`Frame::reach_rad`](super::Frame::reach_rad), but computed without the shots.
     pub reach_rad: f64,
 }
 
@@ -48,7 +48,7 @@ mod tests {
         fn the_bound_is_never_less_than_the_reach(
             bytes in proptest::collection::vec(any::<u8>(), RECORD_BYTES),
             software in proptest::option::of(0.0..9.0_f64),
-            // Whatever stands in a damaged record, and radii that a return can have.
+            // For any content of a damaged record, and possible radii of returns.
             radii in proptest::option::of(proptest::collection::vec(330_000_000..=345_000_000, 21)),
         ) {
             let bytes: [u8; RECORD_BYTES] = bytes.try_into().unwrap();

@@ -41,14 +41,14 @@ pub use writer::{LabelInfo, PedrWriter};
 
 use areograph_base::units::RADIANS_PER_DEGREE;
 
-/// Number of the rules by which records are judged and their places told: raised when a record is complained of otherwise
-/// than before, so that an index made by other rules is made anew.
+/// Version of the rules by which records are checked and located. It increases when complaints change, so that indexes
+/// made by other rules are rebuilt.
 pub const RULES: u32 = 2;
 /// Shots in a frame.
 pub const SHOTS: usize = 20;
-/// Records that the attached label takes.
+/// Records of the attached label.
 pub const LABEL_RECORDS: usize = 10;
-/// Bytes that the attached label takes.
+/// Bytes of the attached label.
 pub const LABEL_BYTES: usize = LABEL_RECORDS * RECORD_BYTES;
 /// Unit of the parallax fields, radians per metre.
 const PARALLAX_UNIT_RAD_PER_M: f64 = RADIANS_PER_DEGREE * 1e-9;

@@ -1,46 +1,46 @@
-//! Records against those around them: a single one, or two, that do not continue what goes on before and after.
+//! Comparison of records with their neighbours: one or two records that are not continuous with those before and after.
 //!
-//! Nothing is said of a file that jumps for good, and nothing where no neighbour continues another: then it is not the
-//! records that differ from what is expected.
+//! A file with a permanent jump is not reported, nor one in which no record continues another: then the expectation is
+//! wrong rather than the records.
 
 use std::f64::consts::TAU;
 
 use super::{FieldGuard, Record, RecordError, quantity::Quantity};
 use areograph_base::units::{METRES_PER_CM, RADIANS_PER_DEGREE, RADIANS_PER_MICRODEGREE, wrap_pi};
 
-/// Records on either side that a record is judged with.
+/// Records on either side with which a record is compared.
 pub(super) const NEIGHBOURS: usize = 8;
 /// Nominal length of a frame, seconds.
 const FRAME_S: f64 = 2.0;
-/// Over at most this time a record leads to the next by its rates, seconds.
+/// Largest time over which the rates of a record predict the next one, seconds.
 const NEAR_S: f64 = 10.0;
-/// Over at most this time the spacecraft's way tells the time, seconds: 30 revolutions.
+/// Largest time over which the spacecraft's motion determines the time, seconds: 30 revolutions.
 const FLIGHT_S: f64 = 30.0 * PERIOD_S;
 /// Period of the mapping orbit, and of a turn of Mars, seconds.
 const PERIOD_S: f64 = 7_064.0;
 const TURN_S: f64 = 88_642.66;
-/// The angle that the spacecraft flies is that of its mean motion to this share, at most to this angle for the ellipse,
-/// and to this for every revolution, degrees.
+/// Tolerances of the angle flown against the mean motion: a share of it, a maximum for the ellipse, and one for every
+/// revolution, degrees.
 const ELLIPSE_SHARE: f64 = 0.03;
 const ELLIPSE_DEG: f64 = 2.5;
 const DEGREES_PER_REVOLUTION: f64 = 0.5;
-/// A frame nearer to a pole than this is not compared by longitude, microdegrees.
+/// Frames nearer to a pole than this are not compared by longitude, microdegrees.
 const POLE: i32 = 89_500_000;
 /// Microdegrees of half and a whole turn.
 const HALF_TURN: f64 = 180e6;
 
-/// What two records say of each other.
+/// Relation between two records.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Link {
-    /// Too far apart to tell.
+    /// Too far apart to decide.
     Unknown,
     /// The later continues the earlier.
     Holds,
-    /// It does not: what, how far off, and the limit.
+    /// It does not: the quantity, the deviation, and the limit.
     Broken(Quantity, f64, f64),
 }
 
-/// How records of a file are compared.
+/// Parameters of the comparison.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Comparison {
     pub guard: FieldGuard,
@@ -49,9 +49,9 @@ pub(super) struct Comparison {
 }
 
 impl Comparison {
-    /// What is wrong with each of some successive records (with their rows) that are sound and in order of time.
+    /// The faults of successive records (with their rows) that are individually valid and in order of time.
     ///
-    /// `number` gives the number of a row as in complaints.
+    /// `number` returns the number of a row as in complaints.
     pub(super) fn odd(
         &self,
         records: &[(usize, &Record)],
@@ -59,7 +59,8 @@ impl Comparison {
     ) -> Vec<(usize, RecordError)> {
         let mut left = records.to_vec();
         let mut found = Vec::new();
-        // A second look, without those found: of two odd ones that lead to each other the first gives the second away.
+        // A second pass without those found: of two deviating records that agree with each other, the first exposes the
+        // second.
         for _ in 0..2 {
             let odd: Vec<Option<RecordError>> = self.look(&left, &number);
             if odd.iter().all(Option::is_none) {
@@ -83,7 +84,7 @@ impl Comparison {
             let pairs = records.iter().zip(later);
             pairs.map(|((_, a), (_, b))| self.link(a, b)).collect()
         });
-        // The up to four links of a record, each with the index of its other end.
+        // Up to four links of a record, each with the index of its other end.
         let around = |index: usize| {
             [1_usize, 2].into_iter().flat_map(move |step| {
                 [index.checked_sub(step), Some(index)].map(|from| {
@@ -133,7 +134,7 @@ impl Comparison {
     fn link(&self, a: &Record, b: &Record) -> Link {
         let apart_s = b.time_s.get() - a.time_s.get();
         if apart_s <= 0.0 {
-            return Link::Unknown; // a block begins that lies at the wrong place
+            return Link::Unknown; // a misplaced block begins
         }
         let (quantity, apart, limit) = if apart_s <= NEAR_S {
             let steps = apart_s / FRAME_S;
@@ -163,7 +164,7 @@ impl Comparison {
         Link::Broken(quantity, apart, limit)
     }
 
-    /// How far `b` is from where `a` leads over so many lengths of a frame, by the mean of their rates.
+    /// Deviation of `b` from the extrapolation of `a` over this number of frame lengths, by the mean of their rates.
     fn steps(&self, a: &Record, b: &Record, steps: f64) -> [Option<(Quantity, f64)>; 10] {
         use Quantity as Q;
         let step = |a: i32, b: i32, rate_a: i32, rate_b: i32| {
@@ -178,7 +179,7 @@ impl Comparison {
             let middle_rad = 0.5
                 * RADIANS_PER_MICRODEGREE
                 * (f64::from(of_a.latitude) + f64::from(of_b.latitude));
-            // The way round Mars that is shorter.
+            // The shorter way around Mars.
             let east = (east + HALF_TURN).rem_euclid(2.0 * HALF_TURN) - HALF_TURN;
             [north.abs() * metres, east.abs() * metres * middle_rad.cos()]
         };
@@ -194,7 +195,7 @@ impl Comparison {
         let off_nadir =
             f64::from(b.off_nadir_microdegrees.get()) - f64::from(a.off_nadir_microdegrees.get());
         let orbits = i64::from(b.orbit.get()) - i64::from(a.orbit.get());
-        // The number goes up once a revolution.
+        // The number increases once per revolution.
         let orbits_off = if (0..=1).contains(&orbits) {
             0.0
         } else {
@@ -271,7 +272,7 @@ fn places(record: &Record, spacecraft: bool) -> Places {
     }
 }
 
-/// Orbit number and orbit model where the nearest records on both sides agree on another one.
+/// Orbit number and orbit model where the nearest records on both sides agree on another value.
 fn odd_one(records: &[(usize, &Record)], index: usize) -> Option<RecordError> {
     let (_, before) = records.get(index.checked_sub(1)?)?;
     let ((_, record), (_, after)) = (records.get(index)?, records.get(index + 1)?);
@@ -293,8 +294,8 @@ fn odd_one(records: &[(usize, &Record)], index: usize) -> Option<RecordError> {
     })
 }
 
-/// Whether so much time went by, by the way of the spacecraft and by the count of its revolutions: the first that does
-/// not agree, else the count.
+/// Elapsed time by the spacecraft's motion and by the count of its revolutions: the first that disagrees, otherwise the
+/// count.
 fn flight(a: &Record, b: &Record, apart_s: f64) -> (Quantity, f64, f64) {
     let revolutions = apart_s / PERIOD_S;
     if apart_s <= FLIGHT_S {
@@ -303,7 +304,7 @@ fn flight(a: &Record, b: &Record, apart_s: f64) -> (Quantity, f64, f64) {
             [place.longitude, place.latitude]
                 .map(|angle| f64::from(angle) * RADIANS_PER_MICRODEGREE)
         });
-        // East longitudes of things at rest fall behind while Mars turns.
+        // East longitudes of objects at rest in inertial space decrease while Mars rotates.
         let east_rad = of_b[0] - of_a[0] + TAU * apart_s / TURN_S;
         let cosine = of_a[1].sin() * of_b[1].sin() + of_a[1].cos() * of_b[1].cos() * east_rad.cos();
         let flown_deg = cosine.clamp(-1.0, 1.0).acos() / RADIANS_PER_DEGREE;

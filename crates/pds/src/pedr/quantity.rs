@@ -1,9 +1,9 @@
-//! What of a record is compared with its neighbours, in which units, and how far it may be off.
+//! Quantities of a record that are compared with its neighbours, their units and tolerances.
 
 use super::Record;
 use areograph_base::units::METRES_PER_CM;
 
-/// What is compared with neighbours.
+/// A quantity that is compared with neighbours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// Areocentric latitude of the spacecraft.
@@ -26,7 +26,7 @@ pub enum Quantity {
     Frequency,
     /// Orbit number.
     Orbit,
-    /// Time, by the way of the spacecraft.
+    /// Time, by the spacecraft's motion.
     Time,
 }
 
@@ -63,7 +63,7 @@ impl Quantity {
         }
     }
 
-    /// The unit in which neighbours are apart.
+    /// The unit of deviations between neighbours.
     pub(super) const fn step_unit(self) -> &'static str {
         match self {
             Self::OffNadir | Self::Time => "degrees",
@@ -73,10 +73,11 @@ impl Quantity {
         }
     }
 
-    /// How far a good record is from where its neighbour leads at most.
+    /// Largest deviation of a valid record from its neighbour's extrapolation.
     ///
-    /// The spacecraft flies a smooth orbit. The beam turns unsteadily, by less than 0.04° from one frame to the next. The
-    /// areoid is a smooth surface and the residual a smooth function of time; a quartz does not jump by 1e-4.
+    /// The spacecraft flies a smooth orbit. The beam rotates irregularly, by less than 0.04° from one frame to the
+    /// next. The areoid is a smooth surface and the residual a smooth function of time; a quartz oscillator does not
+    /// jump by 1e-4.
     ///
     /// In the units of `step_unit`, from one frame to the next.
     pub(super) const fn limit(self) -> f64 {
@@ -93,7 +94,7 @@ impl Quantity {
         }
     }
 
-    /// Whether it depends on how the beam turns, so that the limit grows with time.
+    /// Whether it depends on the rotation of the beam, so that the limit grows with time.
     pub(super) const fn is_of_beam(self) -> bool {
         matches!(
             self,

@@ -1,6 +1,6 @@
-//! A PEDR file read a stretch at a time: archives are searched where they lie, in little memory.
+//! A PEDR file read in stretches: archives are searched in place, with little memory.
 //!
-//! Stretches are copied by `pread`. A mapping would save the copy, but whoever shortens a mapped file ends the process:
+//! Stretches are copied by `pread`. A mapping would save the copy, but truncation of a mapped file ends the process:
 //! docs/decisions/0020.
 
 use std::{
@@ -26,10 +26,10 @@ use super::{
 use areograph_base::error::{Cause, IoError, Kind, Locate, Result};
 use areograph_store::files::Identity;
 
-/// Records among which the first good one is looked for.
+/// Records that are searched for the first valid one.
 const FIRST_RECORDS: usize = 16;
 const NEXT_RECORDS: usize = 1_024;
-/// How long a file is waited for that was written just now, and how often.
+/// Time between checks of a recently written file, and their number.
 const WAIT: Duration = Duration::from_millis(100);
 const WAITS: usize = 30;
 /// Records whose times are read at once.
@@ -43,19 +43,19 @@ pub struct Reader {
     handle: fs::File,
     identity: Identity,
     head: File,
-    /// What does not fit into the chronology of the file, once it is known.
+    /// Records outside the chronology of the file, once known.
     misplaced: OnceLock<Chronology>,
 }
 
-/// Some successive records of a file, with neighbours to judge them by.
+/// Successive records of a file, with neighbours to check them by.
 #[derive(Debug)]
 pub struct Stretch {
     file: File,
-    /// Rows that the stretch is about; neighbours of them are in memory as well.
+    /// Rows of the stretch itself; their neighbours are in memory as well.
     inner: Range<usize>,
 }
 
-/// A file is not what it was when it was opened.
+/// A file that has changed since it was opened.
 #[derive(Debug, thiserror::Error)]
 enum Changed {
     #[error("the file ended early while it was read: it had {0} bytes when it was opened")]
@@ -82,8 +82,8 @@ impl File {
     /// Reads a file as a whole; a [`Reader`] reads one piece by piece.
     ///
     /// # Errors
-    /// The system's refusal; not a regular file; one that changes meanwhile. What is wrong inside is complained of, not
-    /// refused.
+    /// The file cannot be read; not a regular file; one that changes meanwhile. Faults of its content are reported as
+    /// complaints, not as errors.
     pub fn open(path: &Path) -> Result<Self> {
         Reader::open(path)?.whole()
     }
@@ -109,22 +109,22 @@ impl Reader {
         })
     }
 
-    /// The file without its records: name, label, and what is wrong with it as a whole.
+    /// The file without its records: name, label, and their faults.
     #[must_use]
     pub const fn head(&self) -> &File {
         &self.head
     }
 
-    /// What the file system said of the file when it was opened.
+    /// Identity of the file when it was opened.
     #[must_use]
     pub const fn identity(&self) -> Identity {
         self.identity
     }
 
-    /// Reads some rows, counted from 0, into `buffer`; those that are not there are left out.
+    /// Reads some rows, counted from 0, into `buffer`; rows beyond the file are left out.
     ///
     /// # Errors
-    /// What the disk refuses; a file that has become shorter.
+    /// A read error; a file that has become shorter.
     pub fn stretch(&self, rows: Range<usize>, buffer: Vec<u8>) -> Result<Stretch> {
         let chronology = if self.reaches_all(&rows) {
             None
@@ -134,11 +134,11 @@ impl Reader {
         self.stretch_in(rows, buffer, chronology)
     }
 
-    /// Reads the chronology of the file, unless these rows tell it by themselves: once, before several threads ask for
+    /// Reads the chronology of the file, unless these rows suffice for it: once, before several threads request
     /// stretches of the file.
     ///
     /// # Errors
-    /// What the disk refuses; a file that has become shorter.
+    /// A read error; a file that has become shorter.
     pub fn prepare(&self, rows: &Range<usize>) -> Result<()> {
         if !self.reaches_all(rows) {
             self.chronology()?;
@@ -146,12 +146,12 @@ impl Reader {
         Ok(())
     }
 
-    /// Whether all records of the file are in memory with these rows and their neighbours.
+    /// Whether these rows and their neighbours include all records of the file.
     fn reaches_all(&self, rows: &Range<usize>) -> bool {
         rows.start <= NEIGHBOURS && rows.end.saturating_add(NEIGHBOURS) >= self.head.record_count()
     }
 
-    /// The same for records that nobody will judge: the rest of the file is not looked at.
+    /// The same for records that are not checked: the rest of the file is not read.
     ///
     /// # Errors
     /// As [`stretch`](Self::stretch).
@@ -159,7 +159,7 @@ impl Reader {
         self.stretch_in(rows, buffer, Some(Chronology::default()))
     }
 
-    /// The same for a chronology that is known; without, it is told by the rows in memory.
+    /// The same for a known chronology; without one, the rows in memory determine it.
     fn stretch_in(
         &self,
         rows: Range<usize>,
@@ -192,12 +192,12 @@ impl Reader {
         Ok(buffer)
     }
 
-    /// Takes the word of an index for it that every record fits into the chronology.
+    /// Accepts the statement of an index that every record fits into the chronology.
     pub fn set_in_order(&self) {
         let _ = self.misplaced.set(Chronology::default());
     }
 
-    /// What does not fit into the chronology of the file, by all its records.
+    /// Records outside the chronology of the file, from all its records.
     fn chronology(&self) -> Result<Chronology> {
         if let Some(known) = self.misplaced.get() {
             return Ok(Arc::clone(known));
@@ -218,7 +218,7 @@ impl Reader {
     /// Reads all of the file.
     ///
     /// # Errors
-    /// What the disk refuses; a file that has become shorter, has changed or lost its name.
+    /// A read error; a file that has become shorter, has changed or lost its name.
     fn whole(&self) -> Result<File> {
         let path = self.head.path();
         let length = usize::try_from(self.identity.bytes).unwrap_or(usize::MAX);
@@ -233,15 +233,15 @@ impl Reader {
         Ok(File::from_bytes(bytes, path))
     }
 
-    /// Has the system read the file ahead; whether it does is its own affair.
+    /// Requests read-ahead of the file; the system may ignore it.
     pub fn announce(&self) {
         let _ = rustix::fs::fadvise(&self.handle, 0, None, Advice::WillNeed);
     }
 
-    /// Makes sure that the file is what it was when it was opened, and still has a name.
+    /// Checks that the file has not changed since it was opened, and still has a name.
     ///
     /// # Errors
-    /// It is not.
+    /// The file has changed.
     pub fn unchanged(&self) -> Result<()> {
         let path = self.head.path();
         let metadata = self.handle.metadata();
@@ -256,7 +256,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Makes sure that the file is the one that had this identity before.
+    /// Checks that the file is the one that had this identity before.
     ///
     /// # Errors
     /// It is another one, or has changed.
@@ -268,7 +268,7 @@ impl Reader {
         Err(Changed::Content).in_file(self.head.path())
     }
 
-    /// Makes sure that the file was not written just now, so that any later change shows in its times; a young file is
+    /// Checks that the file was not written recently, so that any later change shows in its times; a recent file is
     /// waited for.
     ///
     /// # Errors
@@ -286,7 +286,7 @@ impl Reader {
     /// The bytes after the last whole record.
     ///
     /// # Errors
-    /// What the disk refuses; a file that has become shorter.
+    /// A read error; a file that has become shorter.
     pub fn trailing_bytes(&self) -> Result<Vec<u8>> {
         let from = (self.head.label_length() + self.head.record_count() * RECORD_BYTES) as u64;
         let length = self.identity.bytes.saturating_sub(from);
@@ -295,14 +295,14 @@ impl Reader {
         Ok(bytes)
     }
 
-    /// Time tag of the first good record, ET seconds; a file of another kind holds none.
+    /// Time tag of the first valid record, ET seconds; a file of another kind contains none.
     ///
     /// # Errors
-    /// What is wrong with the label, else with the first record; what the disk refuses.
+    /// The fault of the label, otherwise of the first record; a read error.
     pub fn require_records(&self) -> Result<f64> {
         let (mut row, mut next, mut first) = (0, FIRST_RECORDS, None);
         while row < self.head.record_count() {
-            // Of sound records one fits into any chronology.
+            // One of the valid records fits into any chronology.
             let chronology = Chronology::default();
             let stretch = self.stretch_in(row..row + next, Vec::new(), Some(chronology))?;
             if let Some(good) = stretch.file.good_record(stretch.inner.clone(), &mut first) {
@@ -315,13 +315,13 @@ impl Reader {
 }
 
 impl Stretch {
-    /// Those of the records in rows `rows` of the file that the stretch is about, with their rows.
+    /// Records of the rows `rows` of the stretch, with their rows.
     pub fn records(&self, rows: Range<usize>) -> impl Iterator<Item = (usize, &Record)> {
         self.about(rows).map(|row| (row, self.file.record(row)))
     }
 
-    /// The frames of the rows `rows` of the file that the stretch is about, with their rows: each is judged with its
-    /// neighbours, which cost less the more rows are asked for at once.
+    /// The frames of the rows `rows` of the stretch, with their rows: each is checked with its neighbours, which cost
+    /// less the more rows are requested at once.
     pub fn frames(
         &self,
         rows: Range<usize>,
@@ -330,7 +330,7 @@ impl Stretch {
         self.file.frames(self.about(rows), guard)
     }
 
-    /// The complaint of the record in row `row` of the file.
+    /// The complaint about the record in row `row` of the file.
     #[must_use]
     pub fn complaint(&self, row: usize, error: &RecordError) -> Complaint {
         self.file.record_complaint(row, error)
@@ -348,20 +348,20 @@ impl Stretch {
         in_order(self.file.records().iter().map(|record| record.time_s.get()))
     }
 
-    /// Those of the rows that the stretch is about.
+    /// Those of the rows that belong to the stretch itself.
     fn about(&self, rows: Range<usize>) -> Range<usize> {
         let start = rows.start.clamp(self.inner.start, self.inner.end);
         start..rows.end.clamp(start, self.inner.end)
     }
 
-    /// The bytes of the records that the stretch is about.
+    /// The bytes of the records of the stretch itself.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         let first = self.inner.start - self.file.rows().start;
         self.file.records()[first..first + self.inner.len()].as_bytes()
     }
 
-    /// The memory, for the next stretch.
+    /// The buffer, for the next stretch.
     #[must_use]
     pub fn into_buffer(self) -> Vec<u8> {
         self.file.into_bytes()
@@ -400,7 +400,7 @@ mod tests {
         assert!(said.contains("ap19019l.b: the file ended early"), "{said}");
         let said = refused(&|file| file.set_len(10_000).unwrap());
         assert!(said.contains("the file changed while"), "{said}");
-        // Other bytes, as many as before: the time tells.
+        // Other bytes, the same length: the time reveals the change.
         let said = refused(&|file| file.set_modified(SystemTime::UNIX_EPOCH).unwrap());
         assert!(said.contains("the file changed while"), "{said}");
         let said = refused(&|_| fs::remove_file(&path).unwrap());

@@ -10,9 +10,9 @@ use super::SHOTS;
 /// Bytes of a record; label records have the same length.
 pub const RECORD_BYTES: usize = 776;
 
-/// A record as it stands in the file: big-endian integers in the file's own units.
+/// A record as stored in the file: big-endian integers in the file's own units.
 ///
-/// Bytes whose meaning is not published are kept, so that reading and writing gives the same bytes.
+/// Bytes of unpublished meaning are kept, so that reading and writing preserve them.
 /// "Over the frame" means from its first edge to its last: shot `k` of 1 to 20 lies at `(k − 10.5)/20` of it.
 /// The layout is that of SIS 2.7 and later; before, `parallax_*`, `crossover_residual_cm` and the
 /// spacecraft's changes were Cartesian coordinates.
@@ -49,7 +49,7 @@ pub struct Record {
     pub received_energy: [I16; SHOTS],
     /// Surface reflectivity times transmissivity, 0.001 per cent.
     pub reflectivity_millipercent: [U16; SHOTS],
-    /// Trigger channel, 1 to 4; anything may stand here, so never index by it.
+    /// Trigger channel, 1 to 4; a damaged record may contain any value, so never index by it.
     pub channel: [u8; SHOTS],
     /// Pulse width at threshold crossing, 0.1 ns.
     pub pulse_width: [I16; SHOTS],
@@ -125,7 +125,7 @@ pub struct Record {
     pub clock_frequency_hz: U32,
     /// One-way range per shot to the spacecraft's centre of mass; 0 or less: no return.
     pub range_cm: [I32; SHOTS],
-    /// Range walk correction per shot; not published whether `range_cm` has it already.
+    /// Range walk correction per shot; whether `range_cm` includes it is not published.
     pub range_correction_cm: [I16; SHOTS],
     /// Change of ground latitude over the frame.
     pub ground_latitude_change_microdegrees: I32,
@@ -151,7 +151,7 @@ impl Record {
     /// The records in `bytes`, without a copy; bytes after the last whole record are ignored.
     #[must_use]
     pub fn slice_of(bytes: &[u8]) -> &[Self] {
-        // Any bytes are a record and records need no alignment, so the prefix of whole records always exists.
+        // Any bytes form a record and records need no alignment, so the prefix of whole records always exists.
         let whole = bytes.len() - bytes.len() % RECORD_BYTES;
         <[Self]>::ref_from_bytes(&bytes[..whole]).unwrap_or_default()
     }

@@ -1,4 +1,4 @@
-//! The shots of a frame against its own positions: range, radius, parallax. No kernel is needed.
+//! Checks of the shots of a frame against its own positions: range, radius, parallax. No kernels are required.
 
 use super::{
     Frame, RecordError, SHOTS,
@@ -7,23 +7,23 @@ use super::{
 use areograph_base::units::{METRES_PER_CM, RADIANS_PER_MICRODEGREE};
 use areograph_geom::ellipsoid::{local_axes, spherical_to_xyz_m};
 
-/// Range and distance of spacecraft and footprint come from one orbit and agree to about a metre; this much more is
-/// left to what no public document tells, metres.
+/// Range and distance between spacecraft and footprint come from one orbit and agree to about a metre; this tolerance,
+/// metres, allows for undocumented differences.
 const DISTANCE_M: f64 = 10.0;
-/// The straight ground track of a frame leaves this out, metres: how unsteadily the beam turned over 2 s, and 0.117 s of
-/// the way where position and time belong to clocks that are so far apart.
+/// Error of the straight ground track of a frame, metres: irregular rotation of the beam over 2 s, and 0.117 s of
+/// motion where position and time belong to clocks with that offset.
 const UNSTEADY_M: f64 = 400.0;
-/// Parallax agrees with the direction of the beam to this many metres on the ground per metre of radius, plus a tenth of
-/// what it is: 1.1° of the beam.
+/// Tolerance of parallax against the direction of the beam, metres on the ground per metre of radius, plus a tenth of
+/// its value: 1.1° of the beam.
 const PARALLAX: f64 = 0.02;
-/// Off-nadir angles whose tangent is larger do not make limits wider.
+/// Limits do not widen for off-nadir angles with a larger tangent.
 const TANGENT_MAX: f64 = 10.0;
-/// Nearer to a pole than this a frame that is straight in longitude and latitude has no direction, radians.
+/// Nearer to a pole than this, a frame that is straight in longitude and latitude has no direction, radians.
 const POLE_RAD: f64 = 0.5e6 * RADIANS_PER_MICRODEGREE;
-/// Attitude flags from this one on say that the ground is where the spacecraft would have looked at nadir.
+/// From this attitude flag on, the footprint assumes nadir pointing.
 const NO_ATTITUDE: u16 = 2;
 
-/// Shots of a frame that cannot be what the record says.
+/// Shots of a frame that contradict the record.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SpoiledShots {
     bits: u32,
@@ -37,7 +37,7 @@ impl SpoiledShots {
         shot >= 1 && shot <= 20 && self.bits & (1 << (shot - 1)) != 0
     }
 
-    /// What is wrong with the first of them.
+    /// The fault of the first of them.
     #[must_use]
     pub const fn error(&self) -> Option<&RecordError> {
         self.first.as_ref()
@@ -78,7 +78,7 @@ impl Frame<'_> {
         self.spoiled_by(|shot| self.range_minus_distance_m(shot))
     }
 
-    /// The same for those who know [`range_minus_distance_m`](Self::range_minus_distance_m) of each shot already.
+    /// The same with a known [`range_minus_distance_m`](Self::range_minus_distance_m) of each shot.
     #[must_use]
     pub fn spoiled_by(&self, range_minus_distance_m: impl Fn(u8) -> Option<f64>) -> SpoiledShots {
         let record = self.record();
@@ -100,7 +100,7 @@ impl Frame<'_> {
         spoiled
     }
 
-    /// Wrong radii spoil only their shots, that of the mid-point all of them.
+    /// Wrong radii affect only their shots, a wrong mid-point radius all of them.
     fn check_radii(&self, returned: u32, spoiled: &mut SpoiledShots) {
         let record = self.record();
         let mid_cm = record.mid_radius_cm.get();
@@ -149,7 +149,7 @@ impl Frame<'_> {
             let Some(difference_m) = range_minus_distance_m(shot) else {
                 continue;
             };
-            // Not published whether the range has its walk correction already.
+            // Whether the range includes its walk correction is not published.
             let walk_m = f64::from(record.range_correction_cm[index].get()).abs() * METRES_PER_CM;
             let limit_m = beam.distance_limit_m + walk_m;
             if difference_m.abs() <= limit_m || spoiled.contains(shot) {
@@ -204,7 +204,7 @@ impl Beam {
         } else {
             TANGENT_MAX
         };
-        // A way that is straight in longitude and latitude stays on its parallel; the true one is a great circle.
+        // A path that is straight in longitude and latitude stays on its parallel; the true one is a great circle.
         let bulge_m = |radius_m: f64, latitude_rad: f64, change: i32| {
             radius_m * latitude_rad.cos() * (1.0 - (0.5 * radians(change)).cos())
         };
@@ -224,7 +224,7 @@ impl Beam {
         }
     }
 
-    /// Parallax that does not go along the beam.
+    /// Parallax that does not follow the beam.
     fn parallax_error(&self, frame: &Frame<'_>) -> Option<RecordError> {
         let (_, latitude_rad) = frame.mid_point();
         if latitude_rad.abs() > std::f64::consts::FRAC_PI_2 - POLE_RAD {

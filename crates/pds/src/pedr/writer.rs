@@ -1,4 +1,4 @@
-//! A PEDR file of our own making: the label, then records.
+//! Writer of PEDR files: the label, then records.
 
 use std::{
     fs::File,
@@ -15,7 +15,7 @@ use areograph_base::{
 /// Data set of every PEDR.
 const DATA_SET_ID: &str = "MGS-M-MOLA-3-PEDR-L1A-V1.0";
 
-/// What the label of a written file says.
+/// Contents of the label of a written file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LabelInfo {
     /// Product, for example `AP19215L.B`.
@@ -31,7 +31,7 @@ pub struct LabelInfo {
 /// The label does not fit its format.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub(super) enum LabelError {
-    /// The version has no four characters.
+    /// A version that does not fit into four characters.
     #[error("software version is {0}; expected 0 to 9.99")]
     Version(f64),
     /// A text that a label cannot hold.
@@ -112,7 +112,7 @@ impl PedrWriter {
     /// Creates `path`, or empties it, and writes the label.
     ///
     /// # Errors
-    /// A label that does not fit its format; the system's refusal.
+    /// A label that does not fit its format; the file cannot be created.
     pub fn create(path: &Path, label: &LabelInfo) -> Result<Self> {
         let bytes = label.to_bytes().in_file(path)?;
         let file = File::create(path)
@@ -130,17 +130,17 @@ impl PedrWriter {
     /// Appends one record.
     ///
     /// # Errors
-    /// The system's refusal to write.
+    /// The file cannot be written.
     pub fn write_record(&mut self, record: &Record) -> Result<()> {
         self.write(&record.to_bytes())?;
         self.records += 1;
         Ok(())
     }
 
-    /// Writes what is left in memory to the disk; returns the number of data records.
+    /// Writes buffered data to the disk; returns the number of data records.
     ///
     /// # Errors
-    /// The system's refusal to write.
+    /// The file cannot be written.
     pub fn finish(mut self) -> Result<u32> {
         self.file
             .flush()

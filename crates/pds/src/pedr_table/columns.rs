@@ -2,7 +2,7 @@
 
 use super::edit::{fixed, integer};
 
-/// Whose program the table is like.
+/// The program whose format the table follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Variant {
     /// The MOLA team's: off-nadir angle in 7 columns, packet and orbit in 6.

@@ -5,8 +5,8 @@ pub(super) fn integer(line: &mut String, value: i64, width: usize) {
     justify(line, &value.to_string(), width);
 }
 
-/// Appends a number with so many decimals in `width`: the exact value rounded, halves to even, zeros with their sign; the
-/// zero before the point is left out where there is no room for it; stars when the rest does not fit.
+/// Appends a number with `decimals` decimals in `width`: the exact value rounded, halves to even, zeros with their
+/// sign. The zero before the point is left out where there is no room for it; stars when the rest does not fit.
 pub(super) fn fixed(line: &mut String, value: f64, width: usize, decimals: usize) {
     if !value.is_finite() {
         return justify(line, not_finite(value, width), width);

@@ -2,7 +2,7 @@
 //!
 //! # Source
 //! The MOLA team's program `pedr2tab` (G. Neumann), version 2.71828, and the variant of the USGS: columns, edit
-//! descriptors, filters, order of arithmetic. What they do wrong is done as well, unless [`Rules::PerShot`] is asked for.
+//! descriptors, filters, order of arithmetic. Their errors are reproduced, unless [`Rules::PerShot`] is selected.
 
 mod columns;
 mod edit;

@@ -1,4 +1,4 @@
-//! `PEDR2TAB.PRM`: what to print, of which shots, read as Fortran reads lists.
+//! `PEDR2TAB.PRM`: columns and shots to print, read like Fortran lists.
 
 /// Preferences of a table, with the program's defaults.
 #[derive(Debug, Clone, PartialEq)]
@@ -11,9 +11,9 @@ pub struct Preferences {
     pub headings: bool,
     /// Groups of columns.
     pub groups: [bool; 8],
-    /// Whether the areographic latitude is worked out; read with the groups.
+    /// Whether the areographic latitude is computed; read with the groups.
     pub areographic: bool,
-    /// All shots, whatever their class.
+    /// All shots, of any class.
     pub all_classes: bool,
     /// Ground returns, else clouds and noise.
     pub ground: bool,
@@ -29,7 +29,7 @@ pub struct Preferences {
     pub latitude_deg: [f64; 2],
     /// `(a/c)²` of areographic latitudes.
     pub axes_squared: f64,
-    /// Where and why reading ended before everything was read.
+    /// Location and reason of a premature end of reading.
     pub ended: Option<Ended>,
 }
 
@@ -53,12 +53,12 @@ impl Default for Preferences {
     }
 }
 
-/// Longest name that the program keeps.
+/// Longest name that the program stores.
 const NAME_MAX: usize = 64;
 
 impl Preferences {
-    /// The preferences of a text. As in the program, reading ends where a value is missing or is not of its kind: what
-    /// follows keeps its default.
+    /// Parses preferences. As in the program, reading ends at a missing or invalid value: the following ones keep their
+    /// defaults.
     #[must_use]
     pub fn parse(text: &str) -> Self {
         let mut preferences = Self::default();
@@ -93,7 +93,7 @@ impl Preferences {
     }
 }
 
-/// The file ends, or holds something else than the program reads.
+/// The end of the file, or a value of another type than the program reads.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Ended {
     /// No value is left.
@@ -104,14 +104,14 @@ pub enum Ended {
     Value {
         /// Line of the file, counted from 1.
         line: usize,
-        /// What stands there.
+        /// Text found.
         found: String,
-        /// What the program reads there.
+        /// Expected type.
         expected: &'static str,
     },
 }
 
-/// What the program reads.
+/// Types that the program reads.
 const SWITCH: &str = "T or F";
 const DEGREES: &str = "a number of degrees";
 
@@ -120,7 +120,7 @@ struct Item {
     text: String,
 }
 
-/// `T`, `F`, `.TRUE.`, `false` and the like: the first letter, behind a point or not, tells.
+/// `T`, `F`, `.TRUE.`, `false` and the like: the first letter, after an optional point, decides.
 fn logical(item: &Item) -> Option<bool> {
     let word = item.text.strip_prefix('.').unwrap_or(&item.text);
     match word.chars().next()? {
@@ -133,22 +133,23 @@ fn logical(item: &Item) -> Option<bool> {
 /// A number, its exponent after `E`, `D` or `Q`.
 fn real(item: &Item) -> Option<f64> {
     let plain = item.text.to_ascii_lowercase().replace(['d', 'q'], "e");
-    // Rust reads words as numbers too.
+    // Rust also parses words as numbers.
     let numeric = plain
         .chars()
         .all(|c| c.is_ascii_digit() || "+-.e".contains(c));
     numeric.then(|| plain.parse().ok()).flatten()
 }
 
-/// The records of the file. A read statement begins with the next one, and goes on to further ones until it has its values.
+/// The records of the file. A read statement starts with the next record, and continues with further ones until it has
+/// its values.
 struct Lines<'a> {
     lines: std::str::Lines<'a>,
     /// Number of the record that was read last.
     line: usize,
     rest: &'a str,
-    /// A slash ended the statement: what is left of it keeps its values.
+    /// A slash ended the statement: the remaining variables keep their values.
     ended: bool,
-    /// How often the last value is still repeated.
+    /// Remaining repetitions of the last value.
     repeated: usize,
     last: Option<String>,
 }
@@ -204,7 +205,7 @@ impl<'a> Lines<'a> {
         }
     }
 
-    /// The end of reading at the last value, or at what is left of the line.
+    /// Ends reading at the last value, or at the rest of the line.
     fn ended_at(&self, expected: &'static str) -> Ended {
         let line = self.line;
         let rest = self.last.as_deref().unwrap_or(self.rest.trim());
@@ -256,7 +257,7 @@ impl<'a> Lines<'a> {
         Some(())
     }
 
-    /// A text in quotes, which stands for itself when it is doubled.
+    /// A quoted text, in which a doubled quote stands for one.
     fn quoted(&mut self, quote: char) -> Option<String> {
         let mut text = String::new();
         let mut rest = &self.rest[1..];

@@ -1,4 +1,4 @@
-//! From records to lines, with the program's arithmetic: the order of operations decides the last digit.
+//! Conversion of records to lines, with the program's arithmetic: the order of operations determines the last digit.
 
 use std::{
     f64::consts::PI,
@@ -8,12 +8,13 @@ use std::{
 use super::{Preferences, Variant, columns::Row};
 use crate::pedr::{Complaint, FieldGuard, File, Record};
 
-/// By which rules shots are chosen and corrected.
+/// Rules of selection and correction of shots.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Rules {
-    /// Those of `pedr2tab`, slips included.
+    /// Those of `pedr2tab`, errors included.
     Program,
-    /// Ours: every shot judged by itself, nothing carried over from another frame or file, bad records left out.
+    /// Those of areograph: every shot is checked individually, nothing is carried over from another frame or file,
+    /// invalid records are left out.
     PerShot,
 }
 
@@ -24,7 +25,7 @@ const SHOTS_OF_FRAME: u8 = 20;
 /// Text that is gathered before it is written, bytes.
 const TEXT: usize = 1 << 16;
 
-/// What corrects the shots of a frame; the program keeps it from frame to frame.
+/// Corrections of the shots of a frame; the program keeps them from frame to frame.
 #[derive(Debug, Clone, Copy, Default)]
 struct Corrections {
     latitude_deg_per_m: f64,
@@ -39,7 +40,7 @@ pub struct Table {
     preferences: Preferences,
     variant: Variant,
     rules: Rules,
-    /// Whether crossover residuals are read: no more after the first file that has none.
+    /// Whether crossover residuals are read: not after the first file without them.
     crossover: bool,
     /// Orbit model from which on parallax is used: 3 for all files after an old one.
     gate: i16,
@@ -72,10 +73,10 @@ impl Table {
         &self.preferences
     }
 
-    /// The headings, where they are wanted.
+    /// Writes the headings, if requested.
     ///
     /// # Errors
-    /// The system's refusal to write.
+    /// The file cannot be written.
     pub fn write_headings(&self, out: &mut dyn Write) -> io::Result<()> {
         if !self.preferences.headings {
             return Ok(());
@@ -84,10 +85,10 @@ impl Table {
         out.write_all(headings.as_bytes())
     }
 
-    /// Writes the lines of a file; returns what was left out as bad, nothing by the program's rules.
+    /// Writes the lines of a file; returns the records left out as invalid, none by the program's rules.
     ///
     /// # Errors
-    /// The system's refusal to write.
+    /// The file cannot be written.
     pub fn write(&mut self, file: &File, out: &mut dyn Write) -> io::Result<Vec<Complaint>> {
         match self.rules {
             Rules::Program => self.write_by_program(file, out).map(|()| Vec::new()),
@@ -106,7 +107,7 @@ impl Table {
             return Ok(());
         };
         if model(first) >= self.gate {
-            // Before the first frame stands the second one mirrored; without a second there are no lines.
+            // The first frame is preceded by the mirrored second one; without a second frame there are no lines.
             let Some(second) = file.records().get(1) else {
                 return Ok(());
             };
@@ -138,7 +139,7 @@ impl Table {
         flush(&mut text, 0, out)
     }
 
-    /// Takes what corrects shots from a frame that passed the gate; another frame keeps what was there.
+    /// Updates the corrections from a frame that passed the gate; another frame leaves them unchanged.
     fn correct_by_program(&mut self, record: &Record) {
         let corrections = &mut self.corrections;
         corrections.latitude_deg_per_m =
@@ -155,7 +156,7 @@ impl Table {
     }
 
     fn write_per_shot(&mut self, file: &File, out: &mut dyn Write) -> io::Result<Vec<Complaint>> {
-        /// Records that are judged at a time.
+        /// Records checked at a time.
         const STEP: usize = 4_096;
         let guard = FieldGuard::new(file.label().software_version);
         let mut complaints = file.label_complaints().to_vec();
@@ -204,7 +205,7 @@ impl Table {
         Ok(complaints)
     }
 
-    /// Whether shot `shot`, counted from 0, came back and is of the class that is asked for.
+    /// Whether shot `shot`, counted from 0, has a return and a requested class.
     fn is_wanted(&self, record: &Record, shot: usize) -> bool {
         let class = record.class[shot].get();
         record.returned(shot)
@@ -326,7 +327,7 @@ impl Table {
         row.received_energy = f64::from(record.received_energy[shot].get());
         row.reflectivity =
             f64::from(0.001 * f32::from(record.reflectivity_millipercent[shot].get()));
-        // The program looks beyond its tables where the channel is none; here such a shot has none of these.
+        // The program reads beyond its tables for an invalid channel; here such a shot has none of these values.
         let half = shot / 10;
         let channel = usize::from(record.channel[shot]).checked_sub(1);
         if let Some((channel, gain_mv)) = channel.and_then(|at| Some((at, GAINS_MV.get(at)?))) {
@@ -343,11 +344,11 @@ impl Table {
 }
 
 impl Preferences {
-    /// Whether the window holds a shot, whichever turn its limits are written in.
+    /// Whether the window contains a shot, for limits in any turn.
     fn holds(&self, row: &Row) -> bool {
         let within = |value: f64, [least, most]: [f64; 2]| (least..=most).contains(&value);
         let [west_deg, mut east_deg] = self.longitude_deg;
-        // West above east: the window goes on across the end of the turn.
+        // West above east: the window continues across the end of the turn.
         if west_deg > east_deg {
             east_deg = west_deg + (east_deg - west_deg).rem_euclid(360.0);
         }

@@ -12,12 +12,12 @@ use super::{
 use crate::label::Label;
 use areograph_base::error::{IoError, Result};
 
-/// Lines that are read at a time of a cube without tiles.
+/// Lines read at a time from a cube without tiles.
 const LINES_AT_ONCE: u32 = 64;
-/// Largest edge of a tile that is believed; ISIS writes 128.
+/// Largest accepted edge of a tile; ISIS writes 128.
 const TILE_MAX: u32 = 4_096;
 
-/// How a number is stored.
+/// Storage type of a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Number {
     UnsignedByte,
@@ -38,7 +38,7 @@ pub(super) struct Cube {
     start: u64,
     lines: u32,
     samples: u32,
-    /// Lines and samples of a tile; none where lines follow each other.
+    /// Lines and samples of a tile; `None` for band-sequential lines.
     tile: Option<[u32; 2]>,
 }
 
@@ -74,7 +74,7 @@ impl Core<'_> {
             .parse()
             .ok()
             .filter(|count| (1..=most).contains(count));
-        count.ok_or_else(|| refused(key, value, "a count from 1 that an image has"))
+        count.ok_or_else(|| refused(key, value, "a count from 1, as an image can have"))
     }
 
     fn number(&self, key: &'static str, usual: f64) -> std::result::Result<f64, PixelFileError> {
@@ -95,10 +95,10 @@ fn refused(key: &'static str, value: &str, expected: &'static str) -> PixelFileE
 }
 
 impl Cube {
-    /// The cube of a label that stands before its pixels.
+    /// The cube of an attached label.
     ///
     /// # Errors
-    /// Values that are not those of a cube of one band; a file that is too short for them.
+    /// Invalid values for a cube of one band; a file that is too short for them.
     pub(super) fn of(label: &Label, path: &Path) -> Result<Self> {
         let core = Core(label);
         let word = |group, key| core.text(group, key).unwrap_or_default();
@@ -174,7 +174,7 @@ impl Cube {
         [self.lines, self.samples]
     }
 
-    /// Bytes of all pixels, those that fill up tiles included.
+    /// Bytes of all pixels, including the padding of tiles.
     fn pixel_bytes(&self) -> u64 {
         let [lines, samples] = self.tile.map_or(self.size(), |[lines, samples]| {
             [
@@ -188,7 +188,7 @@ impl Cube {
     /// The lines from the first one on.
     ///
     /// # Errors
-    /// The system's refusal to read.
+    /// The file cannot be read.
     pub(super) fn rows(&self, path: &Path) -> Result<Box<dyn Rows>> {
         let file = File::open(path).map_err(IoError::on("open"))?;
         Ok(Box::new(CubeRows {
@@ -281,7 +281,7 @@ impl Number {
 }
 
 impl Cube {
-    /// The value of a stored number; NaN of one that stands for none.
+    /// The value of a stored number; NaN for special values.
     fn value(&self, bytes: &[u8]) -> f64 {
         let mut bytes: [u8; 4] =
             std::array::from_fn(|at| bytes.get(at).copied().unwrap_or_default());
@@ -291,7 +291,7 @@ impl Cube {
         }
         let word = u16::from_le_bytes([bytes[0], bytes[1]]);
         let (number, is_special) = match self.number {
-            // 0 is NULL, and 255 high saturation, which is a number to look at.
+            // 0 is NULL, and 255 high saturation, which is kept as a number.
             Number::UnsignedByte => (f64::from(bytes[0]), bytes[0] == 0),
             Number::SignedWord => {
                 let word = word.cast_signed();
@@ -300,7 +300,7 @@ impl Cube {
             Number::UnsignedWord => (f64::from(word), !(3..=65_522).contains(&word)),
             Number::Real => {
                 let real = f32::from_le_bytes(bytes);
-                // The specials are the lowest numbers that there are.
+                // The special values are the lowest numbers.
                 (
                     f64::from(real),
                     !real.is_finite() || real.to_bits() >= 0xFF7F_FFFB,

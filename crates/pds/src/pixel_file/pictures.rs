@@ -1,4 +1,4 @@
-//! TIFF and PNG of one band of grey, read by their libraries.
+//! TIFF and PNG of one greyscale band, read by their libraries.
 
 use std::{fmt, fs::File, io::BufReader, path::Path};
 
@@ -11,7 +11,7 @@ use super::{
 };
 use areograph_base::error::{IoError, Result};
 
-/// Lines of a PNG that are read at a time.
+/// Lines of a PNG read at a time.
 const LINES_AT_ONCE: u32 = 64;
 
 /// A format of pictures.
@@ -35,7 +35,7 @@ impl Picture {
         }
     }
 
-    /// The format of a file that begins so.
+    /// The format of a file by its first bytes.
     pub(super) fn recognise(start: &[u8]) -> Option<Self> {
         let begins = |with: &[u8]| start.starts_with(with);
         if begins(b"\x89PNG\r\n\x1a\n") {
@@ -53,7 +53,7 @@ impl Picture {
     /// The lines from the first one on.
     ///
     /// # Errors
-    /// The system's refusal to read; a picture that is not of one band of grey, or that its library refuses.
+    /// The file cannot be read; a picture that is not of one greyscale band, or that its library rejects.
     pub(super) fn rows(self, path: &Path) -> Result<Box<dyn Rows>> {
         let file = BufReader::new(File::open(path).map_err(IoError::on("open"))?);
         Ok(match self {
@@ -232,7 +232,7 @@ impl PngRows {
         })
     }
 
-    /// The number of a pixel; NaN of one that cannot be seen.
+    /// The number of a pixel; NaN for an invisible one.
     fn number(&self, pixel: &[u8]) -> f64 {
         let [bytes, _] = self.bytes;
         let value = |stored: &[u8]| {

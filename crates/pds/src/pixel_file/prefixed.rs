@@ -1,4 +1,4 @@
-//! Rows of samples with a prefix each, as HRSC's files have them.
+//! Rows of samples with a prefix each, as in HRSC files.
 
 use std::{fs::File, path::Path};
 
@@ -6,10 +6,10 @@ use super::rows::Rows;
 use crate::hrsc::{Number, Raster};
 use areograph_base::error::{IoError, Result};
 
-/// Lines that are read at a time.
+/// Lines read at a time.
 const LINES_AT_ONCE: u32 = 64;
 
-/// What the numbers are, for people.
+/// Description of the number type for users.
 pub(super) fn description(raster: &Raster) -> String {
     let number = match raster.number {
         Number::Byte => "8 bits",
@@ -24,10 +24,10 @@ pub(super) fn description(raster: &Raster) -> String {
     format!("rows with prefixes, {number}{order}")
 }
 
-/// The lines from the first one on; a sample of 0 is none, and a line of these alone did not come down.
+/// The lines from the first one on; a sample of 0 is missing, and a line with only zeros was not transmitted.
 ///
 /// # Errors
-/// The system's refusal to read.
+/// The file cannot be read.
 pub(super) fn rows(raster: &Raster, path: &Path) -> Result<Box<dyn Rows>> {
     let file = File::open(path).map_err(IoError::on("open"))?;
     let (raster, line) = (*raster, 0);

@@ -1,5 +1,5 @@
-//! An image at full size and halved again and again, of which windows are read. It stands in a temporary file, so that
-//! memory holds a strip and some lines of each level, whatever the size of the image.
+//! An image at full size and repeatedly halved, with access to windows. It is kept in a temporary file, so that memory
+//! holds only a strip and some lines of each level.
 
 use std::{fs::File, io, ops::Range, os::unix::fs::FileExt as _};
 
@@ -16,17 +16,17 @@ const LEVELS: usize = 7;
 pub struct Pyramid {
     file: File,
     levels: Vec<Level>,
-    /// Whether a pixel of 0 stands for none.
+    /// Whether a pixel of 0 is missing.
     zero_is_none: bool,
 }
 
 /// The image at one size.
 #[derive(Debug)]
 struct Level {
-    /// Where its pixels begin in the file.
+    /// Start of its pixels in the file.
     at: u64,
     size: [usize; 2],
-    /// Lines whose pixels are as they were sent.
+    /// Whether each line is as transmitted.
     is_good: Vec<bool>,
     /// The line that waits for the next one.
     waiting: Option<(Vec<u8>, bool)>,
@@ -34,11 +34,11 @@ struct Level {
 }
 
 impl Pyramid {
-    /// Decodes all of an image. Lines that are missing or suspect are none, and 0 is no number but in files as the archive has
-    /// them.
+    /// Decodes all of an image. Missing or suspect lines are treated as missing, and 0 is a number only in archived
+    /// files.
     ///
     /// # Errors
-    /// The system's refusal to read the image, or to write a temporary file.
+    /// The image cannot be read, or a temporary file cannot be written.
     pub fn of(image: &PixelFile) -> Result<Self> {
         let mut strips = image.strips()?;
         let size = [image.lines() as usize, image.samples() as usize];
@@ -96,7 +96,7 @@ impl Pyramid {
         }
     }
 
-    /// How often the image is halved.
+    /// Number of halvings of the image.
     #[must_use]
     pub fn halvings(&self) -> usize {
         self.levels.len() - 1
@@ -108,7 +108,7 @@ impl Pyramid {
         self.levels[level.min(self.halvings())].size
     }
 
-    /// Of these lines of the image the most that follow each other without one that is missing.
+    /// The longest run without a missing line among these lines of the image.
     #[must_use]
     pub fn longest_good(&self, lines: Range<usize>) -> Range<usize> {
         let is_good = &self.levels[0].is_good;
@@ -125,11 +125,11 @@ impl Pyramid {
         longest
     }
 
-    /// The rectangle of a level with this first line and sample; what lies beyond the image is left out. `None` where
-    /// nothing is left, or where lines or pixels of it are missing.
+    /// The rectangle of a level with this first line and sample; the part beyond the image is left out. `None` if it is
+    /// empty, or if lines or pixels are missing.
     ///
     /// # Errors
-    /// The system's refusal to read the temporary file.
+    /// The temporary file cannot be read.
     pub fn window(&self, level: usize, first: [i64; 2], size: [usize; 2]) -> Result<Option<Patch>> {
         let level = &self.levels[level.min(self.halvings())];
         let span = |axis: usize| -> Option<(usize, usize)> {
@@ -158,7 +158,7 @@ impl Pyramid {
     /// These lines and samples of a level, with NaN where lines or pixels are missing.
     ///
     /// # Errors
-    /// The system's refusal to read the temporary file.
+    /// The temporary file cannot be read.
     pub fn window_with_gaps(&self, level: usize, spans: [&Range<usize>; 2]) -> Result<Patch> {
         let level = &self.levels[level.min(self.halvings())];
         let [lines, samples] = [0, 1].map(|axis| {
@@ -183,7 +183,7 @@ impl Pyramid {
         })
     }
 
-    /// Pixels of lines and samples that are there.
+    /// Pixels of existing lines and samples.
     fn bytes(&self, level: &Level, [lines, samples]: [&Range<usize>; 2]) -> Result<Vec<u8>> {
         let mut bytes = vec![0; lines.len() * samples.len()];
         let rows = bytes.chunks_exact_mut(samples.len().max(1));

@@ -2,15 +2,15 @@
 
 use areograph_base::error::Result;
 
-/// Largest size of a line that is believed, samples: the largest line of any camera here has 5184.
+/// Largest accepted size of a line, samples: the largest line of any camera here has 5184.
 pub(super) const SAMPLES_MAX: u32 = 65_536;
 /// The same of an image, lines.
 pub(super) const LINES_MAX: u32 = 10_000_000;
 
-/// Most numbers that are read at a time: those of a row of tiles.
+/// Largest number of values read at a time: those of a row of tiles.
 const NUMBERS_MAX: u64 = 1 << 24;
 
-/// Whether so many lines can be read at a time.
+/// Whether this many lines can be read at a time.
 pub(super) fn fits(lines: u32, samples: u32) -> bool {
     u64::from(lines) * u64::from(samples) <= NUMBERS_MAX
 }
@@ -23,19 +23,19 @@ pub(crate) trait Rows: std::fmt::Debug {
     /// Whether all numbers are whole, from 0 to 255.
     fn is_bytes(&self) -> bool;
 
-    /// Whole lines that follow those before; NaN where there is no number. `None` behind the last line.
+    /// The next whole lines; NaN for missing numbers. `None` after the last line.
     ///
     /// # Errors
-    /// The system's refusal to read; a picture that its library refuses.
+    /// The file cannot be read; a picture that its library rejects.
     fn next_rows(&mut self) -> Result<Option<Vec<f64>>>;
 }
 
-/// How numbers become bytes.
+/// Conversion of numbers to bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Scale {
     /// As they are.
     Bytes,
-    /// From 1 to 255 between the two; what is no number is 0.
+    /// Scaled to 1 to 255 between the two; NaN becomes 0.
     Between([f64; 2]),
 }
 

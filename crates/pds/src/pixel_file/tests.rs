@@ -1,4 +1,4 @@
-//! Damaged files of every kind: no panic, and memory that does not follow what they claim.
+//! Damaged files of every kind: no panic, and memory independent of the sizes that they state.
 
 use std::{io::Write as _, sync::LazyLock};
 
@@ -77,7 +77,7 @@ static WHOLE: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
         .collect()
 });
 
-/// Lines and largest strip of a file, pixels; `None` of one that is refused.
+/// Lines and largest strip of a file, pixels; `None` for a rejected file.
 fn read(bytes: &[u8]) -> Option<(usize, usize)> {
     let mut file = tempfile::NamedTempFile::new().unwrap();
     file.write_all(bytes).unwrap();

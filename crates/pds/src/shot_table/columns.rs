@@ -1,4 +1,4 @@
-//! Which columns of a table hold what, in which unit.
+//! Assignment of the columns of a table to quantities and units.
 
 use csv::StringRecord;
 
@@ -15,7 +15,7 @@ use areograph_geom::ellipsoid::{on_ellipsoid_m, spherical_to_xyz_m};
 const LONGITUDE_DEG: [f64; 2] = [-360.0, 720.0];
 const LATITUDE_DEG: [f64; 2] = [-90.0, 90.0];
 
-/// Which column of a table holds what: its name in the first row, or its number, from 1.
+/// The column of each quantity: its name in the first row, or its number, from 1.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ShotColumns {
     /// Time of the shot, UTC.
@@ -44,7 +44,7 @@ pub struct ShotColumns {
     pub spacecraft_radius_km: Option<String>,
     /// The same, metres.
     pub spacecraft_radius_m: Option<String>,
-    /// Number of the orbit; without it 0.
+    /// Number of the orbit; 0 without a column.
     pub orbit: Option<String>,
 }
 
@@ -53,11 +53,11 @@ pub struct ShotColumns {
 pub(super) struct Field {
     /// Its key in the configuration, which ends in the unit.
     key: &'static str,
-    /// Its place in a row, from 0.
+    /// Its position in a row, from 0.
     at: usize,
-    /// What makes its numbers metres or radians.
+    /// Factor that converts its numbers to metres or radians.
     scale: f64,
-    /// What its numbers are at most and least, as they are written.
+    /// Minimum and maximum of its numbers, as written.
     limits: Option<[f64; 2]>,
 }
 
@@ -75,21 +75,21 @@ pub(super) struct Fields {
     orbit: Option<Field>,
 }
 
-/// How a table gives the time.
+/// Form of the time in a table.
 #[derive(Debug, Clone)]
 pub(super) enum Time {
     Utc(Field),
     Et(Field),
 }
 
-/// How it gives the place along the radius.
+/// Form of the radial coordinate.
 #[derive(Debug, Clone)]
 pub(super) enum Radius {
     FromCentre(Field),
     AboveEllipsoid(Field),
 }
 
-/// Names and numbers of columns become places in a row.
+/// Resolves names and numbers of columns to positions in a row.
 struct Finder<'a> {
     header: &'a StringRecord,
     names: bool,
@@ -128,7 +128,7 @@ impl Finder<'_> {
 }
 
 impl Fields {
-    /// The columns by a table's first row, and whether that holds their names.
+    /// The columns by a table's first row, and whether that contains their names.
     pub(super) fn of(
         columns: &ShotColumns,
         header: &StringRecord,
@@ -216,7 +216,7 @@ impl Fields {
     }
 }
 
-/// A column that the configuration does not name; its checks keep that from happening.
+/// A column that the configuration does not name; its checks exclude this.
 fn missing(key: &'static str, header: &StringRecord) -> ShotTableError {
     ShotTableError::Column {
         key,
@@ -225,7 +225,7 @@ fn missing(key: &'static str, header: &StringRecord) -> ShotTableError {
     }
 }
 
-/// Whether a first row holds no number where numbers are asked for.
+/// Whether a first row has no number in the columns of numbers.
 pub(super) fn is_header(fields: &Fields, record: &StringRecord) -> bool {
     let asked = [&fields.longitude, &fields.latitude, &fields.range];
     asked.iter().all(|field| {
@@ -270,7 +270,7 @@ impl Field {
         self.written_within(record, limits.map(|limit| limit / self.scale))
     }
 
-    /// The same within these limits, as numbers are written.
+    /// The same within these limits, as written.
     fn written_within(
         &self,
         record: &StringRecord,
@@ -284,7 +284,7 @@ impl Field {
         if (least..=most).contains(&number) {
             return Ok(number * self.scale);
         }
-        // The least of all numbers stands for those above 0.
+        // The smallest positive number stands for limits above 0.
         let expected = if least > 0.0 && least < 1e-300 {
             format!("a number above 0, at most {most}")
         } else {

@@ -1,4 +1,4 @@
-//! Rows that are shots, and every way in which one is none.
+//! Valid rows, and every kind of invalid row.
 
 use std::{fs::File, io::Write as _};
 
@@ -179,7 +179,7 @@ fn tables_that_hold_no_shot_are_refused() {
     let metres = ROW.replace("1735.0", "1735000");
     refused(
         &format!("{HEADER}\n{metres}\n{metres}\n"),
-        "none of its 2 rows is a shot; line 2: radius_km",
+        "none of its 2 rows is a valid shot; line 2: radius_km",
     );
     let bytes = [HEADER.as_bytes(), &[b'\n', 0xff, 0xfe, b'\n']].concat();
     let told = read(bytes, &named()).unwrap_err().to_string();

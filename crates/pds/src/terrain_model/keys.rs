@@ -30,23 +30,23 @@ const POINT: f64 = 2.0;
 const EQUIRECTANGULAR: f64 = 17.0;
 const METRE: f64 = 9001.0;
 const DEGREE: f64 = 9102.0;
-/// Tag of the numbers with decimals.
+/// Tag of the floating-point parameters.
 const DOUBLES: u16 = 34736;
-/// What a file says instead of a number that it defines itself.
+/// Code of a parameter that the file defines itself.
 const USER_DEFINED: f64 = 32_767.0;
-/// Half-axes that differ by less are a sphere, metres.
+/// Largest difference of the half-axes of a sphere, metres.
 const SPHERE_M: f64 = 0.5;
 
 /// The numbers of keys; texts are left out.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct GeoKeys(BTreeMap<u16, f64>);
 
-/// How coordinates of a map become longitude and latitude.
+/// Conversion of map coordinates to longitude and latitude.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Map {
     /// Of x and y.
     pub(super) rad_per_unit: [f64; 2],
-    /// Coordinates and place of the origin.
+    /// Coordinates of the origin and its place.
     origin: [f64; 2],
     origin_rad: [f64; 2],
 }
@@ -60,7 +60,7 @@ impl Map {
 }
 
 impl GeoKeys {
-    /// The keys of a directory whose numbers with decimals are `doubles`.
+    /// The keys of a directory whose floating-point parameters are `doubles`.
     pub(super) fn of(
         directory: &[u16],
         doubles: &[f64],
@@ -93,12 +93,12 @@ impl GeoKeys {
         keys.iter().find_map(|key| self.get(*key)).unwrap_or(0.0)
     }
 
-    /// Whether a coordinate is that of the middle of a cell.
+    /// Whether coordinates refer to the middle of a cell.
     pub(super) fn is_point(&self) -> bool {
         self.get(RASTER_TYPE).is_some_and(|of| is_code(of, POINT))
     }
 
-    /// Radius of the sphere, where the file tells one.
+    /// Radius of the sphere, where the file states it.
     pub(super) fn radius_m(&self) -> std::result::Result<Option<f64>, TerrainModelError> {
         let Some(major_m) = self.get(SEMI_MAJOR) else {
             return Ok(None);
@@ -107,7 +107,7 @@ impl GeoKeys {
             Some(inverse) if inverse > 0.0 => major_m * (1.0 - inverse.recip()),
             _ => self.get(SEMI_MINOR).unwrap_or(major_m),
         };
-        // Written so that NaN is refused too.
+        // Written so that NaN is rejected too.
         if !((major_m - minor_m).abs() <= SPHERE_M) {
             return Err(refused(
                 "GeogSemiMajorAxis and GeogSemiMinorAxis",
@@ -118,7 +118,7 @@ impl GeoKeys {
         Ok(Some(major_m))
     }
 
-    /// How coordinates become places; `radius_m` of the map.
+    /// Conversion of coordinates to places; `radius_m` is that of the map.
     pub(super) fn map(&self, radius_m: f64) -> std::result::Result<Map, TerrainModelError> {
         if self.one_of(&[MERIDIAN]).abs() > 0.0 {
             let found = format!("{} degrees", self.one_of(&[MERIDIAN]));
@@ -180,7 +180,7 @@ impl GeoKeys {
         })
     }
 
-    /// Makes sure of a unit, where the file names one.
+    /// Checks a unit, where the file names one.
     fn is(
         &self,
         key: u16,
@@ -240,7 +240,7 @@ mod tests {
             directory[at] = value;
             GeoKeys::of(&directory, &DOUBLES)
         };
-        // Mercator; a model in three dimensions; a number that there is none of.
+        // Mercator; a model in three dimensions; an undefined number.
         assert!(with(23, 7).is_ok_and(|keys| keys.map(3e6).is_err()));
         assert!(with(7, 3).is_ok_and(|keys| keys.map(3e6).is_err()));
         assert!(with(15, 9).is_err());

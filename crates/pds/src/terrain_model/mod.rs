@@ -16,36 +16,36 @@ use areograph_geom::height_grid::HeightGrid;
 
 /// Largest model that is read, cells: half a gigabyte in memory.
 const CELLS_MAX: u64 = 1 << 27;
-/// Heights are not farther from the sphere than this, metres: Olympus Mons is 21 km high, and −32768 stands for no height.
+/// Largest distance of heights from the sphere, metres: Olympus Mons is 21 km high, and −32768 stands for no height.
 const HEIGHT_MAX_M: f64 = 30_000.0;
-/// A radius is that of the body within this share.
+/// Tolerance of a radius against that of the body, as a share.
 const RADIUS_SHARE: f64 = 0.02;
-/// Radii that differ by less are one, metres: files round them.
+/// Tolerance of equal radii, metres: files round them.
 const SAME_RADIUS_M: f64 = 0.5;
 
-/// What is said of the sphere that heights count from.
+/// Stated reference sphere of heights.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct HeightsAbove {
-    /// Its radius, metres; without one that of the file's own sphere holds.
+    /// Its radius, metres; without one, the sphere of the file applies.
     pub radius_m: Option<f64>,
-    /// Whether it is another sphere than that of the file's map, and meant to be.
+    /// Whether it intentionally differs from the sphere of the file's map.
     pub apart: bool,
 }
 
-/// Why a file is no terrain model.
+/// Reason for the rejection of a terrain model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TerrainModelError {
-    /// Its library refuses it, or a tag.
+    /// Its library rejects it, or a tag.
     #[error("{0}")]
     Tiff(String),
-    /// What places its cells.
+    /// An error in its georeference.
     #[error("{what}: {found}; expected {expected}")]
     Georeference {
         /// Which tag or key.
         what: &'static str,
-        /// What it says.
+        /// Value found.
         found: String,
-        /// What it should say.
+        /// Value expected.
         expected: &'static str,
     },
     /// Too many cells.
@@ -56,10 +56,10 @@ pub enum TerrainModelError {
         /// Columns.
         columns: u32,
     },
-    /// No radius is known.
+    /// The radius is unknown.
     #[error("no key defines the reference sphere of its heights")]
     NoRadius,
-    /// Two radii.
+    /// Two different radii.
     #[error(
         "the sphere of its map has a radius of {of_file} m; the stated radius of the heights is {given} m"
     )]
@@ -78,10 +78,10 @@ pub enum TerrainModelError {
         found: f64,
         /// The body.
         body: &'static str,
-        /// And its radius.
+        /// Its expected radius.
         expected: f64,
     },
-    /// A number that is no height.
+    /// A value that cannot be a height.
     #[error(
         "row {row}, column {column} (from 0) has the height {value}; expected metres within {HEIGHT_MAX_M} of the sphere"
     )]
@@ -132,20 +132,20 @@ impl Cause for TerrainModelError {
 /// Reads a terrain model of `body` into memory.
 ///
 /// # Errors
-/// The system's refusal to read; what is no such `GeoTIFF`; no radius of the sphere, or two; no height.
+/// The file cannot be read; not such a `GeoTIFF`; no radius of the sphere, or two; no height.
 pub fn read_terrain_model(path: &Path, body: Body, above: HeightsAbove) -> Result<HeightGrid> {
     let tags = Tags::read(path)?;
     tags.grid(path, body, above).in_file(path)
 }
 
-/// What a file says beside its numbers.
+/// Tags of a file beside its numbers.
 struct Tags {
     /// Rows and columns.
     size: [u32; 2],
     keys: GeoKeys,
     /// Width and height of a cell in units of the map.
     scale: Vec<f64>,
-    /// Column, row, nothing, x, y, nothing.
+    /// Column, row, unused, x, y, unused.
     tie: Vec<f64>,
     no_data: Option<f64>,
 }
@@ -231,7 +231,7 @@ impl Tags {
         else {
             return Err(of_scale(&[]));
         };
-        // Written so that NaN is refused too.
+        // Written so that NaN is rejected too.
         let are_sizes = [width, height]
             .iter()
             .all(|of| **of > 0.0 && of.is_finite());
@@ -288,7 +288,7 @@ impl Tags {
     }
 }
 
-/// Whether two numbers are one as files of 32 bits have it.
+/// Whether two numbers are equal in 32-bit precision.
 fn is_same(value: f64, other: f64) -> bool {
     (value - other).abs() <= 1e-6 * other.abs()
 }
@@ -302,7 +302,7 @@ fn no_data_of(text: &str) -> std::result::Result<f64, TerrainModelError> {
     })
 }
 
-/// The one radius.
+/// The radius, which must be unambiguous.
 fn radius_m(
     of_file: Option<f64>,
     above: HeightsAbove,

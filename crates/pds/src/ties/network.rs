@@ -1,7 +1,7 @@
 //! ISIS control networks as text (PVL).
 //!
-//! Coordinates of a point are read where its type says that they are known: `Fixed` (formerly `Ground`), or
-//! `Constrained` with a covariance matrix. They are Mars-fixed, IAU 2000, metres.
+//! Coordinates of a point are read if its type declares them as known: `Fixed` (formerly `Ground`), or `Constrained`
+//! with a covariance matrix. They are Mars-fixed, IAU 2000, metres.
 //!
 //! Source: `ControlNetVersioner.cpp` of ISIS, version 5 of the format.
 
@@ -18,7 +18,7 @@ pub(super) fn parse_network(bytes: &[u8]) -> std::result::Result<TieFile, TieErr
     let label = parse_whole(bytes)?;
     let is_in = |name: &str| label.entries.iter().any(|entry| entry.group == name);
     if !is_in("CONTROLNETWORK") {
-        // The label of the binary form describes where its bytes start.
+        // The label of the binary form states where its bytes start.
         return Err(if is_in("PROTOBUFFER") || is_in("CORE") {
             TieError::Binary
         } else {
@@ -62,7 +62,7 @@ impl<'a> BlockEntries<'a> {
     }
 }
 
-/// What measures of a point share.
+/// Context of the measures of a point.
 #[derive(Default)]
 struct Point<'a> {
     id: Option<&'a str>,
@@ -90,10 +90,10 @@ impl<'a> Point<'a> {
     }
 }
 
-/// Ground coordinates of a point that is fixed or constrained; those of a free one are where its last adjustment started.
+/// Ground coordinates of a fixed or constrained point; those of a free one are initial values of its last adjustment.
 ///
 /// # Errors
-/// What such a point lacks; it is free then.
+/// The missing value of such a point, which then becomes free.
 fn known(block: &BlockEntries<'_>) -> std::result::Result<Option<KnownGround>, String> {
     let kind = block.value("POINTTYPE").unwrap_or_default();
     let is = |word: &str| kind.eq_ignore_ascii_case(word);
@@ -123,7 +123,7 @@ fn known(block: &BlockEntries<'_>) -> std::result::Result<Option<KnownGround>, S
     }))
 }
 
-/// The covariance whose upper triangle stands in `text`, row after row.
+/// The covariance whose upper triangle is in `text`, row by row.
 fn covariance_m2(text: &str) -> std::result::Result<Matrix3<f64>, String> {
     let numbers: Option<Vec<f64>> = text
         .split(',')

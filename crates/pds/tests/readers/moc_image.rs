@@ -1,5 +1,4 @@
-//! Images of the archive: the real one against what three other decoders made of it, small ones of every coding, and
-//! damaged ones.
+//! Archived images: a real one compared with three other decoders, small ones of every coding, and damaged ones.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -137,13 +136,13 @@ fn a_plain_raster_is_read_from_where_its_label_points() {
         assert_eq!((found, complaints), (pixels.clone(), Vec::new()));
         assert_eq!((statistics.lines_good, statistics.zeros), (20, 4));
     }
-    // Half a line is none.
+    // An incomplete line is missing.
     let path = files::write_raster(folder.path(), "3", 1200, 48, &pixels[..48 * 7 + 24]);
     let (found, _, complaints) = read(&path);
     assert_eq!(found, pixels[..48 * 7]);
     assert_eq!(
         complaints,
-        ["byte 1560, line 7: 7 of the 20 lines of the header"]
+        ["byte 1560, line 7: 7 lines found; the header states 20"]
     );
 }
 

@@ -1,4 +1,4 @@
-//! The search of many PEDR files and windows against brute force over every shot, and files that fail meanwhile.
+//! The search of many PEDR files and windows compared with brute force over every shot, and files that fail meanwhile.
 
 #![allow(
     clippy::unwrap_used,
@@ -31,7 +31,7 @@ use track::{DEGREE, FRAMES, write, write_frames};
 
 static RUN_ON: AtomicBool = AtomicBool::new(false);
 
-/// File, record, shot, and the windows that hold it.
+/// File, record, shot, and the windows that contain it.
 type Row = (usize, u32, u8, Vec<u32>);
 
 fn filter() -> ShotFilter {
@@ -43,7 +43,7 @@ fn filter() -> ShotFilter {
     }
 }
 
-/// What a search gave.
+/// Result of a search.
 #[derive(Default)]
 struct Rows {
     rows: Vec<Row>,
@@ -51,7 +51,7 @@ struct Rows {
     failures: BTreeMap<usize, Error>,
     frames_read: u64,
     shots_read: u64,
-    /// Called with the first that is found.
+    /// Called with the first result.
     meanwhile: Option<Box<dyn FnOnce() + Send>>,
 }
 
@@ -92,7 +92,7 @@ fn searched(sources: &[Source], query: &Query<'_>) -> Rows {
     rows
 }
 
-/// An older file and a newer one that goes on.
+/// An older file and a newer one that continues it.
 fn archive(folder: &Path) -> Vec<PathBuf> {
     let files = [folder.join("ap19019k.b"), folder.join("AP19020L.B")];
     write(&files[0], Datum::Iau1991, 0, |_, _| ());
@@ -274,7 +274,7 @@ fn a_record_far_from_every_window_is_judged_only_when_all_are() {
     assert_eq!(searched(&sources, &near).complaints.len(), 26);
 }
 
-/// What becomes of a good file when `spoil` does something to it before it is searched: nothing, or its failure.
+/// Effect of `spoil` on a valid file before it is searched: none, or its failure.
 fn spoilt(spoil: impl Fn(&Path)) -> (usize, Option<String>) {
     let folder = tempfile::tempdir().unwrap();
     let paths = archive(folder.path());
@@ -330,7 +330,7 @@ fn a_file_that_is_not_what_it_was_fails_and_the_others_are_searched() {
     }
 }
 
-/// A file of more records than are in memory at once, to which something happens when its first shots are found.
+/// A file with more records than are in memory at once, and an event when its first shots are found.
 fn meanwhile(happens: impl FnOnce(&Path) + Send + 'static) -> Rows {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("AP19019L.B");

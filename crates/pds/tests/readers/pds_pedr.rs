@@ -1,4 +1,4 @@
-//! PEDR files written and read back: shot rules by hand, damaged files.
+//! PEDR files written and read back: shot rules computed by hand, damaged files.
 
 #![allow(clippy::expect_used, reason = "helpers of tests fail as tests do")]
 
@@ -12,7 +12,7 @@ use areograph_pds::pedr::{
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 const METRE_OF_ANGLE: f64 = 1.0 / 3.39e6;
 
-/// A frame with round numbers, so that sums are done in the head.
+/// A frame with round numbers, for mental arithmetic.
 fn values() -> FrameValues {
     FrameValues {
         time_s: -20_000_000.5,
@@ -87,7 +87,7 @@ fn shots(frame: &Frame<'_>) -> Vec<Footprint> {
     (1..=20).filter_map(|shot| frame.shot(shot)).collect()
 }
 
-/// Half a microdegree, what encoding can lose, and a little rounding.
+/// Tolerance of half a microdegree, the resolution of the encoding, and rounding.
 fn assert_angle(found_rad: f64, expected_deg: f64) {
     let difference_deg = found_rad / DEGREE - expected_deg;
     assert!(
@@ -97,7 +97,7 @@ fn assert_angle(found_rad: f64, expected_deg: f64) {
     );
 }
 
-/// A micrometre: these lengths are whole centimetres, only rounding differs.
+/// Tolerance of a micrometre: these lengths are whole centimetres, with rounding differences only.
 fn assert_metres(found_m: f64, expected_m: f64) {
     assert!(
         (found_m - expected_m).abs() < 1e-6,
@@ -130,7 +130,7 @@ fn shots_follow_the_rules_of_the_format() {
     assert_metres(last.areoid_radius_m, 3_391_998.1);
     assert_metres(last.range_m, 388_000.25);
     assert_metres(last.radius_m, 3_391_000.0);
-    // Residual 3 m, 2 m more than in the frame before.
+    // Residual 3 m, 2 m more than in the preceding frame.
     assert_metres(first.radius_crossover_m, 3_391_000.0 - (3.0 - 0.475 * 2.0));
     assert_metres(last.radius_crossover_m, 3_391_000.0 - (3.0 + 0.475 * 2.0));
     assert_angle(last.off_nadir_rad, 0.25);

@@ -1,4 +1,4 @@
-//! Whatever the bytes, a PEDR file is read: no panic, no shot beyond the globe.
+//! Any bytes are read as a PEDR file: no panic, no shot beyond the globe.
 
 #![allow(clippy::expect_used, reason = "helpers of tests fail as tests do")]
 
@@ -12,7 +12,7 @@ use proptest::prelude::*;
 
 const RECORDS: usize = 5;
 
-/// A whole file: a label and five records with relief, parallax and crossover residuals.
+/// A complete file: a label and five records with relief, parallax and crossover residuals.
 fn file_bytes() -> Vec<u8> {
     let folder = tempfile::tempdir().expect("a folder for the file");
     let path = folder.path().join("AP19019L.B");
@@ -53,7 +53,7 @@ fn file_bytes() -> Vec<u8> {
     std::fs::read(&path).expect("the file just written")
 }
 
-/// Reads everything there is in a file; the number of its records.
+/// Reads all of a file; returns the number of its records.
 fn read_all(bytes: Vec<u8>) -> usize {
     let file = File::from_bytes(bytes, Path::new("AP19019L.B"));
     let records = file.records().len();

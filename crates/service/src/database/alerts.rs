@@ -1,13 +1,13 @@
-//! What people are told: edges, and letters to hooks that are not delivered yet.
+//! Alerts: state changes, and undelivered letters to hooks.
 
 use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
 
 use super::Stored;
 
-/// Notes the state of a subject, and gives the former one where it was another; none for a subject that is new.
+/// Records the state of a subject, and returns the former one if it differs; `None` for a new subject.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_alert_state(
     transaction: &Transaction<'_>,
     now_ms: i64,
@@ -31,14 +31,14 @@ pub fn put_alert_state(
     Ok(before.map_or(Edge::First, Edge::From))
 }
 
-/// How a subject came to its state.
+/// The transition of a subject to its state.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Edge {
-    /// It was in it before.
+    /// It was already in this state.
     None,
-    /// Nothing was known of it.
+    /// It had no recorded state.
     First,
-    /// It was in this one.
+    /// It was in this other state.
     From(String),
 }
 
@@ -51,14 +51,14 @@ pub struct Letter {
     pub hook: i64,
     /// JSON.
     pub body: String,
-    /// Times that it was tried.
+    /// Number of delivery attempts.
     pub tries: i64,
 }
 
-/// Notes a letter.
+/// Records a letter.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_letter(
     transaction: &Transaction<'_>,
     now_ms: i64,
@@ -76,7 +76,7 @@ pub fn put_letter(
 /// Letters that are due, oldest first.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn due_letters(connection: &Connection, now_ms: i64, limit: u32) -> Stored<Vec<Letter>> {
     let mut query = connection.prepare_cached(
         "SELECT id, hook, body, tries FROM outbox WHERE delivered_ms IS NULL AND not_before_ms <= ?1 ORDER BY id LIMIT ?2",
@@ -92,10 +92,10 @@ pub fn due_letters(connection: &Connection, now_ms: i64, limit: u32) -> Stored<V
     Ok(found.collect::<Result<_, _>>()?)
 }
 
-/// Notes that a letter was delivered.
+/// Records that a letter was delivered.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_delivered(transaction: &Transaction<'_>, id: i64, now_ms: i64) -> Stored<()> {
     transaction.execute(
         "UPDATE outbox SET tries = tries + 1, delivered_ms = ?2, error = NULL WHERE id = ?1",
@@ -104,10 +104,10 @@ pub fn put_delivered(transaction: &Transaction<'_>, id: i64, now_ms: i64) -> Sto
     Ok(())
 }
 
-/// Notes that a letter could not be delivered, and when it is tried again.
+/// Records that a letter could not be delivered, and the time of the next attempt.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_undelivered(
     transaction: &Transaction<'_>,
     id: i64,

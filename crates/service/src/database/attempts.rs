@@ -1,4 +1,4 @@
-//! Attempts: worker processes, one after the other, of a job.
+//! Attempts: the worker processes of a job, one after the other.
 
 use rusqlite::{Connection, Row, Transaction, params};
 
@@ -12,9 +12,9 @@ pub struct Attempt {
     pub job: i64,
     /// Its number in the job, from 1.
     pub n: i64,
-    /// Its process, once that was started.
+    /// Its process, once started.
     pub process: Option<ProcessIdentity>,
-    /// The stage at work when last heard.
+    /// The last reported stage.
     pub stage: Option<String>,
     /// When it began, milliseconds of UTC since 1970.
     pub started_ms: i64,
@@ -22,10 +22,10 @@ pub struct Attempt {
     pub ended_ms: Option<i64>,
 }
 
-/// Notes that an attempt begins; its log is a path below the folder of the state.
+/// Records the start of an attempt; its log is a path below the state folder.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn begin_attempt(
     transaction: &Transaction<'_>,
     now_ms: i64,
@@ -40,10 +40,10 @@ pub fn begin_attempt(
     Ok(())
 }
 
-/// Notes the process of an attempt.
+/// Records the process of an attempt.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_process(
     transaction: &Transaction<'_>,
     (job, n): (i64, i64),
@@ -57,10 +57,10 @@ pub fn put_process(
     Ok(())
 }
 
-/// Notes a sign of life.
+/// Records a heartbeat.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_beat(
     transaction: &Transaction<'_>,
     now_ms: i64,
@@ -79,7 +79,7 @@ pub fn put_beat(
 /// How an attempt ended.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct AttemptEnd<'a> {
-    /// In words.
+    /// As text.
     pub how: &'a str,
     /// Exit code.
     pub exit: Option<i32>,
@@ -87,10 +87,10 @@ pub struct AttemptEnd<'a> {
     pub signal: Option<i32>,
 }
 
-/// Notes how an attempt ended; the first note stays. Says whether this is the first.
+/// Records how an attempt ended; the first record stays. Returns whether this is the first.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn end_attempt(
     transaction: &Transaction<'_>,
     now_ms: i64,
@@ -104,10 +104,10 @@ pub fn end_attempt(
     Ok(noted > 0)
 }
 
-/// Attempts of a job, in their order.
+/// Attempts of a job, in order.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn attempts(connection: &Connection, job: i64) -> Stored<Vec<Attempt>> {
     let mut query = connection.prepare_cached("SELECT * FROM attempt WHERE job = ?1 ORDER BY n")?;
     let found = query.query_map([job], attempt_row)?;

@@ -1,4 +1,4 @@
-//! Why jobs are there.
+//! Causes of jobs.
 
 use rusqlite::{Connection, Transaction, params};
 use serde::{Deserialize, Serialize};
@@ -16,17 +16,17 @@ pub enum CauseKind {
     DataChanged,
     /// The site file changed.
     ConfigChanged,
-    /// Another areograph.
+    /// The version of areograph changed.
     ToolChanged,
     /// The site is new.
     First,
     /// The night's comparison.
     Scheduled,
-    /// A person asked.
+    /// A person requested it.
     Asked,
     /// An earlier job ended without products.
     RetryOf,
-    /// A product is not what its manifest says.
+    /// A product does not match its manifest.
     ProductDamaged,
 }
 
@@ -48,7 +48,7 @@ impl CauseKind {
     }
 }
 
-/// Why a job is there.
+/// A cause of a job.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct CauseRow {
     /// Its kind, one of the names of [`CauseKind`].
@@ -59,14 +59,14 @@ pub struct CauseRow {
     pub old_blake3: Option<String>,
     /// BLAKE3 of its content now.
     pub new_blake3: Option<String>,
-    /// In words.
+    /// As text.
     pub detail: String,
     /// When, milliseconds of UTC since 1970.
     pub at_ms: i64,
 }
 
 impl CauseRow {
-    /// A cause that is no file.
+    /// A cause without a file.
     #[must_use]
     pub fn plain(kind: CauseKind, detail: &str, at_ms: i64) -> Self {
         Self {
@@ -80,10 +80,10 @@ impl CauseRow {
     }
 }
 
-/// Adds a cause to a job, unless the same file stands there with the same content.
+/// Adds a cause to a job, unless the same file with the same content is already recorded.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn add_cause(transaction: &Transaction<'_>, job: i64, cause: &CauseRow) -> Stored<()> {
     transaction.execute(
         "INSERT INTO cause (job, kind, path, old_blake3, new_blake3, detail, at_ms)
@@ -96,10 +96,10 @@ pub fn add_cause(transaction: &Transaction<'_>, job: i64, cause: &CauseRow) -> S
     Ok(())
 }
 
-/// Why a job is there, in the order in which the causes came.
+/// The causes of a job, in order of arrival.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn causes(connection: &Connection, job: i64) -> Stored<Vec<CauseRow>> {
     let mut query =
         connection.prepare_cached("SELECT * FROM cause WHERE job = ?1 ORDER BY rowid")?;

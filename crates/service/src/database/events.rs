@@ -1,4 +1,4 @@
-//! What happened, in order.
+//! Events, in order.
 
 use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
 use serde::Serialize;
@@ -7,7 +7,7 @@ use utoipa::ToSchema;
 
 use super::Stored;
 
-/// Something that happened.
+/// An event.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Event {
     /// Its number; later events have larger ones.
@@ -22,11 +22,11 @@ pub struct Event {
     pub job: Option<i64>,
     /// The run that it concerns.
     pub run: Option<String>,
-    /// More, by its kind.
+    /// Further data, by its kind.
     pub data: Value,
 }
 
-/// What an event concerns.
+/// Subject of an event.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct About<'a> {
     /// The site.
@@ -37,10 +37,10 @@ pub struct About<'a> {
     pub run: Option<&'a str>,
 }
 
-/// Notes an event and gives its number.
+/// Records an event and returns its number.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn append(
     transaction: &Transaction<'_>,
     now_ms: i64,
@@ -65,7 +65,7 @@ pub fn append(
 /// At most `limit` events after number `after`, oldest first.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn events_after(connection: &Connection, after: i64, limit: u32) -> Stored<Vec<Event>> {
     let mut query =
         connection.prepare_cached("SELECT * FROM event WHERE seq > ?1 ORDER BY seq LIMIT ?2")?;
@@ -76,7 +76,7 @@ pub fn events_after(connection: &Connection, after: i64, limit: u32) -> Stored<V
 /// The number of the newest event, 0 before the first.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn newest_event(connection: &Connection) -> Stored<i64> {
     let newest = connection
         .query_row("SELECT max(seq) FROM event", [], |row| row.get(0))

@@ -1,4 +1,4 @@
-//! Small facts by name.
+//! Named values.
 
 use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
 
@@ -6,34 +6,34 @@ use super::Stored;
 
 /// Number of the newest round of comparisons.
 pub const ROUND: &str = "round";
-/// Version of areograph that wrote last.
+/// Version of areograph of the last writer.
 pub const TOOL_VERSION: &str = "version";
-/// Cron fields and zone that the last intended instant belongs to.
+/// Cron fields and zone of the last intended instant.
 pub const SCHEDULE: &str = "schedule";
 /// The last instant at which a night was intended, milliseconds of UTC since 1970.
 pub const INTENDED_MS: &str = "intended_ms";
 
-/// A fact.
+/// A value.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn fact(connection: &Connection, name: &str) -> Stored<Option<String>> {
     let mut query = connection.prepare_cached("SELECT value FROM fact WHERE name = ?1")?;
     Ok(query.query_row([name], |row| row.get(0)).optional()?)
 }
 
-/// A fact that is a whole number.
+/// A whole number.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn number(connection: &Connection, name: &str) -> Stored<Option<i64>> {
     Ok(fact(connection, name)?.and_then(|text| text.parse().ok()))
 }
 
-/// Notes a fact.
+/// Records a value.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn note(transaction: &Transaction<'_>, name: &str, value: &str) -> Stored<()> {
     transaction.execute(
         "INSERT INTO fact (name, value) VALUES (?1, ?2) ON CONFLICT (name) DO UPDATE SET value = ?2",

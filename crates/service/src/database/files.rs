@@ -6,7 +6,7 @@ use super::{DatabaseError, Stored};
 use areograph_store::files::Identity;
 use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
 
-/// How far a file can be relied upon.
+/// Reliability of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileState {
     /// It changed, and its folder has not been quiet for long enough.
@@ -15,7 +15,7 @@ pub enum FileState {
     Ready,
     /// It cannot be used.
     Bad,
-    /// It is no longer there.
+    /// It was removed.
     Gone,
 }
 
@@ -39,19 +39,19 @@ impl FileState {
 pub struct FileRow {
     /// Its path.
     pub path: String,
-    /// What the file system said when it was last listed.
+    /// Its identity when it was last listed.
     pub identity: Identity,
     /// BLAKE3 of the content that was last read.
     pub blake3: Option<String>,
     /// When it was first seen, milliseconds of UTC since 1970.
     pub first_seen_ms: i64,
-    /// When it was last seen to be another.
+    /// When a change was last detected.
     pub changed_ms: i64,
     /// When its content was last read.
     pub checked_ms: Option<i64>,
-    /// How far it can be relied upon.
+    /// Its reliability.
     pub state: FileState,
-    /// Why.
+    /// The reason.
     pub detail: String,
     /// The round of comparisons that found this content.
     pub round: i64,
@@ -83,11 +83,11 @@ impl RootKind {
 /// Whether the files below a folder can be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RootState {
-    /// They can.
+    /// They can be used.
     Available,
-    /// Some of them changed a short time ago.
+    /// Some of them changed recently.
     Settling,
-    /// The folder is not there, or not what it was.
+    /// The folder is missing, or differs too much from its former state.
     Unavailable,
 }
 
@@ -110,22 +110,22 @@ impl RootState {
 pub struct RootRow {
     /// Its path.
     pub path: String,
-    /// What lies in it.
+    /// Kind of its files.
     pub kind: RootKind,
-    /// Files when it was last available.
+    /// Number of files when it was last available.
     pub files: i64,
     /// Whether they can be used.
     pub state: RootState,
     /// Since when, milliseconds of UTC since 1970.
     pub since_ms: i64,
-    /// Why.
+    /// The reason.
     pub detail: String,
 }
 
 /// Files known below `folder`, by path.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn files_below(connection: &Connection, folder: &str) -> Stored<BTreeMap<String, FileRow>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM file_version WHERE path > ?1 || '/' AND path < ?1 || '0' ORDER BY path",
@@ -138,16 +138,16 @@ pub fn files_below(connection: &Connection, folder: &str) -> Stored<BTreeMap<Str
 /// A file by its path.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn file(connection: &Connection, path: &str) -> Stored<Option<FileRow>> {
     let mut query = connection.prepare_cached("SELECT * FROM file_version WHERE path = ?1")?;
     Ok(query.query_row([path], file_row).optional()?)
 }
 
-/// Ready files whose content was found after a round, with the round that found it.
+/// Ready files whose content was found after a round, with the round of each.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn files_since(connection: &Connection, round: i64) -> Stored<Vec<(String, i64)>> {
     let mut query = connection.prepare_cached(
         "SELECT path, round FROM file_version WHERE round > ?1 AND state = 'ready' ORDER BY path",
@@ -156,10 +156,10 @@ pub fn files_since(connection: &Connection, round: i64) -> Stored<Vec<(String, i
     Ok(found.collect::<Result<_, _>>()?)
 }
 
-/// Ready files whose content was read longest ago, before `before_ms`.
+/// Ready files that were read longest ago, before `before_ms`.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn oldest_checked(connection: &Connection, before_ms: i64, limit: u32) -> Stored<Vec<FileRow>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM file_version WHERE state = 'ready' AND checked_ms < ?1 ORDER BY checked_ms, path LIMIT ?2",
@@ -168,10 +168,10 @@ pub fn oldest_checked(connection: &Connection, before_ms: i64, limit: u32) -> St
     Ok(found.collect::<Result<_, _>>()?)
 }
 
-/// Notes a file.
+/// Records a file.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_file(transaction: &Transaction<'_>, file: &FileRow) -> Stored<()> {
     let mut put = transaction.prepare_cached(
         "INSERT OR REPLACE INTO file_version
@@ -200,7 +200,7 @@ pub fn put_file(transaction: &Transaction<'_>, file: &FileRow) -> Stored<()> {
 /// All folders of inputs.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn roots(connection: &Connection) -> Stored<Vec<RootRow>> {
     let mut query = connection.prepare_cached("SELECT * FROM root ORDER BY path")?;
     let found = query.query_map([], |row| {
@@ -222,19 +222,19 @@ pub fn roots(connection: &Connection) -> Stored<Vec<RootRow>> {
     Ok(found.collect::<Result<_, _>>()?)
 }
 
-/// Whether a folder of inputs has changed a short time ago.
+/// Whether a folder of inputs changed recently.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn any_settling(connection: &Connection) -> Stored<bool> {
     let all = roots(connection)?;
     Ok(all.iter().any(|root| root.state == RootState::Settling))
 }
 
-/// Notes a folder of inputs.
+/// Records a folder of inputs.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_root(transaction: &Transaction<'_>, root: &RootRow) -> Stored<()> {
     transaction.execute(
         "INSERT OR REPLACE INTO root (path, kind, files, state, since_ms, detail) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
@@ -245,10 +245,10 @@ pub fn put_root(transaction: &Transaction<'_>, root: &RootRow) -> Stored<()> {
     Ok(())
 }
 
-/// Forgets the folders that are no longer configured, and the files below them.
+/// Removes the folders that are no longer configured, and the files below them.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn keep_roots(transaction: &Transaction<'_>, configured: &[String]) -> Stored<()> {
     for root in roots(transaction)? {
         if configured.contains(&root.path) {
@@ -270,10 +270,10 @@ pub fn is_below(path: &str, folder: &str) -> bool {
     Path::new(path) != Path::new(folder) && Path::new(path).starts_with(folder)
 }
 
-/// What a kernel covers, by its content.
+/// Records the coverage of a kernel, by its content.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_coverage(
     transaction: &Transaction<'_>,
     blake3: &str,
@@ -286,10 +286,10 @@ pub fn put_coverage(
     Ok(())
 }
 
-/// Whether it is known what a kernel with this content covers.
+/// Whether the coverage of a kernel with this content is known.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn knows_coverage(connection: &Connection, blake3: &str) -> Stored<bool> {
     let mut query = connection.prepare_cached("SELECT 1 FROM kernel_coverage WHERE blake3 = ?1")?;
     Ok(query.exists([blake3])?)

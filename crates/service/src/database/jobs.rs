@@ -1,4 +1,4 @@
-//! Jobs: asked for, taken, moved from state to state, and why they are there.
+//! Jobs: requests, state transitions and causes.
 
 use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
 use serde::{Deserialize, Serialize};
@@ -11,18 +11,18 @@ use super::{
 };
 use crate::state::JobState;
 
-/// Which of several queued jobs is taken first; a job rises by one for every hour that it waits.
+/// Priority of queued jobs; a job rises by one class for every hour of waiting.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 #[repr(i64)]
 pub enum Priority {
-    /// A new version of areograph: all sites, when nothing else is to do.
+    /// A new version of areograph: all sites, when no other job is queued.
     Backfill = 0,
     /// The nightly comparison.
     Scheduled = 1,
     /// An input changed.
     Changed = 2,
-    /// A person asked.
+    /// A person requested it.
     Asked = 3,
 }
 
@@ -44,7 +44,7 @@ pub struct Job {
     pub id: i64,
     /// The site that it brings up to date.
     pub site: String,
-    /// Where it stands.
+    /// Its state.
     pub state: JobState,
     /// Its class.
     pub priority: Priority,
@@ -52,27 +52,27 @@ pub struct Job {
     pub attempt: i64,
     /// Attempts that failed and count.
     pub failures: i64,
-    /// It waits until then, milliseconds of UTC since 1970.
+    /// It waits until this time, milliseconds of UTC since 1970.
     pub not_before_ms: i64,
-    /// Whether every stage runs, whatever is stored.
+    /// Whether every stage runs, including stored ones.
     pub force: bool,
-    /// Whether a person asked it to stop.
+    /// Whether a person requested cancellation.
     pub cancel_asked: bool,
-    /// The night that it belongs to.
+    /// Its night.
     pub night: Option<i64>,
-    /// Who asked for it.
+    /// Who requested it.
     pub asked_by: Option<String>,
-    /// When it was made, milliseconds of UTC since 1970.
+    /// When it was created, milliseconds of UTC since 1970.
     pub created_ms: i64,
     /// When its state last changed.
     pub changed_ms: i64,
     /// When it ended.
     pub ended_ms: Option<i64>,
-    /// How it ended, or why it waits: a JSON object with `text` and more.
+    /// Its outcome, or the reason for waiting: a JSON object with `text` and more.
     pub outcome: Option<Value>,
 }
 
-/// What is asked for.
+/// A request for a job.
 #[derive(Debug, Clone)]
 pub struct Ask<'a> {
     /// The site.
@@ -81,26 +81,26 @@ pub struct Ask<'a> {
     pub priority: Priority,
     /// Whether every stage runs.
     pub force: bool,
-    /// The night that it belongs to.
+    /// Its night.
     pub night: Option<i64>,
-    /// Who asks, where that is a person.
+    /// Who requests it, if a person does.
     pub asked_by: Option<&'a str>,
     /// Whether its inputs are ready.
     pub ready: bool,
-    /// Why.
+    /// The causes.
     pub causes: &'a [CauseRow],
 }
 
-/// What became of it.
+/// The result of a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Asked {
     /// The job.
     pub job: i64,
-    /// Whether a job that was pending took the causes in.
+    /// Whether an existing pending job took over the causes.
     pub joined: bool,
 }
 
-/// A job was sent where it cannot go.
+/// An invalid transition of a job.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("job {job} is {from} and cannot become {to}")]
 pub struct WrongTransition {
@@ -108,26 +108,26 @@ pub struct WrongTransition {
     pub job: i64,
     /// Its state.
     pub from: JobState,
-    /// Where it was sent.
+    /// The requested state.
     pub to: JobState,
 }
 
-/// What goes with a new state.
+/// Data recorded with a new state.
 #[derive(Debug, Clone, Default)]
 pub struct Moved {
-    /// How the job ended, or why it waits.
+    /// The outcome, or the reason for waiting.
     pub outcome: Option<Value>,
-    /// It waits until then, milliseconds of UTC since 1970.
+    /// The job waits until this time, milliseconds of UTC since 1970.
     pub not_before_ms: Option<i64>,
     /// Whether the attempt that ended counts as a failure.
     pub counts_as_failure: bool,
 }
 
-/// Makes a job, or adds the causes to the one of the site that is pending; a blocked or waiting one is queued again when a person asks or an input
-/// changed.
+/// Creates a job, or adds the causes to the pending one of the site. A blocked or waiting job is queued again at the
+/// request of a person or when an input changed.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn ask(transaction: &Transaction<'_>, now_ms: i64, ask: &Ask<'_>) -> Stored<Asked> {
     let state = if ask.ready {
         JobState::Queued
@@ -187,10 +187,10 @@ fn join(
     Ok(())
 }
 
-/// Moves a job to another state and notes the event.
+/// Moves a job to another state and records the event.
 ///
 /// # Errors
-/// [`WrongTransition`] when the table of states has no such way; SQLite's own.
+/// [`WrongTransition`] if the state table has no such transition; SQLite errors.
 pub fn advance(
     transaction: &Transaction<'_>,
     now_ms: i64,
@@ -225,8 +225,8 @@ pub fn advance(
     tell(transaction, now_ms, id, &site, to, moved.outcome.as_ref())
 }
 
-/// Moves a job from a worker back to those that wait. A job of the same site that came meanwhile is taken in: its causes, and that it is to be
-/// done at once.
+/// Returns a job from a worker to the pending ones. A job of the same site that arrived meanwhile is merged into it,
+/// with its causes and its request for an immediate run.
 ///
 /// # Errors
 /// As [`advance`].
@@ -245,7 +245,7 @@ pub fn give_back(
         return advance(transaction, now_ms, id, to, moved);
     };
     let taken_in = Moved {
-        outcome: Some(json!({ "text": format!("taken in by job {id}"), "job": id })),
+        outcome: Some(json!({ "text": format!("merged into job {id}"), "job": id })),
         ..Moved::default()
     };
     advance(
@@ -285,11 +285,11 @@ fn tell(
     Ok(())
 }
 
-/// Asks a job to stop: one that is pending ends at once, one at work when its worker has gone. Gives its state then; none for
-/// a job that is not there.
+/// Requests cancellation of a job: a pending one ends at once, an active one when its worker has ended. Returns its
+/// state; `None` for an unknown job.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn ask_cancel(transaction: &Transaction<'_>, now_ms: i64, id: i64) -> Stored<Option<JobState>> {
     let Some(found) = job(transaction, id)? else {
         return Ok(None);
@@ -308,10 +308,10 @@ pub fn ask_cancel(transaction: &Transaction<'_>, now_ms: i64, id: i64) -> Stored
     Ok(Some(to))
 }
 
-/// The queued job to be taken next: by class, which rises with every hour of waiting, then by age.
+/// The queued job to take next: by class, which rises with every hour of waiting, then by age.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn next_queued(connection: &Connection, now_ms: i64, backfill: bool) -> Stored<Option<Job>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM job WHERE state = 'queued' AND not_before_ms <= ?1 AND (priority > 0 OR ?2)
@@ -326,7 +326,7 @@ pub fn next_queued(connection: &Connection, now_ms: i64, backfill: bool) -> Stor
 /// A job by its number.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn job(connection: &Connection, id: i64) -> Stored<Option<Job>> {
     let mut query = connection.prepare_cached("SELECT * FROM job WHERE id = ?1")?;
     Ok(query.query_row([id], read).optional()?)
@@ -335,17 +335,17 @@ pub fn job(connection: &Connection, id: i64) -> Stored<Option<Job>> {
 /// Jobs in one state, the oldest first.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn jobs_in(connection: &Connection, state: JobState) -> Stored<Vec<Job>> {
     let mut query = connection.prepare_cached("SELECT * FROM job WHERE state = ?1 ORDER BY id")?;
     let found = query.query_map([state.name()], read)?;
     Ok(found.collect::<Result<_, _>>()?)
 }
 
-/// Jobs that have waited for long enough.
+/// Waiting jobs that are due.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn due_waiting(connection: &Connection, now_ms: i64) -> Stored<Vec<Job>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM job WHERE state = 'waiting' AND not_before_ms <= ?1 ORDER BY id",
@@ -354,10 +354,10 @@ pub fn due_waiting(connection: &Connection, now_ms: i64) -> Stored<Vec<Job>> {
     Ok(found.collect::<Result<_, _>>()?)
 }
 
-/// The job of a site that a worker is, or may be, at.
+/// The job of a site that has, or may have, a worker.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn active_job(connection: &Connection, site: &str) -> Stored<Option<Job>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM job WHERE site = ?1 AND state IN ('starting', 'running', 'cancelling')",
@@ -365,10 +365,10 @@ pub fn active_job(connection: &Connection, site: &str) -> Stored<Option<Job>> {
     Ok(query.query_row([site], read).optional()?)
 }
 
-/// The job of a site that waits for its turn.
+/// The pending job of a site.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn pending_job(connection: &Connection, site: &str) -> Stored<Option<Job>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM job WHERE site = ?1 AND state IN ('held', 'queued', 'waiting', 'blocked')",
@@ -376,7 +376,7 @@ pub fn pending_job(connection: &Connection, site: &str) -> Stored<Option<Job>> {
     Ok(query.query_row([site], read).optional()?)
 }
 
-/// Which jobs are wanted.
+/// A filter of jobs.
 #[derive(Debug, Clone, Default)]
 pub struct JobFilter<'a> {
     /// Of this site.
@@ -390,7 +390,7 @@ pub struct JobFilter<'a> {
 /// At most `limit` jobs, the newest first.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn jobs(connection: &Connection, filter: &JobFilter<'_>, limit: u32) -> Stored<Vec<Job>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM job WHERE (?1 IS NULL OR site = ?1) AND (?2 IS NULL OR state = ?2) AND (?3 IS NULL OR id < ?3)

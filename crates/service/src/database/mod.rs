@@ -31,12 +31,12 @@ pub use jobs::{
     ask_cancel, due_waiting, give_back, job, jobs, jobs_in, next_queued, pending_job,
 };
 
-/// Name of the database in the folder of the state.
+/// Name of the database in the state folder.
 pub const DATABASE: &str = "areograph.db";
 /// Layout of the tables; a change raises it and adds a step to [`migrate`].
 const VERSION: i64 = 1;
 const SCHEMA: &str = include_str!("schema.sql");
-/// Connections that read at the same time; a request beyond them opens one of its own.
+/// Concurrent read connections; a request beyond them opens its own.
 const READERS: usize = 8;
 
 /// The database, open.
@@ -47,13 +47,13 @@ pub struct Database {
     readers: Mutex<Vec<Connection>>,
 }
 
-/// What the database refuses.
+/// Errors of the database.
 #[derive(Debug, thiserror::Error)]
 pub enum DatabaseError {
-    /// SQLite's own reason.
+    /// An error of SQLite.
     #[error("the database of the service: {0}")]
     Sqlite(#[source] rusqlite::Error),
-    /// The file is not sound.
+    /// The file is damaged.
     #[error("the database is damaged: {0}")]
     Damaged(String),
     /// A newer areograph wrote it.
@@ -62,13 +62,13 @@ pub enum DatabaseError {
         /// Its layout.
         found: i64,
     },
-    /// A path that the database cannot hold.
+    /// A path that the database cannot store.
     #[error("the path {} is not UTF-8", .0.display())]
     Path(PathBuf),
     /// The system has no random numbers.
     #[error("random numbers are not available: {0}")]
     NoRandom(String),
-    /// A job cannot go where it was sent.
+    /// An invalid transition of a job.
     #[error(transparent)]
     Transition(#[from] WrongTransition),
 }
@@ -108,11 +108,11 @@ impl Cause for DatabaseError {
     }
 }
 
-/// What reading and writing give.
+/// Result of reading or writing.
 pub type Stored<T> = std::result::Result<T, DatabaseError>;
 
 impl Database {
-    /// Opens the database in `folder`, which is made if need be, and brings it to today's layout; before that it is copied.
+    /// Opens the database in `folder`, created if necessary, and migrates it to the current layout after making a copy.
     ///
     /// # Errors
     /// [`DatabaseError`]; [`IoError`].
@@ -131,16 +131,16 @@ impl Database {
         })
     }
 
-    /// Where it lies.
+    /// Its path.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Does `work` as one transaction, on the disk when this returns.
+    /// Performs `work` as one transaction, which is on the disk on return.
     ///
     /// # Errors
-    /// What `work` gives, and then nothing is written; or SQLite's own.
+    /// An error of `work`, in which case nothing is written; or an SQLite error.
     pub fn write<T>(&self, work: impl FnOnce(&Transaction<'_>) -> Stored<T>) -> Stored<T> {
         let mut writer = lock(&self.writer);
         let transaction = writer.transaction_with_behavior(TransactionBehavior::Immediate)?;
@@ -149,10 +149,10 @@ impl Database {
         Ok(done)
     }
 
-    /// Does `look` on one state of the database.
+    /// Performs `look` on one state of the database.
     ///
     /// # Errors
-    /// What `look` gives, or SQLite's own.
+    /// An error of `look`, or an SQLite error.
     pub fn read<T>(&self, look: impl FnOnce(&Connection) -> Stored<T>) -> Stored<T> {
         let idle = lock(&self.readers).pop();
         let mut reader = match idle {
@@ -169,26 +169,26 @@ impl Database {
         seen
     }
 
-    /// Writes the log of the database back into it and shortens the log; readers at work may keep a part of it.
+    /// Writes the log back into the database and truncates it; active readers may retain a part.
     ///
     /// # Errors
-    /// SQLite's own.
+    /// SQLite errors.
     pub fn checkpoint(&self) -> Stored<()> {
         let writer = lock(&self.writer);
         writer.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()))?;
         Ok(())
     }
 
-    /// Copies the database, as it is at one instant, to `path`, where nothing may be.
+    /// Copies the database, as of one instant, to `path`, which must not exist.
     ///
     /// # Errors
-    /// SQLite's own.
+    /// SQLite errors.
     pub fn copy_to(&self, path: &Path) -> Stored<()> {
         copy(&lock(&self.writer), path)
     }
 }
 
-/// Each transaction is whole, whatever happened to the thread that made another one.
+/// Transactions are atomic, so that a panic of another thread leaves no partial state.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,19 +1,19 @@
-//! Nights: at which instants all sites were to be looked at, and what came of it.
+//! Nights: intended instants of the comparison of all sites, and their results.
 
 use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
 
 use super::Stored;
 
-/// How a night came about.
+/// Origin of a night.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NightHow {
     /// It was due.
     Due,
     /// It was due while the service did not run.
     CaughtUp,
-    /// A person, or a timer outside, asked.
+    /// A person, or an external timer, requested it.
     Asked,
-    /// It was due so long ago that it was left out.
+    /// It was due too long ago and was skipped.
     Missed,
 }
 
@@ -39,20 +39,20 @@ pub struct Night {
     pub due_ms: i64,
     /// When it began.
     pub started_ms: Option<i64>,
-    /// When it was over.
+    /// When it ended.
     pub ended_ms: Option<i64>,
-    /// How it came about: `due`, `caught_up`, `asked` or `missed`.
+    /// Its origin: `due`, `caught_up`, `asked` or `missed`.
     pub how: String,
     /// Sites whose inputs were compared.
     pub sites_checked: i64,
     /// Runs that were published.
     pub runs: i64,
-    /// Jobs that failed, were blocked or gave products that are not valid.
+    /// Jobs that failed, were blocked or produced invalid products.
     pub failures: i64,
 }
 
 impl Night {
-    /// What came of it.
+    /// Its results as text.
     #[must_use]
     pub fn words(&self) -> String {
         let count = |count: i64, what: &str| {
@@ -65,10 +65,10 @@ impl Night {
     }
 }
 
-/// Notes a night; of two with the same instant the first stays, and then there is no number.
+/// Records a night; of two with the same instant the first is kept, and `None` is returned.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_night(
     transaction: &Transaction<'_>,
     due_ms: i64,
@@ -83,10 +83,10 @@ pub fn put_night(
     Ok((made > 0).then(|| transaction.last_insert_rowid()))
 }
 
-/// The night that has begun and is not over.
+/// The current night, begun and not ended.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn open_night(connection: &Connection) -> Stored<Option<Night>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM night WHERE started_ms IS NOT NULL AND ended_ms IS NULL ORDER BY id DESC LIMIT 1",
@@ -97,16 +97,16 @@ pub fn open_night(connection: &Connection) -> Stored<Option<Night>> {
 /// A night by its number.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn night(connection: &Connection, id: i64) -> Stored<Option<Night>> {
     let mut query = connection.prepare_cached("SELECT * FROM night WHERE id = ?1")?;
     Ok(query.query_row([id], night_row).optional()?)
 }
 
-/// Notes how many sites were compared in a night.
+/// Records the number of sites compared in a night.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_night_checked(transaction: &Transaction<'_>, id: i64, sites: usize) -> Stored<()> {
     transaction.execute(
         "UPDATE night SET sites_checked = ?2 WHERE id = ?1",
@@ -115,10 +115,10 @@ pub fn put_night_checked(transaction: &Transaction<'_>, id: i64, sites: usize) -
     Ok(())
 }
 
-/// Whether jobs of a night are still to be done.
+/// Whether jobs of a night are unfinished.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn night_at_work(connection: &Connection, id: i64) -> Stored<bool> {
     let mut query = connection.prepare_cached(
         "SELECT 1 FROM job WHERE night = ?1 AND state IN ('queued', 'starting', 'running', 'cancelling', 'waiting')",
@@ -126,10 +126,10 @@ pub fn night_at_work(connection: &Connection, id: i64) -> Stored<bool> {
     Ok(query.exists([id])?)
 }
 
-/// Ends a night and counts what came of it.
+/// Ends a night and counts its results.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn end_night(transaction: &Transaction<'_>, id: i64, now_ms: i64) -> Stored<Option<Night>> {
     transaction.execute(
         "UPDATE night SET ended_ms = ?2,

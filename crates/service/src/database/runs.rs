@@ -1,4 +1,4 @@
-//! Runs: what attempts published.
+//! Runs: publications of attempts.
 
 use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
 use serde_json::Value;
@@ -26,7 +26,7 @@ pub struct RunRow {
     pub verdict: String,
     /// Why the products are not valid: sentences.
     pub reasons: Value,
-    /// Why it ran: sentences.
+    /// Causes of the run: sentences.
     pub because: Value,
     /// Stages that ran, with their reasons.
     pub stages: Value,
@@ -36,11 +36,11 @@ pub struct RunRow {
     pub figures: Value,
     /// Name, role and hash of every kernel.
     pub kernels: Value,
-    /// The run that was current before.
+    /// The previous current run.
     pub predecessor: Option<String>,
     /// When it was published, milliseconds of UTC since 1970.
     pub published_ms: i64,
-    /// Whether it is kept for ever.
+    /// Whether it is kept permanently.
     pub pinned: bool,
     /// When its products were removed.
     pub removed_ms: Option<i64>,
@@ -49,7 +49,7 @@ pub struct RunRow {
 /// Whether a run of the site has this manifest, by its BLAKE3.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn is_run(connection: &Connection, site: &str, manifest_blake3: &str) -> Stored<bool> {
     let mut query = connection.prepare_cached(
         "SELECT EXISTS (SELECT 1 FROM run WHERE site = ?1 AND manifest_blake3 = ?2)",
@@ -57,10 +57,10 @@ pub fn is_run(connection: &Connection, site: &str, manifest_blake3: &str) -> Sto
     Ok(query.query_row([site, manifest_blake3], |row| row.get(0))?)
 }
 
-/// Notes a run; one that is known stays as it is.
+/// Records a run; a known one is unchanged.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_run(transaction: &Transaction<'_>, run: &RunRow) -> Stored<()> {
     transaction.execute(
         "INSERT OR IGNORE INTO run
@@ -90,10 +90,10 @@ pub fn put_run(transaction: &Transaction<'_>, run: &RunRow) -> Stored<()> {
     Ok(())
 }
 
-/// Notes which run readers of a site get.
+/// Records the current run of a site.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_current(
     transaction: &Transaction<'_>,
     site: &str,
@@ -107,10 +107,10 @@ pub fn put_current(
     Ok(())
 }
 
-/// Notes what a comparison with the predecessor found.
+/// Records the result of the comparison with the predecessor.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_moved(transaction: &Transaction<'_>, run: &str, moved: &Value) -> Stored<()> {
     transaction.execute(
         "UPDATE run SET moved = ?2 WHERE id = ?1",
@@ -119,10 +119,10 @@ pub fn put_moved(transaction: &Transaction<'_>, run: &str, moved: &Value) -> Sto
     Ok(())
 }
 
-/// Notes that the products of a run were removed.
+/// Records that the products of a run were removed.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_removed(transaction: &Transaction<'_>, run: &str, now_ms: i64) -> Stored<()> {
     transaction.execute(
         "UPDATE run SET removed_ms = ?2 WHERE id = ?1",
@@ -134,16 +134,16 @@ pub fn put_removed(transaction: &Transaction<'_>, run: &str, now_ms: i64) -> Sto
 /// A run by its identifier.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn run(connection: &Connection, id: &str) -> Stored<Option<RunRow>> {
     let mut query = connection.prepare_cached("SELECT * FROM run WHERE id = ?1")?;
     Ok(query.query_row([id], run_row).optional()?)
 }
 
-/// Runs of a site whose products are there, the newest first.
+/// Runs of a site whose products exist, the newest first.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn kept_runs(connection: &Connection, site: &str) -> Stored<Vec<RunRow>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM run WHERE site = ?1 AND removed_ms IS NULL ORDER BY published_ms DESC, id DESC",
@@ -152,10 +152,10 @@ pub fn kept_runs(connection: &Connection, site: &str) -> Stored<Vec<RunRow>> {
     Ok(found.collect::<Result<_, _>>()?)
 }
 
-/// Runs that have a predecessor and were not compared with it.
+/// Runs with a predecessor to which they have not been compared.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn uncompared_runs(connection: &Connection) -> Stored<Vec<RunRow>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM run WHERE moved IS NULL AND valid AND removed_ms IS NULL AND predecessor IS NOT NULL ORDER BY id",

@@ -1,14 +1,14 @@
-//! The service that runs, for whoever looks into the database.
+//! The running service, for other readers of the database.
 
 use rusqlite::{Transaction, params};
 
 use super::Stored;
 use crate::worker::process::ProcessIdentity;
 
-/// Notes the service that begins.
+/// Records the start of the service.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_service(
     transaction: &Transaction<'_>,
     process: &ProcessIdentity,
@@ -22,10 +22,10 @@ pub fn put_service(
     Ok(())
 }
 
-/// Notes that it is alive.
+/// Records a heartbeat of the service.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn beat(transaction: &Transaction<'_>, now_ms: i64) -> Stored<()> {
     transaction.execute("UPDATE service SET beat_ms = ?1", [now_ms])?;
     Ok(())

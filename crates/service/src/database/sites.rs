@@ -1,4 +1,4 @@
-//! Sites, and which files each reads.
+//! Sites, and the files that each reads.
 
 use std::collections::BTreeMap;
 
@@ -6,35 +6,35 @@ use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
 
 use super::Stored;
 
-/// What is known of a site.
+/// State of a site.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SiteRow {
     /// Its name.
     pub name: String,
     /// Its file.
     pub file: String,
-    /// BLAKE3 of its keys as last planned, empty before.
+    /// BLAKE3 of its keys in the last plan, empty before.
     pub config_blake3: String,
-    /// Whether its file is there.
+    /// Whether its file exists.
     pub enabled: bool,
-    /// Why it cannot be run.
+    /// The reason for which it cannot be run.
     pub problem: Option<String>,
-    /// The run that readers get.
+    /// The current run.
     pub current_run: Option<String>,
-    /// When all that it reads was last compared, milliseconds of UTC since 1970.
+    /// When all its inputs were last compared, milliseconds of UTC since 1970.
     pub checked_ms: Option<i64>,
-    /// Since when its products have not been those of its inputs.
+    /// Since when its products do not match its inputs.
     pub stale_since_ms: Option<i64>,
-    /// Why.
+    /// The reason.
     pub stale_because: Option<String>,
-    /// The round of that comparison; 0: it is to be planned.
+    /// The round of that comparison; 0: a plan is required.
     pub round: i64,
 }
 
 /// All sites, by name.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn sites(connection: &Connection) -> Stored<Vec<SiteRow>> {
     let mut query = connection.prepare_cached("SELECT * FROM site ORDER BY name")?;
     let found = query.query_map([], site_row)?;
@@ -44,16 +44,16 @@ pub fn sites(connection: &Connection) -> Stored<Vec<SiteRow>> {
 /// A site by its name.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn site(connection: &Connection, name: &str) -> Stored<Option<SiteRow>> {
     let mut query = connection.prepare_cached("SELECT * FROM site WHERE name = ?1")?;
     Ok(query.query_row([name], site_row).optional()?)
 }
 
-/// Notes that a site has this file; a site that was switched off is planned anew.
+/// Records the file of a site; a disabled site is planned again.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_site(transaction: &Transaction<'_>, name: &str, file: &str) -> Stored<()> {
     transaction.execute(
         "INSERT INTO site (name, file, config_blake3, enabled) VALUES (?1, ?2, '', 1)
@@ -64,12 +64,12 @@ pub fn put_site(transaction: &Transaction<'_>, name: &str, file: &str) -> Stored
     Ok(())
 }
 
-/// Notes that a site has no file any more.
+/// Records that a site has no file.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn disable_site(transaction: &Transaction<'_>, name: &str) -> Stored<()> {
-    let note = "its site file is gone";
+    let note = "its site file was removed";
     transaction.execute(
         "UPDATE site SET enabled = 0, last_note = ?2, stale_since_ms = NULL, stale_because = NULL WHERE name = ?1",
         params![name, note],
@@ -77,27 +77,27 @@ pub fn disable_site(transaction: &Transaction<'_>, name: &str) -> Stored<()> {
     Ok(())
 }
 
-/// What a comparison or a plan found of a site.
+/// The result of a comparison or plan of a site.
 #[derive(Debug, Clone, Default)]
 pub struct Checked<'a> {
     /// The round of the comparison.
     pub round: i64,
     /// When, milliseconds of UTC since 1970.
     pub at_ms: i64,
-    /// BLAKE3 of its keys, where it was planned.
+    /// BLAKE3 of its keys, if it was planned.
     pub config_blake3: Option<&'a str>,
-    /// What its windows span, degrees, where it was planned.
+    /// Extent of its windows, degrees, if it was planned.
     pub bounds_deg: Option<[f64; 4]>,
-    /// Why it cannot be planned.
+    /// The reason for which it cannot be planned.
     pub problem: Option<&'a str>,
-    /// In words.
+    /// As text.
     pub note: &'a str,
 }
 
-/// Notes what was found of a site.
+/// Records the result for a site.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_checked(transaction: &Transaction<'_>, name: &str, checked: &Checked<'_>) -> Stored<()> {
     let bounds = checked.bounds_deg;
     let bound = |index: usize| bounds.map(|bounds| bounds[index]);
@@ -121,10 +121,10 @@ pub fn put_checked(transaction: &Transaction<'_>, name: &str, checked: &Checked<
     Ok(())
 }
 
-/// Notes that sites were compared and need no plan.
+/// Records that sites were compared and need no plan.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_unchanged(
     transaction: &Transaction<'_>,
     names: &[&str],
@@ -140,10 +140,10 @@ pub fn put_unchanged(
     Ok(())
 }
 
-/// Notes since when and why a site's products are not those of its inputs; the first instant stays.
+/// Records since when and why a site's products do not match its inputs; the first instant is kept.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_stale(
     transaction: &Transaction<'_>,
     name: &str,
@@ -158,10 +158,10 @@ pub fn put_stale(
     Ok(())
 }
 
-/// Notes that a site's products are those of its inputs.
+/// Records that a site's products match its inputs.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_fresh(transaction: &Transaction<'_>, name: &str) -> Stored<()> {
     transaction.execute(
         "UPDATE site SET stale_since_ms = NULL, stale_because = NULL, problem = NULL WHERE name = ?1",
@@ -177,14 +177,14 @@ pub struct SiteInput {
     pub path: String,
     /// `site`, `kernel` or `data`.
     pub role: String,
-    /// BLAKE3 of the content that was last planned with; none of a file that was not there.
+    /// BLAKE3 of the content in the last plan; `None` for a file that did not exist.
     pub blake3: Option<String>,
 }
 
 /// Files that each site reads, by site.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn inputs_by_site(connection: &Connection) -> Stored<BTreeMap<String, Vec<SiteInput>>> {
     let mut query = connection.prepare_cached("SELECT * FROM site_input ORDER BY site, path")?;
     let mut rows = query.query([])?;
@@ -201,7 +201,7 @@ pub fn inputs_by_site(connection: &Connection) -> Stored<BTreeMap<String, Vec<Si
 /// Files that one site reads.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn inputs_of(connection: &Connection, site: &str) -> Stored<Vec<SiteInput>> {
     let mut query =
         connection.prepare_cached("SELECT * FROM site_input WHERE site = ?1 ORDER BY path")?;
@@ -209,10 +209,10 @@ pub fn inputs_of(connection: &Connection, site: &str) -> Stored<Vec<SiteInput>> 
     Ok(found.collect::<Result<_, _>>()?)
 }
 
-/// Notes which files a site reads.
+/// Records which files a site reads.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn put_inputs(transaction: &Transaction<'_>, site: &str, inputs: &[SiteInput]) -> Stored<()> {
     transaction.execute("DELETE FROM site_input WHERE site = ?1", [site])?;
     let mut put = transaction.prepare_cached(
@@ -224,10 +224,10 @@ pub fn put_inputs(transaction: &Transaction<'_>, site: &str, inputs: &[SiteInput
     Ok(())
 }
 
-/// Sites of which a file has another content than they were planned with, or has gone, with these files.
+/// Sites with files that were removed or whose content differs from that in their plan, with these files.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn changed_inputs(connection: &Connection) -> Stored<BTreeMap<String, Vec<String>>> {
     let mut query = connection.prepare_cached(
         "SELECT i.site, i.path FROM file_version f JOIN site_input i ON i.path = f.path

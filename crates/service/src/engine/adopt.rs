@@ -1,5 +1,5 @@
-//! After a start: what an earlier service left. Its workers are ended, what they published is adopted, the rest is queued
-//! again; the links on the disk win over the database.
+//! Reconciliation after a start: workers of an earlier service are ended, their publications are adopted, the rest is
+//! queued again. Links on the disk take precedence over the database.
 
 use rusqlite::Transaction;
 use serde_json::{Value, json};
@@ -27,7 +27,7 @@ use crate::{
 };
 use areograph_base::error::{Locate as _, Result};
 
-/// How often the end of a worker is looked for, and how long between two looks.
+/// Number of checks for the end of a worker, and the time between two checks.
 const LOOKS: u32 = 200;
 const LOOK: std::time::Duration = std::time::Duration::from_millis(50);
 
@@ -61,7 +61,7 @@ fn adopt_jobs<W: Workers>(core: &Core<W>) -> Stored<()> {
     Ok(())
 }
 
-/// Ends a worker that outlived its service, and waits until it has gone.
+/// Ends a worker that outlived its service, and waits for its end.
 fn end(process: &ProcessIdentity) {
     if !process.end() {
         return;
@@ -72,7 +72,7 @@ fn end(process: &ProcessIdentity) {
         }
         std::thread::sleep(LOOK);
     }
-    // Its site's lock keeps the next worker out.
+    // The lock of its site excludes the next worker.
     tracing::warn!("process {} cannot be ended", process.pid);
 }
 
@@ -95,7 +95,7 @@ fn finish_for<W: Workers>(core: &Core<W>, job: &Job, newest: Option<AttemptRow>)
     finish(core, &attempt, &ended, Some(CancelWhy::Shutdown)).map(|_| ())
 }
 
-/// Removes half-made runs, notes those that the database does not know, and follows the link.
+/// Removes incomplete runs, records those unknown to the database, and follows the link.
 fn adopt_runs<W: Workers>(core: &Core<W>, site: &SiteRow) -> Result<()> {
     let products = core.shared.config().outputs.products.clone();
     let folder = site_folder(&products, &site.name);
@@ -108,7 +108,7 @@ fn adopt_runs<W: Workers>(core: &Core<W>, site: &SiteRow) -> Result<()> {
         }
         match read_run(&path) {
             Ok(published) => note(core, &published).in_file(&path)?,
-            Err(failure) => tracing::warn!("a run that is not used: {failure}"),
+            Err(failure) => tracing::warn!("a run is not adopted: {failure}"),
         }
     }
     let Some(linked) = linked.filter(|linked| site.current_run.as_ref() != Some(linked)) else {
@@ -139,10 +139,10 @@ fn note<W: Workers>(core: &Core<W>, published: &Published) -> Stored<()> {
     })
 }
 
-/// Numbers of jobs that runs on the disk bear are not given again.
+/// Reserves the job numbers of runs on the disk, so that they are not reused.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn after_job(transaction: &Transaction<'_>, job: i64) -> Stored<()> {
     transaction.execute(
         "INSERT INTO sqlite_sequence (name, seq) SELECT 'job', 0 WHERE NOT EXISTS (SELECT 1 FROM sqlite_sequence WHERE name = 'job')",

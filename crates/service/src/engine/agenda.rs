@@ -1,35 +1,35 @@
-//! What is under way in the engine, and when what was done last.
+//! Activities of the engine in progress, and times of the last ones.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// What turns of the engine must know of each other.
+/// State shared by the turns of the engine.
 #[derive(Debug, Default)]
 #[allow(
     clippy::struct_excessive_bools,
-    reason = "each is about a task of its own"
+    reason = "each entry describes its own task"
 )]
 pub(super) struct Agenda {
     pub(super) round: bool,
     pub(super) round_ms: Option<i64>,
-    /// The night that has begun.
+    /// The current night.
     pub(super) night: Option<i64>,
-    /// Whether its comparisons have begun, and whether they are done.
+    /// Whether its comparisons have begun, and whether they have ended.
     pub(super) comparing: bool,
     pub(super) compared: bool,
-    /// Its comparisons are not done while files settle, until then.
+    /// Its comparisons wait for settling files until this time.
     pub(super) settles_until_ms: Option<i64>,
     pub(super) upkeep: bool,
     pub(super) upkeep_ms: Option<i64>,
     pub(super) trim_ms: Option<i64>,
     pub(super) letters: bool,
-    /// Whether runs wait to be compared with their predecessors, and whether some are.
+    /// Whether runs wait for comparison with their predecessors, and whether one is in progress.
     pub(super) to_compare: bool,
     pub(super) comparison: bool,
     pub(super) has_room: bool,
 }
 
 impl Agenda {
-    /// A night has begun.
+    /// Begins a night.
     pub(super) fn begin(&mut self, night: Option<i64>, settles_until_ms: Option<i64>) {
         if night.is_some() {
             self.night = night;
@@ -39,7 +39,7 @@ impl Agenda {
     }
 }
 
-/// Each entry is whole, whatever happened to the thread that wrote another one.
+/// Each entry is complete, so that a panic of another thread leaves no partial state.
 pub(super) fn lock(agenda: &Mutex<Agenda>) -> MutexGuard<'_, Agenda> {
     agenda.lock().unwrap_or_else(PoisonError::into_inner)
 }

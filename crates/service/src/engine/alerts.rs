@@ -1,4 +1,4 @@
-//! What people are told of: once when it begins and once when it ends, whatever happens in between.
+//! Alerts: one when a condition begins and one when it ends.
 
 use rusqlite::Transaction;
 use serde_json::{Value, json};
@@ -13,7 +13,7 @@ use crate::{
 };
 use areograph_config::{AlertKind, ServiceConfig};
 
-/// Something that people are told of.
+/// An alert.
 #[derive(Debug, Clone, Copy)]
 pub struct Alert<'a> {
     /// Its kind.
@@ -22,14 +22,14 @@ pub struct Alert<'a> {
     pub site: Option<&'a str>,
     /// The run that it concerns.
     pub run: Option<&'a str>,
-    /// In words.
+    /// As text.
     pub text: &'a str,
 }
 
-/// Tells people: as an event, and by a letter to each hook that wants this kind.
+/// Reports an alert: as an event, and by a letter to each hook that subscribes to this kind.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn tell(
     transaction: &Transaction<'_>,
     config: &ServiceConfig,
@@ -70,21 +70,21 @@ pub fn tell(
     Ok(())
 }
 
-/// How a site stands, for telling its edges.
+/// State of a site, for alerts on changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Standing {
-    /// Its last job gave valid products, or nothing had to be made.
+    /// Its last job produced valid products, or was not necessary.
     Well,
     /// Its last job failed, or waits for another input.
     Failed,
-    /// Its last job made products that are not valid.
+    /// Its last job produced invalid products.
     Invalid,
 }
 
-/// Tells of a site when it stands otherwise than before.
+/// Reports a change of a site's state.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn tell_standing(
     transaction: &Transaction<'_>,
     config: &ServiceConfig,
@@ -114,10 +114,10 @@ pub fn tell_standing(
     tell(transaction, config, now_ms, &alert, &Value::Null)
 }
 
-/// Tells that something is wrong, or with another kind that it is well again, when it was otherwise before.
+/// Reports the beginning of a fault, or with another kind its end, if the state changed.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn tell_edge(
     transaction: &Transaction<'_>,
     config: &ServiceConfig,

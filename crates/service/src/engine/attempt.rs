@@ -33,10 +33,10 @@ use crate::{
     },
 };
 
-/// Time between two tries to note the end of an attempt while the database cannot be written.
+/// Time between two tries to record the end of an attempt while the database cannot be written.
 const NOTE_AGAIN: Duration = Duration::from_secs(1);
 
-/// Attempts at work, by job.
+/// Active attempts, by job.
 #[derive(Debug, Default)]
 pub struct AtWork {
     by_job: Mutex<BTreeMap<i64, Place>>,
@@ -49,7 +49,7 @@ struct Place {
 }
 
 impl AtWork {
-    /// How many.
+    /// Their number.
     #[must_use]
     pub fn count(&self) -> usize {
         self.lock().len()
@@ -59,7 +59,7 @@ impl AtWork {
         self.lock().values().filter(|place| place.backfill).count()
     }
 
-    /// Asks the worker of a job to stop, if there is one; the first reason stays.
+    /// Asks the worker of a job, if any, to stop; the first reason is kept.
     pub fn cancel(&self, job: i64, why: CancelWhy) -> bool {
         let places = self.lock();
         let Some(place) = places.get(&job) else {
@@ -73,7 +73,7 @@ impl AtWork {
         true
     }
 
-    /// Nobody works for the job any more.
+    /// Removes the job: it has no worker.
     pub fn leave(&self, job: i64) {
         self.lock().remove(&job);
     }
@@ -91,7 +91,7 @@ impl AtWork {
     }
 }
 
-/// A job that was taken, and where its worker is asked to stop.
+/// A job taken from the queue, and the channel that stops its worker.
 #[derive(Debug)]
 pub struct Taken {
     job: Job,
@@ -109,7 +109,7 @@ impl Taken {
     }
 }
 
-/// Takes the next job, if one may be taken now.
+/// Takes the next job, if one can be taken now.
 ///
 /// # Errors
 /// The database cannot be written.
@@ -121,12 +121,12 @@ pub fn take<W: Workers>(core: &Core<W>, at_work: &AtWork) -> Stored<Option<Taken
     if at_work.count() >= count || queued.is_empty() {
         return Ok(None);
     }
-    // A backfill leaves room for what changes meanwhile.
+    // A backfill leaves capacity for changes.
     let backfill = at_work.backfills() < count.saturating_sub(1).max(1);
     let now_ms = core.now_ms();
     let taken = core.shared.write(|transaction| {
         let waits = not_ready(transaction)?;
-        // Those that cannot begin now leave the queue.
+        // Jobs that cannot begin now leave the queue.
         while let Some(next) = next_queued(transaction, now_ms, backfill)? {
             if let Some(why) = waits.of(&next.site) {
                 hold(transaction, now_ms, &next, &why)?;
@@ -160,7 +160,7 @@ pub fn take<W: Workers>(core: &Core<W>, at_work: &AtWork) -> Stored<Option<Taken
     }))
 }
 
-/// A job whose site is gone ends here.
+/// A job whose site was removed ends here.
 fn begin(
     transaction: &Transaction<'_>,
     now_ms: i64,
@@ -169,7 +169,7 @@ fn begin(
     let site = site(transaction, &next.site)?.filter(|site| site.enabled);
     let Some(site) = site else {
         let moved = Moved {
-            outcome: Some(json!({ "text": "its site file is gone" })),
+            outcome: Some(json!({ "text": "its site file was removed" })),
             ..Moved::default()
         };
         advance(transaction, now_ms, next.id, JobState::Cancelled, &moved)?;
@@ -195,7 +195,7 @@ fn begin(
     Ok(Some((job, site.file, site.config_blake3)))
 }
 
-/// Follows an attempt to its end; gives the run that it published.
+/// Follows an attempt to its end; returns the run that it published.
 pub async fn follow<W: Workers>(core: Arc<Core<W>>, taken: Taken) -> Option<RunRow> {
     let Taken {
         job,
@@ -206,7 +206,7 @@ pub async fn follow<W: Workers>(core: Arc<Core<W>>, taken: Taken) -> Option<RunR
     } = taken;
     let config = core.shared.config();
     let products = &config.outputs.products;
-    // What cannot be made is met by the worker.
+    // The worker reports a folder that cannot be created.
     let _ = fs::create_dir_all(runs(products, &job.site));
     let what = What::Run {
         site_file: site_file.into(),
@@ -233,10 +233,10 @@ pub async fn follow<W: Workers>(core: Arc<Core<W>>, taken: Taken) -> Option<RunR
     };
     let why = *cancel.borrow();
     loop {
-        // A full disk: what happened is not forgotten before it can be noted.
+        // A full disk: the outcome is kept until it can be recorded.
         match finish(&core, &attempt, &ended, why) {
             Ok(run) => return run,
-            Err(error) => tracing::error!(job = job.id, "the end of an attempt: {error}"),
+            Err(error) => tracing::error!(job = job.id, "unrecorded end of an attempt: {error}"),
         }
         if core.shared.ending.is_cancelled() {
             // The next service finds the run on the disk.
@@ -246,7 +246,7 @@ pub async fn follow<W: Workers>(core: Arc<Core<W>>, taken: Taken) -> Option<RunR
     }
 }
 
-/// Notes what a worker says; a line that cannot be noted is lost, its work is not.
+/// Records a message of a worker; a line that cannot be recorded is lost, but not its work.
 fn hear<W: Workers>(core: &Core<W>, attempt: &mut Attempt, heard: Heard<'_>) {
     let now_ms = core.now_ms();
     let at = (attempt.job, attempt.n);
@@ -299,6 +299,6 @@ fn hear<W: Workers>(core: &Core<W>, attempt: &mut Attempt, heard: Heard<'_>) {
 
 fn told(noted: Stored<()>, attempt: &Attempt) {
     if let Err(error) = noted {
-        tracing::warn!(job = attempt.job, "a line of a worker: {error}");
+        tracing::warn!(job = attempt.job, "unrecorded line of a worker: {error}");
     }
 }

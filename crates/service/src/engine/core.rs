@@ -1,4 +1,4 @@
-//! What every part of the engine works with: the shared service, workers, random numbers, and work that belongs to no job.
+//! Common parts of the engine: the shared service, workers, random numbers, and work that belongs to no job.
 
 use std::{
     collections::BTreeSet,
@@ -24,7 +24,7 @@ use crate::{
 };
 use areograph_base::error::{IoError, Locate as _, Result};
 
-/// Time within which a worker that took too long is ended by force, unless a dead mount holds it.
+/// Time within which an overdue worker is ended by force, unless an unresponsive mount blocks it.
 const ENDED_WITHIN: Duration = Duration::from_secs(25);
 
 /// The engine, as its parts see it.
@@ -32,20 +32,20 @@ const ENDED_WITHIN: Duration = Duration::from_secs(25);
 pub struct Core<W> {
     /// The service.
     pub shared: Arc<Shared>,
-    /// Those who do the work.
+    /// The workers.
     pub workers: W,
     /// Random numbers.
     pub random: Random,
-    /// Work that was given up and has not ended: a dead mount holds its processes.
+    /// Work that was abandoned and has not ended: an unresponsive mount blocks its processes.
     stuck: Mutex<BTreeSet<String>>,
     scratch: AtomicU64,
 }
 
 impl<W: Workers> Core<W> {
-    /// A core over a service; files of work that was under way are removed.
+    /// Creates a core for a service; temporary files of earlier work are removed.
     ///
     /// # Errors
-    /// The folder of the state cannot be written.
+    /// The state folder cannot be written.
     pub fn new(shared: Arc<Shared>, workers: W, random: Random) -> Result<Self> {
         let state = shared.config().outputs.state.clone();
         let _ = fs::remove_dir_all(state.join(WORK));
@@ -64,13 +64,13 @@ impl<W: Workers> Core<W> {
         })
     }
 
-    /// The time, milliseconds of UTC since 1970.
+    /// The current time, milliseconds of UTC since 1970.
     #[must_use]
     pub fn now_ms(&self) -> i64 {
         self.shared.now_ms()
     }
 
-    /// A path for a file of work under way.
+    /// A path for a temporary file of current work.
     #[must_use]
     pub fn scratch(&self) -> PathBuf {
         let number = self.scratch.fetch_add(1, Ordering::Relaxed);
@@ -78,7 +78,7 @@ impl<W: Workers> Core<W> {
         state.join(WORK).join(number.to_string())
     }
 
-    /// A task of a job, or with number 0 of none.
+    /// A task of a job; number 0 stands for none.
     #[must_use]
     pub fn task(&self, job: i64, attempt: i64, what: What) -> Task {
         let config = self.shared.config();
@@ -96,8 +96,8 @@ impl<W: Workers> Core<W> {
         }
     }
 
-    /// Has work done that belongs to no job. After `limit` it is ended; what cannot be ended, since a dead mount holds it, is
-    /// given up, and nothing is begun for the same subject before it ends.
+    /// Has work done that belongs to no job. After `limit` it is ended. Work that an unresponsive mount blocks is
+    /// abandoned, and no work on the same subject begins before it ends.
     pub async fn ask(self: &Arc<Self>, subject: &str, what: What, limit: Duration) -> Ended {
         if !self.stuck().insert(subject.to_owned()) {
             return silent();
@@ -123,7 +123,7 @@ impl<W: Workers> Core<W> {
         match ended {
             Some(Ok(ended)) => ended,
             Some(Err(panicked)) => {
-                tracing::error!("work for {subject}: {panicked}");
+                tracing::error!("work for {subject} failed: {panicked}");
                 silent()
             }
             None => silent(),
@@ -147,14 +147,14 @@ impl<W: Workers> Core<W> {
     }
 }
 
-/// Folder of files of work under way, in the folder of the state.
+/// Folder of temporary files of current work, in the state folder.
 const WORK: &str = "work";
-/// Folder of logs of attempts, in the folder of the state.
+/// Folder of logs of attempts, in the state folder.
 pub const LOGS: &str = "logs";
-/// Folder of copies of the database, in the folder of the state.
+/// Folder of copies of the database, in the state folder.
 pub const COPIES: &str = "copies";
 
-/// Where the log of an attempt lies in the folder of the state.
+/// Path of the log of an attempt in the state folder.
 #[must_use]
 pub fn log_of(job: i64, attempt: i64) -> String {
     format!("{LOGS}/{job}-{attempt}.jsonl")
@@ -166,7 +166,7 @@ pub fn site_folder(products: &Path, site: &str) -> PathBuf {
     products.join(site)
 }
 
-/// Folder whose subfolder of the site's name a site's worker works in.
+/// The folder whose subfolder with the site's name is the working folder of a site's worker.
 #[must_use]
 pub fn working(products: &Path, site: &str) -> PathBuf {
     site_folder(products, site).join("working")

@@ -1,4 +1,4 @@
-//! After every update: what moved from the run before to the new one. A comparison that fails holds nothing back.
+//! Comparison of a new run with its predecessor after every update. A failed comparison delays nothing.
 
 use std::{fs, path::PathBuf, sync::Arc, time::Duration};
 
@@ -31,7 +31,7 @@ pub fn page(products: &std::path::Path, site: &str, run: &str) -> PathBuf {
         .join(format!("{run}.html"))
 }
 
-/// Compares runs that were not compared with their predecessors.
+/// Compares runs that have not been compared with their predecessors.
 ///
 /// # Errors
 /// The database cannot be read or written.
@@ -53,7 +53,7 @@ async fn compare<W: Workers>(core: &Arc<Core<W>>, run: &RunRow) -> Stored<()> {
     let products = &config.outputs.products;
     let page = page(products, &run.site, &run.id);
     if let Some(folder) = page.parent() {
-        // What cannot be made is met by the worker.
+        // The worker reports a folder that cannot be created.
         let _ = fs::create_dir_all(folder);
     }
     let folder = runs(products, &run.site);

@@ -1,4 +1,4 @@
-//! Room on the disks: without it no job begins, and a reserve lets the database end what is under way.
+//! Disk space: without enough of it no job begins, and a reserve lets the database complete current work.
 
 use std::{
     fs::{self, File},
@@ -21,14 +21,14 @@ const RESERVE: &str = "reserve";
 const RESERVE_MIB: u64 = 16;
 const MIB: u64 = 1 << 20;
 
-/// Space that is left below a folder, mebibytes; none where the system does not tell.
+/// Free space below a folder, mebibytes; `None` if the system does not report it.
 #[must_use]
 pub fn free_mib(folder: &Path) -> Option<u64> {
     let found = statvfs(folder).ok()?;
     Some(found.f_bavail.saturating_mul(found.f_frsize) / MIB)
 }
 
-/// Whether there is room for jobs; told at its edges. The reserve is given up and made again as the room needs it.
+/// Whether there is space for jobs; changes are reported. The reserve is released and restored as space permits.
 ///
 /// # Errors
 /// The database cannot be written.
@@ -62,7 +62,7 @@ pub fn has_room<W: Workers>(core: &Core<W>) -> Stored<bool> {
     Ok(!low)
 }
 
-/// Keeps the reserve while there is plenty of room, and gives it up when there is hardly any.
+/// Keeps the reserve while there is ample space, and releases it when there is hardly any.
 pub fn reserve(state: &Path, free_mib: u64, least_mib: u64) {
     let path = state.join(RESERVE);
     if free_mib < RESERVE_MIB {
@@ -79,7 +79,7 @@ pub fn reserve(state: &Path, free_mib: u64, least_mib: u64) {
     }
 }
 
-/// Makes room for the database.
+/// Frees space for the database.
 pub fn give_up_reserve(state: &Path) {
     if fs::remove_file(state.join(RESERVE)).is_ok() {
         tracing::warn!(

@@ -1,4 +1,5 @@
-//! The end of an attempt: what it published is checked, made current and noted; else the job goes on by the kind of failure.
+//! The end of an attempt: its publication is checked, made current and recorded; otherwise the kind of failure
+//! determines the next state of the job.
 
 use rusqlite::Transaction;
 use serde_json::{Value, json};
@@ -27,7 +28,7 @@ use crate::{
 };
 use areograph_base::error::Error;
 
-/// An attempt, and what was last heard of it.
+/// An attempt, and its last report.
 #[derive(Debug, Clone, Default)]
 pub struct Attempt {
     /// The job.
@@ -36,27 +37,27 @@ pub struct Attempt {
     pub n: i64,
     /// The site.
     pub site: String,
-    /// The run that it makes.
+    /// Its run.
     pub run: String,
-    /// The stage at work.
+    /// The current stage.
     pub stage: Option<String>,
 }
 
-/// What an attempt came to.
+/// Result of an attempt.
 #[derive(Debug)]
 enum Fruit {
     /// A run, checked; its row.
     Run(Box<RunRow>),
-    /// Nothing had to be made.
+    /// The products were up to date.
     Unchanged,
-    /// Nothing, and why.
+    /// No result, and the reason.
     None(Ended),
 }
 
-/// Ends an attempt, once; gives the run that it published.
+/// Ends an attempt, once; returns the run that it published.
 ///
 /// # Errors
-/// The database cannot be written; then nothing of it is noted, and it can be done again.
+/// The database cannot be written; then nothing is recorded, and the call can be repeated.
 pub fn finish<W: Workers>(
     core: &Core<W>,
     attempt: &Attempt,
@@ -80,13 +81,13 @@ pub fn finish<W: Workers>(
                 _ => None,
             },
         };
-        // Whoever noted the end has moved the job too.
+        // The first record of the end has already moved the job.
         if !end_attempt(transaction, now_ms, (attempt.job, attempt.n), end)? {
             return Ok(false);
         }
         let (state, moved) = match &fruit {
             Fruit::Run(run) => after_run(transaction, now_ms, run)?,
-            Fruit::Unchanged => (JobState::Unchanged, text("nothing had to be made")),
+            Fruit::Unchanged => (JobState::Unchanged, text("the products are up to date")),
             Fruit::None(ended) => {
                 let fruitless = Fruitless {
                     job: &job,
@@ -120,7 +121,7 @@ pub fn finish<W: Workers>(
     })
 }
 
-/// What a person is told of an outcome.
+/// Text of an outcome for people.
 #[must_use]
 pub fn outcome_text(outcome: &Value) -> String {
     outcome["text"].as_str().unwrap_or_default().to_owned()
@@ -133,7 +134,7 @@ fn text(text: &str) -> Moved {
     }
 }
 
-/// A worker that published or found nothing to do has been running, whether it was heard to say hello or not.
+/// A worker that published, or found the products up to date, has been running, even if its hello was not received.
 fn go(
     transaction: &Transaction<'_>,
     now_ms: i64,
@@ -166,7 +167,7 @@ fn fruit<W: Workers>(core: &Core<W>, attempt: &Attempt, ended: &Ended) -> Stored
     };
     let products = core.shared.config().outputs.products.clone();
     let folder = runs(&products, &attempt.site).join(&attempt.run);
-    // A worker that died after publishing has published all the same.
+    // A worker that died after publishing has nevertheless published.
     if !folder.is_dir() {
         return Ok(match answer {
             Some(answer) if answer.run.is_none() => Fruit::Unchanged,
@@ -188,7 +189,7 @@ fn fruit<W: Workers>(core: &Core<W>, attempt: &Attempt, ended: &Ended) -> Stored
             Ok(Fruit::Run(Box::new(run)))
         }
         Err(failure) => {
-            // Half of it is of no use; the next attempt links it again.
+            // An incomplete run is useless; the next attempt links it again.
             if let Err(kept) = remove(&folder) {
                 tracing::warn!("{kept}");
             }
@@ -223,7 +224,7 @@ fn noted<W: Workers>(
     ))
 }
 
-/// Notes a run; the state and outcome of its job.
+/// Records a run; returns the state and outcome of its job.
 fn after_run(
     transaction: &Transaction<'_>,
     now_ms: i64,
@@ -246,7 +247,7 @@ fn after_run(
     Ok((JobState::Invalid, text(&reasons.join("; "))))
 }
 
-/// A failure of the service itself, as a worker would tell it.
+/// A failure of the service itself, in the form that a worker would report.
 fn as_failure(error: &Error) -> Failure {
     Failure {
         code: error.kind().exit_code(),

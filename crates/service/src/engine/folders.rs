@@ -1,4 +1,4 @@
-//! Folders of inputs as they are configured, and paths below them.
+//! Configured folders of inputs, and paths below them.
 
 use std::path::{Component, Path, PathBuf};
 
@@ -11,13 +11,13 @@ use areograph_config::ServiceInputs;
 /// A folder of inputs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Folder {
-    /// Its path as the database has it.
+    /// Its path in the database.
     pub path: String,
-    /// What lies in it.
+    /// Kind of its files.
     pub kind: RootKind,
 }
 
-/// The folders of a configuration; one that is named twice counts as what it was first named for.
+/// The folders of a configuration; one that is named twice has the kind of its first entry.
 ///
 /// # Errors
 /// A path is not UTF-8.
@@ -39,7 +39,7 @@ pub fn folders(inputs: &ServiceInputs) -> Stored<Vec<Folder>> {
     Ok(found)
 }
 
-/// A path without `.` and `..`, whatever links it leads through.
+/// A path without `.` and `..`; links are not resolved.
 #[must_use]
 pub fn plain(path: &Path) -> PathBuf {
     let mut plain = PathBuf::new();
@@ -55,7 +55,7 @@ pub fn plain(path: &Path) -> PathBuf {
     plain
 }
 
-/// A file that a site reads, under the path that lists of the folders give it: links may lead there by another way.
+/// A file that a site reads, under its path in the folder lists: links may lead there by another way.
 #[must_use]
 pub fn as_listed(folders: &[Folder], path: &Path) -> Option<String> {
     let below_any = |path: &Path| {
@@ -73,7 +73,7 @@ pub fn as_listed(folders: &[Folder], path: &Path) -> Option<String> {
     })
 }
 
-/// What a site uses a file for: `site`, `kernel` or `data`.
+/// The role of a file in a site: `site`, `kernel` or `data`.
 #[must_use]
 pub fn role(folders: &[Folder], path: &str) -> &'static str {
     let folder = folders.iter().find(|folder| is_below(path, &folder.path));

@@ -1,5 +1,5 @@
-//! Since when, and why, a site's products are not those of its inputs. A site whose inputs did not change is fresh, however old
-//! its run.
+//! Since when, and why, a site's products do not match its inputs. A site with unchanged inputs is fresh, independent
+//! of the age of its run.
 
 use std::collections::BTreeMap;
 
@@ -21,10 +21,10 @@ use crate::{
 };
 use areograph_config::{AlertKind, ServiceConfig};
 
-/// Notes of one site, or of all, whether it is fresh.
+/// Records for one site, or for all, whether it is fresh.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn refresh(transaction: &Transaction<'_>, now_ms: i64, only: Option<&str>) -> Stored<()> {
     let sites = match only {
         Some(name) => site(transaction, name)?.into_iter().collect(),
@@ -50,7 +50,7 @@ pub fn refresh(transaction: &Transaction<'_>, now_ms: i64, only: Option<&str>) -
     Ok(())
 }
 
-/// The newest job of a site: its number, state, outcome and beginning.
+/// The newest job of a site: its number, state, outcome and start.
 struct Newest {
     id: i64,
     state: JobState,
@@ -93,7 +93,7 @@ fn by_job(
     };
     let why = match job.state {
         JobState::Succeeded | JobState::Unchanged | JobState::Superseded => return Ok(None),
-        // It ended without products: those of the run before are all there is, if they ever were out of date.
+        // A cancelled job leaves the products of the preceding run, which were not stale.
         JobState::Cancelled if site.stale_since_ms.is_none() => return Ok(None),
         JobState::Queued | JobState::Starting | JobState::Running | JobState::Cancelling => {
             let causes = causes(connection, job.id)?;
@@ -112,10 +112,10 @@ fn hours_ms(hours: f64) -> i64 {
     milliseconds(hours * 3600.0)
 }
 
-/// Tells, once, of sites that have been stale, or were not compared, for too long.
+/// Reports once each site that has been stale, or was not compared, for too long.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn tell_stale(
     transaction: &Transaction<'_>,
     config: &ServiceConfig,

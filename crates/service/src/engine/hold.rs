@@ -1,4 +1,4 @@
-//! Sites whose inputs cannot be used now: their jobs are held, and released when they can.
+//! Sites whose inputs are not usable now: their jobs are held, and released when they are.
 
 use std::collections::BTreeMap;
 
@@ -15,19 +15,19 @@ use crate::{
 };
 use areograph_store::files::file_name;
 
-/// Why inputs cannot be used now.
+/// Reasons for which inputs are not usable now.
 #[derive(Debug, Default)]
 pub struct NotReady {
-    /// Of sites that were planned.
+    /// For planned sites.
     by_site: BTreeMap<String, String>,
-    /// Of others, whose inputs are not known.
+    /// For others, whose inputs are unknown.
     unplanned: Option<String>,
     /// Sites whose inputs are known.
     planned: std::collections::BTreeSet<String>,
 }
 
 impl NotReady {
-    /// Why the inputs of a site cannot be used now, in words; none when they can.
+    /// The reason for which the inputs of a site are not usable now; `None` if they are.
     #[must_use]
     pub fn of(&self, site: &str) -> Option<String> {
         if self.planned.contains(site) {
@@ -37,10 +37,10 @@ impl NotReady {
     }
 }
 
-/// Looks at all sites.
+/// Examines all sites.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn not_ready(connection: &Connection) -> Stored<NotReady> {
     let mut found = NotReady::default();
     let mut query = connection.prepare_cached(
@@ -83,7 +83,7 @@ pub fn not_ready(connection: &Connection) -> Stored<NotReady> {
     Ok(found)
 }
 
-/// A file that a site reads and that is settling, if there is one.
+/// A settling file that a site reads, if any.
 fn changed_below(connection: &Connection, site: &str, root: &str) -> Stored<Option<String>> {
     use rusqlite::OptionalExtension as _;
     let mut query = connection.prepare_cached(
@@ -98,7 +98,7 @@ fn changed_below(connection: &Connection, site: &str, root: &str) -> Stored<Opti
 /// Holds a queued job.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn hold(transaction: &Transaction<'_>, now_ms: i64, job: &Job, why: &str) -> Stored<()> {
     tracing::info!(site = job.site, job = job.id, "held: {why}");
     let moved = Moved {
@@ -108,10 +108,10 @@ pub fn hold(transaction: &Transaction<'_>, now_ms: i64, job: &Job, why: &str) ->
     advance(transaction, now_ms, job.id, JobState::Held, &moved)
 }
 
-/// Holds queued jobs whose inputs cannot be used, and releases those that can go on.
+/// Holds queued jobs whose inputs are not usable, and releases those that can proceed.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn hold_and_release(
     transaction: &Transaction<'_>,
     now_ms: i64,
@@ -137,11 +137,11 @@ pub fn hold_and_release(
     Ok(())
 }
 
-/// Queues blocked jobs of sites that read below a folder which is available again: what they failed by may have been its absence,
-/// and none of their inputs has changed. So do those whose inputs are not known.
+/// Queues blocked jobs of sites that read below a folder which is available again: its absence may have caused their
+/// failure, and none of their inputs has changed. The same applies to sites whose inputs are unknown.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn wake_blocked(transaction: &Transaction<'_>, now_ms: i64, root: &str) -> Stored<()> {
     let mut query = transaction.prepare_cached(
         "SELECT NOT EXISTS (SELECT 1 FROM site_input WHERE site = ?1) OR EXISTS (SELECT 1 FROM site_input

@@ -1,4 +1,4 @@
-//! Programs that are told: run without a shell, with JSON on their standard input, for 30 s at most.
+//! Hooks: programs run without a shell, with JSON on their standard input, for at most 30 s.
 
 use std::{process::Stdio, time::Duration};
 
@@ -20,13 +20,13 @@ use crate::{
 
 /// Longest time that a hook may take.
 const LIMIT: Duration = Duration::from_secs(30);
-/// Letters that are delivered one after the other.
+/// Letters delivered in one pass.
 const LETTERS_MAX: u32 = 20;
-/// What is kept of a hook's complaint, bytes.
+/// Bytes kept of a hook's standard error.
 const COMPLAINT_MAX: u64 = 500;
-/// Delay of the second try, which each further one doubles, and the longest.
+/// Delay of the second try, doubled for each further one, and the longest delay.
 const DELAY_MS: (i64, i64) = (60_000, 3_600_000);
-/// Where hooks find other programs.
+/// Search path of hooks.
 const PATH: &str = "/usr/local/bin:/usr/bin:/bin";
 
 /// Delivers the letters that are due.
@@ -62,7 +62,7 @@ fn delay_ms(letter: &Letter) -> i64 {
     DELAY_MS.0.saturating_mul(1 << doublings).min(DELAY_MS.1)
 }
 
-/// Runs a hook; gives why it failed.
+/// Runs a hook; returns the reason of a failure.
 async fn run(command: &[String], body: &str) -> Result<(), String> {
     let Some((program, arguments)) = command.split_first() else {
         return Err("the hook has no program".to_owned());
@@ -81,7 +81,7 @@ async fn run(command: &[String], body: &str) -> Result<(), String> {
     let group = child.id().and_then(|id| i32::try_from(id).ok());
     let ended = timeout(LIMIT, to_the_end(&mut child, body)).await;
     if let Some(group) = group.and_then(Pid::from_raw) {
-        // Also what it left behind.
+        // Including processes that it left behind.
         let _ = kill_process_group(group, Signal::KILL);
     }
     ended.unwrap_or_else(|_| {
@@ -94,7 +94,7 @@ async fn run(command: &[String], body: &str) -> Result<(), String> {
 
 async fn to_the_end(child: &mut Child, body: &str) -> Result<(), String> {
     if let Some(mut input) = child.stdin.take() {
-        // A hook that does not read is judged by its exit code.
+        // The exit code decides, even for a hook that does not read.
         let _ = input.write_all(body.as_bytes()).await;
     }
     let mut complaint = Vec::new();

@@ -1,4 +1,4 @@
-//! Files as a worker listed them.
+//! File lists from a worker.
 
 use std::{
     collections::BTreeMap,
@@ -13,13 +13,13 @@ use crate::{
 };
 use areograph_store::files::Identity;
 
-/// How names of files end that are being written.
+/// Suffixes of unfinished files.
 const UNFINISHED: [&str; 5] = [".part", ".partial", ".tmp", ".filepart", ".crdownload"];
 
-/// Files below a folder by path; those that are being transferred are left out.
+/// Files below a folder by path; those in transfer are left out.
 ///
 /// # Errors
-/// Why the folder could not be listed whole, in words.
+/// The reason for which the list is incomplete, as text.
 pub fn read_list(
     list: &Path,
     root: &Path,
@@ -37,7 +37,7 @@ pub fn read_list(
                     files.insert(path.to_owned(), identity);
                 }
             }
-            // A file that cannot be looked at is as good as missing; many of them make the folder unavailable.
+            // A file that cannot be examined counts as missing; many of them make the folder unavailable.
             Listed::Unreadable { path, problem } => {
                 tracing::warn!("{}: {problem}", path.display());
             }
@@ -55,8 +55,8 @@ pub fn read_list(
     Err("the list of its files is incomplete".to_owned())
 }
 
-/// Whether a file is an input: site files lie directly in their folder, and rsync and others name unfinished files so that
-/// they can be told.
+/// Whether a file is an input: site files are directly in their folder, and rsync and others give unfinished files
+/// recognisable names.
 fn counts(path: &Path, root: &Path, kind: RootKind) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let unfinished = name.starts_with('.')

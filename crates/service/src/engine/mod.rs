@@ -1,9 +1,8 @@
-//! The engine: it finds changes, decides which sites they touch, has them run, and keeps what they publish.
+//! The engine: it detects changes, determines the affected sites, has them run, and keeps their publications.
 //!
-//! [`Engine::turn`] does all that is due at an instant and leaves what takes long to tasks; [`Engine::run`] takes one turn
-//! after the other.
+//! [`Engine::turn`] does all that is due at an instant and delegates long work to tasks; [`Engine::run`] repeats turns.
 //!
-//! `turn.rs` takes one turn after the other and begins what is due. Each file is one step of this picture:
+//! `turn.rs` repeats turns and begins what is due. Each file is one step of this picture:
 //!
 //! ```text
 //!  round: list folders ─► sweep: changed files ─► settle: quiet, read, opened by CSPICE ─► sites affected

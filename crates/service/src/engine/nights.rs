@@ -1,4 +1,4 @@
-//! Nights: when one is due it begins with a round of comparisons, and it is over when the jobs that came of it are.
+//! Nights: a due night begins with a round of comparisons, and ends with the jobs that result.
 
 use serde_json::json;
 
@@ -21,7 +21,7 @@ use areograph_config::AlertKind;
 /// Milliseconds of an hour.
 const HOUR_MS: f64 = 3_600_000.0;
 
-/// Begins the night that is due, if one is; gives its number. Of the instants that were missed the newest is caught up with.
+/// Begins the night that is due, if any; returns its number. Of missed instants only the newest is caught up.
 ///
 /// # Errors
 /// The database cannot be written.
@@ -31,7 +31,7 @@ pub fn begin_due<W: Workers>(core: &Core<W>) -> Stored<Option<i64>> {
     let schedule = match Schedule::of(&config.schedule, now_ms) {
         Ok(schedule) => schedule,
         Err(bad) => {
-            // It was accepted when it was loaded, and has come to its end since.
+            // It was valid when it was loaded, and has no further instants.
             core.shared.set_problem(Some(bad.to_string()));
             return Ok(None);
         }
@@ -45,7 +45,7 @@ pub fn begin_due<W: Workers>(core: &Core<W>) -> Stored<Option<i64>> {
     })?;
     let last_ms = last_ms.filter(|_| known.as_deref() == Some(schedule.text()));
     let Some(last_ms) = last_ms else {
-        // New or edited: what was before is not made up for.
+        // New or edited: earlier instants are not caught up.
         core.shared.write(|transaction| {
             facts::note(transaction, facts::SCHEDULE, schedule.text())?;
             facts::note(transaction, facts::INTENDED_MS, &now_ms.to_string())
@@ -53,7 +53,7 @@ pub fn begin_due<W: Workers>(core: &Core<W>) -> Stored<Option<i64>> {
         return Ok(None);
     };
     if open.is_some() {
-        // The night goes on; the next one begins when it is over.
+        // The night continues; the next one begins after it.
         return Ok(None);
     }
     let due = schedule.due(
@@ -83,7 +83,7 @@ pub fn begin_due<W: Workers>(core: &Core<W>) -> Stored<Option<i64>> {
     })
 }
 
-/// Begins a night because somebody asks for one now.
+/// Begins a night at the request of a caller.
 ///
 /// # Errors
 /// The database cannot be written.
@@ -91,7 +91,7 @@ pub fn begin_asked<W: Workers>(core: &Core<W>) -> Stored<Option<i64>> {
     let zone = core.shared.config().schedule.zone.clone();
     let now_ms = core.now_ms();
     core.shared.write(|transaction| {
-        // It makes up for those that were due before.
+        // It replaces earlier nights that were due.
         if facts::fact(transaction, facts::SCHEDULE)?.is_some() {
             facts::note(transaction, facts::INTENDED_MS, &now_ms.to_string())?;
         }
@@ -116,7 +116,7 @@ fn begin(
     Ok(night)
 }
 
-/// Ends the night whose comparisons are done when its jobs are; tells its summary.
+/// Ends the night after its comparisons and jobs; reports its summary.
 ///
 /// # Errors
 /// The database cannot be written.

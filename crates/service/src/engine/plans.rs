@@ -1,4 +1,5 @@
-//! What a change means for a site: a worker plans it, and the decision is noted with its reason, also when nothing has to run.
+//! Effect of a change on a site: a worker plans it, and the decision is recorded with its reason, even if nothing has
+//! to run.
 
 use std::{collections::BTreeMap, fs, path::Path, sync::Arc, time::Duration};
 
@@ -31,19 +32,19 @@ use areograph_store::publish::MANIFEST;
 
 /// Longest time for a plan.
 const LIMIT: Duration = Duration::from_mins(30);
-/// Why a site is run although no stage is.
+/// The reason for a run without a stage to run.
 const NOT_KEPT: &str = "its products were made, but not kept as a run";
 
-/// A site that a change may touch.
+/// A site that a change may affect.
 #[derive(Debug, Clone)]
 pub struct Candidate {
     /// The site.
     pub site: SiteRow,
-    /// Files that it reads and that changed.
+    /// Changed files that it reads.
     pub changed: Vec<String>,
 }
 
-/// Plans a site and does what follows.
+/// Plans a site and takes the resulting actions.
 ///
 /// # Errors
 /// The database cannot be written.
@@ -65,9 +66,9 @@ pub async fn plan<W: Workers>(
     let planned = match &ended.answer {
         Some(Ok(Answer::Plan(answer))) => Planned::Answer(answer),
         Some(Err(failure)) if is_final(failure.code) => Planned::Refused(&failure.text),
-        // A kernel that crashes CSPICE: the job that follows tells it.
+        // A kernel that crashes CSPICE: the following job reports it.
         None if matches!(ended.how, How::Signalled(_)) => Planned::Crashed(words(&ended)),
-        // Tried again in the next round.
+        // Retried in the next round.
         _ => {
             tracing::warn!(site = site.name, "no plan: {}", words(&ended));
             return Ok(());
@@ -115,7 +116,7 @@ enum Planned<'a> {
     Crashed(String),
 }
 
-/// Whether only another input helps.
+/// Whether only another input can resolve the failure.
 fn is_final(code: u8) -> bool {
     [Kind::Configuration, Kind::Input, Kind::Coverage, Kind::Bug]
         .iter()
@@ -143,7 +144,7 @@ impl Context<'_> {
         let mut causes = self.causes(transaction, &before, &inputs, answer)?;
         put_inputs(transaction, self.name(), &inputs)?;
         let stages_run = answer.stages.iter().any(|stage| stage.runs);
-        // A plan compares with what was published, which a worker that died has not kept.
+        // A plan compares with the published products, which a worker that died has not kept.
         let only_keeps = !stages_run && !self.kept;
         if only_keeps {
             causes.push(CauseRow::plain(CauseKind::RetryOf, NOT_KEPT, self.now_ms));
@@ -170,7 +171,7 @@ impl Context<'_> {
         Ok(note)
     }
 
-    /// A site that cannot be planned is run all the same: the job tells why, and waits for another input.
+    /// A site that cannot be planned is run nevertheless: the job reports the reason, and waits for another input.
     fn refused(
         &self,
         transaction: &Transaction<'_>,
@@ -236,7 +237,7 @@ impl Context<'_> {
     fn inputs(&self, connection: &Connection, answer: &PlanAnswer) -> Stored<Vec<SiteInput>> {
         let mut inputs: Vec<SiteInput> = Vec::with_capacity(answer.files.len() + 1);
         for file in &answer.files {
-            // Files elsewhere are not seen to change; the worker refuses those that must not be read.
+            // Changes of files elsewhere are not detected; the worker rejects those that must not be read.
             if let Some(path) = as_listed(self.folders, &file.path) {
                 inputs.push(SiteInput {
                     role: role(self.folders, &path).to_owned(),
@@ -245,7 +246,7 @@ impl Context<'_> {
                 });
             }
         }
-        // Files that the site read before and that are gone: so that their return is seen.
+        // Files that the site read before and that were removed: so that their return is detected.
         for path in &self.candidate.changed {
             if seen(connection, path)?.is_none() && inputs.iter().all(|input| input.path != *path) {
                 inputs.push(SiteInput {
@@ -281,11 +282,11 @@ impl Context<'_> {
     ) -> Stored<Vec<CauseRow>> {
         let site = &self.candidate.site;
         let mut causes = differences(before, inputs, self.now_ms);
-        // Before a first plan nothing is known of what the site reads.
+        // Before a first plan the inputs of the site are unknown.
         if site.config_blake3.is_empty() {
             causes.retain(|cause| cause.old_blake3.is_some());
         }
-        // Comments of a site file are no change.
+        // Comments of a site file are not a change.
         if answer.config_blake3 == site.config_blake3 {
             causes.retain(|cause| cause.kind != CauseKind::ConfigChanged.name());
         }
@@ -295,13 +296,13 @@ impl Context<'_> {
         };
         let version = env!("CARGO_PKG_VERSION");
         if let Some(current) = current.filter(|current| current.version != version) {
-            let text = format!("areograph {} became {version}", current.version);
+            let text = format!("areograph {} was replaced by {version}", current.version);
             causes.push(CauseRow::plain(CauseKind::ToolChanged, &text, self.now_ms));
         }
         Ok(causes)
     }
 
-    /// Why a site is to be run of which no input changed.
+    /// The reason to run a site without a changed input.
     fn without_change(&self, connection: &Connection) -> Stored<(CauseKind, &'static str)> {
         let site = &self.candidate.site;
         let pending = pending_job(connection, &site.name)?.is_some();
@@ -312,7 +313,7 @@ impl Context<'_> {
             }
             _ => (
                 CauseKind::RetryOf,
-                "an earlier job ended without products of its inputs",
+                "an earlier job ended without products from its inputs",
             ),
         })
     }
@@ -338,7 +339,7 @@ impl Context<'_> {
         ask(transaction, self.now_ms, &asked).map(|_| ())
     }
 
-    /// What was still to be done need not be done: the inputs are again what they were. A person's wish stands.
+    /// Pending work is superseded: the inputs are again as they were. A person's request stays.
     fn supersede(&self, transaction: &Transaction<'_>, note: &str) -> Stored<()> {
         let Some(job) = pending_job(transaction, self.name())? else {
             return Ok(());
@@ -360,16 +361,16 @@ impl Context<'_> {
     }
 }
 
-/// Whether the products that stand under `manifest`, if any, are a run.
+/// Whether the products of `manifest`, if any, are a run.
 fn is_kept(connection: &Connection, site: &str, manifest: &Path) -> Stored<bool> {
     match fs::read(manifest) {
         Ok(bytes) => is_run(connection, site, blake3::hash(&bytes).to_hex().as_str()),
-        // Without products every plan says that something runs.
+        // Without products every plan has stages to run.
         Err(_) => Ok(true),
     }
 }
 
-/// The content of a file as the service knows it; none of one that is gone or was never seen.
+/// The content of a file as the service knows it; `None` for one that was removed or never seen.
 fn seen(connection: &Connection, path: &str) -> Stored<Option<String>> {
     let file = file(connection, path)?;
     Ok(file
@@ -377,7 +378,7 @@ fn seen(connection: &Connection, path: &str) -> Stored<Option<String>> {
         .and_then(|file| file.blake3))
 }
 
-/// Which files changed, came or went.
+/// Files that changed, were added or removed.
 fn differences(before: &[SiteInput], now: &[SiteInput], at_ms: i64) -> Vec<CauseRow> {
     let by_path = |inputs: &[SiteInput]| -> BTreeMap<String, SiteInput> {
         let named = inputs
@@ -406,7 +407,7 @@ fn differences(before: &[SiteInput], now: &[SiteInput], at_ms: i64) -> Vec<Cause
         let name = areograph_store::files::file_name(Path::new(path));
         let what = match (&old_blake3, &new_blake3) {
             (None, _) => "is new",
-            (_, None) => "is gone, or no longer read",
+            (_, None) => "was removed, or is no longer read",
             _ => "changed",
         };
         causes.push(CauseRow {

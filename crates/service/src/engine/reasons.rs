@@ -1,4 +1,4 @@
-//! Decisions in words: what changed, whom it touches, what runs.
+//! Decisions as text: changes, affected images, stages to run.
 
 use std::path::Path;
 
@@ -8,10 +8,10 @@ use crate::{
 };
 use areograph_store::files::file_name;
 
-/// Stages, and images, that are named one by one.
+/// Number of stages, and images, named individually.
 const NAMED_MAX: usize = 4;
 
-/// What a comparison decided, in one sentence.
+/// The decision of a comparison, in one sentence.
 #[must_use]
 pub fn decision(causes: &[CauseRow], answer: &PlanAnswer) -> String {
     if let [cause] = causes
@@ -29,7 +29,7 @@ pub fn decision(causes: &[CauseRow], answer: &PlanAnswer) -> String {
     }
 }
 
-/// What one change touches: the images whose stages name it, and the stages that run.
+/// The effect of one change: the images whose stages name it, and the stages that run.
 #[must_use]
 pub fn change_text(cause: &CauseRow, answer: &PlanAnswer) -> String {
     let runs = stages(&answer.stages);
@@ -47,7 +47,7 @@ pub fn change_text(cause: &CauseRow, answer: &PlanAnswer) -> String {
         return format!("{}{stages}", cause.detail);
     }
     let meets = if cause.kind == "kernel_changed" {
-        "its coverage meets"
+        "its coverage overlaps"
     } else {
         "it belongs to"
     };
@@ -132,7 +132,7 @@ mod tests {
         cause.path = Some("/mirror/ck/mgs_sc_ext1.bc".to_owned());
         assert_eq!(
             change_text(&cause, &answer),
-            "`mgs_sc_ext1.bc` changed; its coverage meets image E02-01453; stages sample_orientation, publish run"
+            "`mgs_sc_ext1.bc` changed; its coverage overlaps image E02-01453; stages sample_orientation, publish run"
         );
         let also = CauseRow::plain(CauseKind::KernelChanged, "`mgs_clock.tsc` changed", 0);
         assert_eq!(

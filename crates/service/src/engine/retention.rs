@@ -1,4 +1,5 @@
-//! What is kept: newest runs, one a week, pinned ones, the current one and its predecessor; newest events, logs and copies.
+//! Retention: newest runs, one a week, pinned ones, the current one and its predecessor; newest events, logs and
+//! copies.
 
 use std::{
     collections::BTreeSet,
@@ -27,12 +28,12 @@ use areograph_config::RetentionConfig;
 
 const DAY_MS: i64 = 86_400_000;
 const WEEK_MS: i64 = 7 * DAY_MS;
-/// Runs that are removed in one step.
+/// Runs removed in one step.
 const STEP: usize = 8;
-/// Letters, and jobs that left no run, are kept as long as logs.
+/// Letters, and jobs without a run, are kept as long as logs.
 const SECONDS_PER_DAY: f64 = 86_400.0;
 
-/// Runs of a site that need not be kept; `runs` are all that are there, the newest first.
+/// Runs of a site that need not be kept; `runs` are all existing ones, the newest first.
 #[must_use]
 pub fn superfluous<'a>(
     runs: &'a [RunRow],
@@ -63,7 +64,7 @@ pub fn superfluous<'a>(
     superfluous
 }
 
-/// Removes a few runs that need not be kept. Says whether there are more.
+/// Removes a few runs that need not be kept. Returns whether there are more.
 ///
 /// # Errors
 /// The database cannot be written.
@@ -93,12 +94,12 @@ pub fn remove_runs<W: Workers>(core: &Core<W>) -> Stored<bool> {
     Ok(false)
 }
 
-/// First it loses its name, so that half of it is never taken for a run.
+/// It is renamed first, so that an incomplete run is never taken for a run.
 fn remove_run(folder: &Path, run: &str) {
     let leaving = folder.join(format!("{run}.partial"));
     let removed = fs::rename(folder.join(run), &leaving).is_err() || remove(&leaving).is_ok();
     if !removed {
-        // The next start removes what is left.
+        // The next start removes the remainder.
         tracing::warn!("{} could not be removed", leaving.display());
     }
 }
@@ -138,7 +139,7 @@ pub fn trim<W: Workers>(core: &Core<W>) -> Stored<()> {
     Ok(())
 }
 
-/// Logs whose attempts are forgotten, and old ones whose runs are gone.
+/// Removes logs of deleted attempts, and old logs without runs.
 fn remove_logs<W: Workers>(core: &Core<W>, before: SystemTime) -> Stored<()> {
     let kept: BTreeSet<String> = core.shared.read(|connection| {
         let mut query = connection.prepare(

@@ -1,4 +1,4 @@
-//! What becomes of a job when an attempt has ended, by the kind of the ending.
+//! The state of a job after an attempt, by the kind of its end.
 
 use serde_json::{Value, json};
 
@@ -15,31 +15,31 @@ use areograph_base::error::Kind;
 
 use super::workers::words;
 
-/// Attempts at a failure of input or output.
+/// Attempts after a failure of input or output.
 pub const IO_ATTEMPTS: i64 = 5;
-/// Attempts at a site whose worker is ended by a signal, or gives no sign of life.
+/// Attempts at a site whose worker is ended by a signal, or sends no heartbeat.
 pub const CRASH_ATTEMPTS: i64 = 3;
-/// Attempts at a site that meets a bug in areograph.
+/// Attempts at a site that triggers a bug in areograph.
 pub const BUG_ATTEMPTS: i64 = 2;
 /// Longest delay of an attempt.
 const DELAY_MAX_S: f64 = 900.0;
 /// Delay of an attempt that could not be made, and therefore does not count.
 const UNCOUNTED_DELAY_S: f64 = 60.0;
-/// Share of its memory from which on a worker that was killed is taken for one that needed more.
+/// Share of its memory limit above which a killed worker counts as out of memory.
 const MEMORY_SHARE: f64 = 0.9;
 
-/// An attempt that published nothing, and all that decides what follows.
+/// An attempt without a publication, and the data that determine the next state.
 #[derive(Debug)]
 pub struct Fruitless<'a> {
-    /// The job, as it stood when the attempt ended.
+    /// The job, as of the end of the attempt.
     pub job: &'a Job,
     /// How the worker ended.
     pub ended: &'a Ended,
-    /// The stage at work when it was last heard.
+    /// The last reported stage.
     pub stage: Option<&'a str>,
-    /// Memory that it might take, mebibytes.
+    /// Memory limit, mebibytes.
     pub memory_mib: u32,
-    /// Why it was asked to stop.
+    /// The reason of its cancellation.
     pub cancel: Option<CancelWhy>,
     /// Delay of the first retry.
     pub retry_s: f64,
@@ -47,7 +47,7 @@ pub struct Fruitless<'a> {
     pub now_ms: i64,
 }
 
-/// The state that follows.
+/// The next state.
 #[must_use]
 pub fn after(attempt: &Fruitless<'_>, random: Random) -> (JobState, Moved) {
     if attempt.job.state == JobState::Cancelling {
@@ -93,7 +93,7 @@ fn after_failure(attempt: &Fruitless<'_>, failure: &Failure, random: Random) -> 
     } else if is(Kind::Configuration) || is(Kind::Input) || is(Kind::Coverage) {
         counted(JobState::Blocked, outcome)
     } else if is(Kind::Interrupted) {
-        // Somebody else's signal: as if it had been killed.
+        // A signal from elsewhere: treated as a kill.
         again(attempt, CRASH_ATTEMPTS, outcome, random)
     } else {
         again(attempt, BUG_ATTEMPTS, outcome, random)
@@ -118,7 +118,7 @@ fn after_crash(attempt: &Fruitless<'_>, random: Random) -> (JobState, Moved) {
     again(attempt, CRASH_ATTEMPTS, outcome, random)
 }
 
-/// Once more after a growing delay, unless that was the last attempt of `most`.
+/// Another attempt after a growing delay, unless that was the last of `most`.
 fn again(attempt: &Fruitless<'_>, most: i64, outcome: Value, random: Random) -> (JobState, Moved) {
     let failed = attempt.job.failures;
     if failed + 1 >= most {
@@ -225,7 +225,7 @@ mod tests {
         }
     }
 
-    /// The state after an attempt with so many failures before it, the delay, and whether it counts.
+    /// The state after an attempt with this number of earlier failures, the delay, and whether it counts.
     fn next(
         ended: &Ended,
         state: JobState,

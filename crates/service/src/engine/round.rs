@@ -1,4 +1,4 @@
-//! One round of comparisons: folders are listed, settled files read, and the sites planned that a change may touch.
+//! One round of comparisons: folders are listed, settled files read, and the sites planned that a change may affect.
 
 use std::{
     collections::BTreeMap,
@@ -40,17 +40,17 @@ use crate::{
 use areograph_config::AlertKind;
 use areograph_store::files::Identity;
 
-/// What a round is for.
+/// The purpose of a round.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Purpose {
-    /// The night that it belongs to: then sites that are not what they should be are planned again.
+    /// Its night: then sites whose products do not match their inputs are planned again.
     pub night: Option<i64>,
 }
 
-/// Does one round.
+/// Performs one round.
 ///
 /// # Errors
-/// The database cannot be written; the next round begins anew.
+/// The database cannot be written; the next round starts over.
 pub async fn round<W: Workers>(
     core: &Arc<Core<W>>,
     book: &mut SiteBook,
@@ -85,7 +85,7 @@ pub async fn round<W: Workers>(
     Ok(())
 }
 
-/// Gives the round its number.
+/// Assigns the number of the round.
 fn begin<W: Workers>(core: &Core<W>, folders: &[Folder]) -> Stored<i64> {
     let paths: Vec<String> = folders.iter().map(|folder| folder.path.clone()).collect();
     core.shared.write(|transaction| {
@@ -98,7 +98,7 @@ fn begin<W: Workers>(core: &Core<W>, folders: &[Folder]) -> Stored<i64> {
 
 type Listing = Result<BTreeMap<String, Identity>, String>;
 
-/// Lists all folders at the same time, compares, and gives the files that have settled.
+/// Lists all folders in parallel, compares them, and returns the files that have settled.
 async fn sweep<W: Workers>(core: &Arc<Core<W>>, folders: &[Folder]) -> Stored<Vec<FileRow>> {
     let mut lists = JoinSet::new();
     for folder in folders {
@@ -111,10 +111,10 @@ async fn sweep<W: Workers>(core: &Arc<Core<W>>, folders: &[Folder]) -> Stored<Ve
     let mut settled = Vec::new();
     while let Some(listed) = lists.join_next().await {
         match listed {
-            // A service that ends has ended its workers: that says nothing of the folder.
+            // A stopping service has ended its workers, which implies nothing about the folder.
             Ok(_) if core.shared.ending.is_cancelled() => {}
             Ok((folder, listing)) => settled.extend(note_sweep(core, &folder, &listing)?),
-            Err(panicked) => tracing::error!("listing a folder: {panicked}"),
+            Err(panicked) => tracing::error!("listing a folder failed: {panicked}"),
         }
     }
     settled.sort_by(|one: &FileRow, other| one.path.cmp(&other.path));
@@ -217,13 +217,14 @@ fn note_sweep<W: Workers>(
     Ok(settled)
 }
 
-/// What a comparison of all sites gave.
+/// Result of a comparison of all sites.
 struct Compared {
     candidates: Vec<Candidate>,
     unchanged: Vec<String>,
 }
 
-/// Which sites a change may touch, and which not. Sites whose inputs cannot be used now, or that are at work, are neither.
+/// Sites that a change may affect, and those that it does not. Sites with unusable inputs, or with an active job, are
+/// neither.
 fn candidates(
     connection: &rusqlite::Connection,
     book: &SiteBook,
@@ -282,14 +283,14 @@ async fn plan_all<W: Workers>(
                 return;
             }
             if let Err(error) = plan(&core, candidate, round, purpose.night, &folders).await {
-                tracing::error!(site = name, "the plan could not be noted: {error}");
+                tracing::error!(site = name, "the plan could not be recorded: {error}");
             }
             core.shared.wake.notify_one();
         });
     }
     while let Some(done) = plans.join_next().await {
         if let Err(panicked) = done {
-            tracing::error!("planning a site: {panicked}");
+            tracing::error!("planning a site failed: {panicked}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Runs on the disk: checked, made current, noted.
+//! Runs on the disk: checked, made current, recorded.
 
 use std::{
     fs,
@@ -18,19 +18,19 @@ use areograph_store::{
     atomic::sync_folder, manifest::Manifest, publish::MANIFEST, published::read_published,
 };
 
-/// Leads to the run that readers get.
+/// Link to the current run.
 pub const CURRENT: &str = "current";
-/// The identifier of the run that an attempt makes.
+/// The identifier of an attempt's run.
 #[must_use]
 pub fn run_id(started_ms: i64, job: i64, attempt: i64) -> String {
     let started = DateTime::from_timestamp_millis(started_ms).unwrap_or_default();
     format!("{}_j{job}_a{attempt}", started.format("%Y%m%d_%H%M%S"))
 }
 
-/// A run on the disk whose products are those of its manifest.
+/// A run on the disk whose products match its manifest.
 #[derive(Debug)]
 pub struct Published {
-    /// Which attempt published it.
+    /// The attempt that published it.
     pub by: RunRecord,
     /// Its manifest.
     pub manifest: Manifest,
@@ -38,7 +38,7 @@ pub struct Published {
     pub manifest_blake3: String,
 }
 
-/// The folder holds another run than it should.
+/// The folder contains another run than expected.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "this run belongs to job {job}, attempt {attempt}, and is named {run}; expected the run of its folder"
@@ -59,10 +59,10 @@ impl Cause for Foreign {
     }
 }
 
-/// Reads a run, every product checked against its manifest.
+/// Reads a run and checks every product against its manifest.
 ///
 /// # Errors
-/// It is not whole, or is another one's; the disk's refusal.
+/// It is incomplete, or belongs to another attempt; a disk error.
 pub fn read_run(folder: &Path) -> Result<Published> {
     let path = folder.join(RUN_RECORD);
     let read = |path: &Path| fs::read(path).map_err(IoError::on("read")).in_file(path);
@@ -84,7 +84,7 @@ pub fn read_run(folder: &Path) -> Result<Published> {
     })
 }
 
-/// The run that readers get, by the link.
+/// The current run, by the link.
 #[must_use]
 pub fn current(site_folder: &Path) -> Option<String> {
     let target = fs::read_link(site_folder.join(CURRENT)).ok()?;
@@ -96,10 +96,10 @@ pub fn current(site_folder: &Path) -> Option<String> {
         .then(|| name.to_owned())
 }
 
-/// Makes a run the one that readers get: at every instant there is the old one or the new one.
+/// Makes a run the current one: at every instant either the old or the new one is current.
 ///
 /// # Errors
-/// The disk's refusal.
+/// A disk error.
 pub fn make_current(site_folder: &Path, run: &str) -> Result<()> {
     let fresh = site_folder.join(format!(".{CURRENT}-{run}"));
     let _ = fs::remove_file(&fresh);
@@ -111,7 +111,7 @@ pub fn make_current(site_folder: &Path, run: &str) -> Result<()> {
     Ok(())
 }
 
-/// What the database is to know of a run.
+/// The database row of a run.
 #[must_use]
 pub fn row(
     published: &Published,
@@ -154,10 +154,10 @@ pub fn finished_ms(manifest: &Manifest) -> Option<i64> {
     Some(finished.timestamp_millis())
 }
 
-/// Folders of runs of a site that were published, by name; of those that were not, nothing is left.
+/// Folders of published runs of a site, by name; unpublished ones are removed.
 ///
 /// # Errors
-/// The disk's refusal.
+/// A disk error.
 pub fn tidy(site_folder: &Path) -> Result<Vec<PathBuf>> {
     let runs = site_folder.join("runs");
     let mut published = Vec::new();

@@ -1,4 +1,4 @@
-//! At which instants all sites are looked at.
+//! Instants of the scheduled comparison of all sites.
 
 use std::str::FromStr as _;
 
@@ -9,9 +9,9 @@ use croner::Cron;
 use areograph_base::error::{Cause, Kind};
 use areograph_config::ScheduleConfig;
 
-/// Most instants that are looked at: a cron of every minute over the longest time to catch up.
+/// Most instants examined: a cron of every minute over the longest time to catch up.
 const INSTANTS_MAX: usize = 1_000_000;
-/// Instants that were missed and are named one by one; older ones are many at most.
+/// Missed instants that are named individually; older ones are omitted.
 pub const MISSED_MAX: usize = 100;
 
 /// Cron fields in a time zone, checked.
@@ -22,7 +22,7 @@ pub struct Schedule {
     text: String,
 }
 
-/// Fields that name no instant.
+/// Fields without an instant.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("schedule.cron is `{cron}`: {reason}")]
 pub struct BadSchedule {
@@ -40,22 +40,22 @@ impl Cause for BadSchedule {
     }
 }
 
-/// What is due.
+/// Due instants.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Due {
-    /// The instant that is to be made up for now, milliseconds of UTC since 1970.
+    /// The instant to catch up now, milliseconds of UTC since 1970.
     pub instant_ms: Option<i64>,
-    /// Whether it is one of several, or came while nobody looked.
+    /// Whether it is one of several, or is late.
     pub late: bool,
-    /// Instants that are left out, the newest of them.
+    /// Skipped instants, the newest of them.
     pub missed_ms: Vec<i64>,
 }
 
-/// How late a night may begin and still be on time.
+/// Largest delay of a punctual night.
 const ON_TIME_MS: i64 = 5 * 60_000;
 
 impl Schedule {
-    /// Reads the fields, and makes sure that they name an instant after `now_ms`.
+    /// Parses the fields, and checks that they have an instant after `now_ms`.
     ///
     /// # Errors
     /// [`BadSchedule`].
@@ -77,7 +77,7 @@ impl Schedule {
         }
     }
 
-    /// Fields and zone, for telling whether they were edited.
+    /// Fields and zone, to detect edits.
     #[must_use]
     pub fn text(&self) -> &str {
         &self.text
@@ -91,7 +91,7 @@ impl Schedule {
         Some(next.timestamp_millis())
     }
 
-    /// What is due at `now_ms` when the instant of `last_ms` was the last that was seen to.
+    /// Due instants at `now_ms` if that of `last_ms` was the last one handled.
     #[must_use]
     pub fn due(&self, last_ms: i64, now_ms: i64, catch_up_ms: i64) -> Due {
         let mut instants = Vec::new();
@@ -155,7 +155,7 @@ mod tests {
 
     #[test]
     fn no_night_is_lost_or_doubled_when_clocks_change() {
-        // The hour left out is made up for at its end; of the hour that comes twice the first counts.
+        // An omitted hour is caught up at its end; of a repeated hour the first one counts.
         for (zone, spring, expected) in [
             (
                 "Europe/Berlin",
@@ -226,7 +226,7 @@ mod tests {
             (Some(at("2026-05-05T02:30:00Z")), true)
         );
         assert_eq!(late.missed_ms.len(), 3);
-        // A monthly one, missed for longer than is caught up with.
+        // A monthly one, missed for longer than can be caught up.
         let monthly = super::tests::schedule("0 0 1 * *", "UTC").unwrap();
         let due = monthly.due(last, at("2026-06-10T00:00:00Z"), 36 * HOUR_MS);
         assert_eq!(due.instant_ms, None);

@@ -1,4 +1,5 @@
-//! Files are read again from time to time, whatever the file system says of them, and products compared with their manifests.
+//! Periodic checks: files are read again even if the file system reports no change, and products compared with their
+//! manifests.
 
 use std::{path::Path, sync::Arc, time::Duration};
 
@@ -21,13 +22,13 @@ use crate::{
 use areograph_store::files::file_name;
 use areograph_store::published::read_published;
 
-/// Files that are read in one step.
+/// Files read in one step.
 const STEP: u32 = 16;
 /// Longest time for a step.
 const LIMIT: Duration = Duration::from_mins(30);
 const SECONDS_PER_DAY: f64 = 86_400.0;
 
-/// Reads a few of the files again that were not read for the longest time. A file that has another content settles anew.
+/// Reads a few files again, those read longest ago. A file with changed content settles again.
 ///
 /// # Errors
 /// The database cannot be written.
@@ -53,7 +54,7 @@ pub async fn scrub_files<W: Workers>(core: &Arc<Core<W>>) -> Stored<()> {
     let now_ms = core.now_ms();
     core.shared.write(|transaction| {
         for (old, read) in old.iter().zip(&read) {
-            // A sweep may have seen it change meanwhile.
+            // A sweep may have detected the change meanwhile.
             let Some(now) = file(transaction, &old.path)?.filter(|now| now == old) else {
                 continue;
             };
@@ -88,7 +89,7 @@ pub async fn scrub_files<W: Workers>(core: &Arc<Core<W>>) -> Stored<()> {
     })
 }
 
-/// Compares the products of one site with their manifest, that of the site for which it was longest ago; damaged ones are made again.
+/// Compares the products of one site, the one checked longest ago, with their manifest; damaged ones are made again.
 ///
 /// # Errors
 /// The database cannot be written.

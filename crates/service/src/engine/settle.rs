@@ -1,4 +1,4 @@
-//! Files whose folder has been quiet are read: the same content again changes nothing, and a kernel is used when CSPICE opens it.
+//! Files in quiet folders are read: unchanged content has no effect, and a kernel is used if CSPICE opens it.
 
 use std::{path::Path, sync::Arc, time::Duration};
 
@@ -18,17 +18,17 @@ use crate::{
 };
 use areograph_store::files::file_name;
 
-/// Files that one process hashes, and kernels that one opens.
+/// Files that one process hashes, and kernels that one process opens.
 const HASHED_TOGETHER: usize = 256;
 const PROBED_TOGETHER: usize = 16;
 /// Longest time for such a part: 256 PEDR files of an archive on a slow disk.
 const LIMIT: Duration = Duration::from_mins(30);
-/// How names of kernels end that CSPICE opens by themselves.
+/// Suffixes of kernels that CSPICE opens without others.
 const KERNELS: [&str; 10] = [
     "bc", "bsp", "bpc", "tls", "tsc", "tpc", "tf", "ti", "bds", "tk",
 ];
 
-/// Reads files that have settled, and notes what they are. Those that cannot be read now stay as they are.
+/// Reads files that have settled, and records their state. Those that cannot be read now are unchanged.
 ///
 /// # Errors
 /// The database cannot be written.
@@ -41,7 +41,7 @@ pub async fn settle<W: Workers>(
     let (missing, there): (Vec<FileRow>, Vec<FileRow>) = settled.into_iter().partition(is_missing);
     core.shared.write(|transaction| {
         for file in missing {
-            tracing::info!("{} is gone", file.path);
+            tracing::info!("{} was removed", file.path);
             let gone = FileRow {
                 state: FileState::Gone,
                 detail: String::new(),
@@ -67,7 +67,7 @@ pub async fn settle<W: Workers>(
     while let Some(done) = parts.join_next().await {
         match done {
             Ok(done) => done?,
-            Err(panicked) => tracing::error!("reading files: {panicked}"),
+            Err(panicked) => tracing::error!("reading files failed: {panicked}"),
         }
     }
     Ok(())
@@ -109,7 +109,7 @@ async fn read_part<W: Workers>(
     Ok(())
 }
 
-/// The hashes that a worker told.
+/// The hashes from a worker's answer.
 #[must_use]
 pub fn hashes(ended: &Ended) -> Option<Vec<Hashed>> {
     match &ended.answer {
@@ -118,7 +118,7 @@ pub fn hashes(ended: &Ended) -> Option<Vec<Hashed>> {
     }
 }
 
-/// What a file is, now that it has been read, and what there is to say.
+/// The state of a file after reading, and its message.
 fn judged(
     file: &FileRow,
     hashed: &Hashed,
@@ -138,7 +138,7 @@ fn judged(
         (FileState::Bad, ..) => Some(format!("`{name}` cannot be used: {detail}")),
         (_, true, _) => Some(format!("`{name}` was touched, content unchanged")),
         (_, false, Some(_)) => Some(format!("`{name}` has new content")),
-        // The first files of a service are many.
+        // A new service starts with many files.
         (_, false, None) => None,
     };
     let judged = FileRow {
@@ -163,7 +163,7 @@ fn is_kernel(path: &str) -> bool {
     ending.is_some_and(|ending| KERNELS.contains(&ending))
 }
 
-/// Why each of these files is no kernel that can be used; nothing of files that are none, or whose content is known.
+/// The reason for which each of these files is not a usable kernel; none for other files, or known content.
 async fn probe_together<W: Workers>(
     core: &Arc<Core<W>>,
     number: usize,
@@ -189,7 +189,7 @@ async fn probe_together<W: Workers>(
                 problems[place] = problem;
             }
         }
-        // One of them crashes CSPICE: which one is found out by opening each alone.
+        // One of them crashes CSPICE: it is identified by opening each alone.
         Err(_) => {
             for place in unknown {
                 problems[place] = match probe(core, number, vec![path(&place)]).await? {
@@ -202,7 +202,7 @@ async fn probe_together<W: Workers>(
     Ok(problems)
 }
 
-/// Has kernels opened, and notes what they cover; why each cannot be used, or why there is no answer.
+/// Has kernels opened, and records their coverage; returns the fault of each, or the reason for a missing answer.
 async fn probe<W: Workers>(
     core: &Arc<Core<W>>,
     number: usize,

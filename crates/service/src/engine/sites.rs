@@ -1,4 +1,4 @@
-//! Site files: the name of each, and which new files could matter to it.
+//! Site files: the name of each, and the new files that could be its inputs.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -22,10 +22,10 @@ use crate::{
     state::JobState,
 };
 
-/// Longest site file that is read here; a longer one is refused by its worker.
+/// Longest site file that is read here; the worker rejects a longer one.
 const BYTES_MAX: u64 = 1 << 20;
 
-/// A site file, as far as it matters before a worker reads it.
+/// A site file, as far as needed before a worker reads it.
 #[derive(Debug, Clone)]
 pub struct SiteFile {
     /// Name of the site.
@@ -39,8 +39,8 @@ pub struct SiteFile {
 }
 
 impl SiteFile {
-    /// Reads what matters of `text`, the content of `path`. A file without a name, or that is no TOML, has that of the file:
-    /// its worker says what is wrong.
+    /// Parses the required parts of `text`, the content of `path`. A file without a name, or with invalid TOML, is
+    /// named after the file: its worker reports the fault.
     #[must_use]
     pub fn of(text: &str, path: &Path) -> Self {
         let table: Table = text.parse().unwrap_or_default();
@@ -82,7 +82,7 @@ impl SiteFile {
         }
     }
 
-    /// Whether a file that the site did not read could be one of its inputs.
+    /// Whether an unread file could be an input of the site.
     #[must_use]
     pub fn reaches(&self, path: &str) -> bool {
         let options = glob::MatchOptions {
@@ -101,13 +101,13 @@ impl SiteFile {
     }
 }
 
-/// Names of sites, as the configuration has them.
+/// Whether a name is valid, as in the configuration.
 fn is_name(name: &str) -> bool {
     let allowed = |byte: u8| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_';
     !name.is_empty() && name.len() <= 64 && name.bytes().all(allowed)
 }
 
-/// The site files that are known, by path, with the content that was read.
+/// The known site files, by path, with the content that was read.
 #[derive(Debug, Default)]
 pub struct SiteBook {
     read: BTreeMap<String, (Option<String>, SiteFile)>,
@@ -120,8 +120,8 @@ impl SiteBook {
         self.read.get(path).map(|(_, file)| file)
     }
 
-    /// Reads the files that are new or have another content, and forgets those that are gone. Files that cannot be read, or
-    /// are settling, stay as they were known.
+    /// Reads the files that are new or changed, and removes those that no longer exist. Files that cannot be read, or
+    /// are settling, are unchanged.
     fn update(&mut self, files: &BTreeMap<String, FileRow>) {
         self.read.retain(|path, _| {
             files
@@ -145,7 +145,7 @@ impl SiteBook {
 /// Brings the sites of the database in line with the site files below `roots`.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn bring_in_line(
     transaction: &Transaction<'_>,
     now_ms: i64,
@@ -170,17 +170,17 @@ pub fn bring_in_line(
     }
     let gone = |name: &str| !named.contains_key(name);
     for site in sites(transaction)?.iter().filter(|site| site.enabled) {
-        // A service that has just begun, with folders that are away, forgets no site.
+        // A service that has just started, with unavailable folders, removes no site.
         let file_is_gone = files
             .get(&site.file)
             .is_none_or(|file| file.state == FileState::Gone)
             || book.of(&site.file).is_some();
         if gone(&site.name) && file_is_gone {
-            tracing::info!(site = site.name, "its site file is gone");
+            tracing::info!(site = site.name, "its site file was removed");
             disable_site(transaction, &site.name)?;
             if let Some(job) = pending_job(transaction, &site.name)? {
                 let moved = Moved {
-                    outcome: Some(json!({ "text": "its site file is gone" })),
+                    outcome: Some(json!({ "text": "its site file was removed" })),
                     ..Moved::default()
                 };
                 advance(transaction, now_ms, job.id, JobState::Cancelled, &moved)?;

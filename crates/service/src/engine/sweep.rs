@@ -1,4 +1,4 @@
-//! What a list of a folder says: which files changed, and whether the folder can be used at all.
+//! Evaluation of a folder list: changed files, and the availability of the folder.
 
 use std::collections::BTreeMap;
 
@@ -8,35 +8,35 @@ use crate::{
 };
 use areograph_store::files::Identity;
 
-/// What was known of a folder and what was found in it.
+/// The known state of a folder and its list.
 #[derive(Debug)]
 pub struct Sweep<'a> {
     /// The folder as it was.
     pub root: &'a RootRow,
     /// Files known below it.
     pub known: &'a BTreeMap<String, FileRow>,
-    /// Files found below it, or why it could not be listed.
+    /// Files found below it, or the reason for which it could not be listed.
     pub found: Result<&'a BTreeMap<String, Identity>, &'a str>,
     /// When, milliseconds of UTC since 1970.
     pub now_ms: i64,
-    /// Larger shares of files that are lost mean that the folder is not what it was.
+    /// A larger share of missing files makes the folder unavailable.
     pub max_loss: f64,
-    /// It is used when nothing has changed for so long.
+    /// It is used after this time without changes.
     pub quiet_ms: i64,
 }
 
-/// What came of it.
+/// The result.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Swept {
-    /// The folder as it is.
+    /// The new state of the folder.
     pub root: RootRow,
-    /// Files that are not as they were known.
+    /// Files that changed.
     pub changed: Vec<FileRow>,
-    /// Files whose folder has been quiet for long enough: their content can be read now.
+    /// Files in a quiet folder: their content can be read now.
     pub settled: Vec<FileRow>,
 }
 
-/// Compares. A folder that is unavailable changes no file.
+/// Compares. An unavailable folder changes no file.
 #[must_use]
 pub fn compare(sweep: &Sweep<'_>) -> Swept {
     let found = match unavailable(sweep) {
@@ -52,7 +52,7 @@ pub fn compare(sweep: &Sweep<'_>) -> Swept {
     let changed = changed(sweep, found);
     let news: BTreeMap<&str, &FileRow> = changed.iter().map(|file| (&*file.path, file)).collect();
     let known = sweep.known.values();
-    // A file counts as settling from the sweep that saw it change; only a later one may find it quiet.
+    // A file counts as settling from the sweep that detected its change; only a later one may find it quiet.
     let waiting: Vec<&FileRow> = known
         .filter(|file| file.state == FileState::Settling && !news.contains_key(&*file.path))
         .collect();
@@ -85,7 +85,7 @@ pub fn compare(sweep: &Sweep<'_>) -> Swept {
     }
 }
 
-/// The files, or why the folder cannot be what it was.
+/// The files, or the reason for which the folder is unavailable.
 fn unavailable<'a>(sweep: &Sweep<'a>) -> Result<&'a BTreeMap<String, Identity>, String> {
     let found = sweep.found.map_err(str::to_owned)?;
     if found.is_empty() {
@@ -97,7 +97,7 @@ fn unavailable<'a>(sweep: &Sweep<'a>) -> Result<&'a BTreeMap<String, Identity>, 
     let lost = sweep.known.values().filter(is_lost).count();
     if lost as f64 > sweep.max_loss * known as f64 {
         return Err(format!(
-            "{lost} of {known} files are gone, more than changes.max_loss = {} allows; if this is intended, raise it until the \
+            "{lost} of {known} files are missing, more than changes.max_loss = {} allows; if this is intended, raise it until the \
              next sweep",
             sweep.max_loss
         ));
@@ -160,17 +160,17 @@ fn changed(sweep: &Sweep<'_>, found: &BTreeMap<String, Identity>) -> Vec<FileRow
     changed
 }
 
-/// Detail of a settling file that is not there: mirrors remove files before they bring others.
+/// Detail of a missing settling file: mirrors remove files before they add others.
 const MISSING: &str = "missing";
 
-/// Whether a settling file was not there when its folder was last listed.
+/// Whether a settling file was missing when its folder was last listed.
 #[must_use]
 pub fn is_missing(file: &FileRow) -> bool {
     file.state == FileState::Settling && file.detail == MISSING
 }
 
-/// When a file changed: as the file system says, since a service that starts has just seen everything for the first time, but not later
-/// than it was noticed.
+/// Time of a file's change: by the file system, since a starting service sees everything for the first time, but not
+/// later than its detection.
 fn last_change_ms(file: &FileRow) -> i64 {
     if is_missing(file) {
         return file.changed_ms;
@@ -197,7 +197,7 @@ mod tests {
         }
     }
 
-    /// A folder that is swept again and again, and whose settled files are taken for read.
+    /// A folder that is swept repeatedly, and whose settled files count as read.
     struct Folder {
         root: RootRow,
         known: BTreeMap<String, FileRow>,
@@ -222,7 +222,7 @@ mod tests {
             }
         }
 
-        /// Paths that were found to have changed, and those that settled.
+        /// Changed paths, and settled ones.
         fn sweep(&mut self, now_ms: i64, found: Result<(), &str>) -> (usize, usize) {
             let swept = compare(&Sweep {
                 root: &self.root,
@@ -266,7 +266,7 @@ mod tests {
         folder.sweep(QUIET_MS + 1, Ok(()));
         let begin_ms = 2 * QUIET_MS;
         let mut settled = 0;
-        // Pieces every five minutes, an old time of modification, sweeps every minute.
+        // Pieces every five minutes, an old modification time, sweeps every minute.
         for minute in 0..40 {
             let now_ms = begin_ms + minute * 60_000;
             if minute <= 20 && minute % 5 == 0 {
@@ -301,14 +301,14 @@ mod tests {
         folder.files = files.clone();
         folder.files.retain(|path, _| path.as_str() >= "/k/021.bc");
         assert_eq!(folder.sweep(QUIET_MS + 4, Ok(())), (0, 0));
-        assert!(folder.root.detail.contains("21 of 100 files are gone"));
+        assert!(folder.root.detail.contains("21 of 100 files are missing"));
         assert_eq!(folder.root.since_ms, QUIET_MS + 2);
         assert_eq!(folder.known, known);
-        // Back as it was: nothing happened.
+        // Restored: no change.
         folder.files = files;
         assert_eq!(folder.sweep(QUIET_MS + 5, Ok(())), (0, 0));
         assert_eq!(folder.root.state, RootState::Available);
-        // A single file less is a change, after the quiet period.
+        // A single missing file is a change, after the quiet period.
         folder.files.remove("/k/005.bc");
         assert_eq!(folder.sweep(2 * QUIET_MS, Ok(())), (1, 0));
         assert_eq!(folder.sweep(3 * QUIET_MS - 1, Ok(())), (0, 0));

@@ -54,7 +54,7 @@ use areograph_base::error::{Locate as _, Result};
 const TICK: Duration = Duration::from_secs(1);
 /// Longest time for a graceful end.
 const END_WITHIN: Duration = Duration::from_secs(23);
-/// Time between two looks at the disks, freshness and what is kept; and between two clearings.
+/// Time between two checks of the disks, freshness and retention; and between two cleanups.
 const UPKEEP_MS: i64 = 30_000;
 const TRIM_MS: i64 = 3_600_000;
 
@@ -70,7 +70,7 @@ pub struct Engine<W> {
 }
 
 impl<W: Workers> Engine<W> {
-    /// The engine of a service, after it has taken over from an earlier one.
+    /// Creates the engine of a service, after adoption of an earlier one's state.
     ///
     /// # Errors
     /// The database or the folders of state and products cannot be read or written.
@@ -95,7 +95,7 @@ impl<W: Workers> Engine<W> {
         })
     }
 
-    /// Takes turns until the service ends, then stops what is under way.
+    /// Repeats turns until the service ends, then stops current work.
     pub async fn run(&self) {
         let shared = &self.core.shared;
         while !shared.ending.is_cancelled() {
@@ -119,7 +119,7 @@ impl<W: Workers> Engine<W> {
         }
     }
 
-    /// A turn; what goes wrong is told, and the next one tries again.
+    /// A turn; failures are reported, and the next turn retries.
     fn try_turn(&self) {
         match self.turn() {
             Ok(()) => {}
@@ -132,20 +132,20 @@ impl<W: Workers> Engine<W> {
         }
     }
 
-    /// How many turns were taken: a sign of life.
+    /// Number of turns, as a heartbeat.
     #[must_use]
     pub fn turns(&self) -> u64 {
         self.turns.load(Ordering::Relaxed)
     }
 
-    /// Whether nothing is under way that a turn began.
+    /// Whether no work begun by a turn is in progress.
     #[must_use]
     pub fn is_idle(&self) -> bool {
         self.tasks.is_empty()
     }
 
-    /// Begins a night now, whatever the schedule says, and gives its number. Files that settle are waited for: there is no later
-    /// sweep.
+    /// Begins a night now, independent of the schedule, and returns its number. It waits for settling files, since no
+    /// later sweep follows.
     ///
     /// # Errors
     /// The database cannot be written.
@@ -181,7 +181,7 @@ impl<W: Workers> Engine<W> {
         self.see_to_letters()
     }
 
-    /// Jobs that have waited are queued; workers whose jobs are to be cancelled are told.
+    /// Queues jobs after their waiting time; notifies workers whose jobs are to be cancelled.
     fn move_jobs(&self) -> Stored<()> {
         let now_ms = self.core.now_ms();
         let (waited, cancelling) = self.core.shared.read(|connection| {
@@ -238,7 +238,7 @@ impl<W: Workers> Engine<W> {
         let purpose = {
             let mut agenda = self.agenda();
             let night = agenda.night.filter(|_| !agenda.compared);
-            // A clock that was put back does not hold it.
+            // A clock that was set back does not delay it.
             let since_ms = agenda.round_ms.map(|last_ms| now_ms - last_ms);
             let is_due = since_ms.is_none_or(|since_ms| since_ms < 0 || since_ms >= scan_ms);
             if agenda.round || !(is_due || (night.is_some() && !agenda.comparing)) {
@@ -253,7 +253,7 @@ impl<W: Workers> Engine<W> {
         let compares = move |core: Arc<Core<W>>| async move {
             let done = round(&core, &mut *book.lock().await, purpose).await;
             if let Err(error) = &done {
-                tracing::error!("a round of comparisons: {error}");
+                tracing::error!("a round of comparisons failed: {error}");
             }
             let settles = core.shared.read(any_settling).unwrap_or(false);
             (done.is_ok(), settles, core.now_ms())
@@ -303,7 +303,7 @@ impl<W: Workers> Engine<W> {
         let agenda = Arc::clone(&self.agenda);
         let keeps = move |core: Arc<Core<W>>| async move {
             if let Err(error) = upkeep(&core, trims).await {
-                tracing::error!("upkeep: {error}");
+                tracing::error!("upkeep failed: {error}");
             }
         };
         self.spawn(keeps, move |_| lock(&agenda).upkeep = false);
@@ -351,14 +351,14 @@ impl<W: Workers> Engine<W> {
         let agenda = Arc::clone(&self.agenda);
         let delivers = |core: Arc<Core<W>>| async move {
             if let Err(error) = deliver(&core).await {
-                tracing::error!("hooks: {error}");
+                tracing::error!("hooks failed: {error}");
             }
         };
         self.spawn(delivers, move |_| lock(&agenda).letters = false);
         Ok(())
     }
 
-    /// Begins what takes long; `end` is told what came of it, even where it panicked, and another turn follows.
+    /// Begins long work; its result, even a panic, is passed to `end`, and another turn follows.
     fn spawn<T, F>(
         &self,
         task: impl FnOnce(Arc<Core<W>>) -> F,
@@ -386,7 +386,7 @@ impl<W: Workers> Engine<W> {
 
 async fn compare_runs<W: Workers>(core: Arc<Core<W>>) {
     if let Err(error) = compare_all(&core).await {
-        tracing::error!("comparing runs: {error}");
+        tracing::error!("comparing runs failed: {error}");
     }
 }
 
@@ -402,7 +402,7 @@ async fn upkeep<W: Workers>(core: &Arc<Core<W>>, trims: bool) -> Stored<()> {
     Ok(())
 }
 
-/// Whether the disk has no room for the database.
+/// Whether the disk is full for the database.
 fn is_full(error: &DatabaseError) -> bool {
     let DatabaseError::Sqlite(rusqlite::Error::SqliteFailure(failure, _)) = error else {
         return false;

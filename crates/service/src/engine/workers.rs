@@ -1,4 +1,4 @@
-//! Those who do the work: worker processes, or in tests whoever takes their place.
+//! Workers: processes, or their substitutes in tests.
 
 use std::{
     future::Future,
@@ -12,9 +12,9 @@ use crate::worker::{
     protocol::{CancelWhy, Task},
 };
 
-/// Those who do the work.
+/// Workers.
 pub trait Workers: Send + Sync + 'static {
-    /// Does a task to its end, as [`work`] says.
+    /// Performs a task to its end, as [`work`] describes.
     fn work(
         &self,
         task: Task,
@@ -45,7 +45,7 @@ impl Workers for Processes {
     }
 }
 
-/// How a worker ended, in words.
+/// How a worker ended, as text.
 #[must_use]
 pub fn words(ended: &Ended) -> String {
     match (&ended.answer, &ended.how) {

@@ -1,4 +1,4 @@
-//! Connections: so many at a time, each with a time for its head and for taking its answer, and an orderly end.
+//! Connections: bounded in number, each with time limits for its head and for reading its answer, and a graceful end.
 
 use std::{
     net::SocketAddr,
@@ -23,12 +23,12 @@ use tower::ServiceExt as _;
 use super::{app::App, guard::Peer, stall::Stall};
 
 const CONNECTIONS: usize = 256;
-/// Connections beyond these that are told so; further ones are closed without a word.
+/// Connections beyond the limit that receive a refusal; further ones are closed without an answer.
 const REFUSALS: usize = 256;
 const HEADERS: usize = 64;
 const HEAD_BYTES: usize = 32 << 10;
 const HEAD_TIME: Duration = Duration::from_secs(5);
-/// Time for connections to end after the service was asked to.
+/// Time for connections to end after a request to stop.
 const END_TIME: Duration = Duration::from_secs(10);
 const FULL: &[u8] = b"HTTP/1.1 503 Service Unavailable\r\nRetry-After: 5\r\nConnection: close\r\nContent-Length: 0\r\n\r\n";
 
@@ -72,7 +72,7 @@ pub(super) async fn run(listener: TcpListener, router: Router, app: &Arc<App>) {
             app.connections.fetch_add(1, Ordering::Relaxed);
             let connection = watcher.watch(connection(stream, peer, router));
             tokio::select! {
-                // A client that goes away, or is too slow, is no news.
+                // A client that disconnects, or is too slow, is not logged.
                 ended = connection => drop(ended),
                 () = cut.cancelled() => {}
             }
@@ -118,7 +118,7 @@ fn connection(
         .serve_connection(TokioIo::new(Stall::new(stream)), service)
 }
 
-/// Says that there is no place, and takes what the client still sends, without which it would not see the answer.
+/// Sends a refusal, and reads what the client still sends, without which it would not see the answer.
 async fn refuse(mut stream: TcpStream) -> std::io::Result<()> {
     stream.write_all(FULL).await?;
     stream.shutdown().await?;

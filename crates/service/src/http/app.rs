@@ -1,4 +1,4 @@
-//! What all requests share.
+//! State shared by all requests.
 
 use std::{
     net::SocketAddr,
@@ -15,28 +15,28 @@ use super::{hidden::Hidden, metrics::Metrics, plans::Plans, problem::Problem, ra
 use crate::{database::Stored, shared::Shared};
 use areograph_config::ServiceConfig;
 
-/// Reads of the database at the same time.
+/// Concurrent reads of the database.
 const READS: usize = 8;
-/// Streams of events at the same time.
+/// Concurrent streams of events.
 pub(super) const STREAMS: usize = 64;
 
-/// Workers that plan or search at the same time.
+/// Concurrent workers for plans and searches.
 const WORKERS: usize = 2;
 
-/// What all requests share.
+/// State shared by all requests.
 pub(super) struct App {
     pub(super) shared: Arc<Shared>,
-    /// Where the service listens.
+    /// Address of the service.
     pub(super) local: SocketAddr,
     pub(super) metrics: Metrics,
     pub(super) rates: Rates,
     pub(super) streams: Arc<Semaphore>,
     pub(super) connections: AtomicUsize,
-    /// Workers that plan or search.
+    /// Workers for plans and searches.
     pub(super) workers: Arc<Semaphore>,
     pub(super) plans: Plans,
     reads: Arc<Semaphore>,
-    /// For the configuration that they were taken from.
+    /// With the configuration from which they were derived.
     hidden: Mutex<(Arc<ServiceConfig>, Arc<Hidden>)>,
 }
 
@@ -66,7 +66,7 @@ impl App {
         self.shared.now_ms()
     }
 
-    /// What clients must not read: where things lie on this machine.
+    /// Paths of this machine that clients must not see.
     pub(super) fn hidden(&self) -> Arc<Hidden> {
         let config = self.config();
         let mut kept = self.hidden.lock().unwrap_or_else(PoisonError::into_inner);
@@ -77,17 +77,17 @@ impl App {
         Arc::clone(&kept.1)
     }
 
-    /// How many streams of events are open.
+    /// Number of open streams of events.
     pub(super) fn open_streams(&self) -> usize {
         STREAMS - self.streams.available_permits()
     }
 
-    /// How many connections are open.
+    /// Number of open connections.
     pub(super) fn open_connections(&self) -> usize {
         self.connections.load(Ordering::Relaxed)
     }
 
-    /// Looks at the database without holding up other requests.
+    /// Reads the database without blocking other requests.
     pub(super) async fn read<T: Send + 'static>(
         &self,
         look: impl FnOnce(&Connection) -> Stored<T> + Send + 'static,
@@ -103,7 +103,7 @@ impl App {
         .map_err(Problem::from)
     }
 
-    /// Changes the database; the engine looks at once whether there is something to do.
+    /// Changes the database and wakes the engine.
     pub(super) async fn write<T: Send + 'static>(
         &self,
         work: impl FnOnce(&Transaction<'_>) -> Stored<T> + Send + 'static,
@@ -125,7 +125,7 @@ impl App {
     }
 }
 
-/// Does `work` where waiting for the disk holds up nobody.
+/// Performs `work` on a thread that may block on the disk.
 pub(super) async fn blocking<T: Send + 'static>(
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Result<T, Problem> {

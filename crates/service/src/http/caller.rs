@@ -1,4 +1,4 @@
-//! Who asks, and what they may do.
+//! Callers, and their permissions.
 
 use std::{net::IpAddr, sync::Arc};
 
@@ -18,19 +18,19 @@ use crate::{
 };
 use areograph_config::HttpConfig;
 
-/// Longest token that is looked at.
+/// Longest accepted token.
 const TOKEN_MAX: usize = 128;
-/// A use of a token is noted at most so often.
+/// Shortest time between two records of a token's use.
 const NOTE_MS: i64 = 60_000;
 
-/// Who asks.
+/// The caller.
 #[derive(Debug, Clone)]
 pub(super) struct Caller {
-    /// Where the request comes from, through trusted proxies.
+    /// Source of the request, through trusted proxies.
     pub(super) remote: IpAddr,
-    /// Identifier of the token, also of a session's.
+    /// Identifier of the token, including that of a session.
     pub(super) token: Option<String>,
-    /// What they may do; without a token, reading from this machine.
+    /// Role; without a token, reading from this machine.
     pub(super) role: Option<Role>,
     /// The session of a browser.
     pub(super) session: Option<Session>,
@@ -42,13 +42,13 @@ impl Caller {
         self.token.clone().unwrap_or_else(|| "anybody".to_owned())
     }
 
-    /// Whether they may change something through pages.
+    /// Whether the caller may make changes through pages.
     pub(super) fn operates(&self) -> bool {
         self.role == Some(Role::Operate)
     }
 }
 
-/// The name of the cookie: behind TLS one that only this host can set.
+/// The name of the cookie; behind TLS one that only this host can set.
 pub(super) const fn cookie_name(http: &HttpConfig) -> &'static str {
     if http.behind_tls_proxy {
         "__Host-areograph"
@@ -57,7 +57,7 @@ pub(super) const fn cookie_name(http: &HttpConfig) -> &'static str {
     }
 }
 
-/// Finds out who asks; refuses tokens that are not ours, or are no longer.
+/// Identifies the caller; rejects unknown, expired and revoked tokens.
 pub(super) async fn identify(
     app: &App,
     headers: &HeaderMap,
@@ -167,13 +167,13 @@ fn cookie(headers: &HeaderMap, name: &str) -> Option<String> {
         .map(|(_, value)| value.to_owned())
 }
 
-/// Whoever it is.
+/// Any caller.
 pub(super) struct Known(pub(super) Caller);
 
-/// Whoever may read.
+/// A caller who may read.
 pub(super) struct Reader(pub(super) Caller);
 
-/// Whoever may change something through the interface for programs: the bearer of a token, not a browser's session.
+/// A caller who may make changes through the interface for programs: the bearer of a token, not a browser's session.
 pub(super) struct Operator(pub(super) Caller);
 
 fn caller(parts: &Parts) -> Result<Caller, Problem> {
@@ -219,7 +219,7 @@ impl FromRequestParts<Arc<App>> for Operator {
         if !caller.operates() {
             return Err(Problem::new(
                 StatusCode::FORBIDDEN,
-                "This token may read only. Changes need one with the role operate.",
+                "This token may only read. Changes require a token with the role operate.",
             ));
         }
         Ok(Self(caller))

@@ -1,4 +1,4 @@
-//! What people ask the engine for, the same from pages and from programs: each with a line of who asked.
+//! Changes requested through pages and by programs, each recorded with its caller.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use crate::{
     state::JobState,
 };
 
-/// Jobs that are asked for.
+/// Requested jobs.
 #[derive(Debug, Clone)]
 pub(super) struct Wanted {
     pub(super) sites: Vec<String>,
@@ -23,7 +23,7 @@ pub(super) struct Wanted {
     pub(super) reason: String,
 }
 
-/// Asks for jobs of sites that are there.
+/// Requests jobs of existing sites.
 pub(super) fn ask_for(
     transaction: &rusqlite::Transaction<'_>,
     now_ms: i64,
@@ -56,7 +56,7 @@ pub(super) fn ask_for(
     Ok(jobs)
 }
 
-/// Asks for a job of one site.
+/// Requests a job of one site.
 pub(super) async fn run_site(
     app: &Arc<App>,
     caller: Caller,
@@ -77,7 +77,7 @@ pub(super) async fn run_site(
     Ok(asked.first().map(|(_, asked)| asked.job))
 }
 
-/// Asks a job to stop.
+/// Requests cancellation of a job.
 pub(super) async fn cancel(app: &Arc<App>, caller: Caller, id: i64) -> Result<Job, Problem> {
     let now_ms = app.now_ms();
     let done = app
@@ -105,7 +105,7 @@ pub(super) async fn cancel(app: &Arc<App>, caller: Caller, id: i64) -> Result<Jo
     }
 }
 
-/// Tries a job again: one that waits or is blocked at once, one that ended without valid products as a new job.
+/// Retries a job: a waiting or blocked one at once, one that ended without valid products as a new job.
 pub(super) async fn retry(app: &Arc<App>, caller: Caller, id: i64) -> Result<Job, Problem> {
     let now_ms = app.now_ms();
     let done = app
@@ -123,7 +123,7 @@ pub(super) async fn retry(app: &Arc<App>, caller: Caller, id: i64) -> Result<Job
                 }
             };
             let who = caller.name();
-            let detail = format!("job {id} is tried again");
+            let detail = format!("job {id} is retried");
             let wish = Ask {
                 site: &found.site,
                 priority: Priority::Asked,
@@ -143,7 +143,7 @@ pub(super) async fn retry(app: &Arc<App>, caller: Caller, id: i64) -> Result<Job
     done
 }
 
-/// Keeps a run for good, or no longer.
+/// Keeps a run permanently, or releases it.
 pub(super) async fn pin(
     app: &Arc<App>,
     caller: Caller,

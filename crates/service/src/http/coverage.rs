@@ -1,4 +1,4 @@
-//! What kernels cover, and where they do not.
+//! Coverage of kernels, and its gaps.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -15,12 +15,12 @@ pub(super) struct Span {
     pub(super) stop_et_s: f64,
 }
 
-/// What a kernel covers of one kind.
+/// Coverage of one kind by a kernel.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
 pub(super) struct Covered {
     /// Intervals, in order.
     pub(super) intervals: Vec<Span>,
-    /// What lies between them.
+    /// Gaps between them.
     pub(super) gaps: Vec<Span>,
 }
 

@@ -1,4 +1,4 @@
-//! What requests bring: parameters, documents and forms of bounded size, refused in our own words.
+//! Inputs of requests: parameters, documents and forms of bounded size, with the service's own error messages.
 
 use std::{sync::Arc, time::Duration};
 
@@ -13,7 +13,7 @@ use super::{app::App, problem::Problem};
 
 /// Longest document or form, bytes.
 const BODY_MAX: usize = 64 << 10;
-/// Longest time for it to arrive.
+/// Longest time for its arrival.
 const BODY_TIME: Duration = Duration::from_secs(10);
 
 /// Parameters of the path.
@@ -24,7 +24,7 @@ impl<T: DeserializeOwned + Send> FromRequestParts<Arc<App>> for At<T> {
 
     async fn from_request_parts(parts: &mut Parts, app: &Arc<App>) -> Result<Self, Problem> {
         let found = Path::<T>::from_request_parts(parts, app).await;
-        // What is no number names nothing.
+        // An invalid number names nothing.
         found
             .map(|Path(found)| Self(found))
             .map_err(|_| Problem::not_found("There is nothing at this address."))
@@ -45,7 +45,7 @@ impl<T: DeserializeOwned + Send> FromRequestParts<Arc<App>> for Asked<T> {
     }
 }
 
-/// A document of JSON.
+/// A JSON document.
 pub(super) struct Document<T>(pub(super) T);
 
 impl<T: DeserializeOwned> FromRequest<Arc<App>> for Document<T> {
@@ -105,13 +105,13 @@ pub(super) async fn body_of(request: Request, media: &str, max: usize) -> Result
     }
 }
 
-/// A document of JSON as a type.
+/// Parses a JSON document.
 pub(super) fn json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
     serde_json::from_slice(bytes)
         .map_err(|error| Problem::bad_request(format!("The body: {error}.")))
 }
 
-/// Refuses what no site or run can be called; the database is not asked.
+/// Rejects names that no site or run can have, without access to the database.
 pub(super) fn name(text: &str) -> Result<&str, Problem> {
     let plain = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'_' || byte == b'-';
     if (1..=64).contains(&text.len()) && text.bytes().all(plain) {

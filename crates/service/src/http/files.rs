@@ -1,4 +1,4 @@
-//! Files of runs and logs: only what a manifest or the database names, and only below the folder where it belongs.
+//! Files of runs and logs: only those named in a manifest or the database, and only below their own folder.
 
 use std::{
     fs::File,
@@ -18,17 +18,17 @@ use areograph_store::{
     publish::MANIFEST,
 };
 
-/// Longest manifest that is read.
+/// Longest accepted manifest.
 const MANIFEST_MAX: u64 = 64 << 20;
 
-/// A product that is what its manifest says.
+/// A product that matches its manifest.
 #[derive(Debug)]
 pub(super) struct Product {
     pub(super) file: File,
     pub(super) entry: ProductEntry,
 }
 
-/// Folder of a run below that of all products.
+/// Folder of a run below the products folder.
 fn run_folder(run: &Run) -> PathBuf {
     Path::new(&run.site).join("runs").join(&run.id)
 }
@@ -48,7 +48,7 @@ pub(super) fn difference(products: &Path, run: &Run) -> Result<Vec<u8>, Problem>
     Ok(page)
 }
 
-/// Opens the file `path` below `folder`: no part of it may be a symbolic link, nor lead out.
+/// Opens the file `path` below `folder`: no component may be a symbolic link or lead outside.
 pub(super) fn open_below(folder: &Path, path: &Path) -> Result<Option<File>, Problem> {
     let plain = |part: Component<'_>| matches!(part, Component::Normal(_));
     if path.as_os_str().is_empty() || !path.components().all(plain) {
@@ -64,7 +64,7 @@ pub(super) fn open_below(folder: &Path, path: &Path) -> Result<Option<File>, Pro
         Err(Errno::NOENT) => return Ok(None),
         Err(error) => return Err(Problem::internal(error)),
     };
-    // Without waiting for a writer, should it be a pipe.
+    // Does not wait for a writer if it is a pipe.
     let flags = OFlags::RDONLY | OFlags::CLOEXEC | OFlags::NONBLOCK | OFlags::NOCTTY;
     let resolve = ResolveFlags::BENEATH | ResolveFlags::NO_SYMLINKS | ResolveFlags::NO_MAGICLINKS;
     let opened = match openat2(folder, path, flags, Mode::empty(), resolve) {
@@ -85,7 +85,7 @@ pub(super) fn open_below(folder: &Path, path: &Path) -> Result<Option<File>, Pro
     Ok(is_file.then_some(opened))
 }
 
-/// The manifest of a run, if it is the one that was published.
+/// The manifest of a run, if it is the published one.
 pub(super) fn manifest(products: &Path, run: &Run) -> Result<Manifest, Problem> {
     let bytes = manifest_bytes(products, run)?;
     serde_json::from_slice(&bytes)
@@ -100,7 +100,7 @@ fn manifest_bytes(products: &Path, run: &Run) -> Result<Vec<u8>, Problem> {
         ));
     }
     let file = open_below(products, &run_folder(run).join(MANIFEST))?;
-    let file = file.ok_or_else(|| Problem::not_found("The products of this run are not there."))?;
+    let file = file.ok_or_else(|| Problem::not_found("The products of this run are missing."))?;
     let mut bytes = Vec::new();
     file.take(MANIFEST_MAX)
         .read_to_end(&mut bytes)
@@ -113,9 +113,9 @@ fn manifest_bytes(products: &Path, run: &Run) -> Result<Vec<u8>, Problem> {
     Ok(bytes)
 }
 
-/// A product that the manifest of a run names, or the manifest itself.
+/// A product named in the manifest of a run, or the manifest itself.
 pub(super) fn product(products: &Path, run: &Run, path: &str) -> Result<Product, Problem> {
-    let no_product = || Problem::not_found("The manifest of this run names no such product.");
+    let no_product = || Problem::not_found("The manifest of this run lists no such product.");
     let entry = if path == MANIFEST {
         let bytes = manifest_bytes(products, run)?;
         ProductEntry {

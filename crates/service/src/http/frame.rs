@@ -1,4 +1,4 @@
-//! Around every request: its identifier, the headers of its answer, the form of a refusal, a line in the log.
+//! Frame of every request: its identifier, the headers of its answer, the form of an error, a line in the log.
 
 use std::{
     any::Any,
@@ -23,11 +23,11 @@ use super::{
 const LONGEST: Duration = Duration::from_secs(30);
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
-/// Pages load nothing but the style and the script of this service.
+/// Pages load only the style and the script of this service.
 const POLICY: &str = "default-src 'none'; style-src 'self'; script-src 'self'; img-src 'self' data:; connect-src 'self'; \
                       form-action 'self'; base-uri 'none'; frame-ancestors 'none'";
 
-/// Headers of every answer that does not bring its own.
+/// Headers of every answer that does not set its own.
 const HEADERS: [(HeaderName, &str); 7] = [
     (header::CONTENT_SECURITY_POLICY, POLICY),
     (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
@@ -79,13 +79,13 @@ pub(super) async fn frame(State(app): State<Arc<App>>, request: Request, next: N
     response
 }
 
-/// Whether an answer is a document of its own, as that of readiness.
+/// Whether an answer has its own document, as that of readiness.
 fn says_itself(response: &Response) -> bool {
     let form = response.headers().get(header::CONTENT_TYPE);
     form.is_some_and(|form| form == "application/json")
 }
 
-/// A panic is a bug of ours; its text is for the log.
+/// A panic is a bug in areograph; its text goes to the log.
 #[allow(clippy::needless_pass_by_value, reason = "as the layer calls it")]
 pub(super) fn panicked(panic: Box<dyn Any + Send>) -> Response {
     let text = panic
@@ -95,7 +95,7 @@ pub(super) fn panicked(panic: Box<dyn Any + Send>) -> Response {
     Problem::internal(text.unwrap_or("a panic without a text")).into_response()
 }
 
-/// Gives a refusal its form; what libraries refuse has a status alone.
+/// Formats an error; those of libraries have only a status.
 fn refusal(app: &App, method: &Method, uri: &Uri, response: Response, id: &str) -> Response {
     let status = response.status();
     let (parts, _) = response.into_parts();
@@ -172,7 +172,7 @@ fn dress(headers: &mut HeaderMap, id: &str) {
     }
 }
 
-/// Other methods share a name, so that nobody can make new ones in the metrics.
+/// Other methods share a name, so that clients cannot create new ones in the metrics.
 fn method_name(method: &Method) -> &'static str {
     match *method {
         Method::GET => "GET",
@@ -191,7 +191,7 @@ fn one_line(text: &str) -> String {
 
 fn request_id() -> String {
     let mut bytes = [0_u8; 8];
-    // Without random numbers requests cannot be told apart in the log, but they can be answered.
+    // Without random numbers requests cannot be distinguished in the log, but they can be answered.
     let _ = getrandom::fill(&mut bytes);
     format!("{:016x}", u64::from_be_bytes(bytes))
 }

@@ -1,4 +1,4 @@
-//! What every request passes first: the right host, no token in its address, somebody we know, not too often.
+//! First checks of every request: the host, no token in the address, a known caller, the rate.
 
 use std::{
     net::{IpAddr, SocketAddr},
@@ -21,7 +21,7 @@ use super::{
 };
 use crate::tokens::PREFIX;
 
-/// Names of parameters under which people put tokens into addresses.
+/// Parameter names that commonly contain tokens in addresses.
 const TOKEN_PARAMETERS: [&str; 6] = [
     "token",
     "access_token",
@@ -33,7 +33,7 @@ const TOKEN_PARAMETERS: [&str; 6] = [
 const FORWARDED_FOR: &str = "x-forwarded-for";
 const FORWARDED: &str = "forwarded";
 
-/// The other end of the connection.
+/// Remote end of the connection.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Peer(pub(super) SocketAddr);
 
@@ -65,13 +65,13 @@ async fn pass(app: &App, parts: &Parts) -> Result<Caller, Problem> {
     Ok(caller)
 }
 
-/// Refuses requests for another host: a page of a foreign site whose name leads to this machine must not be answered. Says
-/// whether it is a name of this machine.
+/// Rejects requests for another host: a page of a foreign site whose name resolves to this machine must not be
+/// answered. Returns whether it is a name of this machine.
 fn check_host(app: &App, headers: &HeaderMap, uri: &Uri) -> Result<bool, Problem> {
     let wrong = || {
         Problem::new(
             StatusCode::MISDIRECTED_REQUEST,
-            "This service does not answer for this host. Use its own address, or the public_url of its configuration.",
+            "This service does not serve this host. Use its own address, or the public_url of its configuration.",
         )
     };
     let mut hosts = headers.get_all(header::HOST).iter();
@@ -106,7 +106,7 @@ fn is_local_name(host: &str, local: SocketAddr) -> bool {
         .any(|name| name.eq_ignore_ascii_case(host))
 }
 
-/// Addresses end up in logs and histories: a token in one is refused, so that nobody gets used to it.
+/// Addresses are kept in logs and histories: a token in one is rejected, so that this does not become a habit.
 fn refuse_token_in(uri: &Uri) -> Result<(), Problem> {
     let refused = || {
         Problem::bad_request(
@@ -151,7 +151,7 @@ fn percent_decoded(text: &str) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// The last address that no proxy of ours has.
+/// The last address that is not that of a trusted proxy.
 fn remote(headers: &HeaderMap, peer: IpAddr, trusted: &[IpAddr]) -> IpAddr {
     if !trusted.contains(&peer) {
         return peer;
@@ -174,7 +174,7 @@ fn remote(headers: &HeaderMap, peer: IpAddr, trusted: &[IpAddr]) -> IpAddr {
     remote
 }
 
-/// Who reads on this machine without a token is limited by the number of connections alone.
+/// Callers without a token on this machine are limited only by the number of connections.
 fn limit(app: &App, caller: &Caller, reads: bool) -> Result<(), Problem> {
     let name = match &caller.token {
         Some(token) => token.clone(),

@@ -1,10 +1,10 @@
-//! Where things lie on this machine is not for clients: folders of the configuration lose what leads to them.
+//! Paths of this machine are hidden from clients: folders of the configuration are shown without their parents.
 
 use std::path::Path;
 
 use areograph_config::ServiceConfig;
 
-/// Folders as they stand in texts, with what takes their place; the longest first.
+/// Folders as they occur in texts, and their replacements; the longest first.
 #[derive(Debug)]
 pub(super) struct Hidden(Vec<(String, String)>);
 
@@ -32,7 +32,7 @@ impl Hidden {
         Self(hidden)
     }
 
-    /// `text` without the folders that lead to those of the configuration.
+    /// `text` without the parents of the folders of the configuration.
     pub(super) fn strip(&self, text: String) -> String {
         let strip = |text: String, (folder, instead): &(String, String)| {
             if text.contains(&**folder) {

@@ -7,20 +7,20 @@ use std::{
 
 use super::{files::open_below, problem::Problem};
 
-/// Bytes of a log that are given at once.
+/// Bytes of a log in one page.
 pub(super) const PIECE: u64 = 256 << 10;
 
-/// A piece of a log.
+/// A page of a log.
 #[derive(Debug, Default)]
 pub(super) struct LogPiece {
     pub(super) text: String,
-    /// Where the next piece begins, bytes.
+    /// Start of the next page, bytes.
     pub(super) next: u64,
     /// Length of the whole log, bytes.
     pub(super) bytes: u64,
 }
 
-/// At most `most` bytes of a log below `state`, from byte `after`, or its end when that is not said.
+/// At most `most` bytes of a log below `state`, from byte `after`, or by default its end.
 pub(super) fn log_piece(
     state: &Path,
     log: &str,
@@ -42,7 +42,7 @@ pub(super) fn log_piece(
     file.take(most)
         .read_to_end(&mut piece)
         .map_err(Problem::internal)?;
-    // A whole piece ends with a line, so that no letter is cut.
+    // A full page ends with a line, so that no character is split.
     if piece.len() as u64 == most
         && let Some(end) = piece.iter().rposition(|byte| *byte == b'\n')
     {

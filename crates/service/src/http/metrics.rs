@@ -1,4 +1,4 @@
-//! Figures for Prometheus. Labels are routes, methods, states: never a path, a site, a file or a token.
+//! Metrics for Prometheus. Labels are routes, methods, states: never a path, a site, a file or a token.
 
 use std::{fmt::Write as _, time::Duration};
 
@@ -18,7 +18,7 @@ struct Labels {
     status: u16,
 }
 
-/// Requests that were answered.
+/// Answered requests.
 #[derive(Debug)]
 pub(super) struct Metrics {
     registry: Registry,
@@ -49,7 +49,7 @@ impl Metrics {
         }
     }
 
-    /// Notes a request; `route` is one of ours, with its parameters by name.
+    /// Records a request; `route` is a defined one, with its parameters by name.
     pub(super) fn note(&self, method: &'static str, route: &str, status: u16, took: Duration) {
         let labels = Labels {
             method,
@@ -60,7 +60,7 @@ impl Metrics {
         self.seconds.observe(took.as_secs_f64());
     }
 
-    /// The text for Prometheus, with `gauges` (name, help, label if any, value) taken at this moment.
+    /// The text for Prometheus, with current `gauges` (name, help, label if any, value).
     pub(super) fn text(&self, gauges: &[Gauge]) -> String {
         let mut own = String::new();
         // Writing to a string cannot fail.
@@ -83,7 +83,7 @@ impl Metrics {
     }
 }
 
-/// A figure of this moment.
+/// A current value.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Gauge {
     pub(super) name: &'static str,

@@ -1,7 +1,7 @@
-//! The service over HTTP: an interface for programs, pages for people, figures for monitors.
+//! The service over HTTP: an interface for programs, pages for people, metrics for monitors.
 //!
-//! Handlers read the tables of the database (`database/shown`) and ask the engine by rows and a wake-up. Workers start
-//! only for plans and searches of shots. A request passes, from the outside:
+//! Handlers read the tables of the database (`database/shown`) and send requests to the engine by rows and a wake-up.
+//! Workers start only for plans and searches of shots. A request passes, from the outside:
 //!
 //! | layer | task |
 //! |---|---|
@@ -44,7 +44,7 @@ use super::shared::Shared;
 use app::App;
 use areograph_base::error::{Error, IoError, Result};
 
-/// Answers requests until the service ends; then streams of events end first, and requests under way within 10 s.
+/// Answers requests until the service ends; then streams of events end first, and current requests within 10 s.
 ///
 /// # Errors
 /// The listener has no address.

@@ -1,4 +1,4 @@
-//! Plans that were asked for, kept in memory for a while.
+//! Requested plans, kept in memory for a while.
 
 use std::{
     collections::BTreeMap,
@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 
 use crate::instant::Instant;
 
-/// Plans that are kept; the oldest go first.
+/// Number of plans kept; the oldest are removed first.
 const KEPT: usize = 64;
 
 /// A plan: what a run of a site would do.
@@ -20,7 +20,7 @@ pub(super) struct Plan {
     pub(super) id: u64,
     /// The site.
     pub(super) site: String,
-    /// When it was asked for.
+    /// When it was requested.
     pub(super) asked_utc: Instant,
     /// `running`, `done` or `failed`.
     pub(super) state: &'static str,
@@ -28,7 +28,7 @@ pub(super) struct Plan {
     pub(super) stages: Vec<Step>,
     /// Files that the site reads.
     pub(super) files: Vec<Input>,
-    /// Why there is no plan.
+    /// The reason for which there is no plan.
     pub(super) problem: Option<String>,
 }
 
@@ -39,7 +39,7 @@ pub(super) struct Step {
     pub(super) stage: String,
     /// Whether it would run.
     pub(super) runs: bool,
-    /// Why, or that it would not.
+    /// The reason, or that it would not run.
     pub(super) because: String,
 }
 
@@ -52,7 +52,7 @@ pub(super) struct Input {
     pub(super) blake3: String,
 }
 
-/// All plans that are kept.
+/// All kept plans.
 #[derive(Debug, Default)]
 pub(super) struct Plans(Mutex<(u64, BTreeMap<u64, Plan>)>);
 
@@ -77,7 +77,7 @@ impl Plans {
         plan
     }
 
-    /// The same plan, ended.
+    /// Ends the plan.
     pub(super) fn end(&self, plan: Plan) {
         let mut plans = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(kept) = plans.1.get_mut(&plan.id) {

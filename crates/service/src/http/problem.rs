@@ -1,4 +1,4 @@
-//! What clients are told when a request is refused: RFC 9457 documents to programs, pages to people.
+//! Errors of requests: RFC 9457 documents for programs, pages for people.
 
 use std::{borrow::Cow, fmt};
 
@@ -11,13 +11,13 @@ use utoipa::ToSchema;
 
 use crate::database::DatabaseError;
 
-/// Why a request is refused. The frame around all requests gives it its form, and the request's identifier.
+/// The reason of an error. The frame of all requests adds its form, and the request's identifier.
 #[derive(Debug, Clone)]
 pub(super) struct Problem {
     pub(super) status: StatusCode,
     pub(super) detail: Cow<'static, str>,
     pub(super) retry_after_s: Option<u32>,
-    /// For the log alone.
+    /// Only for the log.
     pub(super) cause: Option<String>,
 }
 
@@ -50,7 +50,7 @@ impl Problem {
         }
     }
 
-    /// A failure of ours: what it was is for the log.
+    /// An internal failure, whose cause goes to the log.
     pub(super) fn internal(cause: impl fmt::Display) -> Self {
         Self {
             cause: Some(cause.to_string()),
@@ -80,13 +80,13 @@ impl IntoResponse for Problem {
     }
 }
 
-/// A refusal as a document (RFC 9457).
+/// An error as a document (RFC 9457).
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct ProblemDocument {
-    /// Always `about:blank`: the status says the kind.
+    /// Always `about:blank`: the status identifies the kind.
     #[serde(rename = "type")]
     pub(super) kind: &'static str,
-    /// The status in words.
+    /// The status as text.
     pub(super) title: &'static str,
     /// The status.
     pub(super) status: u16,

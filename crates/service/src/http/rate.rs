@@ -1,4 +1,4 @@
-//! How often somebody may ask: buckets that fill with time, one for each token or, without one, each address.
+//! Rate limits: buckets that fill with time, one for each token or, without one, each address.
 
 use std::{
     collections::HashMap,
@@ -7,10 +7,10 @@ use std::{
     time::Instant,
 };
 
-/// Buckets that are kept; beyond that the full ones are forgotten, which changes nothing.
+/// Number of buckets kept; beyond it full ones are dropped, which has no effect.
 const BUCKETS: usize = 4096;
 
-/// How fast a bucket fills, and how much it holds.
+/// Rate at which a bucket fills, and its capacity.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rate {
     per_s: f64,
@@ -27,13 +27,13 @@ pub(super) const WRITES: Rate = Rate {
     per_s: 1.0,
     burst: 20.0,
 };
-/// Tokens that are not ours.
+/// Invalid tokens.
 pub(super) const FAILURES: Rate = Rate {
     per_s: 0.2,
     burst: 10.0,
 };
 
-/// Whose bucket, and what for.
+/// Owner and purpose of a bucket.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) enum Key {
     Read(String),
@@ -61,7 +61,7 @@ impl Bucket {
 pub(super) struct Rates(Mutex<HashMap<Key, Bucket>>);
 
 impl Rates {
-    /// Takes one from a bucket; gives the seconds to wait when it is empty.
+    /// Takes one from a bucket; returns the seconds to wait when it is empty.
     pub(super) fn take(&self, key: Key, rate: Rate, now: Instant) -> Result<(), u32> {
         self.with(key, rate, now, |bucket| {
             if bucket.left < 1.0 {
@@ -72,7 +72,7 @@ impl Rates {
         })
     }
 
-    /// Whether a bucket is empty, and the seconds to wait then.
+    /// Seconds to wait if a bucket is empty.
     pub(super) fn look(&self, key: Key, rate: Rate, now: Instant) -> Result<(), u32> {
         self.with(key, rate, now, |bucket| {
             if bucket.left < 1.0 {
@@ -95,7 +95,7 @@ impl Rates {
                 bucket.fill(now);
                 bucket.left < bucket.rate.burst
             });
-            // A flood from as many addresses: they share what is new.
+            // A flood from this number of addresses: new ones share a bucket.
             if buckets.len() >= BUCKETS {
                 buckets.clear();
             }

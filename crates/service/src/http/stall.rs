@@ -1,4 +1,4 @@
-//! A connection whose client does not take what it asked for ends.
+//! Ends a connection whose client does not read the answer.
 
 use std::{
     io::{self, ErrorKind, IoSlice},
@@ -12,7 +12,7 @@ use tokio::{
     time::{Sleep, sleep},
 };
 
-/// Longest time in which nothing can be written.
+/// Longest time without write progress.
 const STALL: Duration = Duration::from_secs(30);
 
 /// A stream that fails when writing makes no progress.

@@ -1,4 +1,4 @@
-//! Work of a request that needs a worker process: CSPICE and long searches stay out of the service.
+//! Work of a request that needs a worker process: CSPICE and long searches run outside of the service.
 
 use std::{fs, sync::Arc};
 
@@ -14,7 +14,7 @@ use crate::worker::{
 /// Longest log of such a worker.
 const LOG_KIB: u32 = 256;
 
-/// A place for a worker; there are few.
+/// A slot for a worker; there are few.
 pub(super) fn place(app: &App) -> Result<OwnedSemaphorePermit, Problem> {
     Arc::clone(&app.workers)
         .try_acquire_owned()
@@ -27,7 +27,7 @@ pub(super) fn place(app: &App) -> Result<OwnedSemaphorePermit, Problem> {
         })
 }
 
-/// Has `what` done within `deadline_s`; dropped, or when the service ends, the worker ends too.
+/// Has `what` done within `deadline_s`; the worker also ends if the future is dropped or the service ends.
 pub(super) async fn ask(
     app: &App,
     what: What,

@@ -11,7 +11,7 @@ use std::{
 
 use tokio::sync::{mpsc, oneshot};
 
-/// What a worker sees of the service's environment: where libraries and temporary files are, and how text is written.
+/// Environment variables passed to a worker: locations of libraries and temporary files, and text encoding.
 const PASSED_ON: [&str; 7] = [
     "PATH",
     "LD_LIBRARY_PATH",
@@ -34,7 +34,7 @@ static ORDERS: LazyLock<io::Result<mpsc::UnboundedSender<Order>>> = LazyLock::ne
         while let Some(order) = received.blocking_recv() {
             let started = start(&order.program);
             if let Err(Ok(mut unwanted)) = order.started.send(started) {
-                // Nobody waits for it any more: it has no task and ends when its input does.
+                // The caller no longer waits: the worker has no task and ends with its input.
                 drop(unwanted.stdin.take());
                 let _ = unwanted.wait();
             }
@@ -43,10 +43,10 @@ static ORDERS: LazyLock<io::Result<mpsc::UnboundedSender<Order>>> = LazyLock::ne
     Ok(orders)
 });
 
-/// A worker in a process group of its own, with pipes.
+/// A worker in its own process group, with pipes.
 ///
 /// # Errors
-/// The system's refusal.
+/// An error of the system.
 pub(super) async fn fork(program: &Path) -> io::Result<Child> {
     let orders = ORDERS
         .as_ref()

@@ -1,19 +1,19 @@
-//! Lines of a worker, of bounded length, pieces joined.
+//! Lines of a worker, of bounded length, with pieces joined.
 
 use tokio::io::{AsyncBufRead, AsyncBufReadExt as _};
 
 use super::protocol::{ANSWER_MAX, LINE_MAX, Line};
 
-/// What no worker says.
+/// Invalid output of a worker.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum Garbled {
-    /// A line without an end.
+    /// A line that is too long.
     #[error("a line of more than {LINE_MAX} bytes")]
     LongLine,
-    /// Pieces without an end.
+    /// Pieces that are too long.
     #[error("an answer of more than {ANSWER_MAX} bytes")]
     LongAnswer,
-    /// Not one of the lines.
+    /// Not a line of the protocol.
     #[error("not a line of a worker: {0}")]
     NoLine(serde_json::Error),
     /// The pipe broke.
@@ -37,7 +37,8 @@ impl<R: AsyncBufRead + Unpin> LineReader<R> {
         }
     }
 
-    /// The next line; none at the end, where half a line is none. What was read stays when the future is dropped.
+    /// The next line; `None` at the end, where an incomplete line is ignored. Bytes already read are kept if the future
+    /// is dropped.
     pub(super) async fn next(&mut self) -> Result<Option<Line>, Garbled> {
         loop {
             if !self.read_line().await? {

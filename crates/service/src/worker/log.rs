@@ -10,11 +10,11 @@ use tokio::{
 /// Bytes read at a time.
 const CHUNK: usize = 16 << 10;
 
-/// Copies `from` into a new file `path`, at most about `max_kib` of it: the first half is written as it comes, of the rest
-/// the end is kept and written at last, behind a line `{"cut_bytes": …}`.
+/// Copies `from` into a new file `path`, at most about `max_kib`: the first half is written as it arrives; of the rest,
+/// the end is kept and written last, after a line `{"cut_bytes": …}`.
 ///
 /// # Errors
-/// The file cannot be written; then nothing is read any more.
+/// The file cannot be written; then reading stops.
 pub(super) async fn copy(
     mut from: impl AsyncRead + Unpin,
     path: &Path,
@@ -40,7 +40,7 @@ pub(super) async fn copy(
         cut += over as u64;
     }
     if cut > 0 {
-        // The remains of a line whose begin was cut say nothing.
+        // The rest of a line whose start was cut is dropped.
         let line = tail.iter().position(|byte| *byte == b'\n');
         let remains = line.map_or(0, |end| end + 1);
         tail.drain(..remains);

@@ -1,4 +1,5 @@
-//! The service's side of one worker process: it is started, fed with its task, listened to, ended in time and waited for.
+//! The service's side of one worker process: it starts the process, sends its task, reads its messages, ends it in time
+//! and waits for it.
 
 use std::{future::pending, path::Path, process::ExitStatus, time::Duration};
 
@@ -19,14 +20,14 @@ use super::{
     protocol::{Answer, Cancel, CancelWhy, Failure, Line, PROTOCOL, Task},
 };
 
-/// How long the service's side waits for a process, whatever its task is.
+/// Waiting times of the service's side, independent of the task.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Times {
-    /// How long a worker may take to say hello.
+    /// Longest time until a worker's hello.
     pub hello: Duration,
-    /// When a worker that was asked to stop gets a signal to do so, and when it is ended; both since it was asked.
+    /// Times until a worker that was asked to stop receives a signal, and until it is killed, both from the request.
     pub patience: [Duration; 2],
-    /// How long the pipes of a worker that has ended may stay open.
+    /// Longest time that the pipes of an ended worker may stay open.
     pub drain: Duration,
 }
 
@@ -45,71 +46,71 @@ impl Default for Times {
     }
 }
 
-/// How long a worker may take, and how much it may say.
+/// Limits of a worker's time and output.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WorkerLimits {
     /// Longest time for the task.
     pub deadline_s: f64,
-    /// Longest time without a sign of life.
+    /// Longest time without a heartbeat.
     pub silence_s: f64,
     /// Longest log, kibibytes.
     pub log_max_kib: u32,
-    /// How long it is waited for.
+    /// Waiting times.
     pub times: Times,
 }
 
-/// What is heard of a worker while it lives.
+/// Reports of a running worker.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Heard<'a> {
-    /// First: which process it is.
+    /// First: its process.
     Started(&'a ProcessIdentity),
-    /// A line, whole; no pieces.
+    /// A complete line; no pieces.
     Line(&'a Line),
 }
 
-/// How a worker came to its end.
+/// How a worker ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum How {
     /// By itself, with this code.
     Exited(i32),
     /// By a signal that the service did not send.
     Signalled(i32),
-    /// Ended: no sign of life for too long.
+    /// Ended: no heartbeat for too long.
     Silent,
     /// Ended: the task took too long.
     DeadlinePassed,
-    /// Ended: the caller wanted it.
+    /// Ended: cancelled by the caller.
     Cancelled,
-    /// Ended, or gone by itself: it never said hello.
+    /// Ended, or exited by itself, without a hello.
     NoHello,
-    /// Ended: it is of this version, which is not the service's.
+    /// Ended: its version differs from the service's.
     ForeignVersion(String),
-    /// Ended: it said something that no worker says.
+    /// Ended: it sent an invalid message.
     Garbled(String),
     /// It could not be started, for this reason.
     NotStarted(String),
 }
 
-/// What came of a worker.
+/// Result of a worker.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ended {
-    /// How it came to its end; an answer counts, however that was.
+    /// How it ended; an answer counts in any case.
     pub how: How,
     /// Its last line.
     pub answer: Option<Result<Answer, Failure>>,
-    /// Most memory that it told of, kibibytes.
+    /// Largest reported memory, kibibytes.
     pub rss_peak_kib: u64,
 }
 
-/// Has `task` done by a process of its own, and waits for its end.
+/// Has `task` done by its own process, and waits for its end.
 ///
 /// * `program` – areograph
-/// * `log` – a new file for what the worker writes to standard error; its folder is there
-/// * `cancel` – a reason asks the worker to stop; it is ended by force when it does not
-/// * `heard` – told at once what is heard of the worker
+/// * `log` – a new file for the worker's standard error; its folder exists
+/// * `cancel` – a reason asks the worker to stop; it is ended by force if it does not
+/// * `heard` – receives reports of the worker at once
 ///
-/// Returns when the process has ended. One that sleeps uninterruptibly in the kernel cannot be ended; then that takes as
-/// long as it does.
+/// Returns when the process has ended. A process in uninterruptible sleep in the kernel cannot be ended; the call then
+/// waits for it.
 pub async fn work(
     program: &Path,
     task: &Task,
@@ -131,7 +132,7 @@ pub async fn work(
     if let Some(process) = &worker.process {
         heard(Heard::Started(process));
     }
-    // A worker that reads no task says no hello.
+    // A worker that reads no task sends no hello.
     worker.say(task).await;
     let status = loop {
         let next = worker.next_instant();
@@ -155,23 +156,23 @@ pub async fn work(
     worker.finish(status, &mut heard).await
 }
 
-/// The reason once there is one.
+/// Waits for a reason.
 async fn asked(cancel: &mut watch::Receiver<Option<CancelWhy>>) -> CancelWhy {
     match cancel.wait_for(Option::is_some).await.map(|why| *why) {
         Ok(Some(why)) => why,
-        // Nobody is left who could ask.
+        // No sender is left.
         _ => pending().await,
     }
 }
 
-/// A worker at work.
+/// A running worker.
 struct Worker {
     pid: u32,
     process: Option<ProcessIdentity>,
     times: Times,
     input: Option<ChildStdin>,
     lines: LineReader<BufReader<ChildStdout>>,
-    /// Whether its standard output is open, and makes sense.
+    /// Whether its standard output is open and valid.
     speaks: bool,
     log: JoinHandle<std::io::Result<()>>,
     exit: JoinHandle<Option<ExitStatus>>,
@@ -199,7 +200,7 @@ impl Worker {
         let pid = child.id();
         let (input, output, errors) =
             (child.stdin.take(), child.stdout.take(), child.stderr.take());
-        // Before somebody waits for it, its number is its own.
+        // Before it is waited for, its process number cannot be reused.
         let process = ProcessIdentity::of(pid);
         let exit = tokio::task::spawn_blocking(move || child.wait().ok());
         let output = output.ok_or(std::io::ErrorKind::BrokenPipe)?;
@@ -228,14 +229,14 @@ impl Worker {
         })
     }
 
-    /// Writes a line to the worker; whether it reads it, its own lines will tell.
+    /// Writes a line to the worker; only its own lines show whether it is read.
     async fn say(&mut self, what: &impl serde::Serialize) {
         let Some(input) = &mut self.input else { return };
         let Ok(mut line) = serde_json::to_vec(what) else {
             return;
         };
         line.push(b'\n');
-        // A worker that hangs does not read: its pipe must not hold the service.
+        // A hanging worker does not read: its pipe must not block the service.
         let _ = timeout(self.times.drain, input.write_all(&line)).await;
     }
 
@@ -273,13 +274,13 @@ impl Worker {
         });
     }
 
-    /// The same without waiting for the worker to stop by itself.
+    /// The same without waiting for a graceful stop.
     fn end_at_once(&mut self, how: How) {
         let now = Instant::now();
         self.end(how, now.checked_sub(self.times.patience[0]).unwrap_or(now));
     }
 
-    /// When there is something to do, whatever is heard.
+    /// The next instant with a due action, independent of messages.
     fn next_instant(&self) -> Instant {
         if let Some(ending) = &self.ending {
             let patience = self.times.patience.get(ending.sent).copied();
@@ -294,7 +295,7 @@ impl Worker {
         }
     }
 
-    /// Does what is due at this instant.
+    /// Performs the actions due at this instant.
     async fn wake(&mut self) {
         let now = Instant::now();
         if let Some(ending) = &mut self.ending {
@@ -317,7 +318,7 @@ impl Worker {
         }
     }
 
-    /// The worker is gone: what it still said, and what came of it.
+    /// Collects the remaining messages of an ended worker, and its result.
     async fn finish(
         mut self,
         status: Option<ExitStatus>,
@@ -340,11 +341,11 @@ impl Worker {
         let _ = timeout(drain, rest).await;
         match timeout(drain, &mut self.log).await {
             Ok(Ok(Ok(()))) => {}
-            // The pipe is still open somewhere, or the disk is full: what is written of the log stays.
+            // The pipe is still open elsewhere, or the disk is full: the written part of the log is kept.
             Err(_) => self.log.abort(),
             Ok(failed) => tracing::warn!("the log of a worker was not kept: {failed:?}"),
         }
-        // Whatever the worker may have started goes with it.
+        // Processes started by the worker end with it.
         signal_group(self.pid, Signal::KILL);
         let answered = matches!(self.answer, Some(Ok(_)));
         let how = match self.ending {
@@ -368,7 +369,7 @@ fn exited(status: Option<ExitStatus>) -> How {
         .unwrap_or(How::Exited(-1))
 }
 
-/// An instant so much later, or as late as there is one worth waiting for.
+/// A later instant, or the latest useful one.
 fn far(from: Instant, later: Duration) -> Instant {
     const YEAR: Duration = Duration::from_hours(366 * 24);
     from + later.min(YEAR)

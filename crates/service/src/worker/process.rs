@@ -1,27 +1,27 @@
-//! Which process a worker is, told apart from another one that got its number later.
+//! Identity of a worker process, distinct from a later process with the same number.
 
 use std::fs;
 
 use rustix::process::{Pid, Signal, kill_process_group};
 use serde::{Deserialize, Serialize};
 
-/// A process of this machine, once and for all.
+/// A unique identity of a process of this machine.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ProcessIdentity {
-    /// Its number; that of its group too.
+    /// Its number, which is also that of its group.
     pub pid: u32,
-    /// When it started, in ticks since the machine did.
+    /// When it started, in ticks since the boot.
     pub start: u64,
-    /// Since when the machine runs, as the kernel names it.
+    /// Identifier of the boot.
     pub boot_id: String,
 }
 
 impl ProcessIdentity {
-    /// The process with this number, if there is one.
+    /// The process with this number, if it exists.
     #[must_use]
     pub fn of(pid: u32) -> Option<Self> {
         let stat = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
-        // The name, in brackets, may hold anything; the time of the start is field 22, 20 fields behind it.
+        // The name, in brackets, may contain any characters; the start time is field 22, 20 fields after it.
         let (_, fields) = stat.rsplit_once(')')?;
         Some(Self {
             pid,
@@ -30,20 +30,20 @@ impl ProcessIdentity {
         })
     }
 
-    /// Whether it still runs, or has ended and nobody waited for it.
+    /// Whether it still runs, or has ended and was not waited for.
     #[must_use]
     pub fn is_there(&self) -> bool {
         Self::of(self.pid).as_ref() == Some(self)
     }
 
-    /// Ends it and its group by force, if it still is there; returns whether it was.
+    /// Ends it and its group by force, if it exists; returns whether it did.
     #[must_use]
     pub fn end(&self) -> bool {
         self.is_there() && signal_group(self.pid, Signal::KILL)
     }
 }
 
-/// Sends a signal to the group of a process that leads one; whether it was there.
+/// Sends a signal to the group of a process that leads one; returns whether it existed.
 pub(super) fn signal_group(pid: u32, signal: Signal) -> bool {
     let group = i32::try_from(pid).ok().and_then(Pid::from_raw);
     group.is_some_and(|group| kill_process_group(group, signal).is_ok())

@@ -1,8 +1,8 @@
 //! The lines between the service and a worker: one JSON object each, at most [`LINE_MAX`] bytes.
 //!
-//! The service writes one [`Task`], later perhaps one [`Cancel`]; the end of its output means that it is gone, and the worker
-//! stops. The worker writes [`Line`]s, `hello` first and `answer` or `failure` last; one that is too long for a line goes in
-//! pieces. Unknown fields are ignored.
+//! The service writes one [`Task`], later perhaps one [`Cancel`]; the end of its output means that the service has
+//! ended, and the worker stops. The worker writes [`Line`]s, `hello` first and `answer` or `failure` last; one that is
+//! too long for a line is sent in pieces. Unknown fields are ignored.
 
 use std::path::PathBuf;
 
@@ -19,7 +19,7 @@ pub const LINE_MAX: usize = 64 << 10;
 /// Longest answer in pieces, bytes.
 pub const ANSWER_MAX: usize = 64 << 20;
 
-/// What a worker is to do.
+/// A task of a worker.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Task {
     /// [`PROTOCOL`].
@@ -32,11 +32,11 @@ pub struct Task {
     pub what: What,
     /// Known hashes of input files, which the worker extends: the hash cache.
     pub hashes_file: PathBuf,
-    /// Folders below which input files must lie; empty for no such rule.
+    /// Folders below which input files must be; empty for no restriction.
     pub roots: Vec<PathBuf>,
     /// Threads.
     pub threads: u16,
-    /// Memory that the worker may take, mebibytes.
+    /// Memory limit of the worker, mebibytes.
     pub memory_mib: u32,
 }
 
@@ -44,22 +44,22 @@ pub struct Task {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "do", rename_all = "snake_case")]
 pub enum What {
-    /// Runs a site; products go to `<working>`, and when they were published, hard links of them to `<runs>/<run>`.
+    /// Runs a site; products are written to `<working>`, and after publication hard-linked to `<runs>/<run>`.
     Run {
         /// The site file.
         site_file: PathBuf,
-        /// BLAKE3 of its keys that the service has seen; another one is a failure of input.
+        /// BLAKE3 of its keys as seen by the service; a different one is a failure of input.
         config_blake3: String,
-        /// Folder whose subfolder of the site's name is the site's working folder.
+        /// Folder whose subfolder with the site's name is the site's working folder.
         out: PathBuf,
         /// Folder of the site's runs.
         runs: PathBuf,
-        /// Identifier of the run that this attempt makes.
+        /// Identifier of this attempt's run.
         run: String,
         /// Whether every stage runs.
         force: bool,
     },
-    /// Says what a run would do, and which files the site reads.
+    /// Reports what a run would do, and which files the site reads.
     Plan {
         /// The site file.
         site_file: PathBuf,
@@ -74,28 +74,28 @@ pub enum What {
         after: PathBuf,
         /// Page to write, if any.
         page: Option<PathBuf>,
-        /// How far anything may move, metres.
+        /// Limit of movements, metres.
         limit_m: f64,
-        /// How far a camera may turn, arcseconds.
+        /// Limit of camera rotations, arcseconds.
         limit_arcsec: f64,
     },
-    /// Opens kernels with CSPICE and tells what they cover.
+    /// Opens kernels with CSPICE and reports their coverage.
     Probe {
         /// The kernels.
         files: Vec<PathBuf>,
     },
-    /// Lists the files below folders, in a process since a dead mount does not answer.
+    /// Lists the files below folders, in a process since an unresponsive mount may block it.
     List {
         /// The folders.
         roots: Vec<PathBuf>,
-        /// Where the answer goes, one [`Listed`] a line: it is too long for a line of this protocol.
+        /// File of the answer, one [`Listed`] per line: it is too long for a line of this protocol.
         into: PathBuf,
     },
-    /// Reads files and tells their hashes.
+    /// Reads files and reports their hashes.
     Hash {
         /// The files.
         files: Vec<PathBuf>,
-        /// Whether they are read even where the hash cache knows them.
+        /// Whether they are read even if the hash cache knows them.
         rehash: bool,
     },
     /// Searches the shots of runs within a polygon.
@@ -104,35 +104,35 @@ pub enum What {
         runs: Vec<PathBuf>,
         /// Corners of the polygon: east longitude and areocentric latitude, degrees.
         polygon: Vec<[f64; 2]>,
-        /// Most rows.
+        /// Maximum number of rows.
         rows_max: u64,
         /// `csv`, `geojson` or `parquet`.
         format: String,
-        /// Where the answer goes.
+        /// File of the answer.
         into: PathBuf,
     },
 }
 
-/// Why a worker is asked to stop.
+/// The reason to stop a worker.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CancelWhy {
-    /// A person asked.
+    /// A person requested it.
     User,
     /// The service ends.
     Shutdown,
-    /// It took too long.
+    /// The time limit was exceeded.
     Deadline,
 }
 
 /// The line that asks a worker to stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Cancel {
-    /// Why.
+    /// The reason.
     pub cancel: CancelWhy,
 }
 
-/// What a worker says.
+/// A message of a worker.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "line", rename_all = "snake_case")]
 pub enum Line {
@@ -156,7 +156,7 @@ pub enum Line {
         /// Seconds that it took; 0 before it is done.
         seconds: f64,
     },
-    /// Sign of life, every 2 s.
+    /// Heartbeat, every 2 s.
     Beat {
         /// Memory in use, kibibytes.
         rss_kib: u64,
@@ -168,13 +168,13 @@ pub enum Line {
         /// Whether more of them follow.
         more: bool,
     },
-    /// Last, of work that was done; its content by the kind of work.
+    /// Last message of successful work; its content depends on the kind of work.
     Answer(Answer),
-    /// Last, of work that failed.
+    /// Last message of failed work.
     Failure(Failure),
 }
 
-/// What came of work that was done.
+/// Result of work.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "done", rename_all = "snake_case")]
 pub enum Answer {
@@ -182,43 +182,43 @@ pub enum Answer {
     Run(RunAnswer),
     /// Of a plan.
     Plan(PlanAnswer),
-    /// Of a comparison: the headline, sentences, whether something moved beyond a limit, and the largest movements.
+    /// Of a comparison: the headline, sentences, whether a limit was exceeded, and the largest movements.
     Diff {
-        /// In one sentence.
+        /// One sentence.
         headline: String,
-        /// More of them.
+        /// Further sentences.
         sentences: Vec<String>,
-        /// Whether a limit was passed.
+        /// Whether a limit was exceeded.
         beyond_limit: bool,
     },
     /// Of a probe: kernels in the order of the task.
     Probe {
-        /// What each covers, or why CSPICE refuses it.
+        /// The coverage of each, or the reason for which CSPICE rejects it.
         kernels: Vec<Probed>,
     },
-    /// Of a list: how many files there are.
+    /// Of a list: the number of files.
     List {
         /// Files found.
         files: u64,
     },
     /// Of hashing: files in the order of the task.
     Hash {
-        /// What was found of each.
+        /// The result for each.
         files: Vec<Hashed>,
     },
     /// Of a search.
     Shots {
         /// Rows written.
         rows: u64,
-        /// Whether there are no more.
+        /// Whether the result is complete.
         complete: bool,
     },
 }
 
-/// What came of a run.
+/// Result of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunAnswer {
-    /// The run whose folder now holds the products; none when nothing had changed.
+    /// The run whose folder now contains the products; `None` if nothing had changed.
     pub run: Option<String>,
     /// BLAKE3 of the manifest.
     pub manifest_blake3: String,
@@ -241,7 +241,7 @@ pub struct PlanAnswer {
     pub stages: Vec<PlannedStage>,
     /// Files that the site reads, with their hashes.
     pub files: Vec<PlannedFile>,
-    /// What the site's windows span: west, south, east, north, degrees; none of a site without windows.
+    /// Extent of the site's windows: west, south, east, north, degrees; `None` for a site without windows.
     pub bounds_deg: Option<[f64; 4]>,
 }
 
@@ -265,7 +265,7 @@ pub struct PlannedFile {
     pub blake3: String,
 }
 
-/// What a list tells, in the order of the folders of its task and of names.
+/// Entries of a list, in the order of the folders of its task and of names.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "listed", rename_all = "snake_case")]
 pub enum Listed {
@@ -273,17 +273,17 @@ pub enum Listed {
     File {
         /// Its path below the folder as the task names it.
         path: PathBuf,
-        /// What the file system says of it.
+        /// Its identity in the file system.
         identity: Identity,
     },
-    /// A file or folder that cannot be looked at.
+    /// A file or folder that cannot be examined.
     Unreadable {
         /// Its path.
         path: PathBuf,
         /// The system's reason.
         problem: String,
     },
-    /// Behind the files of a folder of the task: all of it has been listed, or it is not there.
+    /// After the files of a folder of the task: all of it has been listed, or it does not exist.
     Root {
         /// The folder.
         path: PathBuf,
@@ -291,7 +291,7 @@ pub enum Listed {
         device: Option<u64>,
         /// Files found below it.
         files: u64,
-        /// Why it cannot be listed.
+        /// The reason for which it cannot be listed.
         problem: Option<String>,
     },
 }
@@ -301,9 +301,9 @@ pub enum Listed {
 pub struct Hashed {
     /// Its path.
     pub path: PathBuf,
-    /// BLAKE3 of its content; none of a file that cannot be read.
+    /// BLAKE3 of its content; `None` for a file that cannot be read.
     pub blake3: Option<String>,
-    /// Why it cannot be read.
+    /// The reason for which it cannot be read.
     pub problem: Option<String>,
 }
 
@@ -314,14 +314,15 @@ pub struct Probed {
     pub path: PathBuf,
     /// BLAKE3 of its content.
     pub blake3: String,
-    /// Why it cannot be used.
+    /// The reason for which it cannot be used.
     pub problem: Option<String>,
-    /// What it holds of the spacecraft: `position`, relative to whatever body, and `attitude`, lists of intervals as those of
-    /// `areograph kernels coverage --json`; null of a kernel that is neither SPK nor CK, or whose times no clock tells.
+    /// Its coverage of the spacecraft: `position`, relative to any body, and `attitude`, lists of intervals as in
+    /// `areograph kernels coverage --json`; null for a kernel that is neither SPK nor CK, or whose times no clock
+    /// kernel converts.
     pub coverage: Value,
 }
 
-/// Why work failed.
+/// A failure of work.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Failure {
     /// Exit code of its kind: 1 bug, 2 configuration, 3 input, 4 coverage, 6 input or output, 130 stopped.
@@ -334,6 +335,6 @@ pub struct Failure {
     pub stage: Option<String>,
     /// The file.
     pub file: Option<PathBuf>,
-    /// The whole message with its advice.
+    /// The complete message with its advice.
     pub text: String,
 }

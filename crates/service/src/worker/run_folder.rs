@@ -1,7 +1,7 @@
 //! Folders of runs: the products of one publication, never changed again.
 //!
-//! `<runs>/<run>` holds hard links of the products, their manifest, and `run.json`, which says who made them; the manifest's
-//! own bytes depend on neither. A folder without a manifest is no run.
+//! `<runs>/<run>` contains hard links of the products, their manifest, and `run.json`, which identifies the attempt;
+//! the manifest's own bytes depend on neither. A folder without a manifest is not a run.
 
 use std::{
     collections::BTreeSet,
@@ -17,15 +17,15 @@ use areograph_store::{
     atomic, lock::SiteLock, manifest::Manifest, publish::MANIFEST, published::still_published,
 };
 
-/// File that says which attempt made a run.
+/// File that identifies the attempt that made a run.
 pub const RUN_RECORD: &str = "run.json";
-/// How the names of half-made runs end.
+/// Suffix of incomplete runs.
 const PARTIAL: &str = ".partial";
-/// Folders of runs are read-only, and writable again before they are removed.
+/// Mode of run folders, which become writable again before removal.
 const READ_ONLY: u32 = 0o555;
 const WRITABLE: u32 = 0o755;
 
-/// Which attempt made a run: the content of [`RUN_RECORD`].
+/// The attempt that made a run: the content of [`RUN_RECORD`].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RunRecord {
     /// The run, the name of its folder.
@@ -54,10 +54,10 @@ pub fn newest(runs: &Path) -> Option<PathBuf> {
         .max()
 }
 
-/// Removes a run, or what there is of one.
+/// Removes a complete or incomplete run.
 ///
 /// # Errors
-/// The disk's refusal.
+/// A disk error.
 pub fn remove(run_folder: &Path) -> Result<()> {
     make(run_folder, WRITABLE)?;
     fs::remove_dir_all(run_folder)
@@ -67,10 +67,10 @@ pub fn remove(run_folder: &Path) -> Result<()> {
 
 /// Keeps the products that `manifest` lists, published in `site_folder`, as `<runs>/<run>`.
 ///
-/// Returns the BLAKE3 of the manifest, and whether there is a new run: none when the newest holds just this manifest.
+/// Returns the BLAKE3 of the manifest, and whether there is a new run: not if the newest contains this manifest.
 ///
 /// # Errors
-/// Another run is at work in the site's folder, or has published; the disk's refusal. Nothing stands under the name then.
+/// Another run is active in the site's folder, or has published; a disk error. No run with this name exists then.
 pub fn keep(
     site_folder: &Path,
     manifest: &Manifest,
@@ -114,7 +114,7 @@ pub fn keep(
     Ok((blake3, true))
 }
 
-/// What was left of attempts that were killed; the site's lock is held.
+/// Removes remainders of attempts that were killed; the site's lock is held.
 fn remove_partial(runs: &Path) -> Result<()> {
     let entries = fs::read_dir(runs).into_iter().flatten().flatten();
     let mut partial = entries
@@ -144,7 +144,7 @@ fn link(product: &Path, to: &Path) -> Result<()> {
     atomic::sync_file(to)
 }
 
-/// Gives a folder and all folders below it a mode, flushed; those above last.
+/// Sets the mode of a folder and all folders below it, flushed; parents last.
 fn make(folder: &Path, mode: u32) -> Result<()> {
     let set = |folder: &Path| {
         File::open(folder)

@@ -1,4 +1,4 @@
-//! The engine of the service with workers that only pretend: changes, jobs, nights.
+//! The engine of the service with simulated workers: changes, jobs, nights.
 
 mod fake;
 mod service_engine;

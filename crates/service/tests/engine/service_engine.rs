@@ -1,4 +1,4 @@
-//! What the engine of the service does when files change, workers die, people ask and folders vanish; its workers are played.
+//! The engine when files change, workers die, people send requests and folders vanish; its workers are simulated.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -20,14 +20,14 @@ const NOON_MS: i64 = 1_777_636_800_000;
 const MORE: &str =
     "[changes]\nscan_interval_s = 60.0\nquiet_period_s = 600.0\n[workers]\nmin_free_mib = 0\n";
 
-/// Sites `a` and `b` share a kernel, each has one of its own, and all have run.
+/// Sites `a` and `b` share a kernel, each has a further one, and all have run.
 fn two_sites(more: &str) -> (Arc<World>, Life) {
     let world = World::new(NOON_MS, &format!("{MORE}{more}"));
     for kernel in ["both.bc", "a.bsp", "b.bsp"] {
         world.put(&format!("kernels/{kernel}"), "first");
     }
     world.put("kernels/unused.bc", "first");
-    // So many that one less is no loss.
+    // So many that one less does not exceed the allowed loss.
     for number in 0..10 {
         world.put(&format!("kernels/other{number}.bc"), "first");
     }
@@ -61,7 +61,7 @@ fn only_the_sites_that_read_a_changed_kernel_run_and_the_reason_is_kept() {
         "nothing changed, nothing was planned"
     );
     world.put("kernels/a.bsp", "second");
-    // Five minutes later it is still written to: quiet for ten minutes only after that.
+    // Five minutes later it is still being written: it is quiet only ten minutes after that.
     life.go_on(&world, 60, 5);
     world.put("kernels/a.bsp", "third");
     life.go_on(&world, 60, 9);
@@ -114,7 +114,7 @@ fn a_file_that_no_site_reads_is_looked_at_and_noted_as_such() {
         &(world.text("sites/a.toml").unwrap() + "# a remark\n"),
     );
     life.go_on(&world, 60, 15);
-    // The played plan counts a remark as another configuration: nothing has to run for it.
+    // The simulated plan treats a comment as another configuration: nothing has to run for it.
     assert_eq!(later_jobs(&life), []);
     let note = life.ask("SELECT last_note FROM site WHERE name = 'a'");
     assert_eq!(
@@ -139,7 +139,7 @@ fn a_folder_that_vanishes_runs_nothing_and_is_told_once() {
     assert_eq!((told("root_unavailable"), told("root_back")), (1, 0));
     world.mount("kernels", true);
     life.go_on(&world, 60, 3);
-    // A person asked: it was looked at, and nothing had to be made.
+    // A person requested a job: the products were up to date.
     assert_eq!(later_jobs(&life), [("a".to_owned(), JobState::Unchanged)]);
     assert_eq!(held, 3);
     assert_eq!((told("root_unavailable"), told("root_back")), (1, 1));
@@ -199,7 +199,7 @@ fn what_only_another_input_mends_is_blocked_until_it_comes() {
     world.put("kernels/a.bsp", "again");
     life.go_on(&world, 60, 15);
     assert_eq!(later_jobs(&life), [("a".to_owned(), JobState::Succeeded)]);
-    // The job that waited was superseded where the inputs went back.
+    // The waiting job was superseded when the inputs reverted.
     world.remove("kernels/b.bsp");
     life.go_on(&world, 60, 15);
     world.put("kernels/b.bsp", "first");
@@ -219,7 +219,7 @@ fn failures_are_tried_again_by_their_kind() {
         (job.state, job.attempt, job.failures),
         (JobState::Succeeded, 3, 2)
     );
-    // A poisonous site does not eat the night.
+    // A failing site does not delay the night.
     world
         .fate_of
         .lock()
@@ -238,7 +238,7 @@ fn failures_are_tried_again_by_their_kind() {
     assert_eq!(of("b").state, JobState::Succeeded);
     let alerts = life.ask("SELECT data FROM event WHERE kind = 'alert'");
     assert_eq!(alerts.len(), 1, "{alerts:?}");
-    // It is tried again at night, and told when it is well again.
+    // It is retried at night, and its recovery is reported.
     world.fate_of.lock().unwrap().clear();
     let night = life.engine.begin_night().unwrap().unwrap();
     life.settle();
@@ -277,7 +277,7 @@ fn what_a_dead_worker_made_is_kept_though_a_plan_finds_nothing_to_run() {
     let job = life.jobs().pop().unwrap();
     assert_eq!((job.state, job.attempt), (JobState::Failed, 3));
     assert_ne!(world.current("a"), world.clean("a"));
-    // No stage has to run any more: what they make stands in the working folder, and readers have not got it.
+    // No stage has to run: the products are in the working folder, but not yet published.
     life.engine.begin_night().unwrap();
     life.settle();
     life.go_on(&world, 60, 2);
@@ -286,7 +286,7 @@ fn what_a_dead_worker_made_is_kept_though_a_plan_finds_nothing_to_run() {
     assert_eq!(why, ["its products were made, but not kept as a run"]);
 }
 
-/// Site `a` is at work, and goes on until it is stopped.
+/// Site `a` is active, until it is stopped.
 fn at_work() -> (Arc<World>, Life) {
     let (world, life) = two_sites("");
     let lasts = ("a".to_owned(), Fate::Lasts);
@@ -361,11 +361,11 @@ fn a_backfill_leaves_room_and_the_link_on_the_disk_wins() {
     let second = life.ask("SELECT current_run FROM site WHERE name = 'a'");
     assert_ne!(first, second);
     life.kill();
-    // Somebody put the run before back.
+    // The preceding run was restored.
     let link = world.path("products/a/current");
     std::fs::remove_file(&link).unwrap();
     std::os::unix::fs::symlink(format!("runs/{}", first[0]), &link).unwrap();
-    // What was half-made goes.
+    // Incomplete runs are removed.
     let partial = world.path("products/a/runs/20270101_000000_j9_a1.partial");
     std::fs::create_dir_all(&partial).unwrap();
     let life = Life::begin(&world);
@@ -387,7 +387,7 @@ fn a_new_site_runs_and_one_whose_file_is_gone_does_not() {
     world.remove("sites/c.toml");
     std::fs::remove_file(world.path("sites/c.toml")).unwrap();
     life.go_on(&world, 60, 15);
-    // One of three files is more than a folder may lose: it could be a mount that is not whole.
+    // One of three files exceeds the allowed loss: the mount could be incomplete.
     assert_eq!(
         life.ask("SELECT state FROM root WHERE kind = 'sites'"),
         ["unavailable"]

@@ -1,4 +1,4 @@
-//! The table of jobs under random histories: whatever is asked, taken, moved and cancelled, what must hold does.
+//! The table of jobs under random histories of requests, transitions and cancellations: its invariants hold.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -23,7 +23,7 @@ const SITES: [&str; 3] = ["eos", "gusev", "isidis"];
 const STEPS: usize = 60;
 const HISTORIES: u32 = 64;
 
-/// Something that happens to the table.
+/// A random event.
 #[derive(Debug, Clone)]
 enum Step {
     Ask(usize, u8, bool),
@@ -172,10 +172,10 @@ impl Table {
         }
     }
 
-    /// A way that the table has not is refused and changes nothing.
+    /// A transition that is not in the table is rejected and changes nothing.
     fn send(&self, found: &Job, to: JobState, counts: bool) {
         let now_ms = self.now_ms;
-        // Two pending or two active jobs of one site: the database refuses what the engine never asks for.
+        // Two pending or two active jobs of one site: the database rejects what the engine never requests.
         let others = self
             .all()
             .into_iter()
@@ -234,7 +234,7 @@ impl Table {
         }
     }
 
-    /// What holds whatever happened.
+    /// Invariants.
     fn check(&mut self) {
         let mut active: BTreeMap<String, usize> = BTreeMap::new();
         let mut pending = active.clone();

@@ -1,5 +1,5 @@
-//! Nights on a clock that is set, in three time zones round both changes of the clocks, with changes of kernels, failures, dying workers and
-//! dying services: every night ends as a clean run would.
+//! Nights on a simulated clock, in three time zones around both clock changes, with changes of kernels, failures, and
+//! killed workers and services: every night ends as a clean run would.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -21,16 +21,16 @@ const SITES: [(&str, &[&str]); 4] = [
     ("isidis", &["clock.tsc", "mgs1.bsp", "mgs2.bc"]),
 ];
 const KERNELS: [&str; 5] = ["clock.tsc", "mgs1.bsp", "mgs2.bsp", "mgs1.bc", "mgs2.bc"];
-/// Nights round each change of the clocks.
+/// Nights around each clock change.
 const NIGHTS: i64 = 4;
 const HOUR_S: i64 = 3600;
 
-/// Random numbers that are the same every time.
+/// Reproducible random numbers.
 struct Dice(u64);
 
 impl Dice {
     fn below(&mut self, count: usize) -> usize {
-        // Knuth's linear congruential generator; its upper bits are the better ones.
+        // Knuth's linear congruential generator; its upper bits are more random.
         self.0 = self
             .0
             .wrapping_mul(6_364_136_223_846_793_005)
@@ -45,11 +45,11 @@ fn at(text: &str) -> i64 {
         .timestamp_millis()
 }
 
-/// Something happens to kernels.
+/// A random change of kernels.
 fn change(world: &World, dice: &mut Dice, number: usize) {
     let kernel = format!("kernels/{}", KERNELS[dice.below(KERNELS.len())]);
     match dice.below(4) {
-        // A touch, or a mirror that brings the same again.
+        // A touch, or a mirror that restores the same content.
         0 => {
             let text = world.text(&kernel).unwrap();
             world.put(&kernel, &text);
@@ -66,7 +66,7 @@ fn for_a_moment(life: &Life, dice: &mut Dice) {
     }
 }
 
-/// A day in steps of an hour; gives the service that lives at its end.
+/// A day in steps of an hour; returns the service that runs at its end.
 fn day(world: &Arc<World>, mut life: Life, dice: &mut Dice, number: usize) -> Life {
     let mut away = false;
     for hour in 0..24 {
@@ -88,7 +88,7 @@ fn day(world: &Arc<World>, mut life: Life, dice: &mut Dice, number: usize) -> Li
                 Fate::Io,
             ];
             let fate = fates[dice.below(fates.len())];
-            // A job whose workers die three times has failed, and rightly so: no job meets more than two.
+            // A job whose workers die three times fails, as intended: no job meets more than two.
             let met = life.ask("SELECT site FROM job WHERE failures > 0 AND ended_ms IS NULL");
             let mut waiting = world.fates.lock().unwrap();
             if met.is_empty() && waiting.len() < 2 {
@@ -98,7 +98,7 @@ fn day(world: &Arc<World>, mut life: Life, dice: &mut Dice, number: usize) -> Li
         if dice.below(8) == 0 {
             for_a_moment(&life, dice);
             life.kill();
-            // Out for some hours, at times over the night.
+            // Down for some hours, at times during the night.
             world.later(HOUR_S * i64::try_from(dice.below(2)).unwrap());
             life = Life::begin(world);
         }
@@ -108,7 +108,7 @@ fn day(world: &Arc<World>, mut life: Life, dice: &mut Dice, number: usize) -> Li
     life
 }
 
-/// Lets everything come to its end: no more failures, all quiet.
+/// Lets all work finish: no more failures, all quiet.
 fn calm(world: &World, life: &Life) {
     world.fates.lock().unwrap().clear();
     life.settle();
@@ -164,14 +164,14 @@ fn nights_in(zone: &str, begin: &str, seed: u64) {
     assert_eq!(distinct.len(), kept.len(), "an attempt published twice");
     let noted = life.ask("SELECT CAST(count(*) AS TEXT) FROM run");
     assert_eq!(noted, [kept.len().to_string()], "a run was lost");
-    // Only so many runs of each site are left on the disk.
+    // Only a limited number of runs of each site is kept.
     for (site, _) in SITES {
         let runs = std::fs::read_dir(world.path(&format!("products/{site}/runs"))).unwrap();
         assert!(runs.count() <= 4, "{site}");
     }
 }
 
-/// 02:30 of the zone's own clock, or where that hour is left out, at its end, and where it comes twice, the first.
+/// 02:30 local time, or the end of an omitted hour; of a repeated hour, the first.
 fn instants(zone: &str, first_ms: i64, last_ms: i64) -> Vec<i64> {
     use chrono::{NaiveTime, TimeZone as _};
     let zone: chrono_tz::Tz = zone.parse().unwrap();

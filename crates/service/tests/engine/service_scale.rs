@@ -1,4 +1,4 @@
-//! A thousand sites and ten thousand kernels, and many kills: all but fifty of these are left to the long run.
+//! A thousand sites and ten thousand kernels, and many kills; the short run has only fifty of these.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -56,7 +56,7 @@ fn nothing_changed_for_a_thousand_sites() {
         [SITES.to_string()]
     );
     let plans = world.started("plan");
-    // What is done once an hour or a half minute is not part of a sweep.
+    // Hourly and half-minute work is not part of a sweep.
     life.go_on(&world, 60, 1);
     let begun = Instant::now();
     life.go_on(&world, 60, 10);
@@ -120,7 +120,7 @@ fn ten_thousand_jobs_leave_no_more_than_two_thousand() {
     for day in 0..200 {
         world.put("kernels/all.bc", &day.to_string());
         life.go_on(&world, 14_400, 6);
-        // What the played world remembers is not the service's.
+        // The memory of the simulated world does not belong to the service.
         world.started.lock().unwrap().clear();
         world.kept.lock().unwrap().clear();
         if day == 40 {
@@ -134,13 +134,13 @@ fn ten_thousand_jobs_leave_no_more_than_two_thousand() {
     );
     assert!(jobs[0].parse::<usize>().unwrap() >= 10_000);
     assert_eq!(world.current("s7"), world.clean("s7"));
-    // A tenth is left to what the allocator and SQLite hold on to.
+    // A tenth is left for memory retained by the allocator and SQLite.
     assert!(late.0 <= early.0 * 11 / 10, "memory");
     assert!(late.1 <= early.1 * 11 / 10, "database");
     assert!(late.2 <= early.2 * 11 / 10, "files");
 }
 
-/// Kills a service under load, so often; what must hold then.
+/// Kills a service under load repeatedly, and checks its invariants.
 fn kills(count: usize) {
     let more = "[changes]\nscan_interval_s = 10.0\nquiet_period_s = 20.0\n[workers]\nmin_free_mib = 0\ncount = 4\nretry_s = 1.0\n";
     let world = World::new(NOON_MS, more);
@@ -161,7 +161,7 @@ fn kills(count: usize) {
         world.put(&kernel, &kill.to_string());
         let fates = [Fate::DiesEarly, Fate::DiesPublished, Fate::DiesUnheard];
         world.fates.lock().unwrap().push(fates[kill % 3]);
-        // Every second kill comes at any moment, the others when a worker is at work.
+        // Every second kill occurs at any moment, the others when a worker is active.
         let active = "SELECT site FROM job WHERE state IN ('starting', 'running')";
         for turn in 0..400 {
             if turn % 4 == 0 {

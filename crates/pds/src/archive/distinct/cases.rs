@@ -1,4 +1,4 @@
-//! Files that hold the same shots or do not: the cases that every caller has to get right.
+//! Files with and without common shots: cases that every caller must handle.
 
 /// Successive shots 0.1 s apart: microseconds from the start to the first one, and how many.
 type Run = (i64, u32);

@@ -1,4 +1,4 @@
-//! Labels and fragments of one file that are not of one image.
+//! Labels and fragments of one file that belong to different images.
 
 use std::{fs, path::PathBuf};
 
@@ -11,7 +11,7 @@ const SAMPLES: u32 = 640;
 /// Bytes of the label.
 const LABEL: usize = 2048;
 
-/// The file with a value of its label written over by another of the same length.
+/// The file with a value of its label overwritten by another of the same length.
 fn edited(bytes: &[u8], key: &str, value: &str) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     let label = String::from_utf8(bytes[..LABEL].to_vec()).unwrap();
@@ -28,7 +28,7 @@ fn edited(bytes: &[u8], key: &str, value: &str) -> Vec<u8> {
     bytes
 }
 
-/// What is wrong with a file, and where its label contradicts its fragments.
+/// Complaints about a file, and contradictions between its label and its fragments.
 fn told(bytes: &[u8]) -> (Vec<String>, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
     let path: PathBuf = folder.path().join("image.imq");
@@ -64,24 +64,24 @@ fn a_label_of_the_real_image_that_is_changed_contradicts_its_fragments() {
         (
             "SPACECRAFT_CLOCK_START_COUNT",
             "669321585:006",
-            "the fragments say 610472061:131",
+            "the fragments state 610472061:131",
         ),
         (
             "PRODUCT_ID",
             "M01/00999",
-            "M01/00999; the fragments say image 115",
+            "M01/00999; the fragments state image 115",
         ),
-        ("LINES", "4096", "4096; the fragments say 4864 lines"),
+        ("LINES", "4096", "4096; the fragments state 4864 lines"),
         (
             "LINE_EXPOSURE_DURATION",
             "0.5821",
-            "0.5821 ms; the fragments say 0.4821 ms",
+            "0.5821 ms; the fragments state 0.4821 ms",
         ),
-        // A unit of the line clock is the rounding of what is printed.
+        // A unit of the line clock is the rounding of printed values.
         (
             "LINE_EXPOSURE_DURATION",
             "0.4823",
-            "0.4823 ms; the fragments say 0.4821 ms",
+            "0.4823 ms; the fragments state 0.4821 ms",
         ),
     ] {
         let (complaints, contradictions) = told(&edited(&bytes, key, value));
@@ -89,7 +89,7 @@ fn a_label_of_the_real_image_that_is_changed_contradicts_its_fragments() {
         let [only] = &contradictions[..] else {
             panic!("{key}: {contradictions:?}");
         };
-        let start = format!("fragment 0, byte 2048: the label says {key} = ");
+        let start = format!("fragment 0, byte 2048: the label states {key} = ");
         assert!(only.starts_with(&start) && only.ends_with(said), "{only}");
     }
     let rounded = edited(&bytes, "LINE_EXPOSURE_DURATION", "0.4822");
@@ -109,12 +109,12 @@ fn fragments_behind_the_label_of_another_image_are_noticed() {
     let mixed = [&own[..LABEL], &other[LABEL..]].concat();
     let (_, contradictions) = told(&mixed);
     let expected = [
-        "SPACECRAFT_CLOCK_START_COUNT = 610472061:131; the fragments say 610480000:007",
-        "PRODUCT_ID = M01/00123; the fragments say image 200",
-        "LINES = 1344; the fragments say 1360 lines",
-        "EDIT_MODE_ID = 0; the fragments say 16 as first detector",
+        "SPACECRAFT_CLOCK_START_COUNT = 610472061:131; the fragments state 610480000:007",
+        "PRODUCT_ID = M01/00123; the fragments state image 200",
+        "LINES = 1344; the fragments state 1360 lines",
+        "EDIT_MODE_ID = 0; the fragments state 16 as first detector",
     ];
-    let expected = expected.map(|of| format!("fragment 0, byte 2048: the label says {of}"));
+    let expected = expected.map(|of| format!("fragment 0, byte 2048: the label states {of}"));
     assert_eq!(contradictions, expected);
 }
 
@@ -123,7 +123,7 @@ fn the_lines_of_a_label_may_be_those_that_came_down() {
     let whole = edited(&image(1344, 80), "LINES", "1216");
     let (_, contradictions) = told(&whole);
     assert_eq!(contradictions.len(), 1, "{contradictions:?}");
-    // Cut within its last fragment, which is the first that could say so.
+    // Truncated within its last fragment, which is the first to show it.
     let cut = &whole[..whole.len() - 100_000];
     assert!(told(cut).1.is_empty());
     let more = edited(&image(1344, 80), "LINES", "1472");
@@ -134,7 +134,8 @@ fn the_lines_of_a_label_may_be_those_that_came_down() {
 #[test]
 fn a_header_that_is_damaged_itself_is_no_witness() {
     let mut bytes = image(1344, 80);
-    // The number of the image in the first header, whose checksum byte is wrong then; the next fragments are of another image.
+    // The number of the image in the first header, whose checksum byte is then wrong; the next fragments belong to
+    // another image.
     bytes[LABEL + 1] ^= 1;
     assert!(told(&bytes).1.is_empty());
 }
@@ -147,7 +148,7 @@ fn fragments_of_another_image_behind_a_cut_one_are_told_as_such() {
     other.product_id = "M01/00200";
     other.clock = (610_480_000, 7);
     let other = encode(&other).unwrap();
-    // One fragment and its frame.
+    // One fragment, and one frame around it.
     let cut = LABEL + 245_760 + 63;
     let mixed = [&own[..cut], &other[LABEL..]].concat();
     let (complaints, contradictions) = told(&mixed);

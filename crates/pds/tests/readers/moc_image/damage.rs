@@ -1,4 +1,4 @@
-//! Images written here, whole and damaged.
+//! Images written by the test, intact and damaged.
 
 use std::{
     fs,
@@ -10,7 +10,7 @@ use areograph_pds::image_file::{Coding, ImageFile, LineState, Predictor, Transfo
 
 use areograph_testing::moc_file::{bytes_read, new_image, peak_memory};
 
-/// Size of the image: three fragments and more.
+/// Size of the image: more than three fragments.
 const SAMPLES: usize = 640;
 const LINES: usize = 1344;
 
@@ -26,7 +26,7 @@ impl Random {
     }
 }
 
-/// Hills with noise, so that a fragment holds less than half of it.
+/// Hills with noise, such that a fragment covers less than half of the image.
 fn picture() -> Vec<u8> {
     let mut random = Random(7);
     let pixel = |line: usize, sample: usize, noise: usize| {
@@ -54,7 +54,7 @@ const COSINES: Coding = Coding::Transform {
     spacing: 64,
 };
 
-/// What reading gives: pixels, states, complaints; `None` for a file that is refused.
+/// Result of reading: pixels, states, complaints; `None` for a rejected file.
 type Found = Option<(Vec<u8>, Vec<LineState>, Vec<String>)>;
 
 fn read(folder: &Path, bytes: &[u8]) -> Found {
@@ -71,7 +71,7 @@ fn read(folder: &Path, bytes: &[u8]) -> Found {
         );
         // 4080 samples of 128 lines, or a fragment of the transform coder with 16384 blocks.
         assert!(strip.pixels.len() <= 1 << 22);
-        // Not all is kept of a header that tells of gigabytes.
+        // Memory does not follow a header that states gigabytes.
         if pixels.len() < 1 << 22 {
             pixels.extend(strip.pixels);
         }
@@ -152,7 +152,7 @@ fn cosines_give_back_pixels_within_their_quantisation() {
             rms <= limit,
             "spacing {spacing}: rms {rms}, at most {limit}"
         );
-        // Coarse steps lose something: else nothing was quantised.
+        // Coarse steps lose information; otherwise nothing was quantised.
         assert!(spacing == 16 || rms > 0.5, "spacing {spacing}: rms {rms}");
         assert!(bytes.len() < truth.len());
     }
@@ -184,7 +184,7 @@ fn a_lost_fragment_leaves_its_lines_out_and_the_others_in_their_places() {
                 }
             }
             let expected = format!(
-                "fragment {}, byte {}: the fragment before it is lost",
+                "fragment {}, byte {}: the preceding fragment is missing",
                 lost + 1,
                 fragments(&whole)[lost]
             );
@@ -221,7 +221,7 @@ fn a_flipped_byte_spoils_its_block_only() {
     let wrong: Vec<usize> = wrong.collect();
     assert!(!wrong.is_empty() && wrong.len() < 128, "{wrong:?}");
     assert!(wrong.iter().all(|line| states[*line] == LineState::Suspect));
-    // Only the lines of the damaged fragment are suspected, of three and more.
+    // Only the lines of the damaged fragment, out of more than three, are suspect.
     assert!(
         states
             .iter()
@@ -250,7 +250,7 @@ fn a_cut_file_gives_the_lines_that_are_there() {
             assert!(
                 complaints
                     .iter()
-                    .any(|text| text.contains("1344 lines of the header")),
+                    .any(|text| text.contains("the header states 1344")),
                 "{complaints:?}"
             );
             assert!(
@@ -261,7 +261,7 @@ fn a_cut_file_gives_the_lines_that_are_there() {
     }
 }
 
-/// Does damage: bits, bytes, stretches that are cut out, zeroed or repeated, fragments that are lost, a shorter file.
+/// Applies damage: bits, bytes, stretches that are cut out, zeroed or repeated, missing fragments, truncation.
 fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
     let from = if random.below(8) == 0 { 0 } else { 2048 };
     for _ in 0..=random.below(4) {
@@ -276,7 +276,7 @@ fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
                 .splice(at..at, bytes[at..until].to_vec())
                 .for_each(drop),
             6 => bytes.truncate(at.max(2048)),
-            // Headers, where most of what misleads stands.
+            // Headers, where damage is most misleading.
             7 => {
                 let places = fragments(bytes);
                 let header = places[random.below(places.len())] + random.below(62);
@@ -332,14 +332,14 @@ fn damaged_files_never_panic_and_lines_called_good_are_good() {
         "{refused} files refused; {good} good lines, {wrong} of them wrong; {grown} bytes more memory"
     );
     assert!(refused < 50);
-    // Two or three damages to a file of four fragments: more than a third of all lines is still certain.
+    // Two or three faults in a file of four fragments: more than a third of all lines remains good.
     assert!(good > 500 * LINES / 3, "{good}");
-    // Damage is seen by sums of bytes only: what two changes do to them may add up to nothing.
+    // Only sums of bytes reveal damage: two changes may cancel.
     assert!(
         wrong * 1000 <= good,
         "{wrong} of {good} good lines are wrong"
     );
-    // The pixels that this test keeps, and a strip.
+    // The pixels kept by this test, and a strip.
     assert!(grown < 64 << 20, "{grown} bytes");
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// A `.img` file: a label padded to `start` bytes, then pixels of 20 lines, or of as many as there are.
+/// A `.img` file: a label padded to `start` bytes, then pixels of up to 20 lines.
 pub(crate) fn write_raster(
     folder: &Path,
     pointer: &str,
@@ -60,7 +60,7 @@ pub(crate) fn write_fragment(
     path
 }
 
-/// The bytes that hexadecimal digits stand for.
+/// The bytes of hexadecimal digits.
 pub(crate) fn hexadecimal(digits: &str) -> Vec<u8> {
     let digits: Vec<u8> = digits.bytes().filter(u8::is_ascii_hexdigit).collect();
     let pairs = digits

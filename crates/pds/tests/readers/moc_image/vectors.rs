@@ -1,4 +1,4 @@
-//! Small images of every coding with the pixels that the mission's own decompressor makes of them.
+//! Small images of every coding with the pixels by the mission's own decompressor.
 
 use super::{files, read, sha256};
 use areograph_pds::image_file::{Coding, Predictor};
@@ -115,7 +115,7 @@ fn transformed_pixels_are_those_of_the_decompressor() {
             (statistics.lines_good, sha256(&pixels)),
             (16, hash.to_owned())
         );
-        // The last bytes hold the group of the outer blocks; the one in the middle is of another.
+        // The last bytes contain the group of the outer blocks; the middle one belongs to another group.
         let bytes = files::hexadecimal(data);
         let path = files::write_fragment(
             folder.path(),
@@ -127,7 +127,7 @@ fn transformed_pixels_are_those_of_the_decompressor() {
         let (short, statistics, complaints) = read(&path);
         assert_eq!(
             complaints,
-            ["fragment 0, byte 2048, line 0: the data end before the blocks do"]
+            ["fragment 0, byte 2048, line 0: the data end before the last block"]
         );
         assert_eq!(
             (statistics.lines_suspect, &short[16..32]),

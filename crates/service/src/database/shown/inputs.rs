@@ -19,9 +19,9 @@ pub struct RootFolder {
     pub files: i64,
     /// `available`, `settling` or `unavailable`.
     pub state: String,
-    /// Since when.
+    /// Start of that state.
     pub since_utc: Instant,
-    /// Why, in words.
+    /// The reason, as text.
     pub detail: String,
 }
 
@@ -38,20 +38,20 @@ pub struct KernelFile {
     pub blake3: Option<String>,
     /// `settling`, `ready`, `bad` or `gone`.
     pub state: String,
-    /// Why, in words.
+    /// The reason, as text.
     pub detail: String,
     /// When it was first seen.
     pub first_seen_utc: Instant,
     /// When it last changed.
     pub changed_utc: Instant,
-    /// What it covers: arrays `position` and `attitude` of intervals, seconds of ephemeris time past J2000.
+    /// Its coverage: arrays `position` and `attitude` of intervals, seconds of ephemeris time past J2000.
     pub coverage: Value,
 }
 
 /// All folders of inputs.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn roots(connection: &Connection) -> Stored<Vec<RootFolder>> {
     let mut query = connection.prepare_cached("SELECT * FROM root ORDER BY kind, path")?;
     let found = query.query_map([], |row| {
@@ -74,7 +74,7 @@ const KERNELS: &str = "
 /// At most `limit` files below the folders of kernels with numbers above `after`.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn kernels(connection: &Connection, after: i64, limit: u32) -> Stored<Vec<KernelFile>> {
     let mut query = connection.prepare_cached(&format!(
         "{KERNELS} AND f.rowid > ?1 ORDER BY f.rowid LIMIT ?2"
@@ -86,7 +86,7 @@ pub fn kernels(connection: &Connection, after: i64, limit: u32) -> Stored<Vec<Ke
 /// The kernel with this content; of several the first by path.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn kernel_by_hash(connection: &Connection, blake3: &str) -> Stored<Option<KernelFile>> {
     let mut query = connection.prepare_cached(&format!(
         "{KERNELS} AND f.blake3 = ?1 ORDER BY f.path LIMIT 1"
@@ -97,7 +97,7 @@ pub fn kernel_by_hash(connection: &Connection, blake3: &str) -> Stored<Option<Ke
 /// At most `limit` sites that read a file.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn used_by(connection: &Connection, path: &str, limit: u32) -> Stored<Vec<String>> {
     let mut query = connection
         .prepare_cached("SELECT site FROM site_input WHERE path = ?1 ORDER BY site LIMIT ?2")?;

@@ -1,4 +1,4 @@
-//! What pages and the interface for programs show: rows of the tables, read only, in lists of bounded length.
+//! Data for pages and the interface for programs: rows of the tables, read only, in lists of bounded length.
 
 mod inputs;
 mod nights;
@@ -15,7 +15,7 @@ pub use runs::{Run, pin_run, run, runs_of_job, runs_of_night, runs_of_site};
 pub use sites::{Site, count_sites, current_runs, site, site_file, sites};
 pub use work::{Attempt, Totals, attempts, jobs_of_night, last_complete_night_ms, totals};
 
-/// A column of JSON; text that is none stays text.
+/// A column of JSON; invalid JSON stays text.
 fn document(row: &Row<'_>, column: &str) -> rusqlite::Result<Value> {
     let text: Option<String> = row.get(column)?;
     Ok(text.map_or(Value::Null, |text| {

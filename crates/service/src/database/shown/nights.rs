@@ -32,7 +32,7 @@ pub struct Night {
 /// A night by its number.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn night(connection: &Connection, id: i64) -> Stored<Option<Night>> {
     let mut query = connection.prepare_cached("SELECT * FROM night WHERE id = ?1")?;
     Ok(query.query_row([id], read).optional()?)
@@ -41,7 +41,7 @@ pub fn night(connection: &Connection, id: i64) -> Stored<Option<Night>> {
 /// At most `limit` nights, the newest first, with numbers below `before`.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn nights(connection: &Connection, before: Option<i64>, limit: u32) -> Stored<Vec<Night>> {
     let mut query =
         connection.prepare_cached("SELECT * FROM night WHERE id < ?1 ORDER BY id DESC LIMIT ?2")?;

@@ -1,4 +1,4 @@
-//! Runs: what was published, why, and what it moved.
+//! Runs: publications, their causes and changes.
 
 use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
 use serde::Serialize;
@@ -15,7 +15,7 @@ pub struct Run {
     pub id: String,
     /// Its site.
     pub site: String,
-    /// The job that made it.
+    /// The job of the run.
     pub job: i64,
     /// The attempt of that job.
     pub attempt: i64,
@@ -29,32 +29,32 @@ pub struct Run {
     pub verdict: String,
     /// Why its products are not valid.
     pub reasons: Value,
-    /// Why it was made.
+    /// Causes of the run.
     pub because: Value,
     /// Stages that ran or were kept, each with its reason.
     pub stages: Value,
-    /// Things counted, by name.
+    /// Counts, by name.
     pub counts: Value,
     /// The largest figures of the site, by name, in the unit that ends the name.
     pub figures: Value,
     /// Kernels in load order with role and BLAKE3.
     pub kernels: Value,
-    /// The run that was current before.
+    /// The previous current run.
     pub predecessor: Option<String>,
-    /// What moved since the predecessor: headline, sentences, whether a limit was passed.
+    /// Changes since the predecessor: headline, sentences, whether a limit was exceeded.
     pub moved: Value,
     /// When it was published.
     pub published_utc: Instant,
-    /// Whether it is kept for good.
+    /// Whether it is kept permanently.
     pub pinned: bool,
-    /// When its products were removed, since they were too old to be kept.
+    /// When its products were removed because of their age.
     pub removed_utc: Option<Instant>,
 }
 
 /// A run by its identifier.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn run(connection: &Connection, id: &str) -> Stored<Option<Run>> {
     let mut query = connection.prepare_cached("SELECT * FROM run WHERE id = ?1")?;
     Ok(query.query_row([id], read).optional()?)
@@ -63,7 +63,7 @@ pub fn run(connection: &Connection, id: &str) -> Stored<Option<Run>> {
 /// At most `limit` runs of a site, the newest first, published before the run `before` where one is named.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn runs_of_site(
     connection: &Connection,
     site: &str,
@@ -82,7 +82,7 @@ pub fn runs_of_site(
 /// At most `limit` runs that jobs of a night published.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn runs_of_night(connection: &Connection, night: i64, limit: u32) -> Stored<Vec<Run>> {
     let mut query = connection.prepare_cached(
         "SELECT run.* FROM job JOIN run ON run.job = job.id WHERE job.night = ?1 ORDER BY run.site LIMIT ?2",
@@ -94,7 +94,7 @@ pub fn runs_of_night(connection: &Connection, night: i64, limit: u32) -> Stored<
 /// At most `limit` runs that a job published.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn runs_of_job(connection: &Connection, job: i64, limit: u32) -> Stored<Vec<Run>> {
     let mut query = connection
         .prepare_cached("SELECT * FROM run WHERE job = ?1 ORDER BY attempt DESC LIMIT ?2")?;
@@ -102,10 +102,10 @@ pub fn runs_of_job(connection: &Connection, job: i64, limit: u32) -> Stored<Vec<
     Ok(found.collect::<Result<_, _>>()?)
 }
 
-/// Keeps a run for good, or no longer. Says whether there is such a run.
+/// Keeps a run permanently, or releases it. Returns whether the run exists.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn pin_run(transaction: &Transaction<'_>, id: &str, pinned: bool) -> Stored<bool> {
     let change = "UPDATE run SET pinned = ?2 WHERE id = ?1";
     Ok(transaction.execute(change, params![id, pinned])? > 0)

@@ -1,4 +1,4 @@
-//! Sites as they stand.
+//! Current state of the sites.
 
 use rusqlite::{Connection, OptionalExtension as _, Row, params};
 use serde::Serialize;
@@ -6,30 +6,30 @@ use utoipa::ToSchema;
 
 use crate::{database::Stored, instant::Instant, state::JobState};
 
-/// A site as it stands.
+/// Current state of a site.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
 pub struct Site {
     /// Its name.
     pub name: String,
-    /// Whether its site file is there and says that it is to be run.
+    /// Whether its site file exists and enables it.
     pub enabled: bool,
-    /// What is wrong with its site file.
+    /// The fault of its site file.
     pub problem: Option<String>,
     /// The run whose products are current.
     pub current_run: Option<String>,
     /// Verdict of that run in a word.
     pub verdict: Option<String>,
-    /// Since when these products are current.
+    /// Since when that run is current.
     pub current_since_utc: Option<Instant>,
     /// When its inputs were last compared completely.
     pub checked_utc: Option<Instant>,
     /// Since when its inputs are newer than its products.
     pub stale_since_utc: Option<Instant>,
-    /// Why, and what happens next.
+    /// The reason, and the next step.
     pub stale_because: Option<String>,
-    /// What its last comparison found.
+    /// The result of its last comparison.
     pub note: Option<String>,
-    /// Its newest run, which is not current where it is not valid.
+    /// Its newest run, which is not current if it is invalid.
     pub newest_run: Option<String>,
     /// Whether the newest run is valid.
     pub newest_valid: Option<bool>,
@@ -37,9 +37,9 @@ pub struct Site {
     pub newest_verdict: Option<String>,
     /// Its newest job.
     pub job: Option<i64>,
-    /// Where that job stands.
+    /// State of that job.
     pub job_state: Option<JobState>,
-    /// What its windows span: west, south, east, north, degrees of east longitude and areocentric latitude.
+    /// Extent of its windows: west, south, east, north, degrees of east longitude and areocentric latitude.
     pub bounds_deg: Option<[f64; 4]>,
 }
 
@@ -54,7 +54,7 @@ const SELECT: &str = "
 /// At most `limit` sites after the one named `after`, by name.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn sites(connection: &Connection, after: &str, limit: u32) -> Stored<Vec<Site>> {
     let mut query = connection.prepare_cached(&format!(
         "{SELECT} WHERE s.name > ?1 ORDER BY s.name LIMIT ?2"
@@ -66,16 +66,16 @@ pub fn sites(connection: &Connection, after: &str, limit: u32) -> Stored<Vec<Sit
 /// A site by its name.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn site(connection: &Connection, name: &str) -> Stored<Option<Site>> {
     let mut query = connection.prepare_cached(&format!("{SELECT} WHERE s.name = ?1"))?;
     Ok(query.query_row([name], read).optional()?)
 }
 
-/// How many sites there are, and how many of them are stale.
+/// Numbers of sites and of stale sites.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn count_sites(connection: &Connection) -> Stored<(i64, i64)> {
     let counts = "SELECT count(*), count(stale_since_ms) FROM site WHERE enabled";
     Ok(connection.query_row(counts, [], |row| Ok((row.get(0)?, row.get(1)?)))?)
@@ -118,16 +118,16 @@ fn read(row: &Row<'_>) -> rusqlite::Result<Site> {
 /// The site file of a site.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn site_file(connection: &Connection, name: &str) -> Stored<Option<String>> {
     let mut query = connection.prepare_cached("SELECT file FROM site WHERE name = ?1")?;
     Ok(query.query_row([name], |row| row.get(0)).optional()?)
 }
 
-/// Sites with the runs that are current.
+/// Sites with their current runs.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn current_runs(connection: &Connection) -> Stored<Vec<(String, String)>> {
     let mut query = connection.prepare_cached(
         "SELECT name, current_run FROM site WHERE current_run IS NOT NULL ORDER BY name",

@@ -1,4 +1,4 @@
-//! Attempts of jobs, and jobs counted.
+//! Attempts of jobs, and totals.
 
 use rusqlite::{Connection, OptionalExtension as _, params};
 use serde::Serialize;
@@ -17,17 +17,17 @@ pub struct Attempt {
     pub n: i64,
     /// When it began.
     pub started_utc: Instant,
-    /// Its last sign of life.
+    /// Its last heartbeat.
     pub beat_utc: Instant,
     /// Memory in use, kibibytes.
     pub rss_kib: Option<i64>,
-    /// Stage that it was last in.
+    /// Last reported stage.
     pub stage: Option<String>,
     /// Progress in that stage.
     pub done: Option<i64>,
-    /// Of so many.
+    /// Total of that progress.
     pub of: Option<i64>,
-    /// What is counted.
+    /// Unit of the progress.
     pub unit: Option<String>,
     /// When it ended.
     pub ended_utc: Option<Instant>,
@@ -37,7 +37,7 @@ pub struct Attempt {
     pub exit: Option<i64>,
     /// Signal that ended it.
     pub signal: Option<i64>,
-    /// Where its log lies.
+    /// Path of its log.
     #[serde(skip)]
     pub log: String,
 }
@@ -45,7 +45,7 @@ pub struct Attempt {
 /// The attempts of a job, at most the newest `limit`, the newest first.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn attempts(connection: &Connection, job: i64, limit: u32) -> Stored<Vec<Attempt>> {
     let mut query = connection
         .prepare_cached("SELECT * FROM attempt WHERE job = ?1 ORDER BY n DESC LIMIT ?2")?;
@@ -72,7 +72,7 @@ pub fn attempts(connection: &Connection, job: i64, limit: u32) -> Stored<Vec<Att
 /// At most `limit` jobs of a night.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn jobs_of_night(connection: &Connection, night: i64, limit: u32) -> Stored<Vec<Job>> {
     let mut query = connection
         .prepare_cached("SELECT id FROM job WHERE night = ?1 ORDER BY site, id LIMIT ?2")?;
@@ -82,23 +82,23 @@ pub fn jobs_of_night(connection: &Connection, night: i64, limit: u32) -> Stored<
     jobs.filter_map(Stored::transpose).collect()
 }
 
-/// Things counted for metrics.
+/// Totals for metrics.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Totals {
     /// Jobs by state.
     pub jobs: Vec<(JobState, i64)>,
     /// Runs that are kept.
     pub runs: i64,
-    /// When the oldest queued job was made.
+    /// When the oldest queued job was created.
     pub oldest_queued_ms: Option<i64>,
-    /// Alerts that no hook has taken yet.
+    /// Alerts that no hook has accepted yet.
     pub undelivered: i64,
 }
 
 /// Counts jobs, runs and alerts.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn totals(connection: &Connection) -> Stored<Totals> {
     let mut query = connection.prepare_cached("SELECT state, count(*) FROM job GROUP BY state")?;
     let found = query.query_map([], |row| Ok((row.get::<_, String>(0)?, row.get(1)?)))?;
@@ -119,7 +119,7 @@ pub fn totals(connection: &Connection) -> Stored<Totals> {
 /// When the last night that was not missed ended.
 ///
 /// # Errors
-/// SQLite's own.
+/// SQLite errors.
 pub fn last_complete_night_ms(connection: &Connection) -> Stored<Option<i64>> {
     let newest = "SELECT ended_ms FROM night WHERE ended_ms IS NOT NULL AND how != 'missed' ORDER BY id DESC LIMIT 1";
     Ok(connection

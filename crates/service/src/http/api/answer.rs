@@ -1,4 +1,4 @@
-//! Answers of the interface, and lists in pieces.
+//! Answers of the interface, and paginated lists.
 
 use axum::{
     http::{HeaderValue, StatusCode, header},
@@ -13,7 +13,7 @@ use crate::http::{app::App, extract::name, problem::Problem};
 const MOST: u32 = 200;
 const USUAL: u32 = 50;
 
-/// A document, without what clients must not read.
+/// A document, without hidden paths.
 pub(super) fn answer<T: Serialize>(app: &App, document: &T) -> Result<Response, Problem> {
     let text = serde_json::to_string(document).map_err(Problem::internal)?;
     let mut response = app.hidden().strip(text).into_response();
@@ -33,15 +33,15 @@ pub(super) fn answer_with<T: Serialize>(
     Ok(response)
 }
 
-/// Which piece of a list by number is wanted.
+/// Pagination of a list by number.
 #[derive(Debug, Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ByNumber {
-    /// `next` of the piece before.
+    /// `next` of the preceding page.
     #[param(minimum = 0)]
     after: Option<i64>,
-    /// Most items, 50 unless told.
+    /// Maximum number of items, by default 50.
     #[param(minimum = 1, maximum = 200)]
     limit: Option<u32>,
 }
@@ -56,15 +56,15 @@ impl ByNumber {
     }
 }
 
-/// Which piece of a list by name is wanted.
+/// Pagination of a list by name.
 #[derive(Debug, Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ByName {
-    /// `next` of the piece before.
+    /// `next` of the preceding page.
     #[param(pattern = "^[A-Za-z0-9_-]{1,64}$")]
     after: Option<String>,
-    /// Most items, 50 unless told.
+    /// Maximum number of items, by default 50.
     #[param(minimum = 1, maximum = 200)]
     limit: Option<u32>,
 }
@@ -105,17 +105,17 @@ fn not_next(after: impl std::fmt::Display) -> Problem {
     ))
 }
 
-/// A piece of a list.
+/// A page of a list.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct List<T> {
     /// The items.
     pub(super) items: Vec<T>,
-    /// What `after` must be to go on; null at the end.
+    /// `after` of the next page; null at the end.
     pub(super) next: Option<String>,
 }
 
 impl<T> List<T> {
-    /// At most `limit` of `items`, of which one more was asked for to know whether there are more.
+    /// At most `limit` of `items`, of which one more was requested to detect further ones.
     pub(super) fn of(mut items: Vec<T>, limit: u32, cursor: impl Fn(&T) -> String) -> Self {
         let limit = limit as usize;
         let more = items.len() > limit;

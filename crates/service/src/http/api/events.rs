@@ -1,4 +1,4 @@
-//! What happens, as a stream.
+//! The stream of events.
 
 use std::{convert::Infallible, sync::Arc, time::Duration};
 
@@ -27,14 +27,14 @@ use crate::{
     sessions::still_open,
 };
 
-/// Events that are read at once.
+/// Events read at once.
 const BATCH: u32 = 200;
-/// A stream ends after so long; clients begin another one by themselves.
+/// Longest duration of a stream; clients reconnect by themselves.
 const LONGEST: Duration = Duration::from_hours(1);
-/// Whether the client may still read is looked at so often.
+/// Interval at which the client's permission is checked.
 const LOOK: Duration = Duration::from_secs(15);
 
-/// Something that happened: the data of a message, whose `event` is its kind and whose `id` is its number.
+/// An event: the data of a message, whose `event` is its kind and whose `id` is its number.
 #[derive(Debug, Serialize, ToSchema)]
 struct EventData {
     /// Its number; later events have larger ones.
@@ -49,12 +49,12 @@ struct EventData {
     job: Option<i64>,
     /// The run that it concerns.
     run: Option<String>,
-    /// More, by its kind.
+    /// Further data, by its kind.
     data: Value,
 }
 
-/// What happens from now on, or after the event `Last-Event-ID`, as server-sent events. A message `lost` says that older events
-/// are no longer kept.
+/// Events from now on, or after the event `Last-Event-ID`, as server-sent events. A message `lost` means that older
+/// events are no longer kept.
 #[utoipa::path(get, path = "/api/v1/events", tag = "events", params(
     ("Last-Event-ID" = Option<i64>, Header, description = "Number of the last event that was seen", minimum = 0),
 ), responses(
@@ -149,7 +149,7 @@ async fn tell(
             }
         }
         if !more {
-            // Nothing new for a while: look whether the client may still read.
+            // No events for a while: check whether the client may still read.
             let _ = tokio::time::timeout(LOOK, newest.changed()).await;
         }
     }

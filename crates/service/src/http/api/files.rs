@@ -1,4 +1,4 @@
-//! Files of runs: whole or in part, each under the hash of its content.
+//! Files of runs, complete or in part, each under the hash of its content.
 
 use std::{io::SeekFrom, sync::Arc};
 
@@ -22,7 +22,7 @@ use crate::http::{
 
 /// Pages of products run no scripts and send nothing; their links to other products work.
 const POLICY: &str = "sandbox allow-same-origin allow-downloads; default-src 'none'; style-src 'unsafe-inline'; img-src data:";
-/// Browsers show these; everything else is for saving.
+/// Browsers display these; everything else is a download.
 const SHOWN: [&str; 4] = [
     "text/html; charset=utf-8",
     "image/png",
@@ -30,7 +30,8 @@ const SHOWN: [&str; 4] = [
     "image/svg+xml",
 ];
 
-/// A product of a run: `path` as in its manifest, or `manifest.json`. The tag is the BLAKE3 of the content; ranges are understood.
+/// A product of a run: `path` as in its manifest, or `manifest.json`. The tag is the BLAKE3 of the content; ranges are
+/// supported.
 #[utoipa::path(get, path = "/api/v1/runs/{run}/files/{*path}", tag = "runs", params(
     ("run" = String, Path, description = "Identifier of the run", pattern = "^[A-Za-z0-9_-]{1,64}$"),
     ("path" = String, Path, description = "Path of a product as in the manifest; may contain /"),
@@ -38,7 +39,7 @@ const SHOWN: [&str; 4] = [
 ), responses(
     (status = 200, content_type = "application/octet-stream", body = Vec<u8>),
     (status = 206, content_type = "application/octet-stream", body = Vec<u8>),
-    (status = 304, description = "The client has it"),
+    (status = 304, description = "The client has this content"),
     (status = "4XX", body = ProblemDocument, content_type = "application/problem+json"),
 ))]
 pub(super) async fn of_run(
@@ -154,7 +155,7 @@ fn insert(answer: &mut Response, name: HeaderName, value: &str) -> Result<(), Pr
     Ok(())
 }
 
-/// Whether one of the tags of a precondition is ours; none without the header.
+/// Whether one of the tags of a precondition matches; `None` without the header.
 fn fits(headers: &HeaderMap, name: &HeaderName, etag: &str) -> Option<bool> {
     let lines = headers.get_all(name).iter();
     let mut given = lines.filter_map(|line| line.to_str().ok()).peekable();
@@ -175,7 +176,7 @@ enum Wanted {
     Nothing,
 }
 
-/// What `Range` asks for; several ranges, and other units, mean the whole.
+/// The requested range; several ranges, and other units, mean the whole file.
 fn range(headers: &HeaderMap, etag: &str, bytes: u64) -> Wanted {
     let current = headers
         .get(header::IF_RANGE)

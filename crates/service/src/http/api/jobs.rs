@@ -24,7 +24,7 @@ use crate::{
     state::JobState,
 };
 
-/// Attempts that are given with a job.
+/// Attempts returned with a job.
 const ATTEMPTS: u32 = 100;
 
 /// A job.
@@ -34,7 +34,7 @@ pub(super) struct JobLine {
     id: i64,
     /// The site that it brings up to date.
     site: String,
-    /// Where it stands.
+    /// Its state.
     state: JobState,
     /// Its class.
     priority: Priority,
@@ -42,23 +42,23 @@ pub(super) struct JobLine {
     attempt: i64,
     /// Attempts that failed and count.
     failures: i64,
-    /// It waits until then.
+    /// It waits until this time.
     not_before_utc: Option<Instant>,
-    /// Whether every stage runs, whatever is stored.
+    /// Whether every stage runs, including stored ones.
     force: bool,
-    /// Whether somebody asked it to stop.
+    /// Whether cancellation was requested.
     cancel_asked: bool,
-    /// The night that it belongs to.
+    /// Its night.
     night: Option<i64>,
-    /// The token of who asked for it.
+    /// The token of the requester.
     asked_by: Option<String>,
-    /// When it was made.
+    /// When it was created.
     created_utc: Instant,
     /// When its state last changed.
     changed_utc: Instant,
     /// When it ended.
     ended_utc: Option<Instant>,
-    /// How it ended, or why it waits: an object with `text` and more.
+    /// Its outcome, or the reason for waiting: an object with `text` and more.
     outcome: Option<Value>,
 }
 
@@ -84,15 +84,15 @@ impl JobLine {
     }
 }
 
-/// Which jobs are wanted.
+/// A filter of jobs.
 #[derive(Debug, Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub(super) struct JobsWanted {
-    /// `next` of the piece before.
+    /// `next` of the preceding page.
     #[param(minimum = 0)]
     after: Option<i64>,
-    /// Most items, 50 unless told.
+    /// Maximum number of items, by default 50.
     #[param(minimum = 1, maximum = 200)]
     limit: Option<u32>,
     /// Of this site.
@@ -143,7 +143,7 @@ struct JobCause {
     old_blake3: Option<String>,
     /// BLAKE3 of its content now.
     new_blake3: Option<String>,
-    /// In words.
+    /// As text.
     detail: String,
     /// When.
     at_utc: Instant,
@@ -154,7 +154,7 @@ struct JobCause {
 struct JobDetail {
     /// The job.
     job: JobLine,
-    /// Why it is there.
+    /// Its causes.
     causes: Vec<JobCause>,
     /// Its attempts, the newest first, at most 100.
     attempts: Vec<Attempt>,
@@ -198,7 +198,7 @@ pub(super) async fn one(
     answer(&app, &found.ok_or_else(no_job)?)
 }
 
-/// Asks a job to stop; asking again changes nothing.
+/// Requests cancellation of a job; repeated requests have no effect.
 #[utoipa::path(post, path = "/api/v1/jobs/{job}/cancel", tag = "jobs", params(
     ("job" = i64, Path, description = "Number of the job", minimum = 0),
 ), responses(
@@ -213,7 +213,7 @@ pub(super) async fn cancel_one(
     answer(&app, &JobLine::of(cancel(&app, caller, id).await?))
 }
 
-/// Tries a job again: one that waits or is blocked at once, one that ended without valid products as a new job.
+/// Retries a job: a waiting or blocked one at once, one that ended without valid products as a new job.
 #[utoipa::path(post, path = "/api/v1/jobs/{job}/retry", tag = "jobs", params(
     ("job" = i64, Path, description = "Number of the job", minimum = 0),
 ), responses(

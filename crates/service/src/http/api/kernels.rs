@@ -19,13 +19,13 @@ use crate::{
     instant::Instant,
 };
 
-/// Sites that are named with a kernel.
+/// Sites listed with a kernel.
 const SITES: u32 = 1000;
 
 /// A kernel file.
 #[derive(Debug, Serialize, ToSchema)]
 struct Kernel {
-    /// Its path from its folder of kernels.
+    /// Its path from its kernel folder.
     file: String,
     /// Size.
     bytes: i64,
@@ -33,7 +33,7 @@ struct Kernel {
     blake3: Option<String>,
     /// `settling`, `ready`, `bad` or `gone`.
     state: String,
-    /// Why, in words.
+    /// The reason, as text.
     detail: String,
     /// When it was first seen.
     first_seen_utc: Instant,
@@ -77,7 +77,7 @@ pub(super) async fn list(
     answer(&app, &piece)
 }
 
-/// A kernel with what it covers and who reads it.
+/// A kernel with its coverage and its readers.
 #[derive(Debug, Serialize, ToSchema)]
 struct KernelDetail {
     /// The file.

@@ -1,4 +1,4 @@
-//! Whether the service lives and works, and its figures.
+//! Health of the service, and its metrics.
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ use crate::{
 
 const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
-/// Whether the service lives: without looking at disk or database.
+/// Whether the service is alive, without access to disk or database.
 #[utoipa::path(get, path = "/healthz", tag = "life", security(()), responses(
     (status = 200, body = String, content_type = "text/plain"),
 ))]
@@ -32,31 +32,31 @@ pub(super) async fn healthy() -> &'static str {
     "ok\n"
 }
 
-/// Whether the service works.
+/// Whether the service is operational.
 #[derive(Debug, Serialize, ToSchema)]
 #[allow(
     clippy::struct_excessive_bools,
     reason = "each is an entry of the document"
 )]
 struct Readiness {
-    /// Whether everything below is well.
+    /// Whether all of the following hold.
     ready: bool,
     /// Whether the database answers.
     database: bool,
-    /// Whether the disks of products and state have room.
+    /// Whether the disks of products and state have enough space.
     disk: bool,
-    /// Whether all folders of inputs are there.
+    /// Whether all folders of inputs are available.
     roots: bool,
-    /// Whether the configuration in force is the one of the file.
+    /// Whether the configuration in force is that of the file.
     configuration: bool,
-    /// When this was looked at.
+    /// When this was determined.
     at_utc: Instant,
 }
 
-/// Whether the service works: database, disks, folders of inputs, configuration.
+/// Whether the service is operational: database, disks, folders of inputs, configuration.
 #[utoipa::path(get, path = "/readyz", tag = "life", security(()), responses(
     (status = 200, body = Readiness),
-    (status = 503, body = Readiness, description = "It does not"),
+    (status = 503, body = Readiness, description = "The service is not operational"),
 ))]
 pub(super) async fn ready(State(app): State<Arc<App>>) -> Result<Response, Problem> {
     let found = app.read(roots).await;
@@ -89,7 +89,7 @@ pub(super) async fn ready(State(app): State<Arc<App>>) -> Result<Response, Probl
     answer_with(&app, status, &state)
 }
 
-/// Figures for Prometheus.
+/// Metrics for Prometheus.
 #[utoipa::path(get, path = "/metrics", tag = "life", responses(
     (status = 200, body = String, content_type = "application/openmetrics-text"),
     (status = "4XX", body = ProblemDocument, content_type = "application/problem+json"),
@@ -131,10 +131,10 @@ pub(super) async fn metrics(_: Reader, State(app): State<Arc<App>>) -> Result<Re
         ),
         plain(
             "runs_kept",
-            "Runs whose products are there",
+            "Runs whose products are available",
             totals.runs as f64,
         ),
-        plain("sites", "Sites that are to be run", sites.0 as f64),
+        plain("sites", "Sites that are enabled", sites.0 as f64),
         plain(
             "sites_stale",
             "Sites whose inputs are newer than their products",
@@ -147,7 +147,7 @@ pub(super) async fn metrics(_: Reader, State(app): State<Arc<App>>) -> Result<Re
         ),
         plain(
             "alerts_undelivered",
-            "Alerts that no hook has taken yet",
+            "Alerts that no hook has accepted yet",
             totals.undelivered as f64,
         ),
         plain(

@@ -18,33 +18,33 @@ use crate::{
     },
 };
 
-/// Which piece of which log is wanted.
+/// Selection of a log and its page.
 #[derive(Debug, Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LogWanted {
-    /// The attempt, the newest unless told.
+    /// The attempt, by default the newest.
     #[param(minimum = 1)]
     attempt: Option<u32>,
-    /// `next` of the piece before; from the beginning unless told.
+    /// `next` of the preceding page; by default the start.
     #[param(minimum = 0)]
     after: Option<u64>,
 }
 
-/// A piece of a log.
+/// A page of a log.
 #[derive(Debug, Serialize, ToSchema)]
 struct LogText {
     /// The attempt.
     attempt: i64,
     /// Lines, most of them JSON.
     text: String,
-    /// What `after` must be to go on.
+    /// `after` of the next page.
     next: u64,
     /// Whether the attempt has ended and this is the end of its log.
     complete: bool,
 }
 
-/// Attempts that are looked through.
+/// Attempts that are searched.
 const ATTEMPTS: u32 = 1000;
 
 /// The log of an attempt, at most 256 KiB of it.

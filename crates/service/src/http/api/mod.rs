@@ -32,15 +32,15 @@ use super::{app::App, problem::ProblemDocument};
 #[openapi(
     info(
         title = "areograph",
-        description = "Sites, runs, jobs, kernels and shots of an areograph service. Refusals are problem documents (RFC 9457). \
-                       Lists are given in pieces: `next` of one is `after` of the next one. Instants are RFC 3339 in UTC.",
+        description = "Sites, runs, jobs, kernels and shots of an areograph service. Errors are problem documents \
+                       (RFC 9457). Lists come in pages: `next` of one is `after` of the next one. Instants are RFC 3339 in UTC.",
     ),
     components(schemas(ProblemDocument)),
     modifiers(&Tokens),
 )]
 struct Api;
 
-/// Every operation takes a token.
+/// Every operation accepts a token.
 struct Tokens;
 
 impl Modify for Tokens {
@@ -58,7 +58,7 @@ impl Modify for Tokens {
 /// All routes for programs.
 pub(super) fn routes() -> Router<Arc<App>> {
     let (router, mut description) = described().split_for_parts();
-    // The router's mark of a parameter that may contain `/`.
+    // The router's notation for a parameter that may contain `/`.
     let paths = std::mem::take(&mut description.paths.paths);
     let named = paths
         .into_iter()

@@ -1,4 +1,4 @@
-//! Jobs that programs ask for.
+//! Jobs requested by programs.
 
 use std::sync::Arc;
 
@@ -30,10 +30,10 @@ use crate::{
 const SITES: usize = 1000;
 /// Longest reason, characters.
 const REASON: usize = 500;
-/// An answer is given again for so long.
+/// Time for which an answer is repeated.
 const REMEMBERED_MS: i64 = 24 * 3_600_000;
 
-/// Whose jobs are asked for.
+/// Sites of the requested jobs.
 #[derive(Debug, Serialize, Deserialize, ToSchema)]
 #[serde(untagged, expecting = "sites is a list of names, or the word all")]
 pub(super) enum SitesAsked {
@@ -57,46 +57,46 @@ pub(super) enum AllSites {
     All,
 }
 
-/// Jobs that are asked for.
+/// Requested jobs.
 #[derive(Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct JobsAsked {
     /// Names of sites, or `all`.
     sites: SitesAsked,
-    /// Whether every stage runs, whatever is stored.
+    /// Whether every stage runs, including stored ones.
     #[serde(default)]
     force: bool,
-    /// Why.
+    /// The reason.
     #[serde(default)]
     #[schema(max_length = 500)]
     reason: String,
 }
 
-/// A job that was asked for.
+/// A requested job.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 struct JobAsked {
     /// The site.
     site: String,
     /// Its job.
     job: i64,
-    /// Whether a job that was pending took it in.
+    /// Whether a pending job took over the request.
     joined: bool,
 }
 
-/// The jobs that were asked for.
+/// The requested jobs.
 #[derive(Debug, Serialize, ToSchema)]
 struct JobsMade {
     /// A job for each site.
     jobs: Vec<JobAsked>,
 }
 
-/// Asks for jobs. With an `Idempotency-Key`, asking again within 24 h gives the same jobs and makes no others.
+/// Requests jobs. With an `Idempotency-Key`, a repetition within 24 h returns the same jobs and creates no others.
 #[utoipa::path(post, path = "/api/v1/jobs", tag = "jobs", params(
     ("Idempotency-Key" = Option<String>, Header, description = "1 to 100 letters, digits, `_` and `-`, chosen by the client",
      pattern = "^[A-Za-z0-9_-]{1,100}$"),
 ), request_body = JobsAsked, responses(
-    (status = 202, body = JobsMade, description = "Jobs were made"),
-    (status = 200, body = JobsMade, description = "The jobs were there already"),
+    (status = 202, body = JobsMade, description = "Jobs were created"),
+    (status = 200, body = JobsMade, description = "The jobs already existed"),
     (status = "4XX", body = ProblemDocument, content_type = "application/problem+json"),
 ))]
 pub(super) async fn create(
@@ -169,7 +169,7 @@ fn make(
 ) -> Stored<Result<JobsMade, Problem>> {
     let request = serde_json::to_vec(&asked).unwrap_or_default();
     let request = blake3::hash(&request).to_hex().to_string();
-    // Keys of different clients are different keys.
+    // Keys of different clients are distinct.
     let key = key.map(|key| format!("{}:{key}", caller.name()));
     if let Some(key) = &key {
         let old = "DELETE FROM idempotency WHERE at_ms < ?1";

@@ -20,7 +20,7 @@ use crate::{
     },
 };
 
-/// Jobs and runs of a night that are given with it.
+/// Jobs and runs returned with a night.
 const MOST: u32 = 1000;
 
 /// Nights, the newest first.
@@ -40,7 +40,7 @@ pub(super) async fn list(
     answer(&app, &List::of(found, limit, |night| night.id.to_string()))
 }
 
-/// A night with what came of it.
+/// A night and its results.
 #[derive(Debug, Serialize, ToSchema)]
 struct NightDetail {
     /// The night.

@@ -1,4 +1,4 @@
-//! What a run of a site would do, without doing it.
+//! Plans: what a run of a site would do.
 
 use std::sync::Arc;
 
@@ -25,10 +25,10 @@ use crate::{
     worker::protocol::{Answer, What},
 };
 
-/// Longest time for a plan, seconds: on the first one all inputs may have to be read.
+/// Longest time for a plan, seconds: the first one may have to read all inputs.
 const DEADLINE_S: f64 = 1800.0;
 
-/// Begins a plan: what a run of the site would do, and why. The header Location says where the answer will be.
+/// Begins a plan: what a run of the site would do, and why. The header Location contains the address of the answer.
 #[utoipa::path(post, path = "/api/v1/sites/{site}/plan", tag = "sites", params(
     ("site" = String, Path, description = "Name of the site", pattern = "^[A-Za-z0-9_-]{1,64}$"),
 ), responses(
@@ -102,7 +102,7 @@ fn ended(
     }
 }
 
-/// A plan that was asked for; the newest 64 are kept.
+/// A requested plan; the newest 64 are kept.
 #[utoipa::path(get, path = "/api/v1/plans/{plan}", tag = "sites", params(
     ("plan" = u64, Path, description = "Number of the plan", minimum = 0),
 ), responses(

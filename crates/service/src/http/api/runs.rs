@@ -43,7 +43,7 @@ pub(super) async fn of_site(
     answer(&app, &List::of(found, limit, |run| run.id.clone()))
 }
 
-/// One run: why it was made, from which kernels, its figures, and what it moved.
+/// One run: its causes, kernels, figures and changes.
 #[utoipa::path(get, path = "/api/v1/runs/{run}", tag = "runs", params(
     ("run" = String, Path, description = "Identifier of the run", pattern = "^[A-Za-z0-9_-]{1,64}$"),
 ), responses(
@@ -58,15 +58,15 @@ pub(super) async fn one(
     answer(&app, &find(&app, &id).await?)
 }
 
-/// What may be changed of a run.
+/// Properties of a run that can be changed.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RunChange {
-    /// Whether it is kept for good.
+    /// Whether it is kept permanently.
     pinned: bool,
 }
 
-/// Keeps a run for good, or no longer.
+/// Keeps a run permanently, or releases it.
 #[utoipa::path(patch, path = "/api/v1/runs/{run}", tag = "runs", params(
     ("run" = String, Path, description = "Identifier of the run", pattern = "^[A-Za-z0-9_-]{1,64}$"),
 ), request_body = RunChange, responses(
@@ -83,7 +83,7 @@ pub(super) async fn pin_one(
     answer(&app, &pin(&app, caller, id, change.pinned).await?)
 }
 
-/// A run that is there.
+/// An existing run.
 pub(super) async fn find(app: &App, id: &str) -> Result<Run, Problem> {
     let wanted = name(id)?.to_owned();
     let found = app.read(move |connection| run(connection, &wanted)).await?;

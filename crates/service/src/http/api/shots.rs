@@ -35,14 +35,14 @@ const DEADLINE_S: f64 = 25.0;
 const COMPLETE: HeaderName = HeaderName::from_static("areograph-complete");
 const ROW_COUNT: HeaderName = HeaderName::from_static("areograph-rows");
 
-/// Forms of an answer: media type, and what the worker calls it; the first is the usual one.
+/// Formats of an answer: media type, and the worker's name of it; the first is the default.
 const FORMS: [(&str, &str); 3] = [
     ("application/geo+json", "geojson"),
     ("text/csv", "csv"),
     ("application/vnd.apache.parquet", "parquet"),
 ];
 
-/// The box that is searched.
+/// The box to search.
 #[derive(Debug, Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
@@ -55,7 +55,7 @@ pub(super) struct BoxWanted {
     bbox: String,
 }
 
-/// A polygon as GeoJSON has it, of one ring.
+/// A GeoJSON polygon of one ring.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Polygon {
@@ -68,8 +68,8 @@ pub(super) struct Polygon {
     coordinates: Vec<Vec<[f64; 2]>>,
 }
 
-/// Shots of the current runs in a box. The header Areograph-Complete says whether there are no more than the 1,000,000 rows of
-/// an answer.
+/// Shots of the current runs in a box. The header Areograph-Complete states whether they are complete, or limited to
+/// the 1,000,000 rows of an answer.
 #[utoipa::path(get, path = "/api/v1/shots", tag = "shots", params(BoxWanted), responses(
     (status = 200, content(
         (serde_json::Value = "application/geo+json"), (String = "text/csv"), (Vec<u8> = "application/vnd.apache.parquet"),
@@ -183,7 +183,7 @@ async fn search(
         .collect();
     let folder = config.outputs.state.join("requests");
     std::fs::create_dir_all(&folder).map_err(Problem::internal)?;
-    // Removed when it has been opened, or on any failure.
+    // Removed once opened, or on any failure.
     let folder = tempfile::tempdir_in(&folder).map_err(Problem::internal)?;
     let into = folder.path().join("shots");
     let what = What::Shots {
@@ -198,7 +198,7 @@ async fn search(
         Ok(_) => return Err(Problem::internal("the worker sent an unexpected answer")),
         Err(failure) if failure.code == 2 => {
             return Err(Problem::bad_request(
-                "This region has no inside: its sides must not cross.",
+                "This region encloses no area: its sides must not cross.",
             ));
         }
         Err(failure) => return Err(Problem::internal(failure.text)),
@@ -222,7 +222,7 @@ async fn search(
     Ok(response)
 }
 
-/// The form that `Accept` asks for first; anything means GeoJSON.
+/// The first format in `Accept`; a wildcard means GeoJSON.
 fn form(headers: &HeaderMap) -> Result<(&'static str, &'static str), Problem> {
     let Some(accepted) = headers.get(header::ACCEPT) else {
         return Ok(FORMS[0]);

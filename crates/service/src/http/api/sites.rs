@@ -51,7 +51,7 @@ pub(super) async fn one(
     answer(&app, &find(&app, &site).await?)
 }
 
-/// A product of the current run: leads to that of the run.
+/// A product of the current run: redirects to that of the run.
 #[utoipa::path(get, path = "/api/v1/sites/{site}/current/{*path}", tag = "sites", params(
     ("site" = String, Path, description = "Name of the site", pattern = "^[A-Za-z0-9_-]{1,64}$"),
     ("path" = String, Path, description = "Path of a product as in the manifest; may contain /"),
@@ -73,12 +73,12 @@ pub(super) async fn current(
         .all(|byte| byte.is_ascii_graphic() && !b"%?#\\".contains(&byte))
         || path.contains("..")
     {
-        return Err(Problem::not_found("No manifest names such a product."));
+        return Err(Problem::not_found("No manifest lists such a product."));
     }
     Ok(Redirect::temporary(&format!("/api/v1/runs/{run}/files/{path}")).into_response())
 }
 
-/// A site that is there.
+/// An existing site.
 pub(super) async fn find(app: &App, site_name: &str) -> Result<Site, Problem> {
     let wanted = name(site_name)?.to_owned();
     let found = app

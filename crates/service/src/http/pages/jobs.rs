@@ -1,4 +1,4 @@
-//! Jobs, and the page of one.
+//! Jobs, and the page of a job.
 
 use std::sync::Arc;
 
@@ -35,10 +35,10 @@ use crate::{
 const JOBS: u32 = 100;
 /// Attempts on the page of a job.
 const ATTEMPTS: u32 = 50;
-/// Bytes of a log's end on the page of a job.
+/// Bytes of the end of a log on the page of a job.
 const TAIL: u64 = 16 << 10;
 
-/// Which jobs are wanted.
+/// A filter of jobs.
 #[derive(Debug, Deserialize)]
 pub(super) struct JobsWanted {
     after: Option<i64>,
@@ -127,7 +127,7 @@ fn asker(job: &Job) -> Markup {
     }
 }
 
-/// One job: why it is there, its attempts, the end of its log.
+/// One job: its causes, its attempts, the end of its log.
 pub(super) async fn one(
     Reader(caller): Reader,
     State(app): State<Arc<App>>,
@@ -267,7 +267,7 @@ fn why(causes: &[CauseRow], times: &Times) -> Markup {
     }
 }
 
-/// So much of a hash that people compare.
+/// The start of a hash, sufficient for comparison by eye.
 pub(super) fn short(hash: &str) -> &str {
     hash.get(..12).unwrap_or(hash)
 }
@@ -305,13 +305,13 @@ fn run_list(runs: &[Run]) -> Markup {
     }
 }
 
-/// What the buttons of a job send.
+/// Form data of the buttons of a job.
 #[derive(Debug, Deserialize)]
 pub(super) struct JobForm {
     form_token: String,
 }
 
-/// Asks a job to stop.
+/// Requests cancellation of a job.
 pub(super) async fn cancel_one(
     Reader(caller): Reader,
     State(app): State<Arc<App>>,
@@ -323,7 +323,7 @@ pub(super) async fn cancel_one(
     Ok(Redirect::to(&format!("/jobs/{}", job.id)).into_response())
 }
 
-/// Tries a job again.
+/// Retries a job.
 pub(super) async fn retry_one(
     Reader(caller): Reader,
     State(app): State<Arc<App>>,

@@ -1,4 +1,4 @@
-//! Kernels: what they cover, when they last changed, who reads them.
+//! Kernels: their coverage, last change and readers.
 
 use std::sync::Arc;
 
@@ -19,16 +19,16 @@ use crate::{
 
 /// Kernels on one page.
 const KERNELS: u32 = 300;
-/// Sites that are named with a kernel.
+/// Sites listed with a kernel.
 const SITES: u32 = 4;
 
-/// Where the list goes on.
+/// Start of the next page of the list.
 #[derive(Debug, Deserialize)]
 pub(super) struct From {
     after: Option<i64>,
 }
 
-/// Kernels with a timeline of what they cover.
+/// Kernels with a timeline of their coverage.
 pub(super) async fn list(
     Reader(caller): Reader,
     State(app): State<Arc<App>>,

@@ -1,4 +1,4 @@
-//! What all pages have in common.
+//! Common layout of all pages.
 
 use axum::{
     http::{StatusCode, Uri},
@@ -10,19 +10,19 @@ use areograph_base::style::STYLE;
 
 use crate::http::{app::App, caller::Caller, problem::Problem};
 
-/// Where the style lies; another version has another address.
+/// Address of the style; each version has its own.
 pub(super) const STYLE_PATH: &str = concat!("/style-", env!("CARGO_PKG_VERSION"), ".css");
-/// Where the script lies.
+/// Address of the script.
 pub(super) const SCRIPT_PATH: &str = concat!("/script-", env!("CARGO_PKG_VERSION"), ".js");
 /// Keeps pages up to date.
 pub(super) const SCRIPT: &str = include_str!("live.js");
 
-/// The style of reports, and what pages have beyond them.
+/// The style of reports, with additions for pages.
 pub(super) fn style() -> String {
     STYLE.to_owned() + include_str!("pages.css")
 }
 
-/// Pages that every page leads to.
+/// Pages linked from every page.
 const PLACES: [(&str, &str); 4] = [
     ("/", "Sites"),
     ("/jobs", "Jobs"),
@@ -30,7 +30,7 @@ const PLACES: [(&str, &str); 4] = [
     ("/nights", "Nights"),
 ];
 
-/// A page: its title, and the address in the list of places that it belongs to.
+/// A page: its title, and its address in the navigation.
 pub(super) struct Page<'a> {
     pub(super) title: &'a str,
     pub(super) place: &'a str,
@@ -87,24 +87,24 @@ fn account(caller: &Caller) -> Markup {
     }
 }
 
-/// What every form carries.
+/// Hidden field of every form.
 pub(super) fn form_token(token: &str) -> Markup {
     html! { input type="hidden" name="form_token" value=(token); }
 }
 
-/// Whoever may change something, by a form that came from a page of their session.
+/// A caller who may make changes, by a form from a page of the same session.
 pub(super) fn operator(caller: Caller, form_token: &str) -> Result<Caller, Problem> {
     let caller = with_session(caller, form_token)?;
     if !caller.operates() {
         return Err(Problem::new(
             StatusCode::FORBIDDEN,
-            "Your token may read only. Changes need one with the role operate.",
+            "Your token may only read. Changes require a token with the role operate.",
         ));
     }
     Ok(caller)
 }
 
-/// Whoever has a session, by a form that came from one of its pages.
+/// A caller with a session, by a form from one of its pages.
 pub(super) fn with_session(caller: Caller, form_token: &str) -> Result<Caller, Problem> {
     let Some(session) = &caller.session else {
         return Err(Problem::new(StatusCode::UNAUTHORIZED, "Log in first."));
@@ -118,7 +118,7 @@ pub(super) fn with_session(caller: Caller, form_token: &str) -> Result<Caller, P
     Ok(caller)
 }
 
-/// A page that says why there is none.
+/// A page that states an error.
 pub(in crate::http) fn problem_page(
     name: &str,
     title: &str,
@@ -154,7 +154,7 @@ fn head(title: &str, live: bool) -> Markup {
     }
 }
 
-/// Where to log in, to come back to `uri`.
+/// Login address that returns to `uri`.
 pub(in crate::http) fn login_address(uri: &Uri) -> String {
     let back = uri.path_and_query().map_or("/", |back| back.as_str());
     let encoded: String = back

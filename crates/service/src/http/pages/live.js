@@ -30,7 +30,7 @@
   };
   const source = new EventSource('/api/v1/events');
   source.onopen = () => { say(' Live.'); soon(); };
-  source.onerror = () => say(' Not live: the connection was lost; it is tried again.');
+  source.onerror = () => say(' Not live: the connection was lost; reconnecting.');
   for (const kind of ['job', 'stage', 'progress', 'run', 'root', 'night', 'alert', 'config', 'checked', 'lost']) {
     source.addEventListener(kind, soon);
   }

@@ -1,4 +1,4 @@
-//! A token exchanged for a session, and the end of one.
+//! Login: a token exchanged for a session; logout.
 
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ use crate::{
 };
 use areograph_config::HttpConfig;
 
-/// Where to go after that.
+/// Address after the login.
 #[derive(Debug, Deserialize)]
 pub(super) struct Next {
     next: Option<String>,
@@ -43,7 +43,7 @@ pub(super) async fn form(
             input id="areograph-token" name="token" type="password" required autocomplete="current-password" spellcheck="false" maxlength="128";
             button type="submit" { "Log in" }
         }
-        p { "Tokens are made on the command line: " code { "areograph service token add" } ". A session ends after an hour without use, and after twelve hours in all." }
+        p { "Tokens are created on the command line: " code { "areograph service token add" } ". A session ends after an hour without use, and after twelve hours in all." }
     };
     Ok(Page {
         title: "Log in",
@@ -52,7 +52,7 @@ pub(super) async fn form(
     .answer(&app, &caller, &body))
 }
 
-/// What the form sends.
+/// Form data.
 #[derive(Debug, Deserialize)]
 pub(super) struct Entry {
     token: String,
@@ -89,7 +89,7 @@ pub(super) async fn enter(
     Ok(answer)
 }
 
-/// What the button sends.
+/// Form data of the button.
 #[derive(Debug, Deserialize)]
 pub(super) struct Exit {
     form_token: String,

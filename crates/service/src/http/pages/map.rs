@@ -1,25 +1,25 @@
-//! Where the sites lie: Mars from 0° to 360° E, equidistant cylindrical.
+//! Map of the sites: Mars from 0° to 360° E, equidistant cylindrical.
 
 use maud::{Markup, html};
 
 use super::parts::{counted, tone};
 use crate::database::shown::Site;
 
-/// Units of the picture for a degree.
+/// Units of the picture per degree.
 const SCALE: f64 = 2.0;
-/// Room for the names of parallels and meridians.
+/// Space for the labels of parallels and meridians.
 const LEFT: f64 = 64.0;
 const TOP: f64 = 10.0;
 const RIGHT: f64 = 22.0;
-/// Windows smaller than this are drawn so large.
+/// Smallest drawn size of a window.
 const LEAST: f64 = 9.0;
-/// More names than this would lie over each other.
+/// Largest number of names without overlaps.
 const NAMES: usize = 30;
-/// Width of a letter and height of a line, as the names are written.
+/// Width of a letter and height of a line of the names.
 const LETTER: f64 = 9.0;
 const LINE: f64 = 18.0;
 
-/// The map, and what it shows in words.
+/// The map, and its description.
 pub(super) fn map(sites: &[Site]) -> Markup {
     let placed: Vec<(&Site, [f64; 4])> = sites
         .iter()
@@ -69,7 +69,7 @@ struct Name<'a> {
     anchor: &'static str,
 }
 
-/// Names of the sites from north to south; one that would lie over another goes below it. None where they are too many.
+/// Names of the sites from north to south; one that would overlap another moves below it. Empty if there are too many.
 fn names<'a>(placed: &[(&'a Site, [f64; 4])], width: f64) -> Vec<Name<'a>> {
     if placed.len() > NAMES {
         return Vec::new();

@@ -1,4 +1,4 @@
-//! Pages for people: whole without a script, which only keeps them up to date.
+//! Pages for people: complete without the script, which only keeps them up to date.
 
 mod jobs;
 mod kernels;

@@ -1,4 +1,4 @@
-//! Nights, and the page of one.
+//! Nights, and the page of a night.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ const NIGHTS: u32 = 60;
 /// Jobs and runs on the page of a night.
 const MOST: u32 = 500;
 
-/// Where a list goes on.
+/// Start of the next page of a list.
 #[derive(Debug, Deserialize)]
 pub(super) struct From {
     after: Option<i64>,
@@ -47,7 +47,7 @@ pub(super) async fn list(
     let next = shown.last().filter(|_| found.len() > shown.len());
     let schedule = &app.config().schedule;
     let body = html! {
-        p { "Every site is compared with its inputs by the schedule " code { (schedule.cron) } " in " (schedule.zone) ", whether \
+        p { "Every site is compared with its inputs on the schedule " code { (schedule.cron) } " in " (schedule.zone) ", whether \
             or not a change was detected." }
         div id="nights" data-live="" { (night_table(shown, &times)) }
         (more(next.map(|night| format!("/nights?after={}", night.id))))
@@ -79,7 +79,7 @@ fn night_table(nights: &[Night], times: &Times) -> Markup {
     }
 }
 
-/// One night: what it looked at, and what came of it.
+/// One night: its comparisons and results.
 pub(super) async fn one(
     Reader(caller): Reader,
     State(app): State<Arc<App>>,

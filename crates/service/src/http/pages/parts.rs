@@ -13,7 +13,7 @@ const MINUTE_MS: i64 = 60_000;
 const HOUR_MS: i64 = 60 * MINUTE_MS;
 const DAY_MS: i64 = 24 * HOUR_MS;
 
-/// How times are told.
+/// Formats of times.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Times {
     pub(super) zone: Tz,
@@ -46,7 +46,7 @@ impl Times {
         html! { @match instant { Some(instant) => (self.at(instant)), None => "–" } }
     }
 
-    /// How long ago an instant was.
+    /// Age of an instant.
     pub(super) fn age(&self, instant: Instant) -> String {
         let ms = self.now_ms - instant.0;
         let count = |unit_ms: i64, unit: &str| format!("{} {unit}", ms.abs() / unit_ms);
@@ -64,7 +64,7 @@ impl Times {
     }
 }
 
-/// Class of a verdict's colour.
+/// CSS class of a verdict's colour.
 pub(super) fn tone(verdict: Option<&str>) -> &'static str {
     match verdict {
         Some("valid") => "valid",
@@ -90,7 +90,7 @@ pub(super) fn state(state: JobState) -> Markup {
     html! { span class={ "word " (tone) } { (state) } }
 }
 
-/// A box with what must be read first.
+/// A box with the most important statement.
 pub(super) fn lead(tone: &str, headline: &str, body: &Markup) -> Markup {
     html! { div class={ "verdict " (tone) } { p { strong { (headline) } } (body) } }
 }
@@ -130,7 +130,7 @@ pub(super) fn sentences(value: &Value) -> Vec<String> {
     }
 }
 
-/// A sentence in which names of files stand between backticks.
+/// A sentence with file names between backticks.
 pub(super) fn prose(text: &str) -> Markup {
     html! {
         @for (place, part) in text.split('`').enumerate() {
@@ -139,7 +139,7 @@ pub(super) fn prose(text: &str) -> Markup {
     }
 }
 
-/// A list of sentences; one alone is a paragraph.
+/// A list of sentences; a single one is a paragraph.
 pub(super) fn said(sentences: &[String]) -> Markup {
     html! {
         @match sentences {
@@ -150,9 +150,9 @@ pub(super) fn said(sentences: &[String]) -> Markup {
     }
 }
 
-/// The link to the next piece of a list.
+/// The link to the next page of a list.
 pub(super) fn more(address: Option<String>) -> Markup {
-    html! { @if let Some(address) = address { p { a href=(address) rel="next" { "Older ones" } } } }
+    html! { @if let Some(address) = address { p { a href=(address) rel="next" { "Older" } } } }
 }
 
 /// A number of things.
@@ -162,7 +162,7 @@ pub(super) fn counted(count: impl fmt::Display, what: &str) -> String {
     format!("{count} {what}{plural}")
 }
 
-/// Bytes as people read them.
+/// Bytes in a readable unit.
 pub(super) fn size(bytes: u64) -> String {
     match bytes {
         ..10_000 => format!("{bytes} B"),
@@ -171,7 +171,7 @@ pub(super) fn size(bytes: u64) -> String {
     }
 }
 
-/// A number with as many digits as are read.
+/// A number with a readable number of digits.
 pub(super) fn figure(value: f64) -> String {
     let magnitude = value.abs();
     if magnitude == 0.0 {
@@ -190,7 +190,7 @@ pub(super) fn figure(value: f64) -> String {
     }
 }
 
-/// Name of a figure for people: `range_mean_m` is `range mean, m`.
+/// Displayed name of a figure: `range_mean_m` is `range mean, m`.
 pub(super) fn figure_name(name: &str) -> String {
     const UNITS: [(&str, &str); 7] = [
         ("_m", "m"),

@@ -32,10 +32,10 @@ use crate::{
 };
 use areograph_store::{manifest::Manifest, publish::MANIFEST};
 
-/// The page of a site's products that is looked at first.
+/// The first page of a site's products.
 const REPORT: &str = "report/index.html";
 
-/// One run: why, what moved, its figures, kernels, stages and files.
+/// One run: its causes, changes, figures, kernels, stages and files.
 pub(super) async fn one(
     Reader(caller): Reader,
     State(app): State<Arc<App>>,
@@ -94,7 +94,7 @@ fn run_lead(run: &Run, causes: &[CauseRow], manifest: Option<&Manifest>, times: 
             p {
                 "Site " a href={ "/sites/" (run.site) } { (run.site) } ", published " (times.at(run.published_utc))
                 " by " a href={ "/jobs/" (run.job) } { "job " (run.job) } ", attempt " (run.attempt) ", areograph " (run.version) "."
-                @if let Some(before) = &run.predecessor { " Before it: " a href={ "/runs/" (before) } { (before) } "." }
+                @if let Some(before) = &run.predecessor { " Previous run: " a href={ "/runs/" (before) } { (before) } "." }
                 @if let Some(removed) = run.removed_utc { " Its products were removed " (times.at(removed)) "." }
             }
             (said(&sentences(&run.reasons)))
@@ -236,14 +236,14 @@ fn file_table(run: &Run, manifest: &Manifest) -> Markup {
     }
 }
 
-/// What the button of a run sends.
+/// Form data of the button of a run.
 #[derive(Debug, Deserialize)]
 pub(super) struct PinForm {
     form_token: String,
     pinned: bool,
 }
 
-/// Keeps a run for good, or no longer.
+/// Keeps a run permanently, or releases it.
 pub(super) async fn pin_one(
     Reader(caller): Reader,
     State(app): State<Arc<App>>,

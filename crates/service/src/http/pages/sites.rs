@@ -1,4 +1,4 @@
-//! The first page, and the page of a site.
+//! The start page, and the page of a site.
 
 use std::sync::Arc;
 
@@ -41,7 +41,7 @@ const TREND: u32 = 120;
 /// Runs in the table.
 const RUNS: usize = 30;
 
-/// Where a list goes on.
+/// Start of the next page of a list.
 #[derive(Debug, Deserialize)]
 pub(super) struct From {
     after: Option<String>,
@@ -152,7 +152,7 @@ fn standing(sites: &[Site], roots: &[RootFolder], problem: Option<&str>, times: 
         &html! {
             ul {
                 @for root in &away { li { "The folder " code { (root.path) } " is not available since " (times.at(root.since_utc)) ": " (root.detail) ". Its sites are held; nothing is lost." } }
-                @if let Some(problem) = problem { li { "The changed configuration was refused, the old one stays in force: " (problem) } }
+                @if let Some(problem) = problem { li { "The changed configuration was rejected; the old one remains in force: " (problem) } }
                 @for site in &wrong { li { a href={ "/sites/" (site.name) } { (site.name) } ": " (site.problem.as_deref().unwrap_or_default()) } }
                 @if refused > 0 { li { "The newest run of " (counted(refused, "site")) " is not valid; earlier products stay current." } }
                 @if count("remarks") > 0 { li { (count("remarks")) " valid with remarks." } }
@@ -189,10 +189,10 @@ fn site_table(sites: &[Site], times: &Times) -> Markup {
     )
 }
 
-/// Fresh, or stale since when and why.
+/// Fresh, or since when and why stale.
 fn freshness(site: &Site, times: &Times) -> Markup {
     html! {
-        @if !site.enabled { "Not run: its site file is gone or disables it." }
+        @if !site.enabled { "Not run: its site file was removed or disables it." }
         @else if let Some(problem) = &site.problem { "Not run: " (problem) }
         @else if let Some(since) = site.stale_since_utc {
             "Stale since " (times.at(since)) ": " (prose(site.stale_because.as_deref().unwrap_or("its inputs changed")))
@@ -202,7 +202,7 @@ fn freshness(site: &Site, times: &Times) -> Markup {
     }
 }
 
-/// What the last night did.
+/// Summary of the last night.
 fn last_night(night: Option<&Night>, times: &Times) -> Markup {
     html! {
         @match night {
@@ -221,7 +221,7 @@ fn last_night(night: Option<&Night>, times: &Times) -> Markup {
     }
 }
 
-/// One site: how it stands, its trends, its runs.
+/// One site: its state, its trends, its runs.
 pub(super) async fn one(
     Reader(caller): Reader,
     State(app): State<Arc<App>>,
@@ -283,7 +283,7 @@ fn site_lead(site: &Site, newest: Option<&Run>, times: &Times) -> Markup {
             p { (freshness(site, times)) }
             @if let Some(run) = &site.current_run {
                 p {
-                    "Current is run " a href={ "/runs/" (run) } { (run) } " of " (times.maybe(site.current_since_utc)) ". "
+                    "The current run is " a href={ "/runs/" (run) } { (run) } " of " (times.maybe(site.current_since_utc)) ". "
                     a href={ "/api/v1/sites/" (site.name) "/current/report/index.html" } { "Report" }
                 }
             }
@@ -332,7 +332,7 @@ fn run_table(site: &Site, runs: &[Run], times: &Times) -> Markup {
     }
 }
 
-/// What the buttons of a site send.
+/// Form data of the buttons of a site.
 #[derive(Debug, Deserialize)]
 pub(super) struct RunForm {
     form_token: String,
@@ -341,7 +341,7 @@ pub(super) struct RunForm {
     force: bool,
 }
 
-/// Asks for a job of a site.
+/// Requests a job of a site.
 pub(super) async fn run_now(
     Reader(caller): Reader,
     State(app): State<Arc<App>>,
@@ -359,7 +359,7 @@ pub(super) async fn run_now(
         sites: vec![name(&site)?.to_owned()],
         force: form.force,
         reason: if reason.is_empty() {
-            "asked on its page".to_owned()
+            "requested on its page".to_owned()
         } else {
             reason
         },

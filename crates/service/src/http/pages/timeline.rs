@@ -1,4 +1,4 @@
-//! When kernels cover positions and attitude.
+//! Timeline of kernel coverage of positions and attitude.
 
 use chrono::{DateTime, SecondsFormat, TimeDelta, Utc};
 use maud::{Markup, html};
@@ -10,9 +10,9 @@ const WIDTH: f64 = 520.0;
 const LINE: f64 = 34.0;
 const BAR: f64 = 9.0;
 const FOOT: f64 = 26.0;
-/// More bars than this cannot be told apart.
+/// More bars than this cannot be distinguished.
 const BARS: usize = 400;
-/// J2000 as seconds of the calendar's time past 1970.
+/// J2000 as seconds of calendar time since 1970.
 const J2000_S: i64 = 946_728_000;
 
 /// A kernel on the timeline.
@@ -64,12 +64,12 @@ pub(super) fn timeline(rows: &[Row]) -> Markup {
             }
             ul class="keys" { li { i class="k0" {} "positions" } li { i class="k1" {} "attitude" } }
             figcaption {
-                "Times are TDB, a minute ahead of UTC. Empty intervals are gaps; gaps too narrow to be seen are in the "
+                "Times are TDB, about a minute ahead of UTC. Empty intervals are gaps; gaps too narrow to be seen are in the "
                 a href="/api/v1/kernels" { "interface for programs" } "."
             }
         }
         details {
-            summary { "Coverage in words" }
+            summary { "Coverage as text" }
             ul {
                 @for row in rows {
                     li {
@@ -87,7 +87,7 @@ pub(super) fn timeline(rows: &[Row]) -> Markup {
 }
 
 fn bars(spans: &[Span], x: &impl Fn(f64) -> f64, y: f64, colour: &str) -> Markup {
-    // Neighbours closer than a tenth of a unit are one bar.
+    // Adjacent intervals closer than a tenth of a unit are one bar.
     let mut bars: Vec<(f64, f64)> = Vec::new();
     for span in spans {
         let (from, to) = (x(span.start_et_s), x(span.stop_et_s));

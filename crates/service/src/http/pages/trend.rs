@@ -1,4 +1,4 @@
-//! How a site's figures went over its runs, with the changes of kernels.
+//! Trends of a site's figures over its runs, with the changes of kernels.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,7 +15,7 @@ const RIGHT: f64 = 14.0;
 const TOP: f64 = 14.0;
 const BOTTOM: f64 = 30.0;
 
-/// What changed in the kernels from one run to the next.
+/// Changes of kernels from one run to the next.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(super) struct KernelChange {
     pub(super) changed: Vec<String>,
@@ -40,7 +40,7 @@ impl KernelChange {
         }
     }
 
-    /// In words; nothing where nothing changed.
+    /// As text; `None` without changes.
     pub(super) fn words(&self) -> Option<String> {
         let parts = [
             ("changed", &self.changed),
@@ -90,7 +90,7 @@ pub(super) fn trends(runs: &[Run], times: &Times) -> Markup {
     let all: Vec<BTreeMap<String, f64>> = oldest_first.iter().map(|run| figures(run)).collect();
     let names: BTreeSet<&String> = all.iter().flat_map(BTreeMap::keys).collect();
     html! {
-        @if runs.len() < 2 { p { "Plots begin with the second run." } }
+        @if runs.len() < 2 { p { "Plots require at least two runs." } }
         @else {
             div class="plots" {
                 @for name in names {
@@ -116,7 +116,7 @@ pub(super) fn trends(runs: &[Run], times: &Times) -> Markup {
     }
 }
 
-/// What moved, in one sentence.
+/// The changes, in one sentence.
 pub(super) fn headline(run: &Run) -> String {
     let headline = run.moved.get("headline").and_then(Value::as_str);
     headline.map_or_else(|| sentences(&run.moved).join(" "), str::to_owned)
@@ -134,7 +134,7 @@ fn plot(name: &str, runs: &[&Run], values: &[Option<f64>], steps: &[Option<Strin
     };
     let low = known.iter().copied().fold(f64::INFINITY, f64::min);
     let high = known.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    // A figure that stays the same is a line in the middle.
+    // A constant figure is a line in the middle.
     let margin = (0.08 * (high - low))
         .max(1e-3 * high.abs())
         .max(f64::MIN_POSITIVE);

@@ -1,5 +1,5 @@
-//! A service whose workers are played: kernels are texts in memory, a product is a list of what a site read, and a clock
-//! shows what it is set to. Workers die when they are told to.
+//! A service with simulated workers: kernels are texts in memory, a product is a list of a site's inputs, and the clock
+//! is set by the test. Workers die on request.
 #![allow(dead_code, reason = "each test program uses a part of this module")]
 #![allow(
     clippy::disallowed_methods,
@@ -35,7 +35,7 @@ use tokio::runtime::Runtime;
 
 pub(crate) use work::Played;
 
-/// How a played worker comes to its end.
+/// How a simulated worker ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Fate {
     /// It does its work.
@@ -46,33 +46,33 @@ pub(crate) enum Fate {
     DiesPublished,
     /// It dies when the run is kept, before it can answer.
     DiesUnheard,
-    /// The disk refuses.
+    /// The disk fails.
     Io,
     /// It goes on until it is stopped.
     Lasts,
 }
 
-/// Files, and what befalls workers.
+/// Files, and the fates of workers.
 #[derive(Debug)]
 pub(crate) struct World {
     folder: tempfile::TempDir,
     files: Mutex<BTreeMap<String, (String, Identity)>>,
     inodes: AtomicU64,
     away: Mutex<Vec<String>>,
-    /// What befalls the next workers of sites, the last one first; then they work.
+    /// Fates of the next workers of sites, the last one first; then they work.
     pub(crate) fates: Mutex<Vec<Fate>>,
-    /// What befalls the workers of one site, always.
+    /// Permanent fate of the workers of one site.
     pub(crate) fate_of: Mutex<BTreeMap<String, Fate>>,
     /// Every run that was kept: its job and attempt.
     pub(crate) kept: Mutex<Vec<(i64, i64)>>,
-    /// Every worker that was started, by what it was for.
+    /// Every started worker, by its purpose.
     pub(crate) started: Mutex<Vec<String>>,
     pub(crate) clock: Clock,
     more: String,
 }
 
 impl World {
-    /// A world at `now_ms`; `more` stands in the configuration besides the folders.
+    /// A world at `now_ms`; `more` is added to the configuration of the folders.
     pub(crate) fn new(now_ms: i64, more: &str) -> Arc<Self> {
         let folder = tempfile::tempdir().unwrap();
         for name in ["sites", "kernels", "data"] {
@@ -143,7 +143,7 @@ impl World {
         found.map(|(text, _)| text.clone())
     }
 
-    /// Takes a folder away, or brings it back.
+    /// Removes a folder, or restores it.
     pub(crate) fn mount(&self, name: &str, there: bool) {
         let mut away = self.away.lock().unwrap();
         away.retain(|root| *root != self.key(name));
@@ -165,17 +165,17 @@ impl World {
         self.put(&format!("sites/{name}.toml"), &text);
     }
 
-    /// Lets the clock go on.
+    /// Advances the clock.
     pub(crate) fn later(&self, seconds: i64) {
         self.clock.set(self.clock.now_ms() + seconds * 1000);
     }
 
-    /// What a clean run of a site would publish now.
+    /// The publication of a clean run of a site at present.
     pub(crate) fn clean(&self, site: &str) -> Option<String> {
         work::product(self, &self.path(&format!("sites/{site}.toml"))).ok()
     }
 
-    /// What readers of a site get.
+    /// The current products of a site.
     pub(crate) fn current(&self, site: &str) -> Option<String> {
         fs::read_to_string(self.path(&format!("products/{site}/current/product.txt"))).ok()
     }
@@ -186,7 +186,7 @@ impl World {
     }
 }
 
-/// A service in a world, as long as it lives.
+/// A running service in a world.
 pub(crate) struct Life {
     pub(crate) shared: Arc<Shared>,
     pub(crate) engine: Arc<Engine<Played>>,
@@ -218,13 +218,13 @@ impl Life {
         }
     }
 
-    /// One turn; what it began goes on.
+    /// One turn; its tasks continue.
     pub(crate) fn turn(&self) {
         let runtime = self.runtime.as_ref().unwrap();
         runtime.block_on(async { self.engine.turn().unwrap() });
     }
 
-    /// Turns until nothing is under way and nothing is due at this instant.
+    /// Repeats turns until no task is in progress and nothing is due.
     pub(crate) fn settle(&self) {
         for _ in 0..20_000 {
             self.turn();
@@ -236,7 +236,7 @@ impl Life {
         panic!("no end: {:?}", self.jobs());
     }
 
-    /// Sweeps at intervals of `seconds`, so often.
+    /// Sweeps repeatedly at intervals of `seconds`.
     pub(crate) fn go_on(&self, world: &World, seconds: i64, times: usize) {
         for _ in 0..times {
             world.later(seconds);
@@ -264,7 +264,7 @@ impl Life {
         jobs.map(|job| (job.site, job.state)).collect()
     }
 
-    /// The answer to a question to the database, row by row, columns as text.
+    /// The answer to a database query, row by row, columns as text.
     pub(crate) fn ask(&self, question: &str) -> Vec<String> {
         let asked = self.shared.read(|connection| {
             let mut query = connection.prepare(question)?;

@@ -1,4 +1,4 @@
-//! What played workers do.
+//! Work of simulated workers.
 
 use std::{fs, io::Write as _, path::Path, sync::Arc, time::Duration};
 
@@ -21,7 +21,7 @@ use tokio::{sync::watch, time::sleep};
 
 use super::{Fate, World};
 
-/// Plays workers.
+/// Simulated workers.
 #[derive(Debug, Clone)]
 pub(crate) struct Played(pub(crate) Arc<World>);
 
@@ -255,7 +255,7 @@ impl Played {
         }))
     }
 
-    /// Keeps what stands in the working folder as a run, unless the newest run is that.
+    /// Keeps the content of the working folder as a run, unless the newest run equals it.
     fn keep(&self, task: &Task, working: &Path, runs: &Path, run: &str) -> bool {
         let bytes = fs::read(working.join("manifest.json")).unwrap();
         let stands = newest(runs).and_then(|newest| fs::read(newest.join("manifest.json")).ok());
@@ -290,7 +290,7 @@ fn inputs(world: &World, site_file: &Path) -> Vec<std::path::PathBuf> {
     files.iter().map(|file| world.path(&name(file))).collect()
 }
 
-/// What a site publishes: what it read. Or which kernel is not there.
+/// The product of a site, which lists its inputs; otherwise the missing kernel.
 pub(crate) fn product(world: &World, site_file: &Path) -> Result<String, String> {
     let mut product = format!("{}\n", site_name(site_file));
     for path in inputs(world, site_file) {
@@ -305,7 +305,7 @@ fn manifest(folder: &Path) -> Option<Manifest> {
     serde_json::from_slice(&fs::read(folder.join("manifest.json")).ok()?).ok()
 }
 
-/// Publishes a product, as often as it is another one.
+/// Publishes a product if it differs.
 fn publish(working: &Path, site: &str, product: &str, now_ms: i64) {
     fs::create_dir_all(working).unwrap();
     if manifest(working).is_some_and(|stands| stands.stages[0].fingerprint == hash(product)) {
