@@ -1,4 +1,4 @@
-//! How a flow of one stage is answered: a line or JSON, the verdict, the exit code.
+//! The answer of a flow of one stage: a line or JSON, the verdict, the exit code.
 
 use std::process::ExitCode;
 
@@ -11,7 +11,7 @@ use crate::{
     store::manifest::Manifest,
 };
 
-/// What such a flow is called in its answer.
+/// Name of such a flow in its answer.
 pub(super) struct Asked<'a> {
     /// The key of its name in JSON.
     pub(super) what: &'static str,
@@ -21,7 +21,7 @@ pub(super) struct Asked<'a> {
     pub(super) json: bool,
 }
 
-/// Prints how a run ended, with its counts in words.
+/// Prints the outcome of a run, with its counts in words.
 pub(super) fn answer(
     asked: &Asked<'_>,
     ran: Result<SingleOutcome>,
