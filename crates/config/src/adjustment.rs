@@ -41,8 +41,8 @@ declare_table! {
         model: AdjustmentModel = key(words_of(
             AdjustmentModel::WORDS,
             [
-                "heights of tie points by the MOLA surface, orientations by what is known of orbit and attitude",
-                "image coordinates of footprints as observations, one standard deviation an image (Yoon & Shan 2004)",
+                "heights of tie points by the MOLA surface, orientations by a priori orbit and attitude",
+                "image coordinates of footprints as observations, one standard deviation per image (Yoon & Shan 2004)",
             ],
         )).or(AdjustmentModel::MolaSurface),
         /// Standard deviations of tie points, along and across the track, in the focal plane (the paper); measurements
@@ -61,20 +61,20 @@ declare_table! {
         /// unknown, whatever their standard deviation.
         position_unknowns: PositionUnknowns = key(words_of(
             PositionUnknowns::WORDS,
-            ["", "a constant", "and what is linear in t", "and what is quadratic"],
+            ["", "a constant", "and a linear term in t", "and a quadratic term"],
         )).or(PositionUnknowns::Acceleration),
         /// The same of rotations, as jigsaw's camsolve says.
         rotation_unknowns: RotationUnknowns = key(words_of(
             RotationUnknowns::WORDS,
-            ["", "constants", "and what is linear in t", "and what is quadratic"],
+            ["", "constants", "and linear terms in t", "and quadratic terms"],
         )).or(RotationUnknowns::Acceleration),
         /// Whether what the images of a pair disagree by along the flight is put down to one offset of the time at which
         /// attitudes were read, the same for all images: it turns those that follow nadir, and those that are held towards
         /// a star not. Otherwise all images are as likely to be wrong. Tie points do not tell, so this is a decision and no
         /// estimate; where a pair disagrees by more than 100 m the report and adjustment.json have both.
         attitude_clock: bool = key(yes_or_no(
-            "all images are as likely to be wrong",
-            "the images that follow nadir are wrong, by one offset",
+            "all images are equally likely to be in error",
+            "nadir-following images are in error, by one offset",
         )).or(false),
         /// Standard deviation of that offset.
         attitude_clock_sigma_s: f64 = key(SIGMA).or(1.0),
@@ -93,16 +93,16 @@ declare_table! {
         /// report states that relief knows the place to less than half of what is known beforehand: ground rougher than 25 m
         /// at 300 m for measurements of a pixel, 7 m for 0.3 pixels.
         relief_for_plan: bool = key(yes_or_no(
-            "a slope makes heights less certain and nothing else",
-            "each profile may lie elsewhere, and tie points move to where their heights fit",
+            "a slope only increases the uncertainty of heights",
+            "each profile may be offset in plan, and tie points move to where their heights fit",
         )).or(false),
         /// Whether the laser's place in an image that was exposed meanwhile is an observation: camera and laser are on one bus, so
         /// that the mounting tells it, whatever the attitude was. It needs profiles that were flown with the images, whose
         /// place is known to `mola_surface.profile_plan_sigma_m`; each profile then may lie elsewhere, and the laser may point
         /// elsewhere than its file and the frame kernels say.
         common_bus: bool = key(yes_or_no(
-            "footprints say nothing of the attitude",
-            "a footprint is in the simultaneous image where the mounting has the laser",
+            "footprints do not constrain the attitude",
+            "the mounting gives the position of a footprint in the simultaneous image",
         )).or(false),
         /// Standard deviation of the two angles by which the laser points elsewhere, the same for all images: 0.1 mrad. No alignment
         /// with its standard deviation is published; the narrow-angle camera was aligned in flight with the altimeter

@@ -294,11 +294,11 @@ declare_table! {
     pub struct SolutionConfig {
         /// What ties estimate before there is control.
         mode: CalibrationMode = key(words([
-            ("differential", CalibrationMode::Differential, "what roll and scale of the cameras differ by, which ties see"),
+            ("differential", CalibrationMode::Differential, "differences of roll and scale between the cameras, which ties determine"),
             (
                 "as_published",
                 CalibrationMode::AsPublished,
-                "all angles of all cameras, some of whose combinations ties see badly or not at all: they can drive the camera away",
+                "all angles of all cameras; ties determine some combinations weakly or not at all, so that the camera can drift away",
             ),
         ])).or(CalibrationMode::Differential),
         /// Order of the polynomials of the look angles.
@@ -381,7 +381,7 @@ pub fn calibration_example() -> String {
 pub fn calibration_schema() -> impl Serialize {
     schema(
         "Calibration of the lines of a camera by areograph",
-        "The TOML file of one calibration as JSON. areograph checks more than a schema can: files that are there, \
+        "The TOML file of one calibration as JSON. areograph checks more than a schema can: existing files, \
          agreement between keys.",
         &described::<CalibrationConfig>(),
     )

@@ -198,16 +198,16 @@ declare_table! {
         /// What puts the pictures on the map.
         method: Method = key(words([
             ("scale", Method::Scale, "BRICK, EXTEND, SCALE: the figure keeps its shape"),
-            ("mortar", Method::Mortar, "BRICK, EXTEND, MORTAR, SCALE: bricks give way to the controls by their weights"),
+            ("mortar", Method::Mortar, "BRICK, EXTEND, MORTAR, SCALE: bricks adapt to the controls by their weights"),
             ("one_shot", Method::OneShot, "all pictures and controls at once, by their weights"),
         ])).or(Method::Scale),
         /// LOCAL: evens out the seams between bricks afterwards.
-        local: bool = key(yes_or_no("seams stay as they are", "pictures of a brick give way to its neighbours")).or(false),
+        local: bool = key(yes_or_no("seams remain unchanged", "pictures of a brick adapt to its neighbours")).or(false),
         /// Pictures of a brick, where the table of pictures names no bricks.
         brick_pictures: u32 = key(whole_from_to(2, 100)).or(8),
         /// Blunders in bricks: measurements flagged beyond 3.5 robust standard deviations without which a brick's root mean square falls by 30 %.
         blunders: Blunders = key(words([
-            ("remove", Blunders::Remove, "leave them out, and say so"),
+            ("remove", Blunders::Remove, "leave them out and report them"),
             ("report", Blunders::Report, "flag them and use them"),
         ])).or(Blunders::Remove),
         /// Standard deviation of a coordinate of a measurement on the map. Without it, what the bricks' deviations say.
@@ -293,7 +293,7 @@ pub fn net_example() -> String {
 pub fn net_schema() -> impl Serialize {
     schema(
         "Net of rectified pictures of areograph",
-        "The TOML file of one net as JSON. areograph checks more than a schema can: files that are there, agreement \
+        "The TOML file of one net as JSON. areograph checks more than a schema can: existing files, agreement \
          between keys.",
         &described::<NetConfig>(),
     )

@@ -21,7 +21,7 @@ declare_table! {
         /// products. How far the others are from it is told for every image. Ranges are geometric always.
         light_time: LightTime = key(words_of(LightTime::WORDS, [
             "where the camera was when the light left the ground: light time to the surface and aberration",
-            "where it was at the exposure, as papers without a word on it are read",
+            "where it was at the exposure, as for papers that do not state a convention",
             "where it seems to be from the centre of Mars (LT+S): to match ISIS and ALE",
         ])).or(LightTime::Surface),
         /// Largest second-order position RMSE, norm of x, y, z. The default is about twice the largest in Table 4
@@ -40,8 +40,8 @@ declare_table! {
         /// told in `registration.json` and in the report.
         model: CameraModel = key(words_of(CameraModel::WORDS, [
             "positions and angles as polynomials of first order (Shan, Lee & Yoon 2002)",
-            "of second order (Shan et al. 2005); angles lose their meaning near the equator",
-            "second order with a rotation vector, which means the same at every latitude",
+            "of second order (Shan et al. 2005); angles are poorly determined near the equator",
+            "second order with a rotation vector, which is well determined at every latitude",
             "interpolation between the samples, no polynomial over the whole image",
         ])).or(CameraModel::RotationVector),
         /// A step of the two published iterations below this is the last. The default is that of the papers.

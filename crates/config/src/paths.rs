@@ -81,7 +81,7 @@ fn what_is_at(path: &Path) -> &'static str {
         Ok(found) if found.is_file() => "a file",
         Ok(_) => "neither a file nor a folder",
         Err(error) if error.kind() == std::io::ErrorKind::PermissionDenied => "not readable",
-        Err(_) => "not there",
+        Err(_) => "missing",
     }
 }
 

@@ -36,7 +36,7 @@ const HEADER: &str = "\
 /// A person reads what hooks tell; more programs than this are a slip.
 const HOOKS: Many = Many {
     count: Some((1, 16)),
-    purpose: " programs that are told",
+    purpose: " programs that receive events",
     ..Many::ANY
 };
 
@@ -315,7 +315,7 @@ impl AlertKind {
         (
             "stale",
             Self::Stale,
-            "a site is stale, or was not looked at for too long",
+            "a site is stale, or was not checked for too long",
         ),
         (
             "root_unavailable",
@@ -404,7 +404,7 @@ pub fn service_example() -> String {
 pub fn service_schema() -> impl Serialize {
     schema(
         "Service configuration of areograph",
-        "The TOML file of the service as JSON. areograph checks more than a schema can: agreement between keys, and folders that are there.",
+        "The TOML file of the service as JSON. areograph checks more than a schema can: agreement between keys, and existing folders.",
         &described::<ServiceConfig>(),
     )
 }

@@ -255,7 +255,7 @@ fn other_bodies(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     }
     if site.images.iter().any(|image| image.isd.is_none()) {
         let text = format!(
-            "images on {body} need support data (images.isd): labels and kernels are read of spacecraft at Mars alone"
+            "images on {body} need support data (images.isd): labels and kernels are read only of spacecraft at Mars"
         );
         let span = keys.span_of("images");
         keys.review().problem(span, text);
