@@ -79,7 +79,7 @@ impl Compared {
 /// Sets that cannot be compared.
 #[derive(Debug, thiserror::Error)]
 enum CompareError {
-    #[error("kernel set {other} holds the same kernels as {first}")]
+    #[error("kernel set {other} contains the same kernels as {first}")]
     Same { first: String, other: String },
     #[error("the kernel sets have no common coverage of the position of {}; {held}", SPACECRAFT.name)]
     NothingInCommon { held: String },
@@ -183,10 +183,10 @@ fn nothing_in_common(
 ) -> CompareError {
     let held = sets.iter().zip(positions).map(|(set, held)| {
         let held = required.map_or_else(|| held.clone(), |required| required.intersection(held));
-        format!("{} holds {:.3} s", set.id, held.duration_s())
+        format!("{} covers {:.3} s", set.id, held.duration_s())
     });
     let of = required.map_or_else(String::new, |required| {
-        format!(" of {:.3} s asked for", required.duration_s())
+        format!(" of {:.3} s requested", required.duration_s())
     });
     CompareError::NothingInCommon {
         held: held.collect::<Vec<_>>().join(", ") + &of,

@@ -133,7 +133,7 @@ fn gimbal_locks(images: &[SiteImage]) -> Result<Vec<String>> {
         let (times, model) = (image.times.value()?, image.model.value()?);
         if model.near_gimbal_lock {
             locks.push(format!(
-                "image {}: |cos φ| falls to {:.3}, where ω and κ are poorly determined; the rotation-vector form is not",
+                "image {}: |cos φ| falls to {:.3}, where ω and κ are poorly determined; the rotation-vector form is unaffected",
                 times.id, model.cos_phi_min
             ));
         }
@@ -155,7 +155,7 @@ fn same_exposures(images: &[SiteImage]) -> Result<Vec<String>> {
                 .abs();
             if apart_s < times.line_times.mean_period_s() && times.detector() == other.detector() {
                 same.push(format!(
-                    "images {} and {} were exposed at the same time by the same pixels: one label may stand for another",
+                    "images {} and {} were exposed at the same time by the same pixels: one of the labels may belong to another image",
                     other.id, times.id
                 ));
             }

@@ -18,7 +18,7 @@ pub fn schema() -> DocumentSchema {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(
     title = "Manifest of a site",
-    description = "manifest.json of areograph: what the products of a site were made from. finished_utc is the only entry that depends on the clock."
+    description = "manifest.json of areograph: the inputs of the products of a site. finished_utc is the only entry that depends on the clock."
 )]
 pub struct Manifest {
     /// Always `areograph`.
@@ -97,7 +97,7 @@ pub mod figures {
     const ALL: [(&str, &str); 13] = [
         (
             HELD_OUT_RMS_M,
-            "Root mean square of terrain model minus laser at shots that were held out of a match, bias removed, metres.",
+            "Root mean square of terrain model minus laser at shots withheld from a match, bias removed, metres.",
         ),
         (
             RANGE_MEAN_M,
@@ -121,7 +121,7 @@ pub mod figures {
         ),
         (
             HEIGHT_OFF_SURFACE_M,
-            "|Median| height of tie points above the ground between MOLA's shots, metres.",
+            "|Median| height of tie points above the MOLA surface, metres.",
         ),
         (
             ADJUSTED_HEIGHT_OFF_SURFACE_M,
@@ -145,7 +145,7 @@ pub mod figures {
         ),
         (
             HELD_BACK_HEIGHT_RMS_M,
-            "Root mean square height of held-back control of a calibration, intersected minus the laser's, metres.",
+            "Root mean square height of withheld control of a calibration, intersected minus the laser's, metres.",
         ),
     ];
 

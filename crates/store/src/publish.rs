@@ -131,7 +131,7 @@ pub fn entries(staging: &Path, files: &[(PathBuf, u64)]) -> Result<Vec<ProductEn
 
 /// Products of another kind in the folder, which a publication would remove.
 #[derive(Debug, thiserror::Error)]
-#[error("the folder holds other products: {name}, made by {stage}")]
+#[error("the folder contains other products: {name}, made by {stage}")]
 struct OtherKind {
     name: String,
     stage: String,

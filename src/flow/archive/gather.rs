@@ -25,7 +25,7 @@ pub(super) struct Gathered {
 
 /// A file whose shots another one holds as well.
 #[derive(Debug, thiserror::Error)]
-#[error("holds shots of orbit {orbit} that {} holds as well; its shots do not count", .other.display())]
+#[error("contains shots of orbit {orbit} that {} contains as well; its shots are left out", .other.display())]
 struct SharedShots {
     orbit: u32,
     other: PathBuf,

@@ -89,6 +89,6 @@ fn notes(ranges: &ArchiveRanges) -> Vec<String> {
     let failures = ranges.failures.iter();
     let failures = failures.map(|failure| format!("{}: not read: {}", failure.file, failure.why));
     let copies = ranges.copies.iter();
-    let copies = copies.map(|copy| format!("{} is a copy of {}: taken once", copy.file, copy.of));
+    let copies = copies.map(|copy| format!("{} is a copy of {}: used once", copy.file, copy.of));
     failures.chain(copies).collect()
 }

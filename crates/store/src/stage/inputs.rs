@@ -220,7 +220,7 @@ impl Inputs {
         let gone = earlier.named.keys();
         let pending = |name: &str| self.pending.iter().any(|prefix| name.starts_with(prefix));
         let gone = gone.filter(|name| !self.named.contains_key(*name) && !pending(name));
-        changes.extend(gone.map(|name| format!("{name} is gone")));
+        changes.extend(gone.map(|name| format!("{name} was removed")));
         changes
     }
 }
@@ -277,7 +277,7 @@ mod tests {
                 "kernel naif0013.tls is new",
                 "key range_check.mean_max_m changed",
                 "output of tag_times may change",
-                "kernel naif0012.tls is gone",
+                "kernel naif0012.tls was removed",
             ]
         );
     }
