@@ -14,7 +14,7 @@ use crate::{
 /// Complaints that the manifest quotes; all are counted.
 const COMPLAINTS_QUOTED: usize = 100;
 
-/// What the manifest says of an archive but for its products.
+/// The manifest of an archive without its products.
 pub(super) fn manifest(ranges: &ArchiveRanges, inputs: &Inputs) -> Manifest {
     let [without, partly] = ranges.not_covered();
     let beyond = ranges.profiles();

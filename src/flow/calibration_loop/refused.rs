@@ -58,7 +58,7 @@ impl Cause for FewUnits {
 }
 
 impl FewUnits {
-    /// Of what the laser found in a terrain model; nothing where it is enough.
+    /// Checks the units that the laser found in a terrain model; `None` if they suffice.
     pub(super) fn of(control: &LaserMatch) -> Option<Self> {
         let units = |judges: bool| {
             control
