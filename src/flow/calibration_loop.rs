@@ -4,7 +4,7 @@
 //! A round calls plain functions of four stages: `match_ties::match_lines`, `calibrate` by ties only,
 //! `map_surface::map_lines`, `match_laser::match_model`, and `calibrate` by ties and control. It hands calibrated
 //! support data to the next round, as a user would. Every calibration by control begins at the given support data, so
-//! no error accumulates. Ground is withheld in rectangles of a lattice that does not depend on the model, so that a
+//! that no error accumulates. Ground is withheld in rectangles of a lattice that does not depend on the model, so that a
 //! shot remains on one side in all rounds.
 //!
 //! # Source

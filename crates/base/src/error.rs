@@ -201,7 +201,7 @@ impl Cause for IoError {
                 "free some space or choose another --out, then run again: finished stages are kept"
             }
             ErrorKind::IsADirectory | ErrorKind::NotADirectory => {
-                "check the path: a file is in place of a folder, or a folder in place of a file"
+                "check the path: a file is where a folder is expected, or a folder where a file is expected"
             }
             _ => "check the file and the disk, then run again",
         }
@@ -211,7 +211,7 @@ impl Cause for IoError {
     fn advice_on_configured(&self) -> String {
         let advice = self.advice();
         if self.source.kind() == std::io::ErrorKind::NotFound {
-            return advice + "; relative paths in a configuration count from that file's folder";
+            return advice + "; relative paths in a configuration are relative to the folder of that file";
         }
         advice
     }

@@ -20,13 +20,13 @@ pub enum Unmatched {
     #[error("too near to the edge of an image")]
     Edge,
     /// Nothing within the margin is like it.
-    #[error("no place within the margin correlates")]
+    #[error("no correlation within the margin")]
     Unlike,
     /// Which of two is it?
     #[error("another place correlates nearly as well")]
     Ambiguous,
     /// Least squares leads away, or does not end.
-    #[error("least squares does not settle")]
+    #[error("least squares does not converge")]
     Unsettled,
     /// Searched from the other image, it is not found, or elsewhere.
     #[error("not the same place when searched from the other image")]
@@ -35,7 +35,7 @@ pub enum Unmatched {
     #[error("its standard deviation is too large")]
     Uncertain,
     /// A cell of a terrain model that most cells around it contradict.
-    #[error("most cells around it have other heights")]
+    #[error("most neighbouring cells have different heights")]
     Alone,
 }
 

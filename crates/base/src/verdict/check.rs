@@ -181,7 +181,7 @@ impl fmt::Display for Check {
         let (words, subject) = (self.words(), &*self.subject);
         let (Some(value), Some(limit)) = (self.value, self.limit) else {
             let what = match (subject, self.limit.is_some()) {
-                ("", true) => "no number",
+                ("", true) => "not finite",
                 ("", false) => "no",
                 _ => subject,
             };
