@@ -6,7 +6,6 @@
 //!  results in order of time, every shot once ─► shots of the worst profiles ─► verdict ─► products, manifest last
 //! ```
 //!
-//! Two loads, a wave of tasks and one or two profiles are in memory, whatever the size of the archive. One thread reads
 //! At most two loads, a wave of tasks and one or two profiles are in memory, regardless of the size of the archive.
 //! One thread reads a load of records and tabulates the trajectory over it, the only part that calls CSPICE;
 //! meanwhile all threads check the preceding load.

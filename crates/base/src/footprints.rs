@@ -89,6 +89,7 @@ pub enum FootprintImageCoordinates {
     Off,
     /// No observations, but projections with the adjusted orientation: a coordinate that follows the orientation has
     /// no residual and carries no weight, no freedom and no covariance.
+    Reproject,
 }
 
 impl FootprintImageCoordinates {
@@ -160,8 +161,8 @@ macro_rules! columns {
 
             /// The shot in row `row`, counted from 0.
             ///
+            /// # Panics
             /// If the row does not exist.
-            /// When there is no such row.
             #[must_use]
             pub fn row(&self, row: usize) -> Footprint {
                 Footprint { $($column: self.$column[row],)* }

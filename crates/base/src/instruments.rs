@@ -7,9 +7,9 @@
 //! belong to the spacecraft of the laser.
 //!
 //! In code, only readers of labels and files, the synthetic mission and examples of keys name any of them: a test
-//! checks the sources.
-//! or a curve (`Distortion`), which ground to image, intersection and adjustment use through the tangents of look
-//! directions.
+//! checks the sources. The look direction of a sample is `geom::pushbroom::Detector`: a straight line in an ideal focal
+//! plane, or a curve (`Distortion`), which ground to image, intersection and adjustment use through the tangents of
+//! look directions.
 
 use std::fmt;
 

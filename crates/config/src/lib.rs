@@ -170,7 +170,6 @@ fn read(path: &Path) -> Result<String, Error> {
 /// Checks the configuration `text` of `file`.
 /// Besides the text it examines only what the text names: whether files exist, which files globs match, and the
 /// polygons of windows.
-/// match, and the polygons of windows.
 ///
 /// # Errors
 /// [`Problems`] with everything that is wrong.

@@ -32,7 +32,8 @@ const HEADER: &str = "\
 ";
 
 declare_table! {
-    /// Everything that `areograph triangulate` needs to know about a net: every value checked, metres and radians inside.
+    /// Everything that `areograph triangulate` needs to know about a net: every value checked, metres and radians
+    /// inside.
     pub struct NetConfig {
         /// Identifier, and the name of the folder of its products.
         net: String = key(lower_case_identifier()).required().example(r#""tertiary""#),
@@ -49,7 +50,7 @@ declare_table! {
         measurements: MeasurementsConfig = table(),
         /// Points on the map.
         controls: ControlsConfig = table(),
-        /// Pictures; none when nothing is said of them.
+        /// Pictures; empty without a table of them.
         pictures: PicturesConfig = table(),
         /// Corrections of the film.
         film: FilmConfig = table(),
@@ -125,9 +126,9 @@ declare_table! {
 declare_table! {
     /// A priori data of the pictures. Without this table the pictures are those of the measurements.
     pub struct PicturesConfig {
-        /// Paths or globs of tables (.csv), one row per picture: `picture`, and where known `brick`, the name of its brick, and
-        /// `metres_per_unit`, the size of a unit of its coordinates on the ground, from which the adjusted one may differ by a
-        /// factor of 2.
+        /// Paths or globs of tables (.csv), one row per picture: `picture`, and where known `brick`, the name of its
+        /// brick, and `metres_per_unit`, the size of a unit of its coordinates on the ground, from which the adjusted
+        /// one may differ by a factor of 2.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs).or(Vec::new()).unused(r#"["pictures.csv"]"#),
     }
@@ -136,10 +137,10 @@ declare_table! {
 declare_table! {
     /// Corrections of the film, before anything else.
     pub struct FilmConfig {
-        /// Paths or globs of tables (.csv) of ticks, one row per tick: `picture`, `tick`, measured `x`, `y`, known `known_x`,
-        /// `known_y`. The ticks `upper_left`, `upper_right`, `lower_left` and `lower_right` give linear double interpolation
-        /// (drum scanners); with `upper`, `lower`, `left` and `right`, the middles of the edges, a quadratic that is 0 at the
-        /// corners is added (cathode-ray recorders).
+        /// Paths or globs of tables (.csv) of ticks, one row per tick: `picture`, `tick`, measured `x`, `y`, known
+        /// `known_x`, `known_y`. The ticks `upper_left`, `upper_right`, `lower_left` and `lower_right` give linear
+        /// double interpolation (drum scanners); with `upper`, `lower`, `left` and `right`, the middles of the edges,
+        /// a quadratic that is 0 at the corners is added (cathode-ray recorders).
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs).or(Vec::new()).unused(r#"["ticks.csv"]"#),
     }
@@ -206,7 +207,8 @@ declare_table! {
         local: bool = key(yes_or_no("seams remain unchanged", "pictures of a brick adapt to its neighbours")).or(false),
         /// Pictures of a brick, where the table of pictures names no bricks.
         brick_pictures: u32 = key(whole_from_to(2, 100)).or(8),
-        /// Blunders in bricks: measurements flagged beyond 3.5 robust standard deviations without which a brick's root mean square falls by 30 %.
+        /// Blunders in bricks: measurements flagged beyond 3.5 robust standard deviations without which a brick's
+        /// root mean square falls by 30 %.
         blunders: Blunders = key(words([
             ("remove", Blunders::Remove, "leave them out and report them"),
             ("report", Blunders::Report, "flag them and use them"),
@@ -260,8 +262,8 @@ pub struct LoadedNet {
 
 /// Reads and checks the net `path`; relative paths in it count from its own folder.
 ///
-/// # Errors
-/// [`Problems`] with everything that is wrong, or [`IoError`](areograph_base::error::IoError) when the file cannot be read.
+/// # Errors [`Problems`] with everything that is wrong, or [`IoError`](areograph_base::error::IoError) when the file
+/// cannot be read.
 pub fn load_net(path: &Path) -> Result<LoadedNet, Error> {
     let text = read(path)?;
     Ok(parse_net(&text, path)?)
