@@ -261,7 +261,7 @@ mod tests {
         assert_eq!(
             failure.to_string(),
             "gusev/search_footprints: ap19019k.b: cannot read: entity not found\n  \
-             what to do: check the path; relative paths in a configuration count from that file's folder"
+             what to do: check the path; relative paths in a configuration are relative to the folder of that file"
         );
         assert_eq!(failure.kind().exit_code(), 6);
     }
