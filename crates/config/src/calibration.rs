@@ -37,9 +37,9 @@ pub(super) const CALIBRATION_EXAMPLE: &str = "config/calibrations/example.toml";
 const HEADER: &str = "\
 # A calibration of the lines of a camera for `areograph calibrate`, every key with its unit, range and default.
 #
-# Only `calibration`, two [[cameras]] and [ties] are required; a key that is left out has the default written
-# here. Without [control] nothing tells where the camera looks, and the result is marked invalid. Where every camera has
-# `pixels`, ties.match and [laser] take the place of tables of points. Relative paths count from this file's folder.
+# Only `calibration`, two [[cameras]] and [ties] are required; a key that is left out has the default given
+# here. Without [control] absolute pointing is not determined, and the result is marked invalid. If every camera has
+# `pixels`, ties.match and [laser] replace tables of points. Relative paths are relative to the folder of this file.
 # Schema: ../schema/calibration.schema.json
 
 ";
@@ -344,7 +344,7 @@ pub struct LoadedCalibration {
     pub warnings: Vec<String>,
 }
 
-/// Reads and checks the calibration `path`; relative paths in it count from its own folder.
+/// Reads and checks the calibration `path`; relative paths in it are relative to its folder.
 ///
 /// # Errors
 /// [`Problems`] with everything that is wrong, or [`IoError`](areograph_base::error::IoError) when the file cannot be read.

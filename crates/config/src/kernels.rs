@@ -48,7 +48,7 @@ declare_table! {
 declare_table! {
     /// The source of the kernel list.
     struct SourceKeys {
-        /// A SPICE metakernel; relative paths in it count from its own folder.
+        /// A SPICE metakernel; relative paths in it are relative to its folder.
         metakernel: Option<PathBuf> = key(FILE).example(r#""../kernels/scene.tm""#),
         /// Or kernels in load order, plain paths without wildcards; later ones win.
         files: Option<Vec<PathBuf>> = key(list(FILE).each_once("each kernel once"))

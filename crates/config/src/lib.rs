@@ -104,7 +104,7 @@ const HEADER: &str = "\
 # Site configuration of areograph, every key with its unit, range and default.
 #
 # Only `site`, one source of kernels, and either [pedr] (or [[shots]]) with [[windows]] or [[images]] are required;
-# a key that is left out has the default written here. Relative paths count from this file's folder.
+# a key that is left out has the default given here. Relative paths are relative to the folder of this file.
 # Angles are degrees, exposures milliseconds, times seconds; longitudes are east, latitudes
 # areocentric, both in the frame of the body: IAU 2000 of Mars. Schema: ../schema/site.schema.json
 
@@ -124,7 +124,7 @@ pub struct Loaded {
     pub files: Vec<PathBuf>,
 }
 
-/// Reads and checks the configuration `path`; relative paths in it count from its own folder.
+/// Reads and checks the configuration `path`; relative paths in it are relative to its folder.
 ///
 /// # Errors
 /// [`Problems`] with everything that is wrong, or [`IoError`] when the file cannot be read.

@@ -26,8 +26,8 @@ pub(super) const NET_EXAMPLE: &str = "config/nets/example.toml";
 const HEADER: &str = "\
 # A net of rectified pictures for `areograph triangulate`, every key with its unit, range and default.
 #
-# Only `net`, [measurements] and [controls] are required; a key that is left out has the default written
-# here. Relative paths count from this file's folder. Schema: ../schema/net.schema.json
+# Only `net`, [measurements] and [controls] are required; a key that is left out has the default given
+# here. Relative paths are relative to the folder of this file. Schema: ../schema/net.schema.json
 
 ";
 
@@ -260,7 +260,7 @@ pub struct LoadedNet {
     pub warnings: Vec<String>,
 }
 
-/// Reads and checks the net `path`; relative paths in it count from its own folder.
+/// Reads and checks the net `path`; relative paths in it are relative to its folder.
 ///
 /// # Errors [`Problems`] with everything that is wrong, or [`IoError`](areograph_base::error::IoError) when the file
 /// cannot be read.

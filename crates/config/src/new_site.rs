@@ -12,11 +12,11 @@ use super::keys;
 
 /// How such a file begins.
 const HEADER: &str = "\
-# Written by `areograph init`. Keys that are left out have their defaults; relative paths count from this file's folder.
-# `areograph check` says what a run would stumble over.
+# Written by `areograph init`. Keys that are left out have their defaults; relative paths are relative to its folder.
+# `areograph check` reports everything that would stop a run.
 
 ";
-/// How far a window reaches beyond the image that it is named after, kilometres.
+/// Margin of a window beyond the image that it is named after, kilometres.
 const MARGIN_KM: f64 = 5.0;
 
 /// Content of a new site file, with paths as written there.

@@ -141,7 +141,7 @@ impl<'a> Review<'a> {
         }
     }
 
-    /// `path` as written in the file, counted from the file's folder unless absolute.
+    /// `path` as written in the file, relative to the file's folder unless absolute.
     pub(super) fn resolve(&self, path: &str) -> PathBuf {
         self.file
             .parent()

@@ -28,8 +28,8 @@ pub(super) const SERVICE_EXAMPLE: &str = "config/areograph.toml";
 const HEADER: &str = "\
 # The service of areograph, `areograph serve` and `areograph nightly`: every key with its unit, range and default.
 #
-# Only the folders of [inputs] are required; a key that is left out has the default written here. Relative paths
-# count from this file's folder. Schema: schema/service.schema.json
+# Only the folders of [inputs] are required; a key that is left out has the default given here. Relative paths
+# are relative to the folder of this file. Schema: schema/service.schema.json
 
 ";
 
@@ -250,7 +250,7 @@ declare_table! {
     /// Programs that receive events, as JSON on their standard input: run without a shell, ended after 30 s, run
     /// again when they fail.
     pub struct HookConfig {
-        /// Program and arguments; a relative path of the program counts from this file's folder.
+        /// Program and arguments; a relative path of the program is relative to the folder of this file.
         command: Vec<String> = key(list(any_text()))
             .required()
             .unused(r#"["/usr/local/bin/tell-us", "--mars"]"#)
@@ -367,7 +367,7 @@ pub struct LoadedService {
     pub warnings: Vec<String>,
 }
 
-/// Reads and checks the configuration `path` of the service; relative paths in it count from its own folder.
+/// Reads and checks the configuration `path` of the service; relative paths in it are relative to its folder.
 ///
 /// # Errors
 /// [`Problems`] with everything that is wrong, or [`IoError`](areograph_base::error::IoError) when the file cannot be read.
