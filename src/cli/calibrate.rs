@@ -13,7 +13,7 @@ use crate::{
     flow::run_calibration,
 };
 
-/// Calibrates the lines of a camera in orbit: ties between them, then laser points, part of which are held back for validation.
+/// Calibrates the lines of a camera in orbit: ties between them, then laser points, part of which are withheld for validation.
 ///
 /// Points are read from tables; with `ties.match` and `[laser]` they are measured in pixels, in rounds until convergence.
 ///
@@ -59,7 +59,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     let ran = run_calibration(&calibration, &arguments.out, arguments.force);
     answer(&asked, ran, |count| {
         format!(
-            "{} lines, {} ties, {} laser points, {} more held back, {} left out",
+            "{} lines, {} ties, {} laser points, {} more withheld, {} left out",
             count("cameras"),
             count("ties"),
             count("controls"),

@@ -17,7 +17,7 @@ pub(super) struct Asked<'a> {
     pub(super) what: &'static str,
     /// Its name.
     pub(super) name: &'a str,
-    /// Whether JSON was asked for.
+    /// Whether JSON was requested.
     pub(super) json: bool,
 }
 

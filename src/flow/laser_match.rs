@@ -35,7 +35,7 @@ impl Cause for NoFiles {
     }
 
     fn advice(&self) -> String {
-        "name PEDR files (AP#####v.B), or folders that hold them".to_owned()
+        "name PEDR files (AP#####v.B), or folders that contain them".to_owned()
     }
 }
 

@@ -11,7 +11,7 @@ pub enum StageEvent<'a> {
     Kept,
     /// Its progress.
     Counts(Count),
-    /// It is done, after so many seconds.
+    /// It is done, after this time in seconds.
     Done(f64),
 }
 

@@ -90,7 +90,7 @@ pub(super) fn check_out_path(out: &Path) -> Result<()> {
     };
     let text = out.to_str().ok_or_else(|| unspeakable("is not UTF-8"))?;
     if text.contains(char::is_control) {
-        return Err(unspeakable("holds control characters").into());
+        return Err(unspeakable("contains control characters").into());
     }
     for part in out {
         if part.len() > PART_LENGTH_MAX {

@@ -39,7 +39,7 @@ enum ShotsError {
     )]
     Polygon(usize),
     /// A folder without a run.
-    #[error("holds no products")]
+    #[error("contains no products")]
     NoRun,
     /// A product that this program did not write, or that a library rejects.
     #[error("cannot be {0}")]

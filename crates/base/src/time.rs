@@ -4,7 +4,7 @@
 //! only in labels, configuration and reports; `spice::Session` converts them.
 //!
 //! Only `PointingBias::lookup` makes a `CkLookup`, and only `Session::attitude` takes one, so that the −1.15 s of MOC
-//! moves attitude alone, once.
+//! shifts only attitudes, and only once.
 
 use std::fmt;
 

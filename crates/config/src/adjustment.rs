@@ -139,8 +139,8 @@ declare_table! {
         /// Standard deviation of ranges (the paper; the instrument: 7 m at 400 km).
         range_sigma_m: f64 = key(SIGMA).or(10.0),
         /// Range bias of each profile as an unknown with this standard deviation; 0 for no such unknown. Biases
-        /// up to 25 m occur off nadir (Table 3 of Shan et al. 2005). 30 unless the model is the published one, where
-        /// there is none.
+        /// up to 25 m occur off nadir (Table 3 of Shan et al. 2005). The default is 30, and no
+        /// such unknown in the published model.
         range_bias_sigma_m: Option<f64> = key(SIGMA_OR_NONE).unused("30.0"),
         /// Time bias of each image as an unknown with this standard deviation; 0 for no such unknown.
         time_bias_sigma_s as "time_bias_sigma_ms": f64 =

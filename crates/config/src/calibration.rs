@@ -382,7 +382,7 @@ pub fn calibration_example() -> String {
 pub fn calibration_schema() -> impl Serialize {
     schema(
         "Calibration of the lines of a camera by areograph",
-        "The TOML file of one calibration as JSON. areograph checks more than a schema can: existing files, \
+        "The TOML file of one calibration as JSON. areograph checks more than a schema can: existence of files, \
          agreement between keys.",
         &described::<CalibrationConfig>(),
     )

@@ -220,7 +220,7 @@ pub(super) struct Matching {
     takes: fn(&str) -> bool,
 }
 
-/// Text that `takes` accepts; `pattern` says the same, or less, as a regular expression.
+/// Text that `takes` accepts; `pattern` is the same condition, or a weaker one, as a regular expression.
 pub(super) fn matching(expected: &str, pattern: &'static str, takes: fn(&str) -> bool) -> Matching {
     Matching {
         expected: expected.to_owned(),
@@ -371,7 +371,7 @@ pub(super) struct Several<F, const N: usize> {
     expected: &'static str,
 }
 
-/// `N` values; `expected` says how many.
+/// `N` values; `expected` states how many.
 pub(super) const fn several<F, const N: usize>(form: F, expected: &'static str) -> Several<F, N> {
     Several { form, expected }
 }

@@ -22,7 +22,7 @@ pub(super) enum GeoJsonError {
     TooLong,
     #[error("{0}; expected Polygon, MultiPolygon, Feature or FeatureCollection")]
     Shape(#[from] serde_json::Error),
-    #[error("holds no polygon")]
+    #[error("contains no polygon")]
     Empty,
     #[error("has more than {VERTICES_MAX} vertices")]
     TooManyVertices,
@@ -310,7 +310,7 @@ mod tests {
         }
         assert_eq!(
             message(r#"{"type":"FeatureCollection","features":[]}"#),
-            "holds no polygon"
+            "contains no polygon"
         );
         assert!(
             message(r#"{"type":"Point","coordinates":[0,0]}"#).contains("unknown variant `Point`")

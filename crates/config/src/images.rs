@@ -1,4 +1,4 @@
-//! `[[images]]`: labels, or the keys that stand in for them.
+//! `[[images]]`: labels, or the keys that replace them.
 
 use std::path::PathBuf;
 
@@ -132,7 +132,7 @@ declare_table! {
         downtrack_summing = key(SUMMING).example_in(1, "8"),
         /// Detector pixels summed across the track.
         crosstrack_summing = key(SUMMING).example_in(1, "8"),
-        /// Lines that were exposed, as the image header says; the time model counts these, less than 600 s in
+        /// Exposed lines, as in the image header; the time model counts these, less than 600 s in
         /// all.
         lines_header = key(whole_from_to(IMAGE_LINES_MIN, LINES_MAX)).example_in(1, "1536"),
         /// Lines in the delivered file, when fewer.
@@ -151,7 +151,7 @@ fn milliseconds(example: &'static str) -> impl Declare<Value = Option<f64>> {
         .map(|value_ms| value_ms.map(|value_ms| value_ms * SECONDS_PER_MS))
 }
 
-/// Keys that stand in for a label.
+/// Keys that replace a label.
 const OF_FIELDS: [&str; 11] = [
     "exposures",
     "sclk_start",

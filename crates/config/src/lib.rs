@@ -253,7 +253,7 @@ pub fn example() -> String {
 pub fn schema() -> impl Serialize {
     declare::schema(
         "Site configuration of areograph",
-        "The TOML file of one site as JSON. areograph checks more than a schema can: existing files, order \
+        "The TOML file of one site as JSON. areograph checks more than a schema can: existence of files, order \
          within windows, agreement between keys.",
         &described::<SiteConfig>(),
     )

@@ -297,7 +297,7 @@ pub fn net_example() -> String {
 pub fn net_schema() -> impl Serialize {
     schema(
         "Net of rectified pictures of areograph",
-        "The TOML file of one net as JSON. areograph checks more than a schema can: existing files, agreement \
+        "The TOML file of one net as JSON. areograph checks more than a schema can: existence of files, agreement \
          between keys.",
         &described::<NetConfig>(),
     )

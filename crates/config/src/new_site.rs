@@ -170,7 +170,7 @@ mod tests {
             assert!(!first || above.starts_with('#'), "{line}");
             above = line;
         }
-        // Without a box the windows are what the images see; without PEDR files there are none.
+        // Without a box the windows are the outlines of the images; without PEDR files there are none.
         site.edges_deg = None;
         assert_eq!(parse(&site.text(), &file).unwrap().site.windows.len(), 2);
         site.pedr.clear();

@@ -170,7 +170,7 @@ fn matches(folder: &Path, glob: &str) -> Result<Vec<PathBuf>, String> {
     }
     let invalid =
         |error: glob::PatternError| format!("a glob: {} at character {}", error.msg, error.pos + 1);
-    // Checked alone first, so that the position counts in what was written.
+    // Checked separately first, so that the position refers to the written text.
     glob::Pattern::new(glob).map_err(invalid)?;
     let pattern = if Path::new(glob).is_absolute() {
         glob.to_owned()

@@ -150,7 +150,7 @@ declare_table! {
                 "the rotation into IAU 2000 (the one out of the file's datum stays at the tag)",
             ),
             ("both", BiasScope::Both, "both"),
-            ("none", BiasScope::None, "nothing: tags are taken as they are"),
+            ("none", BiasScope::None, "nothing: tags are used unchanged"),
         ])).or(BiasScope::SpkLookup),
         /// Citation that products repeat; change it together with the values.
         source = key(text()).or(usual_altimeter().clock_source.clone()),

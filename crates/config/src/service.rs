@@ -165,7 +165,7 @@ declare_table! {
     pub struct RetentionConfig {
         /// Newest runs of each site.
         runs: u32 = key(whole_from_to(1, 100_000)).or(14),
-        /// One run a week for so many weeks.
+        /// Number of weeks for which one run a week is kept.
         weeks: u32 = key(whole_from_to(0, 1040)).or(52),
         /// Newest events.
         events: u32 = key(whole_from_to(1000, 100_000_000)).or(100_000),
@@ -404,7 +404,7 @@ pub fn service_example() -> String {
 pub fn service_schema() -> impl Serialize {
     schema(
         "Service configuration of areograph",
-        "The TOML file of the service as JSON. areograph checks more than a schema can: agreement between keys, and existing folders.",
+        "The TOML file of the service as JSON. areograph checks more than a schema can: agreement between keys, and existence of folders.",
         &described::<ServiceConfig>(),
     )
 }

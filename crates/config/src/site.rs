@@ -249,7 +249,7 @@ fn other_bodies(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     if body == Body::Mars {
         return;
     }
-    let only_at_mars = format!("none on {body}: it belongs to Mars Global Surveyor");
+    let only_at_mars = format!("no such entry on {body}: it belongs to Mars Global Surveyor");
     for table in ["pedr", "mola_clock", "pointing"] {
         keys.refuse(table, &only_at_mars);
     }
@@ -279,7 +279,7 @@ fn pointing_of_instruments(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         if used_s.abs() > spacecraft.ck_bias_max_s {
             let expected = format!(
                 "no such key: it holds for all images of the site, and attitude kernels of {}, which carries {}, need no \
-                 time correction; that of another camera belongs in an instrument file of its own",
+                 time correction; that of another camera belongs in a separate instrument file",
                 spacecraft.full_name, camera.name
             );
             keys.refuse_below("pointing", "ck_bias_s", expected);

@@ -45,7 +45,7 @@ pub struct Manifest {
     pub products: Vec<ProductEntry>,
     /// Numbers of rows and of other items.
     pub counts: BTreeMap<String, u64>,
-    /// The largest figures of the site under the names in [`figures`]; absent when there is none.
+    /// The largest figures of the site under the names in [`figures`]; absent without figures.
     #[schemars(schema_with = "figures::schema")]
     pub figures: BTreeMap<String, f64>,
     /// Rejected shots inside a window, by reason.

@@ -68,7 +68,7 @@ pub struct Recipe {
     pub range_noise_m: f64,
     /// Noise of ties, lines and pixels.
     pub tie_noise: f64,
-    /// Image coordinates of shots that are kept: all of their own image, of the other those nearest its middle.
+    /// Image coordinates of shots that are kept: all in their own image, and in the other image those nearest its middle.
     pub mola_views: usize,
 }
 

@@ -36,7 +36,7 @@ impl Cause for NotInOrder {
     }
 
     fn advice(&self) -> String {
-        "if both files hold the same orbits, name only one of them: otherwise the answer contains their shots twice"
+        "if both files contain the same orbits, name only one of them: otherwise the answer contains their shots twice"
             .to_owned()
     }
 }

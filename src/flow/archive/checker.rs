@@ -51,7 +51,7 @@ pub(super) struct Checker<'a> {
     pub(super) progress: &'a (dyn Fn(&ArchiveProgress) + Sync),
 }
 
-/// By file: its results, or why there are none.
+/// By file: its results, or its failure.
 pub(super) type Results = BTreeMap<usize, Result<FileRanges>>;
 
 impl Checker<'_> {

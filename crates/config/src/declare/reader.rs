@@ -379,7 +379,7 @@ fn nearest<'n>(written: &str, known: &[&'n str]) -> Option<&'n str> {
     (distance <= 2).then_some(name)
 }
 
-/// The first characters of a name: enough to compare, whatever the length of the input.
+/// The first characters of a name: enough to compare, and of bounded length.
 fn start(name: &str) -> String {
     name.chars().take(40).collect()
 }

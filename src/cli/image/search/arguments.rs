@@ -26,7 +26,7 @@ const PIXEL_MAX_M: f64 = 1e7;
 ///
 /// Pairs are images of different orbits (by the index, else by times more than 30 minutes apart) with common ground. Best
 /// first: overlap × min(convergence / 20°, 1) × cos²(difference of the Sun / 2) / ratio of the pixels. Convergence is the
-/// angle between the rays to the spacecraft, each at the centre of its own image: lines are seen one by one.
+/// angle between the rays to the spacecraft, each at the centre of its own image, since lines are exposed one by one.
 ///
 /// Example: areograph image search cumindex.tab --box 137.0,138.0,-5.5,-4.0
 #[derive(Debug, Args)]
