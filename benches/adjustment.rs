@@ -1,6 +1,6 @@
 //! Times of the combined adjustment: the recipe, many tie points in twenty images, and a thousand images.
 //!
-//! Where `AREOGRAPH_NETWORKS` names a folder, the networks go there for `benches/ceres.cpp`.
+//! If `AREOGRAPH_NETWORKS` names a folder, the networks are written there for `benches/ceres.cpp`.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,
@@ -20,13 +20,14 @@ use areograph::geom::{
 use orbits::{ORBITS, Orbits, instants, sampled};
 use recipe::Recipe;
 
-/// A thousand images: ties hang images together that are up to so many apart, in places along the flight.
+/// A thousand images: ties connect images that are up to this far apart, in groups along the flight.
 const THOUSAND: Orbits = Orbits {
     places: 1_000 / ORBITS,
     ties: 500_000,
     ..TWENTY
 };
-/// Twenty images with the noise that the published adjustment takes for standard deviations, ten times what matching attains.
+/// Twenty images with the noise that the published adjustment takes for standard deviations, ten times that of
+/// matching.
 const TWENTY: Orbits = Orbits {
     places: 1,
     ties: 100_000,
@@ -35,7 +36,7 @@ const TWENTY: Orbits = Orbits {
     position_bias_m: 20.0,
 };
 
-/// Adjusts a network `runs` times and tells the median.
+/// Adjusts a network `runs` times and prints the median time.
 fn time(what: &str, network: &Network<SampledOrientation>, runs: usize) {
     let mut seconds: Vec<f64> = Vec::new();
     let mut result = None;
@@ -60,7 +61,7 @@ fn time(what: &str, network: &Network<SampledOrientation>, runs: usize) {
     }
 }
 
-/// The network as another program can adjust it, with our time and sum of squares, one number after the other.
+/// The network in a form for other programs, with our time and sum of squares, one number after the other.
 fn numbers(
     network: &Network<SampledOrientation>,
     seconds: f64,
@@ -113,7 +114,7 @@ fn numbers(
     numbers
 }
 
-/// The most memory that this process has held, where the system tells.
+/// Peak memory of this process, if the system reports it.
 fn peak_memory() -> String {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));

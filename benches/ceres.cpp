@@ -1,8 +1,9 @@
 // Adjusts the networks that the benchmark wrote with Ceres Solver; built and run by `scripts/bench geometry`.
 //
-// Residuals are those of `geom::bundle`: measured line and place minus those of the line that sees the point, ranges, and
-// the initial values. Orientations are the same cubics through samples, unknowns and start the same. Derivatives are
-// Ceres' automatic ones; of the line they follow from a last step of Newton's method in numbers that carry derivatives.
+// Residuals are those of `geom::bundle`: measured line and sample minus those of the line that sees the point,
+// ranges, and the initial values. Orientations are the same cubics through samples, with the same unknowns and
+// initial values. Derivatives are Ceres' automatic ones; those of the line follow from a last step of Newton's method
+// in dual numbers.
 #include <ceres/ceres.h>
 #include <ceres/normal_prior.h>
 #include <ceres/rotation.h>
@@ -37,7 +38,7 @@ struct Orientation {
   std::vector<Curve> position, vector;
   Matrix reference;
 
-  // Sets the slopes of what was read.
+  // Sets the slopes of the samples that were read.
   void finish(std::vector<Curve>& nodes) const {
     for (size_t row = 0; row < x.size(); ++row) {
       const size_t first = std::min(row == 0 ? 0 : row - 1, x.size() - 3);
@@ -187,7 +188,7 @@ struct Range {
   }
 };
 
-// The numbers of a network, one after the other, as the benchmark writes them.
+// The numbers of a network in sequence, as the benchmark writes them.
 struct Numbers {
   std::vector<double> all;
   size_t next = 0;
@@ -273,14 +274,14 @@ int main(int arguments, char** values) {
 
   ceres::Solver::Options options;
   options.linear_solver_ordering.reset(ordering);
-  // The reduced equations of few images are dense, those of very many are not.
+  // The reduced equations are dense for few images, and sparse for very many.
   options.linear_solver_type = images.size() > 100 ? ceres::SPARSE_SCHUR : ceres::DENSE_SCHUR;
   options.num_threads = static_cast<int>(std::thread::hardware_concurrency());
   options.function_tolerance = kChange;
   options.gradient_tolerance = 0;
   options.parameter_tolerance = 1e-16;
   options.max_num_iterations = 100;
-  // What is known beforehand is part of the equations: without damping at the start it takes half the steps.
+  // A priori values are part of the equations: without damping at the start, half the steps suffice.
   options.initial_trust_region_radius = 1e16;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);

@@ -1,7 +1,7 @@
-//! Times the geometry on all cores: points a second from the ground to the image.
+//! Times the geometry on all cores: points per second from the ground to the image.
 //!
-//! One scene (Gusev of Shan et al. 2005), one set of points, one camera model for all methods; the best of
-//! a few rounds each, taken in turns so that a busy machine hurts all alike.
+//! One scene (Gusev of Shan et al. 2005), one set of points, one camera model for all methods; the best of a few
+//! rounds each, taken in turns so that a busy machine affects all alike.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,
@@ -26,7 +26,7 @@ const LIMITS: Limits = Limits {
 
 type Solve<'a> = Box<dyn Fn(&Vector3<f64>) -> Result<Solution, Unseen> + Sync + 'a>;
 
-/// Points a second of one pass over `points_m`.
+/// Points per second of one pass over `points_m`.
 fn rate(points_m: &[Vector3<f64>], solve: &Solve<'_>) -> f64 {
     let mut lines = vec![0.0; points_m.len()];
     let start = Instant::now();

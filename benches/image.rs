@@ -1,4 +1,4 @@
-//! Decodes images of the camera on one core: pixels a second, and the most memory that this takes.
+//! Decodes images of the camera on one core: pixels per second, and peak memory.
 //!
 //! `cargo bench --bench image [FILE…]`: without files, a synthetic image in every coding, written to the temporary folder.
 #![allow(
@@ -29,7 +29,7 @@ const SAMPLES: usize = 1024;
 const LINES: usize = 10_240;
 const ROUNDS: usize = 5;
 
-/// Decodes an image; its pixels.
+/// Decodes an image; returns its number of pixels.
 fn decode(path: &Path) -> usize {
     let image = ImageFile::open(path, built_in_instruments()).unwrap();
     let mut strips = image.strips().unwrap();

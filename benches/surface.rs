@@ -1,4 +1,5 @@
-//! A terrain model of two rendered lines, and units of shots that are matched with a terrain model: seconds, and what a second does.
+//! A terrain model of two rendered lines, and units of shots that are matched with a terrain model: seconds, and
+//! rates per second.
 //!
 //! `cargo bench --bench surface`: both scenes are made and calibrated in temporary folders first, which is not timed.
 #![allow(
@@ -35,7 +36,7 @@ const CELLS_M: [f64; 3] = [54.0, 81.0, 108.0];
 /// Cells to either side that a unit is searched in: 141 by 141 shifts.
 const SEARCH_CELLS: u32 = 70;
 
-/// Seconds that something takes, the best of three times, and what it gives.
+/// Seconds of a computation, the best of three, and its result.
 fn timed<T>(run: impl Fn() -> T) -> (f64, T) {
     let times = (0..3).map(|_| {
         let began = Instant::now();

@@ -155,7 +155,7 @@ class Service:
 
 
 async def reading(service: Service, rate_per_s: float, work) -> tuple[Readers, object]:
-    """Reads while `work` goes on."""
+    """Reads while `work` is in progress."""
     readers, end = Readers(service, rate_per_s), asyncio.Event()
     task = asyncio.create_task(readers.read(end))
     done = await work

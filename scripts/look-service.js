@@ -21,7 +21,7 @@ async function opened(browser, width, scheme, bypassCSP) {
   const page = await context.newPage();
   const where = () => `${page.url()} (${width}, ${scheme})`;
   page.on('console', (message) => {
-    // The missing page is asked for on purpose.
+    // The missing page is requested on purpose.
     if (message.type() === 'error' && !/\/nothing$/.test(message.location().url)) wrong(where(), `console: ${message.text()}`);
   });
   page.on('pageerror', (error) => wrong(where(), error.message));
@@ -52,7 +52,7 @@ async function look(page, name, place, width, scheme) {
   }
 }
 
-// With the pages' own security policy in force.
+// With the security policy of the pages in force.
 async function use(browser) {
   const page = await opened(browser, 1440, 'light', false);
   await logIn(page);
@@ -60,7 +60,7 @@ async function use(browser) {
   await page.click('#cancel');
   await page.waitForFunction(() => document.getElementById('job').textContent.includes('cancelling'));
   await page.goto(`${address}/sites/gamma`);
-  // Another window asks for a run: this one shows it by itself.
+  // Another window requests a run: this one shows it without reloading.
   const other = await page.context().newPage();
   await other.goto(`${address}/sites/gamma`);
   await other.fill('#reason', 'looked at');
@@ -74,7 +74,7 @@ async function use(browser) {
   await page.click('text=Log out');
   if (new URL(page.url()).pathname !== '/login') wrong(page.url(), 'logging out did not lead to the form');
   await page.context().close();
-  // Without a script the same pages are there.
+  // Without a script the same pages are available.
   const context = await browser.newContext({ javaScriptEnabled: false });
   const plain = await context.newPage();
   await logIn(plain);
@@ -97,7 +97,7 @@ async function use(browser) {
         await logIn(page);
         for (const [name, place] of pages) await look(page, name, place, width, scheme);
         await page.context().close();
-        // Sessions are opened no faster than changes may be asked for.
+        // Sessions are opened no faster than changes are permitted.
         await new Promise((done) => setTimeout(done, 3000));
       }
     }

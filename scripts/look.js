@@ -13,7 +13,7 @@ const views = [
   { name: 'desktop-dark', width: 1440, scheme: 'dark' },
 ];
 
-// Pairs of words in a figure whose letters overlap; a fifth of their height above and below is room, not letters.
+// Pairs of words in a figure whose letters overlap; a fifth of their height above and below is spacing, not letters.
 function overprints() {
   const pairs = [];
   for (const svg of document.querySelectorAll('svg')) {
@@ -46,7 +46,7 @@ async function look(browser, file, view) {
     if (!/^(file|data):/.test(request.url())) problems.push(`asks for ${request.url()}`);
   });
   await page.goto('file://' + path.resolve(file));
-  // What is folded is looked at too.
+  // Folded content is checked too.
   await page.evaluate(() => document.querySelectorAll('details').forEach((folded) => { folded.open = true; }));
   const wide = await page.evaluate(() => document.documentElement.scrollWidth);
   if (wide > view.width) problems.push(`scrolls sideways: ${wide} of ${view.width} pixels`);
@@ -79,7 +79,7 @@ async function look(browser, file, view) {
   let failed = false;
   for (const file of pages) {
     for (const view of views) {
-      // A page that brings the browser down is a problem of that page.
+      // A page that crashes the browser is a problem of that page.
       const problems = await look(browser, file, view).catch((error) => [error.message]);
       for (const problem of problems) {
         failed = true;

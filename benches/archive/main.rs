@@ -1,8 +1,8 @@
-//! Searches a synthetic archive of PEDR files, side by side with what the machine can do at best.
+//! Searches a synthetic archive of PEDR files, compared with the limits of the machine.
 //!
 //! `cargo bench --bench archive -- --gb 2`: ratios go to `target/bench/archive.json`. "Warm" is with all files in the
-//! system's cache, the best of a few rounds in turns; "cold" after their pages were given up, once each. With `--scaling`
-//! archives of 0.5 to 4 GB one after the other, and `docs/archive_scaling.svg`.
+//! system's cache, the best of a few alternating rounds; "cold" after their pages were released, once each. With
+//! `--scaling` archives of 0.5 to 4 GB one after the other, and `docs/archive_scaling.svg`.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -50,9 +50,9 @@ use serde_json::{Value, json};
 static RUN_ON: AtomicBool = AtomicBool::new(false);
 const ROUNDS: usize = 5;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
-/// Frames whose shots get a CSPICE state each.
+/// Frames whose shots each use a CSPICE state.
 const SLOW_FRAMES: usize = 10_000;
-/// Where the ground latitude of the mid-point stands in a record.
+/// Offset of the ground latitude of the mid-point in a record.
 const MID_POINT: usize = 336;
 
 #[derive(Default)]
@@ -80,7 +80,7 @@ struct Archive {
 }
 
 impl Archive {
-    /// An invented archive, with the kernels that go with it.
+    /// A synthetic archive with its kernels.
     fn write(folder: &Path, gb: f64) -> Self {
         write_archive(folder, &ArchiveOptions::of_size(1, gb)).unwrap();
         let folder = folder.join("pedr");
@@ -110,7 +110,7 @@ impl Archive {
         self.folder.with_file_name("kernels").join("archive.tm")
     }
 
-    /// The range check of all shots with its products; shots that were checked.
+    /// The range check of all shots with its products; returns the number of checked shots.
     fn check_ranges(&self, out: &Path) -> u64 {
         let request = ArchiveRequest {
             paths: std::slice::from_ref(&self.folder),
@@ -126,7 +126,7 @@ impl Archive {
         outcome.manifest.counts["shots"]
     }
 
-    /// The same residuals, one after the other with a CSPICE state each, of some frames; shots a second.
+    /// The same residuals for some frames, one after the other with a CSPICE state each; returns shots per second.
     fn one_state_a_shot(&self) -> f64 {
         let session = Session::open(&KernelSet::from_metakernel(&self.kernels()).unwrap()).unwrap();
         let reader = Reader::open(&self.paths[0]).unwrap();
@@ -174,8 +174,8 @@ impl Archive {
     fn lines_mapped(&self) -> u64 {
         let of_file = |path: &PathBuf| {
             let file = fs::File::open(path).unwrap();
-            #[allow(unsafe_code, reason = "nobody shortens the files of the benchmark")]
-            // SAFETY: the map is read only, and the files are of this program alone.
+            #[allow(unsafe_code, reason = "no other process shortens the files of the benchmark")]
+            // SAFETY: the map is read only, and only this program uses the files.
             let map = unsafe { memmap2::Mmap::map(&file) }.unwrap();
             let records = map[LABEL_BYTES..].chunks_exact(RECORD_BYTES);
             records
@@ -185,7 +185,7 @@ impl Archive {
         self.paths.par_iter().map(of_file).sum()
     }
 
-    /// The same of files copied piece by piece into the processor's cache.
+    /// The same for files copied piece by piece into the processor's cache.
     fn lines_copied(&self) -> u64 {
         use std::os::unix::fs::FileExt as _;
         let of_file = |path: &PathBuf| {
@@ -244,7 +244,7 @@ impl Archive {
         bytes
     }
 
-    /// Has the system give up the pages of the files.
+    /// Makes the system release the pages of the files.
     fn cool(&self) {
         for path in &self.paths {
             let file = fs::File::open(path).unwrap();
@@ -275,7 +275,7 @@ fn clock() -> MolaClock {
     }
 }
 
-/// Largest distance of tabulated positions from CSPICE, as the products of a check have it, metres.
+/// Largest distance of tabulated positions from CSPICE, as in the products of a check, metres.
 fn position_error_m(out: &Path) -> f64 {
     let document = fs::read_to_string(out.join("archive.json")).unwrap();
     let document: Value = serde_json::from_str(&document).unwrap();
@@ -333,7 +333,7 @@ fn main() {
     std::io::Write::write_all(&mut file, text.as_bytes()).unwrap();
 }
 
-/// Everything, of an archive of about `gb` gigabytes.
+/// All measurements for an archive of about `gb` gigabytes.
 fn measure(folder: &Path, gb: f64) -> Value {
     let writing = Instant::now();
     let archive = Archive::write(&folder.join("archive"), gb);
@@ -445,7 +445,7 @@ fn measure(folder: &Path, gb: f64) -> Value {
     json!({ "rows_written_per_s": written, "searches_and_checks": document })
 }
 
-/// What the range check did, and how fast one CSPICE state a shot is.
+/// Results of the range check, and the rate of one CSPICE state per shot.
 struct RangeCheck {
     shots: u64,
     slow_per_s: f64,

@@ -1,4 +1,4 @@
-//! How times grow with the archive, as a plot.
+//! Times as a function of the size of the archive, as a plot.
 
 use std::path::Path;
 
@@ -8,10 +8,10 @@ use serde_json::Value;
 /// Sizes of the archives, gigabytes.
 pub(super) const SIZES_GB: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 
-/// Room for the names of lines, right of them.
+/// Width of the names of lines, to their right.
 const LABELS_PX: u32 = 200;
 
-/// What is plotted, from what is nearly free to what reads everything; colours are those of Okabe and Ito.
+/// The plotted series, from the cheapest to the one that reads everything; colours are those of Okabe and Ito.
 const SERIES: [(&str, &str, RGBColor); 7] = [
     ("indexed", "one window, with index", RGBColor(0, 114, 178)),
     (
@@ -75,7 +75,7 @@ pub(super) fn plot(path: &Path, measured: &[Value]) {
             .collect();
         let line = LineSeries::new(points.iter().copied(), colour.stroke_width(2));
         chart.draw_series(line.point_size(3)).unwrap();
-        // Beside the end of the line, where no other line is.
+        // Beside the end of the line, away from the other lines.
         let (x, y) = chart.backend_coord(&points[points.len() - 1]);
         let style = ("sans-serif", 12).into_font().color(&colour);
         root.draw(&Text::new(label, (x + 10, y - 6), style))

@@ -1,4 +1,4 @@
-//! How fast found shots are written.
+//! Writing rate of found shots.
 
 use std::{path::Path, time::Instant};
 
@@ -30,7 +30,7 @@ impl Sink for Kept {
     }
 }
 
-/// Rows a second by format, of shots that are in memory.
+/// Rows per second by format, for shots in memory.
 pub(super) fn rows_per_s(archive: &Archive, folder: &Path) -> Value {
     let sources: Vec<Source> = archive
         .sources(&Indexes::default())

@@ -13,7 +13,7 @@ use crate::{
     flow::run_calibration,
 };
 
-/// Calibrates the lines of a camera in orbit: ties between them, then laser points, part of which are held back for validation.
+/// Calibrates the lines of a camera in orbit: ties between them, then laser points, part of which are withheld for validation.
 ///
 /// Points are read from tables; with `ties.match` and `[laser]` they are measured in pixels, in rounds until convergence.
 ///
@@ -27,7 +27,7 @@ pub(super) struct Arguments {
     /// Calibration file (TOML); config/calibrations/example.toml documents every key.
     #[arg(value_name = "CALIBRATION.toml")]
     calibration: PathBuf,
-    /// Folder of the products; the calibration gets a folder of its own in it.
+    /// Output folder; the calibration is written to a subfolder.
     #[arg(long, default_value = "out")]
     out: PathBuf,
     /// Calibrate again, even if stored results are up to date.
@@ -38,7 +38,7 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-/// Runs the calibration and prints how it ended.
+/// Runs the calibration and prints the outcome.
 pub(super) fn run(arguments: &Arguments) -> ExitCode {
     let loaded = match load_calibration(&arguments.calibration) {
         Ok(loaded) => loaded,
@@ -59,7 +59,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     let ran = run_calibration(&calibration, &arguments.out, arguments.force);
     answer(&asked, ran, |count| {
         format!(
-            "{} lines, {} ties, {} laser points, {} more held back, {} left out",
+            "{} lines, {} ties, {} laser points, {} more withheld, {} left out",
             count("cameras"),
             count("ties"),
             count("controls"),

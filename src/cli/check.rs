@@ -51,7 +51,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     if arguments.json {
         output::json(&answers.into());
     }
-    // The one that is given back decides on the exit code: a failure says more than an invalid site.
+    // The returned failure determines the exit code: a failure outranks an invalid site.
     let failed = failures
         .iter()
         .position(|failure| failure.kind() != Kind::Validation);

@@ -55,7 +55,7 @@ pub(super) struct Arguments {
     ties: Vec<PathBuf>,
 }
 
-/// Why there is no new site file.
+/// Why no site file is written.
 #[derive(Debug, thiserror::Error)]
 enum Refused {
     #[error("already exists")]
@@ -89,7 +89,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
         return Err(Refused::Exists).in_file(file);
     }
     let text = asked.new_site(&folder)?.text();
-    // Judged as the file that it will be, so that paths count from its folder.
+    // Checked as the future file, so that paths are relative to its folder.
     fs::create_dir_all(&folder)
         .map_err(IoError::on("create the folder"))
         .in_file(&folder)?;
@@ -106,7 +106,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     Ok(())
 }
 
-/// What was given or answered, paths as seen from here.
+/// Options and answers, with paths relative to the current folder.
 struct Asked {
     site: String,
     description: String,
@@ -118,7 +118,7 @@ struct Asked {
 }
 
 impl Asked {
-    /// Options, and answers to what they leave out where somebody can answer.
+    /// Options, completed by answers on a terminal.
     fn of(arguments: &Arguments, name: &str) -> Result<Self, Error> {
         let mut asked = Self {
             site: arguments.site.clone().unwrap_or_else(|| identifier(name)),
@@ -143,7 +143,7 @@ impl Asked {
                 "Kernels: a metakernel, a folder, or files in load order",
                 &mut asked.kernels,
             ),
-            ("PEDR files or globs [none: images alone]", &mut asked.pedr),
+            ("PEDR files or globs [none: images only]", &mut asked.pedr),
             ("Labels of images [none]", &mut asked.labels),
             ("Tie point files [none]", &mut asked.ties),
         ];
@@ -167,7 +167,7 @@ impl Asked {
         Ok(asked)
     }
 
-    /// Whether there is enough for a site.
+    /// Checks that the input suffices for a site.
     fn complete(&self) -> Result<(), Refused> {
         if self.kernels.is_empty() {
             return Err(Refused::Missing("kernels (--kernels)"));
@@ -185,7 +185,7 @@ impl Asked {
         Ok(())
     }
 
-    /// The same with paths as seen from `folder`.
+    /// The same with paths relative to `folder`.
     fn new_site(&self, folder: &Path) -> Result<NewSite, Error> {
         let seen = |paths: &[PathBuf]| -> Result<Vec<PathBuf>, Error> {
             let paths = paths
@@ -210,7 +210,7 @@ impl Asked {
     }
 }
 
-/// The identifier of an image: the product of its label, such as `E02-02855`, else the name of the file.
+/// The identifier of an image: the product identifier of its label, such as `E02-02855`, else the file name.
 fn image_of(label: &Path) -> Result<String, Error> {
     let product = read_label(label, built_in_instruments())?.product_id;
     let product = product.and_then(|product| product_named(&product));
@@ -220,7 +220,7 @@ fn image_of(label: &Path) -> Result<String, Error> {
     ))
 }
 
-/// A name with what identifiers cannot hold replaced.
+/// A name with characters that identifiers do not permit replaced.
 fn identifier(name: &str) -> String {
     let letters = name.chars().map(|letter| match letter {
         '-' | '_' => letter,
@@ -234,7 +234,7 @@ fn absolute(path: &Path) -> Result<PathBuf, Error> {
     let path = std::path::absolute(path)
         .map_err(IoError::on("find"))
         .in_file(path)?;
-    // Steps back are taken here: behind a wildcard or a folder yet to be made they lead nowhere.
+    // Parent components are resolved here: after a wildcard or before a folder exists, they lead nowhere.
     let mut steps = PathBuf::new();
     for step in path.components() {
         match step {
@@ -247,7 +247,7 @@ fn absolute(path: &Path) -> Result<PathBuf, Error> {
     Ok(steps)
 }
 
-/// `path` as seen from `folder`, both absolute; as it is where they have nothing but the root in common.
+/// `path` relative to `folder`, both absolute; unchanged if they share only the root.
 fn seen_from(folder: &Path, path: &Path) -> PathBuf {
     let (here, there): (Vec<Component>, Vec<Component>) =
         (folder.components().collect(), path.components().collect());

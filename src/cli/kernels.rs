@@ -24,7 +24,7 @@ pub(super) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Lists kernels in load order: role by content, size, hash, and why each is there.
+    /// Lists kernels in load order: role by content, size, hash, and why each is included.
     #[command(after_help = "Example: areograph kernels list kernels/nav.tm")]
     List(Files),
     /// Shows position and attitude coverage of Mars Global Surveyor with its gaps, and the coverage of other spacecraft.
@@ -99,7 +99,7 @@ fn coverage(files: &Files) -> Result<(), Error> {
     if !files.json {
         print_coverage("", &session, coverage)?;
     }
-    // Of other spacecraft what is there.
+    // For other spacecraft, the available coverage.
     for session in &others {
         let (spacecraft, coverage) = (session.spacecraft(), session.coverage()?);
         if coverage.per_kernel.is_empty() {

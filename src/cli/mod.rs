@@ -105,7 +105,7 @@ pub fn main() -> ExitCode {
     let cli = Cli::parse();
     log(&cli);
     let code = run(cli.command);
-    // Success with half an answer is none.
+    // A success with incomplete output is a failure.
     match output::complete() {
         Err(lost) if code == ExitCode::SUCCESS => report(&lost.into()),
         _ => code,
@@ -114,7 +114,7 @@ pub fn main() -> ExitCode {
 
 /// Starts the log.
 fn log(cli: &Cli) {
-    // Of what runs unattended the log is all there is to see.
+    // The log is the only account of an unattended command.
     let unattended = matches!(
         cli.command,
         Command::Worker(_) | Command::Serve(_) | Command::Nightly(_)
@@ -178,13 +178,13 @@ fn finish(result: Result<(), Error>) -> ExitCode {
     }
 }
 
-/// Prints a failure and gives its exit code.
+/// Prints a failure and returns its exit code.
 fn report(failure: &Error) -> ExitCode {
     output::error(failure);
     ExitCode::from(failure.kind().exit_code())
 }
 
-/// Loads site files; every problem of every file is reported before the first failure is given back.
+/// Loads site files; every problem of every file is reported before the first failure is returned.
 fn load_sites(paths: &[std::path::PathBuf]) -> Result<Vec<SiteConfig>, Error> {
     let mut sites = Vec::with_capacity(paths.len());
     let mut first_failure = None;

@@ -21,7 +21,7 @@ use crate::{
 
 /// Time between two turns.
 const TICK: Duration = Duration::from_millis(200);
-/// Jobs of one night whose endings are looked at.
+/// Maximum number of jobs of one night whose outcomes are read.
 const JOBS_MAX: u32 = 100_000;
 
 /// Performs one nightly run without a service, for a timer: compares all sites, runs those affected by a change, and exits.
@@ -84,7 +84,7 @@ async fn through_the_night(
         engine.turn()?;
         let night = engine.night(id)?;
         let over = night.as_ref().is_none_or(|night| night.ended_ms.is_some());
-        // Letters that cannot be delivered now are for the next night.
+        // Messages that cannot be delivered now wait for the next night.
         if shared.ending.is_cancelled() || (over && engine.is_idle()) {
             engine.stop().await;
             return engine.night(id);
@@ -93,7 +93,7 @@ async fn through_the_night(
     }
 }
 
-/// A failure says more than an invalid site, and of several the first one counts.
+/// A failure outranks an invalid site; of several failures, the first counts.
 fn exit_code(shared: &Shared, night: i64) -> crate::service::database::Stored<u8> {
     let all = shared.read(|connection| jobs(connection, &JobFilter::default(), JOBS_MAX))?;
     let mut codes: Vec<u8> = Vec::new();

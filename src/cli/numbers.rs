@@ -1,4 +1,4 @@
-//! Numbers on the command line that must lie in a range, as those of a site file do.
+//! Range checks for numbers on the command line, as for those of a site file.
 
 /// Reads a number above `low`, up to `high`.
 pub(super) fn above_to(

@@ -10,17 +10,17 @@ use std::{
 
 use super::output;
 
-/// What opens a file with the program of the user's choice.
+/// Program that opens a file with the user's default application.
 const OPENER: &str = if cfg!(target_os = "macos") {
     "open"
 } else {
     "xdg-open"
 };
-/// How often, and how far apart, the opener is asked whether it has failed: one that has not by then is showing the page.
+/// How often, and how far apart, the opener is polled for failure; if it has not failed by then, the page is shown.
 const LOOKS: u32 = 40;
 const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
 
-/// Opens `page` in the browser, and does not wait until it is closed; where that fails, a warning says where the page is.
+/// Opens `page` in the browser without waiting for it; on failure a warning states the path of the page.
 pub(super) fn page(page: &Path) {
     let why = match failure(page) {
         Ok(None) => return,

@@ -8,40 +8,40 @@ use std::{
 
 use crate::error::IoError;
 
-/// Why some of the answer was lost.
+/// Why part of the output was lost.
 static LOST: OnceLock<Error> = OnceLock::new();
 
-/// Prints a line of the answer. A reader that went away (`| head`) is no failure.
+/// Prints a line of the output. A closed pipe (`| head`) is not a failure.
 pub(super) fn line(text: impl Display) {
     told(writeln!(stdout().lock(), "{text}"));
 }
 
-/// Prints text as it is.
+/// Prints text unchanged.
 pub(super) fn text(text: &[u8]) {
     told(stdout().lock().write_all(text));
 }
 
 /// Prints a failure.
 pub(super) fn error(failure: impl Display) {
-    // Where failures cannot be told either, the exit code tells them.
+    // If standard error fails too, the exit code still reports the failure.
     let _ = writeln!(stderr().lock(), "error: {failure}");
 }
 
-/// Prints what a user should know of a command that succeeded.
+/// Prints a warning of a command that succeeded.
 pub(super) fn warning(text: impl Display) {
     // As for failures.
     let _ = writeln!(stderr().lock(), "warning: {text}");
 }
 
-/// Prints an answer for scripts.
+/// Prints JSON for scripts.
 pub(super) fn json(value: &serde_json::Value) {
     line(format_args!("{value:#}"));
 }
 
-/// Gives out what is still held back.
+/// Flushes the output.
 ///
 /// # Errors
-/// Some of the answer was lost.
+/// Part of the output was lost.
 pub(super) fn complete() -> std::result::Result<(), IoError> {
     told(stdout().lock().flush());
     LOST.get().map_or(Ok(()), |error| {
@@ -54,7 +54,7 @@ fn told(result: Result<()>) {
     if let Err(error) = result
         && error.kind() != ErrorKind::BrokenPipe
     {
-        // The first failure is the one that is told.
+        // Only the first failure is reported.
         let _ = LOST.set(error);
     }
 }

@@ -83,7 +83,7 @@ pub(super) fn print(
     Ok(())
 }
 
-/// A stage with its reason, as plans and runs answer.
+/// A stage with its reason, for the answers of plans and runs.
 pub(super) fn stage_json(stage: &StageReason) -> serde_json::Value {
     json!({
         "stage": stage.stage,

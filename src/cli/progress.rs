@@ -1,5 +1,5 @@
-//! What a run tells while it goes on: on a terminal a live line for each site, elsewhere a line for each stage, and of one
-//! that takes long now and then how far it is.
+//! Progress of a run: on a terminal a live line for each site; elsewhere a line for each stage, and lines at
+//! intervals during long stages.
 
 use std::{
     fmt,
@@ -18,14 +18,14 @@ use crate::{
     watch::Count,
 };
 
-/// The live lines of the program, on standard error; nothing is drawn where that is no terminal.
+/// The live lines of the program, on standard error; nothing is drawn if that is not a terminal.
 static LINES: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
-/// What a live line shows: site, stages done of all, time since the start and expected until the end, and of the stage as
-/// much as there is room for. No bar: with one the line would break on a terminal of 40 columns.
+/// Template of a live line: site, stages done of all, time elapsed and time left, and as much of the stage as fits. A
+/// bar would break the line on a terminal of 40 columns.
 const LINE: &str = "{prefix:.bold}  {pos}/{len}  {elapsed}{left}  {wide_msg}";
-/// A stage that takes longer tells how far it is, that often where there is no live line.
+/// Interval of progress lines during long stages where there is no live line.
 const TOLD_EVERY: Duration = Duration::from_secs(10);
-/// How often the time on a live line is drawn anew.
+/// Interval at which the time on a live line is redrawn.
 const TICK: Duration = Duration::from_millis(200);
 
 /// Standard error for the log: what is written goes above the live lines.
@@ -50,18 +50,18 @@ impl Write for Log {
     }
 }
 
-/// How a site gets on.
+/// Progress of a site.
 #[derive(Debug)]
 pub(super) struct Progress {
     site: String,
     line: ProgressBar,
     counted: Mutex<Option<Counted>>,
-    /// Whether each stage has a line of its own.
+    /// Whether each stage has a separate line.
     plain: bool,
 }
 
 impl Progress {
-    /// Of a site that begins. The log tells of stages itself, and who wants errors only hears of none.
+    /// Progress of a new site. Nothing is shown with `--verbose`, since the log reports stages, or with `--quiet`.
     pub(super) fn of(site: &SiteConfig) -> Self {
         let level = LevelFilter::current();
         let told = level >= LevelFilter::WARN && level < LevelFilter::INFO;
@@ -69,7 +69,7 @@ impl Progress {
         let line = if told && terminal {
             let stages = stage_count(site);
             let line = LINES.add(ProgressBar::new(stages as u64));
-            // A template that the library refuses leaves its own in place.
+            // If the library rejects the template, its default remains.
             if let Ok(style) = ProgressStyle::with_template(LINE) {
                 line.set_style(style.with_key("left", left));
             }
@@ -88,11 +88,11 @@ impl Progress {
     }
 }
 
-/// The time until the end, once a stage tells how long one takes.
+/// The estimated time until the end, once a stage is done.
 fn left(state: &ProgressState, out: &mut dyn fmt::Write) {
     let left_s = state.eta().as_secs_f64();
     if state.pos() > 0 && left_s >= 1.0 {
-        // Whoever draws the line need not draw this.
+        // A failure to draw the line is ignored.
         let _ = write!(out, ", {} left", duration(left_s));
     }
 }
@@ -103,7 +103,7 @@ impl Observer for Progress {
             StageEvent::Begins(_) => {
                 self.line.set_message(stage.to_owned());
                 if self.plain {
-                    // Whoever does not listen any more need not hear it.
+                    // A closed standard error is not a failure.
                     let _ = writeln!(io::stderr().lock(), "{}: {stage}", self.site);
                 }
             }
@@ -113,7 +113,7 @@ impl Observer for Progress {
     }
 }
 
-/// The stage that counts.
+/// The stage whose progress is counted.
 #[derive(Debug)]
 struct Counted {
     stage: String,
@@ -123,7 +123,7 @@ struct Counted {
 }
 
 impl Progress {
-    /// How far a stage is, which counts on any thread.
+    /// Reports the progress of a stage; called from any thread.
     fn count(&self, stage: &str, count: Count) {
         let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
         let now = Instant::now();
@@ -149,7 +149,7 @@ impl Progress {
     }
 }
 
-/// How far a stage is after so long, and how long it may still take.
+/// Progress of a stage after the time `taken`, with the estimated time left.
 fn words(stage: &str, count: Count, taken: Duration) -> String {
     let Count { done, all, of } = count;
     if all == 0 {
@@ -159,7 +159,7 @@ fn words(stage: &str, count: Count, taken: Duration) -> String {
     format!("{stage}: {done} of {all} {of}, {} left", duration(left_s))
 }
 
-/// Seconds as people say them.
+/// Seconds as readable text.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -202,7 +202,7 @@ mod tests {
             at(4_000, 4_000),
             "check_ranges: 4000 of 4000 shots, 0 s left"
         );
-        // Nobody knows how many it takes.
+        // The total is unknown.
         assert_eq!(at(3, 0), "check_ranges: 3 shots");
         assert_eq!(duration(3_725.0), "1 h 02 min");
     }

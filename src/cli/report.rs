@@ -18,7 +18,7 @@ use crate::{
     store::page::PagePath,
 };
 
-/// Makes the report of a site again from its products alone, or compares two runs.
+/// Rebuilds the report of a site from its products only, or compares two runs.
 ///
 /// No site file, kernel or stored stage is read; the page is byte for byte the one that `areograph run` wrote.
 /// Products that are missing, damaged or of another version are refused.
@@ -39,7 +39,7 @@ pub(super) struct Arguments {
     /// Products of a site.
     #[arg(value_name = "OUT/SITE", required = true)]
     folder: Option<PathBuf>,
-    /// Write the page to this file, and leave the products as they are; its folder must exist.
+    /// Write the page to this file, and leave the products unchanged; its folder must exist.
     #[arg(long, value_name = "FILE.html")]
     page: Option<PathBuf>,
     /// Open the page in the browser.
@@ -103,7 +103,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     }
 }
 
-/// Makes the page of the products in `folder` again.
+/// Rebuilds the page of the products in `folder`.
 fn again(folder: &Path, arguments: &Arguments) -> Result<u8, Error> {
     let elsewhere = arguments.page.as_deref().map(PagePath::new).transpose()?;
     let again = page_again(folder)?;
@@ -121,7 +121,7 @@ fn again(folder: &Path, arguments: &Arguments) -> Result<u8, Error> {
     Ok(0)
 }
 
-/// A site and what came of its comparison.
+/// A site and the result of its comparison.
 type Compared = (String, Result<RunDifference, Error>);
 
 fn diff(arguments: &DiffArguments) -> Result<u8, Error> {
@@ -226,7 +226,7 @@ fn answer<'a>(sites: &'a [Compared], pairs: &'a Pairs) -> Answer<'a> {
     }
 }
 
-/// A failure says more than a limit; a site that is gone keeps no limit.
+/// A failure outranks a limit; a missing site exceeds every limit.
 fn exit_code(sites: &[Compared], pairs: &Pairs, limits: &Limits) -> u8 {
     let failed = sites
         .iter()

@@ -37,7 +37,7 @@ pub(super) struct Arguments {
     /// Site files (TOML).
     #[arg(required = true, value_name = "SITE.toml")]
     sites: Vec<PathBuf>,
-    /// Folder of the products; each site gets a folder of its own in it.
+    /// Output folder; each site is written to a subfolder.
     #[arg(long, default_value = "out")]
     out: PathBuf,
     /// Sites that run at the same time (SPICE itself serves one at a time).
@@ -91,7 +91,7 @@ impl Arguments {
     }
 }
 
-/// Runs the sites and prints how each ended, in the order given.
+/// Runs the sites and prints the outcome of each, in the order given.
 pub(super) fn run(arguments: &Arguments) -> ExitCode {
     let sites = match load_sites(&arguments.sites) {
         Ok(sites) => sites,
@@ -107,7 +107,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
         return super::finish(plan::print(&sites, &options, arguments.json));
     }
     if let Some(threads) = arguments.threads {
-        // The only failure is a pool that exists already; then its size stands.
+        // The only failure is an existing pool, which keeps its size.
         let _ = rayon::ThreadPoolBuilder::new()
             .num_threads(usize::from(threads))
             .build_global();
@@ -118,7 +118,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     };
     let outcomes = runtime.block_on(run_all(sites, arguments, &hashes));
     print(&outcomes, arguments.json);
-    // A run that could not even make the folder has said so already.
+    // If the folder could not be created, the run has already reported it.
     let page = arguments
         .out
         .is_dir()
@@ -133,7 +133,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     if arguments.open {
         open_page(&outcomes, page.as_ref().and_then(|page| page.as_ref().ok()));
     }
-    // A failure says more than an invalid site, and of several the first one counts.
+    // A failure outranks an invalid site; of several failures, the first counts.
     let codes: Vec<u8> = outcomes
         .iter()
         .map(exit_code)
@@ -151,7 +151,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
 
 type Outcome = Result<SiteOutcome, Error>;
 
-/// Runs at most `jobs` sites at a time; a signal lets each finish its stage, or leave a long one, and stop.
+/// Runs at most `jobs` sites at a time; after a signal each finishes its stage, or leaves a long one, and stops.
 async fn run_all(
     sites: Vec<SiteConfig>,
     arguments: &Arguments,
@@ -238,7 +238,7 @@ fn print_outcome(outcome: &SiteOutcome) {
                 || ", no products".to_owned(),
                 |earlier| {
                     let utc = earlier.finished_utc;
-                    format!("; the products of {utc} in {folder} stay as they are")
+                    format!("; the products of {utc} in {folder} remain unchanged")
                 },
             );
             return output::line(format_args!("{site}: stopped after {stage}{products}"));

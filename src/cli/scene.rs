@@ -57,7 +57,7 @@ pub(super) struct Arguments {
     /// With --images: coding of the images; the transform coding is lossy, as it was on board.
     #[arg(long, value_enum, default_value_t = Code::Predictive, requires = "images", conflicts_with = "calibration")]
     coder: Code,
-    /// Fly these kernels instead of the invented orbit.
+    /// Use these kernels instead of the synthetic orbit.
     #[arg(long, value_name = "KERNELS.tm")]
     along: Option<PathBuf>,
     /// A net of rectified pictures for `areograph triangulate` instead of a mission.
@@ -82,7 +82,7 @@ pub(super) struct Arguments {
     label: Vec<PathBuf>,
 }
 
-/// How rough the ground is, as typed.
+/// Roughness of the ground, as typed.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Ground {
     Plains,
@@ -90,7 +90,7 @@ enum Ground {
     Rough,
 }
 
-/// How images are coded, as typed.
+/// Coding of the images, as typed.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Code {
     Predictive,
@@ -107,7 +107,7 @@ impl Code {
 }
 
 impl Arguments {
-    /// The archive that is asked for, if one is.
+    /// The requested archive, if any.
     fn archive(&self) -> Option<ArchiveOptions> {
         let seed = self.seed;
         let of_size = || Some(ArchiveOptions::of_size(seed, self.gb?));

@@ -35,7 +35,7 @@ use crate::{
 
 /// Name of the configuration that `--init` writes.
 const FILE: &str = "areograph.toml";
-/// Longest time that a graceful end may take.
+/// Maximum time of a graceful shutdown.
 const END_WITHIN: Duration = Duration::from_secs(25);
 
 /// Runs sites again when their inputs change, every night at the latest; serves pages and an interface for programs.
@@ -50,7 +50,7 @@ pub(super) struct Arguments {
     /// Write a synthetic mission and a configuration for it into this folder, and exit.
     #[arg(long, value_name = "DIR")]
     init: Option<PathBuf>,
-    /// Listen here instead of the address of the configuration; port 0 takes a free one.
+    /// Listen at this address instead of the configured one; port 0 selects a free port.
     #[arg(long, value_name = "ADDRESS:PORT", conflicts_with = "init")]
     listen: Option<SocketAddr>,
     /// Log as JSON, one object per line.
@@ -100,7 +100,7 @@ fn init(folder: &Path) -> Result<(), Error> {
     Ok(())
 }
 
-/// The example, with times for somebody who looks on.
+/// The example, with short intervals for a demonstration.
 fn demonstration() -> String {
     let mut text = service_example();
     for (from, to) in [
@@ -146,17 +146,18 @@ fn serve(file: &Path, listen: Option<SocketAddr>) -> Result<(), Error> {
         let _ = sd_notify::notify(&[NotifyState::Ready]);
         engine.run().await;
     });
-    // A service whose pages cannot be served any more goes on with its work until it is ended.
+    // If pages can no longer be served, the service continues its work until it is stopped.
     let served = pages.block_on(served);
     work.shutdown_background();
     pages.shutdown_background();
     served.unwrap_or_else(|panicked| {
-        tracing::error!("the pages: {panicked}");
+        tracing::error!("serving the pages failed: {panicked}");
         Ok(())
     })
 }
 
-/// Ends the service at SIGTERM or SIGINT, at the second or after a while by force; takes the configuration again at SIGHUP.
+/// Shuts the service down at SIGTERM or SIGINT, by force at the second signal or after a delay; reloads the
+/// configuration at SIGHUP.
 async fn obey(shared: Arc<Shared>, listen: Option<SocketAddr>) {
     let signals = [
         signal(SignalKind::terminate()),
@@ -186,11 +187,11 @@ async fn obey(shared: Arc<Shared>, listen: Option<SocketAddr>) {
         _ = interrupt.recv() => {}
         () = sleep(END_WITHIN) => {}
     }
-    // Workers end with their pipes, and nothing half-made stands under a final name: the next service goes on from here.
+    // Workers end with their pipes, and no incomplete file has a final name: the next service continues from here.
     std::process::exit(0);
 }
 
-/// Tells the service manager that the engine takes its turns.
+/// Reports to the service manager that the engine is alive.
 async fn tell_life(engine: Arc<Engine<Processes>>) {
     let Some(patience) = sd_notify::watchdog_enabled() else {
         return;

@@ -1,4 +1,4 @@
-//! `areograph service`: what a service's keeper does on the command line.
+//! `areograph service`: maintenance of a service.
 
 use std::path::PathBuf;
 
@@ -178,7 +178,7 @@ fn token(command: &TokenCommand) -> Result<(), Error> {
                 let ends = match (token.revoked_ms, token.expires_ms) {
                     (Some(at_ms), _) => format!("revoked {}", utc_text(at_ms)),
                     (None, Some(at_ms)) => format!("until {}", utc_text(at_ms)),
-                    (None, None) => "without end".to_owned(),
+                    (None, None) => "no expiry".to_owned(),
                 };
                 let used = token.used_ms.map_or_else(
                     || "never used".to_owned(),

@@ -1,4 +1,4 @@
-//! How a flow of one stage is answered: a line or JSON, the verdict, the exit code.
+//! The answer of a flow of one stage: a line or JSON, the verdict, the exit code.
 
 use std::process::ExitCode;
 
@@ -11,17 +11,17 @@ use crate::{
     store::manifest::Manifest,
 };
 
-/// What such a flow is called in its answer.
+/// Name of such a flow in its answer.
 pub(super) struct Asked<'a> {
     /// The key of its name in JSON.
     pub(super) what: &'static str,
     /// Its name.
     pub(super) name: &'a str,
-    /// Whether JSON was asked for.
+    /// Whether JSON was requested.
     pub(super) json: bool,
 }
 
-/// Prints how a run ended, with its counts in words.
+/// Prints the outcome of a run, with its counts in words.
 pub(super) fn answer(
     asked: &Asked<'_>,
     ran: Result<SingleOutcome>,

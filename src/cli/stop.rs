@@ -1,4 +1,4 @@
-//! How a command is told to stop: Ctrl-C, or SIGTERM from systemd, Slurm or a person.
+//! Signals that stop a command: Ctrl-C, or SIGTERM from systemd, Slurm or a user.
 
 use std::{
     process,
@@ -22,7 +22,7 @@ pub(super) struct Signals {
 }
 
 impl Signals {
-    /// Begins to wait.
+    /// Starts to wait.
     pub(super) fn heard() -> Result<Self> {
         let mut builder = Builder::new_multi_thread();
         let runtime = builder.worker_threads(1).enable_all().build();
@@ -36,7 +36,7 @@ impl Signals {
         })
     }
 
-    /// Set once there was one.
+    /// Set after the first signal.
     pub(super) const fn stop(&self) -> &Arc<AtomicBool> {
         &self.stop
     }
@@ -49,7 +49,7 @@ pub(super) async fn on_signals(stop: &AtomicBool) {
         stop.store(true, Ordering::Relaxed);
     }
     if told().await.is_ok() {
-        // Nothing half-made stands under a final name at any moment, so this is safe.
+        // No incomplete file ever has a final name, so this is safe.
         process::exit(i32::from(Kind::Interrupted.exit_code()));
     }
 }

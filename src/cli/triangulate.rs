@@ -24,7 +24,7 @@ pub(super) struct Arguments {
     /// Net file (TOML); config/nets/example.toml documents every key.
     #[arg(value_name = "NET.toml")]
     net: PathBuf,
-    /// Folder of the products; the net gets a folder of its own in it.
+    /// Output folder; the net is written to a subfolder.
     #[arg(long, default_value = "out")]
     out: PathBuf,
     /// Triangulate again, even if stored results are up to date.
@@ -35,7 +35,7 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-/// Runs the net and prints how it ended.
+/// Runs the net and prints the outcome.
 pub(super) fn run(arguments: &Arguments) -> ExitCode {
     let loaded = match load_net(&arguments.net) {
         Ok(loaded) => loaded,

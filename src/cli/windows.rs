@@ -9,7 +9,7 @@ use crate::{
     error::Result,
 };
 
-/// Where to search.
+/// Windows of a search.
 #[derive(Debug, Args)]
 pub(super) struct WindowArguments {
     /// West, east, south and north edge, degrees: east longitude (-180 to 360, west above east crosses 0 or 180) and
@@ -28,7 +28,7 @@ impl WindowArguments {
     /// Boxes, polygons and windows of files, in this order.
     ///
     /// # Errors
-    /// A box that is none; a file that cannot be read or holds no window.
+    /// A malformed box; a file that cannot be read or contains no window.
     pub(super) fn windows(&self) -> Result<Vec<WindowConfig>> {
         let mut windows = Vec::new();
         for (number, edges) in (1..).zip(&self.boxes) {

@@ -9,7 +9,7 @@ use crate::worker;
 /// Performs one task of the service, which communicates over standard input and output.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// The process of the service; the worker ends when its parent is another one.
+    /// The process of the service; the worker ends if its parent is a different process.
     #[arg(long, value_name = "PID")]
     parent: Option<u32>,
 }

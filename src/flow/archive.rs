@@ -6,9 +6,9 @@
 //!  results in order of time, every shot once ─► shots of the worst profiles ─► verdict ─► products, manifest last
 //! ```
 //!
-//! Two loads, a wave of tasks and one or two profiles are in memory, whatever the size of the archive. One thread reads
-//! a load of records and tabulates the trajectory over it, the only part that asks CSPICE; meanwhile all threads check
-//! the load before it.
+//! At most two loads, a wave of tasks and one or two profiles are in memory, regardless of the size of the archive.
+//! One thread reads a load of records and tabulates the trajectory over it, the only part that calls CSPICE;
+//! meanwhile all threads check the preceding load.
 //!
 //! The result of a file is stored with the identity of the file, the hashes of the kernels and the rules, once the
 //! kernels are confirmed unchanged. The BLAKE3 of a file is computed from the checked bytes. `archive/gather.rs` counts
@@ -65,11 +65,11 @@ use crate::{
     units::RADIANS_PER_DEGREE,
 };
 
-/// Raised when the products are laid out anew.
+/// Raised when the layout of the products changes.
 const LAYOUT: u32 = 2;
 /// Profiles whose shots are written.
 const WORST: usize = 12;
-/// Step of the scan of clock biases, seconds: the parabola through the variances tells what lies between.
+/// Step of the scan of clock biases, seconds: the parabola through the variances interpolates between steps.
 const SCAN_STEP_S: f64 = 0.05;
 
 /// What to check.
@@ -85,18 +85,18 @@ pub struct ArchiveRequest<'a> {
     pub clock: MolaClock,
     /// Whether shots without a position in the kernels leave the archive valid.
     pub allow_uncovered: bool,
-    /// Check every file again, whatever is stored.
+    /// Check every file again, even if its result is stored.
     pub force: bool,
-    /// Looked at before every load.
+    /// Checked before every load.
     pub stop: &'a AtomicBool,
 }
 
-/// What a check of an archive did.
+/// Outcome of a check of an archive.
 #[derive(Debug)]
 pub struct ArchiveOutcome {
     /// The manifest of the products.
     pub manifest: Manifest,
-    /// Whether the products stood already.
+    /// Whether the products already existed.
     pub unchanged: bool,
     /// Why files could not be checked; all others were.
     pub failures: Vec<Error>,
@@ -139,10 +139,10 @@ pub fn archive_filter() -> ShotFilter {
 
 /// Checks every file and publishes the products in the folder `out`.
 ///
-/// The result of a file is stored once it is known: a check that was ended, however, goes on where it was.
+/// The result of a file is stored once it is complete: a check that was interrupted resumes where it stopped.
 ///
 /// # Errors
-/// Kernels that cannot be read; a disk that refuses; [`Stopped`]. Files that cannot be checked are told in the outcome.
+/// Kernels that cannot be read; write errors; [`Stopped`]. Files that cannot be checked are part of the outcome.
 pub fn check_archive(
     request: &ArchiveRequest<'_>,
     progress: &(dyn Fn(&ArchiveProgress) + Sync),
@@ -186,7 +186,7 @@ struct Archive<'a> {
     limits: RangeCheckConfig,
     filter: ShotFilter,
     view: KernelView,
-    /// The kernels, which must stay what they are.
+    /// The kernels, which must not change.
     kernels: &'a InputFiles,
     cache: StageCache,
     progress: &'a (dyn Fn(&ArchiveProgress) + Sync),
@@ -201,7 +201,7 @@ impl Archive<'_> {
         }
     }
 
-    /// What every result depends on.
+    /// The inputs of every result.
     fn inputs(&self) -> Inputs {
         let mut inputs = Inputs::new(METHOD);
         inputs.calls(CALLS);
@@ -251,7 +251,7 @@ impl Archive<'_> {
         Ok(self.ranges(gather(&paths, &sources, results, failures)))
     }
 
-    /// Under which name the result of a file is stored, and what it depends on.
+    /// Name under which the result of a file is stored, and its inputs.
     fn stored_as(&self, path: &Path, identity: &Identity) -> (String, Inputs) {
         let place = blake3::hash(path.as_os_str().as_encoded_bytes()).to_hex();
         let mut inputs = self.inputs();
@@ -260,7 +260,7 @@ impl Archive<'_> {
         (format!("{NAME}/{}", &place[..32]), inputs)
     }
 
-    /// Checks what is not stored: this thread loads, another one has all threads of the pool check.
+    /// Checks the files without stored results: this thread loads, another one has all threads of the pool check.
     fn check_todo(
         &self,
         paths: &[PathBuf],
@@ -280,7 +280,7 @@ impl Archive<'_> {
             progress: self.progress,
         };
         thread::scope(|scope| {
-            // Nothing waits in between: two loads stand in memory at most.
+            // The channel has no buffer: at most two loads are in memory.
             let (parts, received) = sync_channel(0);
             let worker = scope.spawn(|| checker.run(received, start));
             let loader = Loader {
@@ -297,7 +297,7 @@ impl Archive<'_> {
         })
     }
 
-    /// What was found, and why files are not in it.
+    /// The results, and the failures of the other files.
     fn ranges(&self, gathered: Gathered) -> (ArchiveRanges, Vec<Error>) {
         let kernels = self.view.kernels().into_iter().flat_map(KernelSet::kernels);
         let ranges = ArchiveRanges {
@@ -335,7 +335,7 @@ impl Archive<'_> {
         inputs
     }
 
-    /// Publishes, and notes what could not be read again for it.
+    /// Publishes, and adds the failures of files that could not be read again for it.
     fn publish(&self, ranges: &mut ArchiveRanges, failures: &mut Vec<Error>) -> Result<Manifest> {
         let staging = staging(self.request.out)?;
         let (mut written, mut shots) = (Vec::new(), Vec::new());
@@ -365,7 +365,7 @@ impl Archive<'_> {
                     file,
                     profile,
                     shots,
-                    // Without leap seconds there is no UTC, and nothing needs it.
+                    // Without leap seconds there is no UTC, and it is not required.
                     start_utc: session.et_to_utc(start).ok(),
                 })
             })
@@ -393,7 +393,7 @@ impl Archive<'_> {
         Ok(manifest)
     }
 
-    /// Writes the shots of a profile, or says why its file does not give them any more.
+    /// Writes the shots of a profile, or returns why its file does not provide them any more.
     fn shots_of(
         &self,
         file: &CheckedFile,

@@ -1,4 +1,4 @@
-//! How far a run or a plan goes.
+//! Extent of a run or a plan.
 
 use std::sync::atomic::AtomicBool;
 
@@ -11,7 +11,7 @@ use crate::{
     files::InputFiles,
 };
 
-/// Where a run or a plan ends, and the files that it reads.
+/// Last stage of a run or a plan, and the files that it reads.
 pub(super) struct Bounds<'a> {
     pub(super) until: &'a str,
     pub(super) stop: &'a AtomicBool,
@@ -19,7 +19,7 @@ pub(super) struct Bounds<'a> {
 }
 
 impl Bounds<'_> {
-    /// Leaves the flow before `stage` when it is not asked for, or when the user stops the program.
+    /// Leaves the flow before `stage` if it was not requested, or when the user stops the program.
     pub(super) fn enter(&self, stage: &'static str) -> Flow<()> {
         let place = |name: &str| stages().iter().position(|stage| *stage == name);
         if place(self.until) < place(stage) {

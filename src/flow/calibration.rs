@@ -21,14 +21,14 @@ use crate::{
     store::manifest::figures,
 };
 
-/// Raised when the products of a calibration are laid out anew.
+/// Raised when the layout of the products of a calibration changes.
 const METHOD: u32 = 2;
 
-/// Calibrates the lines of a camera and publishes the products in `<out>/<calibration>`, when something has changed since the
-/// last time.
+/// Calibrates the lines of a camera and publishes the products in `<out>/<calibration>`, if an input has changed
+/// since the last run.
 ///
 /// # Errors
-/// Files that cannot be read, points that do not fit the support data, a disk that refuses; what stood before stands then.
+/// Files that cannot be read, points that do not fit the support data, write errors; earlier products then remain.
 pub fn run_calibration(
     config: &CalibrationConfig,
     out: &Path,
@@ -67,7 +67,7 @@ pub fn run_calibration(
     )
 }
 
-/// What the manifest says of a calibration.
+/// Content of the manifest of a calibration.
 fn told(result: &Calibration) -> Told<'_> {
     let count = |kind: PointKind| {
         let of = result.points.iter().filter(|of| of.kind == kind);

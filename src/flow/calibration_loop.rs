@@ -1,14 +1,14 @@
-//! A calibration from pixels, round by round: tie points, a consistent camera, a terrain model, laser control, the calibrated camera,
-//! with which the next round begins.
+//! A calibration from pixels in rounds: tie points, a consistent camera, a terrain model, laser control, and the
+//! calibrated camera, with which the next round begins.
 //!
-//! A round calls plain functions of four stages: `match_ties::match_lines`, `calibrate` by ties alone,
+//! A round calls plain functions of four stages: `match_ties::match_lines`, `calibrate` by ties only,
 //! `map_surface::map_lines`, `match_laser::match_model`, and `calibrate` by ties and control. It hands calibrated
 //! support data to the next round, as a user would. Every calibration by control begins at the given support data, so
-//! that no error accumulates. Ground is withheld in rectangles of a lattice that no model moves, so that a shot is on
-//! one side in all rounds.
+//! that no error accumulates. Ground is withheld in rectangles of a lattice that does not depend on the model, so that a
+//! shot remains on one side in all rounds.
 //!
 //! # Source
-//! Li et al. 2023, figure 4. The paper ends "until accuracy converges"; when that is, `Rounds::is_converged` says.
+//! Li et al. 2023, figure 4. The paper ends "until accuracy converges"; `Rounds::is_converged` defines convergence.
 
 mod refused;
 
@@ -44,14 +44,13 @@ use crate::{
     units::wrap_pi,
 };
 
-/// Shots that tell heights of the ground before there is a terrain model: kilometres apart, as relief asks.
+/// Shots that provide heights of the ground before a terrain model exists: kilometres apart, as relief requires.
 const SHOTS: usize = 256;
-/// Standard deviations that a search covers.
+/// Search range, standard deviations.
 const SIGMAS: f64 = 3.0;
-/// Once lines agree, they see a place within so many pixels of where another one expects it: heights between tie points are off by
-/// more than the cameras.
+/// Search range once the lines agree, pixels: errors of heights between tie points exceed those of the cameras.
 const LATER_PX: f64 = 20.0;
-/// Tie points that say how high the ground is, and how far heights may be off them as a whole, pixels.
+/// Tie points that provide the height of the ground, and the common error of their heights, pixels.
 const PLACES: usize = 400;
 const OFF_PX: f64 = 3.0;
 
@@ -69,7 +68,7 @@ impl Stage for CalibrationLoop<'_> {
         called::<MapSurface<'_>>(),
         called::<MatchLaser<'_>>(),
         called::<Calibrate<'_>>(),
-        // What the matching with the laser calls.
+        // Called by the matching with the laser.
         called::<ConvertDatum<'_>>(),
     ];
     type Output = Calibration;
@@ -107,7 +106,7 @@ impl Stage for CalibrationLoop<'_> {
     }
 }
 
-/// What a round gave.
+/// Result of a round.
 struct Round {
     ties: TiesOfLines,
     control: LaserMatch,
@@ -115,18 +114,18 @@ struct Round {
     told: CalibrationRound,
 }
 
-/// The lines of the camera as the last round left them.
+/// The lines of the camera after the last round.
 struct Lines<'a> {
     config: &'a CalibrationConfig,
     pixels: Vec<Pyramid>,
-    /// Their support data, and where those of a round are written.
+    /// Their support data, and the path to which those of a round are written.
     isd: Vec<PathBuf>,
     folder: &'a Path,
-    /// Places of the ground as these see it, before there are any by the laser; body-fixed, metres.
+    /// Ground points seen by the lines, before laser control exists; body-fixed, metres.
     ground_m: Vec<Vector3<f64>>,
-    /// The two lines that differ most in where they look.
+    /// The two lines with the largest convergence.
     pair: [usize; 2],
-    /// Which shots make units: those of the first round, so that rounds can be compared.
+    /// Shots that form units: those of the first round, so that rounds can be compared.
     units: Option<UnitShots>,
 }
 
@@ -156,7 +155,7 @@ impl<'a> Lines<'a> {
     ) -> Result<Round> {
         let config = self.config;
         if round == 1 {
-            // So wide a search finds few places, but these say enough for a narrow one.
+            // Such a wide search finds few points, but they suffice for a narrow one.
             let given = cameras(config, &self.isd)?;
             let reach_m = self.first_reach_m(&given);
             self.ground_m = self.shots(&given, stop).in_stage(&stage("match_laser"))?;
@@ -201,7 +200,7 @@ impl<'a> Lines<'a> {
         })
     }
 
-    /// Tie points as these cameras find them.
+    /// Tie points, matched with these cameras.
     fn ties(&self, lines: &[LineCamera], reach_m: f64, stop: &AtomicBool) -> Result<TiesOfLines> {
         let lines = LinesToMatch {
             body: self.config.body,
@@ -213,7 +212,7 @@ impl<'a> Lines<'a> {
         match_lines(&lines, stop)
     }
 
-    /// A calibration of the present cameras by ties alone.
+    /// A calibration of the present cameras by ties only.
     fn tied(&self, ties: &TiesOfLines) -> Result<Calibration> {
         let mut config = self.config.clone();
         for (camera, isd) in config.cameras.iter_mut().zip(&self.isd) {
@@ -227,7 +226,7 @@ impl<'a> Lines<'a> {
         calibrate_given(&config, &given)
     }
 
-    /// Goes on with the cameras of a calibration, and with the ground where they see it.
+    /// Continues with the cameras of a calibration, and with the ground as they see it.
     fn take(&mut self, calibration: &Calibration) -> Result<()> {
         let places = calibration.points.iter();
         let places = places.filter(|point| point.kind == PointKind::Tie && !point.left_out);
@@ -275,17 +274,17 @@ impl<'a> Lines<'a> {
         )
     }
 
-    /// How far from where it is expected a line may see a place by what is known beforehand, metres on the ground.
+    /// A priori uncertainty of the position at which a line sees a ground point, metres on the ground.
     fn first_reach_m(&self, lines: &[LineCamera]) -> f64 {
         let (line, radius_m) = (&lines[self.pair[0]], self.config.body.map().radius_m);
         let known = &self.config.a_priori;
-        // What lines have in common they see by its height: as much aside as they look apart.
+        // Errors that lines share act through the height: the convergence turns a height error into a horizontal one.
         let apart = convergence_rad(lines, self.pair).tan();
         let pointing_m = std::f64::consts::SQRT_2 * known.angle_rad * line.height_m(radius_m);
         SIGMAS * pointing_m.hypot(apart * known.orbit_bias_m)
     }
 
-    /// The terrain model of the widest pair, about the places of the ties.
+    /// The terrain model of the pair with the largest convergence, about the ground points of the ties.
     fn surface(&self, lines: &[LineCamera], stop: &AtomicBool) -> Result<Surface> {
         let [one, other] = self.pair;
         map_lines(
@@ -300,7 +299,7 @@ impl<'a> Lines<'a> {
         )
     }
 
-    /// What the laser finds in a terrain model.
+    /// Laser control that is found in a terrain model.
     fn control(
         &mut self,
         lines: &[LineCamera],
@@ -331,7 +330,7 @@ impl<'a> Lines<'a> {
         };
         let (mut control, units) = match_model(&request, self.units.as_ref(), stop)?;
         self.units.get_or_insert(units);
-        // Where other lines have the model's places is for them to say: they did not make it.
+        // Measurements of the other lines are removed: these lines are not part of the model.
         for point in &mut control.points {
             for (camera, seen) in point.in_images.iter_mut().enumerate() {
                 *seen = seen.filter(|_| self.pair.contains(&camera));
@@ -348,13 +347,13 @@ fn cameras(config: &CalibrationConfig, isd: &[PathBuf]) -> Result<Vec<LineCamera
         .collect()
 }
 
-/// Angle between what two lines look at in the middle.
+/// Angle between the viewing directions of two lines in the middle of the image.
 fn convergence_rad(lines: &[LineCamera], pair: [usize; 2]) -> f64 {
     let [one, other] = pair.map(|at| lines[at].looks());
     one.angle(&other)
 }
 
-/// The two lines that differ most in where they look.
+/// The two lines with the largest convergence.
 fn widest(lines: &[LineCamera]) -> [usize; 2] {
     let all =
         (0..lines.len()).flat_map(|one| (one + 1..lines.len()).map(move |other| [one, other]));

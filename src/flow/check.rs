@@ -1,4 +1,4 @@
-//! The flow that tries: configuration, files and kernel coverage of a site, then what a run of it would be judged as, without
+//! The flow of a check: configuration, files and kernel coverage of a site, then the verdict of a run, without
 //! writing anything.
 
 use std::{collections::BTreeSet, path::PathBuf, sync::atomic::AtomicBool};
@@ -24,24 +24,25 @@ use crate::{
     store::hashes::HashCache,
 };
 
-/// What a check found.
+/// Outcome of a check.
 #[derive(Debug, Default)]
 pub struct Checked {
-    /// What is well, one line each.
+    /// What is in order, one line each.
     pub findings: Vec<String>,
-    /// What a run would stumble over; all of it, not only the first.
+    /// All failures of a run, not only the first.
     pub failures: Vec<Error>,
-    /// What a run would be judged as; nothing where an input keeps it from being made.
+    /// The verdict of a run; `None` if an input prevents it.
     pub verdict: Option<Verdict>,
 }
 
 /// Checks a site's kernels, labels, PEDR and tie point files, and coverage at its images and at its shots; of rival
 /// sets of kernels every one, since any of them may be chosen.
 ///
-/// The PEDR files are searched as a run does it: only shots in the windows tell which times are needed. When nothing is
-/// wrong with any input, all stages run as in a run, and what would make its products invalid is a failure too.
+/// The PEDR files are searched as in a run: only shots in the windows determine the required times. If all inputs are
+/// valid, all stages run as in a run, and causes that would make its products invalid are failures too.
 ///
-/// * `hashes` – kernels that are known there are not read again to check their words; nothing is added to them
+/// * `hashes` – kernels that are known there are not read again for the check of their content; nothing is added to
+/// them
 #[must_use]
 pub fn check_site(config: &SiteConfig, hashes: &HashCache) -> Checked {
     let mut check = Check::of(config, hashes.files());
@@ -51,10 +52,10 @@ pub fn check_site(config: &SiteConfig, hashes: &HashCache) -> Checked {
     check.checked
 }
 
-/// The times at which a site reads kernels, found by the stages that need no orbit; nothing is stored.
+/// The times at which a site reads kernels, determined by the stages that need no orbit; nothing is stored.
 ///
 /// # Errors
-/// What those stages say of labels, clocks and PEDR files.
+/// Failures of those stages with labels, clocks and PEDR files.
 pub fn required_by_site(config: &SiteConfig) -> Result<RequiredCoverage> {
     let mut check = Check::of(config, InputFiles::default());
     let prepared = prepare(&mut check, config);
@@ -68,7 +69,7 @@ pub fn required_by_site(config: &SiteConfig) -> Result<RequiredCoverage> {
     }
 }
 
-/// The rival sets of the configuration; none when it names one source of kernels.
+/// The rival sets of the configuration; empty if it names one source of kernels.
 ///
 /// # Errors
 /// Kernels that cannot be read.
@@ -76,7 +77,7 @@ pub fn rival_sets(config: &SiteConfig) -> Result<Vec<RivalSet>> {
     load_rivals(config, &InputFiles::default()).in_site(&config.site)
 }
 
-/// What a run would make is invalid.
+/// The products of a run would be invalid.
 #[derive(Debug, thiserror::Error)]
 #[error("products would be invalid: {reason}")]
 struct WouldBeInvalid {
@@ -97,12 +98,12 @@ struct Check<'a> {
     site: &'a str,
     files: InputFiles,
     never: AtomicBool,
-    /// Set of kernels that findings are about.
+    /// Set of kernels to which findings refer.
     prefix: String,
-    /// Whether all inputs are sound, so that every stage runs as it does in a run.
+    /// Whether all inputs are valid, so that every stage runs as it does in a run.
     is_trial: bool,
     checked: Checked,
-    /// Failures that have been noted.
+    /// Failures that have been reported.
     told: BTreeSet<String>,
 }
 
@@ -163,7 +164,7 @@ impl<'a> Check<'a> {
             .push(format!("{}{finding}", self.prefix));
     }
 
-    /// Notes a finding or a failure; each failure once, for kernels are loaded for clocks and for orbits.
+    /// Records a finding or a failure; each failure once, since kernels are loaded for clocks and for orbits.
     fn note<T>(&mut self, stage: &str, result: Result<T>) -> Option<T> {
         match result.in_stage(stage).in_site(self.site) {
             Ok(found) => Some(found),
@@ -190,13 +191,13 @@ impl Driver for Check<'_> {
         Ok(())
     }
 
-    /// A file that cannot be read is told by the stage that reads it, or by what the stage examines.
+    /// An unreadable file is reported by the stage that reads it, or by the examination of that stage.
     fn hash(&mut self, _stage: &'static str, paths: &[PathBuf]) -> Flow<Vec<HashedFile>> {
         let hashed = self.files.hash_all(paths, &self.never);
         Ok(hashed.unwrap_or_default())
     }
 
-    /// An image without times fails by itself; it does not keep profiles from being checked.
+    /// An image without times fails on its own; profiles are checked nevertheless.
     fn usable(&self, images: &[Output<ImageTimes>]) -> Vec<Output<ImageTimes>> {
         let usable = images.iter().filter(|image| image.get().is_some());
         usable.cloned().collect()
@@ -206,7 +207,7 @@ impl Driver for Check<'_> {
         Ok(self.note(stage, result))
     }
 
-    /// The times as far as they are known.
+    /// The required times, as far as they are known.
     fn required(
         &self,
         config: &SiteConfig,
@@ -259,7 +260,7 @@ impl Driver for Check<'_> {
     }
 }
 
-/// Nothing is kept by an output's origin here.
+/// The origin of an output is not used here.
 fn known<T>(label: String, value: T) -> Output<T> {
     let nowhere = Provenance {
         blake3: String::new(),

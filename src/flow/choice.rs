@@ -1,4 +1,4 @@
-//! Of rival kernel sets the one whose trajectory is closest to the mean of all.
+//! Chooses the rival kernel set whose trajectory is closest to the mean of all.
 
 use std::sync::atomic::AtomicBool;
 
@@ -20,14 +20,14 @@ use crate::{
     time::PointingBias,
 };
 
-/// Which set was chosen, and by which distances.
+/// The chosen set, and the distances on which the choice is based.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct KernelChoice {
     /// Index of the chosen set.
     pub chosen: usize,
-    /// All sets, as the manifest tells of them.
+    /// All sets, as entries of the manifest.
     pub entries: Vec<KernelChoiceEntry>,
-    /// The choice and what was left out, one sentence each.
+    /// The choice and the exclusions, one sentence each.
     pub notes: Vec<String>,
 }
 
@@ -38,17 +38,17 @@ stage_inputs! {
         pub sets: RivalKernelSets<'a>,
         /// Times at which the site reads kernels.
         pub required: Required<'a>,
-        /// Whether the clocks must agree: times of images rest on them.
+        /// Whether the clocks must agree: times of images depend on them.
         pub compare_clocks: &'a bool,
     }
 }
 
-/// Rival sets in the order of the configuration; those of their kernels that positions may depend on.
+/// Rival sets in the order of the configuration, with the kernels on which positions may depend.
 #[derive(Debug)]
 pub struct RivalKernelSets<'a>(&'a [RivalSet]);
 
 impl<'a> RivalKernelSets<'a> {
-    /// These sets, which hold only kernels that positions may depend on.
+    /// These sets, which contain only kernels on which positions may depend.
     pub(super) const fn new(sets: &'a [RivalSet]) -> Self {
         Self(sets)
     }
@@ -94,7 +94,7 @@ fn choose_kernels(
             chosen: 0,
             entries: Vec::new(),
             notes: vec![format!(
-                "kernel set {first} is used: no position is needed by which the sets could be compared"
+                "kernel set {first} is used: no position is needed for which the sets could be compared"
             )],
         });
     }
@@ -113,7 +113,7 @@ fn choose_kernels(
     })
 }
 
-/// The rival sets of the configuration with the kernels that positions may depend on; none when it names one source.
+/// The rival sets of the configuration with the kernels on which positions may depend; empty if it names one source.
 ///
 /// # Errors
 /// Kernels that cannot be read.

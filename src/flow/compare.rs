@@ -1,4 +1,4 @@
-//! Rival sets of kernels, asked for the same instants one session after the other.
+//! Comparison of rival kernel sets at the same instants, one session after the other.
 
 mod answer;
 mod clocks;
@@ -31,12 +31,12 @@ pub struct RivalSet {
     pub kernels: KernelSet,
 }
 
-/// What is compared.
+/// Request of a comparison.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
-    /// What asks; failures of one set are placed there, followed by `/` and the set.
+    /// The calling stage; failures of one set are placed there, followed by `/` and the set.
     pub stage: &'static str,
-    /// The instants of interest; without them all that every set holds.
+    /// The instants of interest; without them all that every set covers.
     pub required: Option<&'a RequiredCoverage>,
     /// How C-kernels are read.
     pub bias: PointingBias,
@@ -46,7 +46,7 @@ pub struct Request<'a> {
     pub clocks: bool,
 }
 
-/// What a comparison found.
+/// Result of a comparison.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Compared {
     /// Orbits: geometric positions relative to Mars.
@@ -55,9 +55,9 @@ pub struct Compared {
     pub attitude: Option<AttitudeComparison>,
     /// First and last epoch of the orbits in UTC.
     pub utc: [String; 2],
-    /// Instants that were of interest but that one set does not hold.
+    /// Instants of interest that one set does not cover.
     pub uncovered: Vec<Uncovered>,
-    /// What a reader should know, one sentence each.
+    /// Notes for the reader, one sentence each.
     pub notes: Vec<String>,
 }
 
@@ -69,7 +69,7 @@ impl Request<'_> {
 }
 
 impl Compared {
-    /// For each set what it lacks: how much, and the first spans; one sentence each.
+    /// For each set the time that it does not cover: total, and the first intervals; one sentence each.
     #[must_use]
     pub fn uncovered_lines(&self) -> Vec<String> {
         uncovered::lines(&self.uncovered)
@@ -79,7 +79,7 @@ impl Compared {
 /// Sets that cannot be compared.
 #[derive(Debug, thiserror::Error)]
 enum CompareError {
-    #[error("kernel set {other} holds the same kernels as {first}")]
+    #[error("kernel set {other} contains the same kernels as {first}")]
     Same { first: String, other: String },
     #[error("the kernel sets have no common coverage of the position of {}; {held}", SPACECRAFT.name)]
     NothingInCommon { held: String },
@@ -119,10 +119,10 @@ impl Cause for CompareError {
 
 /// Compares the orbits, and where possible the attitudes, of at least two sets.
 ///
-/// Instants that one set does not hold are left out, and listed.
+/// Instants that one set does not cover are left out, and listed.
 ///
 /// # Errors
-/// Sets without common time, sets whose clocks differ, and what a session says of its kernels.
+/// Sets without common time, sets whose clocks differ, and failures of a session with its kernels.
 pub fn compare_kernels(sets: &[RivalSet], request: &Request<'_>) -> Result<Compared> {
     let held = sets
         .iter()
@@ -175,7 +175,7 @@ pub fn compare_kernels(sets: &[RivalSet], request: &Request<'_>) -> Result<Compa
     })
 }
 
-/// How much of the time of interest each set holds, none of it held by all.
+/// Covered time of interest of each set, where the sets have none in common.
 fn nothing_in_common(
     sets: &[RivalSet],
     positions: &[Intervals],
@@ -183,10 +183,10 @@ fn nothing_in_common(
 ) -> CompareError {
     let held = sets.iter().zip(positions).map(|(set, held)| {
         let held = required.map_or_else(|| held.clone(), |required| required.intersection(held));
-        format!("{} holds {:.3} s", set.id, held.duration_s())
+        format!("{} covers {:.3} s", set.id, held.duration_s())
     });
     let of = required.map_or_else(String::new, |required| {
-        format!(" of {:.3} s asked for", required.duration_s())
+        format!(" of {:.3} s requested", required.duration_s())
     });
     CompareError::NothingInCommon {
         held: held.collect::<Vec<_>>().join(", ") + &of,
@@ -206,7 +206,7 @@ fn uncovered(
     })
 }
 
-/// Makes sure that no set is named twice: what is compared with itself looks like agreement.
+/// Ensures that no set is named twice: a set compared with itself looks like agreement.
 ///
 /// # Errors
 /// Two sets with the same files in the same order.

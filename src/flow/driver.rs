@@ -1,4 +1,4 @@
-//! What a driver of the flow does with its stages.
+//! Interface of a driver of the flow to its stages.
 
 use std::{path::PathBuf, sync::atomic::AtomicBool};
 
@@ -15,7 +15,7 @@ use crate::{
 /// Why the flow ends before its end.
 #[derive(Debug)]
 pub(super) enum Leave {
-    /// The last stage that was asked for is done.
+    /// The last requested stage is done.
     StageReached,
     /// Something failed.
     Failed(Error),
@@ -27,7 +27,7 @@ impl From<Error> for Leave {
     }
 }
 
-/// What a step of the flow gives, unless the flow ends there.
+/// Result of a step of the flow, unless the flow ends there.
 pub(super) type Flow<T> = std::result::Result<T, Leave>;
 
 /// A stage with the reason why it runs, or [`Reason::Unchanged`].
@@ -35,7 +35,7 @@ pub(super) type Flow<T> = std::result::Result<T, Leave>;
 pub struct StageReason {
     /// Label of the stage, for example `register/E02-00665`.
     pub stage: String,
-    /// Why it runs, or that it does not.
+    /// Why it runs, or that it is kept.
     pub reason: Reason,
 }
 
@@ -62,12 +62,12 @@ pub(super) trait Driver {
         Ok(self.files().hash_all(paths, self.stop()).in_stage(stage)?)
     }
 
-    /// The images that profiles may be simultaneous with.
+    /// The images with which profiles may be simultaneous.
     fn usable(&self, images: &[Output<ImageTimes>]) -> Vec<Output<ImageTimes>> {
         images.to_vec()
     }
 
-    /// What a step between stages gave; `None` when it failed and the driver goes on.
+    /// Result of a step between stages; `None` if it failed and the driver continues.
     fn attempt<T>(&mut self, stage: &str, result: Result<T>) -> Flow<Option<T>> {
         Ok(Some(result.in_stage(stage)?))
     }

@@ -1,4 +1,4 @@
-//! What the verdict rests on, and what a reader of the products should know.
+//! Evidence for the verdict, and notes for readers of the products.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ use crate::{
     wording::with_minus,
 };
 
-/// The verdict, and whether the images of every pair place their tie points together after the adjustment.
+/// The verdict, and whether the images of every pair agree at their tie points after the adjustment.
 pub(super) fn judged(
     config: &SiteConfig,
     site: &Site,
@@ -67,7 +67,7 @@ pub(super) fn judged(
     ))
 }
 
-/// What a reader must weigh of kernels, clocks, labels and tie points, one sentence each.
+/// Remarks on kernels, clocks, labels and tie points, one sentence each.
 pub(super) fn warnings(config: &SiteConfig, site: &Site) -> Result<Vec<String>> {
     let described = site.described.value()?;
     let mut warnings: Vec<String> = described.pck_note.iter().cloned().collect();
@@ -133,7 +133,7 @@ fn gimbal_locks(images: &[SiteImage]) -> Result<Vec<String>> {
         let (times, model) = (image.times.value()?, image.model.value()?);
         if model.near_gimbal_lock {
             locks.push(format!(
-                "image {}: |cos φ| falls to {:.3}, where ω and κ are poorly determined; the rotation-vector form is not",
+                "image {}: |cos φ| falls to {:.3}, where ω and κ are poorly determined; the rotation-vector form is unaffected",
                 times.id, model.cos_phi_min
             ));
         }
@@ -141,7 +141,7 @@ fn gimbal_locks(images: &[SiteImage]) -> Result<Vec<String>> {
     Ok(locks)
 }
 
-/// Images that one camera took at one time with the same pixels: one label may stand for another.
+/// Images that one camera took at one time with the same pixels: their labels may have been exchanged.
 fn same_exposures(images: &[SiteImage]) -> Result<Vec<String>> {
     let mut same = Vec::new();
     for (index, image) in images.iter().enumerate() {
@@ -155,7 +155,7 @@ fn same_exposures(images: &[SiteImage]) -> Result<Vec<String>> {
                 .abs();
             if apart_s < times.line_times.mean_period_s() && times.detector() == other.detector() {
                 same.push(format!(
-                    "images {} and {} were exposed at the same time by the same pixels: one label may stand for another",
+                    "images {} and {} were exposed at the same time by the same pixels: one of the labels may belong to another image",
                     other.id, times.id
                 ));
             }
@@ -175,7 +175,7 @@ fn judged_images(images: &[SiteImage]) -> Result<Vec<JudgedImage<'_>>> {
     images.collect()
 }
 
-/// What a reader of the products should know, one sentence each.
+/// Notes for a reader of the products, one sentence each.
 pub(super) fn notes(config: &SiteConfig, site: &Site) -> Result<Vec<String>> {
     let mut notes = Vec::new();
     if let Some(choice) = &site.choice {
@@ -203,7 +203,7 @@ pub(super) fn notes(config: &SiteConfig, site: &Site) -> Result<Vec<String>> {
     Ok(said.collect())
 }
 
-/// What was wrong with the files of pixels, one sentence each, and how much that is in all.
+/// Complaints about pixel files, one sentence each, and their total number.
 pub(super) fn complaints_of_pixels(site: &Site) -> Result<(Vec<String>, u64)> {
     let (mut texts, mut count) = (Vec::new(), 0);
     for (id, image) in shown(site)? {
@@ -214,7 +214,7 @@ pub(super) fn complaints_of_pixels(site: &Site) -> Result<(Vec<String>, u64)> {
     Ok((texts, count))
 }
 
-/// What was wrong with input records, one sentence each.
+/// Complaints about input records, one sentence each.
 pub(super) fn complaints(site: &Site) -> Result<Vec<String>> {
     let complaints = site.found.value()?.complaints.iter();
     let mut complaints: Vec<String> = complaints.map(ToString::to_string).collect();

@@ -1,4 +1,4 @@
-//! Which kernels a site uses, and for which times.
+//! The kernels that a site uses, and the required times.
 
 use std::collections::BTreeMap;
 
@@ -14,8 +14,8 @@ use crate::{
     time::Intervals,
 };
 
-/// The kernels of the configuration; from a folder, those that cover `required` (text kernels always);
-/// of rival sets the `chosen` one, which is the first as long as only clocks are needed.
+/// The kernels of the configuration; from a folder, those that cover `required` (text kernels always); of rival sets
+/// the `chosen` one, which is the first if only clocks are needed.
 pub(super) fn load_kernels(
     config: &SiteConfig,
     required: &RequiredCoverage,
@@ -41,7 +41,7 @@ fn load_list(list: &KernelList, files: &InputFiles) -> Result<KernelSet> {
     }
 }
 
-/// The rival sets of the configuration; none when it names one source.
+/// The rival sets of the configuration; empty if it names one source.
 pub(super) fn load_rivals(config: &SiteConfig, files: &InputFiles) -> Result<Vec<RivalSet>> {
     let KernelSource::Sets(sets) = &config.kernels.source else {
         return Ok(Vec::new());
@@ -55,8 +55,8 @@ pub(super) fn load_rivals(config: &SiteConfig, files: &InputFiles) -> Result<Vec
     rivals.collect()
 }
 
-/// Times at which the site reads kernels: exposures with their padding and the time that light takes, flights over
-/// the windows as far as the scan reaches, and attitudes at the exposures shifted by the pointing bias.
+/// Times at which the site reads kernels: exposures with their padding and the light time, flights over the windows
+/// up to the range of the scan, and attitudes at the exposures shifted by the pointing bias.
 pub(super) fn required_coverage(
     config: &SiteConfig,
     images: &[&ImageTimes],
@@ -67,12 +67,12 @@ pub(super) fn required_coverage(
         trajectory_reach_s(&config.range_check, &config.mola_clock),
     );
     let mut by_spacecraft: BTreeMap<&str, Vec<&ImageTimes>> = BTreeMap::new();
-    // Those of support data read no kernels.
+    // Images with support data read no kernels.
     for image in images.iter().filter(|image| image.support.is_none()) {
         let of = by_spacecraft.entry(&image.instrument.spacecraft.id);
         of.or_default().push(image);
     }
-    // No kernels have the spacecraft of tables.
+    // The spacecraft of tables has no kernels.
     let flown = if config.shots.is_empty() {
         profiles
     } else {
@@ -82,7 +82,7 @@ pub(super) fn required_coverage(
     let light_time = config.orientation.light_time;
     let position =
         |image: &&ImageTimes| light_time.read_over(image.exposures().padded(kernels.padding_s));
-    // Within the tolerance a look-up reaches kernels that end before it or begin after it.
+    // Within the tolerance, a look-up reaches kernels that end before it or begin after it.
     let padding_s = kernels.padding_s + kernels.ck_tolerance_s;
     let attitude = |image: &&ImageTimes| {
         let bias_s = config.pointing.bias_of(&image.instrument).seconds();

@@ -19,9 +19,9 @@ use crate::{
     store::manifest::figures,
 };
 
-/// Raised when the products of a match are laid out anew.
+/// Raised when the layout of the products of a match changes.
 const METHOD: u32 = 2;
-/// What stands for the name of a site in messages and in the manifest.
+/// Stands for the name of a site in messages and in the manifest.
 const NAME: &str = "pedr_match";
 
 /// No file to search.
@@ -35,15 +35,15 @@ impl Cause for NoFiles {
     }
 
     fn advice(&self) -> String {
-        "name PEDR files (AP#####v.B), or folders that hold them".to_owned()
+        "name PEDR files (AP#####v.B), or folders that contain them".to_owned()
     }
 }
 
-/// Matches laser profiles with a terrain model and publishes the products in the folder `out`, when something has changed since
-/// the last time. `request.pedr` may name folders too.
+/// Matches laser profiles with a terrain model and publishes the products in the folder `out`, if an input has
+/// changed since the last run. `request.pedr` may name folders too.
 ///
 /// # Errors
-/// Files that cannot be read, no shot on the model, a disk that refuses; what stood before stands then.
+/// Files that cannot be read, no shot on the model, write errors; earlier products then remain.
 pub fn run_match(request: &MatchRequest, out: &Path, force: bool) -> Result<SingleOutcome> {
     check_out_path(out)?;
     let listing = Listing::of(&request.pedr);
@@ -89,7 +89,7 @@ pub fn run_match(request: &MatchRequest, out: &Path, force: bool) -> Result<Sing
     )
 }
 
-/// What was asked for, as the manifest has it.
+/// The request, as in the manifest.
 fn keys(request: &MatchRequest) -> BTreeMap<String, String> {
     let options = &request.options;
     let name = |path: &Path| crate::files::file_name(path);
@@ -116,7 +116,7 @@ fn keys(request: &MatchRequest) -> BTreeMap<String, String> {
     keys.map(|(key, value)| (key.to_owned(), value)).into()
 }
 
-/// What the manifest says of a match.
+/// Content of the manifest of a match.
 fn told(result: &LaserMatch) -> Told<'_> {
     let kept = result.units.iter().filter(|unit| unit.is_kept());
     let held_out = result.held_out.as_ref();

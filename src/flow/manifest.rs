@@ -1,4 +1,4 @@
-//! What the manifest says of a run.
+//! The manifest of a run.
 
 use std::collections::BTreeMap;
 
@@ -27,7 +27,7 @@ use crate::{
 /// Complaints that the manifest quotes; all are counted.
 const COMPLAINTS_QUOTED: usize = 100;
 
-/// What is known of the products once they are made.
+/// Account of the finished products.
 pub(super) struct Account {
     pub(super) verdict: Verdict,
     pub(super) products: Vec<ProductEntry>,
@@ -36,7 +36,7 @@ pub(super) struct Account {
     pub(super) rejected: BTreeMap<String, u64>,
 }
 
-/// How far apart along the flight the images of the worst pair place their tie points, metres.
+/// Largest along-track parallax of a pair of images at their tie points, metres.
 fn largest_along_track_parallax_m(intersection: Option<&Intersection>) -> Result<Option<f64>> {
     let Some(intersection) = intersection else {
         return Ok(None);
@@ -46,7 +46,7 @@ fn largest_along_track_parallax_m(intersection: Option<&Intersection>) -> Result
     Ok(parallaxes_m.max_by(f64::total_cmp))
 }
 
-/// How far the median height of the tie points is from the ground between MOLA's shots, metres.
+/// Median height of the tie points above the MOLA surface, metres.
 fn height_off_surface_m(intersection: Option<&Intersection>) -> Result<Option<f64>> {
     let Some(intersection) = intersection else {
         return Ok(None);
@@ -105,7 +105,7 @@ pub(super) fn manifest(
     })
 }
 
-/// Every stage with the hash over its inputs; the last one is what made the products.
+/// Every stage with the hash over its inputs; the last one made the products.
 fn stages(ledger: &Ledger, inputs: &Inputs) -> Vec<StageEntry> {
     let entry = |name: &str, fingerprint: String| StageEntry {
         name: name.to_owned(),
@@ -165,7 +165,7 @@ fn counts(site: &Site) -> Result<BTreeMap<String, u64>> {
     Ok(counts)
 }
 
-/// Cells of common ground in which a tie point was searched, and what became of them; nothing where none was.
+/// Cells of common ground in which a tie point was searched, by outcome; empty without matching.
 fn matched(ties: &Ties) -> BTreeMap<String, u64> {
     let mut counts = BTreeMap::new();
     for pair in &ties.matched {
@@ -245,7 +245,7 @@ fn biases(config: &SiteConfig, site: &Site) -> Result<Vec<BiasEntry>> {
         },
         source: of.source.to_owned(),
     });
-    // Nothing at another body is corrected for MOLA.
+    // The MOLA clock correction applies only at Mars.
     let clock = (config.body == Body::Mars).then_some(clock);
     Ok(pointing.chain(clock).collect())
 }

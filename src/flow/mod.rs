@@ -1,8 +1,9 @@
 //! The data flow: kernels → times → footprints → IAU 2000 → ranges → orientation → model → registration →
 //! adjustment → products.
 //!
-//! `flow/site.rs` is one description of it, read top to bottom. A driver says what becomes of each stage: a run makes or
-//! keeps its output, a plan looks whether it would be kept, a check runs what tells whether a run can succeed.
+//! `flow/site.rs` is one description of it, read top to bottom. A driver decides on each stage: a run computes or
+//! keeps its output, a plan determines whether it would be kept, a check runs the stages that determine whether a run
+//! can succeed.
 
 mod archive;
 mod bounds;

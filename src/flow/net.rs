@@ -19,13 +19,13 @@ use crate::{
     store::manifest::figures,
 };
 
-/// Raised when the products of a net are laid out anew.
+/// Raised when the layout of the products of a net changes.
 const METHOD: u32 = 1;
 
-/// Triangulates a net and publishes its products in `<out>/<net>`, when something has changed since the last time.
+/// Triangulates a net and publishes its products in `<out>/<net>`, if an input has changed since the last run.
 ///
 /// # Errors
-/// Tables that cannot be read, a net without a solution, a disk that refuses; what stood before stands then.
+/// Tables that cannot be read, a net without a solution, write errors; earlier products then remain.
 pub fn run_net(config: &NetConfig, out: &Path, force: bool) -> Result<SingleOutcome> {
     check_out_path(out)?;
     let single = Single {
@@ -59,7 +59,7 @@ pub fn run_net(config: &NetConfig, out: &Path, force: bool) -> Result<SingleOutc
     )
 }
 
-/// What the manifest says of a net.
+/// Content of the manifest of a net.
 fn told(result: &Triangulation) -> Told<'_> {
     let totals = &result.totals;
     let largest = |of: [f64; 2]| of[0].max(of[1]);

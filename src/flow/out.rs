@@ -1,4 +1,4 @@
-//! Whether products can be written into a folder, asked before any stage runs.
+//! Checks, before any stage runs, whether products can be written into a folder.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use crate::{
     store::publish::staging_path,
 };
 
-/// Longest part of a path that the usual file systems hold, bytes.
+/// Longest component of a path that common file systems accept, bytes.
 const PART_LENGTH_MAX: usize = 255;
 
 /// Why no products can be written into a folder.
@@ -21,10 +21,10 @@ pub enum OutError {
     Unspeakable {
         /// The folder.
         out: PathBuf,
-        /// What stands in the way.
+        /// The obstacle.
         holds: &'static str,
     },
-    /// No file system holds it.
+    /// No file system accepts it.
     #[error(
         "--out has a path component of {bytes} bytes, {part:.20}…; expected at most {PART_LENGTH_MAX}"
     )]
@@ -34,7 +34,7 @@ pub enum OutError {
         /// Its length.
         bytes: usize,
     },
-    /// A kernel of an adjusted image has a path that CSPICE does not take.
+    /// A kernel of an adjusted image has a path that CSPICE does not accept.
     #[error(
         "with --out the path of a product, {}, is {} bytes long while it is written; CSPICE accepts at most {PATH_LENGTH_MAX}",
         .product.display(), .product.as_os_str().len()
@@ -61,7 +61,7 @@ impl Cause for OutError {
     }
 }
 
-/// Makes sure that the paths of all products of `sites` in `out` can be written.
+/// Ensures that the paths of all products of `sites` in `out` can be written.
 ///
 /// # Errors
 /// [`OutError`], of kind configuration.
@@ -79,7 +79,7 @@ pub fn check_out(out: &Path, sites: &[SiteConfig]) -> Result<()> {
     Ok(())
 }
 
-/// Makes sure that a folder has a path that file systems and metakernels hold.
+/// Ensures that file systems and metakernels accept the path of a folder.
 ///
 /// # Errors
 /// [`OutError`], of kind configuration.
@@ -90,7 +90,7 @@ pub(super) fn check_out_path(out: &Path) -> Result<()> {
     };
     let text = out.to_str().ok_or_else(|| unspeakable("is not UTF-8"))?;
     if text.contains(char::is_control) {
-        return Err(unspeakable("holds control characters").into());
+        return Err(unspeakable("contains control characters").into());
     }
     for part in out {
         if part.len() > PART_LENGTH_MAX {

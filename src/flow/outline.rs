@@ -1,4 +1,4 @@
-//! The flow told without a site: the names of its stages, in their order.
+//! The flow without a site: the names of its stages, in their order.
 
 use std::{
     path::PathBuf,
@@ -24,7 +24,7 @@ use crate::{
 pub fn stages() -> &'static [&'static str] {
     static NAMES: LazyLock<Vec<&str>> = LazyLock::new(|| {
         let mut outline = Outline::default();
-        // Of no kernels; with an image, its pixels, its window and tie points, so that no stage is passed over.
+        // Without kernels; with an image, its pixels, its window and tie points, so that no stage is skipped.
         let mut config = SiteConfig::default();
         config.images.push(ImageConfig {
             pixels: Some(PathBuf::new()),
@@ -47,11 +47,11 @@ pub fn stages() -> &'static [&'static str] {
     &NAMES
 }
 
-/// Stages, those of every image and round each, that a run of the site passes.
+/// Number of stages that a run of the site passes, counting each image and round.
 #[must_use]
 pub fn stage_count(of: &SiteConfig) -> usize {
     let mut outline = Outline::default();
-    // Of what is configured only what stages are passed for: nothing is read.
+    // Only the parts of the configuration that determine stages: nothing is read.
     let mut config = SiteConfig::default();
     let image = |image: &ImageConfig| ImageConfig {
         pixels: image.pixels.clone(),
@@ -70,7 +70,7 @@ struct Outline {
     files: InputFiles,
     never: AtomicBool,
     names: Vec<&'static str>,
-    /// Stages passed, each of every image.
+    /// Stages passed, counting each image.
     passed: usize,
 }
 

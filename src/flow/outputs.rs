@@ -1,4 +1,4 @@
-//! What the flow makes of a site: the outputs of its stages.
+//! The outputs of the stages of a site.
 
 use super::choice::KernelChoice;
 use crate::{
@@ -15,7 +15,7 @@ use crate::{
     },
 };
 
-/// What the stages before the kernels' choice make of a site.
+/// Outputs of the stages before the choice of kernels.
 #[derive(Clone)]
 pub(super) struct Prepared {
     pub(super) found: Output<SearchResult>,
@@ -41,21 +41,21 @@ pub(super) struct Site {
     pub(super) ranges: Output<RangeCheck>,
     /// In the order of the configuration.
     pub(super) images: Vec<SiteImage>,
-    /// Nothing for a site without tie point files.
+    /// `None` for a site without tie point files.
     pub(super) ties: Option<Output<Ties>>,
-    /// With the orientation of the kernels; none when it failed.
+    /// With the orientation of the kernels; `None` if it failed.
     pub(super) intersection: Option<Intersection>,
-    /// None when it failed.
+    /// `None` if it failed.
     pub(super) adjustment: Option<Adjustment>,
-    /// What the images show; nothing for a site without pixels.
+    /// Overlays on the images; `None` for a site without pixels.
     pub(super) overlays: Option<Output<Overlays>>,
-    /// A terrain model; nothing for a site that asks for none.
+    /// A terrain model; `None` for a site that requests none.
     pub(super) surface: Option<Output<Surface>>,
-    /// Why there is no adjustment although there are tie points.
+    /// Why a site with tie points has no adjustment.
     pub(super) adjustment_failure: Option<Error>,
 }
 
-/// Ground points of the tie points, and what every pair of images says of itself.
+/// Ground points of the tie points, and the internal agreement of every pair of images.
 pub(super) struct Intersection {
     pub(super) intersected: Output<IntersectedTies>,
     pub(super) pairs: Output<Vec<PairComparison>>,
@@ -63,12 +63,12 @@ pub(super) struct Intersection {
     pub(super) heights: Output<HeightCheck>,
 }
 
-/// What the adjustment makes of a site.
+/// Outputs of the adjustment of a site.
 pub(super) struct Adjustment {
     pub(super) adjusted: Output<Adjusted>,
     /// The images with their adjusted orientation.
     pub(super) images: Vec<SiteImage>,
-    /// What the adjusted kernels of every image hold.
+    /// Contents of the adjusted kernels of every image.
     pub(super) tables: Vec<Output<KernelTables>>,
     /// With the adjusted orientation.
     pub(super) intersection: Intersection,

@@ -1,4 +1,4 @@
-//! The part of the flow that looks at pixels.
+//! The part of the flow that reads pixels.
 
 use super::{
     driver::{Driver, Flow},
@@ -15,7 +15,7 @@ use crate::{
     },
 };
 
-/// For every image the file of its pixels, which a stage is about to read.
+/// The pixel file of every image, which a stage is about to read.
 pub(super) fn pixel_files<D: Driver>(
     flow: &mut D,
     stage: &'static str,
@@ -25,7 +25,7 @@ pub(super) fn pixel_files<D: Driver>(
     config.images.iter().map(hash).collect()
 }
 
-/// What images with pixels show of footprints and tie points; nothing for a site without pixels.
+/// Overlays of footprints and tie points on images with pixels; `None` for a site without pixels.
 pub(super) fn overlays<D: Driver>(
     flow: &mut D,
     config: &SiteConfig,

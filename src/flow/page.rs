@@ -1,7 +1,7 @@
-//! The page of a published site, made again from its products.
+//! The page of a published site, rebuilt from its products.
 //!
-//! The content of the page is a product of its own, unrounded (`products/page_data.rs`), and the page follows from it
-//! alone (decision 0023). New content of `SiteProducts` for a page belongs there too.
+//! The content of the page is a product of its own, unrounded (`products/page_data.rs`), and the page depends only on
+//! it (decision 0023). New content of `SiteProducts` for a page belongs there too.
 
 use std::path::{Path, PathBuf};
 
@@ -17,7 +17,7 @@ use crate::{
     },
 };
 
-/// The page is not the one that was published, although everything that it shows is.
+/// The page differs from the published one, although its content is unchanged.
 #[derive(Debug, thiserror::Error)]
 #[error("the page made from these products differs from the published one")]
 struct OtherPage;
@@ -32,7 +32,7 @@ impl Cause for OtherPage {
     }
 }
 
-/// A page that was made again.
+/// A rebuilt page.
 #[derive(Debug)]
 pub struct PageAgain {
     /// The site.
@@ -43,10 +43,10 @@ pub struct PageAgain {
     manifest: Manifest,
 }
 
-/// Makes the page of the site whose products lie in `folder` again: no site file, kernel or stored stage is read.
+/// Rebuilds the page of the site whose products are in `folder`: no site file, kernel or stored stage is read.
 ///
 /// # Errors
-/// Products of another version, missing or damaged ones; the page itself may be.
+/// Products that are missing, damaged or of another version; the page itself may be.
 pub fn page_again(folder: &Path) -> Result<PageAgain> {
     let manifest = read_published_by_this_version(folder, |path| path == REPORT)?;
     let data = PageData::read(folder)?;
@@ -61,10 +61,10 @@ pub fn page_again(folder: &Path) -> Result<PageAgain> {
 }
 
 impl PageAgain {
-    /// Puts the page in its place among the products, and says where that is.
+    /// Writes the page to its place among the products, and returns its path.
     ///
     /// # Errors
-    /// A page that is not the one of the manifest; another run at work; the disk's refusal.
+    /// A page that differs from that of the manifest; another run in progress; write errors.
     pub fn put_back(&self) -> Result<PathBuf> {
         let path = self.folder.join(REPORT);
         let mut products = self.manifest.products.iter();

@@ -1,4 +1,4 @@
-//! The flow that looks: which stages would run, and why; no product is written.
+//! The flow of a plan: which stages would run, and why; no product is written.
 
 use std::{path::PathBuf, sync::atomic::AtomicBool};
 
@@ -24,14 +24,14 @@ use crate::{
 pub struct SitePlan {
     /// Every stage with the reason why it would run, or that it would be kept.
     pub stages: Vec<StageReason>,
-    /// The files that the stages read, as far as is known before the first one runs that would.
+    /// The files that the stages read, as far as is known before the first stage that would run.
     pub files: Vec<HashedFile>,
 }
 
-/// Says what [`run_site`](super::run_site) would do with these options. But for hashes nothing is written.
+/// Reports what [`run_site`](super::run_site) would do with these options. Only hashes are written.
 ///
-/// A stage below one that would run is listed as running because that output may change; if it turns
-/// out the same, the run will keep the later stage.
+/// A stage below one that would run is listed as running because that output may change; if it does not, the run
+/// keeps the later stage.
 ///
 /// # Errors
 /// Input files or kernels that cannot be read.

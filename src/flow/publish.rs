@@ -1,4 +1,4 @@
-//! The last step: products staged, read back, named, and explained by the manifest.
+//! The last step: products are staged, read back, named, and explained by the manifest.
 
 use std::path::{Path, PathBuf};
 
@@ -31,11 +31,11 @@ use crate::{
     },
 };
 
-/// Raised when products are laid out anew.
+/// Raised when the layout of products changes.
 const METHOD: u32 = 16;
 
-/// The configuration as written, the outlines that it names, all kernels and where they lie from `folder`, and
-/// every stage with what it was made from.
+/// The configuration as written, the outlines that it names, all kernels and their paths relative to `folder`, and
+/// the inputs of every stage.
 pub(super) fn inputs(config: &SiteConfig, site: &Site, folder: &Path, ledger: &Ledger) -> Inputs {
     let mut inputs = Inputs::new(METHOD);
     for (key, value) in &config.keys {
@@ -60,7 +60,7 @@ pub(super) fn inputs(config: &SiteConfig, site: &Site, folder: &Path, ledger: &L
     inputs
 }
 
-/// The products that stand for these inputs, or why they have to be made.
+/// The existing products of these inputs, or why they must be made.
 pub(super) fn standing(
     folder: &Path,
     cache: &StageCache,
@@ -81,20 +81,19 @@ pub(super) fn standing(
     }
 }
 
-/// Keeps what was published for the next run, as the text that a manifest is: the form of stage outputs cannot leave out
-/// what is unknown.
+/// Keeps the published manifest for the next run, as JSON: the format of stage outputs cannot omit unknown values.
 ///
 /// # Errors
-/// A disk that refuses.
+/// Write errors.
 pub(super) fn keep(cache: &StageCache, inputs: Inputs, manifest: &Manifest) -> Result<()> {
     let text = serde_json::to_string(manifest).map_err(ProductError::refused("encode JSON"))?;
     cache.store(PUBLISH, inputs, text).map(|_| ())
 }
 
-/// Makes the products and puts them under their final names.
+/// Makes the products and gives them their final names.
 ///
 /// # Errors
-/// A product that does not read back, a disk that refuses.
+/// A product that cannot be read back, write errors.
 pub(super) fn publish(
     config: &SiteConfig,
     site: &Site,
@@ -113,7 +112,7 @@ pub(super) fn publish(
         tracing::warn!("{warning}");
     }
     let (verdict, images_agree) = judged(config, site, &warnings, &complaints)?;
-    // Those of pixels are no skipped records; the verdict has them from the warnings.
+    // Complaints about pixels are no skipped records; the verdict receives them through the warnings.
     complaints.extend(complaints_of_pixels(site)?.0);
     let images = image_products(&site.images)?;
     let adjusted_images = site
@@ -188,7 +187,7 @@ pub(super) fn publish(
     Ok(manifest)
 }
 
-/// The images as products want them.
+/// The images in the form that products require.
 fn image_products(images: &[SiteImage]) -> Result<Vec<ImageProducts<'_>>> {
     let images = images.iter().map(|image| {
         Ok(ImageProducts {
@@ -201,7 +200,7 @@ fn image_products(images: &[SiteImage]) -> Result<Vec<ImageProducts<'_>>> {
     images.collect()
 }
 
-/// What tie points make of the site; nothing where they could not be intersected.
+/// Results of the tie points of the site; `None` if they could not be intersected.
 fn geometric_products<'a>(
     site: &'a Site,
     adjustment: Option<AdjustmentProducts<'a>>,

@@ -1,4 +1,4 @@
-//! Adjusted kernels as SPICE reads them, before they get their final names.
+//! Adjusted kernels as SPICE reads them, before they receive their final names.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use crate::{
 /// Samples every adjusted image through the original kernels and its own pair in `staging`.
 ///
 /// # Errors
-/// [`Kind::Bug`](crate::error::Kind::Bug) for orientations that do not come back.
+/// [`Kind::Bug`](crate::error::Kind::Bug) for orientations that differ when read back.
 pub(super) fn read_back(
     config: &SiteConfig,
     site: &Site,

@@ -1,4 +1,4 @@
-//! The flow that makes products: a stage runs when something that it sees has changed.
+//! The flow that makes products: a stage runs when one of its inputs has changed.
 
 use std::{path::PathBuf, sync::atomic::AtomicBool, time::Instant};
 
@@ -26,7 +26,7 @@ use crate::{
     watch::{Counter, Watch},
 };
 
-/// How a site is run.
+/// Options of a run.
 #[derive(Debug)]
 pub struct RunOptions<'a> {
     /// Products go to `<out>/<site>`.
@@ -37,11 +37,11 @@ pub struct RunOptions<'a> {
     pub force: bool,
     /// Set from outside to stop between two stages, or inside the long ones.
     pub stop: &'a AtomicBool,
-    /// Hashes of input files from earlier runs, to which those of this one are added.
+    /// Hashes of input files from earlier runs; those of this run are added.
     pub hashes: &'a HashCache,
-    /// Folders below which input files must lie, without links; none for no such rule.
+    /// Folders below which input files must lie, links resolved; empty for no restriction.
     pub roots: &'a [PathBuf],
-    /// Hears what becomes of each stage.
+    /// Receives the events of each stage.
     pub observer: &'a dyn Observer,
 }
 
@@ -52,7 +52,7 @@ impl RunOptions<'_> {
     }
 }
 
-/// What a run did.
+/// Outcome of a run.
 #[derive(Debug)]
 pub struct SiteOutcome {
     /// Site identifier.
@@ -70,18 +70,18 @@ pub struct SiteOutcome {
 pub enum Ending {
     /// Products were published.
     Published(Manifest),
-    /// Nothing had changed; the products of an earlier run stand.
+    /// Nothing had changed; the products of an earlier run remain.
     Unchanged(Manifest),
-    /// Stopped after the stage that was asked for.
+    /// Stopped after the requested stage.
     StoppedAfter(String),
 }
 
 /// Runs one site from its configuration to its products.
 ///
-/// A stage whose inputs did not change is not run; its stored output is used.
+/// A stage whose inputs are unchanged is not run; its stored output is used.
 ///
 /// # Errors
-/// The first failure, with site, stage and file; products of an earlier run stay as they are.
+/// The first failure, with site, stage and file; products of an earlier run remain unchanged.
 pub fn run_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOutcome> {
     let span = tracing::info_span!("site", id = %config.site);
     let _entered = span.enter();
@@ -105,7 +105,7 @@ pub fn run_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOut
     let driven = match site(&mut run, config) {
         Ok(()) | Err(Leave::StageReached) => run.verify_inputs(),
         Err(Leave::Failed(failure)) => {
-            // What was made from files that changed is forgotten; the failure itself says more than the change.
+            // Outputs made from changed files are discarded; the failure itself takes precedence over the change.
             let _ = run.verify_inputs();
             Err(failure)
         }
@@ -132,7 +132,7 @@ struct Run<'a> {
     hashes: &'a HashCache,
     observer: &'a dyn Observer,
     ledger: Ledger,
-    /// The number of the method of each stage so far, whatever it ran for.
+    /// The number of the method of each stage so far, regardless of why it ran.
     methods: Vec<(String, u32)>,
     /// Every stage so far.
     passed: Vec<StageReason>,
@@ -140,7 +140,7 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Notes and tells why a stage runs, or that it is kept.
+    /// Records and reports why a stage runs, or that it is kept.
     fn pass(&mut self, label: &str, reason: Reason) {
         let word = if reason.runs() { "running" } else { "kept" };
         tracing::info!(stage = label, "{word}: {reason}");
@@ -161,8 +161,8 @@ impl Run<'_> {
         self.observer.hear(label, &event);
     }
 
-    /// Makes sure that all stages have read the same files. Otherwise their outputs would stand under the hashes
-    /// of other ones: those that were made just now are forgotten.
+    /// Ensures that all stages have read the same files. Otherwise their outputs would be stored under the hashes of
+    /// other files: those that were just made are discarded.
     fn verify_inputs(&self) -> Result<()> {
         let unchanged = self.bounds.files.verify_all();
         if unchanged.is_err() {
@@ -198,7 +198,7 @@ impl Driver for Run<'_> {
             Err(reason) => {
                 self.pass(&label, reason);
                 let begun = Instant::now();
-                // Reading a large archive is not lost when the run is.
+                // The hashes of a large archive are kept even if the run fails.
                 self.hashes.keep(self.files());
                 let tell = |count| self.observer.hear(&label, &StageEvent::Counts(count));
                 let counter = Counter::new(&tell);
@@ -227,7 +227,7 @@ impl Driver for Run<'_> {
         Ok(self.files().hash_all(paths, watch).in_stage(stage)?)
     }
 
-    /// Publishes the products unless those of an earlier run stand.
+    /// Publishes the products unless those of an earlier run are current.
     fn publish(&mut self, config: &SiteConfig, site: &Site) -> Flow<()> {
         self.enter(PUBLISH)?;
         let inputs = inputs(config, site, &self.folder, &self.ledger);

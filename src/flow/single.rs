@@ -1,4 +1,4 @@
-//! A flow of one stage: from files to the stage's output, and from that to products in a folder of their own.
+//! A flow of one stage: from files to the output of the stage, and from that to products in a separate folder.
 
 use std::{
     collections::BTreeMap,
@@ -27,18 +27,18 @@ use crate::{
 /// Complaints that the manifest quotes; all are counted.
 const COMPLAINTS_QUOTED: usize = 100;
 
-/// What a run of such a flow did.
+/// Outcome of such a flow.
 #[derive(Debug)]
 pub struct SingleOutcome {
     /// Folder of the products.
     pub folder: PathBuf,
     /// The manifest of the products.
     pub manifest: Manifest,
-    /// Whether the products stood already.
+    /// Whether the products already existed.
     pub unchanged: bool,
 }
 
-/// What a flow of one stage is told by its configuration.
+/// Configuration of a flow of one stage.
 pub(super) struct Single<'a> {
     /// Identifier, and name of the folder.
     pub(super) name: &'a str,
@@ -46,15 +46,15 @@ pub(super) struct Single<'a> {
     pub(super) file: &'a Path,
     pub(super) blake3: &'a str,
     pub(super) keys: &'a BTreeMap<String, String>,
-    /// Raised when products are laid out anew.
+    /// Raised when the layout of products changes.
     pub(super) method: u32,
     /// `<out>/<name>`.
     pub(super) folder: PathBuf,
-    /// Run whatever is stored.
+    /// Run even if the output is stored.
     pub(super) force: bool,
 }
 
-/// What a manifest says of an output.
+/// The part of a manifest that depends on an output.
 pub(super) struct Told<'a> {
     pub(super) verdict: &'a Verdict,
     pub(super) counts: Vec<(&'static str, u64)>,
@@ -64,11 +64,11 @@ pub(super) struct Told<'a> {
 }
 
 impl Single<'_> {
-    /// Runs the stage that `stage` makes of the hashed `files`, and publishes what `write` and `tell` make of its output, when
-    /// something has changed since the last time.
+    /// Runs the stage that `stage` makes of the hashed `files`, and publishes what `write` and `tell` make of its
+    /// output, if an input has changed since the last run.
     ///
     /// # Errors
-    /// Files that cannot be read, what the stage refuses, a disk that refuses; what stood before stands then.
+    /// Files that cannot be read, refusals of the stage, write errors; earlier products then remain.
     pub(super) fn run<T>(
         &self,
         files: &[PathBuf],
@@ -155,7 +155,7 @@ impl Single<'_> {
         Ok(read_manifest(&self.folder).unwrap_or(manifest))
     }
 
-    /// What the manifest says but for products and stages.
+    /// The manifest without products and stages.
     fn manifest(&self, told: Told<'_>) -> Manifest {
         let named = |(name, count): (&str, u64)| (name.to_owned(), count);
         let (texts, count) = told.complaints;
@@ -197,7 +197,7 @@ pub(super) struct Made<T> {
     output: Output<T>,
 }
 
-/// The output of a stage, as it is stored or made now.
+/// The output of a stage, stored or computed now.
 pub(super) fn made<S: Stage>(
     stage: &S,
     cache: &StageCache,

@@ -1,4 +1,4 @@
-//! The flow of one site, told once: [`site`] is driven by run and plan, its two halves by check.
+//! The flow of one site, described once: [`site`] is driven by run and plan, its two halves by check.
 
 use super::{
     LOAD_KERNELS,
@@ -40,7 +40,7 @@ pub(super) fn site<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<()> {
     finish(flow, config, prepared)
 }
 
-/// From the kernels' choice to the products.
+/// From the choice of kernels to the products.
 pub(super) fn finish<D: Driver>(flow: &mut D, config: &SiteConfig, prepared: Prepared) -> Flow<()> {
     let (choice, chosen) = choose(flow, config, prepared.required.as_ref())?;
     let kernels = match chosen {
@@ -51,7 +51,7 @@ pub(super) fn finish<D: Driver>(flow: &mut D, config: &SiteConfig, prepared: Pre
     site.choice = choice;
     match triangulate(flow, config, &mut site) {
         Ok(()) => {}
-        // What the measurements do not determine keeps no other product from its readers.
+        // A failed adjustment does not prevent the other products.
         Err(Leave::Failed(failure)) if is_of_adjustment(&failure) => {
             tracing::warn!("{failure}");
             site.adjustment_failure = Some(failure);
@@ -63,7 +63,7 @@ pub(super) fn finish<D: Driver>(flow: &mut D, config: &SiteConfig, prepared: Pre
     flow.publish(config, &site)
 }
 
-/// Times, footprints and profiles: what needs clocks and no orbit.
+/// Times, footprints and profiles: the stages that need clocks but no orbit.
 pub(super) fn prepare<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Prepared> {
     let clocks = kernels(flow, config, Some(&RequiredCoverage::default()), 0)?;
     let images = {
@@ -101,7 +101,7 @@ pub(super) fn prepare<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Prep
     })?;
     Ok(Prepared {
         required: flow.required(config, &images, &profiles),
-        // Nobody asks for shots as their files have them any more: of a million of them that is a fifth of a gigabyte.
+        // Shots as in their files are not needed any more: a million of them occupy a fifth of a gigabyte.
         found: found.lightened(|found| found.footprints = Footprints::new(Vec::new())),
         converted,
         utc,
@@ -150,7 +150,8 @@ fn found<D: Driver>(
     })
 }
 
-/// Windows with the outlines of images, of the first of rival kernel sets; none where no window is what an image sees.
+/// Windows with the outlines of images, with the first of rival kernel sets; empty if no window is the outline of an
+/// image.
 fn outlined<D: Driver>(
     flow: &mut D,
     config: &SiteConfig,
@@ -174,8 +175,8 @@ fn outlined<D: Driver>(
     Ok(Some(outlined))
 }
 
-/// Of rival kernel sets the one to use, by its index; the first where there is one source. The index is `None`
-/// while it is not known.
+/// Index of the rival kernel set to use; the first where there is one source. The index is `None` while it is not
+/// known.
 fn choose<D: Driver>(
     flow: &mut D,
     config: &SiteConfig,
@@ -278,7 +279,7 @@ fn orientations<D: Driver>(
         flow.stage(&SampleOrientation {
             image: &image.id,
             times,
-            // Support data are read instead of kernels.
+            // Support data replace the kernels.
             kernels: if image.isd.is_some() { none } else { kernels },
             coverage: &config.kernels,
             pointing: &config.pointing,
@@ -288,7 +289,7 @@ fn orientations<D: Driver>(
     images.map(sample).collect()
 }
 
-/// The kernels of the configuration for the `required` times; `None` while it is not known which these are.
+/// The kernels of the configuration for the `required` times; `None` while these are not known.
 pub(super) fn kernels<D: Driver>(
     flow: &mut D,
     config: &SiteConfig,

@@ -1,4 +1,4 @@
-//! The page over all sites of an output folder, made again after every run.
+//! The page over all sites of an output folder, rebuilt after every run.
 //!
 //! `fidelity.html` beside it is `docs/fidelity.html`, which the program contains.
 
@@ -21,7 +21,7 @@ use crate::{
     },
 };
 
-/// Writes the page over the sites whose folders lie in `out`, and the one that it links to; returns the path of the
+/// Writes the page over the sites whose folders are in `out`, and the one that it links to; returns the path of the
 /// former.
 ///
 /// # Errors
@@ -36,7 +36,7 @@ pub fn publish_sites(out: &Path) -> Result<PathBuf> {
         let name = folder.file_name().unwrap_or_default().to_string_lossy();
         let manifest = read_manifest(&folder);
         let failure = last_failure(&folder);
-        // Folders that no run ever worked in are none of our business.
+        // Folders in which no run ever worked are ignored.
         if manifest.is_some() || has_work(&folder) {
             let products = manifest.as_ref().map(|manifest| SiteSummary {
                 earlier: read_previous(&folder)
@@ -64,7 +64,7 @@ pub fn publish_sites(out: &Path) -> Result<PathBuf> {
     Ok(page)
 }
 
-/// The body of the site, Mars where its file names none.
+/// The body of the site; Mars if its file does not name one.
 fn body(keys: &BTreeMap<String, String>) -> Body {
     let word = keys.get("body");
     word.and_then(|word| serde_json::from_str(word).ok())
@@ -80,7 +80,7 @@ fn place_deg(keys: &BTreeMap<String, String>) -> Option<(f64, f64)> {
             .strip_suffix(".longitude_deg")?;
         let [west, east] = ends(key)?;
         let [south, north] = ends(&format!("windows.{window}.latitude_deg"))?;
-        // Across the prime meridian a box runs eastward all the same.
+        // A box that crosses the prime meridian runs eastward as well.
         let width = (east - west).rem_euclid(360.0);
         Some((
             (west + 0.5 * width).rem_euclid(360.0),
@@ -90,7 +90,7 @@ fn place_deg(keys: &BTreeMap<String, String>) -> Option<(f64, f64)> {
     boxes.next()
 }
 
-/// What the products said that stood there before.
+/// Summary of the preceding products.
 fn earlier(manifest: &Manifest, folder: &str) -> Earlier {
     let SiteSummary {
         verdict,
@@ -111,7 +111,7 @@ fn earlier(manifest: &Manifest, folder: &str) -> Earlier {
 fn summary(manifest: &Manifest) -> SiteSummary {
     let count = |name: &str| manifest.counts.get(name).copied().unwrap_or(0);
     let figure = |name: &str| manifest.figures.get(name).copied();
-    // Figures are sizes; the checks of the same numbers have their signs.
+    // Figures are magnitudes; the checks of the same numbers have signs.
     let signed = |name: &str, kind: CheckKind| {
         let mut checks = manifest.verdict.checks.iter();
         let value = checks.find(|check| check.kind == kind)?.value?;

@@ -15,8 +15,8 @@ use crate::{
     },
 };
 
-/// The terrain model of a pair of images with their best orientation; nothing for a site that asks for none, or whose adjustment
-/// failed.
+/// The terrain model of a pair of images with their best orientation; `None` for a site that requests none, or whose
+/// adjustment failed.
 pub(super) fn surface<D: Driver>(
     flow: &mut D,
     config: &SiteConfig,

@@ -1,4 +1,4 @@
-//! What tie points make of a site: those of files, those that are matched, their ground points, and the adjustment.
+//! Tie points of a site, from files and matched; their ground points, and the adjustment.
 //!
 //! A site whose adjustment fails publishes all earlier products, marked invalid.
 
@@ -28,12 +28,12 @@ use crate::{
     },
 };
 
-/// Images and tie points, and what lies between the orbits of shots and kernels.
+/// Images and tie points, and the difference between the orbits of shots and kernels.
 type Measured<'a> = (&'a [SiteImage], &'a Output<Ties>, &'a Output<RangeCheck>);
-/// Ground points of tie points, and what pairs of images say of each other.
+/// Ground points of tie points, and comparisons of pairs of images.
 type Ground<'a> = (&'a Output<IntersectedTies>, &'a Output<Vec<PairComparison>>);
 
-/// Tie points, their ground points, and the adjustment, as far as it goes; nothing for a site without tie points.
+/// Tie points, their ground points, and the adjustment, as far as it succeeds; `None` for a site without tie points.
 pub(super) fn triangulate<D: Driver>(
     flow: &mut D,
     config: &SiteConfig,
@@ -53,7 +53,7 @@ pub(super) fn triangulate<D: Driver>(
     Ok(())
 }
 
-/// The tie points of the site's files, and behind them those that are matched; none for a site without either.
+/// The tie points of the site's files, followed by the matched ones; `None` for a site without either.
 fn ties<D: Driver>(flow: &mut D, config: &SiteConfig, site: &Site) -> Flow<Option<Output<Ties>>> {
     let read = if config.ties.files.is_empty() {
         None
@@ -77,8 +77,8 @@ pub(super) fn ties_of_files<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flo
     })
 }
 
-/// Tie points by the orientation of the kernels, and by the one that these adjust once more: it expects places nearer to
-/// where they are.
+/// Tie points matched with the orientation of the kernels, and again with the orientation adjusted by these, which
+/// predicts their positions better.
 fn matched<D: Driver>(
     flow: &mut D,
     config: &SiteConfig,
@@ -95,7 +95,7 @@ fn matched<D: Driver>(
     match_ties(flow, config, Round::Adjusted, &images, shots, read)
 }
 
-/// Tie points that are matched with one orientation, behind those of files.
+/// Tie points that are matched with one orientation, following those of files.
 pub(super) fn match_ties<D: Driver>(
     flow: &mut D,
     config: &SiteConfig,
@@ -131,7 +131,7 @@ fn adjust<D: Driver>(
     let (_, ties, _) = measured;
     let intersection = intersect(flow, config, Some(&adjusted), &images, ties, shots)?;
     let times: Vec<_> = images.iter().map(|image| image.times.clone()).collect();
-    // Images with support data have no orbit and attitude of kernels.
+    // Images with support data do not use orbit and attitude of kernels.
     let none = &KernelView::all(Some(&KernelSet::default()));
     let tabulate = |(index, image): (usize, &SiteImage)| {
         flow.stage(&TabulateKernels {
@@ -158,7 +158,7 @@ fn adjust<D: Driver>(
     })
 }
 
-/// An adjustment, and the images with the orientation that it gives.
+/// An adjustment, and the images with the adjusted orientation.
 fn corrected<D: Driver>(
     flow: &mut D,
     config: &SiteConfig,
@@ -199,7 +199,7 @@ fn corrected<D: Driver>(
     Ok((adjusted, images))
 }
 
-/// Whether a failure lies in what the tie points and the orientation determine, not in a file that cannot be read.
+/// Whether a failure is one of geometry, of tie points and orientation, and not an unreadable file.
 pub(super) fn is_of_adjustment(failure: &Error) -> bool {
     let stage = failure.stage.as_deref().unwrap_or_default();
     let name = stage.split('/').next().unwrap_or_default();
@@ -214,8 +214,8 @@ pub(super) fn is_of_adjustment(failure: &Error) -> bool {
     failure.kind() == Kind::Input && failure.file.is_none() && of_adjustment
 }
 
-/// Ground points of the tie points, what every pair of images says of itself, and what MOLA says of heights: with the
-/// orientation of the kernels, or with the adjusted one.
+/// Ground points of the tie points, the internal agreement of every pair of images, and heights against MOLA: with
+/// the orientation of the kernels, or with the adjusted one.
 fn intersect<D: Driver>(
     flow: &mut D,
     config: &SiteConfig,
@@ -245,7 +245,7 @@ fn intersect<D: Driver>(
     })
 }
 
-/// Ground points of the tie points, and what every pair of images says of itself.
+/// Ground points of the tie points, and the internal agreement of every pair of images.
 fn ground<D: Driver>(
     flow: &mut D,
     config: &SiteConfig,

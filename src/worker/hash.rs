@@ -1,4 +1,4 @@
-//! Reading files for their hashes.
+//! Hashes files.
 
 use std::path::{Path, PathBuf};
 
@@ -10,11 +10,11 @@ use crate::{
     store::hashes::HashCache,
 };
 
-/// Files that are read between two looks whether the worker is to stop.
+/// Files that are read between two checks of the stop flag.
 const PART: usize = 16;
 
 impl Worker {
-    /// Reads every file, or with `rehash` also those whose hash is known; one that cannot be read is told as such.
+    /// Hashes the files that are not known, or with `rehash` all of them; unreadable files are reported as such.
     pub(super) fn hash(&self, files: &[PathBuf], rehash: bool) -> Result<Vec<Hashed>> {
         let cache = HashCache::new(&self.task.hashes_file, rehash);
         let run = cache.files().within(&self.roots);

@@ -1,4 +1,4 @@
-//! Opening kernels, one by one, with what they cover.
+//! Opens kernels one by one and reads their coverage.
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,8 @@ use crate::{
 };
 
 impl Worker {
-    /// Opens every kernel; the service is told before each, so that it knows which one ended the worker.
+    /// Opens every kernel; each is announced to the service first, which can so identify a kernel that ends the
+    /// worker.
     pub(super) fn probe(&self, files: &[PathBuf]) -> Result<Vec<Probed>> {
         let run = self.hashes.files().within(&self.roots);
         let mut clocks: Option<KernelSet> = None;
@@ -54,8 +55,8 @@ impl Worker {
         Ok(probed)
     }
 
-    /// Leap seconds and the spacecraft's clock, without which CSPICE cannot tell the times of a C-kernel: those of the task,
-    /// or the latest ones of the folder that holds the C-kernel.
+    /// Leap seconds and the spacecraft clock, without which CSPICE cannot convert the times of a C-kernel: those of
+    /// the task, or the latest ones of the folder that contains the C-kernel.
     fn clocks(&self, kernel: &Path, files: &[PathBuf], run: &InputFiles) -> KernelSet {
         let is_clock = |role| matches!(role, KernelRole::Lsk | KernelRole::Sclk);
         let given = files
@@ -89,10 +90,10 @@ impl Worker {
     }
 }
 
-/// What a kernel covers, opened by CSPICE; null of one that covers nothing by its kind, or whose times no clock tells.
+/// Coverage of a kernel, opened by CSPICE; null for kinds without coverage and for C-kernels without clocks.
 fn open(clocks: KernelSet, kernel: Kernel) -> Result<Value> {
     let role = kernel.role;
-    // A metakernel is a list, which CSPICE would follow.
+    // A metakernel is a list that CSPICE would follow.
     if role == KernelRole::Meta {
         return Ok(Value::Null);
     }
@@ -103,7 +104,7 @@ fn open(clocks: KernelSet, kernel: Kernel) -> Result<Value> {
         return Ok(Value::Null);
     }
     let coverage = session.coverage()?;
-    // Of this kernel alone: behind the clocks it is the only one that holds anything.
+    // Coverage of this kernel only; the clocks have none.
     let own = coverage.per_kernel.first().map(|(_, own)| own.clone());
     let own = own.unwrap_or_default();
     let nothing = Intervals::default();
@@ -115,7 +116,7 @@ fn open(clocks: KernelSet, kernel: Kernel) -> Result<Value> {
     Ok(json!({ "position": position, "attitude": attitude }))
 }
 
-/// A failure without the name of the file, which stands beside it.
+/// A failure without the file name, which is reported beside it.
 fn without_file(failure: &Error) -> String {
     failure.cause.to_string()
 }

@@ -1,4 +1,4 @@
-//! What a worker may take of the machine, and whose child it is.
+//! Resource limits of a worker, and its parent process.
 
 use std::{fs::File, io::Write as _};
 
@@ -8,27 +8,28 @@ use rustix::process::{
 
 use crate::service::worker::protocol::Task;
 
-/// How much less urgent than the service a worker is.
+/// Niceness of a worker, relative to the service.
 const NICENESS: i32 = 10;
-/// How much rather than the service a worker is ended when memory runs out, of 1000.
+/// Out-of-memory score of a worker, of 1000: it is killed before the service.
 const OUT_OF_MEMORY_SCORE: &[u8] = b"500";
 
-/// Makes the worker end with its parent; false when that is gone already.
+/// Makes the worker end with its parent; false if that has already ended.
 ///
-/// The end of input says the same, and is what a worker stops by; this is for one that hangs.
+/// A worker normally stops at the end of its input; this is for one that hangs.
 pub(super) fn end_with(parent: Option<u32>) -> bool {
     let Some(parent) = parent else { return true };
     if let Err(error) = set_parent_process_death_signal(Some(Signal::KILL)) {
         tracing::warn!("the worker may outlive the service: {error}");
     }
-    // It may have ended before that was set.
+    // The parent may have ended before this was set.
     let now = getppid().map(|pid| pid.as_raw_nonzero().get());
     now.and_then(|pid| u32::try_from(pid).ok()) == Some(parent)
 }
 
-/// Keeps the worker to what its task allows. What the system refuses is told, for the task can be done all the same.
+/// Limits the resources of the worker to those of its task. Refusals of the system are reported; the task can be done
+/// without the limits.
 pub(super) fn keep_to(task: &Task) {
-    // Of the data, not of the address space: large files are mapped.
+    // Limits the data, not the address space: large files are mapped.
     let memory = u64::from(task.memory_mib) << 20;
     for (resource, limit, what) in [
         (Resource::Data, memory, "memory"),
@@ -50,9 +51,9 @@ pub(super) fn keep_to(task: &Task) {
         .open("/proc/self/oom_score_adj")
         .and_then(|mut file| file.write_all(OUT_OF_MEMORY_SCORE));
     if let Err(error) = score {
-        tracing::warn!("the worker is not the first to go when memory runs out: {error}");
+        tracing::warn!("the worker is not the first process to be killed when memory runs out: {error}");
     }
-    // The only failure is a pool that exists already, and none does.
+    // The only failure is an existing pool; none exists.
     let _ = rayon::ThreadPoolBuilder::new()
         .num_threads(usize::from(task.threads))
         .build_global();

@@ -1,4 +1,4 @@
-//! Listing what lies below folders.
+//! Lists the files below folders.
 
 use std::{
     fs::{self, Metadata},
@@ -15,14 +15,14 @@ use crate::{
     store::atomic,
 };
 
-/// How deep folders are followed.
+/// Maximum depth of folders.
 const DEPTH_MAX: usize = 32;
 
-/// Lists all regular files below `roots` into a file, and says how many there are. Links to files are followed, those to
-/// folders are not. Names of transfers under way are left out.
+/// Lists all regular files below `roots` into a file, and returns their number. Links to files are followed, links to
+/// folders are not. Names of unfinished transfers are left out.
 ///
 /// # Errors
-/// [`Stopped`]; the disk's refusal to write the list. What cannot be read stands in the list.
+/// [`Stopped`]; the list cannot be written. Unreadable entries are part of the list.
 pub(super) fn list(roots: &[PathBuf], into: &Path, stop: &AtomicBool) -> Result<u64> {
     let mut list = List {
         bytes: Vec::new(),
@@ -56,7 +56,7 @@ struct List<'a> {
 
 impl List<'_> {
     fn add(&mut self, listed: &Listed) {
-        // Paths that are no UTF-8 cannot be named, by site files and CSPICE neither.
+        // Paths that are not UTF-8 cannot be named in site files or to CSPICE either.
         if serde_json::to_writer(&mut self.bytes, listed).is_ok() {
             self.bytes.push(b'\n');
         }
@@ -91,7 +91,7 @@ impl List<'_> {
                 .err()
                 .map(|error| error.to_string()),
             Ok(found) if found.is_dir() => Some(format!("more than {DEPTH_MAX} folders deep")),
-            // A link is what it leads to.
+            // A link counts as its target.
             Ok(_) => match path.metadata() {
                 Ok(found) if found.is_file() => {
                     let identity = Identity::of(&found);
@@ -102,7 +102,7 @@ impl List<'_> {
                 Ok(_) => None,
                 Err(error) => Some(error.to_string()),
             },
-            // It went away since its folder was read.
+            // It was removed after its folder was read.
             Err(error) if error.kind() == io::ErrorKind::NotFound => None,
             Err(error) => Some(error.to_string()),
         };
@@ -113,7 +113,7 @@ impl List<'_> {
     }
 }
 
-/// Whether the name is one under which programs copy files.
+/// Whether the name is a temporary one under which programs copy files.
 fn is_under_way(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().as_encoded_bytes();
     let ends = [&b".part"[..], b".tmp", b".partial"];

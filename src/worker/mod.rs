@@ -1,6 +1,6 @@
-//! A worker process: one task, from its line to the answer.
+//! A worker process: one task, from its input line to the answer.
 //!
-//! What it does can be ended at any moment: nothing half-made stands under a final name.
+//! It can be killed at any moment: no incomplete file has a final name.
 
 mod hash;
 mod kernels;
@@ -36,12 +36,12 @@ use crate::{
 use shots::{Search, search};
 use voice::Voice;
 
-/// Time between two signs of life.
+/// Interval of heartbeats.
 const BEAT: Duration = Duration::from_secs(2);
-/// How long a worker goes on to a good place to stop when the service is gone.
+/// Time that a worker has to stop gracefully after the service has ended.
 const ORPHANED: Duration = Duration::from_secs(10);
 
-/// What the parts of a worker share.
+/// State that the parts of a worker share.
 struct Worker {
     task: Task,
     voice: Arc<Voice>,
@@ -51,9 +51,9 @@ struct Worker {
     roots: Vec<PathBuf>,
 }
 
-/// Says hello, reads a task from standard input, does it and answers.
+/// Announces itself, reads a task from standard input, performs it and answers.
 ///
-/// * `parent` – the process of the service, whose end is the worker's
+/// * `parent` – the process of the service; the worker ends with it
 #[must_use]
 pub fn main(parent: Option<u32>) -> ExitCode {
     let interrupted = ExitCode::from(Kind::Interrupted.exit_code());
@@ -63,7 +63,7 @@ pub fn main(parent: Option<u32>) -> ExitCode {
     let voice = match Voice::take() {
         Ok(voice) => Arc::new(voice),
         Err(error) => {
-            tracing::error!("standard output cannot be kept for the service: {error}");
+            tracing::error!("standard output cannot be reserved for the service: {error}");
             return ExitCode::from(Kind::Io.exit_code());
         }
     };
@@ -78,7 +78,7 @@ pub fn main(parent: Option<u32>) -> ExitCode {
         Some(Ok(task)) => task,
     };
     let stop = Arc::new(AtomicBool::new(false));
-    // Without these two threads the worker could neither be stopped nor told from one that hangs.
+    // Without these two threads the worker could not be stopped, nor distinguished from one that hangs.
     let threads = listen(&stop).and_then(|()| beat(&voice));
     if let Err(error) = threads {
         return fail(&voice, bug(format!("no thread can be started: {error}")));
@@ -97,7 +97,7 @@ pub fn main(parent: Option<u32>) -> ExitCode {
     };
     match catch_unwind(AssertUnwindSafe(|| worker.work())) {
         Ok(Ok(answer)) => {
-            // Work that is done at once ends before the first sign of life.
+            // Short tasks end before the first heartbeat.
             worker.voice.beat();
             worker.voice.say(&Line::Answer(answer));
             ExitCode::SUCCESS
@@ -107,7 +107,7 @@ pub fn main(parent: Option<u32>) -> ExitCode {
     }
 }
 
-/// The task; none when the service is gone, or why it is none.
+/// The task, or why it is invalid; `None` if the service has ended.
 fn read_task() -> Option<std::result::Result<Task, String>> {
     let mut line = Vec::new();
     let input = std::io::stdin().lock();
@@ -129,7 +129,7 @@ fn read_task() -> Option<std::result::Result<Task, String>> {
     }))
 }
 
-/// Sets `stop` when the service says so or is gone.
+/// Sets `stop` when the service requests it or has ended.
 fn listen(stop: &Arc<AtomicBool>) -> std::io::Result<()> {
     let stop = Arc::clone(stop);
     let listener = move || {
@@ -137,13 +137,13 @@ fn listen(stop: &Arc<AtomicBool>) -> std::io::Result<()> {
             let Ok(line) = line else { break };
             match serde_json::from_str::<Cancel>(&line) {
                 Ok(Cancel { cancel }) => {
-                    tracing::info!(?cancel, "the service asks to stop");
+                    tracing::info!(?cancel, "the service requests a stop");
                     stop.store(true, Ordering::Relaxed);
                 }
                 Err(error) => tracing::warn!("malformed message from the service: {error}"),
             }
         }
-        tracing::warn!("the service is gone");
+        tracing::warn!("the service has ended");
         stop.store(true, Ordering::Relaxed);
         thread::sleep(ORPHANED);
         process::exit(i32::from(Kind::Interrupted.exit_code()));
@@ -151,7 +151,7 @@ fn listen(stop: &Arc<AtomicBool>) -> std::io::Result<()> {
     thread::Builder::new().spawn(listener).map(drop)
 }
 
-/// Gives signs of life from now on.
+/// Starts the heartbeats.
 fn beat(voice: &Arc<Voice>) -> std::io::Result<()> {
     let voice = Arc::clone(voice);
     let beats = move || {
@@ -218,7 +218,7 @@ impl Worker {
     }
 }
 
-/// Tells a failure; its code is that of the process.
+/// Reports a failure; returns its exit code.
 fn fail(voice: &Voice, failure: Failure) -> ExitCode {
     let code = failure.code;
     tracing::error!("{}", failure.text);
@@ -246,7 +246,7 @@ fn panicked(panic: &(dyn Any + Send)) -> Failure {
     ))
 }
 
-/// A failure that is nobody's input: of areograph, or of the service.
+/// A failure that no input causes: of areograph, or of the service.
 fn bug(text: String) -> Failure {
     Failure {
         code: Kind::Bug.exit_code(),

@@ -22,26 +22,26 @@ use crate::{
 
 /// The product that is searched.
 const FOOTPRINTS: &str = "footprints.parquet";
-/// Columns that say where a shot hit the ground.
+/// Columns with the position of a shot on the ground.
 const PLACE: [&str; 2] = ["longitude_deg", "latitude_deg"];
-/// Column in front of those of the product: the site.
+/// Column before those of the product: the site.
 const SITE: &str = "site";
 
 /// Why shots cannot be searched.
 #[derive(Debug, thiserror::Error)]
 enum ShotsError {
-    /// No such format.
+    /// Unknown format.
     #[error("unknown format {0}; expected csv, geojson or parquet")]
     Format(String),
-    /// A region without an inside.
+    /// A region without area.
     #[error(
         "a polygon of {0} corners; expected 3 or more, longitudes -180 to 360 and latitudes -90 to 90 degrees"
     )]
     Polygon(usize),
-    /// Not a run.
-    #[error("holds no products")]
+    /// A folder without a run.
+    #[error("contains no products")]
     NoRun,
-    /// Not what this program writes, or what a library refuses.
+    /// A product that this program did not write, or that a library rejects.
     #[error("cannot be {0}")]
     Parquet(String),
 }
@@ -70,25 +70,25 @@ fn refused<E: std::fmt::Display>(action: &'static str) -> impl Fn(E) -> Error {
     move |error| ShotsError::Parquet(format!("{action}: {error}")).into()
 }
 
-/// What a search asks for.
+/// Request of a search.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Search<'a> {
     /// Folders of runs, searched in this order.
     pub(super) runs: &'a [PathBuf],
     /// Corners of a polygon: east longitude and areocentric latitude, degrees.
     pub(super) polygon: &'a [[f64; 2]],
-    /// Most rows.
+    /// Maximum number of rows.
     pub(super) rows_max: u64,
     /// `csv`, `geojson` or `parquet`.
     pub(super) format: &'a str,
-    /// The file of the answer.
+    /// The output file.
     pub(super) into: &'a Path,
 }
 
-/// Writes the shots inside a polygon and says how many there are, and whether there are no more.
+/// Writes the shots inside a polygon; returns their number, and whether they are complete.
 ///
 /// # Errors
-/// No region, no such format; a run that is none; what the disk refuses; [`Stopped`].
+/// Invalid region or format; a folder without a run; write errors; [`Stopped`].
 pub(super) fn search(search: &Search<'_>, stop: &AtomicBool) -> Result<(u64, bool)> {
     let region = region(search.polygon)?;
     let mut answer = Answer::new(search.format, search.into)?;
@@ -137,7 +137,7 @@ fn region(corners: &[[f64; 2]]) -> Result<Region> {
     }))
 }
 
-/// The site of a run and its footprints; none of a site without any.
+/// The site of a run and its footprints; `None` for a site without footprints.
 fn open(run: &Path, path: &Path) -> Result<Option<(String, ParquetRecordBatchReader)>> {
     let manifest = read_manifest(run).ok_or(ShotsError::NoRun).in_file(run)?;
     if !manifest
@@ -156,7 +156,7 @@ fn open(run: &Path, path: &Path) -> Result<Option<(String, ParquetRecordBatchRea
     Ok(Some((manifest.site, batches)))
 }
 
-/// The rows whose shot hit the ground inside.
+/// The rows whose shots lie inside.
 fn inside(batch: &RecordBatch, region: &Region) -> Result<RecordBatch> {
     let [longitude, latitude] = PLACE.map(|name| {
         let column = batch.column_by_name(name);
@@ -175,7 +175,7 @@ fn inside(batch: &RecordBatch, region: &Region) -> Result<RecordBatch> {
     filter_record_batch(batch, &mask).map_err(refused("searched"))
 }
 
-/// The same rows behind a column that names their site.
+/// The same rows with a leading column that names their site.
 fn with_site(batch: &RecordBatch, site: &str) -> Result<RecordBatch> {
     let field = Field::new(SITE, DataType::Utf8, false);
     let fields = batch.schema();
@@ -190,7 +190,7 @@ fn with_site(batch: &RecordBatch, site: &str) -> Result<RecordBatch> {
     RecordBatch::try_new(Arc::new(schema), columns.collect()).map_err(refused("searched"))
 }
 
-/// An answer, which begins with its first rows: they say what columns it has.
+/// An answer; its first rows determine its columns.
 struct Answer<'a> {
     format: RowsFormat,
     into: &'a Path,
@@ -228,7 +228,7 @@ impl<'a> Answer<'a> {
         self.begin(&batch.schema())?.write(batch)
     }
 
-    /// Ends the answer and gives it its name. One without any run is empty.
+    /// Completes the answer and gives it its name. Without runs it is empty.
     fn finish(mut self) -> Result<()> {
         let empty = Schema::new(vec![Field::new(SITE, DataType::Utf8, false)]);
         self.begin(&Arc::new(empty))?;
@@ -243,7 +243,7 @@ impl<'a> Answer<'a> {
     }
 }
 
-/// The metadata of the footprints, but for the box of those of one site.
+/// The metadata of the footprints, except the box of a single site.
 fn notes(schema: &Schema) -> Vec<(&str, String)> {
     let metadata = schema.metadata().iter().map(|(key, text)| {
         let mut geo: Value = serde_json::from_str(text).unwrap_or_default();

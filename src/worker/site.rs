@@ -1,4 +1,4 @@
-//! Running and planning a site.
+//! Runs and plans a site.
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ use crate::{
     units::RADIANS_PER_DEGREE,
 };
 
-/// A site file with other keys than those that the service has seen.
+/// A site file whose keys differ from those that the service recorded.
 #[derive(Debug, thiserror::Error)]
 #[error("its keys have the hash {is}; expected {seen}, the hash that the service recorded")]
 struct OtherKeys {
@@ -34,7 +34,7 @@ impl Cause for OtherKeys {
     }
 }
 
-/// A run that ended before its products.
+/// A run that ended before its products were written.
 #[derive(Debug, thiserror::Error)]
 #[error("the run ended after {0}; expected products")]
 struct NoProducts(String);
@@ -99,7 +99,7 @@ impl Worker {
         })
     }
 
-    /// Says what a run would do, and what it reads.
+    /// Reports what a run would do, and what it reads.
     pub(super) fn plan(&self, site_file: &Path, out: &Path) -> Result<PlanAnswer> {
         let Loaded { site, files, .. } = self.load(site_file)?;
         let plan = plan_site(&site, &self.options(out, false))?;

@@ -1,4 +1,4 @@
-//! What a worker says to the service.
+//! Messages of a worker to the service.
 
 use std::{
     fs::{self, File},
@@ -16,7 +16,7 @@ use crate::{
     service::worker::protocol::{LINE_MAX, Line},
 };
 
-/// Bytes of a piece: with every character escaped, and those of the line around it, less than a line.
+/// Bytes of a piece: with every character escaped, and with the rest of the message, it fits into a line.
 const PIECE: usize = LINE_MAX / 2 - 1024;
 /// Descriptors below this one are the standard ones.
 const BEYOND_STANDARD: i32 = 3;
@@ -28,7 +28,7 @@ pub(super) struct Voice {
 }
 
 impl Voice {
-    /// Takes standard output for the service alone; what C code prints goes to standard error from now on.
+    /// Reserves standard output for the service; from now on, C code prints to standard error.
     pub(super) fn take() -> io::Result<Self> {
         let pipe = fcntl_dupfd_cloexec(stdout(), BEYOND_STANDARD)?;
         dup2_stdout(stderr())?;
@@ -37,7 +37,7 @@ impl Voice {
         })
     }
 
-    /// Says a line, in pieces when it is long. When the service is gone, the end of the worker's input tells.
+    /// Sends a line, in pieces if it is long. If the service has ended, the end of the worker's input shows it.
     pub(super) fn say(&self, line: &Line) {
         let Ok(text) = serde_json::to_string(line) else {
             return;
@@ -61,7 +61,7 @@ impl Voice {
         }
     }
 
-    /// Says that a stage begins or is over.
+    /// Reports that a stage begins or has ended.
     pub(super) fn stage(&self, stage: &str, state: &str, because: &str, seconds: f64) {
         self.say(&Line::Stage {
             stage: stage.to_owned(),
@@ -71,7 +71,7 @@ impl Voice {
         });
     }
 
-    /// Gives a sign of life.
+    /// Sends a heartbeat.
     pub(super) fn beat(&self) {
         self.say(&Line::Beat {
             rss_kib: rss_kib().unwrap_or(0),
@@ -83,12 +83,12 @@ impl Observer for Voice {
     fn hear(&self, stage: &str, event: &StageEvent<'_>) {
         match event {
             StageEvent::Begins(reason) => self.stage(stage, "running", &reason.to_string(), 0.0),
-            // Signs of life are given by the clock.
+            // The clock sends the heartbeats.
             StageEvent::Counts(_) => {}
             StageEvent::Kept => self.stage(stage, "kept", "unchanged", 0.0),
             StageEvent::Done(seconds) => {
                 self.stage(stage, "done", "", *seconds);
-                // A short run would end between two signs of life, and its memory would not be known.
+                // A short run would end between two heartbeats, and its memory would not be known.
                 self.beat();
             }
         }

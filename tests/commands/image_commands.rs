@@ -221,7 +221,7 @@ fn calibrated_pictures_have_no_offset_between_odd_and_even_samples() {
     assert!(
         notes
             .iter()
-            .any(|note| note.contains("a constant that is not known") && note.contains(" 3.00")),
+            .any(|note| note.contains("an unknown constant") && note.contains(" 3.00")),
         "{notes:?}"
     );
 }

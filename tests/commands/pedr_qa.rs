@@ -584,7 +584,7 @@ fn every_shot_counts_once() {
     for part in [
         "c/ap10001l.b",
         "a/ap10001l.b",
-        "holds shots of orbit",
+        "contains shots of orbit",
         "only one of the two",
     ] {
         assert!(told.contains(part), "{part}: {told}");

@@ -190,7 +190,7 @@ fn an_index_changes_no_byte_and_is_brought_up_to_date() {
     fs::remove_file(archive.join("AP19030L.B")).unwrap();
     let (code, said) = index(&[]);
     assert!(
-        code == Some(3) && said.contains("2 files of ") && said.contains("1 gone"),
+        code == Some(3) && said.contains("2 files of ") && said.contains("1 removed"),
         "{said}"
     );
     assert!(said.contains("empty.b: no valid record"), "{said}");

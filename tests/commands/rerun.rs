@@ -304,7 +304,7 @@ fn until_force_and_dry_run() {
     let mut command = case.run();
     command.args(["--until", "convert_datum"]);
     let expected = format!(
-        "exit 0\ncase: stopped after convert_datum; the products of {} in out/case stay as they are\n",
+        "exit 0\ncase: stopped after convert_datum; the products of {} in out/case remain unchanged\n",
         manifest["finished_utc"].as_str().unwrap()
     );
     assert_eq!(case.outcome(command), expected);

@@ -614,7 +614,7 @@ fn products_of_something_else_are_left_alone() {
     let before = fs::read_to_string(&path).unwrap();
     let refused = run(folder.path(), true).unwrap_err().to_string();
     assert!(
-        refused.contains("the folder holds other products"),
+        refused.contains("the folder contains other products"),
         "{refused}"
     );
     assert!(refused.contains("made by convert_datum"), "{refused}");

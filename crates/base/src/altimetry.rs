@@ -14,15 +14,15 @@ pub struct MolaClock {
     /// Size, seconds, not negative.
     #[cfg_attr(feature = "schema", schemars(range(min = 0.0)))]
     pub bias_s: f64,
-    /// On which side of the true time the tags lie.
+    /// Sign of the error of the tags.
     pub sign: TagSign,
-    /// What the corrected time is used for.
+    /// Use of the corrected time.
     pub scope: BiasScope,
     /// Citation that products repeat.
     pub source: String,
 }
 
-/// On which side of the true time a tag lies.
+/// Sign of the error of a tag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
@@ -33,7 +33,7 @@ pub enum TagSign {
     Early,
 }
 
-/// What the corrected shot time is used for.
+/// Use of the corrected shot time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
@@ -44,7 +44,7 @@ pub enum BiasScope {
     Rotation,
     /// Both.
     Both,
-    /// Nothing: tags are taken as they are.
+    /// Nothing: tags are used unchanged.
     None,
 }
 
@@ -54,7 +54,7 @@ impl MolaClock {
     pub fn correction_s(&self) -> f64 {
         match (self.scope, self.sign) {
             (BiasScope::None, _) => 0.0,
-            // Not −bias: no correction has no sign.
+            // 0 − bias, not −bias: a zero correction has no sign.
             (_, TagSign::Late) => 0.0 - self.bias_s,
             (_, TagSign::Early) => self.bias_s,
         }
@@ -66,7 +66,7 @@ impl MolaClock {
         matches!(self.scope, BiasScope::SpkLookup | BiasScope::Both)
     }
 
-    /// The instant at which the spacecraft's position belongs to a shot with this tag, ET seconds.
+    /// The instant of the spacecraft position of a shot with this tag, ET seconds.
     #[must_use]
     pub fn spacecraft_time(&self, tag_s: f64) -> Et {
         Et::from_seconds(if self.moves_spacecraft() {
@@ -76,14 +76,14 @@ impl MolaClock {
         })
     }
 
-    /// Whether Mars turns between leaving the file's datum and entering IAU 2000.
+    /// Whether Mars rotates between the rotation out of the file's datum and the rotation into IAU 2000.
     #[must_use]
     pub const fn moves_rotation(&self) -> bool {
         matches!(self.scope, BiasScope::Rotation | BiasScope::Both)
     }
 }
 
-/// How the datum of a PEDR file is decided.
+/// How the datum of a PEDR file is determined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DatumChoice {
@@ -109,6 +109,6 @@ pub struct ShotFilter {
 impl ShotFilter {
     /// First and last trigger channel.
     pub const CHANNELS: [u8; 2] = [1, 4];
-    /// The largest angle that a largest off-nadir angle may be, degrees; it is above 0.
+    /// Upper limit of the largest off-nadir angle, degrees; the lower limit is above 0.
     pub const OFF_NADIR_LIMIT_DEG: f64 = 90.0;
 }

@@ -1,9 +1,9 @@
-//! The bodies whose ground is seen: rotation, shape and names, as their files under `config/bodies` say.
+//! The observed bodies: rotation, shape and names, from their files under `config/bodies`.
 //!
 //! Frame, ellipsoid, maps, names and numbers of products are those of the body of the site. Footprints, image times and
 //! orientations carry it through the stages; `Body::Mars` is written where something belongs to Mars Global Surveyor.
-//! Mars is in IAU 2000 of our own constants, not of whichever PCK is loaded (one that differs is noted); the Moon turns
-//! as its support data state, which its formula checks.
+//! Mars is in IAU 2000 of our own constants, not of the loaded PCK (a difference is noted); the Moon rotates as its
+//! support data state, which its formula checks.
 //!
 //! ```
 //! use areograph_base::body::Body;
@@ -103,7 +103,7 @@ static MARS: LazyLock<BodyFile> =
 static MOON: LazyLock<BodyFile> =
     LazyLock::new(|| of_the_program(include_str!("../../../config/bodies/moon.toml")));
 
-/// What a file under `config/bodies` says.
+/// Content of a file under `config/bodies`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 #[allow(dead_code, reason = "sources are for those who read the file")]
@@ -116,23 +116,23 @@ struct BodyFile {
     report: BTreeMap<String, Report>,
 }
 
-/// What texts call a body and its frame.
+/// Names of a body and its frame in texts.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Names {
     /// Its name in headings, labels and catalogues.
     pub name: String,
-    /// The same within a sentence.
+    /// The name within a sentence.
     pub in_text: String,
-    /// What it is, as PDS4 labels say, and in small letters STAC catalogues.
+    /// Its class, as in PDS4 labels, and in lower case in STAC catalogues.
     pub class: String,
-    /// Whose frame coordinates are in, one line for readers of products.
+    /// Frame of the coordinates, one line for readers of products.
     pub frame: String,
-    /// The same in two or three words.
+    /// The frame in two or three words.
     pub short_frame: String,
 }
 
-/// What NAIF's kernels call a body and its frame.
+/// Names of a body and its frame in NAIF's kernels.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Naif {
@@ -140,11 +140,11 @@ pub struct Naif {
     pub body: i32,
     /// Number of the frame of its products.
     pub frame: i32,
-    /// Name of the frame that planetary constants kernels turn.
+    /// Name of the frame that planetary constants kernels define.
     pub pck_frame: String,
 }
 
-/// How far rotations of files may lie from the formula.
+/// Tolerance of rotations of files against the formula.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 #[allow(dead_code, reason = "sources are for those who read the file")]
@@ -163,7 +163,7 @@ pub struct MapSphere {
     pub crs: String,
     /// Name of its datum and of the sphere.
     pub datum: String,
-    /// What holds the longitudes, where the registry says.
+    /// Anchor of the longitudes, if the registry states one.
     pub anchor: Option<String>,
     /// Radius, metres.
     pub radius_m: f64,
@@ -192,10 +192,10 @@ struct Report {
 }
 
 impl Body {
-    /// Every body, with its word in the configuration.
+    /// Every body, with its name in the configuration.
     pub const WORDS: [(&'static str, Self); 2] = [("mars", Self::Mars), ("moon", Self::Moon)];
 
-    /// Its word in the configuration.
+    /// Its name in the configuration.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -226,13 +226,13 @@ impl Body {
         }
     }
 
-    /// What texts call it.
+    /// Its names in texts.
     #[must_use]
     pub fn names(self) -> &'static Names {
         &self.file().names
     }
 
-    /// What NAIF's kernels call it.
+    /// Its names in NAIF's kernels.
     #[must_use]
     pub fn naif(self) -> &'static Naif {
         &self.file().naif
@@ -244,7 +244,7 @@ impl Body {
         &self.file().map
     }
 
-    /// Body rotations of support data within this of the formula are those of the products' frame, radians.
+    /// Tolerance of body rotations of support data against the formula of the products' frame, radians.
     #[must_use]
     pub fn rotation_tolerance_rad(self) -> f64 {
         self.file().rotation.tolerance_rad
@@ -258,7 +258,7 @@ impl fmt::Display for Body {
 }
 
 impl Datum {
-    /// The body that it is of.
+    /// The body of this datum.
     #[must_use]
     pub const fn body(self) -> Body {
         match self {

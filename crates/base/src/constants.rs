@@ -1,13 +1,13 @@
-//! Constants of the mission, each with its source and sign; those of the spacecraft stand in `config/spacecraft`, those
+//! Constants of the mission, each with its source and sign; those of the spacecraft are in `config/spacecraft`, those
 //! of bodies in [`crate::body`].
 
 use std::sync::LazyLock;
 
-/// Smallest standard deviation of a point, pixels or metres: no measurement is better, and squares stay numbers.
+/// Smallest standard deviation of a point, pixels or metres: no measurement is better, and squares remain finite.
 pub const SIGMA_MIN: f64 = 1e-3;
 
-/// Largest standard deviation of a laser point, metres: so far away the ground lies 3 m below a plane (of the Moon), which laser
-/// heights do not notice; three times as far 23 m.
+/// Largest standard deviation of a laser point, metres: at this distance the ground is 3 m below a plane (of the
+/// Moon), which laser heights do not resolve; at three times the distance 23 m.
 pub const CONTROL_SIGMA_MAX_M: f64 = 3_000.0;
 
 use serde::Deserialize;
@@ -24,7 +24,7 @@ pub const NAIF_SOLAR_SYSTEM_BARYCENTRE: i32 = 0;
 /// Speed of light, metres per second.
 pub const SPEED_OF_LIGHT_M_S: f64 = 299_792_458.0;
 
-/// All that the program knows; the first is that of the laser.
+/// All built-in spacecraft; the first carries the laser.
 static ALL: LazyLock<[Spacecraft; 2]> = LazyLock::new(|| {
     [
         of_the_program(include_str!("../../../config/spacecraft/mgs.toml")),
@@ -32,10 +32,10 @@ static ALL: LazyLock<[Spacecraft; 2]> = LazyLock::new(|| {
     ]
 });
 
-/// The spacecraft of the laser, and of cameras that name no other one.
+/// The spacecraft of the laser, and of cameras that name no other spacecraft.
 pub static SPACECRAFT: LazyLock<&Spacecraft> = LazyLock::new(|| &ALL[0]);
 
-/// A spacecraft, as its file under `config/spacecraft` says.
+/// A spacecraft, as described in its file under `config/spacecraft`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spacecraft {
@@ -45,7 +45,7 @@ pub struct Spacecraft {
     pub name: String,
     /// Its name in full.
     pub full_name: String,
-    /// Its name in labels, where underscores may stand for blanks.
+    /// Its name in labels, where underscores may replace blanks.
     pub label_name: String,
     /// NAIF id of the spacecraft and of its clock.
     pub naif: i32,
@@ -53,32 +53,32 @@ pub struct Spacecraft {
     pub bus: i32,
     /// Name of that frame.
     pub bus_frame: String,
-    /// Whether its labels hold the clock of the clock kernels.
+    /// Whether its labels contain the clock of the clock kernels.
     pub labels_tell_clock: bool,
     /// A file of the archive that defines the clock.
     pub clock_kernel: String,
     /// A file of the archive that defines the frame of the bus.
     pub frame_kernel: String,
-    /// Largest time correction of its attitude kernels that is taken, seconds; 0 where they need none.
+    /// Largest accepted time correction of its attitude kernels, seconds; 0 if they need none.
     pub ck_bias_max_s: f64,
-    /// Where these come from.
+    /// Source of these values.
     pub source: String,
 }
 
 impl Spacecraft {
-    /// All that the program knows; the first is that of the laser.
+    /// All built-in spacecraft; the first carries the laser.
     #[must_use]
     pub fn all() -> &'static [Self] {
         &*ALL
     }
 
-    /// The one with this identifier.
+    /// The spacecraft with this identifier.
     #[must_use]
     pub fn of_id(id: &str) -> Option<&'static Self> {
         ALL.iter().find(|spacecraft| spacecraft.id == id)
     }
 
-    /// Its place among [`Self::all`].
+    /// Its index in [`Self::all`].
     #[must_use]
     pub fn place(&self) -> usize {
         let place = ALL.iter().position(|one| one.naif == self.naif);

@@ -1,6 +1,6 @@
-//! What can go wrong, and where: one wrapper adds the place, each room's own enum says the cause.
+//! Failures and their places: one wrapper adds the place, the enum of each room the cause.
 //!
-//! A cause is a [`Cause`]: it knows its [`Kind`] (hence the exit code) and what to do about it.
+//! A cause is a [`Cause`]: it has a [`Kind`] (hence the exit code) and an advice.
 //! [`Error`] carries it upwards and collects site, stage and file on the way.
 
 use std::{
@@ -17,9 +17,9 @@ pub enum Kind {
     Bug = 1,
     /// Command line or configuration.
     Configuration = 2,
-    /// Labels, PEDR files, kernels whose content is not what it should be.
+    /// Invalid content of labels, PEDR files or kernels.
     Input = 3,
-    /// Kernels do not cover what was asked.
+    /// Kernels do not cover the requested times.
     Coverage = 4,
     /// The products exist but are marked invalid.
     Validation = 5,
@@ -39,12 +39,12 @@ impl Kind {
 
 /// A cause of failure, with its kind and advice.
 pub trait Cause: std::error::Error + Send + Sync + 'static {
-    /// Which kind of failure this is.
+    /// The kind of this failure.
     fn kind(&self) -> Kind;
-    /// What the user can do about it, one sentence.
+    /// The advice to the user, one sentence.
     fn advice(&self) -> String;
 
-    /// The same where a configuration named what the failure concerns.
+    /// The same for a failure that concerns an entry of a configuration.
     fn advice_on_configured(&self) -> String {
         self.advice()
     }
@@ -74,21 +74,21 @@ impl Error {
         }
     }
 
-    /// The same failure, known to concern `file` (an inner file stays).
+    /// The same failure, which concerns `file` (an inner file is kept).
     #[must_use]
     pub fn in_file(mut self, file: impl Into<PathBuf>) -> Self {
         self.file.get_or_insert_with(|| file.into());
         self
     }
 
-    /// The same failure, known to come from `stage`.
+    /// The same failure, which comes from `stage`.
     #[must_use]
     pub fn in_stage(mut self, stage: &str) -> Self {
         self.stage.get_or_insert_with(|| stage.to_owned());
         self
     }
 
-    /// The same failure, known to concern `site`.
+    /// The same failure, which concerns `site`.
     #[must_use]
     pub fn in_site(mut self, site: &str) -> Self {
         self.site.get_or_insert_with(|| site.to_owned());
@@ -121,7 +121,7 @@ impl fmt::Display for Error {
             write!(formatter, "{}: ", file.display())?;
         }
         write!(formatter, "{}", self.cause)?;
-        // Stages read what a configuration names.
+        // The files of stages are named in a configuration.
         let advice = if self.stage.is_some() {
             self.cause.advice_on_configured()
         } else {
@@ -134,7 +134,7 @@ impl fmt::Display for Error {
     }
 }
 
-/// What fallible functions above the lowest floor return.
+/// Result of fallible functions above the lowest floor.
 pub type Result<T> = std::result::Result<T, Error>;
 
 /// Adds the place to a result on its way up.
@@ -174,7 +174,7 @@ impl<T, E: Into<Error>> Locate<T> for std::result::Result<T, E> {
 #[derive(Debug, thiserror::Error)]
 #[error("cannot {action}: {source}")]
 pub struct IoError {
-    /// What was tried, for example "read" or "rename into place".
+    /// The attempted action, for example "read" or "rename into place".
     pub action: &'static str,
     /// The system's reason.
     pub source: std::io::Error,
@@ -201,7 +201,7 @@ impl Cause for IoError {
                 "free some space or choose another --out, then run again: finished stages are kept"
             }
             ErrorKind::IsADirectory | ErrorKind::NotADirectory => {
-                "check the path: a file is in place of a folder, or a folder in place of a file"
+                "check the path: a file is where a folder is expected, or a folder where a file is expected"
             }
             _ => "check the file and the disk, then run again",
         }
@@ -211,13 +211,13 @@ impl Cause for IoError {
     fn advice_on_configured(&self) -> String {
         let advice = self.advice();
         if self.source.kind() == std::io::ErrorKind::NotFound {
-            return advice + "; relative paths in a configuration count from that file's folder";
+            return advice + "; relative paths in a configuration are relative to the folder of that file";
         }
         advice
     }
 }
 
-/// The user stopped the program, and the stage at work gave up.
+/// The user stopped the program, and the running stage was abandoned.
 #[derive(Debug, thiserror::Error)]
 #[error("interrupted")]
 pub struct Stopped;
@@ -261,7 +261,7 @@ mod tests {
         assert_eq!(
             failure.to_string(),
             "gusev/search_footprints: ap19019k.b: cannot read: entity not found\n  \
-             what to do: check the path; relative paths in a configuration count from that file's folder"
+             what to do: check the path; relative paths in a configuration are relative to the folder of that file"
         );
         assert_eq!(failure.kind().exit_code(), 6);
     }

@@ -8,7 +8,8 @@
 //! assert!(footprints.topography_m().is_empty());
 //! ```
 //!
-//! Footprints as their files have them are not taken for footprints in the frame of the products:
+//! Footprints with the coordinates of their files are a type of their own, and not accepted as footprints in the
+//! frame of the products:
 //!
 //! ```compile_fail,E0308
 //! use areograph_base::{
@@ -31,14 +32,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::body::{Body, Datum};
 
-/// State of footprint coordinates as their files have them; each file says its own datum.
+/// State of footprint coordinates as in their files; each file states its datum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AsRead;
 
 /// A PEDR file that footprints came from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SourceFile {
-    /// File name without folders: where a file lies does not change what is made of it.
+    /// File name without folders: the location of a file does not affect the results.
     pub name: String,
     /// Version letter of the file name in upper case, `None` when the name has none.
     pub version: Option<char>,
@@ -48,26 +49,26 @@ pub struct SourceFile {
     pub blake3: String,
 }
 
-/// What controls an adjustment.
+/// Control of an adjustment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum AdjustmentModel {
-    /// Heights of tie points by the surface of all MOLA shots; orientations by what is known of orbit and attitude.
+    /// Heights of tie points by the surface of all MOLA shots; orientations by a priori orbit and attitude.
     MolaSurface,
-    /// As published: image coordinates of footprints hold the images, one standard deviation an image stands for all
+    /// As published: image coordinates of footprints hold the images, one standard deviation per image represents all
     /// unknowns (Yoon & Shan 2004).
     Published,
 }
 
 impl AdjustmentModel {
-    /// Every model, with its word in the configuration.
+    /// Every model, with its name in the configuration.
     pub const WORDS: [(&'static str, Self); 2] = [
         ("mola_surface", Self::MolaSurface),
         ("published", Self::Published),
     ];
 
-    /// Its word in the configuration.
+    /// Its name in the configuration.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -77,7 +78,7 @@ impl AdjustmentModel {
     }
 }
 
-/// What image coordinates of footprints are to an adjustment.
+/// Use of image coordinates of footprints in an adjustment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
@@ -86,13 +87,13 @@ pub enum FootprintImageCoordinates {
     Weighted,
     /// Nothing.
     Off,
-    /// No observations, but projected with the adjusted orientation afterwards: a coordinate that
-    /// follows the orientation has no residual and carries no weight, no freedom and no covariance.
+    /// No observations, but projections with the adjusted orientation: a coordinate that follows the orientation has
+    /// no residual and carries no weight, no freedom and no covariance.
     Reproject,
 }
 
 impl FootprintImageCoordinates {
-    /// Every mode, with its word in the configuration.
+    /// Every mode, with its name in the configuration.
     pub const WORDS: [(&'static str, Self); 3] = [
         ("weighted", Self::Weighted),
         ("off", Self::Off),
@@ -108,27 +109,27 @@ macro_rules! columns {
 
         /// Footprints of a site, one entry per shot in every column, ordered by file, record and shot.
         ///
-        /// `D` tells whose coordinates they are: [`AsRead`] or a frame such as
-        /// [`BodyFixed`](crate::frames::BodyFixed). Only `stages::convert_datum` changes it, so
-        /// converting twice does not compile.
+        /// `D` is the state of the coordinates: [`AsRead`] or a frame such as
+        /// [`BodyFixed`](crate::frames::BodyFixed). Only `stages::convert_datum` changes it, so converting twice does
+        /// not compile.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         pub struct Footprints<D> {
-            /// The files that `file` counts into.
+            /// The files to which `file` refers by index.
             pub files: Vec<SourceFile>,
-            /// The body whose ground they are.
+            /// The body of the footprints.
             pub body: Body,
             $($(#[$doc])* pub $column: Vec<$kind>,)*
             datum: PhantomData<D>,
         }
 
         impl<D> Footprints<D> {
-            /// No footprints on Mars yet, of these files.
+            /// No footprints on Mars yet, from these files.
             #[must_use]
             pub const fn new(files: Vec<SourceFile>) -> Self {
                 Self::on(Body::Mars, files)
             }
 
-            /// No footprints on `body` yet, of these files.
+            /// No footprints on `body` yet, from these files.
             #[must_use]
             pub const fn on(body: Body, files: Vec<SourceFile>) -> Self {
                 Self { files, body, $($column: Vec::new(),)* datum: PhantomData }
@@ -139,15 +140,15 @@ macro_rules! columns {
                 $(self.$column.push(footprint.$column);)*
             }
 
-            /// Appends all shots of `other`, which must count into the same files.
+            /// Appends all shots of `other`, which must refer to the same files.
             pub fn append(&mut self, mut other: Self) {
                 $(self.$column.append(&mut other.$column);)*
             }
 
-            /// Takes the shots from row `row` on, counted from 0, away.
+            /// Removes and returns the shots from row `row` on, counted from 0.
             ///
             /// # Panics
-            /// When there are fewer rows.
+            /// If there are fewer rows.
             #[must_use]
             pub fn split_off(&mut self, row: usize) -> Self {
                 Self {
@@ -161,13 +162,13 @@ macro_rules! columns {
             /// The shot in row `row`, counted from 0.
             ///
             /// # Panics
-            /// When there is no such row.
+            /// If the row does not exist.
             #[must_use]
             pub fn row(&self, row: usize) -> Footprint {
                 Footprint { $($column: self.$column[row],)* }
             }
 
-            /// The same columns, their coordinates now said to belong to `E`.
+            /// The same columns, with coordinates declared to belong to `E`.
             ///
             /// For the stage that converts the coordinates, and for the reader of its product.
             #[must_use]

@@ -1,7 +1,7 @@
-//! Reference frames as types: positions and rotations say which frame they belong to.
+//! Reference frames as types: positions and rotations carry their frame.
 //!
-//! Types do not see time, so a [`Rotation`] carries the instant at which it holds, and two rotations
-//! of different instants do not combine.
+//! Types do not depend on time, so a [`Rotation`] carries its instant, and two rotations of different instants cannot
+//! be combined.
 //!
 //! `Position<F>` and `Rotation<A, B>` carry their frames, and `Footprints<D>` their datum: only `convert_datum` turns
 //! `AsRead` into `BodyFixed`, so that a second conversion does not compile. The body of a `BodyFixed` place is data
@@ -56,7 +56,7 @@ use crate::time::Et;
 
 /// A reference frame with right-handed axes.
 pub trait Frame: Copy + fmt::Debug + Send + Sync + 'static {
-    /// Name as messages and products write it.
+    /// Name in messages and products.
     const NAME: &'static str;
 }
 
@@ -72,8 +72,8 @@ macro_rules! frames {
 frames! {
     /// Inertial, Earth mean equator and equinox of J2000.
     J2000 = "J2000";
-    /// Fixed to the body of the site, in the frame of its products: for Mars that of the IAU 2000 report
-    /// (W₀ = 176.630°), for the Moon mean Earth/polar axis. Which body that is says [`crate::body::Body`] beside it.
+    /// Fixed to the body of the site, in the frame of its products: for Mars that of the IAU 2000 report (W₀ =
+    /// 176.630°), for the Moon mean Earth/polar axis. The body is given by the accompanying [`crate::body::Body`].
     BodyFixed = "body-fixed";
     /// Bus of the spacecraft: +Z towards nadir, flight along −X.
     SpacecraftBus = "bus";
@@ -107,7 +107,7 @@ impl<F: Frame> Position<F> {
     }
 }
 
-/// Takes components in `A` to components in `B`; holds at one instant.
+/// Transforms components in `A` to components in `B`; valid at one instant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "")]
 pub struct Rotation<A, B> {
@@ -133,7 +133,7 @@ impl<A: Frame, B: Frame> Rotation<A, B> {
         &self.matrix
     }
 
-    /// The instant at which the rotation holds.
+    /// The instant of the rotation.
     #[must_use]
     pub const fn at(&self) -> Et {
         self.at
@@ -145,7 +145,7 @@ impl<A: Frame, B: Frame> Rotation<A, B> {
         Rotation::new(self.matrix.transpose(), self.at)
     }
 
-    /// A position, its components taken from `A` to `B`.
+    /// A position, with components transformed from `A` to `B`.
     #[must_use]
     pub fn apply(&self, position: &Position<A>) -> Position<B> {
         Position::new(self.matrix * position.xyz_m)
@@ -160,7 +160,7 @@ impl<Start: Frame, Middle: Frame, End: Frame> Mul<Rotation<Start, Middle>>
     /// First `first`, then `self`.
     ///
     /// # Panics
-    /// When the two hold at different instants: that is an error of the program, not of its input.
+    /// If the two have different instants: this is an error of the program, not of its input.
     fn mul(self, first: Rotation<Start, Middle>) -> Rotation<Start, End> {
         assert!(
             self.at == first.at,

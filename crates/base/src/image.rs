@@ -1,8 +1,8 @@
-//! What labels and configuration say of an image, and the limits of what an image can be.
+//! Image data of labels and configuration, and the limits of an image.
 
 use serde::{Deserialize, Serialize};
 
-/// What a label or the configuration says of an image; anything may be missing from either.
+/// Data of an image from a label or the configuration; any entry may be missing in either.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ImageFields {
     /// Spacecraft clock at the start of the first line, for example `619971158:28`.
@@ -17,9 +17,9 @@ pub struct ImageFields {
     pub downtrack_summing: Option<u32>,
     /// Detector pixels summed across the track.
     pub crosstrack_summing: Option<u32>,
-    /// Lines that were exposed, as the header says; the time model counts these.
+    /// Exposed lines, as in the header; the time model counts these.
     pub lines_header: Option<u32>,
-    /// Lines in the delivered file, when fewer.
+    /// Lines in the delivered file, if fewer.
     pub lines_delivered: Option<u32>,
     /// Samples per line.
     pub samples: Option<u32>,
@@ -27,20 +27,20 @@ pub struct ImageFields {
     pub first_detector: Option<u32>,
 }
 
-/// Fewest lines of an image: orientation is fitted over its length.
+/// Minimum number of lines of an image: orientation is fitted over its length.
 pub const IMAGE_LINES_MIN: u32 = 3;
 
-/// No image is exposed this long, seconds: the longest of the mission take about a minute, and minutes
-/// later the orientation is no polynomial of second order any more.
+/// Upper limit of the exposure of an image, seconds: the longest of the mission take about a minute, and over minutes
+/// the orientation is no longer a polynomial of second order.
 pub const IMAGE_DURATION_END_S: f64 = 600.0;
 
-/// What a clock string looks like, for messages.
+/// Form of a clock string, for messages.
 pub const CLOCK_STRING: &str =
     "a spacecraft clock `seconds:ticks` with ticks below 256, such as 619971158:028";
 
 /// Whether `text` is `[1/]seconds:ticks`, the two fields of the MGS clock (32 bits and 1/256 s) in its one partition.
 ///
-/// Without ticks a clock is known to a second only, which is 3 km on the ground.
+/// Without ticks a clock is known only to a second, which is 3 km on the ground.
 #[must_use]
 pub fn is_clock_string(text: &str) -> bool {
     let (partition, count) = text.split_once('/').unwrap_or(("1", text));
@@ -54,7 +54,7 @@ pub fn is_clock_string(text: &str) -> bool {
             .is_some_and(|(seconds, ticks)| below(seconds, 1 << 32) && below(ticks, 256))
 }
 
-/// Labels print exposures and periods to 0.0001 ms; half of that is their rounding, seconds.
+/// Labels print exposures and periods to 0.0001 ms; half of this is their rounding error, seconds.
 const EXPOSURE_ROUNDING_S: f64 = 0.5e-7;
 
 /// Whether a line period is exposure × downtrack summing, within the rounding of printed values.

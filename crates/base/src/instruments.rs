@@ -1,15 +1,15 @@
-//! Instruments as data: what a camera or an altimeter is, as its file under `config/` says.
+//! Instruments as data: cameras and altimeters, as described in their files under `config/`.
 //!
 //! `config/instruments` holds cameras, the pointing bias included; an image carries its camera through all stages
 //! (`ImageTimes::instrument`). `config/altimeters` has the clock of the altimeter, `config/spacecraft` the identifiers
 //! of spacecraft: that of the laser (`constants::SPACECRAFT`), and others that carry cameras. An instrument names its
-//! spacecraft, and a stage asks `Session::of` it for clock, orbit and attitude of an image; shots belong to that of the
-//! laser.
+//! spacecraft, and a stage queries `Session::of` this spacecraft for clock, orbit and attitude of an image; shots
+//! belong to the spacecraft of the laser.
 //!
-//! In code, only readers of labels and files, the synthetic mission and examples of keys name any of them: a test reads
-//! the sources. The look direction of a sample is `geom::pushbroom::Detector`: a straight line in an ideal focal plane,
-//! or a curve (`Distortion`), which ground to image, intersection and adjustment use through the tangents of look
-//! directions.
+//! In code, only readers of labels and files, the synthetic mission and examples of keys name any of them: a test
+//! checks the sources. The look direction of a sample is `geom::pushbroom::Detector`: a straight line in an ideal focal
+//! plane, or a curve (`Distortion`), which ground to image, intersection and adjustment use through the tangents of
+//! look directions.
 
 use std::fmt;
 
@@ -18,7 +18,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error as _};
 
 use crate::{constants::Spacecraft, time::PointingBias};
 
-/// Most coefficients of a distortion.
+/// Maximum number of coefficients of a distortion.
 pub const COEFFICIENTS_MAX: usize = 10;
 
 /// A line-scan camera.
@@ -28,9 +28,9 @@ pub const COEFFICIENTS_MAX: usize = 10;
 pub struct Instrument {
     /// Identifier, the name of its file.
     pub id: String,
-    /// Its name, for people.
+    /// Its name in texts.
     pub name: String,
-    /// What carries it: whose clock, orbit and attitude are read for its images.
+    /// Its spacecraft, whose clock, orbit and attitude are read for its images.
     #[serde(
         serialize_with = "id_of_spacecraft",
         deserialize_with = "spacecraft_of_id"
@@ -40,7 +40,7 @@ pub struct Instrument {
     pub label: LabelNames,
     /// Numbers and frames in kernels.
     pub naif: NaifNames,
-    /// Rotation from the bus to the camera, where no kernel is at hand.
+    /// Rotation from the bus to the camera, used if no kernel is available.
     pub mounting: Mounting,
     /// Focal length and pixel pitch.
     pub optics: Optics,
@@ -48,7 +48,7 @@ pub struct Instrument {
     pub detector: DetectorLine,
     /// Departure from an ideal camera.
     pub distortion: DistortionModel,
-    /// How many detector lines and pixels may be summed.
+    /// Limits of the summing of detector lines and pixels.
     pub summing: SummingLimits,
     /// Time correction of its attitude.
     pub pointing: PointingTime,
@@ -77,9 +77,9 @@ fn spacecraft_of_id<'de, D: Deserializer<'de>>(
 pub struct LabelNames {
     /// Instrument keyword.
     pub instrument: String,
-    /// Filter keyword, where it tells cameras of one instrument apart.
+    /// Filter keyword, if it distinguishes cameras of one instrument.
     pub filter: Option<String>,
-    /// Instrument and filter in the serial numbers of ISIS; none where these are made otherwise.
+    /// Instrument and filter in the serial numbers of ISIS; `None` if these are formed differently.
     pub serial: Option<String>,
 }
 
@@ -100,7 +100,7 @@ pub struct NaifNames {
     pub instrument: i32,
     /// Frame of the camera.
     pub frame: String,
-    /// Number of that frame, mostly that of the instrument.
+    /// Number of that frame, usually that of the instrument.
     pub frame_id: i32,
     /// From that frame to the camera axes, about their common +Z, radians.
     pub turn_rad: f64,
@@ -198,9 +198,9 @@ pub enum DistortionModel {
 /// Limits of summing.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SummingLimits {
-    /// Most detector lines or pixels in a line or sample.
+    /// Maximum number of detector lines or pixels in a line or sample.
     pub max: u32,
-    /// Numbers across the track that stand for a summing that varies over the line.
+    /// Codes across the track for a summing that varies over the line.
     pub variable_codes: Vec<u32>,
 }
 
@@ -209,7 +209,7 @@ pub struct SummingLimits {
 pub struct PointingTime {
     /// Attitude of an exposure at `t` is read at `t` plus this, seconds.
     pub ck_bias_s: f64,
-    /// Where it comes from; products repeat it.
+    /// Its source; products repeat it.
     pub source: String,
 }
 
@@ -226,23 +226,23 @@ impl Instrument {
 pub struct Altimeter {
     /// Identifier, the name of its file.
     pub id: String,
-    /// Its name, for people.
+    /// Its name in texts.
     pub name: String,
     /// Its name in full.
     pub full_name: String,
     /// Size of the error of its time tags, seconds.
     pub clock_bias_s: f64,
-    /// Where that comes from; products repeat it.
+    /// Its source; products repeat it.
     pub clock_source: String,
-    /// Direction of its beam, components of the bus; none where its file does not tell it.
+    /// Direction of its beam, components of the bus; `None` if its file does not state it.
     pub beam_in_bus: Option<[f64; 3]>,
-    /// Where that comes from.
+    /// Its source.
     pub beam_source: Option<String>,
 }
 
 impl Altimeter {
-    /// Its axes as columns, components of the bus: the directions that the two angles of its boresight turn the beam to, X of the
-    /// bus and what completes them to the right, and the beam.
+    /// Its axes as columns, components of the bus: the directions towards which the two boresight angles rotate the
+    /// beam (X of the bus, and its complement to a right-handed system), and the beam.
     #[must_use]
     pub fn axes_in_bus(&self) -> Option<Matrix3<f64>> {
         let beam = Vector3::from(self.beam_in_bus?).normalize();

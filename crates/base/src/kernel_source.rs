@@ -27,13 +27,13 @@ impl Default for KernelSource {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum KernelList {
-    /// A metakernel; relative paths in it count from its own folder.
+    /// A metakernel; relative paths in it are relative to its folder.
     Metakernel(PathBuf),
     /// Files in load order (later ones win).
     Files(Vec<PathBuf>),
 }
 
-/// One of several complete sets of kernels.
+/// One of several complete kernel sets.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RivalKernels {
     /// Identifier, unique in the site, for example `nav`.
@@ -51,16 +51,17 @@ pub struct KernelSelection {
     pub spk_family: String,
     /// Attitude qualities that may be used, best first: `reconstructed`, `nominal`.
     pub ck_quality: Vec<CkQuality>,
-    /// Text kernels pinned by file name, such as `pck00010.tpc`; without one the latest version is taken.
+    /// Text kernels pinned by file name, such as `pck00010.tpc`; of others the latest version is used.
     pub pinned: Vec<String>,
 }
 
-/// Where an attitude kernel comes from.
+/// Origin of an attitude kernel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CkQuality {
     /// From telemetry.
     Reconstructed,
-    /// Commanded attitude that fills telemetry gaps (`mgs_ext_roto_all_v*`); loaded first, so that telemetry wins.
+    /// Commanded attitude that fills telemetry gaps (`mgs_ext_roto_all_v*`); loaded first, so that telemetry takes
+    /// precedence.
     Nominal,
 }

@@ -1,10 +1,10 @@
-//! When the lines of an image are exposed: a table of pieces, each with its own line period.
+//! Exposure times of the lines of an image: a table of pieces, each with its line period.
 //!
-//! A line coordinate counts lines from the top edge of the first line, so that the centre of line `i` (from 0) is
-//! `i + 0.5`. The sensor models of Shan et al. take time in another unit: [`LineTimes::offset`], seconds from the
-//! middle of the exposure over the mean line period. In an image of one piece that is the line coordinate less half
-//! the number of lines; where the exposure changes inside an image it is not, but positions and attitudes are as
-//! smooth over it as they are over time.
+//! A line coordinate counts lines from the top edge of the first line, so that the centre of line `i` (from 0) is `i
+//! + 0.5`. The sensor models of Shan et al. measure time in another unit: [`LineTimes::offset`], seconds from the
+//! middle of the exposure over the mean line period. In an image of one piece this is the line coordinate less half
+//! the number of lines. If the exposure changes inside an image the two differ, but positions and attitudes are as
+//! smooth over the offset as over time.
 //!
 //! A file whose rows have times (`ImageLabel::lines`) gives the pieces itself. Only `OrientedCamera` and `register`
 //! convert a line coordinate into an offset and back.
@@ -28,11 +28,12 @@ use crate::{
     time::{Et, Interval},
 };
 
-/// A piece that begins this close to the end of the one before follows it, seconds: ET of the mission is rounded to
-/// 1.2e-7 s, published pieces overlap by up to 4e-7 s, and a microsecond is a five hundredth of the shortest line.
+/// A piece that begins within this time of the end of the preceding one follows it directly, seconds: ET of the
+/// mission is rounded to 1.2e-7 s, published pieces overlap by up to 4e-7 s, and a microsecond is a five hundredth of
+/// the shortest line.
 const TOUCHING_S: f64 = 1e-6;
 
-/// Lines that are exposed one after the other with one period.
+/// Consecutive lines with one period.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinePiece {
     /// Its first line, counted from 0.
@@ -43,19 +44,19 @@ pub struct LinePiece {
     pub period_s: f64,
 }
 
-/// Times of the lines of an image, in pieces that follow each other at once or after a gap.
+/// Times of the lines of an image, in pieces that follow each other directly or after a gap.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LineTimes {
     start: Et,
     lines: u32,
-    /// Mean of the time from line to line, gaps included, seconds; of one piece its period.
+    /// Mean time from line to line, gaps included, seconds; for one piece its period.
     mean_period_s: f64,
     /// From the start of the first line to the end of the last, seconds.
     duration_s: f64,
     pieces: Vec<Piece>,
 }
 
-/// A piece relative to the start of the image, so that no time is rounded as ET is.
+/// A piece relative to the start of the image, which avoids the rounding of ET.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Piece {
     first_line: u32,
@@ -64,7 +65,7 @@ struct Piece {
     period_s: f64,
 }
 
-/// Pieces that are no table of line times.
+/// Pieces that do not form a table of line times.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum LineTimesError {
     /// No pieces.
@@ -89,7 +90,7 @@ pub enum LineTimesError {
         /// First line of the next one, or the number of lines.
         next: u32,
     },
-    /// A period that is none.
+    /// An invalid period.
     #[error(
         "piece {piece} of the line times has a line period of {period_s} s; expected a number above 0"
     )]
@@ -99,7 +100,7 @@ pub enum LineTimesError {
         /// Its period, seconds.
         period_s: f64,
     },
-    /// A piece begins before the one before it has ended, or at no instant at all.
+    /// A piece begins before the preceding one has ended, or its start is not finite.
     #[error(
         "piece {piece} of the line times begins {overlap_s} s before the last line of the preceding piece ends; expected pieces \
          that do not overlap"
@@ -107,7 +108,7 @@ pub enum LineTimesError {
     Overlap {
         /// The piece, counted from 1.
         piece: usize,
-        /// How much too early, seconds.
+        /// Overlap, seconds.
         overlap_s: f64,
     },
 }
@@ -141,7 +142,7 @@ impl LineTimes {
         Self::continuous(start, &[(lines, period_s)])
     }
 
-    /// An image whose pieces, numbers of lines with periods in seconds, follow each other at once.
+    /// An image whose pieces, numbers of lines with periods in seconds, follow each other directly.
     ///
     /// # Errors
     /// [`LineTimesError::NoPieces`], [`LineTimesError::NoLines`], [`LineTimesError::Period`].
@@ -157,7 +158,7 @@ impl LineTimes {
         Self::relative(start, line, &pieces)
     }
 
-    /// An image of `lines` lines with the `pieces` of a label, in order; between two of them may be a gap.
+    /// An image of `lines` lines with the `pieces` of a label, in order; gaps between pieces are permitted.
     ///
     /// # Errors
     /// As [`Self::continuous`], and [`LineTimesError::FirstLine`], [`LineTimesError::Overlap`].
@@ -190,7 +191,7 @@ impl LineTimes {
                     next,
                 });
             }
-            // Written so that NaN is refused too, here and below.
+            // This form also refuses NaN, here and below.
             if !(period_s > 0.0 && period_s.is_finite()) {
                 return Err(LineTimesError::Period { piece, period_s });
             }
@@ -199,8 +200,8 @@ impl LineTimes {
                 let overlap_s = before_s - after_s;
                 return Err(LineTimesError::Overlap { piece, overlap_s });
             }
-            // The piece before ends where this one says that it begins: were this one moved instead, the rounding of many
-            // pieces would add up.
+            // The preceding piece ends where this one begins: if this one were moved instead, the rounding errors of
+            // many pieces would accumulate.
             if let Some(before) = pieces.last_mut()
                 && after_s - before_s <= TOUCHING_S
                 && after_s.to_bits() != before_s.to_bits()
@@ -215,7 +216,8 @@ impl LineTimes {
             });
         }
         let duration_s = pieces.last().map_or(0.0, Piece::end_s);
-        // The mean departs from the first period by what the others have more, so that of one piece it is that period.
+        // The mean is the first period plus the mean excess of the others, so that for one piece it is exactly that
+        // period.
         let first_s = pieces[0].period_s;
         let more_s: f64 = match pieces.len() {
             1 => 0.0,
@@ -242,7 +244,8 @@ impl LineTimes {
         self.lines
     }
 
-    /// Mean time from line to line, seconds: the unit of [`Self::offset`]. Of an image of one piece its line period.
+    /// Mean time from line to line, seconds: the unit of [`Self::offset`]. For an image of one piece, its line
+    /// period.
     #[must_use]
     pub const fn mean_period_s(&self) -> f64 {
         self.mean_period_s
@@ -260,7 +263,7 @@ impl LineTimes {
         Interval::new(self.start, self.start.plus(self.duration_s))
     }
 
-    /// Middle of the exposure, where the sensor models have their origin.
+    /// Middle of the exposure, the origin of the sensor models.
     #[must_use]
     pub fn middle(&self) -> Et {
         self.start.plus(0.5 * self.duration_s)
@@ -276,15 +279,15 @@ impl LineTimes {
         })
     }
 
-    /// Seconds from the start of the image to a line coordinate; outside the image the first and the last piece go on.
-    /// At the end of a piece that a gap follows it is the start of the next one.
+    /// Seconds from the start of the image to a line coordinate; outside the image the first and the last piece are
+    /// extrapolated. At the end of a piece that is followed by a gap, it is the start of the next piece.
     #[must_use]
     pub fn seconds(&self, line: f64) -> f64 {
         let piece = self.piece(|piece| piece.first() <= line);
         piece.after_s + (line - piece.first()) * piece.period_s
     }
 
-    /// The line coordinate that is exposed `after_s` seconds after the start; within a gap that of its ends. The
+    /// The line coordinate that is exposed `after_s` seconds after the start; within a gap, that of its ends. The
     /// inverse of [`Self::seconds`] to 1e-9 lines.
     #[must_use]
     pub fn line_at(&self, after_s: f64) -> f64 {
@@ -295,7 +298,7 @@ impl LineTimes {
         )
     }
 
-    /// The instant of a line coordinate, rounded as ET is.
+    /// The instant of a line coordinate, with the rounding of ET.
     #[must_use]
     pub fn et(&self, line: f64) -> Et {
         self.start.plus(self.seconds(line))
@@ -316,14 +319,14 @@ impl LineTimes {
         instant.since(self.middle()) / self.mean_period_s
     }
 
-    /// The same of a line coordinate, without the rounding of ET.
+    /// The same for a line coordinate, without the rounding of ET.
     #[must_use]
     pub fn offset_of_line(&self, line: f64) -> f64 {
         let piece = self.piece(|piece| piece.first() <= line);
         self.first_offset(piece) + (line - piece.first()) * (piece.period_s / self.mean_period_s)
     }
 
-    /// The line coordinate of a time in the unit of the sensor models; within a gap that of its ends.
+    /// The line coordinate of a time in the unit of the sensor models; within a gap, that of its ends.
     #[must_use]
     pub fn line_of_offset(&self, offset: f64) -> f64 {
         let piece = self.piece(|piece| self.first_offset(piece) <= offset);
@@ -341,7 +344,7 @@ impl LineTimes {
             .any(|(end_s, begin_s)| end_s < after_s && after_s < begin_s)
     }
 
-    /// How much of that unit the line passes that is exposed at `offset`: its period over the mean.
+    /// Duration, in that unit, of the line that is exposed at `offset`: its period over the mean.
     #[must_use]
     pub fn offsets_per_line(&self, offset: f64) -> f64 {
         let piece = self.piece(|piece| self.first_offset(piece) <= offset);
@@ -352,13 +355,13 @@ impl LineTimes {
         piece.after_s / self.mean_period_s - 0.5 * f64::from(self.lines)
     }
 
-    /// The last piece that `begins` by then, or the first one.
+    /// The last piece for which `begins` holds, or the first one.
     fn piece(&self, begins: impl Fn(&Piece) -> bool) -> &Piece {
         let after = self.pieces.partition_point(begins);
         &self.pieces[after.saturating_sub(1)]
     }
 
-    /// `line` of `piece`, not beyond its end where another piece follows.
+    /// `line` of `piece`, limited to its end if another piece follows.
     fn held(&self, piece: &Piece, line: f64) -> f64 {
         let end = piece.first_line + piece.lines;
         if end < self.lines {

@@ -19,7 +19,7 @@ pub struct DocumentSchema {
 impl DocumentSchema {
     /// The schema of what `T` writes, under `name`.
     ///
-    /// Objects have no other members than declared, and nothing is null: what is unknown is left out.
+    /// Objects have only declared members, and nothing is null: unknown values are left out.
     #[must_use]
     pub fn of<T: JsonSchema>(name: &'static str) -> Self {
         let settings = SchemaSettings::draft2020_12()
@@ -32,7 +32,7 @@ impl DocumentSchema {
         }
     }
 
-    /// Sets `keyword` of the schema at a JSON pointer, where the type itself does not say it.
+    /// Sets `keyword` of the schema at a JSON pointer, for rules that the type does not express.
     #[must_use]
     pub fn with(mut self, pointer: &str, keyword: &str, value: impl Into<Value>) -> Self {
         if let Some(part) = self.schema.pointer_mut(pointer) {
@@ -42,8 +42,8 @@ impl DocumentSchema {
     }
 }
 
-/// Sets `keyword` at the JSON pointer `pointer` of a member's schema; for what attributes of single numbers cannot
-/// say, such as limits of the numbers in an array.
+/// Sets `keyword` at the JSON pointer `pointer` of a member's schema, for rules that attributes cannot express, such
+/// as limits of the numbers in an array.
 pub fn at(pointer: &'static str, keyword: &'static str, value: impl Into<Value>) -> impl Transform {
     let value = value.into();
     move |schema: &mut Schema| {
@@ -67,7 +67,7 @@ fn close(schema: &mut Schema) {
     let Some(object) = schema.as_object_mut() else {
         return;
     };
-    // Rust's own sizes of numbers.
+    // Rust's formats of numbers.
     object.remove("format");
     if object.contains_key("properties") && !object.contains_key("additionalProperties") {
         object.insert("additionalProperties".to_owned(), json!(false));

@@ -1,8 +1,8 @@
-//! Fields that a document leaves out where they have no value.
+//! Fields that a document omits if they have no value.
 //!
-//! Outputs of stages are stored without names of fields, so that each must be there. A field with
-//! `#[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]` has no key in a JSON document, and is written by
-//! [`whole`].
+//! Outputs of stages are stored without field names, so that every field must be present. A field with
+//! `#[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]` has no key in a JSON document without a
+//! value, and is written by [`whole`].
 
 use std::cell::Cell;
 
@@ -10,13 +10,13 @@ thread_local! {
     static WHOLE: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Whether a field is left out: one without a value, in a document.
+/// Whether a field is omitted: in a document, if it has no value.
 #[must_use]
 pub fn is_left_out<T>(value: &Option<T>) -> bool {
     value.is_none() && !WHOLE.get()
 }
 
-/// What `write` gives when it serializes all fields, on this thread.
+/// Result of `write` with all fields serialized, on this thread.
 pub fn whole<T>(write: impl FnOnce() -> T) -> T {
     struct Reset(bool);
     impl Drop for Reset {

@@ -1,4 +1,4 @@
-//! Tie points: places on the ground that were measured in several images.
+//! Tie points: points on the ground that were measured in several images.
 
 mod matching;
 
@@ -19,18 +19,18 @@ pub use matching::{MatchedPair, Unmatched, reasons};
 pub struct TiePoint<I = usize> {
     /// Identifier in its file.
     pub id: String,
-    /// Its ground coordinates, where they are known beforehand.
+    /// Its ground coordinates, if known a priori.
     pub known: Option<KnownGround>,
     /// Its measurements.
     pub measures: Vec<TieMeasure<I>>,
 }
 
-/// Ground coordinates that a point has from elsewhere.
+/// A priori ground coordinates of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct KnownGround {
-    /// Where it lies.
+    /// Its position.
     pub ground: Position<BodyFixed>,
-    /// Covariance of its coordinates, m²; none where they are held fixed.
+    /// Covariance of its coordinates, m²; `None` if they are held fixed.
     pub covariance_m2: Option<Matrix3<f64>>,
 }
 
@@ -43,13 +43,13 @@ pub struct TieMeasure<I = usize> {
     pub line: f64,
     /// Sample, 0 at the outer edge of the first pixel and 0.5 at its middle.
     pub sample: f64,
-    /// Standard deviations of line and sample, where the file has its own, lines and pixels of the image.
+    /// Standard deviations of line and sample, if the file states them, lines and pixels of the image.
     pub sigma_px: Option<[f64; 2]>,
 }
 
 impl TiePoint<String> {
-    /// The point with the indices that `index_of` knows for the names of its images; names that it does not know
-    /// go to `unknown`, and their measurements are left out.
+    /// The point with the indices that `index_of` gives for the names of its images; unknown names go to `unknown`,
+    /// and their measurements are left out.
     pub fn in_images(
         self,
         index_of: impl Fn(&str) -> Option<usize>,
@@ -81,7 +81,7 @@ impl TiePoint<String> {
     }
 }
 
-/// A measurement belongs to an image that is not there.
+/// A measurement belongs to an image that does not exist.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "tie point {tie} is measured in image {image}, counted from 0; expected one of {images} images"
@@ -91,7 +91,7 @@ pub struct UnknownImage {
     pub tie: String,
     /// Index of the image.
     pub image: usize,
-    /// How many images there are.
+    /// Number of images.
     pub images: usize,
 }
 
@@ -105,7 +105,7 @@ impl Cause for UnknownImage {
     }
 }
 
-/// Makes sure that every measurement belongs to one of `images` images.
+/// Ensures that every measurement belongs to one of `images` images.
 ///
 /// # Errors
 /// The first measurement that does not.

@@ -4,7 +4,7 @@
 //! only in labels, configuration and reports; `spice::Session` converts them.
 //!
 //! Only `PointingBias::lookup` makes a `CkLookup`, and only `Session::attitude` takes one, so that the −1.15 s of MOC
-//! moves attitude alone, once.
+//! shifts only attitudes, and only once.
 
 use std::fmt;
 
@@ -50,7 +50,7 @@ impl fmt::Display for Et {
     }
 }
 
-/// The instant at which a C-kernel is asked for the attitude of an exposure.
+/// The instant of an attitude look-up in a C-kernel for an exposure.
 ///
 /// It is not an exposure instant: only [`PointingBias::lookup`] makes one, and only
 /// `spice::Session::attitude` takes one, so the bias cannot be applied twice or to a position.
@@ -58,7 +58,7 @@ impl fmt::Display for Et {
 pub struct CkLookup(Et);
 
 impl CkLookup {
-    /// The instant as the C-kernel counts time.
+    /// The instant in the time of the C-kernel.
     #[must_use]
     pub const fn kernel_time(self) -> Et {
         self.0
@@ -88,7 +88,7 @@ impl PointingBias {
         self.seconds
     }
 
-    /// Where the C-kernel has the attitude of the exposure at `exposure`.
+    /// The instant at which the C-kernel contains the attitude of the exposure at `exposure`.
     #[must_use]
     pub fn lookup(self, exposure: Et) -> CkLookup {
         CkLookup(exposure.plus(self.seconds))
@@ -118,7 +118,7 @@ impl Interval {
         self.stop.since(self.start)
     }
 
-    /// The interval made longer by `seconds` at both ends.
+    /// The interval extended by `seconds` at both ends.
     #[must_use]
     pub fn padded(self, seconds: f64) -> Self {
         Self::new(self.start.plus(-seconds), self.stop.plus(seconds))
@@ -154,7 +154,7 @@ impl fmt::Display for Interval {
     }
 }
 
-/// Disjoint intervals in order of time, as kernel coverage comes.
+/// Disjoint intervals in time order, as in kernel coverage.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Intervals(Vec<Interval>);
@@ -179,13 +179,13 @@ impl Intervals {
         Self(merged)
     }
 
-    /// The intervals in order of time.
+    /// The intervals in time order.
     #[must_use]
     pub fn as_slice(&self) -> &[Interval] {
         &self.0
     }
 
-    /// Whether one interval holds all of `required`.
+    /// Whether one interval covers all of `required`.
     #[must_use]
     pub fn cover(&self, required: Interval) -> bool {
         self.0
@@ -193,7 +193,7 @@ impl Intervals {
             .any(|held| held.start <= required.start && required.stop <= held.stop)
     }
 
-    /// The parts of `required` that no interval holds, in order of time.
+    /// The parts of `required` that no interval covers, in time order.
     #[must_use]
     pub fn gaps_in(&self, required: Interval) -> Vec<Interval> {
         let mut gaps = Vec::new();
@@ -212,7 +212,7 @@ impl Intervals {
         gaps
     }
 
-    /// The instants that this set holds and `other` does not.
+    /// The instants of this set that `other` does not cover.
     #[must_use]
     pub fn without(&self, other: &Self) -> Self {
         Self::union_of(self.0.iter().flat_map(|own| other.gaps_in(*own)))
@@ -224,7 +224,7 @@ impl Intervals {
         Self(self.0.iter().map(|one| one.shifted(seconds)).collect())
     }
 
-    /// How much time it is in all, seconds.
+    /// Total time, seconds.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         // An empty sum of floats would be −0.
@@ -233,7 +233,7 @@ impl Intervals {
             .fold(0.0, |sum, interval| sum + interval.duration_s())
     }
 
-    /// The instants that both sets hold.
+    /// The instants that both sets cover.
     #[must_use]
     pub fn intersection(&self, other: &Self) -> Self {
         let mut shared = Vec::new();

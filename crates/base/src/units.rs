@@ -9,7 +9,7 @@
 //! ```
 //! use areograph_base::units::{METRES_PER_KM, RADIANS_PER_DEGREE, wrap_two_pi};
 //!
-//! // A label says 178.2° W; inside, longitudes are radians east.
+//! // A label states 178.2° W; inside, longitudes are radians east.
 //! let longitude_rad = wrap_two_pi(-178.2 * RADIANS_PER_DEGREE);
 //! assert!((longitude_rad / RADIANS_PER_DEGREE - 181.8).abs() < 1e-12); // rounding, degrees
 //!
@@ -47,12 +47,12 @@ pub fn wrap_pi(angle_rad: f64) -> f64 {
     wrap_two_pi(angle_rad + std::f64::consts::PI) - std::f64::consts::PI
 }
 
-/// Steps in longitude this close to half or a whole turn, radians, count as such (3 µm on the ground).
+/// Steps in longitude this close to half a turn or a whole turn, radians, count as such (3 µm on the ground).
 const TURN_TOLERANCE_RAD: f64 = 1e-12;
 
-/// A step in longitude as written, radians, or the shorter way when it is longer than half a turn.
+/// A step in longitude as written, radians, or the shorter direction if it is longer than half a turn.
 ///
-/// A whole turn stays: polar caps are written with an edge from −180° to 180°.
+/// A whole turn is kept: polar caps are written with an edge from −180° to 180°.
 #[must_use]
 pub fn longitude_step_rad(written_rad: f64) -> f64 {
     let (half, whole) = (std::f64::consts::PI, std::f64::consts::TAU);

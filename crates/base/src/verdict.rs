@@ -1,4 +1,4 @@
-//! A verdict: reasons, remarks and checks. `judge` and the judges of nets, calibrations and matches make it.
+//! A verdict: reasons, remarks and checks. `judge` and the verdicts of nets, calibrations and matches produce it.
 
 mod check;
 mod kind;
@@ -10,23 +10,23 @@ pub use kind::CheckKind;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Whether the products keep the limits of the configuration.
+/// Whether the products are within the limits of the configuration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 pub struct Verdict {
-    /// No limit is broken.
+    /// No limit is exceeded.
     pub valid: bool,
-    /// Every broken limit, with its profile or image.
+    /// Every exceeded limit, with its profile or image.
     pub reasons: Vec<String>,
-    /// What a reader must weigh although no limit is broken.
+    /// Remarks for the reader although no limit is exceeded.
     pub remarks: Vec<String>,
-    /// Every limit with what uses most of it, the worst first.
+    /// Every limit with the item that uses most of it, the worst first.
     #[serde(default)]
     pub checks: Vec<Check>,
 }
 
 impl Verdict {
-    /// Sentences and checks are two accounts of the same evidence: what either finds is reported.
+    /// Sentences and checks are two accounts of the same evidence: findings of both are reported.
     #[must_use]
     pub fn of(mut reasons: Vec<String>, mut remarks: Vec<String>, mut checks: Vec<Check>) -> Self {
         let failed = in_words(&checks, CheckOutcome::Fail);
@@ -39,7 +39,7 @@ impl Verdict {
         if remarks.is_empty() {
             remarks = in_words(&checks, CheckOutcome::Warning);
         }
-        // The worst first, and of equals the most independent.
+        // The worst first; of equal ones the most independent.
         checks.sort_by_key(|check| (check.outcome, check.kind));
         Self {
             valid: reasons.is_empty(),
@@ -49,7 +49,7 @@ impl Verdict {
         }
     }
 
-    /// The verdict in one word or three, as every message and page has it.
+    /// The verdict in one or three words, as in every message and page.
     #[must_use]
     pub const fn word(&self) -> &'static str {
         match (self.valid, self.remarks.as_slice()) {
@@ -59,8 +59,8 @@ impl Verdict {
         }
     }
 
-    /// The three checks that say most of how good the products are: heights of tie points and MOLA, images by each
-    /// other, ranges; then orbits and pointing where there are no tie points.
+    /// The three checks that are most informative on the quality of the products: heights of tie points and MOLA,
+    /// agreement of images, ranges; then orbits and pointing without tie points.
     pub fn key_checks(&self) -> impl Iterator<Item = &Check> {
         let kinds = [
             CheckKind::HeightAfter,
@@ -77,7 +77,7 @@ impl Verdict {
     }
 }
 
-/// The checks that came out so, a sentence each.
+/// The checks with this outcome, one sentence each.
 fn in_words(checks: &[Check], outcome: CheckOutcome) -> Vec<String> {
     let such = checks.iter().filter(|check| check.outcome == outcome);
     such.map(ToString::to_string).collect()

@@ -1,4 +1,4 @@
-//! What the long loops of a stage look at, and what they count for whoever watches them.
+//! Stop flag and progress counter of the long loops of a stage.
 
 use std::{
     fmt,
@@ -7,18 +7,18 @@ use std::{
 
 use crate::error::Stopped;
 
-/// How far a stage is.
+/// Progress of a stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Count {
-    /// Things done.
+    /// Items done.
     pub done: u64,
-    /// Things in all; 0 where nobody knows.
+    /// Items in all; 0 if unknown.
     pub all: u64,
-    /// What they are, in the plural.
+    /// Name of the items, in the plural.
     pub of: &'static str,
 }
 
-/// Counts the steps of one stage, on all threads, and tells each to whoever listens.
+/// Counts the steps of one stage, on all threads, and reports each to a listener.
 pub struct Counter<'a> {
     done: AtomicU64,
     all: AtomicU64,
@@ -35,7 +35,7 @@ impl fmt::Debug for Counter<'_> {
 }
 
 impl<'a> Counter<'a> {
-    /// One that begins.
+    /// A new counter.
     #[must_use]
     pub const fn new(tell: &'a (dyn Fn(Count) + Sync)) -> Self {
         Self {
@@ -46,15 +46,15 @@ impl<'a> Counter<'a> {
     }
 }
 
-/// What long loops look at before each part of their work, and tell after it. A counter is no input: what is computed
-/// does not depend on it.
+/// Checked by long loops before each part of their work, and informed after it. A counter is not an input: results do
+/// not depend on it.
 #[derive(Debug, Clone, Copy)]
 pub struct Watch<'a> {
     stop: &'a AtomicBool,
     counter: Option<&'a Counter<'a>>,
 }
 
-/// Nobody counts.
+/// Without a counter.
 impl<'a> From<&'a AtomicBool> for Watch<'a> {
     fn from(stop: &'a AtomicBool) -> Self {
         Self {
@@ -65,7 +65,7 @@ impl<'a> From<&'a AtomicBool> for Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    /// A counter beside what stops the loops.
+    /// A counter with the stop flag of the loops.
     #[must_use]
     pub const fn counted(stop: &'a AtomicBool, counter: &'a Counter<'a>) -> Self {
         Self {
@@ -74,28 +74,28 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// What is set from outside to stop.
+    /// The stop flag.
     #[must_use]
     pub const fn stop(&self) -> &'a AtomicBool {
         self.stop
     }
 
-    /// Before a part of the work.
+    /// Called before a part of the work.
     ///
     /// # Errors
-    /// [`Stopped`], once it is to stop.
+    /// [`Stopped`], once the flag is set.
     pub fn check(&self) -> Result<(), Stopped> {
         Stopped::check(self.stop)
     }
 
-    /// So many more things are to be done.
+    /// Announces further items.
     pub fn announce(&self, more: usize) {
         if let Some(counter) = self.counter {
             counter.all.fetch_add(more as u64, Ordering::Relaxed);
         }
     }
 
-    /// So many things are done; `of` says what they are, in the plural.
+    /// Reports items that are done; `of` is their name, in the plural.
     pub fn step(&self, by: u64, of: &'static str) {
         if let Some(counter) = self.counter {
             (counter.tell)(Count {
@@ -127,7 +127,7 @@ mod tests {
         assert!(watch.check().is_ok());
         stop.store(true, Ordering::Relaxed);
         assert!(watch.check().is_err());
-        // Where nobody listens, nothing is counted.
+        // Without a listener nothing is counted.
         Watch::from(&stop).step(1, "shots");
         assert_eq!(told.lock().unwrap().len(), 2);
     }

@@ -1,6 +1,7 @@
-//! Texts that people read: the words of another body and altimeter, and the minus sign of their numbers.
+//! Texts for readers: the words of another body and altimeter, and the minus sign of their numbers.
 //!
-//! Texts are written for MOLA at Mars; [`Wording`] says them for the site. Numbers that programs read keep their hyphen.
+//! Texts are written for MOLA at Mars; [`Wording`] adapts them to the site. Numbers that programs read keep their
+//! hyphen.
 //!
 //! `judge` adapts reasons, remarks and checks, `Table::in_words` the descriptions of columns, and the page its
 //! sections. Text from a user or a file stays as it is.
@@ -23,7 +24,7 @@ pub const MINUS: char = '\u{2212}';
 /// The altimeter for which texts are written.
 const ALTIMETER: &str = "MOLA";
 
-/// What texts say where shots come from tables: these hold no areoid, and are no PEDR files.
+/// Replacements in texts if shots come from tables: these contain no areoid, and are not PEDR files.
 const TABLES: [(&str, &str); 6] = [
     ("PEDR files", "tables of shots"),
     ("PEDR file", "table of shots"),
@@ -33,10 +34,10 @@ const TABLES: [(&str, &str); 6] = [
     ("areoid radius", "radius of the ellipsoid"),
 ];
 
-/// Whose words texts have.
+/// The words of a site.
 #[derive(Debug, Clone, Copy)]
 pub struct Wording<'a> {
-    /// The body that they are about.
+    /// The body.
     pub body: Body,
     /// Name of the altimeter.
     pub altimeter: &'a str,
@@ -45,7 +46,7 @@ pub struct Wording<'a> {
 }
 
 impl Wording<'_> {
-    /// `text` in these words; what is part of a longer name (a file, an identifier, a picture in a page) stays.
+    /// `text` in these words; parts of longer names (a file, an identifier, a picture in a page) are kept.
     #[must_use]
     pub fn of<'a>(&self, text: impl Into<Cow<'a, str>>) -> Cow<'a, str> {
         let mut text = text.into();
@@ -78,7 +79,7 @@ impl Wording<'_> {
     }
 }
 
-/// `text` with `words` replaced wherever they stand by themselves; none where they do not.
+/// `text` with `words` replaced wherever they occur as separate words; `None` if they do not.
 fn replaced(text: &str, words: &str, by: &str) -> Option<String> {
     let of_name = |letter: char| letter.is_ascii_alphanumeric() || "_/+=".contains(letter);
     let (mut said, mut told) = (String::new(), 0);
@@ -100,7 +101,7 @@ fn replaced(text: &str, words: &str, by: &str) -> Option<String> {
     (told > 0).then(|| said + &text[told..])
 }
 
-/// A sentence with the minus sign before its numbers; hyphens in names, dates and exponents stay.
+/// A sentence with the minus sign before its numbers; hyphens in names, dates and exponents are kept.
 #[must_use]
 pub fn with_minus(sentence: &str) -> String {
     let mut written = String::with_capacity(sentence.len());
@@ -116,7 +117,7 @@ pub fn with_minus(sentence: &str) -> String {
     written
 }
 
-/// A number with its sign and so many decimals, for sentences; what rounds to zero has no sign.
+/// A number with its sign and this number of decimals, for sentences; a value that rounds to zero has no sign.
 #[must_use]
 pub fn signed(value: f64, decimals: usize) -> String {
     let size = format!("{:.decimals$}", value.abs());

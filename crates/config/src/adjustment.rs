@@ -17,10 +17,10 @@ use super::{
     unknowns::{PositionUnknowns, RotationUnknowns},
 };
 
-/// Standard deviations of observations: none is better than a micrometre or a millionth of a pixel, and smaller
-/// ones would drown all others in rounding.
+/// Standard deviations of observations. Values below a micrometre or a millionth of a pixel are unrealistic, and all
+/// others would be lost in rounding.
 pub(super) const SIGMA: Number = from_to(1e-6, 1e6);
-/// Standard deviations of unknowns that 0 takes out.
+/// Standard deviations of unknowns; 0 removes the unknown.
 const SIGMA_OR_NONE: Number = zero_or(1e-6, 1e6);
 /// Standard deviations of orientation unknowns: 0 holds fixed, infinity leaves free.
 const SIGMA_OR_FREE: Number = zero_or(1e-6, f64::INFINITY);
@@ -36,88 +36,91 @@ declare_table! {
     /// Combined adjustment of images, laser shots and tie points. Standard deviations are those of Yoon & Shan 2004 where
     /// the paper gives one.
     pub struct AdjustmentConfig: Deserialize {
-        /// What controls it. In the published model the image coordinates of footprints come from the orientations
-        /// that are adjusted and hold them where they were; it is there for comparison.
+        /// Control of the adjustment. In the published model, image coordinates of footprints are computed from the
+        /// orientations under adjustment and hold them fixed; it is provided for comparison.
         model: AdjustmentModel = key(words_of(
             AdjustmentModel::WORDS,
             [
-                "heights of tie points by the MOLA surface, orientations by what is known of orbit and attitude",
-                "image coordinates of footprints as observations, one standard deviation an image (Yoon & Shan 2004)",
+                "heights of tie points by the MOLA surface, orientations by a priori orbit and attitude",
+                "image coordinates of footprints as observations, one standard deviation per image (Yoon & Shan 2004)",
             ],
         )).or(AdjustmentModel::MolaSurface),
-        /// Standard deviations of tie points, along and across the track, in the focal plane (the paper); measurements
-        /// that have their own in their file keep them.
+        /// Standard deviations of tie points, along and across the track, in the focal plane (the paper); standard
+        /// deviations in a tie point file take precedence.
         tie_sigma_px: [f64; 2] = key(SIGMAS).or([1.0, 1.0]),
-        /// Standard deviations of X, Y and Z of every image for the powers 0, 1, 2 of t, which is 0 in the middle of the
-        /// image and 1 at its end; inf leaves free, 0 holds fixed. Orbits of three families lie up to 50 m apart
-        /// (Shan et al. 2005), and errors go with the revolution.
+        /// Standard deviations of X, Y and Z of every image for the powers 0, 1, 2 of t, which is 0 in the middle of
+        /// the image and 1 at its end; inf leaves free, 0 holds fixed. Orbits of three families differ by up to 50 m
+        /// (Shan et al. 2005), and errors vary with the revolution.
         position_sigma_m: [f64; 3] = key(SIGMAS_OF_TIME).or([25.0, 0.2, 0.0]),
-        /// Standard deviations of the rotations about the camera's axes, likewise: 0.4 mrad, 150 m on the ground, as the
-        /// distances between images of a pair ask for, with drifts of the size of the attitude's own residuals.
+        /// Standard deviations of the rotations about the camera's axes, likewise: 0.4 mrad, 150 m on the ground, as
+        /// required by the distances between images of a pair; drifts have the size of the attitude residuals.
         rotation_sigma_rad as "rotation_sigma_arcsec": [f64; 3] = key(SIGMAS_OF_TIME)
             .or([82.5, 2.0, 2.0])
             .map(|sigmas| sigmas.map(|sigma| sigma * RADIANS_PER_ARCSECOND)),
-        /// How many powers of t are unknown of every image's position, as jigsaw's spsolve says: levels above have no
-        /// unknown, whatever their standard deviation.
+        /// Powers of t that are unknowns of the position of every image, as jigsaw's spsolve; higher powers are not
+        /// estimated, regardless of their standard deviation.
         position_unknowns: PositionUnknowns = key(words_of(
             PositionUnknowns::WORDS,
-            ["", "a constant", "and what is linear in t", "and what is quadratic"],
+            ["", "a constant", "and a linear term in t", "and a quadratic term"],
         )).or(PositionUnknowns::Acceleration),
-        /// The same of rotations, as jigsaw's camsolve says.
+        /// The same for rotations, as jigsaw's camsolve.
         rotation_unknowns: RotationUnknowns = key(words_of(
             RotationUnknowns::WORDS,
-            ["", "constants", "and what is linear in t", "and what is quadratic"],
+            ["", "constants", "and linear terms in t", "and quadratic terms"],
         )).or(RotationUnknowns::Acceleration),
-        /// Whether what the images of a pair disagree by along the flight is put down to one offset of the time at which
-        /// attitudes were read, the same for all images: it turns those that follow nadir, and those that are held towards
-        /// a star not. Otherwise all images are as likely to be wrong. Tie points do not tell, so this is a decision and no
-        /// estimate; where a pair disagrees by more than 100 m the report and adjustment.json have both.
+        /// Whether the along-track disagreement of the images of a pair is attributed to one time offset of the
+        /// attitudes, the same for all images: it rotates nadir-following images, but not inertially held ones.
+        /// Otherwise all images are equally likely to be in error. Tie points cannot distinguish the two, so this is
+        /// a decision and not an estimate; where a pair disagrees by more than 100 m, the report and adjustment.json
+        /// give both.
         attitude_clock: bool = key(yes_or_no(
-            "all images are as likely to be wrong",
-            "the images that follow nadir are wrong, by one offset",
+            "all images are equally likely to be in error",
+            "nadir-following images are in error, by one offset",
         )).or(false),
         /// Standard deviation of that offset.
         attitude_clock_sigma_s: f64 = key(SIGMA).or(1.0),
-        /// What the constant rotations of every image have at most as standard deviation beside it: 0.1 mrad. An offset of
-        /// the clock explains nothing where the attitude may err as much without it.
+        /// Upper limit of the standard deviation of the constant rotations of every image with this offset: 0.1 mrad.
+        /// A clock offset explains nothing if the attitude may err by as much without it.
         attitude_clock_rotation_sigma_rad as "attitude_clock_rotation_sigma_arcsec": f64 = key(SIGMA)
             .or(20.6)
             .map(|sigma| sigma * RADIANS_PER_ARCSECOND),
-        /// Whether an image that was exposed during a profile is expected where the PEDR file has the spacecraft, and not where
-        /// the kernels have it: camera and altimeter are then on one orbit. The range check tells the distance between the two.
+        /// Whether the a priori position of an image exposed during a profile is that of the spacecraft in the PEDR
+        /// file, not that of the kernels: camera and altimeter then share one orbit. The range check reports the
+        /// distance between the two.
         orbit_of_pedr: bool = key(yes_or_no(
             "the orbit of the kernels",
             "the orbit of the kernels, moved by the mean distance over the profile",
         )).or(false),
-        /// Whether heights of tie points on slopes of the MOLA surface also tell where the images lie in plan. Of use where the
-        /// report states that relief knows the place to less than half of what is known beforehand: ground rougher than 25 m
-        /// at 300 m for measurements of a pixel, 7 m for 0.3 pixels.
+        /// Whether heights of tie points on slopes of the MOLA surface also determine the images in plan. Useful
+        /// where the report states that relief determines the position to less than half of the a priori standard
+        /// deviation: ground rougher than 25 m over 300 m for measurements of a pixel, 7 m for 0.3 pixels.
         relief_for_plan: bool = key(yes_or_no(
-            "a slope makes heights less certain and nothing else",
-            "each profile may lie elsewhere, and tie points move to where their heights fit",
+            "a slope only increases the uncertainty of heights",
+            "each profile may be offset in plan, and tie points move to where their heights fit",
         )).or(false),
-        /// Whether the laser's place in an image that was exposed meanwhile is an observation: camera and laser are on one bus, so
-        /// that the mounting tells it, whatever the attitude was. It needs profiles that were flown with the images, whose
-        /// place is known to `mola_surface.profile_plan_sigma_m`; each profile then may lie elsewhere, and the laser may point
-        /// elsewhere than its file and the frame kernels say.
+        /// Whether the position of the laser in a simultaneous image is an observation: camera and laser share one
+        /// bus, so that the mounting determines it, regardless of the attitude. It requires profiles simultaneous
+        /// with the images, whose position is known to `mola_surface.profile_plan_sigma_m`; each profile may then be
+        /// offset in plan, and the boresight of the laser may differ from its file and the frame kernels.
         common_bus: bool = key(yes_or_no(
-            "footprints say nothing of the attitude",
-            "a footprint is in the simultaneous image where the mounting has the laser",
+            "footprints do not constrain the attitude",
+            "the mounting gives the position of a footprint in the simultaneous image",
         )).or(false),
-        /// Standard deviation of the two angles by which the laser points elsewhere, the same for all images: 0.1 mrad. No alignment
-        /// with its standard deviation is published; the narrow-angle camera was aligned in flight with the altimeter
-        /// (Kirk et al. 2001).
+        /// Standard deviation of the two boresight angles of the laser, the same for all images: 0.1 mrad. No
+        /// alignment with its standard deviation is published; the narrow-angle camera was aligned in flight with the
+        /// altimeter (Kirk et al. 2001).
         boresight_sigma_rad as "boresight_sigma_arcsec": f64 = key(SIGMA_OR_NONE)
             .or(20.6)
             .map(|sigma| sigma * RADIANS_PER_ARCSECOND),
-        /// Standard deviation of what the line times of each image are late by against the shots. Along the track they hide
-        /// where the laser points: without this key nothing is taken from there, since `rotation_sigma_arcsec` already allows
-        /// for line times and pitch together; 0 is for line times that are right.
+        /// Standard deviation of the delay of the line times of each image relative to the shots. Along the track the
+        /// delay cannot be separated from the boresight of the laser: without this key the along-track observation is
+        /// not used, since `rotation_sigma_arcsec` already allows for line times and pitch together; 0 assumes exact
+        /// line times.
         boresight_line_time_sigma_s as "boresight_line_time_sigma_ms": Option<f64> = key(SIGMA_OR_NONE)
             .unused("0.0")
             .map(|milliseconds| milliseconds.map(|milliseconds| milliseconds * SECONDS_PER_MS)),
-        /// What image coordinates of footprints are: "off" unless the model is the published one, where they are
-        /// "weighted". They come from the orientation that is being adjusted and are no measurements of their own.
+        /// Use of the image coordinates of footprints: "off" unless the model is the published one, where it is
+        /// "weighted". They are computed from the orientation under adjustment and are not independent measurements.
         footprint_image_coordinates: Option<FootprintImageCoordinates> = key(words_of(
             FootprintImageCoordinates::WORDS,
             [
@@ -129,34 +132,34 @@ declare_table! {
         /// Their standard deviations, along and across the track, in the focal plane: one MOLA spacing (325 m
         /// at 4.4 m a pixel), and 4; the paper gives none.
         footprint_sigma_px: [f64; 2] = key(SIGMAS).or([74.0, 4.0]).was("mola_sigma_px"),
-        /// How far outside an image a footprint still counts as seen by it.
+        /// Distance outside an image within which a footprint still counts as seen by it.
         footprint_margin_px: f64 = key(from_to(0.0, 1e4)).or(200.0).was("mola_margin_px"),
         /// Standard deviation of footprint coordinates (the paper).
         ground_sigma_m: f64 = key(SIGMA).or(10.0),
         /// Standard deviation of ranges (the paper; the instrument: 7 m at 400 km).
         range_sigma_m: f64 = key(SIGMA).or(10.0),
         /// Range bias of each profile as an unknown with this standard deviation; 0 for no such unknown. Biases
-        /// up to 25 m occur off nadir (Table 3 of Shan et al. 2005). 30 unless the model is the published one, where
-        /// there is none.
+        /// up to 25 m occur off nadir (Table 3 of Shan et al. 2005). The default is 30, and no
+        /// such unknown in the published model.
         range_bias_sigma_m: Option<f64> = key(SIGMA_OR_NONE).unused("30.0"),
         /// Time bias of each image as an unknown with this standard deviation; 0 for no such unknown.
         time_bias_sigma_s as "time_bias_sigma_ms": f64 =
             key(SIGMA_OR_NONE).or(0.0).map(|milliseconds| milliseconds * SECONDS_PER_MS),
         /// Published model: standard deviation of the position unknowns of images that look to nadir (within 5
-        /// degrees); inf leaves free, 0 holds fixed. Rotations get what moves the ground as far (the paper).
+        /// degrees); inf leaves free, 0 holds fixed. Rotations get the equivalent on the ground (the paper).
         position_sigma_nadir_m: Option<f64> = key(SIGMA_OR_FREE).unused("100.0").was("nadir_sigma_m"),
         /// The same for all other images (the paper).
         position_sigma_off_nadir_m: Option<f64> =
             key(SIGMA_OR_FREE).unused("200.0").was("off_nadir_sigma_m"),
         /// Weights of image coordinates that fall with their residual.
         robust: Option<RobustWeight> = group::<RobustKeys>().map(RobustKeys::weight),
-        /// Standardised residual above which a tie point is a blunder and rejected; 0 keeps all. Beyond the
-        /// default is one good observation in a thousand.
+        /// Standardised residual above which a tie point is a blunder and rejected; 0 keeps all. One good observation
+        /// in a thousand exceeds the default.
         blunder_limit: Option<f64> = key(from_to(0.0, 1000.0))
             .or(BAARDA_LIMIT)
             .map(|limit| (limit > 0.0).then_some(limit)),
         /// Height against the MOLA surface, in standard deviations, above which a tie point is a blunder and rejected
-        /// unless a neighbour lies off to the same side; 0 keeps all. Not used in the published model.
+        /// unless a neighbour deviates to the same side; 0 keeps all. Not used in the published model.
         height_blunder_limit: Option<f64> = key(from_to(0.0, 1000.0))
             .or(5.0)
             .map(|limit| (limit > 0.0).then_some(limit)),
@@ -191,7 +194,7 @@ fn keys_of_the_model(checked: &AdjustmentConfig, keys: &mut Keys<'_, '_>) {
 }
 
 impl AdjustmentConfig {
-    /// What image coordinates of footprints are.
+    /// Use of the image coordinates of footprints.
     #[must_use]
     pub fn footprints_in_images(&self) -> FootprintImageCoordinates {
         self.footprint_image_coordinates

@@ -37,9 +37,9 @@ pub(super) const CALIBRATION_EXAMPLE: &str = "config/calibrations/example.toml";
 const HEADER: &str = "\
 # A calibration of the lines of a camera for `areograph calibrate`, every key with its unit, range and default.
 #
-# Only `calibration`, two [[cameras]] and [ties] are required; a key that is left out has the default written
-# here. Without [control] nothing tells where the camera looks, and the result is marked invalid. Where every camera has
-# `pixels`, ties.match and [laser] take the place of tables of points. Relative paths count from this file's folder.
+# Only `calibration`, two [[cameras]] and [ties] are required; a key that is left out has the default given
+# here. Without [control] absolute pointing is not determined, and the result is marked invalid. If every camera has
+# `pixels`, ties.match and [laser] replace tables of points. Relative paths are relative to the folder of this file.
 # Schema: ../schema/calibration.schema.json
 
 ";
@@ -73,21 +73,21 @@ declare_table! {
         cameras: Vec<CameraConfig> = tables(CAMERAS),
         /// Points that several lines see.
         ties: CalibrationTiesConfig = table(),
-        /// Points whose place the laser knows.
+        /// Points located by the laser.
         control: CalibrationControlConfig = table(),
         /// Laser passes from which such points are found.
         laser: CalibrationLaserConfig = table(),
-        /// What is known beforehand.
+        /// A priori values.
         a_priori: APrioriConfig = table(),
         /// How it is solved.
         solution: SolutionConfig = table(),
-        /// Other orbits, into which the result goes unchanged.
+        /// Other orbits, to which the result is applied unchanged.
         validation: Vec<ValidationConfig> = tables(Many::ANY),
     }
     check across_tables
 }
 
-/// What must be there.
+/// Required entries.
 fn across_tables(written: &CalibrationConfig, keys: &mut Keys<'_, '_>) {
     keys.rule(|| serde_json::json!({"required": ["ties"]}));
     if written.ties.files.is_empty() && keys.span_of("ties").is_none() {
@@ -171,17 +171,18 @@ declare_table! {
 declare_table! {
     /// Points that several lines of the camera see.
     pub struct CalibrationTiesConfig {
-        /// Paths or globs of tables (.csv), one row an image of a point: `point`, `camera`, `line`, `sample` (0 at the outer
-        /// edge of the first line and sample), and where known `sigma_line`, `sigma_sample`.
+        /// Paths or globs of tables (.csv), one row per image of a point: `point`, `camera`, `line`, `sample` (0 at
+        /// the outer edge of the first line and sample), and where known `sigma_line`, `sigma_sample`.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs).or(Vec::new()).example(r#"["ties.csv"]"#),
-        /// Whether areograph measures tie points itself, in the `pixels` of all cameras. Tie points, terrain model, laser control
-        /// and calibration then follow each other in rounds, each with the cameras of the round before (Li et al. 2023), until
-        /// they change no more.
+        /// Whether areograph measures tie points itself, in the `pixels` of all cameras. Tie points, terrain model,
+        /// laser control and calibration then follow each other in rounds, each with the cameras of the preceding
+        /// round (Li et al. 2023), until convergence.
         matched as "match": bool = key(Switch).or(false),
         /// Standard deviation of lines and samples, where the table has none.
         sigma_px: f64 = key(from_to(SIGMA_MIN, 100.0)).or(0.2),
-        /// Distance of a tie point's images from where the uncalibrated cameras see one point, beyond which it is left out.
+        /// Distance of the images of a tie point from the projections of one point by the uncalibrated cameras,
+        /// beyond which it is left out.
         limit_px: f64 = key(from_to(1.0, 1e4)).or(100.0),
     }
     check something_measures
@@ -204,17 +205,17 @@ fn something_measures(ties: &CalibrationTiesConfig, keys: &mut Keys<'_, '_>) {
 }
 
 declare_table! {
-    /// Laser passes over the ground of the images, in which control points are found by a terrain model of the two lines that
-    /// differ most in where they look, as `areograph pedr match` does. Only for ties.match.
+    /// Laser passes over the ground of the images, in which control points are found by a terrain model of the two
+    /// lines with the largest convergence, as `areograph pedr match` does. Only for ties.match.
     pub struct CalibrationLaserConfig {
         /// Paths or globs of PEDR files.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs).or(Vec::new()).unused(r#"["pedr/*.b"]"#),
         /// Edge of a cell of the terrain model, metres. It is a pixel at least.
         cell_m: Option<f64> = key(above_to(0.0, 1e5)).unused("100.0"),
-        /// Shifts of a unit of shots are tried within so many cells: what orbit and mounting may be wrong by.
+        /// Search radius of the shifts of a unit of shots, cells: the possible error of orbit and mounting.
         search_cells: u32 = key(whole_from_to(1, 500)).or(70),
-        /// Most shots of a segment.
+        /// Maximum number of shots in a segment.
         segment_points: u32 = key(whole_from_to(3, 1_000)).or(15),
         /// Variance of heights that a segment must exceed, square metres.
         least_variance_m2: f64 = key(above_to(0.0, 1e9)).or(1_000.0),
@@ -222,9 +223,9 @@ declare_table! {
         least_score: f64 = key(from_to(0.01, 0.999)).or(0.9),
         /// Largest root mean square of model minus laser at shots that take no part in the search, bias removed, metres.
         limit_m: f64 = key(above_to(0.0, 1e5)).or(60.0),
-        /// Of the clusters of shots, and of which ground is held back.
+        /// Seed of the clusters of shots and of the withheld ground.
         seed: u32 = key(whole_from_to(0, u32::MAX)).or(1),
-        /// Most rounds; a calibration that has not converged by then is invalid.
+        /// Maximum number of rounds; a calibration that has not converged by then is invalid.
         rounds_max: u32 = key(whole_from_to(1, 100)).or(10),
         /// Shots to keep.
         filter: ShotFilter = table(),
@@ -244,42 +245,42 @@ fn what_is_searched(laser: &CalibrationLaserConfig, keys: &mut Keys<'_, '_>) {
 }
 
 declare_table! {
-    /// Points whose place the laser knows. Without them only what the cameras differ by can be told.
+    /// Points located by the laser. Without them only differences between the cameras can be determined.
     pub struct CalibrationControlConfig {
-        /// Paths or globs of tables (.csv), one row an image of a point: `point`, `camera`, `line`, `sample`, `longitude_deg`
-        /// (east), `latitude_deg` (areocentric), `radius_m` (from the centre of the body: heights have a datum), and where
-        /// known `sigma_line`, `sigma_sample`, `sigma_horizontal_m`, `sigma_vertical_m`, and what matching the point adds to
-        /// these, `sigma_matching_horizontal_m`, `sigma_matching_vertical_m`.
+        /// Paths or globs of tables (.csv), one row per image of a point: `point`, `camera`, `line`, `sample`,
+        /// `longitude_deg` (east), `latitude_deg` (areocentric), `radius_m` (from the centre of the body: heights
+        /// have a datum), and where known `sigma_line`, `sigma_sample`, `sigma_horizontal_m`, `sigma_vertical_m`, and
+        /// the contribution of matching to these, `sigma_matching_horizontal_m`, `sigma_matching_vertical_m`.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs).or(Vec::new()).example(r#"["control.csv"]"#),
         /// Standard deviation of lines and samples, where the table has none.
         sigma_px: f64 = key(from_to(SIGMA_MIN, 100.0)).or(1.0),
-        /// Standard deviation of a horizontal coordinate of a laser point, where the table has none: the profiles of MOLA. With
-        /// `ties.match` what matching leaves open is added to it. Beyond the range the ground bends away from the plane in which
-        /// errors are taken.
+        /// Standard deviation of a horizontal coordinate of a laser point, where the table has none: the profiles of
+        /// MOLA. With `ties.match` the uncertainty of matching is added to it. Beyond the permitted range, the ground
+        /// departs from the plane in which errors are computed.
         sigma_horizontal_m: f64 = key(from_to(SIGMA_MIN, CONTROL_SIGMA_MAX_M)).or(100.0),
         /// Standard deviation of its radius, likewise.
         sigma_vertical_m: f64 = key(from_to(SIGMA_MIN, CONTROL_SIGMA_MAX_M)).or(10.0),
-        /// Every so manieth control point along the flight judges the result and is never used for it; with ties.match
-        /// every so manieth rectangle of 5 by 10 km of the ground, with all of its shots.
+        /// Every n-th control point along the flight is withheld for validation; with ties.match every n-th rectangle
+        /// of 5 by 10 km of the ground, with all of its shots.
         held_back_every: u32 = key(whole_from_to(2, 100)).or(4),
-        /// Distance of a control point from where the uncalibrated cameras see it, beyond which it is left out.
+        /// Distance of a control point from its projection by the uncalibrated cameras, beyond which it is left out.
         limit_px: f64 = key(from_to(1.0, 1e4)).or(300.0),
     }
 }
 
 declare_table! {
-    /// What is known beforehand, one standard deviation each. The first three are those of Li et al. 2023, table 2.
+    /// A priori values, one standard deviation each. The first three are those of Li et al. 2023, table 2.
     pub struct APrioriConfig {
-        /// Of a coordinate of the orbit. It is not estimated, as offsets of the camera take it up; with `angle_deg` it tells by
-        /// how much a calibration may move the image.
+        /// Of a coordinate of the orbit. It is not estimated, since offsets of the camera absorb it; with `angle_deg`
+        /// it determines how far a calibration may move the image.
         orbit_bias_m: f64 = key(from_to(1e-3, 1e5)).or(1_000.0),
         /// Of its drift from line to line.
         orbit_drift_m_per_line: f64 = key(from_to(1e-6, 10.0)).or(0.01),
-        /// Of an offset angle, while ties alone are asked.
+        /// Of an offset angle, in the solution by tie points only.
         angle_rad as "angle_deg": f64 =
             key(from_to(1e-4, 10.0)).or(0.025).map(|degrees| degrees * RADIANS_PER_DEGREE),
-        /// Of an offset angle, once there is control: wide, as it takes up what is left of the orbit.
+        /// Of an offset angle, in the solution with control: wide, since it absorbs the remaining error of the orbit.
         control_angle_rad as "control_angle_deg": f64 =
             key(from_to(1e-3, 10.0)).or(1.0).map(|degrees| degrees * RADIANS_PER_DEGREE),
         /// Of constant and slope of the look angles, at the edge of the image.
@@ -292,13 +293,13 @@ declare_table! {
 declare_table! {
     /// How the calibration is solved.
     pub struct SolutionConfig {
-        /// What ties estimate before there is control.
+        /// Parameters that tie points estimate before control is used.
         mode: CalibrationMode = key(words([
-            ("differential", CalibrationMode::Differential, "what roll and scale of the cameras differ by, which ties see"),
+            ("differential", CalibrationMode::Differential, "differences of roll and scale between the cameras, which ties determine"),
             (
                 "as_published",
                 CalibrationMode::AsPublished,
-                "all angles of all cameras, some of whose combinations ties see badly or not at all: they can drive the camera away",
+                "all angles of all cameras; ties determine some combinations weakly or not at all, so that the camera can drift away",
             ),
         ])).or(CalibrationMode::Differential),
         /// Order of the polynomials of the look angles.
@@ -307,11 +308,11 @@ declare_table! {
 }
 
 declare_table! {
-    /// Another orbit of the same camera, into which the result goes unchanged.
+    /// Another orbit of the same camera, to which the result is applied unchanged.
     pub struct ValidationConfig {
         /// Its name.
         id: String = key(identifier()).required().example(r#""i818""#),
-        /// Paths or globs of its image support data, one file a camera; `name_sensor` tells which.
+        /// Paths or globs of its image support data, one file per camera, identified by `name_sensor`.
         #[serde(skip)]
         isd: Vec<PathBuf> = key(Globs).required_as("paths or globs of image support data").example(r#"["isd/i818_*.json"]"#),
         /// Tables of its tie points.
@@ -324,17 +325,17 @@ declare_table! {
     }
 }
 
-/// What ties estimate before there is control.
+/// Parameters that tie points estimate before control is used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CalibrationMode {
-    /// What roll and scale of the cameras differ by.
+    /// Differences of roll and scale between the cameras.
     Differential,
     /// All angles of all cameras.
     AsPublished,
 }
 
-/// A calibration that passed every check, and what was accepted but is worth a word.
+/// A calibration that passed every check, with its warnings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoadedCalibration {
     /// The valid form.
@@ -343,7 +344,7 @@ pub struct LoadedCalibration {
     pub warnings: Vec<String>,
 }
 
-/// Reads and checks the calibration `path`; relative paths in it count from its own folder.
+/// Reads and checks the calibration `path`; relative paths in it are relative to its folder.
 ///
 /// # Errors
 /// [`Problems`] with everything that is wrong, or [`IoError`](areograph_base::error::IoError) when the file cannot be read.
@@ -381,7 +382,7 @@ pub fn calibration_example() -> String {
 pub fn calibration_schema() -> impl Serialize {
     schema(
         "Calibration of the lines of a camera by areograph",
-        "The TOML file of one calibration as JSON. areograph checks more than a schema can: files that are there, \
+        "The TOML file of one calibration as JSON. areograph checks more than a schema can: existence of files, \
          agreement between keys.",
         &described::<CalibrationConfig>(),
     )

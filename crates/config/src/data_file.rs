@@ -1,4 +1,4 @@
-//! Files of numbers with their sources: every table says where its values come from.
+//! Files of numbers with their sources: every table states the source of its values.
 
 use std::{fmt, ops::Range, path::Path};
 
@@ -12,7 +12,7 @@ use super::{
     problems::{Problems, Review},
 };
 
-/// One table of a file; keys that nobody takes are problems when it is closed.
+/// One table of a file; keys that are not read are problems when it is closed.
 pub(super) struct DataTable<'i> {
     path: String,
     span: Option<Range<usize>>,
@@ -62,7 +62,7 @@ impl<'i> DataTable<'i> {
         self.keys.remove(key)
     }
 
-    /// What `accept` makes of the value of `key`, or its default after telling what is wrong.
+    /// The value of `key` as `accept` converts it, or its default after a problem was reported.
     fn required<T: Default>(
         &mut self,
         review: &mut Review<'_>,
@@ -103,7 +103,7 @@ impl<'i> DataTable<'i> {
         match self.take(key) {
             None => {
                 review.missing(None, &path, "a table");
-                // Its keys are not missed one by one.
+                // Its keys are not reported as missing one by one.
                 let mut unheard = Review::new(Path::new(""), "");
                 return read(&mut table, String::new(), &mut unheard);
             }

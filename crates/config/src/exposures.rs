@@ -14,14 +14,14 @@ use areograph_base::{
     units::SECONDS_PER_MS,
 };
 
-/// Instants that are told in seconds of ET, and all that stands beside them.
+/// Instants in ET seconds; the range also covers the other numbers of a row.
 const NUMBERS: Number = from_to(-2e9, 2e9);
 /// One row.
 const ROW: Several<Number, 3> = several(
     NUMBERS,
     "3 numbers: first line, its start in ET seconds, line period in milliseconds",
 );
-/// Beyond every image, so that line counts cannot make a run endless.
+/// More lines than any image has; it limits the duration of a run.
 pub(super) const LINES_MAX: u32 = 1_000_000;
 /// Longest exposure or line period, milliseconds: a hundred times those of the cameras.
 pub(super) const MILLISECONDS_MAX: f64 = 1_000.0;
@@ -57,7 +57,7 @@ impl ExposureRows {
     const EXPECTED: &'static str =
         "rows [first line, its start in ET seconds, line period in milliseconds]";
 
-    /// What a row says, or nothing after a problem was told.
+    /// The piece of a row, or `None` after a problem was reported.
     fn piece(found: &Found<'_>, review: &mut Review<'_>) -> Option<ExposurePiece> {
         let [first_line, start_et_s, period_ms] = ROW.read(found, review)?;
         if !(first_line.fract() == 0.0 && (0.0..f64::from(LINES_MAX)).contains(&first_line)) {

@@ -104,7 +104,7 @@ impl<T: TryFrom<i64> + Into<i64> + Copy> Form for Whole<T> {
 /// One of `N` words, each with its value and meaning.
 pub(super) struct Words<T, const N: usize>([(&'static str, T, &'static str); N]);
 
-/// One of these words: as written, as valid, and what it means, empty where the word says it.
+/// One of these words: as written, as valid, and its meaning, empty if self-explanatory.
 pub(super) const fn words<T, const N: usize>(
     words: [(&'static str, T, &'static str); N],
 ) -> Words<T, N> {
@@ -139,7 +139,7 @@ pub(super) const fn yes_or_no(no: &'static str, yes: &'static str) -> Words<bool
     words([("no", false, no), ("yes", true, yes)])
 }
 
-/// The same of words that stand elsewhere.
+/// The same for words that are defined elsewhere.
 pub(super) fn words_of<T: Copy, const N: usize>(
     words: [(&'static str, T); N],
     meanings: [&'static str; N],
@@ -182,12 +182,12 @@ pub(super) struct Text {
     empty: bool,
 }
 
-/// Any text, also none.
+/// Any text, including empty text.
 pub(super) const fn any_text() -> Text {
     Text { empty: true }
 }
 
-/// Some text.
+/// Non-empty text.
 pub(super) const fn text() -> Text {
     Text { empty: false }
 }
@@ -220,7 +220,7 @@ pub(super) struct Matching {
     takes: fn(&str) -> bool,
 }
 
-/// Text that `takes` accepts; `pattern` says the same, or less, as a regular expression.
+/// Text that `takes` accepts; `pattern` is the same condition, or a weaker one, as a regular expression.
 pub(super) fn matching(expected: &str, pattern: &'static str, takes: fn(&str) -> bool) -> Matching {
     Matching {
         expected: expected.to_owned(),
@@ -312,7 +312,7 @@ pub(super) const fn list_or_none<F>(form: F) -> List<F> {
 }
 
 impl<F> List<F> {
-    /// None may come twice; `expected` says it.
+    /// Entries must be distinct; `expected` states this.
     pub(super) const fn each_once(mut self, expected: &'static str) -> Self {
         self.each_once = Some(expected);
         self
@@ -371,7 +371,7 @@ pub(super) struct Several<F, const N: usize> {
     expected: &'static str,
 }
 
-/// `N` values; `expected` says how many.
+/// `N` values; `expected` states how many.
 pub(super) const fn several<F, const N: usize>(form: F, expected: &'static str) -> Several<F, N> {
     Several { form, expected }
 }

@@ -22,7 +22,7 @@ pub(super) enum GeoJsonError {
     TooLong,
     #[error("{0}; expected Polygon, MultiPolygon, Feature or FeatureCollection")]
     Shape(#[from] serde_json::Error),
-    #[error("holds no polygon")]
+    #[error("contains no polygon")]
     Empty,
     #[error("has more than {VERTICES_MAX} vertices")]
     TooManyVertices,
@@ -167,12 +167,12 @@ fn ring(positions: &[Vec<f64>]) -> Result<Vec<[f64; 2]>, RingError> {
     }
 }
 
-/// A ring that crosses the antimeridian is believed to be narrower than this, degrees: one as written with such an edge would be
-/// wider than three quarters of Mars. So is the last edge of a ring round a pole.
+/// A ring that crosses the antimeridian is assumed to be narrower than this, degrees: as written, a ring with such an
+/// edge would be wider than three quarters of Mars. The same holds for the last edge of a ring around a pole.
 const CROSSING_MAX_DEG: f64 = 90.0;
 
-/// The first edge of more than half a turn as written that may be meant either way round: the position at its end, counted from
-/// 1, and the longitudes of its ends, degrees.
+/// The first edge of more than half a turn as written whose direction is ambiguous: the position at its end, counted
+/// from 1, and the longitudes of its ends, degrees.
 fn ambiguous_edge(positions: &[Vec<f64>]) -> Option<(usize, f64, f64)> {
     let (mut path, mut west, mut east) = (0.0_f64, 0.0_f64, 0.0_f64);
     let (mut wide, mut longest) = (None, 0.0_f64);
@@ -310,7 +310,7 @@ mod tests {
         }
         assert_eq!(
             message(r#"{"type":"FeatureCollection","features":[]}"#),
-            "holds no polygon"
+            "contains no polygon"
         );
         assert!(
             message(r#"{"type":"Point","coordinates":[0,0]}"#).contains("unknown variant `Point`")

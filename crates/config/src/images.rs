@@ -1,4 +1,4 @@
-//! `[[images]]`: labels, or the keys that stand in for them.
+//! `[[images]]`: labels, or the keys that replace them.
 
 use std::path::PathBuf;
 
@@ -25,7 +25,7 @@ use super::{
 
 /// Largest summing of the wide-angle cameras; the narrow-angle camera sums up to 8.
 const SUMMING: Whole<u32> = whole_from_to(1, 127);
-/// Beyond the detectors of all cameras.
+/// More than the detectors of any camera.
 const DETECTORS_MAX: u32 = 8_192;
 
 /// Images of a site.
@@ -46,39 +46,42 @@ declare_table! {
             .required()
             .example(r#""E02-02855""#)
             .example_in(1, r#""M04-02852""#),
-        /// PDS3 or ISIS label, attached or detached. Of HRSC on Mars Express the file of the archive at level 2 (`h….img`), whose
-        /// rows hold the times of their lines, with `instrument`; a label alone needs `exposures` beside it. Where such a file
-        /// has fewer samples than the detector has pixels, it needs `first_detector`: ISIS and ALE take pixel 0.
+        /// PDS3 or ISIS label, attached or detached. For HRSC on Mars Express, the level-2 file of the archive
+        /// (`h….img`), whose rows contain the line times, with `instrument`; a label without its image also requires
+        /// `exposures`. If such a file has fewer samples than the detector has pixels, it requires `first_detector`:
+        /// ISIS and ALE assume pixel 0.
         #[serde(skip)]
         label: Option<PathBuf> = key(FILE).example(r#""../labels/e0202855.lbl""#),
-        /// The image itself (.imq, .img, .cub, TIFF, PNG), which may be the label's file. The report shows footprints and tie
-        /// points on it, and tie points are matched in it where `ties.match` says so. A file without a label must have all
-        /// lines, and of two such files that are matched each must have a size of its own: nothing else tells them apart.
+        /// The image itself (.imq, .img, .cub, TIFF, PNG), which may be the file of the label. The report shows
+        /// footprints and tie points on it, and with `ties.match` tie points are matched in it. A file without a
+        /// label must contain all lines, and two such files that are matched must differ in size, by which they are
+        /// distinguished.
         #[serde(skip)]
         pixels: Option<PathBuf> = key(FILE).unused(r#""../images/e0202855.imq""#),
         /// Or image support data (ISD) of the Community Sensor Model, as ALE writes them: camera, line times and
-        /// orientation of a line scanner, and then neither label nor the keys below. The orientation is taken as it
-        /// stands there: pointing bias, `light_time` and the kernels of orbit and attitude are not for such an image.
+        /// orientation of a line scanner, without a label and without the keys below. The orientation is used
+        /// unchanged: pointing bias, `light_time` and the kernels of orbit and attitude do not apply to such an
+        /// image.
         #[serde(skip)]
         isd: Option<PathBuf> = key(FILE).unused(r#""../isd/m0402852.json""#),
-        /// Whether the laser flew on the spacecraft of these support data, and their positions are geometric: then ranges of
-        /// shots that were fired while the image was exposed are measured from them. With support data alone.
+        /// Whether the laser is on the spacecraft of these support data, and their positions are geometric: then they
+        /// are used for the ranges of shots that were fired while the image was exposed. Only with support data.
         has_laser: bool = key(Switch).or(false).unused("true"),
-        /// The camera: `moc_na`, `moc_wa_red`, `moc_wa_blue`; a line of HRSC on Mars Express: `hrsc_nd`, `hrsc_s1`, `hrsc_s2`,
-        /// `hrsc_p1`, `hrsc_p2`, `hrsc_ir`, `hrsc_gr`, `hrsc_bl`, `hrsc_re`, which no label can do without; or the path of an
-        /// instrument file like those in `config/instruments`. Without it, the camera of MOC that the label names, and without
-        /// a label `moc_na`. Clock, orbit and attitude are those of the spacecraft that carries it.
+        /// The camera: `moc_na`, `moc_wa_red`, `moc_wa_blue`; a line of HRSC on Mars Express: `hrsc_nd`, `hrsc_s1`,
+        /// `hrsc_s2`, `hrsc_p1`, `hrsc_p2`, `hrsc_ir`, `hrsc_gr`, `hrsc_bl`, `hrsc_re`, required with its labels; or
+        /// the path of an instrument file like those in `config/instruments`. Without it, the camera of MOC that the
+        /// label names, and without a label `moc_na`. Clock, orbit and attitude are those of its spacecraft.
         instrument: Option<Instrument> = key(CAMERA).example(r#""moc_na""#),
-        /// Its name in tie point files and in what is written for ISIS, when that is not the identifier: for a
-        /// control network the ISIS serial number, in which the clock must be that of the image. Without it, the
-        /// identifier.
+        /// Its name in tie point files and in files for ISIS, if that is not the identifier: for a control network
+        /// the ISIS serial number, whose clock must be that of the image. Without it, the identifier.
         serial_number: Option<String> =
             key(text()).example(r#""MGS/651158134:116/MOC-NA""#),
-        /// When its lines were exposed, where their exposure changes inside the image, as HRSC's does: for every piece its
-        /// first line, counted from 0, the start of that line in ephemeris time (TDB seconds past J2000), and the time
-        /// between two lines in milliseconds. ISIS has them in the table `LineScanTimes` (there lines count from 1), ALE in
-        /// `line_scan_rate` (seconds from `center_ephemeris_time`). With `lines_header`; then neither `exposure_ms` nor
-        /// `line_period_ms`. A start beside it must agree, and more than half a line between two pieces is remarked on.
+        /// When its lines were exposed, if their exposure changes inside the image, as for HRSC: for every piece its
+        /// first line, counted from 0, the start of that line in ephemeris time (TDB seconds past J2000), and the
+        /// line period in milliseconds. ISIS stores them in the table `LineScanTimes` (lines counted from 1), ALE in
+        /// `line_scan_rate` (seconds from `center_ephemeris_time`). Requires `lines_header`; excludes `exposure_ms`
+        /// and `line_period_ms`. A separate start time must agree, and a gap of more than half a line between two
+        /// pieces is reported.
         exposures: Option<Vec<ExposurePiece>> = key(ExposureRows)
             .unused("[[0, 255744599.027482, 12.800791], [6665, 255744684.345045, 13.227428]]"),
         /// Keys written in the configuration.
@@ -88,13 +91,13 @@ declare_table! {
 }
 
 impl ImageConfig {
-    /// The file that says when and how its lines were exposed: support data, or a label.
+    /// The file with line times and exposure: support data, or a label.
     #[must_use]
     pub fn source(&self) -> Option<&PathBuf> {
         self.isd.as_ref().or(self.label.as_ref())
     }
 
-    /// The name that tie points give the image.
+    /// The name of the image in tie point files.
     #[must_use]
     pub fn name_in_ties(&self) -> &str {
         self.serial_number.as_deref().unwrap_or(&self.id)
@@ -102,12 +105,12 @@ impl ImageConfig {
 }
 
 declare_table! {
-    /// What the configuration says of an image.
+    /// Parameters of an image in the configuration.
     fill ImageFields {
-        /// Spacecraft clock at the start of the first line, seconds:ticks with 256 ticks a second (":28" and
-        /// ":028" are both 28/256 s). Preferred: label UTC is rounded, 1.0 to 4.8 ms off in five labels. Farther
-        /// apart than 20 ms they are remarked on, farther than 1 s refused. Not for Mars Express, whose labels hold
-        /// counts that lie seconds from its clock kernels.
+        /// Spacecraft clock at the start of the first line, seconds:ticks with 256 ticks a second (":28" and ":028"
+        /// are both 28/256 s). Preferred: label UTC is rounded, with errors of 1.0 to 4.8 ms in five labels. A
+        /// difference of more than 20 ms is reported, of more than 1 s refused. Not for Mars Express, whose labels
+        /// contain counts that differ by seconds from its clock kernels.
         sclk_start = key(matching(
             CLOCK_STRING,
             "^(1/)?[0-9]+[:.][0-9]+$",
@@ -129,7 +132,7 @@ declare_table! {
         downtrack_summing = key(SUMMING).example_in(1, "8"),
         /// Detector pixels summed across the track.
         crosstrack_summing = key(SUMMING).example_in(1, "8"),
-        /// Lines that were exposed, as the image header says; the time model counts these, less than 600 s in
+        /// Exposed lines, as in the image header; the time model counts these, less than 600 s in
         /// all.
         lines_header = key(whole_from_to(IMAGE_LINES_MIN, LINES_MAX)).example_in(1, "1536"),
         /// Lines in the delivered file, when fewer.
@@ -148,7 +151,7 @@ fn milliseconds(example: &'static str) -> impl Declare<Value = Option<f64>> {
         .map(|value_ms| value_ms.map(|value_ms| value_ms * SECONDS_PER_MS))
 }
 
-/// Keys that stand in for a label.
+/// Keys that replace a label.
 const OF_FIELDS: [&str; 11] = [
     "exposures",
     "sclk_start",
@@ -219,7 +222,7 @@ fn of_spacecraft(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
     }
 }
 
-/// Pieces of line times follow each other, and nothing says otherwise beside them.
+/// Pieces of line times follow each other, and no other key contradicts them.
 fn of_pieces(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
     let Some(pieces) = &image.exposures else {
         return;
@@ -230,7 +233,7 @@ fn of_pieces(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
             "no such key beside images.exposures, which state it for every piece",
         );
     }
-    // Those of a label are held against them when it is read.
+    // Those of a label are compared with them when it is read.
     let Some(lines) = image.fields.lines_header else {
         return;
     };

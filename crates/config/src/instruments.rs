@@ -26,8 +26,7 @@ macro_rules! built_in {
     };
 }
 
-/// Files of cameras that the program knows; the first is that of images which name none, and those on its spacecraft
-/// stand before all others.
+/// Files of the built-in cameras; the first is the default, and cameras on its spacecraft precede all others.
 const INSTRUMENTS: &[(&str, &str)] = &built_in![
     "instruments/moc_na.toml",
     "instruments/moc_wa_red.toml",
@@ -42,7 +41,7 @@ const INSTRUMENTS: &[(&str, &str)] = &built_in![
     "instruments/hrsc_bl.toml",
     "instruments/hrsc_re.toml",
 ];
-/// Files of altimeters that the program knows; the first is that of sites which name none.
+/// Files of the built-in altimeters; the first is the default.
 const ALTIMETERS: &[(&str, &str)] = &built_in!["altimeters/mola.toml", "altimeters/lola.toml"];
 /// Numbers of NAIF for spacecraft, instruments and frames.
 const NAIF_IDS: [i32; 2] = [-999_999_999, -1];
@@ -58,7 +57,7 @@ fn all_of<T>(files: &[(&str, &str)], read: fn(&str, &Path) -> Result<T, Problems
     of_the_program(all)
 }
 
-/// What a file of the program itself says.
+/// The content of a built-in file.
 #[expect(
     clippy::panic,
     reason = "a program built with a bad file of its own; a test reads them all"
@@ -74,35 +73,35 @@ pub fn built_in_instruments() -> &'static [Instrument] {
     &CAMERAS[..own]
 }
 
-/// All cameras that the program knows, those on other spacecraft too.
+/// All built-in cameras, including those on other spacecraft.
 #[must_use]
 pub fn all_instruments() -> &'static [Instrument] {
     &CAMERAS
 }
 
-/// The camera of images that name none, in configuration or label.
+/// The default camera of images, used if neither configuration nor label names one.
 #[must_use]
 pub fn usual_instrument() -> &'static Instrument {
     &CAMERAS[0]
 }
 
-/// The altimeters that the program knows.
+/// The built-in altimeters.
 #[must_use]
 pub fn built_in_altimeters() -> &'static [Altimeter] {
     &LASERS
 }
 
-/// The altimeter of sites that name none.
+/// The default altimeter of sites.
 #[must_use]
 pub fn usual_altimeter() -> &'static Altimeter {
     &LASERS[0]
 }
 
-/// What a key names by its identifier, or by the path of a file like those of the program.
+/// A value that is an identifier, or the path of a file like the built-in ones.
 pub(super) struct DataFile<T: 'static> {
     /// The kind of file, with its article.
     what: &'static str,
-    /// What the program knows.
+    /// The built-in ones.
     known: fn() -> &'static [T],
     /// The identifier of one.
     id: fn(&T) -> &str,
@@ -110,7 +109,7 @@ pub(super) struct DataFile<T: 'static> {
     read: fn(&str, &Path) -> Result<T, Problems>,
 }
 
-/// The camera of an image: one of the program's, or an instrument file.
+/// The camera of an image: a built-in one, or an instrument file.
 pub(super) const CAMERA: DataFile<Instrument> = DataFile {
     what: "an instrument file",
     known: all_instruments,
@@ -118,7 +117,7 @@ pub(super) const CAMERA: DataFile<Instrument> = DataFile {
     read: instrument,
 };
 
-/// The altimeter of a site: one of the program's, or an altimeter file.
+/// The altimeter of a site: a built-in one, or an altimeter file.
 pub(super) const ALTIMETER: DataFile<Altimeter> = DataFile {
     what: "an altimeter file",
     known: built_in_altimeters,

@@ -20,7 +20,7 @@ const SOURCES: [&str; 4] = ["metakernel", "files", "root", "sets"];
 /// Keys that only a folder needs.
 const OF_ROOT: [&str; 3] = ["spk_family", "ck_quality", "pinned"];
 
-/// Sets are loaded one after the other and compared; more than this is a slip.
+/// Sets are loaded one after the other and compared; more than this is a mistake.
 const SETS: Many = Many {
     count: Some((2, 16)),
     purpose: " sets to choose from",
@@ -34,9 +34,9 @@ declare_table! {
         /// The source of the kernel list.
         #[serde(skip)]
         source: KernelSource = group::<SourceKeys>().map(SourceKeys::source),
-        /// How far from an attitude sample the C-kernel may be asked; 0 only inside its intervals, so that gaps
-        /// are reported. (The ISIS addendum for MOC uses 1 s.) Beyond the intervals the nearest attitude is
-        /// held though the bus turns: noted, and invalid beyond 4 s.
+        /// Tolerance of attitude look-ups; 0 permits look-ups only inside the intervals of the C-kernel, so that gaps
+        /// are reported. (The ISIS addendum for MOC uses 1 s.) Beyond the intervals the nearest attitude is used
+        /// although the bus rotates: this is noted, and invalid beyond 4 s.
         ck_tolerance_s: f64 = key(from_to(0.0, 60.0)).or(0.0),
         /// Margin that kernel coverage must have beyond the first and last instant used. The default is more
         /// than the rounding of label times (10 ms) and clock ticks (4 ms), well below the 4 s between attitude
@@ -48,7 +48,7 @@ declare_table! {
 declare_table! {
     /// The source of the kernel list.
     struct SourceKeys {
-        /// A SPICE metakernel; relative paths in it count from its own folder.
+        /// A SPICE metakernel; relative paths in it are relative to its folder.
         metakernel: Option<PathBuf> = key(FILE).example(r#""../kernels/scene.tm""#),
         /// Or kernels in load order, plain paths without wildcards; later ones win.
         files: Option<Vec<PathBuf>> = key(list(FILE).each_once("each kernel once"))
@@ -120,7 +120,7 @@ impl SourceKeys {
     }
 }
 
-/// Of both the metakernel, of none an empty list.
+/// With both, the metakernel; with neither, an empty list.
 fn listed(metakernel: Option<PathBuf>, files: Option<Vec<PathBuf>>) -> KernelList {
     metakernel.map_or_else(
         || KernelList::Files(files.unwrap_or_default()),
@@ -129,10 +129,10 @@ fn listed(metakernel: Option<PathBuf>, files: Option<Vec<PathBuf>>) -> KernelLis
 }
 
 declare_table! {
-    /// Or 2 to 16 rival sets instead of the source above, each complete with the same clocks: the one whose
-    /// trajectory is closest to the mean of all (root mean square distance over the positions that the site
-    /// needs) is used, the rule by which Shan et al. 2005 chose; the manifest tells the distances. Of two sets
-    /// both are equally far from their mean: the first is used. Each has either `metakernel` or `files`.
+    /// Or 2 to 16 rival sets instead of the source above, each complete with the same clocks: the set whose
+    /// trajectory is closest to the mean of all (root mean square distance over the positions that the site needs) is
+    /// used, the rule by which Shan et al. 2005 chose; the manifest states the distances. Two sets are equally far
+    /// from their mean: the first is used. Each has either `metakernel` or `files`.
     fill RivalKernels {
         /// Identifier, unique in the site.
         id = key(lower_case_identifier()).required().unused(r#""nav""#).unused_in(1, r#""ipng""#),

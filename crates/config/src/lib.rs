@@ -1,11 +1,11 @@
 //! Site configuration: a TOML file, checked whole, turned into [`SiteConfig`].
 //!
-//! The file speaks of degrees and milliseconds, the valid form of radians and seconds. All
-//! problems of a file are reported together, each as `file:line:column: key is value; expected …`.
+//! The file uses degrees and milliseconds, the valid form radians and seconds. All problems of a file are reported
+//! together, each as `file:line:column: key is value; expected …`.
 //! Each table has a file here, in which its keys are declared; `config/sites/example.toml`, which
 //! documents every key, and `config/schema/site.schema.json` are made from the declarations.
 //!
-//! The crate uses the vocabulary of `base` and `geom` alone.
+//! The crate uses only the vocabulary of `base` and `geom`.
 //!
 //! ```
 //! use std::path::Path;
@@ -104,7 +104,7 @@ const HEADER: &str = "\
 # Site configuration of areograph, every key with its unit, range and default.
 #
 # Only `site`, one source of kernels, and either [pedr] (or [[shots]]) with [[windows]] or [[images]] are required;
-# a key that is left out has the default written here. Relative paths count from this file's folder.
+# a key that is left out has the default given here. Relative paths are relative to the folder of this file.
 # Angles are degrees, exposures milliseconds, times seconds; longitudes are east, latitudes
 # areocentric, both in the frame of the body: IAU 2000 of Mars. Schema: ../schema/site.schema.json
 
@@ -118,13 +118,13 @@ const BYTES_MAX: u64 = 1 << 20;
 pub struct Loaded {
     /// The valid form.
     pub site: SiteConfig,
-    /// What was accepted but is worth a word, each with its place: entries that are never used.
+    /// Warnings, each with its place: entries that are never used.
     pub warnings: Vec<String>,
-    /// Files, and folders of kernels, that its keys lead to.
+    /// Files, and folders of kernels, to which its keys refer.
     pub files: Vec<PathBuf>,
 }
 
-/// Reads and checks the configuration `path`; relative paths in it count from its own folder.
+/// Reads and checks the configuration `path`; relative paths in it are relative to its folder.
 ///
 /// # Errors
 /// [`Problems`] with everything that is wrong, or [`IoError`] when the file cannot be read.
@@ -132,7 +132,7 @@ pub fn load(path: &Path) -> Result<Loaded, Error> {
     load_within(path, &[])
 }
 
-/// As [`load`], of a configuration that may lead only to what lies below `roots`, links followed.
+/// As [`load`], for a configuration that may refer only to files below `roots`, links followed.
 ///
 /// # Errors
 /// Those of [`load`].
@@ -144,7 +144,7 @@ pub fn load_within(path: &Path, roots: &[PathBuf]) -> Result<Loaded, Error> {
 /// The text of the file, of bounded length.
 fn read(path: &Path) -> Result<String, Error> {
     let size = path.metadata().map_err(IoError::on("read")).in_file(path)?;
-    // Devices and pipes could be read for ever.
+    // Devices and pipes may never end.
     if !size.is_file() {
         return Err(Problems::of_file(path, "is not a regular file; expected a TOML file").into());
     }
@@ -168,9 +168,8 @@ fn read(path: &Path) -> Result<String, Error> {
 }
 
 /// Checks the configuration `text` of `file`.
-///
-/// Beyond the text it looks only at what the text names: whether files are there, which files globs
-/// match, and the polygons of windows.
+/// Besides the text it examines only what the text names: whether files exist, which files globs match, and the
+/// polygons of windows.
 ///
 /// # Errors
 /// [`Problems`] with everything that is wrong.
@@ -210,7 +209,7 @@ fn parse_file<T: Table>(
     review.finish(read)
 }
 
-/// What `text` says, to be used only when `review` has found no problem.
+/// The content of `text`, to be used only when `review` has found no problem.
 fn read_table<T: Table>(text: &str, review: &mut Review<'_>) -> Option<(T, Written)> {
     let (document, syntax_errors) = DeTable::parse_recoverable(text);
     if !syntax_errors.is_empty() {
@@ -254,7 +253,7 @@ pub fn example() -> String {
 pub fn schema() -> impl Serialize {
     declare::schema(
         "Site configuration of areograph",
-        "The TOML file of one site as JSON. areograph checks more than a schema can: files that are there, order \
+        "The TOML file of one site as JSON. areograph checks more than a schema can: existence of files, order \
          within windows, agreement between keys.",
         &described::<SiteConfig>(),
     )

@@ -8,8 +8,8 @@ use super::{
 };
 
 declare_table! {
-    /// Limits on tie points, their adjustment and a terrain model that make a site valid or invalid. What took no part in a result
-    /// judges it first: heights by MOLA, then what images say of each other.
+    /// Limits on tie points, their adjustment and a terrain model that make a site valid or invalid. Independent data
+    /// are checked first: heights by MOLA, then the agreement of images with each other.
     pub struct LimitsConfig: Deserialize {
         /// Largest |median| height of tie points above the MOLA surface before the adjustment. A priori the height of a
         /// pair is known to some 500 m; the default is five times that.
@@ -24,8 +24,8 @@ declare_table! {
         profiles_apart_max_sigma: f64 = key(above_to(0.0, 1000.0)).or(4.0),
         /// Largest correction of an image's position or pointing by the adjustment, in its standard deviations.
         correction_max_sigma: f64 = key(above_to(0.0, 1000.0)).or(4.0),
-        /// Largest distance along the flight between two images at their tie points before the adjustment. Shan et al.
-        /// 2005 find 225 to 271 m; the default is what the attitude turns in 3 s.
+        /// Largest distance along the flight between two images at their tie points before the adjustment. Shan et
+        /// al. 2005 find 225 to 271 m; the default corresponds to the rotation of the attitude in 3 s.
         parallax_before_max_m: f64 = key(above_to(0.0, 1e6)).or(1000.0),
         /// The same after the adjustment: six lines of MOC's usual 4 m.
         parallax_after_max_m: f64 = key(above_to(0.0, 1e6)).or(25.0),
@@ -37,7 +37,7 @@ declare_table! {
         surface_filled_min: f64 = key(from_to(0.0, 1.0)).or(0.2),
         /// Largest robust spread of the altimeter's shots about a terrain model, in their standard deviations.
         surface_spread_max_sigma: f64 = key(above_to(0.0, 1000.0)).or(3.0),
-        /// Largest share of tie points that a sound adjustment rejects; of more than half the site is invalid.
+        /// Largest share of rejected tie points in a sound adjustment; above one half the site is invalid.
         rejected_share_max: f64 = key(from_to(0.0, 1.0)).or(0.1),
     }
 }

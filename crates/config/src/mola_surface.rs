@@ -18,19 +18,20 @@ declare_table! {
         shot_sigma_m: f64 = key(from_to(0.01, 1e4)).or(SurfaceOptions::default().shot_sigma_m),
         /// Radial error that all shots of a profile share (1 m after crossovers, Neumann et al. 2001).
         profile_sigma_m: f64 = key(zero_or(1e-3, 1e4)).or(SurfaceOptions::default().profile_sigma_m),
-        /// Error in plan between images and shots, shared by all tie points; on a slope it becomes one of height.
-        /// The default is 110 m of the images and 70 m of MOLA.
+        /// Error in plan between images and shots, shared by all tie points; on a slope it becomes one of height. The
+        /// default combines 110 m of the images and 70 m of MOLA.
         plan_sigma_m: f64 = key(zero_or(1e-3, 1e5)).or(SurfaceOptions::default().plan_sigma_m),
-        /// Where a profile lies in plan, on each axis (MOLA's 100 m in the horizontal, Neumann et al. 2001); only where
-        /// `adjustment.relief_for_plan` or `adjustment.common_bus` is "yes".
+        /// Standard deviation of the position of a profile in plan, per axis (MOLA's 100 m in the horizontal, Neumann
+        /// et al. 2001); only where `adjustment.relief_for_plan` or `adjustment.common_bus` is "yes".
         profile_plan_sigma_m: f64 = key(from_to(1e-3, 1e5)).or(70.0),
-        /// Least roughness: root mean square difference of heights 300 m apart. More is learnt from the shots.
+        /// Least roughness: root mean square difference of heights 300 m apart. Larger values are estimated from the
+        /// shots.
         roughness_min_m: f64 = key(from_to(0.01, 1e4)).or(SurfaceOptions::default().roughness_min_m),
     }
 }
 
 impl MolaSurfaceConfig {
-    /// What is uncertain about the surface of `body`.
+    /// Uncertainties of the surface of `body`.
     #[must_use]
     pub const fn options(&self, body: Body) -> SurfaceOptions {
         SurfaceOptions {

@@ -26,13 +26,14 @@ pub(super) const NET_EXAMPLE: &str = "config/nets/example.toml";
 const HEADER: &str = "\
 # A net of rectified pictures for `areograph triangulate`, every key with its unit, range and default.
 #
-# Only `net`, [measurements] and [controls] are required; a key that is left out has the default written
-# here. Relative paths count from this file's folder. Schema: ../schema/net.schema.json
+# Only `net`, [measurements] and [controls] are required; a key that is left out has the default given
+# here. Relative paths are relative to the folder of this file. Schema: ../schema/net.schema.json
 
 ";
 
 declare_table! {
-    /// Everything that `areograph triangulate` needs to know about a net: every value checked, metres and radians inside.
+    /// Everything that `areograph triangulate` needs to know about a net: every value checked, metres and radians
+    /// inside.
     pub struct NetConfig {
         /// Identifier, and the name of the folder of its products.
         net: String = key(lower_case_identifier()).required().example(r#""tertiary""#),
@@ -49,7 +50,7 @@ declare_table! {
         measurements: MeasurementsConfig = table(),
         /// Points on the map.
         controls: ControlsConfig = table(),
-        /// Pictures; none when nothing is said of them.
+        /// Pictures; empty without a table of them.
         pictures: PicturesConfig = table(),
         /// Corrections of the film.
         film: FilmConfig = table(),
@@ -61,7 +62,7 @@ declare_table! {
     check across_tables
 }
 
-/// What must be there, and what is never used.
+/// Required entries, and entries that are never used.
 fn across_tables(net: &NetConfig, keys: &mut Keys<'_, '_>) {
     keys.rule(|| serde_json::json!({"required": ["measurements", "controls"]}));
     for (name, files) in [
@@ -77,14 +78,15 @@ fn across_tables(net: &NetConfig, keys: &mut Keys<'_, '_>) {
 declare_table! {
     /// Points in pictures.
     pub struct MeasurementsConfig {
-        /// Paths or globs of tables (.csv), one row a measurement: `picture`, `point`, `x`, `y`, y upwards as in a map (turned over
-        /// where it counts lines downwards). A crater boxed by two settings of a cross has `x_upper_right`, `y_upper_right`,
-        /// `x_lower_left`, `y_lower_left` instead of `x`, `y`. Units are the picture's own.
+        /// Paths or globs of tables (.csv), one row per measurement: `picture`, `point`, `x`, `y`, y upwards as in a
+        /// map (turned over where it counts lines downwards). A crater boxed by two settings of a cross has
+        /// `x_upper_right`, `y_upper_right`, `x_lower_left`, `y_lower_left` instead of `x`, `y`. Units are the
+        /// picture's own.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs)
             .required_as("paths or globs of tables of measurements")
             .example(r#"["measurements.csv"]"#),
-        /// Which way y counts in all pictures.
+        /// Direction of y in all pictures.
         y_axis: YAxis = key(words([
             ("up", YAxis::Up, "as on a map"),
             ("down", YAxis::Down, "as lines of an image"),
@@ -92,7 +94,7 @@ declare_table! {
     }
 }
 
-/// Which way y counts.
+/// Direction of y.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum YAxis {
@@ -103,30 +105,30 @@ pub enum YAxis {
 }
 
 declare_table! {
-    /// Points whose place is known.
+    /// Points with known positions.
     pub struct ControlsConfig {
-        /// Paths or globs of tables (.csv), one row a control: `point` and `x_m`, `y_m` or `x_km`, `y_km` on the map, or
-        /// `longitude_deg` (east), `latitude_deg` (areocentric); `sigma_m` or `sigma_km` where the control has a standard
-        /// deviation of its own.
+        /// Paths or globs of tables (.csv), one row per control: `point` and `x_m`, `y_m` or `x_km`, `y_km` on the
+        /// map, or `longitude_deg` (east), `latitude_deg` (areocentric); `sigma_m` or `sigma_km` for a control with
+        /// an individual standard deviation.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs)
             .required_as("paths or globs of tables of controls")
             .example(r#"["controls.csv"]"#),
-        /// Standard deviation of a coordinate of a control, its measurement included, where the table has none. Without it, what
-        /// SCALE leaves at the controls.
+        /// Standard deviation of a coordinate of a control, its measurement included, where the table has none.
+        /// Without it, estimated from the residuals of SCALE at the controls.
         sigma_m: Option<f64> = key(above_to(0.0, 1e7)).unused("2000.0"),
-        /// Residual, in standard deviations of SCALE, beyond which a control is left out. Two gross errors that hide each other are
-        /// found too, by least median of squares; fewer than five controls cannot be judged.
+        /// Residual, in standard deviations of SCALE, beyond which a control is left out. Two gross errors that mask
+        /// each other are found too, by least median of squares; fewer than five controls cannot be tested.
         limit: f64 = key(from_to(2.5, 1e6)).or(4.0),
     }
 }
 
 declare_table! {
-    /// What is known of the pictures. Without this table they are those of the measurements.
+    /// A priori data of the pictures. Without this table the pictures are those of the measurements.
     pub struct PicturesConfig {
-        /// Paths or globs of tables (.csv), one row a picture: `picture`, and where known `brick`, the name of its brick, and
-        /// `metres_per_unit`, the size of a unit of its coordinates on the ground, from which the adjusted one may differ by a
-        /// factor of 2.
+        /// Paths or globs of tables (.csv), one row per picture: `picture`, and where known `brick`, the name of its
+        /// brick, and `metres_per_unit`, the size of a unit of its coordinates on the ground, from which the adjusted
+        /// one may differ by a factor of 2.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs).or(Vec::new()).unused(r#"["pictures.csv"]"#),
     }
@@ -135,10 +137,10 @@ declare_table! {
 declare_table! {
     /// Corrections of the film, before anything else.
     pub struct FilmConfig {
-        /// Paths or globs of tables (.csv) of ticks, one row a tick: `picture`, `tick`, measured `x`, `y`, known `known_x`,
-        /// `known_y`. The ticks `upper_left`, `upper_right`, `lower_left` and `lower_right` give linear double interpolation
-        /// (drum scanners); with `upper`, `lower`, `left` and `right`, the middles of the edges, a quadratic that is 0 at the
-        /// corners is added (cathode-ray recorders).
+        /// Paths or globs of tables (.csv) of ticks, one row per tick: `picture`, `tick`, measured `x`, `y`, known
+        /// `known_x`, `known_y`. The ticks `upper_left`, `upper_right`, `lower_left` and `lower_right` give linear
+        /// double interpolation (drum scanners); with `upper`, `lower`, `left` and `right`, the middles of the edges,
+        /// a quadratic that is 0 at the corners is added (cathode-ray recorders).
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs).or(Vec::new()).unused(r#"["ticks.csv"]"#),
     }
@@ -195,22 +197,24 @@ fn mercator_has_an_equator(map: &MapKeys, keys: &mut Keys<'_, '_>) {
 declare_table! {
     /// How the net is solved. The programs are those of Arthur & McMacken 1977.
     pub struct TriangulationConfig {
-        /// What puts the pictures on the map.
+        /// Method that positions the pictures on the map.
         method: Method = key(words([
             ("scale", Method::Scale, "BRICK, EXTEND, SCALE: the figure keeps its shape"),
-            ("mortar", Method::Mortar, "BRICK, EXTEND, MORTAR, SCALE: bricks give way to the controls by their weights"),
+            ("mortar", Method::Mortar, "BRICK, EXTEND, MORTAR, SCALE: bricks adapt to the controls by their weights"),
             ("one_shot", Method::OneShot, "all pictures and controls at once, by their weights"),
         ])).or(Method::Scale),
         /// LOCAL: evens out the seams between bricks afterwards.
-        local: bool = key(yes_or_no("seams stay as they are", "pictures of a brick give way to its neighbours")).or(false),
+        local: bool = key(yes_or_no("seams remain unchanged", "pictures of a brick adapt to its neighbours")).or(false),
         /// Pictures of a brick, where the table of pictures names no bricks.
         brick_pictures: u32 = key(whole_from_to(2, 100)).or(8),
-        /// Blunders in bricks: measurements flagged beyond 3.5 robust standard deviations without which a brick's root mean square falls by 30 %.
+        /// Blunders in bricks: measurements flagged beyond 3.5 robust standard deviations without which a brick's
+        /// root mean square falls by 30 %.
         blunders: Blunders = key(words([
-            ("remove", Blunders::Remove, "leave them out, and say so"),
+            ("remove", Blunders::Remove, "leave them out and report them"),
             ("report", Blunders::Report, "flag them and use them"),
         ])).or(Blunders::Remove),
-        /// Standard deviation of a coordinate of a measurement on the map. Without it, what the bricks' deviations say.
+        /// Standard deviation of a coordinate of a measurement on the map. Without it, estimated from the deviations
+        /// in bricks.
         tie_sigma_m: Option<f64> = key(above_to(0.0, 1e7)).unused("50.0"),
     }
     check seams_need_bricks
@@ -225,7 +229,7 @@ fn seams_need_bricks(written: &TriangulationConfig, keys: &mut Keys<'_, '_>) {
     }
 }
 
-/// What puts the pictures on the map.
+/// Method that positions the pictures on the map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
@@ -237,7 +241,7 @@ pub enum Method {
     OneShot,
 }
 
-/// What becomes of blunders.
+/// Treatment of blunders.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Blunders {
@@ -247,7 +251,7 @@ pub enum Blunders {
     Report,
 }
 
-/// A net that passed every check, and what was accepted but is worth a word.
+/// A net that passed every check, with its warnings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoadedNet {
     /// The valid form.
@@ -256,10 +260,10 @@ pub struct LoadedNet {
     pub warnings: Vec<String>,
 }
 
-/// Reads and checks the net `path`; relative paths in it count from its own folder.
+/// Reads and checks the net `path`; relative paths in it are relative to its folder.
 ///
-/// # Errors
-/// [`Problems`] with everything that is wrong, or [`IoError`](areograph_base::error::IoError) when the file cannot be read.
+/// # Errors [`Problems`] with everything that is wrong, or [`IoError`](areograph_base::error::IoError) when the file
+/// cannot be read.
 pub fn load_net(path: &Path) -> Result<LoadedNet, Error> {
     let text = read(path)?;
     Ok(parse_net(&text, path)?)
@@ -293,7 +297,7 @@ pub fn net_example() -> String {
 pub fn net_schema() -> impl Serialize {
     schema(
         "Net of rectified pictures of areograph",
-        "The TOML file of one net as JSON. areograph checks more than a schema can: files that are there, agreement \
+        "The TOML file of one net as JSON. areograph checks more than a schema can: existence of files, agreement \
          between keys.",
         &described::<NetConfig>(),
     )

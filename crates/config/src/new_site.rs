@@ -1,4 +1,4 @@
-//! A first site file, written for people: the keys that a site needs, each with what is declared of it.
+//! A new site file with comments: the keys that a site needs, each with its documentation.
 
 use std::{
     collections::BTreeMap,
@@ -12,14 +12,14 @@ use super::keys;
 
 /// How such a file begins.
 const HEADER: &str = "\
-# Written by `areograph init`. Keys that are left out have their defaults; relative paths count from this file's folder.
-# `areograph check` says what a run would stumble over.
+# Written by `areograph init`. Keys that are left out have their defaults; relative paths are relative to its folder.
+# `areograph check` reports everything that would stop a run.
 
 ";
-/// How far a window reaches beyond the image that it is named after, kilometres.
+/// Margin of a window beyond the image that it is named after, kilometres.
 const MARGIN_KM: f64 = 5.0;
 
-/// What a new site file says. Paths are as they will stand there.
+/// Content of a new site file, with paths as written there.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct NewSite {
     /// Identifier.
@@ -30,9 +30,9 @@ pub struct NewSite {
     pub kernels: Vec<PathBuf>,
     /// Whether the only one of them is a folder.
     pub kernels_are_a_folder: bool,
-    /// Paths or globs of PEDR files; none for images alone.
+    /// Paths or globs of PEDR files; empty for images only.
     pub pedr: Vec<PathBuf>,
-    /// West, east, south and north edge of the window, degrees; without it the window is what the images see.
+    /// West, east, south and north edge of the window, degrees; without it the window is the outline of the images.
     pub edges_deg: Option<[f64; 4]>,
     /// Identifier and label of every image.
     pub images: Vec<(String, PathBuf)>,
@@ -91,7 +91,7 @@ impl NewSite {
     }
 }
 
-/// A file with what is declared of each key above its first use.
+/// A file with the documentation of each key above its first use.
 struct Commented {
     text: String,
     about: BTreeMap<String, Vec<&'static str>>,
@@ -170,7 +170,7 @@ mod tests {
             assert!(!first || above.starts_with('#'), "{line}");
             above = line;
         }
-        // Without a box the windows are what the images see; without PEDR files there are none.
+        // Without a box the windows are the outlines of the images; without PEDR files there are none.
         site.edges_deg = None;
         assert_eq!(parse(&site.text(), &file).unwrap().site.windows.len(), 2);
         site.pedr.clear();

@@ -17,11 +17,11 @@ declare_table! {
         /// Equal intervals over the image; one epoch more than intervals. The default is that of Shan et
         /// al. 2005; a second-order polynomial through four epochs is the least that leaves residuals.
         intervals: u32 = key(whole_from_to(3, 10_000)).or(30),
-        /// From where straight rays to the ground start: one convention for all positions of the camera in all
-        /// products. How far the others are from it is told for every image. Ranges are geometric always.
+        /// Origin of straight rays to the ground: one convention for all positions of the camera in all products. The
+        /// distances of the other conventions from it are reported for every image. Ranges are always geometric.
         light_time: LightTime = key(words_of(LightTime::WORDS, [
             "where the camera was when the light left the ground: light time to the surface and aberration",
-            "where it was at the exposure, as papers without a word on it are read",
+            "where it was at the exposure, as for papers that do not state a convention",
             "where it seems to be from the centre of Mars (LT+S): to match ISIS and ALE",
         ])).or(LightTime::Surface),
         /// Largest second-order position RMSE, norm of x, y, z. The default is about twice the largest in Table 4
@@ -36,19 +36,19 @@ declare_table! {
 declare_table! {
     /// Projection of the footprints into the images.
     pub struct RegistrationConfig: Deserialize, JsonSchema {
-        /// The orientation that points are projected with. How far the others are from the one chosen is
-        /// told in `registration.json` and in the report.
+        /// The orientation that points are projected with. The distances of the other models from the chosen one are
+        /// reported in `registration.json` and in the report.
         model: CameraModel = key(words_of(CameraModel::WORDS, [
             "positions and angles as polynomials of first order (Shan, Lee & Yoon 2002)",
-            "of second order (Shan et al. 2005); angles lose their meaning near the equator",
-            "second order with a rotation vector, which means the same at every latitude",
+            "of second order (Shan et al. 2005); angles are poorly determined near the equator",
+            "second order with a rotation vector, which is well determined at every latitude",
             "interpolation between the samples, no polynomial over the whole image",
         ])).or(CameraModel::RotationVector),
-        /// A step of the two published iterations below this is the last. The default is that of the papers.
-        /// They run beside Newton's method, which makes the product.
+        /// Convergence limit of the two published iterations. The default is that of the papers. They run beside
+        /// Newton's method, which computes the product.
         // Below, steps drown in the rounding of coordinates: 1e-9 m of 4e6 m, lines of metres.
         tolerance_lines: f64 = key(from_to(1e-6, 100.0)).or(0.1),
-        /// Steps after which they are given up. The default is our choice.
+        /// Maximum number of their steps. The default is our choice.
         steps_max: u32 = key(whole_from_to(1, 10_000)).or(100),
     }
 }

@@ -1,4 +1,4 @@
-//! Paths: files and folders that are there, and globs resolved to files.
+//! Paths: existing files and folders, and globs resolved to files.
 
 use std::{
     collections::BTreeMap,
@@ -19,23 +19,23 @@ const FILES_MAX: usize = 65_535;
 /// Folders and file name of a glob that may hold wildcards: an archive is `volume/folder/file`.
 const WILD_PARTS_MAX: usize = 3;
 
-/// A path that leads where it should, counted from the configuration's folder.
+/// A path of the expected kind, relative to the configuration's folder.
 pub(super) struct Place {
     kind: ValueKind,
     suits: fn(&Path) -> bool,
 }
 
-/// The path of a file that is there.
+/// The path of an existing file.
 pub(super) const FILE: Place = Place {
     kind: ValueKind::File,
     suits: Path::is_file,
 };
-/// The path of a folder that is there.
+/// The path of an existing folder.
 pub(super) const FOLDER: Place = Place {
     kind: ValueKind::Folder,
     suits: Path::is_dir,
 };
-/// The path of a folder that may be away for a while, as a mirror may that is not mounted.
+/// The path of a folder that may be temporarily absent, such as a mirror that is not mounted.
 pub(super) const MIRROR: Place = Place {
     kind: ValueKind::Mirror,
     suits: |path| path.metadata().map_or(true, |found| found.is_dir()),
@@ -65,7 +65,7 @@ impl Form for Place {
         } else if !review.admit(&path, found.value.span(), &found.key) {
             return None;
         }
-        // Also a path that leads nowhere: a second one like it is told as well.
+        // Also a path that leads nowhere, so that its duplicates are reported as well.
         Some(path)
     }
 
@@ -81,7 +81,7 @@ fn what_is_at(path: &Path) -> &'static str {
         Ok(found) if found.is_file() => "a file",
         Ok(_) => "neither a file nor a folder",
         Err(error) if error.kind() == std::io::ErrorKind::PermissionDenied => "not readable",
-        Err(_) => "not there",
+        Err(_) => "missing",
     }
 }
 
@@ -121,7 +121,7 @@ impl Form for Globs {
                         if !review.admit(&path, span.clone(), &found.key) {
                             break;
                         }
-                        // Asked, not tried: a file that did not change is not opened.
+                        // Access is tested without opening: a file that did not change is not opened.
                         if let Err(error) = access(&path, Access::READ_OK) {
                             let error = io::Error::from(error);
                             let expected =
@@ -170,7 +170,7 @@ fn matches(folder: &Path, glob: &str) -> Result<Vec<PathBuf>, String> {
     }
     let invalid =
         |error: glob::PatternError| format!("a glob: {} at character {}", error.msg, error.pos + 1);
-    // Checked alone first, so that the position counts in what was written.
+    // Checked separately first, so that the position refers to the written text.
     glob::Pattern::new(glob).map_err(invalid)?;
     let pattern = if Path::new(glob).is_absolute() {
         glob.to_owned()
@@ -191,7 +191,7 @@ fn matches(folder: &Path, glob: &str) -> Result<Vec<PathBuf>, String> {
         match path.metadata() {
             Ok(found) if found.is_file() => files.push(path),
             Ok(_) => {}
-            // A file that is passed over would be missed by nobody.
+            // A skipped file would go unnoticed.
             Err(error) => {
                 return Err(format!(
                     "existing files: {} cannot be accessed: {error}",

@@ -18,17 +18,18 @@ use super::{
 const TURNED_SIGN_S: f64 = 0.05;
 /// A bias this close to the known one is the known one, seconds: 0.2 m on the ground.
 const KNOWN_S: f64 = 0.0005;
-/// What a second of attitude time is on the ground when the bus keeps nadir, metres: it turns by 0.0501° meanwhile.
+/// Effect of a second of attitude time on the ground for a nadir-following bus, metres: it rotates by 0.0501° per
+/// second.
 const NADIR_TURN_M_S: f64 = 330.0;
 
 declare_table! {
-    /// Pointing bias, where it is not to be that of the cameras. Every instrument file holds the bias of its camera and
-    /// where that is known from; what is written here holds for all images of the site instead.
+    /// Pointing bias, if it is not that of the cameras. Every instrument file contains the bias of its camera and its
+    /// source; a value here applies to all images of the site instead.
     pub struct PointingConfig: Deserialize {
         /// Time correction of attitude kernels: the attitude of an exposure at t is read at t + `ck_bias_s`.
         /// Position, Mars rotation and mounting stay at t. Without it, that of the instrument file.
         /// Known: value and sign for MOC, from ISIS and ALE (`INS-94031_CK_TIME_BIAS`) and Shan et al. 2005.
-        /// The known value with its sign turned is refused; any other one is remarked on.
+        /// The known value with its sign reversed is refused; any other value is reported in a remark.
         /// Unknown: whether the same value holds for kernels before the mapping phase (before April 1999).
         ck_bias as "ck_bias_s": Option<PointingBias> = key(from_to(-10.0, 10.0))
             .unused("-1.15")
@@ -126,7 +127,7 @@ declare_table! {
     /// Clock bias of MOLA.
     /// Known: Shan et al. 2005 (data preparation, citing NAIF 2001) corrected it. Unknown: its sign, and whether PEDR
     /// time tags, of which versions, already include it. The defaults below are therefore a choice; the
-    /// bias scan of the range check tells which one a profile supports. Size: about one shot spacing
+    /// bias scan of the range check shows which one a profile supports. Size: about one shot spacing
     /// (353 to 398 m) along the track, 28 m of Mars rotation at the equator, at most 3.2 m of height.
     fill MolaClock {
         /// Size of the bias. Without it, that of the altimeter file.
@@ -149,7 +150,7 @@ declare_table! {
                 "the rotation into IAU 2000 (the one out of the file's datum stays at the tag)",
             ),
             ("both", BiasScope::Both, "both"),
-            ("none", BiasScope::None, "nothing: tags are taken as they are"),
+            ("none", BiasScope::None, "nothing: tags are used unchanged"),
         ])).or(BiasScope::SpkLookup),
         /// Citation that products repeat; change it together with the values.
         source = key(text()).or(usual_altimeter().clock_source.clone()),

@@ -10,7 +10,7 @@ use std::{
 use areograph_base::error::{Cause, Kind};
 use areograph_store::files::outside;
 
-/// Problems reported one by one; a file with more is told how many were left out.
+/// Problems reported one by one; for a file with more, the number of the others is reported.
 const LISTED_MAX: usize = 100;
 /// Characters of a value that a message repeats.
 const EXCERPT_MAX: usize = 60;
@@ -64,10 +64,10 @@ impl Cause for Problems {
     }
 }
 
-/// Where something stands: a byte range of the text, or the file as a whole.
+/// Position of an entry: a byte range of the text, or the file as a whole.
 type TextSpan = Option<Range<usize>>;
 
-/// A key that stands in the file under its former name.
+/// A key that the file gives under its former name.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Rename {
     /// Its tables, with dots between them.
@@ -113,8 +113,8 @@ impl<'a> Review<'a> {
         Self { roots, ..self }
     }
 
-    /// Notes a file to which the value of `key` at `span` leads. Where it must not lead is a problem, and such a file is not
-    /// to be read.
+    /// Records a file to which the value of `key` at `span` refers. A file outside the permitted folders is a problem
+    /// and must not be read.
     pub(super) fn admit(&mut self, path: &Path, span: Range<usize>, key: &str) -> bool {
         match outside(path, self.roots) {
             None => {
@@ -128,12 +128,12 @@ impl<'a> Review<'a> {
         }
     }
 
-    /// Files to which the text leads.
+    /// Files to which the text refers.
     pub(super) fn take_files(&mut self) -> Vec<PathBuf> {
         std::mem::take(&mut self.files)
     }
 
-    /// The same of a file whose keys another example documents.
+    /// The same for a file whose keys another example documents.
     pub(super) fn documented_in(self, documentation: &'static str) -> Self {
         Self {
             documentation,
@@ -141,14 +141,14 @@ impl<'a> Review<'a> {
         }
     }
 
-    /// `path` as written in the file, counted from the file's folder unless absolute.
+    /// `path` as written in the file, relative to the file's folder unless absolute.
     pub(super) fn resolve(&self, path: &str) -> PathBuf {
         self.file
             .parent()
             .map_or_else(|| PathBuf::from(path), |folder| folder.join(path))
     }
 
-    /// A problem in words of its own.
+    /// A problem with a separate text.
     pub(super) fn problem(&mut self, place: TextSpan, text: String) {
         if self.problems.len() < LISTED_MAX {
             self.problems.push((place, text));
@@ -168,14 +168,14 @@ impl<'a> Review<'a> {
         self.problem(place, format!("{key} is missing; expected {expected}"));
     }
 
-    /// The entry at `span` is accepted but worth a word.
+    /// The entry at `span` is accepted with a warning.
     pub(super) fn warn(&mut self, span: Range<usize>, text: String) {
         if self.warnings.len() < LISTED_MAX {
             self.warnings.push((Some(span), text));
         }
     }
 
-    /// The key at `span` stands under its former name.
+    /// The key at `span` has its former name.
     pub(super) fn renamed(&mut self, span: Range<usize>, rename: Rename) {
         let Rename { table, was, name } = &rename;
         let dot = if table.is_empty() { "" } else { "." };
@@ -190,7 +190,7 @@ impl<'a> Review<'a> {
         !self.problems.is_empty()
     }
 
-    /// Keys that stand under former names.
+    /// Keys that have their former names.
     pub(super) const fn renames(&self) -> &BTreeSet<Rename> {
         &self.renames
     }

@@ -8,7 +8,7 @@ use super::{
     forms::{above_to, from_to, whole_from_to},
 };
 
-/// Most steps of the bias scan, so that a slip in its step cannot make a run endless.
+/// Maximum number of steps of the bias scan; it limits the duration of a run.
 pub const SCAN_STEPS_MAX: u32 = 10_000;
 
 declare_table! {
@@ -27,9 +27,9 @@ declare_table! {
         /// Largest |mean| of range minus distance to the file's own spacecraft position: a test of
         /// decoding, which needs no kernels. Both come from one orbit solution and agree to about a metre.
         decoding_max_m: f64 = key(above_to(0.0, 1e6)).or(2.0),
-        /// Largest mean distance of the file's own spacecraft position from that of the kernels: whether both
-        /// are of one orbit, one clock and one datum. The default is twice what the orbits of three producers
-        /// are apart (Shan et al. 2005); 117 ms of the clock are 400 m, IAU 1994 taken for 1991 is 2 km.
+        /// Largest mean distance of the file's own spacecraft position from that of the kernels: a test of orbit,
+        /// clock and datum. The default is twice the distance between the orbits of three producers (Shan et al.
+        /// 2005); 117 ms of the clock correspond to 400 m, IAU 1994 taken for 1991 to 2 km.
         orbit_max_m: f64 = key(above_to(0.0, 1e6)).or(100.0),
         /// The clock bias scan tries biases to both sides of 0 up to this one. The default is four times
         /// 0.117 either way.

@@ -28,15 +28,15 @@ pub(super) const SERVICE_EXAMPLE: &str = "config/areograph.toml";
 const HEADER: &str = "\
 # The service of areograph, `areograph serve` and `areograph nightly`: every key with its unit, range and default.
 #
-# Only the folders of [inputs] are required; a key that is left out has the default written here. Relative paths
-# count from this file's folder. Schema: schema/service.schema.json
+# Only the folders of [inputs] are required; a key that is left out has the default given here. Relative paths
+# are relative to the folder of this file. Schema: schema/service.schema.json
 
 ";
 
-/// A person reads what hooks tell; more programs than this are a slip.
+/// People read the output of hooks; more programs than this are a mistake.
 const HOOKS: Many = Many {
     count: Some((1, 16)),
-    purpose: " programs that are told",
+    purpose: " programs that receive events",
     ..Many::ANY
 };
 
@@ -55,7 +55,7 @@ declare_table! {
         inputs: ServiceInputs = table(),
         /// Folders that are written.
         outputs: ServiceOutputs = table(),
-        /// When every site is looked at.
+        /// When every site is checked.
         schedule: ScheduleConfig = table(),
         /// How changes are found.
         changes: ChangesConfig = table(),
@@ -65,19 +65,19 @@ declare_table! {
         retention: RetentionConfig = table(),
         /// When a site counts as stale.
         freshness: FreshnessConfig = table(),
-        /// How far a site may move between two runs before people are told.
+        /// How far a site may move between two runs before an alert is sent.
         moved: MovedConfig = table(),
         /// The HTTP service.
         http: HttpConfig = table(),
-        /// Programs that are told of events.
+        /// Programs that receive events.
         hooks: Vec<HookConfig> = tables(HOOKS),
     }
     check across_tables
 }
 
 declare_table! {
-    /// Folders that are read. Site files may name files below these folders only. A folder must be there when the service
-    /// first sees it; later it may be away for a while, and its sites are held.
+    /// Folders that are read. Site files may name files below these folders only. A folder must exist when the
+    /// service first reads it; later it may be temporarily absent, and its sites are held.
     pub struct ServiceInputs {
         /// Folders of site files (`*.toml`, without subfolders). A file that appears or changes is seen by the next sweep.
         sites: Vec<PathBuf> = key(list(MIRROR).each_once("each folder once")).required().example(r#"["sites"]"#),
@@ -91,17 +91,17 @@ declare_table! {
 }
 
 declare_table! {
-    /// Folders that are written; they are made where they are not there.
+    /// Folders that are written; they are created if missing.
     pub struct ServiceOutputs {
         /// Products: `<products>/<site>/current` leads to those of the newest valid run.
         products: PathBuf = key(text()).or("products".to_owned()).then(|path, keys: &mut Keys<'_, '_>| keys.review().resolve(&path)),
-        /// Database, logs and copies of the database; on a local disk, for one service alone.
+        /// Database, logs and copies of the database; on a local disk, for one service only.
         state: PathBuf = key(text()).or("state".to_owned()).then(|path, keys: &mut Keys<'_, '_>| keys.review().resolve(&path)),
     }
 }
 
 declare_table! {
-    /// When every site is looked at, whether something was seen to change or not.
+    /// When every site is checked, whether or not a change was detected.
     pub struct ScheduleConfig {
         /// Five fields: minute, hour, day of the month, month, day of the week.
         cron: String = key(matching(
@@ -109,31 +109,31 @@ declare_table! {
             r"^\S+( +\S+){4}$",
             |text| text.split_ascii_whitespace().count() == 5,
         )).or("30 2 * * *".to_owned()),
-        /// IANA time zone of these fields. An hour that daylight saving leaves out is made up for at its end; of one that comes
-        /// twice the first counts.
+        /// IANA time zone of these fields. A time that daylight saving skips is moved to the end of the gap; of a
+        /// repeated time the first counts.
         zone: String = key(matching(
             "a time zone as in Europe/Berlin or UTC",
             r"^[A-Za-z0-9_+/-]+$",
             |text| text.parse::<chrono_tz::Tz>().is_ok(),
         )).or("UTC".to_owned()),
-        /// A night that was missed, since the service did not run, is caught up with if it is not older than this; of several
-        /// the newest alone.
+        /// A night that was missed because the service did not run is made up for if it is not older than this; of
+        /// several nights only the newest.
         catch_up_h: f64 = key(from_to(0.0, 8784.0)).or(36.0),
     }
 }
 
 declare_table! {
-    /// How changes are found: files are listed, not watched, since network file systems tell nothing.
+    /// How changes are found: files are listed, not watched, since network file systems do not report changes.
     pub struct ChangesConfig {
         /// Time between two sweeps of all folders.
         scan_interval_s: f64 = key(from_to(0.05, 86_400.0)).or(60.0),
-        /// A folder is used when nothing below it has changed for so long: mirrors copy slowly.
+        /// A folder is used when nothing below it has changed for this time: mirrors copy slowly.
         quiet_period_s: f64 = key(from_to(0.0, 86_400.0)).or(600.0),
         /// A folder that has lost a larger share of its files is taken for unavailable, and its sites are held.
         max_loss: f64 = key(from_to(0.0, 1.0)).or(0.2),
         /// Longest time that listing a folder may take; a dead mount does not answer.
         sweep_limit_s: f64 = key(from_to(0.1, 3600.0)).or(30.0),
-        /// How often all files are read again, whatever the file system says of them, days; 0 never.
+        /// Interval at which all files are read again, even if the file system reports no change, days; 0 never.
         scrub_days: f64 = key(from_to(0.0, 3660.0)).or(7.0),
     }
 }
@@ -141,7 +141,7 @@ declare_table! {
 declare_table! {
     /// The processes that run sites, one site each.
     pub struct WorkersConfig {
-        /// How many run at the same time.
+        /// Number of processes that run at the same time.
         count: u16 = key(whole_from_to(1, 256)).or(2),
         /// Threads of each.
         threads: u16 = key(whole_from_to(1, 1024)).or(2),
@@ -149,7 +149,7 @@ declare_table! {
         memory_mib: u32 = key(whole_from_to(64, 1 << 24)).or(8192),
         /// Longest time for a site.
         deadline_s: f64 = key(from_to(1.0, 2_592_000.0)).or(21_600.0),
-        /// A worker that gives no sign of life for so long is ended.
+        /// A worker without a heartbeat for this time is ended.
         silence_s: f64 = key(from_to(1.0, 86_400.0)).or(30.0),
         /// Longest log of an attempt, kibibytes; its middle is left out.
         log_max_kib: u32 = key(whole_from_to(16, 1 << 20)).or(4096),
@@ -165,13 +165,13 @@ declare_table! {
     pub struct RetentionConfig {
         /// Newest runs of each site.
         runs: u32 = key(whole_from_to(1, 100_000)).or(14),
-        /// One run a week for so many weeks.
+        /// Number of weeks for which one run a week is kept.
         weeks: u32 = key(whole_from_to(0, 1040)).or(52),
         /// Newest events.
         events: u32 = key(whole_from_to(1000, 100_000_000)).or(100_000),
-        /// Logs of attempts whose runs are gone, days.
+        /// Logs of attempts whose runs were removed, days.
         logs_days: f64 = key(from_to(0.0, 36_600.0)).or(90.0),
-        /// Figures of runs that are gone, which a site's trends show, days.
+        /// Figures of removed runs, which the trends of a site show, days.
         history_days: f64 = key(from_to(0.0, 36_600.0)).or(1830.0),
         /// Nightly copies of the database.
         copies: u32 = key(whole_from_to(0, 1000)).or(7),
@@ -189,7 +189,7 @@ declare_table! {
 }
 
 declare_table! {
-    /// How far a site may move between two runs before people are told, as for `areograph report diff`.
+    /// How far a site may move between two runs before an alert is sent, as for `areograph report diff`.
     pub struct MovedConfig {
         /// How far a footprint, a camera or a boresight on the ground may move.
         limit_m: f64 = key(from_to(0.0, 1e7)).or(50.0),
@@ -201,7 +201,7 @@ declare_table! {
 declare_table! {
     /// The HTTP service: pages, and an interface for programs.
     pub struct HttpConfig {
-        /// Address and port. One that is not of this machine alone needs `behind_tls_proxy`.
+        /// Address and port. An address that other machines can reach requires `behind_tls_proxy`.
         listen: SocketAddr = key(matching(
             "an address with its port, as in 127.0.0.1:8470",
             r"^[0-9a-fA-F.:\[\]]+:[0-9]{1,5}$",
@@ -216,14 +216,14 @@ declare_table! {
         )).or(String::new()).unused(r#""https://mars.example.org""#),
         /// A proxy in front of the service encrypts the connections.
         behind_tls_proxy: bool = key(words([("no", false, ""), ("yes", true, "")])).or(false),
-        /// Addresses of proxies whose `X-Forwarded-For` is believed.
+        /// Addresses of proxies whose `X-Forwarded-For` is trusted.
         trusted_proxies: Vec<IpAddr> = key(list_or_none(matching(
             "addresses as in 10.0.0.1",
             r"^[0-9a-fA-F.:]+$",
             |text| text.parse::<IpAddr>().is_ok(),
         ))).or(Vec::new()).unused(r#"["127.0.0.1"]"#).then(|texts, _: &mut Keys<'_, '_>| addresses(&texts)),
-        /// Who may read on a loopback address: everybody on this machine, or those with a token. Elsewhere a token is always
-        /// needed; to change anything, too.
+        /// Who may read on a loopback address: everybody on this machine, or holders of a token. Other addresses, and
+        /// all changes, always require a token.
         open_reading: bool = key(words([
             ("yes", true, "reading from this machine needs no token"),
             ("no", false, "reading needs a token"),
@@ -247,15 +247,15 @@ fn is_public_url(text: &str) -> bool {
 }
 
 declare_table! {
-    /// Programs that are told of events, as JSON on their standard input: run without a shell, ended after 30 s, told again
-    /// when they fail.
+    /// Programs that receive events, as JSON on their standard input: run without a shell, ended after 30 s, run
+    /// again when they fail.
     pub struct HookConfig {
-        /// Program and arguments; a relative path of the program counts from this file's folder.
+        /// Program and arguments; a relative path of the program is relative to the folder of this file.
         command: Vec<String> = key(list(any_text()))
             .required()
             .unused(r#"["/usr/local/bin/tell-us", "--mars"]"#)
             .then(program_below_the_file),
-        /// What it is told of; everything when empty.
+        /// Events that it receives; all events when empty.
         events: Vec<AlertKind> = key(list_or_none(words(AlertKind::WORDS))).or(Vec::new()).unused(r#"["failed", "night_complete"]"#),
     }
 }
@@ -272,7 +272,7 @@ fn program_below_the_file(mut command: Vec<String>, keys: &mut Keys<'_, '_>) -> 
     command
 }
 
-/// What people are told of.
+/// Events of which people are notified.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, serde::Deserialize,
 )]
@@ -286,7 +286,7 @@ pub enum AlertKind {
     Invalid,
     /// A site moved beyond a limit.
     Moved,
-    /// A site is stale, or was not looked at for too long.
+    /// A site is stale, or was not checked for too long.
     Stale,
     /// A folder of inputs is not available.
     RootUnavailable,
@@ -315,7 +315,7 @@ impl AlertKind {
         (
             "stale",
             Self::Stale,
-            "a site is stale, or was not looked at for too long",
+            "a site is stale, or was not checked for too long",
         ),
         (
             "root_unavailable",
@@ -358,7 +358,7 @@ fn across_tables(service: &ServiceConfig, keys: &mut Keys<'_, '_>) {
     }
 }
 
-/// A configuration of the service that passed every check, and what was accepted but is worth a word.
+/// A configuration of the service that passed every check, with its warnings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoadedService {
     /// The valid form.
@@ -367,7 +367,7 @@ pub struct LoadedService {
     pub warnings: Vec<String>,
 }
 
-/// Reads and checks the configuration `path` of the service; relative paths in it count from its own folder.
+/// Reads and checks the configuration `path` of the service; relative paths in it are relative to its folder.
 ///
 /// # Errors
 /// [`Problems`] with everything that is wrong, or [`IoError`](areograph_base::error::IoError) when the file cannot be read.
@@ -404,7 +404,7 @@ pub fn service_example() -> String {
 pub fn service_schema() -> impl Serialize {
     schema(
         "Service configuration of areograph",
-        "The TOML file of the service as JSON. areograph checks more than a schema can: agreement between keys, and folders that are there.",
+        "The TOML file of the service as JSON. areograph checks more than a schema can: agreement between keys, and existence of folders.",
         &described::<ServiceConfig>(),
     )
 }

@@ -20,16 +20,16 @@ pub(super) const SHOTS: Many = Many::ANY;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ShotLayout {
-    /// LOLA's reduced data records, a row a shot.
+    /// LOLA's reduced data records, one row per shot.
     LolaRdr,
     /// `footprints.csv` of a site.
     Areograph,
 }
 
 declare_table! {
-    /// Tables of laser shots (CSV), in place of `[pedr]`: those of other altimeters, or of MOLA from elsewhere. A row is a
-    /// shot; rows that lie in no window are left out, rows that are none are told with file and line. Rows that say the same
-    /// of the same instant count once.
+    /// Tables of laser shots (CSV), in place of `[pedr]`: those of other altimeters, or of MOLA from other sources. A
+    /// row is a shot; rows outside all windows are left out, malformed rows are reported with file and line.
+    /// Duplicate rows are counted once.
     pub struct ShotTableConfig: Deserialize {
         /// Tables: paths or globs as in `[pedr]`.
         #[serde(skip)]
@@ -48,14 +48,14 @@ declare_table! {
             ("iau2000", Datum::Iau2000, "that of the products at Mars"),
             ("moon_me", Datum::MoonMe, "the Moon's mean Earth/polar axis, that of the products there"),
         ])).unused(r#""moon_me""#),
-        /// Which column holds what.
+        /// Assignment of columns.
         columns: ShotColumns = table(),
     }
     check has_columns
 }
 
 declare_table! {
-    /// Which column holds what: its name in the first row, or its number, from 1. Units are those of the keys.
+    /// Assignment of columns: the name in the first row, or the number, from 1. Units are those of the keys.
     pub struct ShotColumns: Deserialize {
         /// Time of the shot, UTC such as 2010-01-27T06:19:47.013. Or `et_s`.
         utc: Option<String> = key(text()).unused(r#""1""#),
@@ -83,13 +83,13 @@ declare_table! {
         spacecraft_radius_km: Option<String> = key(text()).unused(r#""21""#),
         /// The same in metres.
         spacecraft_radius_m: Option<String> = key(text()).unused(r#""sc_rad""#),
-        /// Number of the orbit; without it 0, and pauses alone part profiles.
+        /// Number of the orbit; without it 0, and only pauses separate profiles.
         orbit: Option<String> = key(text()).unused(r#""orbit""#),
     }
 }
 
 impl ShotLayout {
-    /// Which of its columns holds what.
+    /// Assignment of its columns.
     ///
     /// # Source
     /// LOLA RDR software interface specification; the header of the Orbital Data Explorer's tables
@@ -127,7 +127,7 @@ impl ShotLayout {
 }
 
 impl ShotTableConfig {
-    /// Which column holds what, by the layout or as written.
+    /// Assignment of columns, by the layout or as written.
     #[must_use]
     pub fn columns(&self) -> ShotColumns {
         self.layout
@@ -135,7 +135,7 @@ impl ShotTableConfig {
     }
 }
 
-/// Ways to write what a table must hold: of each exactly one.
+/// Alternative keys of every required quantity: exactly one of each.
 const NEEDS: [&[&str]; 8] = [
     &["utc", "et_s"],
     &["longitude_deg"],

@@ -154,7 +154,7 @@ fn across_tables(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     images_of_windows(site, keys);
 }
 
-/// Matching needs two images at least whose pixels are there.
+/// Matching requires at least two images with pixels.
 fn matched_images(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     let with_pixels = site.images.iter().filter(|image| image.pixels.is_some());
     if site.ties.matched && site.images.len() > 1 && with_pixels.count() < 2 {
@@ -166,7 +166,7 @@ fn matched_images(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     }
 }
 
-/// A terrain model needs two images whose pixels are there, and their names where there are more.
+/// A terrain model requires two images with pixels, and their names where there are more.
 fn images_of_surface(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     if !site.surface.is_asked_for() {
         return;
@@ -233,7 +233,7 @@ fn something_to_do(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     }
 }
 
-/// What kernels, labels and PEDR files are of is at Mars; a datum is of one body.
+/// Kernels, labels and PEDR files belong to Mars; a datum belongs to one body.
 fn other_bodies(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     let body = site.body;
     for table in keys.entries(&["shots"]) {
@@ -249,13 +249,13 @@ fn other_bodies(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     if body == Body::Mars {
         return;
     }
-    let only_at_mars = format!("none on {body}: it belongs to Mars Global Surveyor");
+    let only_at_mars = format!("no such entry on {body}: it belongs to Mars Global Surveyor");
     for table in ["pedr", "mola_clock", "pointing"] {
         keys.refuse(table, &only_at_mars);
     }
     if site.images.iter().any(|image| image.isd.is_none()) {
         let text = format!(
-            "images on {body} need support data (images.isd): labels and kernels are read of spacecraft at Mars alone"
+            "images on {body} need support data (images.isd): labels and kernels are read only of spacecraft at Mars"
         );
         let span = keys.span_of("images");
         keys.review().problem(span, text);
@@ -265,7 +265,7 @@ fn other_bodies(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     }
 }
 
-/// A pointing bias of the site has the sign of what is known of its cameras, and takes the place of it.
+/// A pointing bias of the site has the sign of the known bias of its cameras, and replaces it.
 fn pointing_of_instruments(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     let Some(used_s) = site.pointing.ck_bias.map(PointingBias::seconds) else {
         return;
@@ -279,7 +279,7 @@ fn pointing_of_instruments(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         if used_s.abs() > spacecraft.ck_bias_max_s {
             let expected = format!(
                 "no such key: it holds for all images of the site, and attitude kernels of {}, which carries {}, need no \
-                 time correction; that of another camera belongs in an instrument file of its own",
+                 time correction; that of another camera belongs in a separate instrument file",
                 spacecraft.full_name, camera.name
             );
             keys.refuse_below("pointing", "ck_bias_s", expected);
@@ -300,7 +300,7 @@ fn pointing_of_instruments(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     }
 }
 
-/// A folder of kernels is searched, and rival sets are weighed, for one spacecraft alone.
+/// Only for one spacecraft is a folder of kernels searched, and are rival sets compared.
 fn kernels_of_spacecraft(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     let key = match &site.kernels.source {
         KernelSource::Listed(_) => return,
@@ -317,7 +317,7 @@ fn kernels_of_spacecraft(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     }
 }
 
-/// The cameras that images of kernels name; the usual one where such an image, or no image, names none.
+/// The cameras of images with kernels; the default one where such an image, or no image, names one.
 fn cameras(images: &[ImageConfig]) -> Vec<&Instrument> {
     let named = images
         .iter()
@@ -327,7 +327,7 @@ fn cameras(images: &[ImageConfig]) -> Vec<&Instrument> {
     named.chain(usual).collect()
 }
 
-/// Names in tie point files are as unique as identifiers; an image without one has its identifier.
+/// Names in tie point files are unique like identifiers; an image without a name has its identifier.
 fn serial_numbers(keys: &mut Keys<'_, '_>) {
     let images = keys.entries(&["images"]);
     if images
@@ -341,7 +341,7 @@ fn serial_numbers(keys: &mut Keys<'_, '_>) {
     }
 }
 
-/// Windows are what images of the site see.
+/// Windows that are outlines of images belong to images of the site.
 fn images_of_windows(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     let known: BTreeSet<&str> = site.images.iter().map(|image| &*image.id).collect();
     for window in keys.entries(&["windows"]) {
@@ -360,7 +360,7 @@ fn images_of_windows(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     }
 }
 
-/// Standard deviations of their own are for images of the site.
+/// Individual standard deviations belong to images of the site.
 fn priors_of_images(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     let known: BTreeSet<&str> = site.images.iter().map(|image| &*image.id).collect();
     for prior in keys.entries(&["adjustment", "images"]) {

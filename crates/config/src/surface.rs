@@ -9,8 +9,9 @@ use super::{
 };
 
 declare_table! {
-    /// A terrain model that areograph makes of a pair of images with `pixels`, with the adjusted orientation where there is
-    /// one: `surface.tif`, its standard deviations, and what the altimeter says of it. Without `cell_m` none is made.
+    /// A terrain model that areograph makes of a pair of images with `pixels`, with the adjusted orientation if there
+    /// is one: `surface.tif`, its standard deviations, and its comparison with the altimeter. Without `cell_m` none
+    /// is made.
     pub struct SurfaceConfig: Deserialize {
         /// Edge of a cell. Three pixels of the coarser image are usual: a height is that of a square of 17 pixels. Cells finer
         /// than a pixel are refused; for cells above six pixels images are compared at a coarser size, which is quick.
@@ -21,7 +22,7 @@ declare_table! {
     check a_cell_is_given
 }
 
-/// What is asked for has a cell.
+/// A requested terrain model has a cell size.
 fn a_cell_is_given(surface: &SurfaceConfig, keys: &mut Keys<'_, '_>) {
     keys.rule(|| json!({"dependentRequired": {"images": ["cell_m"]}}));
     if surface.images.is_some() && keys.span_of("cell_m").is_none() {
@@ -33,7 +34,7 @@ fn a_cell_is_given(surface: &SurfaceConfig, keys: &mut Keys<'_, '_>) {
 }
 
 impl SurfaceConfig {
-    /// Whether a terrain model is asked for.
+    /// Whether a terrain model is requested.
     #[must_use]
     pub const fn is_asked_for(&self) -> bool {
         self.cell_m.is_some()

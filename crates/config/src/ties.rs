@@ -20,17 +20,18 @@ declare_table! {
     /// Tie points between the images. Without this table nothing is intersected or adjusted.
     pub struct TiesConfig: Deserialize {
         /// Paths or globs as in `[pedr]`: tables (.csv) with the columns `point_id`, `serial_number`, `sample`,
-        /// `line`, one row a measurement, and where known `line_sigma_px` and `sample_sigma_px`, its standard deviations;
-        /// or ISIS control networks in PVL (a binary one: cnetbin2pvl), of which points that are fixed or constrained
-        /// bring their coordinates, IAU 2000. Lines and samples count as in ISIS, the middle of the first pixel is 1. `serial_number` is an image's
-        /// `serial_number` above, or its `id`; measurements in other images are counted and left out.
+        /// `line`, one row per measurement, and where known `line_sigma_px` and `sample_sigma_px`, its standard
+        /// deviations; or ISIS control networks in PVL (a binary one: cnetbin2pvl), whose fixed or constrained points
+        /// provide their coordinates, IAU 2000. Lines and samples count as in ISIS, the middle of the first pixel is
+        /// 1. `serial_number` is an image's `serial_number` above, or its `id`; measurements in other images are
+        /// counted and left out.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs)
             .or(Vec::new())
             .example(r#"["../ties/*.csv"]"#),
-        /// Whether areograph measures tie points itself, beside those of files: every pair of images that have `pixels` is
-        /// matched where both show the same ground with enough texture, and once more with the orientation that these tie
-        /// points adjust. Each measurement has the standard deviations of its own match.
+        /// Whether areograph measures tie points itself, beside those of files: every pair of images that have
+        /// `pixels` is matched where both show the same ground with enough texture, and again with the orientation
+        /// that these tie points adjust. Each measurement has the standard deviations of its match.
         matched as "match": bool = key(Switch).or(false),
     }
     check something_measures
@@ -74,7 +75,7 @@ declare_table! {
 declare_table! {
     /// Weights of the measurements.
     struct WeightingKeys {
-        /// The unit in which measuring errors are alike in all images.
+        /// The unit in which measurement errors are equal in all images.
         weighting: ErrorUnit = key(words([
             ("focal", ErrorUnit::Focal, "pixels of the focal plane, along and across the track"),
             (
@@ -91,7 +92,7 @@ declare_table! {
     check lines_are_used
 }
 
-/// What a measuring error is given in.
+/// Unit of a measurement error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 enum ErrorUnit {
     Focal,

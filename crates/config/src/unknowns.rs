@@ -14,9 +14,9 @@ macro_rules! levels {
             None,
             $(#[$constant_about])*
             $constant,
-            /// And what is linear in time.
+            /// And a linear term in time.
             Velocity,
-            /// And what is quadratic.
+            /// And a quadratic term.
             Acceleration,
         }
 
@@ -39,14 +39,14 @@ macro_rules! levels {
 }
 
 levels! {
-    /// What of an image's position is unknown: each level adds a power of time (jigsaw's `spsolve`).
+    /// Unknowns of the position of an image: each level adds a power of time (jigsaw's `spsolve`).
     PositionUnknowns,
     /// A constant.
     Position "position"
 }
 
 levels! {
-    /// What of an image's rotation is unknown, likewise (jigsaw's `camsolve`).
+    /// Unknowns of the rotation of an image, likewise (jigsaw's `camsolve`).
     RotationUnknowns,
     /// Constant angles.
     Angles "angles"

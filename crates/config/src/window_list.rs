@@ -25,7 +25,7 @@ const MANY: Many = Many {
 const DOCUMENTATION: &str = "config/sites/example.toml";
 
 declare_table! {
-    /// Windows to search, as a site has them.
+    /// Windows to search, as in a site file.
     pub(super) struct WindowList {
         /// Windows on the ground, 1 to 10,000.
         windows: Vec<WindowConfig> = tables(MANY),
@@ -42,7 +42,7 @@ fn require_windows(list: &WindowList, keys: &mut Keys<'_, '_>) {
     }
 }
 
-/// What is wrong with a window of the command line.
+/// Errors of a window on the command line.
 #[derive(Debug, thiserror::Error)]
 enum WindowError {
     #[error("the box has {what}; expected {expected}")]
@@ -91,7 +91,7 @@ pub fn load_windows(path: &Path) -> Result<Vec<WindowConfig>, Error> {
 /// Makes sure that the outlines of windows are known without a run.
 ///
 /// # Errors
-/// A window that is what an image sees.
+/// A window that is the outline of an image.
 pub fn require_outlines(windows: &[WindowConfig]) -> Result<(), Error> {
     let is_of_image = |window: &&WindowConfig| matches!(window.shape, WindowShape::Image { .. });
     match windows.iter().find(is_of_image) {
@@ -100,7 +100,7 @@ pub fn require_outlines(windows: &[WindowConfig]) -> Result<(), Error> {
     }
 }
 
-/// The window of a box: west, east, south and north edge, degrees, as a site file has them.
+/// The window of a box: west, east, south and north edge, degrees, as in a site file.
 ///
 /// # Errors
 /// Edges beyond the globe or in the wrong order.
@@ -137,7 +137,7 @@ pub fn window_of_box(id: &str, edges_deg: [f64; 4]) -> Result<WindowConfig, Erro
 /// The window of the polygons in a GeoJSON file; its identifier is the file's name.
 ///
 /// # Errors
-/// No such file; no polygons.
+/// The file cannot be read; it contains no polygons.
 pub fn window_of_polygon(path: &Path) -> Result<WindowConfig, Error> {
     let polygons = geojson::read(path)
         .map_err(|error| WindowError::Polygon(error.to_string()))

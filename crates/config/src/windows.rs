@@ -65,10 +65,10 @@ declare_table! {
             key(several(from_to(-90.0, 90.0), "two numbers [south, north]")).example("[-14.0, -12.9]"),
         /// GeoJSON file.
         polygon: Option<PathBuf> = key(FILE).example_in(1, r#""outline.geojson""#),
-        /// Identifier of an image of the site: the window is what it sees, by its times and the kernels (of rival
+        /// Identifier of an image of the site: the window is its outline, by its times and the kernels (of rival
         /// sets, the first).
         image: Option<String> = key(identifier()).example_in(2, r#""E02-02855""#),
-        /// How far the window reaches beyond the outline of the image, at least.
+        /// Least margin of the window beyond the outline of the image.
         margin_km: Option<f64> = key(from_to(0.0, 1_000.0)).example_in(2, "5.0"),
     }
 }
@@ -117,7 +117,7 @@ fn shape(written: ShapeKeys, keys: &mut Keys<'_, '_>) -> WindowShape {
     bounds.or(outline).unwrap_or_else(nowhere)
 }
 
-/// A shape that stands for one that is refused.
+/// A placeholder for a refused shape.
 const fn nowhere() -> WindowShape {
     WindowShape::Polygons {
         polygons: Vec::new(),
@@ -172,7 +172,7 @@ fn bounds(
     })
 }
 
-/// Names a window that goes more than half round Mars, but not all round: its edges may have been swapped.
+/// Warns of a window that covers more than half of all longitudes, but not all: its edges may have been swapped.
 fn name_wide([west, east]: [f64; 2], keys: &mut Keys<'_, '_>) {
     let width = (east - west).rem_euclid(360.0);
     if width > 180.0
@@ -189,7 +189,7 @@ fn name_wide([west, east]: [f64; 2], keys: &mut Keys<'_, '_>) {
     }
 }
 
-/// Longitudes in `0..360`, or `[0, 360]` for all of them; `None` when the width is none or over 360°.
+/// Longitudes in `0..360`, or `[0, 360]` for all of them; `None` when the width is 0 or over 360°.
 ///
 /// Wrapped in degrees, where whole numbers stay exact.
 pub(super) fn wrapped_longitudes([west, east]: [f64; 2]) -> Option<[f64; 2]> {

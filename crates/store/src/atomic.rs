@@ -1,4 +1,4 @@
-//! Files appear under their final name whole or not at all.
+//! Files appear under their final names complete or not at all.
 //!
 //! Files are written under another name, read back, flushed and renamed. Half-written files of a killed run are removed
 //! under the lock of the next.
@@ -11,12 +11,12 @@ use areograph_base::error::{IoError, Locate, Result};
 /// Writes `bytes` beside `path` under a temporary name, flushes them to the disk and renames.
 ///
 /// # Errors
-/// The folder cannot be made or written, or the disk is full; `path` is then as it was.
+/// The folder cannot be created or written, or the disk is full; `path` is then unchanged.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     write_parts(path, &[bytes])
 }
 
-/// The same for bytes in several parts, one behind the other.
+/// The same for bytes in several consecutive parts.
 ///
 /// # Errors
 /// Those of [`write()`].
@@ -41,8 +41,8 @@ pub fn sync_file(path: &Path) -> Result<()> {
         .in_file(path)
 }
 
-/// Makes renames in `folder` durable, where the system can do that.
+/// Makes renames in `folder` durable, if the system supports it.
 pub fn sync_folder(folder: &Path) {
-    // Some file systems refuse to flush folders; the data are safe all the same.
+    // Some file systems refuse to flush folders; the data are safe nevertheless.
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
 }

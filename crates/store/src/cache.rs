@@ -1,7 +1,7 @@
-//! Stage outputs on disk, each with the inputs it was made from.
+//! Stage outputs on disk, each with its inputs.
 //!
 //! Outputs are in `<site>/.cache` (postcard) and are not read back from products: products serve external tools and
-//! round where their formats do.
+//! are rounded where their formats are.
 
 use std::{
     collections::BTreeSet,
@@ -26,7 +26,7 @@ pub struct StageCache {
     forced: bool,
 }
 
-/// What stands before a stage output in its file, both in postcard: outputs are large, so they are not copied.
+/// Header of a stage output in its file, both in postcard: outputs are large, so they are not copied.
 #[derive(Serialize, Deserialize)]
 struct Head {
     inputs: Inputs,
@@ -97,7 +97,7 @@ impl StageCache {
         Ok(Output::known(label.to_owned(), value, provenance))
     }
 
-    /// Stores the output of the stage with this label, with the inputs it was made from.
+    /// Stores the output of the stage with this label, with its inputs.
     ///
     /// # Errors
     /// The output cannot be written.
@@ -112,7 +112,7 @@ impl StageCache {
             source,
         };
         let payload = whole(|| postcard::to_stdvec(&value)).map_err(unstorable)?;
-        // A field that is skipped when written cannot be read back, and the stage would run again for ever.
+        // A field that is skipped when written cannot be read back, and the stage would run again every time.
         debug_assert!(
             read::<T>(&payload).is_some(),
             "the output of {label} cannot be read back"
@@ -132,13 +132,13 @@ impl StageCache {
         Ok(Output::known(label.to_owned(), value, provenance))
     }
 
-    /// Forgets the output of `stage`, so that it runs again.
+    /// Discards the output of `stage`, so that it runs again.
     pub fn forget(&self, stage: &str) {
-        // A missing file is already forgotten.
+        // A missing file is already discarded.
         let _ = fs::remove_file(self.path(stage));
     }
 
-    /// Forgets all stages but these, such as those of an image that is no longer configured.
+    /// Discards all stages but these, such as those of an image that is no longer configured.
     pub fn keep_only<'s>(&self, stages: impl IntoIterator<Item = &'s str>) {
         let kept: BTreeSet<PathBuf> = stages.into_iter().map(|stage| self.path(stage)).collect();
         let entries = fs::read_dir(&self.folder).into_iter().flatten().flatten();
@@ -155,7 +155,7 @@ impl StageCache {
     }
 }
 
-/// An output that is stored in these bytes and in no others.
+/// An output, if these bytes are exactly its stored form.
 fn read<T: DeserializeOwned>(payload: &[u8]) -> Option<T> {
     let (value, rest) = postcard::take_from_bytes(payload).ok()?;
     rest.is_empty().then_some(value)

@@ -1,5 +1,5 @@
-//! Files as several floors need them: their hash, read once as long as they do not change, their name without folders, and
-//! how they come under that name whole or not at all.
+//! Files: their hash, read once while they are unchanged, their name without folders, and how they receive that name
+//! complete or not at all.
 
 mod known;
 mod outputs;
@@ -34,7 +34,7 @@ pub struct HashedFile {
     pub blake3: String,
 }
 
-/// Input files of one run: each is hashed once, and must stay what it was.
+/// Input files of one run: each is hashed once, and must not change.
 #[derive(Debug, Default)]
 pub struct InputFiles {
     earlier: KnownFiles,
@@ -42,7 +42,7 @@ pub struct InputFiles {
     seen: Mutex<Seen>,
 }
 
-/// What a run has found out.
+/// Findings of a run.
 #[derive(Debug, Default)]
 struct Seen {
     files: BTreeMap<PathBuf, SeenFile>,
@@ -50,16 +50,16 @@ struct Seen {
     passed: BTreeSet<(String, u32)>,
 }
 
-/// A file that the run has met.
+/// A file that the run has read or hashed.
 #[derive(Debug, Clone)]
 struct SeenFile {
     identity: Identity,
     file: HashedFile,
-    /// When it was read, seconds of UTC since 1970; none of a file that changed just before, or meanwhile.
+    /// When it was read, seconds of UTC since 1970; `None` for a file that changed just before, or meanwhile.
     read_s: Option<u64>,
 }
 
-/// A file that is no longer what was read earlier in the run.
+/// A file that differs from what was read earlier in the run.
 #[derive(Debug, thiserror::Error)]
 #[error("the file changed while it was in use: its hash was {was} and is {is}")]
 struct ChangedFile {
@@ -77,7 +77,7 @@ impl Cause for ChangedFile {
     }
 }
 
-/// A file that lies elsewhere than it may.
+/// A file outside the permitted folders.
 #[derive(Debug, thiserror::Error)]
 #[error("a path below {}; this one leads to {}", listed(.roots), .leads_to.display())]
 pub struct Outside {
@@ -100,8 +100,8 @@ impl Cause for NotAdmitted {
     }
 }
 
-/// Why the file must not be read, if it lies below none of the folders `roots`, links followed. Without folders there is no
-/// such rule.
+/// Why the file must not be read, if it lies below none of the folders `roots`, links followed. Without folders there
+/// is no restriction.
 ///
 /// * `roots` – without links
 #[must_use]
@@ -109,7 +109,7 @@ pub fn outside(path: &Path, roots: &[PathBuf]) -> Option<Outside> {
     if roots.is_empty() {
         return None;
     }
-    // What is not there leads nowhere.
+    // A missing file leads nowhere.
     let leads_to = path.canonicalize().ok()?;
     let within = roots.iter().any(|root| leads_to.starts_with(root));
     (!within).then(|| Outside {
@@ -124,7 +124,7 @@ fn listed(folders: &[PathBuf]) -> String {
 }
 
 impl InputFiles {
-    /// Those of a run that does not read again what is known from earlier ones.
+    /// Those of a run that does not read known files of earlier runs again.
     #[must_use]
     pub fn knowing(earlier: KnownFiles) -> Self {
         let checked = earlier.iter().filter(|file| file.checked > 0);
@@ -139,7 +139,7 @@ impl InputFiles {
         }
     }
 
-    /// The same of a run that may read only below the folders `roots`; see [`outside`].
+    /// The same for a run that may read only below the folders `roots`; see [`outside`].
     #[must_use]
     pub fn within(self, roots: &[PathBuf]) -> Self {
         Self {
@@ -148,10 +148,10 @@ impl InputFiles {
         }
     }
 
-    /// Makes sure that the run may read a file.
+    /// Ensures that the run may read a file.
     ///
     /// # Errors
-    /// The file lies elsewhere, of kind configuration.
+    /// The file is outside the permitted folders, of kind configuration.
     pub fn admit(&self, path: &Path) -> Result<()> {
         match outside(path, &self.roots) {
             None => Ok(()),
@@ -162,7 +162,7 @@ impl InputFiles {
     /// The file with its hash; a file that was hashed before is not read again.
     ///
     /// # Errors
-    /// The file cannot be read, must not be, or is no longer what it was.
+    /// The file cannot be read, must not be read, or has changed.
     pub fn hash(&self, path: &Path) -> Result<HashedFile> {
         self.admit(path)?;
         let now = identity(path)?;
@@ -196,19 +196,19 @@ impl InputFiles {
         self.lock().passed.contains(&(blake3.to_owned(), check))
     }
 
-    /// Notes that content with this hash has passed that version of the check of kernels.
+    /// Records that content with this hash has passed that version of the check of kernels.
     pub fn note_passed(&self, blake3: &str, check: u32) {
         self.lock().passed.insert((blake3.to_owned(), check));
     }
 
-    /// All files that the run has met.
+    /// All files that the run has hashed.
     #[must_use]
     pub fn all(&self) -> Vec<HashedFile> {
         let seen = self.lock();
         seen.files.values().map(|seen| seen.file.clone()).collect()
     }
 
-    /// What later runs need not find out again, beyond what was known.
+    /// Findings that later runs need not repeat, beyond those that were known.
     #[must_use]
     pub fn learnt(&self) -> Vec<KnownFile> {
         let seen = self.lock();
@@ -226,7 +226,7 @@ impl InputFiles {
         new.collect()
     }
 
-    /// Several files in their order; `watch` is looked at before each, and counts those that were not known before.
+    /// Several files in their order; `watch` is checked before each, and counts those that were not known before.
     ///
     /// # Errors
     /// As [`Self::hash`]; [`Stopped`](areograph_base::error::Stopped).
@@ -250,10 +250,10 @@ impl InputFiles {
         paths.par_iter().map(hash).collect()
     }
 
-    /// Makes sure that a file which was hashed is still what it was. Other files are no concern.
+    /// Ensures that a file that was hashed is unchanged. Other files are ignored.
     ///
     /// # Errors
-    /// The file cannot be read, or is no longer what it was.
+    /// The file cannot be read, or has changed.
     pub fn verify(&self, path: &Path) -> Result<()> {
         if !self.knows(path) {
             return Ok(());
@@ -261,7 +261,7 @@ impl InputFiles {
         self.hash(path).map(|_| ())
     }
 
-    /// Makes sure that every file is still what it was.
+    /// Ensures that every file is unchanged.
     ///
     /// # Errors
     /// As [`Self::verify`], for the first of them.
@@ -271,7 +271,7 @@ impl InputFiles {
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Seen> {
-        // Each entry is whole, whatever happened to the thread that wrote another one.
+        // Each entry is complete, even if the thread that wrote another one failed.
         self.seen.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -352,14 +352,14 @@ fn hash_open(mut file: &File) -> std::result::Result<(String, u64), IoError> {
     Ok((hasher.finalize().to_hex().to_string(), bytes))
 }
 
-/// The name of a file without its folders, as products quote it: they do not depend on where files lie.
+/// The name of a file without its folders, as in products, which do not depend on the location of files.
 #[must_use]
 pub fn file_name(path: &Path) -> String {
     let name = path.file_name().unwrap_or(path.as_os_str());
     name.to_string_lossy().into_owned()
 }
 
-/// The first digits of a hash: enough for people to tell files apart.
+/// The first digits of a hash: enough to distinguish files.
 #[must_use]
 pub fn short_hash(blake3: &str) -> String {
     blake3.chars().take(12).collect()

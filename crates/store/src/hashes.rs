@@ -1,7 +1,6 @@
-//! Hashes of input files, kept from run to run: a file that did not change is not read again.
+//! Hashes of input files, kept between runs: an unchanged file is not read again.
 //!
-//! What is kept saves time and nothing else. A file of hashes that is damaged, foreign or cannot be written is as good as
-//! none.
+//! Stored hashes only save time. A file of hashes that is damaged, foreign or not writable is treated as absent.
 //!
 //! Kernels, labels, PEDR and tie point files are hashed once in a run (`files.rs`), and again in later runs only when
 //! the file system reports a change; `--rehash` reads all of them. Their identity (device, inode, size, times) is
@@ -23,15 +22,16 @@ use areograph_base::error::{IoError, Locate, Result};
 /// Name of the file in a folder of products.
 pub const HASHES: &str = ".hashes";
 
-/// How the file begins: what it is, and the form of its entries. BLAKE3 of the rest follows, then the entries in postcard.
+/// Header of the file: its kind, and the form of its entries. BLAKE3 of the rest follows, then the entries in
+/// postcard.
 const HEADER: &[u8] = b"areograph hashes 1\n";
 /// Bytes of a BLAKE3 hash.
 const HASH_SIZE: usize = 32;
-/// Most files that are kept; those that were read first go.
+/// Maximum number of files; the oldest entries are removed first.
 const FILES_MAX: usize = 200_000;
-/// Largest file of hashes that is read, bytes: more than so many entries take.
+/// Largest file of hashes that is read, bytes: more than this number of entries occupies.
 const SIZE_MAX: u64 = 64 << 20;
-/// How often another process that writes the same file is waited for, and how long each time.
+/// Number and duration of waits for another process that writes the same file.
 const WAITS: usize = 40;
 const WAIT: Duration = Duration::from_millis(50);
 
@@ -43,7 +43,7 @@ pub struct HashCache {
 }
 
 impl HashCache {
-    /// The hashes in the file `path`; when `rehash`, they are not believed, but made anew.
+    /// The hashes in the file `path`; with `rehash` they are not used, but recomputed.
     #[must_use]
     pub fn new(path: &Path, rehash: bool) -> Self {
         Self {
@@ -67,13 +67,13 @@ impl HashCache {
         InputFiles::knowing(self.known())
     }
 
-    /// What the file holds.
+    /// The content of the file.
     #[must_use]
     pub fn known(&self) -> KnownFiles {
         read(&self.path).unwrap_or_default()
     }
 
-    /// Adds what a run has learnt of its input files. Nothing is kept in a folder that is not there.
+    /// Adds the findings of a run about its input files. Nothing is stored if the folder does not exist.
     pub fn keep(&self, files: &InputFiles) {
         let learnt = files.learnt();
         if learnt.is_empty() || !self.folder().is_dir() {
@@ -95,7 +95,7 @@ impl HashCache {
         let mut name = OsString::from(&self.path);
         name.push(".lock");
         let Some(_lock) = wait_for_lock(Path::new(&name))? else {
-            // Whoever holds it is stopped. To read files again costs less than to wait for it.
+            // The holder of the lock is stopped. Reading files again costs less than waiting for it.
             return Ok(());
         };
         let mut known: Vec<KnownFile> = {
@@ -129,7 +129,7 @@ fn read(path: &Path) -> Option<KnownFiles> {
     Some(known.into_iter().collect())
 }
 
-/// The lock in a file of its own, since the file of hashes is replaced; none when another process does not give it back.
+/// The lock in a separate file, since the file of hashes is replaced; `None` if another process does not release it.
 fn wait_for_lock(path: &Path) -> Result<Option<File>> {
     let file = File::create(path)
         .map_err(IoError::on("create"))

@@ -1,5 +1,5 @@
-//! Files known by their hashes, what a stage is, and what lies in a site's output folder besides the products: stage outputs
-//! with their fingerprints, the manifest, the lock; and how files get under their final names.
+//! Files known by their hashes, the definition of a stage, and the contents of a site's output folder besides the
+//! products: stage outputs with their fingerprints, the manifest, the lock; and how files receive their final names.
 //!
 //! ```
 //! use areograph_store::stage::Inputs;

@@ -1,4 +1,4 @@
-//! One process at a time works in a site's folder.
+//! Only one process at a time works in a site's folder.
 
 use std::{
     fs::{self, File, TryLockError},
@@ -9,19 +9,19 @@ use super::publish::{CACHE, STAGING};
 use crate::files::TEMPORARY;
 use areograph_base::error::{Cause, Error, IoError, Kind, Locate, Result};
 
-/// Held while a run works in a site's folder; the system frees it when the process ends, however it ends.
+/// Held while a run works in a site's folder; the system releases it when the process ends for any reason.
 #[derive(Debug)]
 pub struct SiteLock {
     _file: File,
 }
 
-/// Another run is at work in the folder.
+/// Another run is using the folder.
 #[derive(Debug, thiserror::Error)]
 #[error("another run is using this folder")]
 pub struct Busy;
 
 impl Busy {
-    /// Whether this is why something failed: nothing was tried then.
+    /// Whether a failure was caused by the lock; then nothing was tried.
     #[must_use]
     pub fn is_cause_of(failure: &Error) -> bool {
         let cause: &(dyn std::error::Error + 'static) = &*failure.cause;
@@ -40,7 +40,7 @@ impl Cause for Busy {
 }
 
 impl SiteLock {
-    /// Takes the lock of `folder`, which is made if need be.
+    /// Takes the lock of `folder`, which is created if necessary.
     ///
     /// # Errors
     /// Another process holds it, or the folder cannot be written.
@@ -56,7 +56,7 @@ impl SiteLock {
             Ok(()) => {
                 remove_temporaries(folder);
                 remove_temporaries(&folder.join(CACHE));
-                // A killed run's half-made products; what cannot be removed is met when publishing.
+                // Incomplete products of a killed run; files that cannot be removed are reported when publishing.
                 let _ = fs::remove_dir_all(folder.join(STAGING));
                 Ok(Self { _file: file })
             }
@@ -66,11 +66,11 @@ impl SiteLock {
     }
 }
 
-/// Removes what a killed run left half-written; nobody else works here while the lock is held.
+/// Removes incomplete files of a killed run; no other process works here while the lock is held.
 fn remove_temporaries(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         if entry.file_name().to_string_lossy().starts_with(TEMPORARY) {
-            // What cannot be removed does no harm.
+            // A file that cannot be removed does no harm.
             let _ = fs::remove_file(entry.path());
         }
     }

@@ -1,4 +1,4 @@
-//! `manifest.json`: what a site's products were made from.
+//! `manifest.json`: the origin of a site's products.
 
 use std::collections::BTreeMap;
 
@@ -18,7 +18,7 @@ pub fn schema() -> DocumentSchema {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(
     title = "Manifest of a site",
-    description = "manifest.json of areograph: what the products of a site were made from. finished_utc is the only entry that depends on the clock."
+    description = "manifest.json of areograph: the inputs of the products of a site. finished_utc is the only entry that depends on the clock."
 )]
 pub struct Manifest {
     /// Always `areograph`.
@@ -28,7 +28,7 @@ pub struct Manifest {
     pub version: String,
     /// Site identifier.
     pub site: String,
-    /// Whether every profile and image keeps the configured limits.
+    /// Whether every profile and image is within the configured limits.
     pub verdict: Verdict,
     /// The configuration file.
     pub configuration: ConfigurationEntry,
@@ -36,25 +36,25 @@ pub struct Manifest {
     pub biases: Vec<BiasEntry>,
     /// Kernels in load order.
     pub kernels: Vec<KernelEntry>,
-    /// Rival kernel sets, and which was used; empty when the configuration names one source of kernels.
+    /// Rival kernel sets, and the one that was used; empty if the configuration names one source of kernels.
     pub kernel_choice: Vec<KernelChoiceEntry>,
-    /// Stages with the fingerprint of everything that entered them.
+    /// Stages with the fingerprint of all their inputs.
     pub stages: Vec<StageEntry>,
     /// Product files.
     #[schemars(length(min = 1))]
     pub products: Vec<ProductEntry>,
-    /// Rows and things counted.
+    /// Numbers of rows and of other items.
     pub counts: BTreeMap<String, u64>,
-    /// The largest figures of the site under the names in [`figures`]; absent when there is none.
+    /// The largest figures of the site under the names in [`figures`]; absent without figures.
     #[schemars(schema_with = "figures::schema")]
     pub figures: BTreeMap<String, f64>,
     /// Rejected shots inside a window, by reason.
     pub rejected: BTreeMap<String, u64>,
-    /// What was wrong with input records.
+    /// Problems of input records.
     pub complaints: Complaints,
-    /// What a reader should know, one sentence each.
+    /// Notes for the reader, one sentence each.
     pub notes: Vec<String>,
-    /// When the products were published: the only entry that depends on the clock.
+    /// Time of publication: the only entry that depends on the clock.
     pub finished_utc: String,
 }
 
@@ -73,7 +73,7 @@ pub mod figures {
     pub const ALONG_TRACK_PARALLAX_M: &str = "along_track_parallax_m";
     /// The same with the adjusted orientation, metres.
     pub const ADJUSTED_ALONG_TRACK_PARALLAX_M: &str = "adjusted_along_track_parallax_m";
-    /// |Median| height of tie points above the ground between MOLA's shots, metres.
+    /// |Median| height of tie points above the MOLA surface, metres.
     pub const HEIGHT_OFF_SURFACE_M: &str = "height_off_surface_m";
     /// The same with the adjusted orientation, metres.
     pub const ADJUSTED_HEIGHT_OFF_SURFACE_M: &str = "adjusted_height_off_surface_m";
@@ -87,17 +87,17 @@ pub mod figures {
 
     /// Root mean square residual of tie points in a calibrated camera, the largest of all lines and axes, pixels.
     pub const TIE_RESIDUAL_RMS_PX: &str = "tie_residual_rms_px";
-    /// Root mean square height of held-back control of a calibration, intersected minus the laser's, metres.
+    /// Root mean square height of withheld control of a calibration, intersected minus the laser's, metres.
     pub const HELD_BACK_HEIGHT_RMS_M: &str = "held_back_height_rms_m";
 
-    /// Root mean square of terrain model minus laser at shots that were held out of a match, bias removed, metres.
+    /// Root mean square of terrain model minus laser at shots withheld from a match, bias removed, metres.
     pub const HELD_OUT_RMS_M: &str = "held_out_rms_m";
 
-    /// All of them, and what they are.
+    /// All of them, with their descriptions.
     const ALL: [(&str, &str); 13] = [
         (
             HELD_OUT_RMS_M,
-            "Root mean square of terrain model minus laser at shots that were held out of a match, bias removed, metres.",
+            "Root mean square of terrain model minus laser at shots withheld from a match, bias removed, metres.",
         ),
         (
             RANGE_MEAN_M,
@@ -121,7 +121,7 @@ pub mod figures {
         ),
         (
             HEIGHT_OFF_SURFACE_M,
-            "|Median| height of tie points above the ground between MOLA's shots, metres.",
+            "|Median| height of tie points above the MOLA surface, metres.",
         ),
         (
             ADJUSTED_HEIGHT_OFF_SURFACE_M,
@@ -145,7 +145,7 @@ pub mod figures {
         ),
         (
             HELD_BACK_HEIGHT_RMS_M,
-            "Root mean square height of held-back control of a calibration, intersected minus the laser's, metres.",
+            "Root mean square height of withheld control of a calibration, intersected minus the laser's, metres.",
         ),
     ];
 
@@ -180,9 +180,9 @@ pub struct BiasEntry {
     pub name: String,
     /// Seconds added to the time of a look-up.
     pub correction_s: f64,
-    /// What it is applied to.
+    /// The look-ups or computations to which it applies.
     pub scope: String,
-    /// Where the value comes from.
+    /// Source of the value.
     pub source: String,
 }
 
@@ -198,7 +198,7 @@ pub struct KernelEntry {
     /// BLAKE3 of the file.
     #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
     pub blake3: String,
-    /// Which of the needed intervals were read from this kernel, ET seconds: later kernels come first.
+    /// Needed intervals that were read from this kernel, ET seconds: later kernels take precedence.
     pub coverage_used: Vec<Interval>,
 }
 
@@ -265,7 +265,7 @@ pub struct ProductEntry {
 /// Problems in the input records.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Complaints {
-    /// How many there are.
+    /// Their number.
     pub count: u64,
     /// The first of them.
     pub texts: Vec<String>,

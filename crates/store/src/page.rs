@@ -1,4 +1,4 @@
-//! Pages that a command writes where the user says: beside products, never over them.
+//! Pages that a command writes to a path of the user: beside products, never over them.
 
 use std::{
     fs::{self, FileType},
@@ -15,13 +15,13 @@ use areograph_base::error::{Cause, IoError, Kind, Locate, Result};
 /// File of the page over all sites, in the folder that holds the sites' folders.
 pub const SITES_PAGE: &str = "index.html";
 
-/// Why a page must not be written to a place.
+/// Why a page must not be written to a path.
 #[derive(Debug, thiserror::Error)]
 pub enum PageError {
-    /// Replacing it would take away something else than a file.
+    /// It would replace something other than a file.
     #[error("is {found}; a page can replace a regular file only")]
     NotAFile {
-        /// What is there.
+        /// The existing entry.
         found: &'static str,
     },
     /// The next run, and every check of the products, would find a foreign file.
@@ -46,24 +46,24 @@ impl Cause for PageError {
     }
 }
 
-/// A place at which a page may be written.
+/// A path to which a page may be written.
 #[derive(Debug)]
 pub struct PagePath(PathBuf);
 
 impl PagePath {
-    /// Checks the place, before the work whose result the page will show.
+    /// Checks the path before the work whose result the page will show.
     ///
     /// # Errors
-    /// [`PageError`] for what is no regular file and for products; [`IoError`] when its folder cannot be found.
+    /// [`PageError`] for anything but a regular file, and for products; [`IoError`] if its folder cannot be found.
     pub fn new(path: &Path) -> Result<Self> {
         check(path).in_file(path)?;
         Ok(Self(path.to_owned()))
     }
 
-    /// Writes the page, whole or not at all.
+    /// Writes the page completely or not at all.
     ///
     /// # Errors
-    /// As [`Self::new`], should the place have changed meanwhile; [`IoError`] when the system refuses to write.
+    /// As [`Self::new`], if the path has changed meanwhile; [`IoError`] if the system refuses to write.
     pub fn write(&self, page: &str) -> Result<()> {
         check(&self.0).in_file(&self.0)?;
         atomic::write(&self.0, page.as_bytes())
@@ -99,7 +99,7 @@ fn check(path: &Path) -> Result<()> {
     }
 }
 
-/// Whether products were, or are being, published into the folder.
+/// Whether products were published, or are being published, into the folder.
 fn is_published(folder: &Path) -> bool {
     folder.join(JOURNAL).exists() || read_manifest(folder).is_some()
 }

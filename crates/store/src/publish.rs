@@ -1,8 +1,8 @@
-//! Staged products go under their final names, and products that are no longer made go away.
+//! Gives staged products their final names, and removes products that are no longer made.
 //!
-//! Renaming many files is not one step for the file system, so a journal says that it has begun and
-//! which files may be concerned. While it lasts there is no manifest: a reader without a manifest has
-//! no products. Whoever finds a journal finishes the work by publishing again.
+//! Renaming many files is not atomic, so a journal records that it has begun and which files it may affect. While the
+//! journal exists there is no manifest: without a manifest a reader has no products. The next publication completes
+//! the work of a journal that it finds.
 //!
 //! The manifest comes last, and the next run checks every product against it.
 
@@ -31,21 +31,21 @@ const PUBLISH: &str = "publish";
 /// Name of the folder of stored stages.
 pub const CACHE: &str = ".cache";
 
-/// Name of the folder of half-made products.
+/// Name of the folder of incomplete products.
 pub(super) const STAGING: &str = ".staging";
 
-/// Paths below the site's folder that a publication under way may have made or will remove.
+/// Paths below the site's folder that a publication in progress may have created or will remove.
 pub(super) const JOURNAL: &str = ".publishing";
 
-/// The manifest of the products that stood in the folder before those that stand there.
+/// The manifest of the products that preceded the present ones.
 pub const PREVIOUS: &str = ".previous.json";
 
-/// Why the last run of the site failed; there is none after a run that did not.
+/// Why the last run of the site failed; absent after a successful run.
 const FAILED: &str = ".failed";
 
-/// Keeps why a run of the site failed, for the page over all sites; `None` when it did not.
+/// Stores why a run of the site failed, for the page over all sites; `None` if it succeeded.
 ///
-/// What the disk refuses is no matter here: the failure itself is told by whoever calls.
+/// Write errors are ignored here: the caller reports the failure itself.
 pub fn note_failure(site_folder: &Path, failure: Option<&str>) {
     let path = site_folder.join(FAILED);
     if let Some(text) = failure {
@@ -61,13 +61,13 @@ pub fn last_failure(site_folder: &Path) -> Option<String> {
     fs::read_to_string(site_folder.join(FAILED)).ok()
 }
 
-/// Where products of a site are made.
+/// Folder in which products of a site are made.
 #[must_use]
 pub fn staging_path(site_folder: &Path) -> PathBuf {
     site_folder.join(STAGING)
 }
 
-/// A folder for half-made products, which goes away with this value.
+/// A folder for incomplete products, which is removed with this value.
 #[derive(Debug)]
 pub struct Staging {
     folder: PathBuf,
@@ -83,15 +83,15 @@ impl Deref for Staging {
 
 impl Drop for Staging {
     fn drop(&mut self) {
-        // After a publication it is gone; what the disk does not give back now, the next run removes.
+        // After a publication it no longer exists; the next run removes files that cannot be removed now.
         let _ = fs::remove_dir_all(&self.folder);
     }
 }
 
-/// An empty folder for half-made products inside the site's folder, hence on the same file system.
+/// An empty folder for incomplete products inside the site's folder, hence on the same file system.
 ///
 /// # Errors
-/// The folder cannot be made, or an earlier one could not be removed.
+/// The folder cannot be created, or an earlier one could not be removed.
 pub fn staging(site_folder: &Path) -> Result<Staging> {
     let folder = site_folder.join(STAGING);
     fs::create_dir(&folder)
@@ -100,7 +100,7 @@ pub fn staging(site_folder: &Path) -> Result<Staging> {
     Ok(Staging { folder })
 }
 
-/// Whether a run ever worked in the folder: it holds stored stages or a publication under way.
+/// Whether a run ever worked in the folder: it contains stored stages or a publication in progress.
 #[must_use]
 pub fn has_work(site_folder: &Path) -> bool {
     [CACHE, STAGING, JOURNAL, FAILED]
@@ -131,7 +131,7 @@ pub fn entries(staging: &Path, files: &[(PathBuf, u64)]) -> Result<Vec<ProductEn
 
 /// Products of another kind in the folder, which a publication would remove.
 #[derive(Debug, thiserror::Error)]
-#[error("the folder holds other products: {name}, made by {stage}")]
+#[error("the folder contains other products: {name}, made by {stage}")]
 struct OtherKind {
     name: String,
     stage: String,
@@ -147,7 +147,7 @@ impl Cause for OtherKind {
     }
 }
 
-/// Makes sure that what stands in the folder was made by the same flow, if it was made: by one of the same stages.
+/// Ensures that existing products in the folder were made by the same flow, identified by one of its stages.
 fn require_same_kind(site_folder: &Path, next: &Manifest) -> Result<()> {
     let Some(standing) = read_manifest(site_folder) else {
         return Ok(());
@@ -204,7 +204,7 @@ pub fn publish(site_folder: &Path, staging: &Path, manifest: &Manifest) -> Resul
     for path in earlier.iter().filter(|path| !made.contains(&***path)) {
         let path = site_folder.join(path);
         remove_if_there(&path)?;
-        // The folder of an image that is no longer configured goes with its last file.
+        // The folder of an image that is no longer configured is removed with its last file.
         let _ = path.parent().map(fs::remove_dir);
     }
     for folder in &folders {
@@ -217,7 +217,7 @@ pub fn publish(site_folder: &Path, staging: &Path, manifest: &Manifest) -> Resul
         .in_file(staging)
 }
 
-/// Keeps the manifest that stands in the folder, if its products are others than those of `next`.
+/// Keeps the manifest of the folder, if its products differ from those of `next`.
 fn keep_previous(site_folder: &Path, next: &Manifest) -> Result<()> {
     match read_manifest(site_folder) {
         Some(standing) if standing.products != next.products => {
@@ -227,7 +227,7 @@ fn keep_previous(site_folder: &Path, next: &Manifest) -> Result<()> {
     }
 }
 
-/// The manifest of the products before those that stand in the folder; none of the first ones.
+/// The manifest of the preceding products; `None` for the first ones.
 #[must_use]
 pub fn read_previous(site_folder: &Path) -> Option<Manifest> {
     let text = fs::read_to_string(site_folder.join(PREVIOUS)).ok()?;
@@ -282,13 +282,13 @@ fn manifest_bytes(manifest: &Manifest) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The manifest that lies in the folder, if it can be read.
+/// The manifest of the folder, if it can be read.
 #[must_use]
 pub fn read_manifest(site_folder: &Path) -> Option<Manifest> {
     serde_json::from_slice(&fs::read(site_folder.join(MANIFEST)).ok()?).ok()
 }
 
-/// Products that are not what the manifest says, with what is there instead, or why it cannot be read.
+/// Products that differ from the manifest, with the difference, or why they cannot be read.
 pub(super) fn damaged<'a>(
     site_folder: &Path,
     manifest: &'a Manifest,
@@ -308,7 +308,7 @@ pub(super) fn damaged<'a>(
     })
 }
 
-/// The first product that is missing or not what the manifest says.
+/// The first product that is missing or differs from the manifest.
 #[must_use]
 pub fn damaged_product(site_folder: &Path, manifest: &Manifest) -> Option<String> {
     let (product, _) = damaged(site_folder, manifest).next()?;

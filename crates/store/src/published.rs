@@ -1,4 +1,4 @@
-//! Products as a reader finds them: whole and as the manifest says, or not to be used.
+//! Published products: complete and in agreement with the manifest, or not to be used.
 
 use std::{fs, io::ErrorKind, path::Path};
 
@@ -15,7 +15,7 @@ pub enum PublishedError {
     /// Nothing was published.
     #[error("there is no {MANIFEST}, so there are no products")]
     NoManifest,
-    /// A run was killed, or is at work, while files got their final names.
+    /// A run was killed, or is in progress, while files received their final names.
     #[error("the publication of products into this folder was not finished")]
     Unfinished,
     /// The manifest is damaged, or of a version with other entries.
@@ -24,18 +24,18 @@ pub enum PublishedError {
         /// The parser's reason, with line and column.
         reason: String,
     },
-    /// Products of a version that may have computed or kept other things.
+    /// Products of a version that may have computed or stored other results.
     #[error("these are products of areograph {found}; expected {}, the running version", env!("CARGO_PKG_VERSION"))]
     OtherVersion {
         /// That version.
         found: String,
     },
-    /// A product is not the one that was published.
+    /// A product differs from the published one.
     #[error(
         "{found}; expected {expected_bytes} bytes with the BLAKE3 hash {expected} of {MANIFEST}"
     )]
     Contradicts {
-        /// What is there instead.
+        /// The existing content.
         found: String,
         /// Size in the manifest.
         expected_bytes: u64,
@@ -77,15 +77,15 @@ pub fn is_site_folder(folder: &Path) -> bool {
     folder.join(MANIFEST).exists() || has_work(folder)
 }
 
-/// The manifest of a site's folder, every product checked against it.
+/// The manifest of a site's folder; every product is checked against it.
 ///
 /// # Errors
-/// [`PublishedError`], of kind input; the disk's refusal.
+/// [`PublishedError`], of kind input; read errors.
 pub fn read_published(folder: &Path) -> Result<Manifest> {
     read_published_but(folder, |_| false)
 }
 
-/// The same without those products, by their path, that will be made again; of this version of areograph.
+/// The same without the products, by their path, that will be made again; only of this version of areograph.
 ///
 /// # Errors
 /// As [`read_published`], and [`PublishedError::OtherVersion`].
@@ -132,7 +132,7 @@ fn read_published_but(folder: &Path, made_again: impl Fn(&str) -> bool) -> Resul
     Ok(manifest)
 }
 
-/// Checks that `manifest` still stands when its products have been read.
+/// Checks that `manifest` is still current after its products have been read.
 ///
 /// # Errors
 /// [`PublishedError::Replaced`].

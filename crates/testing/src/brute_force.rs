@@ -1,4 +1,4 @@
-//! Every shot of PEDR files, one after the other, with its position in IAU 2000: what a search is held against.
+//! Every shot of PEDR files, one after the other, with its position in IAU 2000: the reference for searches.
 
 use std::path::PathBuf;
 
@@ -9,15 +9,15 @@ use areograph_geom::{
 };
 use areograph_pds::pedr::{FieldGuard, File};
 
-/// A shot as its file has it, with file and record.
+/// A shot as in its file, with file and record.
 pub struct TrueShot {
-    /// The shot; `file` and `record` say where it is from.
+    /// The shot; `file` and `record` give its origin.
     pub shot: Footprint,
     /// East longitude and areocentric latitude in IAU 2000, radians.
     pub place_rad: [f64; 2],
 }
 
-/// Every shot with a return of files whose records are all good, in their order.
+/// Every shot with a return of files without bad records, in file order.
 pub fn every_shot(paths: &[PathBuf]) -> Vec<TrueShot> {
     let mut shots = Vec::new();
     for (index, path) in (0..).zip(paths) {

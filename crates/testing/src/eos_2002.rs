@@ -14,7 +14,7 @@ pub struct Ends {
     pub line_period_s: f64,
 }
 
-/// "Right": E02-02855, its start Y as it must read.
+/// "Right": E02-02855, with the corrected start Y.
 pub const RIGHT: Ends = Ends {
     start_km: [2_743.679, -2_435.358, -895.114],
     end_km: [2_749.133, -2_450.626, -836.828],
@@ -23,7 +23,7 @@ pub const RIGHT: Ends = Ends {
     lines: 9_856.0,
     line_period_s: 1.807_8e-3,
 };
-/// The start Y of "right" as it is printed.
+/// The start Y of "right" as printed.
 const MISPRINTED_Y_KM: f64 = -2_453.358;
 /// "Left": E04-01275.
 pub const LEFT: Ends = Ends {

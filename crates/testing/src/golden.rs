@@ -1,12 +1,12 @@
-//! Golden texts: what the program is expected to say stands in files beside the tests.
+//! Golden texts: the expected output of the program in files beside the tests.
 //!
-//! `SNAPSHOTS=overwrite cargo test` writes them anew; the difference is then for a person to read.
+//! `SNAPSHOTS=overwrite cargo test` rewrites them; the difference must then be reviewed.
 
 use std::{collections::BTreeSet, fs, path::PathBuf};
 
 use snapbox::{Assert, Data, IntoData, assert::DEFAULT_ACTION_ENV};
 
-/// The files of one folder that a test compares with, told all together at the end.
+/// The files of one folder that a test compares with, reported together at the end.
 pub struct Golden {
     folder: PathBuf,
     compared: BTreeSet<PathBuf>,
@@ -23,7 +23,7 @@ impl Golden {
         }
     }
 
-    /// Compares with the text file of this name, letter by letter but for what ends the last line.
+    /// Compares with the text file of this name, letter by letter except for the end of the last line.
     pub fn compare(&mut self, name: &str, found: &str) {
         let path = self.folder.join(name).with_extension("txt");
         let found = format!("{}\n", found.trim_end()).into_data();
@@ -35,13 +35,13 @@ impl Golden {
         assert!(self.compared.insert(path), "{name} is compared twice");
     }
 
-    /// Fails with every difference, and on text files that nothing was compared with.
+    /// Fails with every difference, and with text files that were not compared.
     pub fn finish(mut self) {
         for entry in fs::read_dir(&self.folder).unwrap() {
             let path = entry.unwrap().path();
             let text = path.extension().is_some_and(|extension| extension == "txt");
             if text && !self.compared.contains(&path) {
-                let left = format!("{}: no case says this\n", path.display());
+                let left = format!("{}: no case produces this\n", path.display());
                 self.differing.push(left);
             }
         }
@@ -55,7 +55,7 @@ impl Golden {
     }
 }
 
-/// Compares what a test was told, case by case, with `tests/messages/<name>.txt`.
+/// Compares the messages of a test, case by case, with `tests/messages/<name>.txt`.
 pub fn assert_messages<What: AsRef<str>>(name: &str, told: &[(What, String)]) {
     let told: Vec<String> = told
         .iter()

@@ -2,7 +2,7 @@
 
 use std::{env, fs};
 
-/// Fails where the file is not what the declarations say now; with `SNAPSHOTS=overwrite` writes it anew.
+/// Fails if the file differs from the present declarations; with `SNAPSHOTS=overwrite` rewrites it.
 pub fn is_up_to_date(relative: &str, expected: &str) {
     let path = crate::checkout().join(relative);
     if env::var("SNAPSHOTS").is_ok_and(|mode| mode == "overwrite") {
@@ -17,7 +17,7 @@ pub fn is_up_to_date(relative: &str, expected: &str) {
     let line = differs.unwrap_or_else(|| found.lines().count().min(expected.lines().count()));
     assert!(
         found == expected,
-        "{relative}: line {} is {:?}, the declarations say {:?}; write it anew with \
+        "{relative}: line {} is {:?}, the declarations give {:?}; rewrite it with \
          `SNAPSHOTS=overwrite` and the same test",
         line + 1,
         found.lines().nth(line),

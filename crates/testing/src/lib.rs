@@ -1,7 +1,7 @@
 //! What tests of several crates share: real data, expected texts, recipes of published simulations.
 //!
-//! Real data lie in `AREOGRAPH_DATA`, or beside the checkout in `shared/data`. A test that does not find what it needs
-//! from outside notes that it was skipped; `scripts/test` counts these notes.
+//! Real data are in `AREOGRAPH_DATA`, or beside the checkout in `shared/data`. A test whose external input is missing
+//! records that it was skipped; `scripts/test` counts these records.
 #![allow(
     missing_docs,
     clippy::disallowed_methods,
@@ -38,7 +38,7 @@ pub fn checkout() -> &'static Path {
     here.ancestors().nth(2).unwrap()
 }
 
-/// Makes sure that `answer` keeps the shipped schema `config/schema/<name>.schema.json`.
+/// Ensures that `answer` conforms to the shipped schema `config/schema/<name>.schema.json`.
 pub fn assert_keeps_schema(answer: &serde_json::Value, name: &str) {
     let path = checkout()
         .join("config/schema")
@@ -67,12 +67,12 @@ pub fn real_data(relative: &str, test: &str) -> Option<PathBuf> {
     None
 }
 
-/// Whether this is the long run, `scripts/test --long`: tests then take as many cases as they can.
+/// Whether this is the long run, `scripts/test --long`: tests then take as many cases as possible.
 pub fn long() -> bool {
     std::env::var_os("AREOGRAPH_LONG").is_some()
 }
 
-/// Whether `test` runs: one of more than 20 s is left to the long run, and notes it.
+/// Whether `test` runs: a test of more than 20 s is left to the long run, and recorded.
 pub fn long_test(test: &str) -> bool {
     let runs = long();
     if !runs {
@@ -81,8 +81,8 @@ pub fn long_test(test: &str) -> bool {
     runs
 }
 
-/// Whether this process runs the test alone; if not, a process of its own has run it, and it has passed there. For
-/// what is measured of a whole process.
+/// Whether this process runs only this test; if not, a separate process has run it, and it has passed there. For
+/// measurements of a whole process.
 pub fn alone() -> bool {
     const ALONE: &str = "AREOGRAPH_TEST_ALONE";
     let thread = std::thread::current();
@@ -144,7 +144,7 @@ pub const M0402852_KERNELS: [&str; 9] = [
     "mgs_sc_map2_1_sliced_-94000.bc",
 ];
 
-/// Line times of an image whose start does not matter: whole `lines` of `period_s` seconds.
+/// Line times of an image with an arbitrary start: whole `lines` of `period_s` seconds.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

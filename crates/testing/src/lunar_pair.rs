@@ -16,7 +16,7 @@ use serde_json::Value;
 
 pub const FOLDER: &str = "isis_lidar/lidarObservationPair";
 
-/// The images of the pair, as the files name them.
+/// The images of the pair, as named in the files.
 pub const SERIALS: [&str; 2] = ["LRO/1/286265995:36824/NACL", "LRO/1/286272781:34203/NACL"];
 
 pub fn read_json(path: &Path) -> Value {
@@ -45,7 +45,7 @@ pub fn shots(path: &Path) -> Vec<Shot> {
         .unwrap();
     let records = reader.records().map(|record| {
         let record = record.unwrap();
-        // Columns counted from 1, as the data's description does.
+        // Columns counted from 1, as in the data's description.
         let number = |column: usize| record[column - 1].parse::<f64>().unwrap();
         let position = |longitude: usize, radius_km: f64| {
             Position::new(spherical_to_xyz_m(
@@ -140,7 +140,7 @@ pub fn attitude(table: &Value, et_s: f64) -> Matrix3<f64> {
         .into_inner()
 }
 
-/// One image of the pair with what its support data say.
+/// One image of the pair with its support data.
 pub struct Image {
     pub orientation: SampledOrientation,
     pub detector: Detector,
@@ -177,7 +177,7 @@ impl Image {
             orientation: SampledOrientation::new(&samples).unwrap(),
             detector: Detector {
                 focal_length_px: number("/focal_length_model/focal_length") * pixels_per_mm,
-                // The centre of the first pixel is 0.5 there, as here.
+                // The centre of the first pixel is 0.5 in both conventions.
                 boresight_sample: number("/detector_center/sample"),
                 sample_sense: -1.0,
                 samples: number("/image_samples"),
@@ -205,7 +205,7 @@ impl Image {
         [solution.x + 0.5 * self.lines + 0.5, sample + 0.5]
     }
 
-    /// Where a camera without distortion has what this one has at `sample`; both 0 at the outer edge.
+    /// Position in a camera without distortion that corresponds to `sample` of this one; both 0 at the outer edge.
     pub fn ideal_sample(&self, sample: f64) -> f64 {
         let distorted_mm = self.detector.place_px(sample).y / self.pixels_per_mm;
         let ideal_mm = distorted_mm / (1.0 + self.distortion_per_mm2 * distorted_mm * distorted_mm);
@@ -239,7 +239,7 @@ pub struct LidarPoint {
     pub ground_m: Vector3<f64>,
     /// To the north, to the east, upwards.
     pub ground_sigma_m: [f64; 3],
-    /// Images that were exposed meanwhile.
+    /// Simultaneous images.
     pub simultaneous: Vec<String>,
     /// Image with line and sample as ISIS counts them.
     pub measures: Vec<(usize, [f64; 2])>,

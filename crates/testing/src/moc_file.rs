@@ -1,10 +1,10 @@
-//! Images of the camera that tests and benchmarks write, and what reading them takes.
+//! Images of the camera that tests and benchmarks write, and the cost of reading them.
 
 use std::fs;
 
 use areograph_pds::image_file::{Coding, NewImage};
 
-/// A narrow-angle image of some day.
+/// A narrow-angle image of an arbitrary day.
 pub fn new_image(samples: u32, summing: u8, pixels: &[u8], coding: Coding) -> NewImage<'_> {
     NewImage {
         product_id: "M01/00123",
@@ -20,7 +20,7 @@ pub fn new_image(samples: u32, summing: u8, pixels: &[u8], coding: Coding) -> Ne
     }
 }
 
-/// A number that the system tells of processes or threads, `key` in front of it.
+/// A number that the system reports for processes or threads, preceded by `key`.
 fn told(path: &str, key: &str) -> u64 {
     let status = fs::read_to_string(path).unwrap();
     let line = status.lines().find(|line| line.starts_with(key)).unwrap();

@@ -15,19 +15,18 @@ use super::{
     scene::{GUSEV, Scene},
 };
 
-/// Images of one place, each from an orbit of its own.
+/// Images of one place, each from a different orbit.
 pub const ORBITS: usize = 20;
-/// Orbits lie evenly between this far west and as far east of the place, degrees.
+/// Orbits are evenly spaced from this far west to this far east of the place, degrees.
 const FARTHEST_DEG: f64 = 2.45;
-/// A tie is measured in an image, in the one so many orbits on, and in the one as many on again: rays that converge, and
-/// images that hang together in a ring.
+/// Step between the three images of a tie, in orbits: rays converge, and the images are connected in a ring.
 const STEP: usize = 7;
-/// Of so many ties between two places one is measured in images of both.
+/// One in this number of ties between two places is measured in images of both.
 const LINKS: usize = 10;
 /// Shots along the track of the image that looks down most steeply.
 const SHOTS: usize = 120;
 
-/// Images over places that follow one another along the flight, half an image apart.
+/// Images over consecutive places along the flight, half an image apart.
 #[derive(Debug, Clone, Copy)]
 pub struct Orbits {
     pub places: usize,
@@ -41,14 +40,14 @@ pub struct Orbits {
     pub position_bias_m: f64,
 }
 
-/// An image as it truly flew, and as it is known.
+/// An image with its true and its known orientation.
 struct Flown {
     scene: Scene,
     truth: SampledOrientation,
     known: BundleImage<SampledOrientation>,
 }
 
-/// The lines of the samples of an orientation, 31 as the flow has them.
+/// The lines of the samples of an orientation, 31 as in the flow.
 pub fn instants(half_lines: f64) -> Vec<f64> {
     let samples = -15..=15;
     samples.map(|k| f64::from(k) / 15.0 * half_lines).collect()
@@ -73,7 +72,7 @@ impl Orbits {
             for orbit in 0..ORBITS {
                 flown.push(self.fly(&nadir, orbit, &mut normals));
             }
-            // The next place lies where this image ends.
+            // The next place is where this image ends.
             let end_m = nadir.boresight_ground_m(0.5 * nadir.duration_s).normalize();
             nadir.latitude_deg = end_m.z.asin().to_degrees();
             nadir.longitude_deg = end_m.y.atan2(end_m.x).to_degrees();
@@ -122,7 +121,7 @@ impl Orbits {
         }
     }
 
-    /// A tie in three images; one of [`LINKS`] in two images of its place and in one of the next.
+    /// A tie in three images; one in [`LINKS`] is in two images of its place and in one of the next.
     fn tie(
         &self,
         tie: usize,

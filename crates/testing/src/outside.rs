@@ -1,12 +1,12 @@
-//! What tests need from outside the project, noted test by test; `scripts/test` counts it at the end.
+//! External requirements of tests, recorded test by test; `scripts/test` counts them at the end.
 
 use std::{env, fs, path::PathBuf};
 
-/// Folder of the notes of one run of all tests; nothing is noted where nobody asks for it.
+/// Folder of the records of one run of all tests; without it nothing is recorded.
 const NOTES: &str = "AREOGRAPH_TEST_NOTES";
 
-/// Writes what a test says of itself under a name that is its own: its program's and its function's, after which
-/// the harness names its thread; run in one thread, it is known by its words.
+/// Writes the record of a test under a unique name: that of its program and its function, after which the harness
+/// names its thread; in a single-threaded run, its text is used.
 fn note(folder: &str, test: &str, text: &str) {
     let Some(notes) = env::var_os(NOTES) else {
         return;
@@ -23,13 +23,13 @@ fn note(folder: &str, test: &str, text: &str) {
     fs::write(folder.join(name), text).unwrap();
 }
 
-/// The test has what it needs.
+/// The requirements of the test are met.
 pub fn found(test: &str) {
     note("found", test, "");
 }
 
-/// The test does nothing, for this reason.
-#[allow(clippy::print_stderr, reason = "tests say what they skip")]
+/// The test is skipped, for this reason.
+#[allow(clippy::print_stderr, reason = "tests report what they skip")]
 pub fn skipped(test: &str, why: &str) {
     eprintln!("skipped {test}: {why}");
     note("skipped", test, why);

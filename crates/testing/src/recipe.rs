@@ -1,4 +1,4 @@
-//! A stereo pair like Gusev's with MOLA shots and tie points, its truth known.
+//! A stereo pair like Gusev's with MOLA shots and tie points, and its true values.
 
 use areograph_geom::{
     bundle::{Adjustment, BundleImage, BundlePoint, KnownCoordinates, Network, Range, View},
@@ -15,9 +15,10 @@ use super::scene::{GUSEV, Held, Scene};
 
 /// Half the width of an image that sums two pixels, pixels.
 pub const HALF_SWATH_PX: f64 = 512.0;
-/// Shots so far outside a swath still count as measured in it, pixels.
+/// Shots within this distance outside a swath count as measured in it, pixels.
 const OUTSIDE_PX: f64 = 200.0;
-/// From perspective centre to ground, roughly: turns a standard deviation of positions into one of angles.
+/// Approximate distance from perspective centre to ground: converts a standard deviation of positions to one of
+/// angles.
 pub const RANGE_M: f64 = 380e3;
 /// Interval of MOLA's shots, seconds.
 pub const SHOT_INTERVAL_S: f64 = 0.1;
@@ -50,7 +51,7 @@ impl Normals {
     }
 }
 
-/// What is simulated.
+/// Parameters of the simulation.
 #[derive(Debug, Clone, Copy)]
 pub struct Recipe {
     /// Latitude and longitude of the nadir image, degrees.
@@ -59,7 +60,7 @@ pub struct Recipe {
     pub ties: usize,
     /// Shots along the track of each image.
     pub shots: [usize; 2],
-    /// Lines by which the tags of each image are late.
+    /// Delay of the time tags of each image, lines.
     pub shift_lines: [f64; 2],
     /// Standard deviation of a constant error of each image's position, metres.
     pub position_bias_m: f64,
@@ -67,7 +68,7 @@ pub struct Recipe {
     pub range_noise_m: f64,
     /// Noise of ties, lines and pixels.
     pub tie_noise: f64,
-    /// Image coordinates of shots that are kept: all of the own image, of the other those nearest its middle.
+    /// Image coordinates of shots that are kept: all in their own image, and in the other image those nearest its middle.
     pub mola_views: usize,
 }
 
@@ -97,10 +98,10 @@ impl Recipe {
     };
 }
 
-/// A network and what it should be.
+/// A network and its true values.
 #[derive(Debug, Clone)]
 pub struct Simulated<M> {
-    /// Initial orientations are the true ones, late and off their place.
+    /// Initial orientations are the true ones with errors of time and position.
     pub network: Network<CorrectedOrientation<M>>,
     /// The images.
     pub scenes: [Scene; 2],
@@ -113,7 +114,7 @@ pub struct Simulated<M> {
 }
 
 impl<M: ExteriorOrientation> Simulated<M> {
-    /// The same observations with other initial orientations, made from the former ones.
+    /// The same observations with other initial orientations, derived from the present ones.
     pub fn based_on<N>(
         &self,
         base: impl Fn(&BundleImage<CorrectedOrientation<M>>) -> N,
@@ -141,7 +142,7 @@ impl<M: ExteriorOrientation> Simulated<M> {
     }
 }
 
-/// The pair: nadir image, and one from an orbit 2.45° west that looks at the same ground.
+/// The pair: the nadir image, and one from an orbit 2.45° west that is aimed at the same ground.
 pub fn pair([latitude_deg, longitude_deg]: [f64; 2]) -> [Scene; 2] {
     let nadir = Scene {
         latitude_deg,
@@ -151,7 +152,7 @@ pub fn pair([latitude_deg, longitude_deg]: [f64; 2]) -> [Scene; 2] {
     [nadir, aimed(&nadir, -2.45)]
 }
 
-/// An image from an orbit `east_deg` beside that of `nadir` which looks at the same ground.
+/// An image from an orbit `east_deg` beside that of `nadir`, aimed at the same ground.
 pub fn aimed(nadir: &Scene, east_deg: f64) -> Scene {
     let oblique = Scene {
         longitude_deg: nadir.longitude_deg + east_deg,
@@ -171,14 +172,14 @@ pub fn held_on(mut oblique: Scene, target_m: &Vector3<f64>) -> Scene {
         };
         let camera_m = unrolled.pose(0.0).camera_vector_m(target_m);
         let roll_deg = camera_m.y.atan2(camera_m.z).to_degrees();
-        // The camera flies along its −X: what lies ahead has a negative x.
+        // The camera flies along its −X: points ahead have a negative x.
         oblique.latitude_deg -= (camera_m.x / target_m.norm()).to_degrees();
         oblique.held = Held::Inertial { roll_deg };
     }
     oblique
 }
 
-/// Standard deviations of the paper: `sigma_m` for positions, the same on the ground for angles.
+/// Standard deviations of the paper: `sigma_m` for positions, the equivalent on the ground for angles.
 pub fn sigmas(sigma_m: f64) -> [f64; 18] {
     std::array::from_fn(|index| {
         if index < 9 {
@@ -214,12 +215,12 @@ pub fn ray(image: &BundleImage<impl ExteriorOrientation>, x_lines: f64, y_px: f6
 }
 
 impl Recipe {
-    /// With the sensor model of the papers as the truth.
+    /// With the sensor model of the papers as the true orientation.
     pub fn simulate(&self) -> Simulated<EulerPolynomial> {
         self.simulate_with(|scene| scene.euler(2))
     }
 
-    /// With any sensor model of the scenes as the truth.
+    /// With any sensor model of the scenes as the true orientation.
     pub fn simulate_with<M: ExteriorOrientation + Clone>(
         &self,
         model: impl Fn(&Scene) -> M,
@@ -227,7 +228,7 @@ impl Recipe {
         self.simulate_pair(pair(self.place_deg), model)
     }
 
-    /// The same for other images, of which the first looks down.
+    /// The same for other images; the first is a nadir image.
     pub fn simulate_pair<M: ExteriorOrientation + Clone>(
         &self,
         scenes: [Scene; 2],
@@ -315,7 +316,7 @@ impl Recipe {
                 points_m.push(point_m);
             }
         }
-        // MOLA's image coordinates are where the initial orientation puts its footprints.
+        // MOLA's image coordinates are projections of its footprints with the initial orientation.
         let mut views = Vec::new();
         for (image, entry) in network.images.iter().enumerate() {
             let projector = Projector::new(&entry.base, 2.0 * entry.half_lines).unwrap();

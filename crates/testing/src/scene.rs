@@ -1,4 +1,4 @@
-//! Images of Shan et al. 2005 from first principles: a circular two-body orbit over a turning sphere.
+//! Images of Shan et al. 2005 from first principles: a circular two-body orbit over a rotating sphere.
 
 use areograph_base::units::RADIANS_PER_DEGREE;
 use areograph_geom::{
@@ -22,25 +22,25 @@ pub const INCLINATION_DEG: f64 = 92.9;
 const MARS_RATE_RAD_S: f64 = 7.088_218e-5;
 /// Radius of the ground, metres.
 pub const GROUND_RADIUS_M: f64 = 3_395_800.0;
-/// Focal length over the detector's pitch, as the papers have them (3500 mm, 13 µm).
+/// Focal length over the detector's pitch, as in the papers (3500 mm, 13 µm).
 const FOCAL_LENGTH_DETECTORS: f64 = 3_500.0 / 0.013;
 
-/// How the camera is held.
+/// Attitude of the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Held {
-    /// Turning with the orbit, towards nadir.
+    /// Rotating with the orbit, towards nadir.
     Nadir,
-    /// At rest among the stars, this many degrees to the side.
+    /// Fixed inertially, this many degrees to the side.
     Inertial { roll_deg: f64 },
 }
 
-/// When the published iterations end: the papers' tolerance.
+/// Termination of the published iterations: the papers' tolerance.
 pub const PAPER: Limits = Limits {
     tolerance_lines: 0.1,
     steps_max: 100,
 };
 
-/// What the published iterations cost on some points.
+/// Cost of the published iterations on some points.
 #[derive(Debug, Clone, Copy)]
 pub struct Iterations {
     /// Mean evaluations of the frame-first iteration.
@@ -153,7 +153,7 @@ impl Scene {
         }
     }
 
-    /// Where the boresight meets the ground `at_s` seconds from the middle.
+    /// Intersection of the boresight with the ground `at_s` seconds from the middle.
     pub fn boresight_ground_m(&self, at_s: f64) -> Vector3<f64> {
         let pose = self.pose(at_s);
         let ray = pose.mars_to_camera.row(2).transpose();
@@ -173,7 +173,7 @@ impl Scene {
             .collect()
     }
 
-    /// Both iterations of second order, on points that they all find.
+    /// Both iterations of second order, on points that both find.
     pub fn iterations(&self, points_m: &[Vector3<f64>], limits: &Limits) -> Iterations {
         let model = self.euler(2);
         let frame_first = FrameFirst::new(&model, self.focal_length_px()).unwrap();

@@ -10,7 +10,7 @@ pub const DEGREE: f64 = std::f64::consts::PI / 180.0;
 /// A little less than one polar revolution and a half.
 pub const FRAMES: u32 = 5_000;
 
-/// Ground longitude and latitude, radians, `time_s` after the start: a circular polar orbit over turning Mars.
+/// Ground longitude and latitude, radians, `time_s` after the start: a circular polar orbit over rotating Mars.
 fn ground(time_s: f64) -> [f64; 2] {
     let along_rad = 0.9 + time_s * 8.9e-4;
     let inclination_rad = 92.9 * DEGREE;
@@ -19,7 +19,7 @@ fn ground(time_s: f64) -> [f64; 2] {
     [wrap_pi(node_rad - 7.088e-5 * time_s), latitude_rad]
 }
 
-/// An areoid as flat as Mars.
+/// An areoid with the flattening of Mars.
 fn areoid_radius_m(latitude_rad: f64) -> f64 {
     3.396e6 - 2e4 * latitude_rad.sin().powi(2)
 }
@@ -65,7 +65,7 @@ fn frame(number: u32) -> FrameValues {
     values
 }
 
-/// Puts the spacecraft where the beam comes from that the parallax tells, and the ranges that belong to it.
+/// Places the spacecraft on the beam that the parallax implies, and sets the corresponding ranges.
 fn look_along_the_parallax(values: &mut FrameValues) {
     let height_m = values.spacecraft_radius_m - values.mid_radius_m;
     values.spacecraft_longitude_rad =

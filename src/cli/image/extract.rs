@@ -41,7 +41,7 @@ pub(super) struct Arguments {
     mask: Option<PathBuf>,
 }
 
-/// An ending of another format.
+/// An unsupported extension.
 #[derive(Debug, thiserror::Error)]
 #[error("{}; expected the extension .png, .tif or .tiff", .0.display())]
 struct Ending(PathBuf);
@@ -56,7 +56,7 @@ impl Cause for Ending {
     }
 }
 
-/// An image of which not a line can be read.
+/// An image without a readable line.
 #[derive(Debug, thiserror::Error)]
 #[error("no line of the image can be read")]
 struct NoLines;
@@ -71,7 +71,7 @@ impl Cause for NoLines {
     }
 }
 
-/// A radiometric correction of what has no label with gain and offset.
+/// A radiometric correction of a file whose label does not state gain and offset.
 #[derive(Debug, thiserror::Error)]
 #[error("--calibrate requires an image file of the archive, whose label states gain and offset")]
 struct NotOfTheArchive;
@@ -86,14 +86,14 @@ impl Cause for NotOfTheArchive {
     }
 }
 
-/// Numbers beyond those of the pixels that the correction of odd and even samples may reach.
+/// Margin beyond the range of the pixels for the correction of odd and even samples, DN.
 const ROOM_DN: f64 = 16.0;
 
-/// From a number to a value of 16 bits.
+/// Conversion of a DN to a 16-bit value.
 struct Calibration {
     radiometry: Radiometry,
     odd_even_dn: f64,
-    /// Radiance of the value 0, and of a step.
+    /// Radiance of the value 0, and increment per step.
     least: f64,
     step: f64,
 }
@@ -174,7 +174,7 @@ fn format(path: &Path) -> Result<PictureFormat> {
     }
 }
 
-/// Shows all strips of an image; how many complaints that gave.
+/// Passes every strip of an image to `show`; returns the number of complaints.
 fn each(image: &PixelFile, mut show: impl FnMut(&Strip) -> Result<()>) -> Result<u64> {
     let mut strips = image.strips()?;
     while let Some(strip) = strips.next_strip()? {
@@ -196,12 +196,12 @@ fn notes(image: &PixelFile, calibration: Option<&Calibration>) -> Vec<(&'static 
         let zero = if calibration.radiometry.knows_zero {
             ""
         } else {
-            ", less a constant that is not known"
+            ", less an unknown constant"
         };
         notes.push((
             "Description",
             format!(
-                "radiance in DN/ms at gain 1{zero} = {:e} + {:e} * value; {:.3} DN added to odd samples, taken from even ones",
+                "radiance in DN/ms at gain 1{zero} = {:e} + {:e} * value; {:.3} DN added to odd samples, subtracted from even ones",
                 calibration.least, calibration.step, calibration.odd_even_dn
             ),
         ));

@@ -51,7 +51,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     if arguments.json {
         output::json(&answers.into());
     }
-    // Every file is shown first; the last failure is told by whoever called.
+    // Every file is shown first; the caller reports the last failure.
     let last = failures.pop();
     failures.iter().for_each(output::error);
     last.map_or(Ok(()), Err)

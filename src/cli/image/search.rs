@@ -29,13 +29,13 @@ struct Found {
     image: IndexedImage,
     centre_rad: [f64; 2],
     outline: ImageOutline,
-    /// Identifiers of the windows that it meets.
+    /// Identifiers of the windows that it intersects.
     windows: Vec<String>,
-    /// How far its worst corner lies from where kernels have it, metres; `None` where nothing tells.
+    /// Largest distance of a corner from its position by the kernels, metres; `None` if unknown.
     off_kernels_m: Option<f64>,
 }
 
-/// Mean radius of Mars, metres: what turns kilometres into angles where an image has no corners.
+/// Mean radius of Mars, metres; converts kilometres to angles where an image has no corners.
 const RADIUS_M: f64 = 3_389_500.0;
 
 pub(super) fn run(arguments: &Arguments) -> Result<()> {
@@ -51,7 +51,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
         tell_index(path, &index);
         found.extend(found_in(path, index, arguments, &regions));
     }
-    // Volumes have all images up to theirs: an image of two indexes is one.
+    // The index of a volume contains all earlier images: duplicates are merged.
     found.sort_by(|a, b| a.image.product_id.cmp(&b.image.product_id));
     found.dedup_by(|a, b| a.image.product_id == b.image.product_id);
     if let Some(metakernel) = &arguments.kernels {
@@ -92,7 +92,7 @@ fn tell_index(path: &Path, index: &ImageIndex) {
     }
 }
 
-/// The images of an index that are wanted and meet a window; what the index does not say is told.
+/// The requested images of an index that intersect a window; values that the index lacks are reported.
 fn found_in(
     path: &Path,
     index: ImageIndex,
@@ -140,7 +140,7 @@ fn found_in(
     found
 }
 
-/// Centre and outline of an image; none of one without a centre, or without corners and size.
+/// Centre and outline of an image; `None` without a centre, or without both corners and size.
 fn place(image: &IndexedImage) -> Option<([f64; 2], ImageOutline)> {
     let centre_rad = image.centre_rad?;
     let [width_m, height_m] = image.extent_m;
@@ -152,7 +152,7 @@ fn place(image: &IndexedImage) -> Option<([f64; 2], ImageOutline)> {
     Some((centre_rad, outline))
 }
 
-/// The image, if it may show ground of a window.
+/// The image, if it may show ground inside a window.
 fn meeting(
     image: IndexedImage,
     centre_rad: [f64; 2],

@@ -41,7 +41,7 @@ pub(super) struct Arguments {
     /// Compare over the times for which this site needs kernels, with its pointing bias.
     #[arg(long, value_name = "SITE.toml")]
     site: Option<PathBuf>,
-    /// Answer in JSON, deviations at every epoch included.
+    /// Print JSON, including the deviations at every epoch.
     #[arg(long)]
     json: bool,
     /// Write a page with tables and plots to this file; its folder must exist, and products are not overwritten.
@@ -49,7 +49,7 @@ pub(super) struct Arguments {
     page: Option<PathBuf>,
 }
 
-/// A command line that asks for no comparison.
+/// A command line that does not define a comparison.
 #[derive(Debug, thiserror::Error)]
 enum Usage {
     #[error("kernel sets to compare: {count}; expected two or more")]
@@ -136,7 +136,7 @@ fn page(compared: &Compared) -> Result<String, Error> {
     })
 }
 
-/// The sets by the names of their metakernels, by their paths where two have one name.
+/// The sets by the names of their metakernels, or by their paths where names coincide.
 fn named(paths: &[PathBuf]) -> Result<Vec<RivalSet>, Error> {
     let stem = |path: &Path| path.file_stem().map(ToOwned::to_owned);
     let sets = paths.iter().map(|path| {
@@ -155,7 +155,7 @@ fn named(paths: &[PathBuf]) -> Result<Vec<RivalSet>, Error> {
     sets.collect()
 }
 
-/// The same stretch of positions and attitudes; `kernels` convert its ends.
+/// The same interval for positions and attitudes; `kernels` convert its ends.
 fn wanted_by_time(
     written: &str,
     bias: PointingBias,
@@ -246,7 +246,7 @@ fn print_table(comparison: &Comparison, unit: f64, attitude: Option<&AttitudeCom
     let closest = &comparison.closest().set;
     let tied: Vec<&str> = comparison.tied_sets().collect();
     if let [_, _] = &*comparison.deviations {
-        output::line("  two sets are equally far from their mean: which is better takes a third");
+        output::line("  two sets are equally far from their mean: a third set is needed to choose one");
     } else if tied.is_empty() {
         output::line(format_args!("  closest to the mean of all: {closest}"));
     } else {
@@ -265,6 +265,6 @@ fn print_table(comparison: &Comparison, unit: f64, attitude: Option<&AttitudeCom
         output::line(format_args!("  pulls the mean towards itself: {}", far.set));
     }
     if let Some(far) = comparison.decided_by() {
-        output::line(format_args!("  which set is closest rests on {}", far.set));
+        output::line(format_args!("  the choice of the closest set depends on {}", far.set));
     }
 }

@@ -1,4 +1,4 @@
-//! Which shots are kept, on the command line.
+//! Filter of shots on the command line.
 
 use clap::{Args, builder::TypedValueParser, value_parser};
 
@@ -32,7 +32,7 @@ impl FilterArguments {
     }
 }
 
-/// A trigger channel, as the site file takes them.
+/// A trigger channel, as in the site file.
 fn channel() -> impl TypedValueParser<Value = u8> {
     let [first, last] = ShotFilter::CHANNELS.map(i64::from);
     value_parser!(u8).range(first..=last)

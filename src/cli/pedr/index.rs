@@ -69,7 +69,7 @@ impl Cause for NotEncoded {
 /// Indexing cannot be interrupted gracefully; killing it is harmless.
 static RUN_ON: AtomicBool = AtomicBool::new(false);
 
-/// What becomes of the files.
+/// Outcome for the files.
 #[derive(Default)]
 struct Outcome {
     files: Vec<IndexedFile>,
@@ -103,7 +103,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let encoded = index.encode().ok_or(NotEncoded).in_file(&path)?;
     atomic::write(&path, &encoded)?;
     output::line(format_args!(
-        "{}: {files} files of {bytes} bytes, {read} of them read now, {gone} gone; {} bytes",
+        "{}: {files} files of {bytes} bytes, {read} of them read now, {gone} removed; {} bytes",
         path.display(),
         encoded.len()
     ));
@@ -115,7 +115,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     Err(first)
 }
 
-/// The entries of files below folders that cannot be listed, such as one that is not mounted: they count again when it is.
+/// Entries of files below folders that cannot be listed, such as an unmounted one; they are used again once it is
+/// mounted.
 fn unseen(earlier: &Index, folder: &Path, failures: &[Error]) -> Vec<IndexedFile> {
     let closed: Vec<&PathBuf> = failures.iter().filter_map(|of| of.file.as_ref()).collect();
     let is_unseen = |file: &&IndexedFile| {
@@ -126,7 +127,7 @@ fn unseen(earlier: &Index, folder: &Path, failures: &[Error]) -> Vec<IndexedFile
 }
 
 impl Outcome {
-    /// Takes over what is known of a file, or reads it.
+    /// Reuses the entry of a file, or reads the file.
     fn add(&mut self, arguments: &Arguments, earlier: &Index, path: &Path) -> Result<(), Error> {
         let below = path.strip_prefix(&arguments.folder).unwrap_or(path);
         let metadata = fs::metadata(path)
@@ -152,7 +153,7 @@ impl Outcome {
     }
 }
 
-/// How the file differs from what was indexed.
+/// How the file differs from the indexed one.
 fn altered(path: &Path, known: &IndexedFile) -> Result<Option<Altered>, Error> {
     let (is, _) = hash_file(path)?;
     let was = known.blake3();

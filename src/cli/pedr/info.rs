@@ -67,7 +67,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     if arguments.json {
         output::json(&answers.into());
     }
-    // Every file is shown first; the last of the useless ones is told by whoever called.
+    // Every file is shown first; the caller reports the last unusable one.
     let last = useless.pop();
     useless.iter().for_each(output::error);
     last.map_or(Ok(()), Err)
@@ -111,7 +111,7 @@ fn info(path: &Path, file: &File, clock: Option<&Session>) -> Result<(Counts, Va
     Ok((counts, answer))
 }
 
-/// The answer as a table: counts and statistics in lines of their own.
+/// The answer as a table; counts and statistics are on separate lines.
 fn print(counts: &Counts, answer: &Value) {
     for (key, value) in answer.as_object().into_iter().flatten() {
         let counted = match key.as_str() {

@@ -51,7 +51,8 @@ pub(super) struct Arguments {
     /// Variance of heights that a segment must exceed, square metres.
     #[arg(long, value_name = "M2", default_value_t = 1_000.0, value_parser = above_zero)]
     least_variance: f64,
-    /// Similarity of heights; auto takes pearson while the model lies off by more than a tenth of the relief, or 100 m, else ccc.
+    /// Similarity of heights; auto uses pearson while the model is offset by more than a tenth of the relief, or 100
+    /// m, else ccc.
     #[arg(long, value_enum, default_value_t = Measure::Auto)]
     similarity: Measure,
     /// Search radius of the shifts in each direction, cells.
@@ -157,7 +158,7 @@ impl Arguments {
     }
 }
 
-/// Matches and prints how it ended.
+/// Matches and prints the outcome.
 pub(super) fn run(arguments: &Arguments) -> ExitCode {
     let request = match arguments.request() {
         Ok(request) => request,

@@ -18,7 +18,7 @@ use crate::{
     flow::{ArchiveOutcome, ArchiveProgress, ArchiveRequest, check_archive},
 };
 
-/// How often progress is told where there is no terminal.
+/// Interval of progress lines without a terminal.
 const TOLD_EVERY: Duration = Duration::from_secs(10);
 
 /// Checks every shot of an archive against kernels: measured range minus distance, profile by profile.
@@ -57,7 +57,7 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-/// A clock bias beyond what a clock can have.
+/// An implausible clock bias.
 #[derive(Debug, thiserror::Error)]
 #[error("--clock-bias-s is {0}; expected -10 to 10")]
 struct ClockBias(f64);
@@ -72,7 +72,7 @@ impl Cause for ClockBias {
     }
 }
 
-/// Profiles that break limits, or that could not be checked.
+/// Profiles that exceed limits, or that could not be checked.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "the archive is invalid against these kernels, or was checked only in part; products were written"
@@ -116,7 +116,7 @@ impl Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     if let Some(threads) = arguments.threads {
-        // The only failure is a pool that exists already; then its size stands.
+        // The only failure is an existing pool, which keeps its size.
         let _ = rayon::ThreadPoolBuilder::new()
             .num_threads(usize::from(threads.get()))
             .build_global();
@@ -181,7 +181,7 @@ fn print(arguments: &Arguments, outcome: &ArchiveOutcome) -> Result<(), Error> {
     }
 }
 
-/// Tells progress on standard error: a line that is written over on a terminal, else a line now and then.
+/// Reports progress on standard error: a line that is overwritten on a terminal, else a line at intervals.
 struct Telling {
     begun: Instant,
     is_terminal: bool,
@@ -207,7 +207,7 @@ impl Telling {
         *told = Some(Instant::now());
         let line = words(progress, self.begun.elapsed());
         let mut out = std::io::stderr().lock();
-        // Nobody reads it: no failure.
+        // A closed standard error is not a failure.
         let _ = if self.is_terminal {
             write!(out, "\r\x1b[K{line}").and_then(|()| out.flush())
         } else {
@@ -215,7 +215,7 @@ impl Telling {
         };
     }
 
-    /// Leaves the line on a terminal.
+    /// Ends the line on a terminal.
     fn end(&self) {
         let told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
         if self.is_terminal && told.is_some() {
@@ -224,7 +224,7 @@ impl Telling {
     }
 }
 
-/// How far a check is after so long, and how long it may still take.
+/// Progress of a check after the time `taken`, with the estimated time left.
 fn words(progress: &ArchiveProgress, taken: Duration) -> String {
     let taken_s = taken.as_secs_f64();
     let of = format!("{} of {} files", progress.files_done, progress.files);

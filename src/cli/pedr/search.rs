@@ -19,7 +19,7 @@ use crate::{
     time::{Et, Interval},
 };
 
-/// Rows that are not in the order of time, or stand in an earlier file as well.
+/// Rows that are not in time order, or that an earlier file contains as well.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "{rows} rows are not in time order, the first in record {record}, after a shot of {before}"
@@ -36,7 +36,7 @@ impl Cause for NotInOrder {
     }
 
     fn advice(&self) -> String {
-        "if both files hold the same orbits, name only one of them: otherwise the answer contains their shots twice"
+        "if both files contain the same orbits, name only one of them: otherwise the answer contains their shots twice"
             .to_owned()
     }
 }
@@ -87,7 +87,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     answer.end()
 }
 
-/// What is found, and what fails.
+/// Results and failures.
 #[derive(Default)]
 struct Answer {
     file: Option<ShotsFile>,
@@ -99,7 +99,7 @@ struct Answer {
     failures: Vec<Error>,
     complaints: Vec<String>,
     complaint_counts: BTreeMap<String, u64>,
-    /// Records with shots that are left out for a complaint: some may have been in a window.
+    /// Records whose shots are left out because of a complaint; some may lie in a window.
     records_left_out: u64,
     rejected: BTreeMap<String, u64>,
     frames_read: u64,
@@ -111,7 +111,7 @@ struct Answer {
 }
 
 impl Answer {
-    /// What was asked for, and how complete the answer is.
+    /// The request, and the completeness of the answer.
     fn tell(
         &self,
         arguments: &Arguments,
@@ -166,7 +166,7 @@ impl Answer {
         told
     }
 
-    /// The failures of an answer that is not what was asked for.
+    /// The failures of an answer that does not meet the request.
     fn end(self) -> Result<()> {
         let disorder = self.disorder.into_iter();
         let disorder = disorder.map(|(disorder, path)| Error::from(disorder).in_file(path));
@@ -178,7 +178,7 @@ impl Answer {
         Err(first)
     }
 
-    /// Notices rows that are earlier than one before them, or that an earlier file holds as well.
+    /// Detects rows that precede an earlier row in time, or that an earlier file contains as well.
     fn follow(&mut self, file: usize, footprints: &Footprints<AsRead>) {
         for (record, tag_s) in footprints.record.iter().zip(&footprints.et_tag_s) {
             let holder = self.seen.take(file, *tag_s);

@@ -68,11 +68,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     );
     let tally = table.tally();
     let runtime = tokio::runtime::Builder::new_current_thread().build();
-    let runtime = runtime.map_err(IoError::on("begin an asynchronous runtime"))?;
+    let runtime = runtime.map_err(IoError::on("start an asynchronous runtime"))?;
     let answered = runtime.block_on(answer(table, arguments, signals.stop()));
     let mut tally = tally.lock().unwrap_or_else(PoisonError::into_inner);
     tell(&tally);
-    // What failed beyond the last row that was asked for does not count.
+    // Failures beyond the last requested row are ignored.
     answered.map_err(|told| tally.failure.take().unwrap_or(told))
 }
 

@@ -61,7 +61,7 @@ pub(super) struct Arguments {
     out: PathBuf,
 }
 
-/// Whose program.
+/// Program whose output is reproduced.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Program {
     /// Program of the MOLA team: off-nadir angle in 7 columns, packet and orbit in 6.
@@ -70,7 +70,7 @@ enum Program {
     Usgs,
 }
 
-/// The file is none that pedr2tab takes.
+/// A file that pedr2tab does not accept.
 #[derive(Debug, thiserror::Error)]
 #[error("the label does not begin with CCSD3ZF0")]
 struct NoMarker;
@@ -86,7 +86,7 @@ impl Cause for NoMarker {
     }
 }
 
-/// Two files whose tables have one name.
+/// Two files whose tables have the same name.
 #[derive(Debug, thiserror::Error)]
 #[error("would be the table of {} and of {}; expected a table for each", .0.display(), .1.display())]
 struct OneName(PathBuf, PathBuf);
@@ -103,7 +103,7 @@ impl Cause for OneName {
     }
 }
 
-/// Preferences where the program looks for them.
+/// Default preferences file.
 const PREFERENCES: &str = "PEDR2TAB.PRM";
 /// Complaints printed of a file; all are counted.
 const COMPLAINTS_PRINTED: usize = 20;
@@ -174,7 +174,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     failure.map_or(Ok(()), Err)
 }
 
-/// Those of the file that was named, else of the usual one, which need not be there.
+/// Preferences of the named file, else of the default one, which is optional.
 fn read_preferences(named: Option<&Path>) -> Result<Preferences> {
     let path = named.unwrap_or(Path::new(PREFERENCES));
     let bytes = match fs::read(path) {
@@ -221,7 +221,7 @@ fn files(input: &Path) -> Result<(Vec<PathBuf>, bool)> {
     Ok((files, true))
 }
 
-/// The table of each file: none of them is another one's, or a file that is read.
+/// The table of each file; no table is shared or is an input file.
 fn tables(
     arguments: &Arguments,
     files: &[PathBuf],
@@ -248,7 +248,8 @@ fn tables(
     Ok(tables)
 }
 
-/// Name of the one table, or of a file's own: the last eight characters before its extension, and that of the template.
+/// Name of the common table, or of the table of a file: the last eight characters before its extension, and the
+/// extension of the template.
 fn table_name(path: &Path, preferences: &Preferences) -> String {
     let template = preferences.table_name.as_str();
     if preferences.one_table {
@@ -274,7 +275,7 @@ fn tell(path: &Path, shots: u64, complaints: &[Complaint]) {
     }
 }
 
-/// A table under way: it gets its name when it is whole.
+/// An unfinished table; it gets its name once it is complete.
 struct Output {
     file: StagedFile,
     writer: BufWriter<fs::File>,

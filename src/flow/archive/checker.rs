@@ -1,4 +1,4 @@
-//! The threads that check what is loaded.
+//! The threads that check loads.
 
 use std::{
     collections::BTreeMap,
@@ -13,7 +13,7 @@ use crate::{
     store::cache::StageCache,
 };
 
-/// How far a check is.
+/// Progress of a check.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ArchiveProgress {
     /// Files that are done, those whose result was stored included.
@@ -32,30 +32,30 @@ pub struct ArchiveProgress {
 
 /// A part of a file on its way to the threads that check it.
 pub(super) struct Part {
-    /// Which of the files.
+    /// Index of the file.
     pub(super) file: usize,
     /// Its size.
     pub(super) bytes: u64,
-    /// The part, or why there is none, nor any after it.
+    /// The part, or why it is missing; then no further part follows.
     pub(super) loaded: Result<(Arc<ArchiveSource>, Load)>,
 }
 
-/// What the threads that check are given.
+/// Input of the checking threads.
 pub(super) struct Checker<'a> {
     pub(super) rules: ArchiveRules<'a>,
-    /// The kernels: what was checked with others is not stored.
+    /// The kernels: results obtained with other kernels are not stored.
     pub(super) kernels: &'a InputFiles,
     pub(super) cache: &'a StageCache,
-    /// Name under which the result of each file is stored, and what it is made from.
+    /// Name under which the result of each file is stored, and its inputs.
     pub(super) todo: &'a BTreeMap<usize, (String, Inputs)>,
     pub(super) progress: &'a (dyn Fn(&ArchiveProgress) + Sync),
 }
 
-/// By file: what was found, or why nothing was.
+/// By file: its results, or its failure.
 pub(super) type Results = BTreeMap<usize, Result<FileRanges>>;
 
 impl Checker<'_> {
-    /// Checks what comes, and stores the result of every file.
+    /// Checks incoming parts, and stores the result of every file.
     pub(super) fn run(&self, parts: Receiver<Part>, start: ArchiveProgress) -> Result<Results> {
         let mut progress = start;
         let mut results = Results::new();

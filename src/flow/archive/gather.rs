@@ -1,4 +1,4 @@
-//! The results of files, put together: in the order of time, and every shot once.
+//! The results of files, combined: in time order, and every shot once.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -13,7 +13,7 @@ use crate::{
     stages::check_archive::{ArchiveProfile, CheckedFile, FileCopy, FileFailure},
 };
 
-/// What files gave.
+/// Results of files.
 pub(super) struct Gathered {
     /// Files in the order of their first shots.
     pub(super) files: Vec<CheckedFile>,
@@ -23,9 +23,9 @@ pub(super) struct Gathered {
     pub(super) failures: Vec<Error>,
 }
 
-/// A file whose shots another one holds as well.
+/// A file whose shots another file contains as well.
 #[derive(Debug, thiserror::Error)]
-#[error("holds shots of orbit {orbit} that {} holds as well; its shots do not count", .other.display())]
+#[error("contains shots of orbit {orbit} that {} contains as well; its shots are left out", .other.display())]
 struct SharedShots {
     orbit: u32,
     other: PathBuf,
@@ -43,7 +43,7 @@ impl Cause for SharedShots {
     }
 }
 
-/// Puts results of files together; of files that share shots the first by its path stays.
+/// Combines results of files; of files that share shots, the first by its path is kept.
 pub(super) fn gather(
     paths: &[PathBuf],
     identities: &BTreeMap<usize, Identity>,
@@ -76,7 +76,7 @@ pub(super) fn gather(
     }
 }
 
-/// Takes out files with the bytes of an earlier one, understood alike.
+/// Removes files with the bytes of an earlier file, read alike.
 fn without_copies(files: &mut Vec<CheckedFile>) -> Vec<FileCopy> {
     let paths: Vec<PathBuf> = files.iter().map(|file| file.path.clone()).collect();
     let mut by_content = Copies::default();
@@ -95,7 +95,7 @@ fn without_copies(files: &mut Vec<CheckedFile>) -> Vec<FileCopy> {
     copies
 }
 
-/// Takes out files with shots that an earlier one holds as well.
+/// Removes files with shots that an earlier file contains as well.
 fn without_rivals(files: &mut Vec<CheckedFile>) -> Vec<Error> {
     let paths: Vec<PathBuf> = files.iter().map(|file| file.path.clone()).collect();
     let mut seen = Seen::default();
@@ -112,7 +112,8 @@ fn without_rivals(files: &mut Vec<CheckedFile>) -> Vec<Error> {
     failures
 }
 
-/// Enters the shots of a file, unless an earlier file holds some of them: the orbit of the first such profile, and that file.
+/// Enters the shots of a file, unless an earlier file contains some of them: the orbit of the first such profile, and
+/// that file.
 fn enter(seen: &mut Seen, file: usize, profiles: &[ArchiveProfile]) -> Option<(u32, usize)> {
     let spans: Vec<(u32, Span)> = profiles
         .iter()
@@ -138,7 +139,7 @@ fn enter(seen: &mut Seen, file: usize, profiles: &[ArchiveProfile]) -> Option<(u
     shared
 }
 
-/// Files of equal names in several folders are told apart by their paths.
+/// Files of equal names in several folders are distinguished by their paths.
 fn tell_apart(files: &mut [CheckedFile]) {
     let mut seen = BTreeSet::new();
     let names = files.iter().map(|file| file_name(&file.path));
@@ -154,7 +155,7 @@ fn tell_apart(files: &mut [CheckedFile]) {
     }
 }
 
-/// A failure as products tell it.
+/// A failure in the form of products.
 pub(super) fn file_failure(failure: &Error) -> FileFailure {
     FileFailure {
         file: failure.file.as_deref().map(file_name).unwrap_or_default(),

@@ -1,4 +1,4 @@
-//! The thread that loads what others check: the only one that asks CSPICE.
+//! The thread that loads data for the checking threads: the only one that calls CSPICE.
 
 use std::{
     path::Path,
@@ -13,32 +13,32 @@ use crate::{
     stages::check_archive::{ArchiveRules, ArchiveSource},
 };
 
-/// What the thread that loads is given.
+/// Input of the loading thread.
 pub(super) struct Loader<'a> {
     pub(super) rules: ArchiveRules<'a>,
     pub(super) session: &'a Session,
-    /// Looked at before every load.
+    /// Checked before every load.
     pub(super) stop: &'a AtomicBool,
-    /// Where loads go.
+    /// Destination of the loads.
     pub(super) parts: SyncSender<Part>,
 }
 
 impl Loader<'_> {
-    /// Loads files one after the other, each as it was when it was first looked at.
+    /// Loads files one after the other, each with its initial identity.
     pub(super) fn run<'f>(
         self,
         files: impl Iterator<Item = (usize, &'f Path, &'f Identity)>,
     ) -> Result<()> {
         for (file, path, identity) in files {
             if !self.load(file, ArchiveSource::reopen(path, identity))? {
-                // Whoever checks has stopped, and says why.
+                // The checker has stopped, and reports why.
                 return Ok(());
             }
         }
         Ok(())
     }
 
-    /// Loads a file part by part; gives whether anybody still takes them.
+    /// Loads a file part by part; returns whether the checker still accepts parts.
     fn load(&self, file: usize, source: Result<ArchiveSource>) -> Result<bool> {
         let send = |bytes, loaded| {
             let part = Part {

@@ -14,7 +14,7 @@ use crate::{
 /// Complaints that the manifest quotes; all are counted.
 const COMPLAINTS_QUOTED: usize = 100;
 
-/// What the manifest says of an archive but for its products.
+/// The manifest of an archive without its products.
 pub(super) fn manifest(ranges: &ArchiveRanges, inputs: &Inputs) -> Manifest {
     let [without, partly] = ranges.not_covered();
     let beyond = ranges.profiles();
@@ -89,6 +89,6 @@ fn notes(ranges: &ArchiveRanges) -> Vec<String> {
     let failures = ranges.failures.iter();
     let failures = failures.map(|failure| format!("{}: not read: {}", failure.file, failure.why));
     let copies = ranges.copies.iter();
-    let copies = copies.map(|copy| format!("{} is a copy of {}: taken once", copy.file, copy.of));
+    let copies = copies.map(|copy| format!("{} is a copy of {}: used once", copy.file, copy.of));
     failures.chain(copies).collect()
 }

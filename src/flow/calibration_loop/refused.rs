@@ -10,7 +10,7 @@ use crate::{
 /// Pixels of another image.
 #[derive(Debug, thiserror::Error)]
 enum PixelsError {
-    #[error("camera {camera}: its pixels have {} lines of {} samples; expected {} of {}, as its support data state", found[0], found[1], expected[0], expected[1])]
+    #[error("camera {camera}: its pixels have {} lines of {} samples; expected {} of {}, as in its support data", found[0], found[1], expected[0], expected[1])]
     Size {
         camera: String,
         found: [u32; 2],
@@ -35,7 +35,7 @@ impl Cause for PixelsError {
 /// Too little laser control was found.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "{used} of {} units of laser shots match the terrain model of the images, and {judging} of {} that are held back; expected at least \
+    "{used} of {} units of laser shots match the terrain model of the images, and {judging} of {} withheld units; expected at least \
      {CONTROLS_MIN} of each. {example}", of[0], of[1]
 )]
 pub(super) struct FewUnits {
@@ -58,7 +58,7 @@ impl Cause for FewUnits {
 }
 
 impl FewUnits {
-    /// Of what the laser found in a terrain model; nothing where it is enough.
+    /// Checks the units that the laser found in a terrain model; `None` if they suffice.
     pub(super) fn of(control: &LaserMatch) -> Option<Self> {
         let units = |judges: bool| {
             control

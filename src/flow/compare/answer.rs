@@ -73,7 +73,7 @@ struct AttitudeWithGround<'a> {
     ground_max_m: Option<f64>,
 }
 
-/// Time that a set does not hold.
+/// Time that a set does not cover.
 #[derive(Serialize, JsonSchema)]
 struct LeftOut<'a> {
     set: &'a str,
@@ -85,7 +85,7 @@ struct LeftOut<'a> {
     stop_utc: &'a str,
 }
 
-/// Statistics in the unit of the member's name.
+/// Statistics in the unit of the member name.
 #[derive(Serialize, JsonSchema)]
 struct Moments {
     mean: f64,

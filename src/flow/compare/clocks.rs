@@ -10,7 +10,7 @@ const CLOCK_PROBES: usize = 100;
 /// Clocks that differ by less read the same times, seconds: 3 cm of flight.
 const CLOCK_TOLERANCE_S: f64 = 1e-5;
 
-/// A text by which a clock is read.
+/// A text that a clock reads.
 pub(super) enum Reading {
     Utc(String),
     Sclk(String),
@@ -34,7 +34,7 @@ impl fmt::Display for Reading {
     }
 }
 
-/// Clock readings over `epochs`, with the instants that they mean to the set of `session`.
+/// Clock readings over `epochs`, with their instants by the set of `session`.
 pub(super) fn read_clocks(
     session: &Session,
     epochs: &[Et],
@@ -55,7 +55,7 @@ pub(super) fn read_clocks(
     meant.collect()
 }
 
-/// Makes sure that the clocks of the set `other` mean the same instants.
+/// Ensures that the clocks of the set `other` give the same instants.
 pub(super) fn check_clocks(
     session: &Session,
     readings: &[(Reading, Et)],

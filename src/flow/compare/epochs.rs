@@ -1,4 +1,4 @@
-//! Instants at which rival sets are compared, and what one of them lacks.
+//! Instants at which rival sets are compared, and the gaps of each set.
 
 use super::{Request, RivalSet};
 use crate::{
@@ -6,19 +6,19 @@ use crate::{
     time::{Et, Interval, Intervals},
 };
 
-/// Seconds between epochs, as long as that makes no more than [`EPOCHS_MAX`].
+/// Seconds between epochs, unless their number exceeds [`EPOCHS_MAX`].
 const STEP_S: f64 = 1.0;
-/// Most epochs at which orbits, or attitudes, are compared.
+/// Maximum number of epochs at which orbits, or attitudes, are compared.
 pub const EPOCHS_MAX: u32 = 10_000;
 
-/// Epochs at which attitudes are compared, none when the notes say why not, and what sets lack.
+/// Epochs at which attitudes are compared, and gaps of the sets; without epochs the notes state why.
 pub(super) fn turn_epochs(
     sets: &[RivalSet],
     held: &[Coverage],
     request: &Request<'_>,
     notes: &mut Vec<String>,
 ) -> (Vec<Et>, Vec<Gap>) {
-    // C-kernels count another time than exposures.
+    // The time of C-kernels is shifted against that of exposures.
     let shift_s = -request.bias.seconds();
     let turned: Vec<Intervals> = held
         .iter()
@@ -34,12 +34,12 @@ pub(super) fn turn_epochs(
     let positions: Vec<Intervals> = held.iter().map(|coverage| coverage.spk.clone()).collect();
     let epochs = equally_spaced(&common.intersection(&held_by_all(&positions)));
     if epochs.is_empty() {
-        notes.push("attitudes are not compared: the sets hold none in common".to_owned());
+        notes.push("attitudes are not compared: the sets have none in common".to_owned());
     }
     (epochs, gaps)
 }
 
-/// Whether there are attitudes that may differ; if not, the notes say why.
+/// Whether attitudes may differ; if not, the notes state why.
 fn may_turn(sets: &[RivalSet], turned: &[Intervals], notes: &mut Vec<String>) -> bool {
     let without: Vec<&str> = sets
         .iter()
@@ -66,12 +66,12 @@ fn may_turn(sets: &[RivalSet], turned: &[Intervals], notes: &mut Vec<String>) ->
     false
 }
 
-/// Index of a set, what it lacks, and when.
+/// Index of a set, the missing quantity, and the interval.
 pub(super) type Gap = (usize, &'static str, Interval);
 
-/// The instants of interest that all sets hold, and for each set those that it does not hold.
+/// The instants of interest that all sets cover, and for each set those that it does not cover.
 ///
-/// Without stated interest, what any set holds is of interest.
+/// Without a request, all instants that any set covers are of interest.
 pub(super) fn shared(
     required: Option<&Intervals>,
     held: &[Intervals],
@@ -102,10 +102,10 @@ fn held_by_all(held: &[Intervals]) -> Intervals {
         .fold(first, |common, next| common.intersection(next))
 }
 
-/// The middles of equal parts of the time in `intervals`, a second long or as long as the limit needs.
+/// The middles of equal parts of the time in `intervals`, a second long or as long as the limit requires.
 ///
-/// Each epoch stands for the same time, so that means over epochs are means over time, and none lies
-/// at an end, where kernels round.
+/// Each epoch represents the same time, so that means over epochs are means over time, and none lies at an end, where
+/// kernels round.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

@@ -1,24 +1,24 @@
-//! Time that is not compared because a set does not hold it.
+//! Time that is not compared because a set does not cover it.
 
 use crate::time::Interval;
 
-/// Spans that are named for a set; the others are counted.
+/// Intervals that are listed for a set; the others are counted.
 const SPANS_NAMED: usize = 5;
 
-/// Time that a set does not hold, and that is therefore not compared.
+/// Time that a set does not cover, and that is therefore not compared.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Uncovered {
     /// The set.
     pub set: String,
     /// `position` or `attitude`.
     pub what: &'static str,
-    /// When.
+    /// The interval.
     pub interval: Interval,
     /// The same in UTC.
     pub utc: [String; 2],
 }
 
-/// For each set what it lacks: how much, and the first spans.
+/// For each set the time that it does not cover: total, and the first intervals.
 pub(super) fn lines(uncovered: &[Uncovered]) -> Vec<String> {
     let same = |a: &Uncovered, b: &Uncovered| a.set == b.set && a.what == b.what;
     let of_one_set = uncovered.chunk_by(same);

@@ -1,69 +1,69 @@
-//! What matching says of the places that it tried.
+//! Outcome of matching for the points that were tried.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// Why a place of one image has no tie point in another.
+/// Why a point of one image has no tie point in another.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, thiserror::Error,
 )]
 #[serde(rename_all = "snake_case")]
 pub enum Unmatched {
-    /// Noise alone would make such slopes.
+    /// Noise alone would produce such gradients.
     #[error("no texture beyond the noise")]
     Flat,
-    /// Pixels that were never received, or may be wrong.
+    /// Pixels that were never received, or may be invalid.
     #[error("lines are missing or damaged")]
     Missing,
-    /// A template or what it is searched in reaches over an edge.
+    /// A template or its search area extends over an edge.
     #[error("too near to the edge of an image")]
     Edge,
-    /// Nothing within the margin is like it.
-    #[error("no place within the margin correlates")]
+    /// Nothing within the margin is similar.
+    #[error("no correlation within the margin")]
     Unlike,
-    /// Which of two is it?
+    /// The match is ambiguous.
     #[error("another place correlates nearly as well")]
     Ambiguous,
-    /// Least squares leads away, or does not end.
-    #[error("least squares does not settle")]
+    /// Least squares diverges, or does not end.
+    #[error("least squares does not converge")]
     Unsettled,
-    /// Searched from the other image, it is not found, or elsewhere.
+    /// The search from the other image fails, or leads to another point.
     #[error("not the same place when searched from the other image")]
     OneWay,
-    /// Found, but not well enough.
+    /// Found, but with insufficient accuracy.
     #[error("its standard deviation is too large")]
     Uncertain,
-    /// A cell of a terrain model that most cells around it contradict.
-    #[error("most cells around it have other heights")]
+    /// A cell of a terrain model that contradicts most neighbouring cells.
+    #[error("most neighbouring cells have different heights")]
     Alone,
 }
 
-/// A pair of images, and what became of the places that both show.
+/// A pair of images, and the outcome for the ground that both show.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MatchedPair {
     /// Indices of the images; templates come from the first.
     pub images: [usize; 2],
-    /// Cells of the ground that both show; in each a place was tried.
+    /// Cells of the ground that both show; one point was tried in each.
     pub cells: u32,
     /// Tie points.
     pub ties: u32,
     /// The other cells by reason.
     pub unmatched: BTreeMap<Unmatched, u32>,
-    /// Of the parts into which the common ground is cut: those that have cells, and of these those with a tie point.
+    /// Parts of the common ground: those that have cells, and of these those with a tie point.
     pub parts: [u32; 2],
-    /// How far from where it was predicted a place was searched, metres on the ground.
+    /// Search distance from the predicted position, metres on the ground.
     pub reach_m: f64,
     /// Median standard deviation of a tie point in the second image, lines and samples.
     pub sigma_px: [f64; 2],
     /// Median correlation.
     pub correlation: f64,
-    /// Whether so few places were found that none of them is believed.
+    /// Whether too few points were found to be significant.
     pub is_refused: bool,
 }
 
 impl Unmatched {
-    /// The reason as one word of documents.
+    /// The reason as one word, for documents.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -81,7 +81,7 @@ impl Unmatched {
 }
 
 impl MatchedPair {
-    /// Places with texture that were searched in the other image.
+    /// Points with texture that were searched in the other image.
     #[must_use]
     pub fn searched(&self) -> u32 {
         let not_searched = [Unmatched::Flat, Unmatched::Missing, Unmatched::Edge];
@@ -98,7 +98,7 @@ impl MatchedPair {
     }
 }
 
-/// Reasons with how often they hold, the most frequent first.
+/// Reasons with their counts, the most frequent first.
 #[must_use]
 pub fn reasons(counted: &BTreeMap<Unmatched, u32>) -> String {
     let mut reasons: Vec<(&Unmatched, &u32)> = counted.iter().collect();

@@ -1,4 +1,4 @@
-//! One check of a site: what was found, what is allowed, and who says so.
+//! One check of a site: the value, the limit and the outcome.
 
 use std::fmt;
 
@@ -9,41 +9,41 @@ use serde::{Deserialize, Serialize};
 use super::kind::CheckKind;
 use crate::wording::Wording;
 
-/// Most decimals that a number is written with.
+/// Maximum number of decimals.
 const DECIMALS_MAX: usize = 9;
-/// A limit is told to three significant digits.
+/// Limits are written with three significant digits.
 const LIMIT_ACCURACY: f64 = 5e-4;
 
-/// How a check came out.
+/// Outcome of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum CheckOutcome {
     /// Beyond a limit: the site is invalid.
     Fail,
-    /// To be weighed by the reader.
+    /// A remark for the reader.
     Warning,
     /// Within the limit.
     Pass,
 }
 
-/// A check of a site: of many profiles, images or pairs the one that uses most of the limit.
+/// A check of a site: of many profiles, images or pairs, the one that uses most of the limit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 pub struct Check {
-    /// What is checked.
+    /// The checked quantity.
     pub kind: CheckKind,
-    /// The same in the words of the site.
+    /// Its name in the words of the site.
     #[serde(default)]
     pub what: String,
-    /// How it came out.
+    /// The outcome.
     pub outcome: CheckOutcome,
-    /// Profile, image or pair that is told; empty where the whole site is.
+    /// The profile, image or pair; empty for the whole site.
     pub subject: String,
-    /// What was found, in `unit`; nothing where it is no finite number.
+    /// The value, in `unit`; `None` if it is not finite.
     #[serde(default, skip_serializing_if = "crate::stored::is_left_out")]
     pub value: Option<f64>,
-    /// The largest magnitude that is allowed, for counts of what is wanted the least.
+    /// The largest permitted magnitude; for counts with a lower limit, the least.
     #[serde(default, skip_serializing_if = "crate::stored::is_left_out")]
     pub limit: Option<f64>,
     /// Unit of both.
@@ -51,7 +51,8 @@ pub struct Check {
 }
 
 impl Check {
-    /// A check of `value` against `limit`; when broken, it came out as `broken`. What is no number breaks every limit.
+    /// A check of `value` against `limit` with the outcome `broken` if it is exceeded. A value that is not finite
+    /// exceeds every limit.
     #[must_use]
     pub fn new(
         kind: CheckKind,
@@ -76,7 +77,8 @@ impl Check {
         }
     }
 
-    /// A check of shares, which pages show in percent. They are compared as they are: 29 % are not 28.999 999 999 999 996.
+    /// A check of shares, which pages show in percent. They are compared unrounded: 29 % are not 28.999 999 999 999
+    /// 996.
     #[must_use]
     pub fn of_share(
         kind: CheckKind,
@@ -93,7 +95,7 @@ impl Check {
         }
     }
 
-    /// A check that has no number.
+    /// A check without a number.
     #[must_use]
     pub fn told(kind: CheckKind, subject: impl Into<String>, outcome: CheckOutcome) -> Self {
         Self {
@@ -107,13 +109,13 @@ impl Check {
         }
     }
 
-    /// Says what is checked in the words of a site.
+    /// Sets the name of the check in the words of a site.
     pub fn say(&mut self, wording: &Wording<'_>) {
         self.what = wording.of(self.kind.words()).into_owned();
         self.subject = wording.of(&*self.subject).into_owned();
     }
 
-    /// What is checked, in words; manifests of earlier versions say only its kind.
+    /// Name of the check; manifests of earlier versions contain only its kind.
     #[must_use]
     pub fn words(&self) -> &str {
         if self.what.is_empty() {
@@ -123,8 +125,7 @@ impl Check {
         }
     }
 
-    /// Decimals of value and limit: those that tell the limit, and those by which a value beyond it is never written like
-    /// it.
+    /// Decimals of value and limit: enough for the limit, and enough to distinguish a value beyond it.
     #[must_use]
     pub fn decimals(&self) -> [usize; 2] {
         if self.unit.is_empty() {
@@ -147,7 +148,7 @@ impl Check {
         [of_value, of_limit]
     }
 
-    /// Share of the limit that is used, infinite where it cannot be said.
+    /// Share of the limit that is used; infinite if it is not defined.
     fn used(&self) -> f64 {
         let (Some(value), Some(limit)) = (self.value, self.limit) else {
             return f64::INFINITY;
@@ -161,10 +162,10 @@ impl Check {
         }
     }
 
-    /// The worst of several checks of one kind; nothing of none.
+    /// The worst of several checks of one kind; `None` without checks.
     #[must_use]
     pub fn worst(checks: impl Iterator<Item = Self>) -> Option<Self> {
-        // The first of equals: `max_by` would take the last.
+        // The first of equal ones: `max_by` would take the last.
         checks.reduce(|worst, check| {
             let worse = check.outcome.cmp(&worst.outcome).reverse();
             if worse.then(check.used().total_cmp(&worst.used())).is_gt() {
@@ -181,7 +182,7 @@ impl fmt::Display for Check {
         let (words, subject) = (self.words(), &*self.subject);
         let (Some(value), Some(limit)) = (self.value, self.limit) else {
             let what = match (subject, self.limit.is_some()) {
-                ("", true) => "no number",
+                ("", true) => "not finite",
                 ("", false) => "no",
                 _ => subject,
             };
@@ -192,7 +193,7 @@ impl fmt::Display for Check {
             write!(formatter, ", {subject}")?;
         }
         let [of_value, of_limit] = self.decimals();
-        // What rounds to zero has no sign.
+        // A value that rounds to zero has no sign.
         let is_zero = value.abs() < 0.5 * 0.1_f64.powi(i32::try_from(of_value).unwrap_or(0));
         let (sign, bound) = match (self.kind.at_least(), self.kind.is_signed()) {
             (true, _) => ("", "at least "),

@@ -1,30 +1,30 @@
-//! What can be checked, of sites, nets, calibrations and matches.
+//! Kinds of checks of sites, nets, calibrations and matches.
 
 #[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What is checked, data that took no part in the result first, then what took part in it, then what images say of
-/// each other.
+/// Kind of a check: independent data first, then data that entered the result, then the agreement of images with each
+/// other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum CheckKind {
-    /// What contradicts itself and has no number: told in the reasons.
+    /// A contradiction without a number: described in the reasons.
     Contradiction,
     /// Footprints in the windows.
     Footprints,
-    /// An adjustment that was asked for.
+    /// A requested adjustment.
     AdjustmentMade,
     /// Median height of tie points above the MOLA surface, with the orientation of the kernels.
     HeightBefore,
-    /// Mean difference of the surfaces of two profiles, in its standard deviations.
+    /// Mean difference of the surfaces of two profiles, in standard deviations.
     ProfilesApart,
-    /// Mean of range minus distance of a profile, its outliers left out.
+    /// Mean of range minus distance of a profile, without outliers.
     RangeMean,
-    /// Mean distance of the spacecraft of the PEDR file from that of the kernels.
+    /// Mean distance between the spacecraft positions of the PEDR file and of the kernels.
     OrbitsApart,
-    /// Mean of range minus distance to the spacecraft of the PEDR file itself.
+    /// Mean of range minus distance to the spacecraft position of the PEDR file itself.
     Decoding,
     /// Share of outliers among the ranges of a profile.
     RangeOutliers,
@@ -32,14 +32,14 @@ pub enum CheckKind {
     Shots,
     /// Clock correction of least spread minus the configured one.
     ClockCorrection,
-    /// Median height of tie points above the MOLA surface, adjusted: of a default adjustment MOLA is part.
+    /// Median height of tie points above the MOLA surface, adjusted: MOLA is part of a default adjustment.
     HeightAfter,
     /// Share of tie points that lie farther from the MOLA surface than 3.29 of their standard deviations, or were
     /// rejected for it.
     HeightOutliers,
     /// Standard deviation of the mean height of the adjusted tie points.
     HeightSigma,
-    /// Share of the common ground that a terrain model has heights of.
+    /// Share of the common ground with heights in a terrain model.
     SurfaceFilled,
     /// Median height of the altimeter's shots above a terrain model.
     SurfaceHeight,
@@ -61,11 +61,12 @@ pub enum CheckKind {
     TiesRejected,
     /// Tie points that took part in the adjustment.
     TiesUsed,
-    /// Largest correction of an image, in standard deviations of what was known of it.
+    /// Largest correction of an image, in a priori standard deviations.
     Correction,
-    /// Boresight of the laser or place of a profile, by the images of a common bus, in standard deviations.
+    /// Boresight of the laser or position of a profile, by the images of a common bus, in standard deviations.
     Boresight,
-    /// Time that attitudes of an image are extrapolated by beyond what is trusted: as a sentence among the reasons.
+    /// Time by which the attitude of an image is extrapolated beyond the permitted time: a sentence among the
+    /// reasons.
     Attitude,
     /// RMSE of the second-order polynomials of position.
     PositionRmse,
@@ -75,23 +76,23 @@ pub enum CheckKind {
     TableError,
     /// Records that could not be read.
     SkippedRecords,
-    /// What laser control that was held back from a calibration misses in the plane, over what is expected.
+    /// Error in plan of laser control withheld from a calibration, over the expected error.
     HeldBackPlane,
     /// The same in height.
     HeldBackHeight,
-    /// What laser control that a calibration used misses in the plane, over what is expected.
+    /// Error in plan of laser control used by a calibration, over the expected error.
     ControlPlane,
     /// The same in height.
     ControlHeight,
-    /// By how much control of an orbit that took no part in a calibration becomes worse, in standard deviations.
+    /// Degradation of the control of an orbit that was not used in a calibration, in standard deviations.
     OtherOrbits,
-    /// How well a calibration places a tie point in the plane, beside what was known beforehand.
+    /// Standard deviation of a tie point in plan after a calibration, over the a priori one.
     PlaceKnown,
     /// The same in height.
     HeightKnown,
     /// Root mean square of the residuals of tie points between the lines of a camera.
     LinesAgree,
-    /// How far a calibration moves the image of a camera.
+    /// Shift of the image of a camera by a calibration.
     CameraMoved,
     /// Share of the tie points that a calibration left out.
     TiesLeftOut,
@@ -99,9 +100,9 @@ pub enum CheckKind {
     ControlLeftOut,
     /// Median shift of the units of the last round of a calibration.
     RoundShift,
-    /// By how much the residuals of control changed in that round.
+    /// Change of the residuals of control in that round.
     RoundControl,
-    /// Laser shots that were held out of a match: root mean square of model minus laser, bias removed.
+    /// Laser shots withheld from a match: root mean square of model minus laser, bias removed.
     HeldOutShots,
     /// Units of laser shots that were matched and kept.
     UnitsKept,
@@ -109,11 +110,11 @@ pub enum CheckKind {
     UnitsAgree,
     /// Terrain model above the laser.
     ModelBias,
-    /// Equations of a net that nothing needs, by which its measurements test each other.
+    /// Redundant equations of a net, by which its measurements test each other.
     Redundancy,
     /// Share of the measurements of a net that were left out as blunders.
     MeasurementsRemoved,
-    /// Share of those in use that lie beyond 3.5 robust standard deviations.
+    /// Share of used measurements beyond 3.5 robust standard deviations.
     MeasurementsFlagged,
     /// Controls of a net that were kept.
     ControlsKept,
@@ -124,19 +125,19 @@ pub enum CheckKind {
 }
 
 impl CheckKind {
-    /// What is checked, in words.
+    /// Name of the check.
     pub(super) const fn words(self) -> &'static str {
         match self {
-            Self::Contradiction => "Inputs do not contradict each other",
+            Self::Contradiction => "Inputs consistent",
             Self::Footprints => "Footprints in the windows",
             Self::AdjustmentMade => "Adjustment converged",
             Self::HeightAfter => "Tie points above MOLA, adjusted (median)",
             Self::HeightBefore => "Tie points above MOLA, before (median)",
             Self::HeightOutliers => "Tie points beyond 3.29 σ of MOLA",
-            Self::ProfilesApart => "MOLA profiles against each other",
-            Self::SurfaceFilled => "Terrain model, ground with heights",
+            Self::ProfilesApart => "Disagreement of MOLA profiles",
+            Self::SurfaceFilled => "Terrain model, completeness",
             Self::SurfaceHeight => "MOLA above the terrain model (median)",
-            Self::SurfaceSpread => "MOLA about the terrain model",
+            Self::SurfaceSpread => "Spread of MOLA about the terrain model",
             Self::ImagesJoined => "Images joined by tie points",
             Self::PairsJoined => "Pairs joined by tie points",
             Self::HeightSigma => "Uncertainty of the mean height",
@@ -146,8 +147,8 @@ impl CheckKind {
             Self::RangeOutliers => "Outliers among ranges",
             Self::Shots => "Shots in a profile",
             Self::ClockCorrection => "Clock correction, best − configured",
-            Self::ParallaxAfter => "Images apart along track, adjusted",
-            Self::ParallaxBefore => "Images apart along track, before",
+            Self::ParallaxAfter => "Along-track parallax, adjusted",
+            Self::ParallaxBefore => "Along-track parallax, before",
             Self::TieResidualsAlong => "Tie residuals along track",
             Self::TieResidualsAcross => "Tie residuals across track",
             Self::TiesRejected => "Tie points rejected",
@@ -159,33 +160,33 @@ impl CheckKind {
             Self::PointingRmse => "Pointing model, RMSE",
             Self::TableError => "Camera table, interpolation error",
             Self::SkippedRecords => "Records skipped",
-            Self::HeldBackPlane => "Control held back, off in the plane",
-            Self::HeldBackHeight => "Control held back, off in height",
-            Self::ControlPlane => "Control used, off in the plane",
-            Self::ControlHeight => "Control used, off in height",
-            Self::OtherOrbits => "Control of other orbits, worse by",
-            Self::PlaceKnown => "Tie points known in the plane",
-            Self::HeightKnown => "Tie points known in height",
+            Self::HeldBackPlane => "Withheld control, error in plan",
+            Self::HeldBackHeight => "Withheld control, error in height",
+            Self::ControlPlane => "Control used, error in plan",
+            Self::ControlHeight => "Control used, error in height",
+            Self::OtherOrbits => "Control of other orbits, degradation",
+            Self::PlaceKnown => "Tie point uncertainty in plan",
+            Self::HeightKnown => "Tie point uncertainty in height",
             Self::LinesAgree => "Tie points between lines",
             Self::CameraMoved => "Image moved by the calibration",
             Self::TiesLeftOut => "Tie points left out",
             Self::ControlLeftOut => "Control left out",
             Self::RoundShift => "Units shifted in the last round (median)",
             Self::RoundControl => "Control, change in the last round",
-            Self::HeldOutShots => "Shots held out, model − laser",
+            Self::HeldOutShots => "Withheld shots, model − laser",
             Self::UnitsKept => "Units kept",
             Self::UnitsAgree => "Matching units that agree",
             Self::ModelBias => "Model above the laser (median)",
-            Self::Redundancy => "Equations left over",
+            Self::Redundancy => "Redundancy",
             Self::MeasurementsRemoved => "Measurements left out as blunders",
             Self::MeasurementsFlagged => "Measurements beyond 3.5 robust σ",
             Self::ControlsKept => "Controls kept",
             Self::ControlsRefused => "Controls left out",
-            Self::Seams => "Bricks apart at their seams",
+            Self::Seams => "Misfit of bricks at their seams",
         }
     }
 
-    /// Unit of value and limit; empty for a count or where there is neither.
+    /// Unit of value and limit; empty for a count or without values.
     #[must_use]
     pub const fn unit(self) -> &'static str {
         match self {
@@ -245,7 +246,7 @@ impl CheckKind {
         }
     }
 
-    /// Whether the limit is the least that is allowed.
+    /// Whether the limit is a lower limit.
     #[must_use]
     pub const fn at_least(self) -> bool {
         matches!(
@@ -263,7 +264,7 @@ impl CheckKind {
         )
     }
 
-    /// Whether values have a sign, and the limit holds for both.
+    /// Whether values have a sign, and the limit applies to both.
     #[must_use]
     pub const fn is_signed(self) -> bool {
         matches!(

@@ -8,11 +8,11 @@ use toml::Value;
 /// Accepted numbers. Comparisons are written so that NaN is refused too.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Accept {
-    /// Both ends belong to it.
+    /// Both ends included.
     FromTo(f64, f64),
     /// Above the first, at most the second.
     AboveTo(f64, f64),
-    /// 0 and both ends belong to it.
+    /// 0, and an interval with both ends.
     ZeroOr(f64, f64),
 }
 
@@ -32,7 +32,7 @@ impl fmt::Display for Accept {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::ZeroOr(low, f64::INFINITY) => {
-                write!(formatter, "0, or a number not below {low}; inf is one")
+                write!(formatter, "0, or a number of at least {low}, or inf")
             }
             Self::ZeroOr(low, high) => {
                 write!(formatter, "0, or a number from {low} to {high}")
@@ -48,7 +48,7 @@ impl fmt::Display for Accept {
 pub struct Word {
     /// As written in the file.
     pub word: &'static str,
-    /// What it means; empty where the word says it.
+    /// Its meaning; empty if the word is self-explanatory.
     pub meaning: &'static str,
 }
 
@@ -67,11 +67,11 @@ pub enum ValueKind {
         /// The same, or less, as a regular expression (ECMA 262).
         pattern: &'static str,
     },
-    /// The path of a file that is there.
+    /// The path of an existing file.
     File,
-    /// The path of a folder that is there.
+    /// The path of an existing folder.
     Folder,
-    /// The path of a folder, which may be away.
+    /// The path of a folder, which may be temporarily absent.
     Mirror,
     /// A path or glob that matches a file.
     Glob,
@@ -94,11 +94,11 @@ pub enum ValueKind {
         expected: String,
         /// Its entries.
         of: Box<ValueKind>,
-        /// How many there must be, `None` for any number.
+        /// Required number of entries, `None` for any number.
         count: Option<usize>,
         /// Whether it may be empty.
         empty: bool,
-        /// Whether no entry may come twice.
+        /// Whether entries must be distinct.
         distinct: bool,
     },
 }
@@ -139,7 +139,7 @@ pub struct DeclaredKey {
     pub kind: ValueKind,
     /// The unit that its name ends in.
     pub unit: Option<&'static str>,
-    /// The value that it has when it is absent; none when there is no single one.
+    /// Its default; `None` when there is no single one.
     pub default: Option<Value>,
     /// Whether its table must have it.
     pub required: bool,
@@ -152,10 +152,10 @@ pub struct DeclaredKey {
 /// A value of the example file.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Example {
-    /// Which entry of a list of tables it stands in, counted from 0.
+    /// Index of its entry in a list of tables, from 0.
     pub(crate) entry: usize,
     pub(crate) toml: &'static str,
-    /// Whether it stands there in force, not behind a `#`.
+    /// Whether it is active, not commented out.
     pub(crate) used: bool,
 }
 
@@ -189,12 +189,12 @@ impl DescribedKey {
     }
 }
 
-/// How often a table of a list may come, and what the example file says of it.
+/// Permitted number of tables in a list, and their documentation in the example file.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Many {
-    /// Fewest and most entries; nothing for any number.
+    /// Minimum and maximum number of entries; `None` for any number.
     pub(crate) count: Option<(usize, usize)>,
-    /// What they are for, behind the expected number in messages.
+    /// Their purpose, which follows the expected number in messages.
     pub(crate) purpose: &'static str,
     /// Documentation before each entry of the example file after the first.
     pub(crate) further: &'static [&'static [&'static str]],
@@ -219,7 +219,7 @@ pub(crate) struct DescribedTable {
     pub(crate) many: Option<Many>,
     pub(crate) keys: Vec<DescribedKey>,
     pub(crate) tables: Vec<DescribedTable>,
-    /// What the schema says beyond single keys.
+    /// Rules of the schema beyond single keys.
     pub(crate) rules: Vec<Json>,
 }
 
@@ -229,7 +229,7 @@ impl DescribedTable {
         self.path.rsplit('.').next().unwrap_or_default()
     }
 
-    /// All keys, those of tables below behind those of their table.
+    /// All keys; those of subtables follow those of their table.
     pub(crate) fn walk(&self, into: &mut Vec<DeclaredKey>) {
         let dot = if self.path.is_empty() { "" } else { "." };
         into.extend(self.keys.iter().map(|key| {

@@ -64,7 +64,7 @@ fn keys(table: &DescribedTable, entry: usize, text: &mut String) {
     }
 }
 
-/// Documentation as it stands in the source, where each line begins with a space.
+/// Documentation as written in the source, where each line begins with a space.
 fn comment(lines: &[&str], text: &mut String) {
     for line in lines {
         text.push('#');
@@ -121,7 +121,7 @@ fn values(key: &DescribedKey) -> Vec<String> {
     }
 }
 
-/// The accepted values in words, where they are not all of their kind.
+/// The accepted values in words, unless all of their kind are accepted.
 fn range(kind: &ValueKind) -> Option<String> {
     match kind {
         ValueKind::Text { .. }

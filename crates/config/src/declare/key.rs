@@ -38,7 +38,7 @@ impl<F: Form> Key<F, Optional> {
         self.with(Required { expected })
     }
 
-    /// The key must be there; `expected` says what for.
+    /// The key is required; `expected` states its purpose.
     pub(crate) fn required_as(self, expected: &str) -> Key<F, Required> {
         let expected = expected.to_owned();
         self.with(Required { expected })
@@ -55,12 +55,12 @@ impl<F: Form> Key<F, Optional> {
 }
 
 impl<F, P> Key<F, P> {
-    /// What the example file says, as TOML, when that is not the default.
+    /// The value in the example file, as TOML, if it is not the default.
     pub(crate) fn example(self, toml: &'static str) -> Self {
         self.example_in(0, toml)
     }
 
-    /// What entry `entry`, counted from 0, of a list of tables says in the example file.
+    /// The value in entry `entry`, counted from 0, of a list of tables in the example file.
     pub(crate) fn example_in(mut self, entry: usize, toml: &'static str) -> Self {
         self.examples.push(Example {
             entry,
@@ -70,12 +70,12 @@ impl<F, P> Key<F, P> {
         self
     }
 
-    /// What the example file says behind a `#`: one of several ways, or a key that is rarely needed.
+    /// The commented-out value in the example file: one of several alternatives, or a rarely needed key.
     pub(crate) fn unused(self, toml: &'static str) -> Self {
         self.unused_in(0, toml)
     }
 
-    /// The same in entry `entry` of a list of tables.
+    /// The same for entry `entry` of a list of tables.
     pub(crate) fn unused_in(mut self, entry: usize, toml: &'static str) -> Self {
         self.examples.push(Example {
             entry,
@@ -120,7 +120,7 @@ impl<F: Form, P: Presence<F::Value>> Declare for Key<F, P> {
     }
 }
 
-/// Whether a key may be absent, and what holds then.
+/// Whether a key may be absent, and its value then.
 pub(crate) trait Presence<V> {
     /// What the field holds.
     type Value;
@@ -142,7 +142,7 @@ pub(crate) trait Presence<V> {
 
 /// The key may be absent.
 pub(crate) struct Optional;
-/// The key may be absent; its value is this then.
+/// The key may be absent; this is then its value.
 pub(crate) struct Default<V>(V);
 /// The key must be there.
 pub(crate) struct Required {
@@ -231,7 +231,7 @@ impl<T: Table> Declare for Group<T> {
     }
 }
 
-/// A field that no key fills: reading a file does it.
+/// A field that is filled when a file is read, not by a key.
 pub(crate) fn of_the_file<V: std::default::Default>() -> impl Declare<Value = V> {
     OfTheFile(PhantomData)
 }

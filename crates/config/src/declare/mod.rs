@@ -12,12 +12,10 @@
 //!
 //! From the declaration follow the field of the valid configuration, the reading of a file with its
 //! messages, `config/sites/example.toml`, `config/schema/site.schema.json` and [`keys`](super::keys).
-//! Reading and describing are the same text: [`Table::read`] declares key after key to [`Keys`], which
-//! takes each from the file, or where there is no file notes what was declared.
+//! Reading and describing share their code: [`Table::read`] declares key after key to [`Keys`], which takes each from
+//! the file, or without a file records the declaration.
 //!
-//! The field of the valid configuration, the reading of a file with its messages, `example.toml`, `site.schema.json`
-//! and `config::keys()` follow from the declaration. A former name is accepted with a warning and changes no
-//! fingerprint.
+//! A former name is accepted with a warning and does not change fingerprints.
 
 mod described;
 mod example;
@@ -55,21 +53,21 @@ pub(super) struct Found<'a> {
 }
 
 impl Found<'_> {
-    /// Tells that the value is not what the key takes.
+    /// Reports that the key does not accept the value.
     pub(super) fn refuse(&self, review: &mut Review<'_>, expected: impl std::fmt::Display) {
         review.refuse(self.value.span(), &self.key, expected);
     }
 }
 
-/// What values a key takes, and what they become.
+/// The values that a key accepts, and their valid form.
 pub(super) trait Form {
     /// The valid form of a value.
     type Value;
 
-    /// The values in words that example, schema and tests understand.
+    /// The accepted values in words that example, schema and tests understand.
     fn kind(&self) -> ValueKind;
 
-    /// The valid form of what was written, or nothing after a problem was told.
+    /// The valid form of the written value, or `None` after a problem was reported.
     fn read(&self, found: &Found<'_>, review: &mut Review<'_>) -> Option<Self::Value>;
 
     /// How `value` is written in a file; for defaults.
@@ -78,7 +76,7 @@ pub(super) trait Form {
 
 /// Something that takes one or several keys from a table.
 pub(super) trait Declare: Sized {
-    /// What becomes of them.
+    /// The resulting value.
     type Value;
 
     /// Declares the keys to `keys`; `name` and `about` are those of the field in the valid form.
@@ -155,7 +153,7 @@ macro_rules! declare_table {
         $vis struct $name { $($(#[doc = $doc])+ $(#[serde($skip)])? $vis $field: $type,)+ }
 
         impl Default for $name {
-            /// Every key as where the file leaves it out; what has no default is empty.
+            /// Every key at its default; keys without a default are empty.
             fn default() -> Self {
                 $crate::declare::Keys::default_of()
             }

@@ -20,13 +20,13 @@ pub(crate) struct Keys<'a, 'r> {
     path: String,
     /// The table, when there is one.
     table: Option<&'a DeTable<'a>>,
-    /// Where the table stands; nothing for the file itself and for an absent table.
+    /// Position of the table; `None` for the file itself and for an absent table.
     span: Option<Range<usize>>,
     /// Keys and tables declared so far.
     declared: Vec<&'static str>,
     /// Former names found, and those of today.
     former: Vec<(&'static str, &'static str)>,
-    /// What was declared, when that is asked for.
+    /// The declarations, if requested.
     description: Option<Description>,
     review: &'a mut Review<'r>,
 }
@@ -71,7 +71,7 @@ impl<'a, 'r> Keys<'a, 'r> {
         }
     }
 
-    /// What `T` is where every key has its default.
+    /// `T` with every key at its default.
     pub(crate) fn default_of<T: Table>() -> T {
         let mut review = Review::new(Path::new(""), "");
         T::read(&mut Keys::absent(&mut review))
@@ -83,7 +83,7 @@ impl<'a, 'r> Keys<'a, 'r> {
         }
     }
 
-    /// What the schema says of this table beyond single keys.
+    /// Adds a schema rule for this table beyond single keys.
     pub(crate) fn rule(&mut self, rule: impl FnOnce() -> Json) {
         if let Some(description) = &mut self.description {
             description.rules.push(rule());
@@ -131,8 +131,7 @@ impl<'a, 'r> Keys<'a, 'r> {
         })
     }
 
-    /// Whether a key that nobody knows is near one of `names`: then that key is told, and not what it leaves
-    /// missing.
+    /// Whether an unknown key resembles one of `names`; then that key is reported instead of the missing one.
     pub(crate) fn misspelt(&self, names: &[&str]) -> bool {
         let keys = self.table.into_iter().flat_map(|table| table.keys());
         let mut unknown = keys
@@ -145,7 +144,7 @@ impl<'a, 'r> Keys<'a, 'r> {
         self.declared.contains(&key) || self.former.iter().any(|(was, _)| *was == key)
     }
 
-    /// Tells that the key `name` is missing, when its table is there.
+    /// Reports that the key `name` is missing, if its table exists.
     pub(crate) fn missing(&mut self, name: &str, expected: &str) {
         if self.table.is_some() && !self.misspelt(&[name]) {
             let key = self.path_of(name);
@@ -161,7 +160,7 @@ impl<'a, 'r> Keys<'a, 'r> {
         Some((key, table.get(key)?))
     }
 
-    /// Where the value of the key `name` stands, when it is there.
+    /// Position of the value of the key `name`, if it exists.
     pub(crate) fn span_of(&self, name: &str) -> Option<Range<usize>> {
         self.written(name).map(|(_, value)| value.span())
     }
@@ -181,7 +180,7 @@ impl<'a, 'r> Keys<'a, 'r> {
         self.table.is_none() && self.span.is_some()
     }
 
-    /// Tells that the value of the key `name`, when it is there, is not `expected`.
+    /// Reports that the value of the key `name`, if it exists, is not `expected`.
     pub(crate) fn refuse(&mut self, name: &str, expected: impl std::fmt::Display) {
         if let Some((key, value)) = self.written(name) {
             let (key, span) = (self.path_of(key), value.span());
@@ -189,7 +188,7 @@ impl<'a, 'r> Keys<'a, 'r> {
         }
     }
 
-    /// The same of a key of the table `table` below this one.
+    /// The same for a key of the table `table` below this one.
     pub(crate) fn refuse_below(
         &mut self,
         table: &str,
@@ -202,7 +201,7 @@ impl<'a, 'r> Keys<'a, 'r> {
         }
     }
 
-    /// Tells that the key `name`, when it is there, is never used.
+    /// Reports that the key `name`, if it exists, is never used.
     pub(crate) fn unused(&mut self, name: &str, why: &str) {
         if let Some((key, value)) = self.written(name) {
             let text = format!("{} is never used: {why}", self.path_of(key));
@@ -215,7 +214,7 @@ impl<'a, 'r> Keys<'a, 'r> {
         self.review.problem(self.span.clone(), text);
     }
 
-    /// The tables of the list `path` below this table, when they are there.
+    /// The tables of the list `path` below this table, if they exist.
     pub(crate) fn entries(&self, path: &[&str]) -> Vec<&'a DeTable<'a>> {
         let list = path.split_last().and_then(|(name, tables)| {
             let mut table = self.table?;
@@ -309,7 +308,7 @@ impl<'a, 'r> Keys<'a, 'r> {
         read
     }
 
-    /// Tells of keys that nobody declared.
+    /// Reports keys that were not declared.
     pub(crate) fn finish(self) {
         for key in self.table.into_iter().flat_map(|table| table.keys()) {
             let name: &str = key.get_ref();
@@ -345,7 +344,7 @@ impl<'a, 'r> Keys<'a, 'r> {
     }
 }
 
-/// Identifiers name folders and columns: none may come twice, whatever their capitals.
+/// Identifiers name folders and columns: they must be distinct, ignoring case.
 pub(crate) fn no_repeats<'a>(
     key: &str,
     ids: impl Iterator<Item = &'a Spanned<DeValue<'a>>>,
@@ -370,7 +369,7 @@ pub(crate) fn suggestion(written: &str, known: &[&str]) -> String {
     }
 }
 
-/// The name that is nearest to what was written, when it is near: two slips of the hand at most.
+/// The name nearest to the written one, if they differ by at most two typing errors.
 fn nearest<'n>(written: &str, known: &[&'n str]) -> Option<&'n str> {
     let written = start(written);
     let distances = known
@@ -380,7 +379,7 @@ fn nearest<'n>(written: &str, known: &[&'n str]) -> Option<&'n str> {
     (distance <= 2).then_some(name)
 }
 
-/// The first characters of a name: enough to compare, whatever the length of the input.
+/// The first characters of a name: enough to compare, and of bounded length.
 fn start(name: &str) -> String {
     name.chars().take(40).collect()
 }

@@ -1,4 +1,4 @@
-//! What is known of files from earlier runs, as long as the file system says that they did not change.
+//! Known files of earlier runs, valid while the file system reports no change.
 
 use std::{
     collections::BTreeMap,
@@ -9,27 +9,27 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-/// How long a file must have stood still before it was read, seconds. File systems count time in steps: of two changes
-/// within one step the second leaves no trace. The coarsest in use count 2 s.
+/// How long a file must have been unchanged before it was read, seconds. File systems count time in steps: of two
+/// changes within one step, the second leaves no trace. The coarsest in use count 2 s.
 const STEADY_S: u64 = 2;
 
-/// What the file system says of a file; writing to a file changes its times, as finely as the system counts them.
+/// Identity of a file in the file system; writing to a file changes its times, within the resolution of the system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity {
     /// Device of its file system.
     pub device: u64,
-    /// Number of the file there.
+    /// Inode.
     pub inode: u64,
     /// Size.
     pub bytes: u64,
-    /// When its content changed last, as it says: seconds and nanoseconds of UTC since 1970.
+    /// Time of the last change of its content, as stated: seconds and nanoseconds of UTC since 1970.
     pub modified: [i64; 2],
-    /// When the file or what is said of it changed last; no program can set it.
+    /// Time of the last change of the file or its metadata; no program can set it.
     pub changed: [i64; 2],
 }
 
 impl Identity {
-    /// That of a file.
+    /// The identity of a file.
     #[must_use]
     pub fn of(metadata: &Metadata) -> Self {
         Self {
@@ -41,7 +41,7 @@ impl Identity {
         }
     }
 
-    /// Whether the file had stood still for a while at `instant`, so that any later change shows in its times.
+    /// Whether the file had been unchanged for a while at `instant`, so that any later change shows in its times.
     #[must_use]
     pub fn is_steady(&self, instant: SystemTime) -> bool {
         let latest = instant
@@ -60,11 +60,11 @@ impl Identity {
 /// A file whose content is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct KnownFile {
-    /// What the file system said of it when it was read.
+    /// Its identity when it was read.
     pub identity: Identity,
     /// BLAKE3 of its content.
     pub blake3: [u8; 32],
-    /// Version of the check of kernels that its content passed; 0 of none.
+    /// Version of the check of kernels that its content passed; 0 for none.
     pub checked: u32,
     /// When it was read, seconds of UTC since 1970.
     pub read_s: u64,
@@ -75,13 +75,13 @@ pub struct KnownFile {
 pub struct KnownFiles(BTreeMap<(u64, u64), KnownFile>);
 
 impl KnownFiles {
-    /// Adds a file, in place of what was known of it before.
+    /// Adds a file; it replaces an earlier entry.
     pub fn add(&mut self, file: KnownFile) {
         let Identity { device, inode, .. } = file.identity;
         self.0.insert((device, inode), file);
     }
 
-    /// What is known of the file with this identity.
+    /// The entry of the file with this identity.
     #[must_use]
     pub fn get(&self, identity: &Identity) -> Option<&KnownFile> {
         let found = self.0.get(&(identity.device, identity.inode));

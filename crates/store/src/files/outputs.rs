@@ -1,4 +1,4 @@
-//! Files that a command is to write, held against those that it reads and against each other.
+//! Output files of a command, checked against its inputs and against each other.
 
 use std::{
     fs,
@@ -8,12 +8,12 @@ use std::{
 
 use areograph_base::error::{Cause, Kind, Locate, Result};
 
-/// What a file is known by, whatever its names.
+/// Identity of a file, independent of its names.
 #[derive(Debug, PartialEq, Eq)]
 enum Place {
     /// Device and inode.
     Node(u64, u64),
-    /// Where a file that is not there yet will be.
+    /// The future path of a file that does not exist yet.
     Path(PathBuf),
 }
 
@@ -31,7 +31,7 @@ impl Place {
     }
 }
 
-/// A file that would be lost.
+/// A file that would be overwritten.
 #[derive(Debug, thiserror::Error)]
 enum Overwritten {
     #[error("would be written over the input {0}; expected a different file")]
@@ -50,11 +50,11 @@ impl Cause for Overwritten {
     }
 }
 
-/// Makes sure that no file of `outputs` is one of `inputs` or another output, under whatever names and links. Files that are
-/// not there are compared by their paths.
+/// Ensures that no file of `outputs` is one of `inputs` or another output, under any name or link. Files that do not
+/// exist are compared by their paths.
 ///
 /// # Errors
-/// One is, of kind configuration; both are named.
+/// A conflict, of kind configuration; both files are named.
 pub fn require_apart<'a>(
     outputs: impl IntoIterator<Item = &'a Path>,
     inputs: impl IntoIterator<Item = &'a Path>,
@@ -78,7 +78,7 @@ pub fn require_apart<'a>(
     Ok(())
 }
 
-/// Something that a file would take the place of.
+/// An entry that a file would replace.
 #[derive(Debug, thiserror::Error)]
 #[error("is {0}; expected a file or a new path")]
 struct NotAFile(&'static str);
@@ -95,15 +95,15 @@ impl Cause for NotAFile {
     }
 }
 
-/// Makes sure that at `path` there is nothing or a regular file.
+/// Ensures that `path` is free or a regular file.
 ///
 /// # Errors
-/// A link, a folder, a device, a pipe or a socket is there.
+/// `path` is a link, a folder, a device, a pipe or a socket.
 pub(super) fn require_replaceable(path: &Path) -> Result<()> {
     use std::os::unix::fs::FileTypeExt as _;
     let found = match fs::symlink_metadata(path) {
         Ok(metadata) => metadata.file_type(),
-        // Whoever writes the file says what is wrong with its folder.
+        // The writer of the file reports problems of its folder.
         Err(_) => return Ok(()),
     };
     let what = match found {

@@ -1,4 +1,4 @@
-//! A file that is being written, and gets its name when it is whole.
+//! A file that is being written; it receives its name once it is complete.
 
 use std::{
     fs::{self, File},
@@ -10,10 +10,10 @@ use tempfile::NamedTempFile;
 use super::outputs::require_replaceable;
 use areograph_base::error::{IoError, Locate, Result};
 
-/// How names of half-written files begin.
+/// Prefix of the names of incomplete files.
 pub const TEMPORARY: &str = ".partial-";
 
-/// A file under a temporary name in the folder where it belongs; it goes away with this, unless it is finished.
+/// A file under a temporary name in its final folder; it is removed when dropped, unless it is finished.
 #[derive(Debug)]
 pub struct StagedFile {
     path: PathBuf,
@@ -21,10 +21,10 @@ pub struct StagedFile {
 }
 
 impl StagedFile {
-    /// Begins the file `path`, its folder made where missing.
+    /// Creates the file `path`, and its folder if it is missing.
     ///
     /// # Errors
-    /// The folder cannot be made or written; something else than a file is there under this name.
+    /// The folder cannot be created or written; another kind of entry has this name.
     pub fn create(path: &Path) -> Result<Self> {
         require_replaceable(path)?;
         let folder = match path.parent() {
@@ -45,7 +45,7 @@ impl StagedFile {
         })
     }
 
-    /// Its path when it is finished.
+    /// Its final path.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
@@ -60,7 +60,7 @@ impl StagedFile {
         handle.map_err(IoError::on("create")).in_file(&self.path)
     }
 
-    /// A handle to read from its beginning what was written.
+    /// A handle to read the written content from its beginning.
     ///
     /// # Errors
     /// The file cannot be opened.
@@ -69,10 +69,10 @@ impl StagedFile {
         handle.map_err(IoError::on("read")).in_file(&self.path)
     }
 
-    /// Flushes the file to the disk, lets everyone read it whom the folder lets in, and gives it its name.
+    /// Flushes the file to the disk, makes it readable for everyone with access to the folder, and gives it its name.
     ///
     /// # Errors
-    /// The disk is full or refuses; what was there under this name is then as it was.
+    /// The disk is full or refuses; an existing file of this name is then unchanged.
     pub fn finish(self) -> Result<()> {
         let file = self.temporary.as_file();
         let synced = file.sync_all().map_err(IoError::on("write"));
@@ -87,7 +87,7 @@ impl StagedFile {
     }
 }
 
-/// Temporary files are private; products are for everyone whom the folder lets in.
+/// Temporary files are private; products are readable for everyone with access to the folder.
 #[cfg(unix)]
 fn make_readable(file: &File) -> std::io::Result<()> {
     use std::os::unix::fs::PermissionsExt as _;

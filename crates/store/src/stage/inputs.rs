@@ -1,4 +1,4 @@
-//! What a stage's output depends on, input by input, so that a re-run can be explained.
+//! The inputs of a stage, by name, so that a re-run can be explained.
 
 use std::{
     collections::BTreeMap,
@@ -12,10 +12,10 @@ use super::Called;
 use crate::files::{HashedFile, file_name};
 use areograph_base::error::{Cause, Kind};
 
-/// Value of an input that an earlier stage has yet to make.
+/// Value of an input that an earlier stage has not made yet.
 const NOT_KNOWN_YET: &str = "not known yet";
 
-/// Everything that enters a stage, by name; equal inputs mean an equal output.
+/// All inputs of a stage by name; equal inputs imply an equal output.
 ///
 /// | input | value |
 /// |---|---|
@@ -25,26 +25,25 @@ const NOT_KNOWN_YET: &str = "not known yet";
 /// | `kernel …`, `label …`, `pedr …` | BLAKE3 of a file; where the order matters with its place |
 /// | `output of …` | BLAKE3 of an earlier stage's output |
 ///
-/// Outputs enter by content: when an earlier stage runs again and gives the same bytes, the later
-/// stage stays as it is.
+/// Outputs enter by content: if an earlier stage runs again and gives the same bytes, the later stage is kept.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Inputs {
     named: BTreeMap<String, String>,
-    /// Files behind the inputs, which must not change while the stage runs; not part of what is compared.
+    /// Files behind the inputs, which must not change while the stage runs; not part of the comparison.
     #[serde(skip)]
     files: Vec<PathBuf>,
-    /// What the names of inputs begin with that are not known yet.
+    /// Prefixes of the names of inputs that are not known yet.
     #[serde(skip)]
     pending: Vec<String>,
 }
 
-/// A field of what a stage may see.
+/// A field of the inputs of a stage.
 pub trait Input {
-    /// Adds the field, under its name where it has no better one, to the inputs of the stage.
+    /// Adds the field to the inputs of the stage, under its name unless it has a better one.
     fn add_to(&self, field: &str, inputs: &mut Inputs);
 }
 
-/// Values of the configuration, and what is derived from them.
+/// Values of the configuration, and values derived from them.
 impl<T: Serialize + ?Sized> Input for &T {
     fn add_to(&self, field: &str, inputs: &mut Inputs) {
         inputs.setting(field, self);
@@ -57,7 +56,7 @@ impl Input for HashedFile {
     }
 }
 
-/// Something that may be absent.
+/// An optional input.
 impl<T: Input> Input for Option<T> {
     fn add_to(&self, field: &str, inputs: &mut Inputs) {
         if let Some(input) = self {
@@ -86,7 +85,7 @@ impl Input for InOrder<'_, HashedFile> {
     }
 }
 
-/// An output that was asked for its value before it was made.
+/// An output whose value was requested before it was made.
 #[derive(Debug, thiserror::Error)]
 #[error("the output of {0} was used before it was made")]
 pub(super) struct Pending(pub(super) String);
@@ -102,7 +101,7 @@ impl Cause for Pending {
 }
 
 impl Inputs {
-    /// The inputs of a stage whose method, or the layout of whose output, has this number.
+    /// The inputs of a stage whose method, or output layout, has this number.
     #[must_use]
     pub fn new(method: u32) -> Self {
         let version = format!("{}, method {method}", env!("CARGO_PKG_VERSION"));
@@ -113,7 +112,7 @@ impl Inputs {
         }
     }
 
-    /// Adds the methods of stages whose functions the stage calls: when one of these computes something else, so does it.
+    /// Adds the methods of stages whose functions the stage calls: if one of these changes, so does the stage.
     pub fn calls(&mut self, called: &[Called]) {
         for (stage, method) in called {
             self.named
@@ -121,9 +120,9 @@ impl Inputs {
         }
     }
 
-    /// Adds a value of the valid configuration; of a table each field under its own name.
+    /// Adds a value of the valid configuration; for a table each field under its own name.
     pub fn setting(&mut self, name: &str, value: &(impl Serialize + ?Sized)) {
-        // Configuration types hold nothing that JSON cannot say; were it so, the text says that.
+        // Configuration types contain only values that JSON can represent; otherwise the text reports it.
         let value =
             serde_json::to_value(value).unwrap_or_else(|error| Value::String(error.to_string()));
         self.flatten(format!("key {name}"), value);
@@ -142,8 +141,7 @@ impl Inputs {
         }
     }
 
-    /// Adds an input that is not known before earlier stages have run, and whose parts have names that begin with
-    /// `prefix`.
+    /// Adds an input that is not known before earlier stages have run; the names of its parts begin with `prefix`.
     pub fn not_known_yet(&mut self, name: &str, prefix: &str) {
         self.named.insert(name.to_owned(), NOT_KNOWN_YET.to_owned());
         self.pending.push(prefix.to_owned());
@@ -173,7 +171,7 @@ impl Inputs {
         self.named.insert(format!("output of {label}"), value);
     }
 
-    /// Adds what an earlier stage was made from, for what repeats its fingerprint.
+    /// Adds the fingerprint of an earlier stage, for an output that repeats it.
     pub fn fingerprint_of(&mut self, label: &str, fingerprint: Option<&str>) {
         let value = fingerprint.unwrap_or(NOT_KNOWN_YET).to_owned();
         self.named.insert(format!("inputs of {label}"), value);
@@ -203,7 +201,7 @@ impl Inputs {
         hasher.finalize().to_hex().to_string()
     }
 
-    /// Names of the inputs that `earlier` has otherwise, or not, or alone.
+    /// Names of the inputs that differ from those of `earlier`, or exist only here or there.
     #[must_use]
     pub fn changed_since(&self, earlier: &Self) -> Vec<String> {
         let mut changes = Vec::new();
@@ -220,7 +218,7 @@ impl Inputs {
         let gone = earlier.named.keys();
         let pending = |name: &str| self.pending.iter().any(|prefix| name.starts_with(prefix));
         let gone = gone.filter(|name| !self.named.contains_key(*name) && !pending(name));
-        changes.extend(gone.map(|name| format!("{name} is gone")));
+        changes.extend(gone.map(|name| format!("{name} was removed")));
         changes
     }
 }
@@ -277,7 +275,7 @@ mod tests {
                 "kernel naif0013.tls is new",
                 "key range_check.mean_max_m changed",
                 "output of tag_times may change",
-                "kernel naif0012.tls is gone",
+                "kernel naif0012.tls was removed",
             ]
         );
     }

@@ -1,11 +1,11 @@
-//! What a stage is: a name, everything that it may see, and a function of that.
+//! A stage: a name, all its inputs, and a function of them.
 //!
-//! [`stage_inputs!`](crate::stage_inputs) declares the struct of what a stage sees. Its fields are its fingerprint:
-//! what is no field cannot be used, and what is a field cannot be forgotten.
+//! [`stage_inputs!`](crate::stage_inputs) declares the struct of the inputs of a stage. Its fields are its
+//! fingerprint: a value that is not a field cannot be used, and a field cannot be forgotten.
 //!
-//! A rerun names the field that changed. Of the kernels a stage sees a `KernelView`: what does not enter its
-//! fingerprint is not loaded. A stage calls no other stage, prints nothing and does not know the files of another
-//! stage; long ones count their steps (`base/watch`).
+//! A rerun names the field that changed. Of the kernels a stage sees a `KernelView`: kernels outside its fingerprint
+//! are not loaded. A stage calls no other stage, prints nothing and does not know the files of another stage; long
+//! stages count their steps (`base/watch`).
 //!
 //! Outputs enter fingerprints by content: an early stage that gives the same bytes again ends the chain of reruns. A
 //! change of the computation raises the `METHOD` of the stage. `docs/methods.csv` holds the output of every stage for
@@ -39,7 +39,7 @@ pub enum Round {
 }
 
 impl Round {
-    /// Part of a stage that runs once a site in each round.
+    /// Part of a stage that runs once per site in each round.
     #[must_use]
     pub fn part(self) -> Option<String> {
         self.name().map(str::to_owned)
@@ -54,7 +54,7 @@ impl Round {
         })
     }
 
-    /// What a stage that makes the orientation of this round is marked by: the last adjustment of a site is the adjustment.
+    /// Mark of a stage that makes the orientation of this round: the last adjustment of a site is the adjustment.
     #[must_use]
     pub const fn of_adjustment(self) -> Self {
         match self {
@@ -80,41 +80,41 @@ impl Input for Round {
 /// A stage whose functions another one calls, by its name and the number of its method; see [`called`].
 pub type Called = (&'static str, u32);
 
-/// What a stage lists in [`Stage::CALLS`] for each stage whose functions it calls.
+/// Entry of [`Stage::CALLS`] for a stage whose functions are called.
 #[must_use]
 pub const fn called<S: Stage>() -> Called {
     (S::NAME, S::METHOD)
 }
 
-/// A step of the flow: a function of its fields, and of nothing else.
+/// A step of the flow: a function of its fields only.
 pub trait Stage {
-    /// Name as logs, messages, the manifest and the command line write it.
+    /// Name in logs, messages, the manifest and the command line.
     const NAME: &'static str;
-    /// Raised when the stage computes something else from the same inputs, or lays its output out anew; `docs/methods.csv` holds
-    /// what it computes, and `tests/products/methods.rs` fails where this is forgotten.
+    /// Raised when the stage computes a different output from the same inputs, or the layout of its output changes;
+    /// `docs/methods.csv` contains its output, and `tests/products/methods.rs` fails if this is forgotten.
     const METHOD: u32 = 1;
     /// Stages whose functions it calls: their methods are inputs of it.
     const CALLS: &'static [Called] = &[];
-    /// Whether `check` runs the stage; the others only look at their inputs, by [`Stage::examine`].
+    /// Whether `check` runs the stage; for other stages it only examines the inputs, by [`Stage::examine`].
     const CHECKED: bool = false;
-    /// What it makes; stored, and handed to later stages.
+    /// Its output; stored, and passed to later stages.
     type Output: Serialize + DeserializeOwned;
 
-    /// Everything that the stage sees, by name; made by [`stage_inputs!`](crate::stage_inputs).
+    /// All inputs of the stage by name; made by [`stage_inputs!`](crate::stage_inputs).
     fn inputs(&self) -> Inputs;
 
-    /// What the stage is run for when it is run several times in a site: an image, or the second round.
+    /// The part for which a stage runs if it runs several times in a site: an image, or the second round.
     fn part(&self) -> Option<String> {
         None
     }
 
-    /// Computes the output. `stop` is looked at inside long loops.
+    /// Computes the output. `stop` is checked inside long loops.
     ///
     /// # Errors
-    /// What the stage's own documentation says; [`Stopped`](areograph_base::error::Stopped).
+    /// Those of the stage; [`Stopped`](areograph_base::error::Stopped).
     fn run(&self, stop: &AtomicBool) -> Result<Self::Output>;
 
-    /// The same, with the steps of long loops counted; of a stage that counts none as without.
+    /// The same, counting the steps of long loops; identical for a stage that counts none.
     ///
     /// # Errors
     /// As [`Stage::run`].
@@ -122,12 +122,12 @@ pub trait Stage {
         self.run(watch.stop())
     }
 
-    /// What `check` finds in the inputs without running the stage: every finding and every failure.
+    /// Findings of `check` in the inputs without running the stage: all findings and all failures.
     fn examine(&self) -> Vec<Result<String>> {
         Vec::new()
     }
 
-    /// What `check` tells of the output.
+    /// Findings of `check` in the output.
     fn findings(&self, _output: &Self::Output) -> Vec<String> {
         Vec::new()
     }
@@ -141,7 +141,7 @@ pub trait Stage {
     }
 }
 
-/// Declares what a stage may see. The fields are its fingerprint, each by its [`Input`].
+/// Declares the inputs of a stage. The fields are its fingerprint, each by its [`Input`].
 ///
 /// ```
 /// use areograph_store::{stage::{Output, Stage}, stage_inputs};

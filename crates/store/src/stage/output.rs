@@ -1,20 +1,20 @@
-//! The output of a stage with its origin, or the place of one that is not known yet.
+//! The output of a stage with its origin, or a placeholder for one that is not known yet.
 
 use std::sync::Arc;
 
 use super::inputs::{InOrder, Input, Inputs, Pending};
 use areograph_base::error::Result;
 
-/// Where an output comes from.
+/// Origin of an output.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Provenance {
     /// BLAKE3 of the stored output.
     pub blake3: String,
-    /// BLAKE3 over the inputs that it was made from.
+    /// BLAKE3 over its inputs.
     pub fingerprint: String,
 }
 
-/// What a stage made; pending in a plan or a check, where the stage did not run.
+/// The output of a stage; pending in a plan or a check, where the stage did not run.
 #[derive(Debug)]
 pub struct Output<T> {
     label: String,
@@ -47,7 +47,7 @@ impl<T> Output<T> {
         Self { label, known: None }
     }
 
-    /// The same output, by its origin, without what `lighten` takes away; as it is where others have a part in it.
+    /// The same output, by its origin, reduced by `lighten`; unchanged if it is shared.
     #[must_use]
     pub fn lightened(mut self, lighten: impl FnOnce(&mut T)) -> Self {
         if let Some((value, _)) = self.known.as_mut().and_then(Arc::get_mut) {
@@ -65,7 +65,7 @@ impl<T> Output<T> {
     /// The value.
     ///
     /// # Errors
-    /// A bug in areograph that no stage meets: the flow runs it when everything that it sees is known.
+    /// A bug in areograph that stages do not encounter: the flow runs a stage only when all its inputs are known.
     pub fn value(&self) -> Result<&T> {
         let pending = || Pending(self.label.clone()).into();
         self.get().ok_or_else(pending)
@@ -77,7 +77,7 @@ impl<T> Output<T> {
         self.known.as_ref().map(|known| &known.0)
     }
 
-    /// Where it comes from, if it is known.
+    /// Its origin, if it is known.
     #[must_use]
     pub fn provenance(&self) -> Option<&Provenance> {
         self.known.as_ref().map(|known| &known.1)

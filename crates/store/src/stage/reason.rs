@@ -9,7 +9,7 @@ pub enum Reason {
     Unchanged,
     /// No stored output.
     First,
-    /// The user asked for it.
+    /// The user requested it.
     Forced,
     /// The stored output cannot be read or is not what was stored.
     Damaged,

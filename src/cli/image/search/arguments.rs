@@ -1,4 +1,4 @@
-//! What `areograph image search` is asked for.
+//! Arguments of `areograph image search`.
 
 use std::path::PathBuf;
 
@@ -15,7 +15,7 @@ use crate::{
 
 /// Largest angle between two directions, degrees.
 const ANGLE_MAX_DEG: f64 = 180.0;
-/// Wider than Mars: no pixel is.
+/// Wider than Mars, and therefore than any pixel.
 const PIXEL_MAX_M: f64 = 1e7;
 
 /// Finds the images of the mission's cumulative index that may show ground of a window, and pairs of them.
@@ -26,7 +26,7 @@ const PIXEL_MAX_M: f64 = 1e7;
 ///
 /// Pairs are images of different orbits (by the index, else by times more than 30 minutes apart) with common ground. Best
 /// first: overlap × min(convergence / 20°, 1) × cos²(difference of the Sun / 2) / ratio of the pixels. Convergence is the
-/// angle between the rays to the spacecraft, each at the centre of its own image: lines are seen one by one.
+/// angle between the rays to the spacecraft, each at the centre of its own image, since lines are exposed one by one.
 ///
 /// Example: areograph image search cumindex.tab --box 137.0,138.0,-5.5,-4.0
 #[derive(Debug, Args)]
@@ -85,7 +85,7 @@ fn known_cameras() -> String {
     ids.join(", ")
 }
 
-/// The cameras that an image may be of by its names in the index: several where these are lacking.
+/// The cameras that may have taken an image, by the names in the index; several if names are missing.
 pub(super) fn cameras_of(image: &IndexedImage) -> impl Iterator<Item = &'static Instrument> + '_ {
     let [instrument, filter] = &image.instrument;
     let may_be = |own: &str, found: &str| found.is_empty() || own == found;
@@ -96,7 +96,7 @@ pub(super) fn cameras_of(image: &IndexedImage) -> impl Iterator<Item = &'static 
     })
 }
 
-/// The camera of an image, where the index tells it.
+/// The camera of an image, if the index identifies it.
 pub(super) fn camera_of(image: &IndexedImage) -> Option<&'static Instrument> {
     let mut cameras = cameras_of(image);
     cameras.next().filter(|_| cameras.next().is_none())
@@ -128,7 +128,7 @@ impl Arguments {
     }
 
     /// # Errors
-    /// A camera that is none.
+    /// An unknown camera.
     pub(super) fn check_cameras(&self) -> Result<()> {
         let is_known = |id: &&String| {
             built_in_instruments()
@@ -141,7 +141,8 @@ impl Arguments {
         }
     }
 
-    /// Whether camera, angles and pixels of an image are as wanted; what the index does not say is no reason to leave it out.
+    /// Whether camera, angles and pixel size of an image are as requested; values missing from the index exclude no
+    /// image.
     pub(super) fn wants(&self, image: &IndexedImage) -> bool {
         let within = |value: Option<f64>, most: Option<f64>| {
             value.zip(most).is_none_or(|(value, most)| value <= most)

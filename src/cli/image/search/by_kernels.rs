@@ -1,4 +1,4 @@
-//! Corners of the index against those that kernels tell.
+//! Corners of the index compared with those computed from kernels.
 
 use std::path::Path;
 
@@ -17,14 +17,14 @@ use crate::{
     units::METRES_PER_KM,
 };
 
-/// Notes of each image how far that corner lies from where the kernels have it that is worst, and warns of images that the
-/// search may have missed by that. Images that the kernels do not cover stay as they are.
+/// Records the largest distance of a corner of each image from its position by the kernels, and warns of images for
+/// which it exceeds the tolerance of the search. Images that the kernels do not cover remain unchanged.
 ///
 /// # Errors
 /// Kernels that cannot be read; an image that no camera can have taken.
 pub(super) fn compare(found: &mut [Found], metakernel: &Path) -> Result<()> {
     let session = Session::open(&KernelSet::from_metakernel(metakernel)?)?;
-    // What the search lets the index be off by.
+    // Tolerance of the search for errors of the index.
     let allowed_m = RADIUS_M * INDEX_LATITUDE_RAD.hypot(INDEX_LONGITUDE_RAD);
     let kilometres = |metres: f64| metres / METRES_PER_KM;
     let mut distances_m = Vec::new();
@@ -33,7 +33,7 @@ pub(super) fn compare(found: &mut [Found], metakernel: &Path) -> Result<()> {
         distances_m.extend(found.off_kernels_m);
         if let Some(off_m) = found.off_kernels_m.filter(|off_m| !(*off_m <= allowed_m)) {
             tracing::warn!(
-                "{}: its corners lie up to {:.1} km from where the kernels have them; the search allows {:.1} km, so others like it \
+                "{}: its corners are up to {:.1} km from their positions by the kernels; the search allows {:.1} km, so similar images \
                  may have been missed",
                 found.image.product_id,
                 kilometres(off_m),
@@ -55,7 +55,7 @@ pub(super) fn compare(found: &mut [Found], metakernel: &Path) -> Result<()> {
     Ok(())
 }
 
-/// How far the worst corner is off; `None` where index or kernels have none.
+/// Largest offset of a corner, metres; `None` if the index or the kernels give no corners.
 fn off_kernels_m(image: &IndexedImage, session: &Session) -> Result<Option<f64>> {
     let [Some(a), Some(b), Some(c), Some(d)] = image.corners_rad else {
         return Ok(None);
@@ -95,7 +95,7 @@ fn off_kernels_m(image: &IndexedImage, session: &Session) -> Result<Option<f64>>
     Ok(distances_m.max_by(f64::total_cmp))
 }
 
-/// The image as a site file would have it.
+/// The image as an entry of a site file.
 fn entry(image: &IndexedImage) -> ImageConfig {
     let [crosstrack_summing, downtrack_summing] = image.summing;
     let [samples, lines] = image.size;

@@ -13,9 +13,10 @@ pub(super) struct Pair<'a> {
     pub(super) images: [&'a Found; 2],
     /// Share of the smaller outline.
     pub(super) overlap: f64,
-    /// Whether index or times say that they are of different orbits.
+    /// Whether index or times determine that they belong to different orbits.
     pub(super) is_known_apart: bool,
-    /// Angle between the rays to the spacecraft, see [`convergence_rad`]; where the index tells where it was.
+    /// Angle between the rays to the spacecraft, see [`convergence_rad`]; `None` if the index lacks a spacecraft
+    /// position.
     pub(super) convergence_rad: Option<f64>,
     /// Larger pixel over smaller one.
     pub(super) pixel_ratio: Option<f64>,
@@ -25,10 +26,10 @@ pub(super) struct Pair<'a> {
     pub(super) score: f64,
 }
 
-/// Convergence from which on more is not better, radians.
+/// Convergence beyond which the score does not increase, radians.
 const CONVERGENCE_RAD: f64 = 20.0 * RADIANS_PER_DEGREE;
 
-/// Images that are this close in time are of one orbit, seconds; an orbit of the mapping mission takes 118 minutes.
+/// Images within this time belong to one orbit, seconds; an orbit of the mapping mission takes 118 minutes.
 const ONE_ORBIT_S: i64 = 1_800;
 
 /// All pairs, the best first.
@@ -46,7 +47,7 @@ fn pair(images: [&Found; 2]) -> Option<Pair<'_>> {
     let [one, other] = images;
     let overlap = one.outline.overlap(&other.outline);
     let is_one_orbit = is_one_orbit(&one.image, &other.image);
-    // Context images are taken together with those of the narrow angle: no base between them.
+    // Context images are taken together with those of the narrow angle: they have no base.
     if overlap <= 0.0 || is_one_orbit == Some(true) {
         return None;
     }
@@ -77,8 +78,8 @@ fn sight(found: &Found) -> Option<Sight> {
     })
 }
 
-/// Whether two images are of one orbit: by its number in their mission phase, else by their times; none where neither is
-/// known.
+/// Whether two images belong to one orbit: by its number in their mission phase, else by their times; `None` if
+/// neither is known.
 fn is_one_orbit(one: &IndexedImage, other: &IndexedImage) -> Option<bool> {
     let orbits = one.orbit.as_ref().zip(other.orbit.as_ref());
     let by_number = orbits.map(|(one, other)| one == other);

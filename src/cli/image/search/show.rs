@@ -1,4 +1,4 @@
-//! The answer of a search, in each of its forms.
+//! The result of a search in each output format.
 
 use serde_json::{Value, json};
 
@@ -11,7 +11,7 @@ use crate::{
 /// Pairs that are printed for reading; all are counted.
 const PAIRS_PRINTED: usize = 20;
 
-/// Degrees with two digits, as the index has them; nothing for an unknown angle.
+/// Degrees with two digits, as in the index; empty for an unknown angle.
 fn degrees(angle_rad: Option<f64>) -> String {
     angle_rad.map_or_else(String::new, |angle| {
         format!("{:.2}", angle / RADIANS_PER_DEGREE)
@@ -26,7 +26,7 @@ fn count(value: Option<u32>) -> String {
     value.map_or_else(String::new, |value| value.to_string())
 }
 
-/// Identifier as site files have it.
+/// Identifier as in site files.
 fn id(found: &Found) -> String {
     found.image.product_id.replace('/', "-")
 }
@@ -151,12 +151,12 @@ pub(super) fn pairs_csv(pairs: &[Pair<'_>]) {
 
 fn lines<const N: usize>(rows: impl Iterator<Item = [String; N]>) {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    // Into memory: no failure.
+    // Writing to memory does not fail.
     rows.for_each(|row| drop(writer.write_record(row)));
     output::text(&writer.into_inner().unwrap_or_default());
 }
 
-/// Outlines with what is known of each image.
+/// Outlines with the attributes of each image.
 pub(super) fn geojson(found: &[Found], pairs: &[Pair<'_>]) -> Value {
     let features = found.iter().map(|found| {
         let partners = pairs.iter().filter_map(|pair| match pair.images {
@@ -184,7 +184,7 @@ pub(super) fn geojson(found: &[Found], pairs: &[Pair<'_>]) -> Value {
     json!({"type": "FeatureCollection", "features": features.collect::<Vec<_>>()})
 }
 
-/// The outline, in several polygons where it crosses the antimeridian or holds a pole.
+/// The outline, in several polygons where it crosses the antimeridian or contains a pole.
 fn geometry(found: &Found) -> Value {
     let rings = found.outline.rings_rad().into_iter();
     let polygons: Vec<[Vec<[f64; 2]>; 1]> = rings

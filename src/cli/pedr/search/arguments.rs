@@ -1,4 +1,4 @@
-//! What `areograph pedr search` is asked for.
+//! Arguments of `areograph pedr search`.
 
 use std::path::{Path, PathBuf};
 
@@ -59,7 +59,7 @@ pub(super) enum Format {
 }
 
 impl Format {
-    /// That of the files with this ending, if it is one of ours.
+    /// The format of files with this extension, if supported.
     fn of_ending(path: &Path) -> Option<Self> {
         let ending = path.extension()?.to_ascii_lowercase();
         match ending.to_str()? {
@@ -71,7 +71,7 @@ impl Format {
     }
 }
 
-/// What is wrong with the command line.
+/// Errors of the command line.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum Usage {
     #[error("{0:?} is not a time interval")]
@@ -110,7 +110,7 @@ impl Cause for Usage {
 }
 
 impl Arguments {
-    /// None only counts.
+    /// `None` only counts shots.
     pub(super) fn format(&self) -> Result<Option<RowsFormat>> {
         let out = self.out.as_deref();
         let named = || out.unwrap_or(Path::new("")).display().to_string();
@@ -135,7 +135,7 @@ impl Arguments {
     }
 
     /// # Errors
-    /// A value that was left outside of a list, and so would be searched as a file.
+    /// A filter value outside its list, which would be searched as a file.
     pub(super) fn check_paths(&self) -> Result<()> {
         let is_value = |path: &&PathBuf| {
             let number = path.to_str().and_then(|text| text.parse::<i64>().ok());
@@ -147,12 +147,12 @@ impl Arguments {
         }
     }
 
-    /// Makes sure that nothing that is read is written over.
+    /// Ensures that no input is overwritten.
     ///
     /// # Errors
-    /// An output is one of these files, or of those that say what to search for.
+    /// An output is one of these files, or a file of windows or leap seconds.
     pub(super) fn require_apart(&self, sources: &[Source], failures: &[Error]) -> Result<()> {
-        // What was asked for stands in a file beside CSV.
+        // The request is stored in a file beside the CSV.
         let beside = self.out.as_ref().map(|out| {
             let mut name = out.clone().into_os_string();
             name.push(".json");

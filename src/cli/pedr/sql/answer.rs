@@ -1,4 +1,4 @@
-//! How an answer is printed or written, piece by piece.
+//! Prints or writes an answer batch by batch.
 
 use std::{
     io::{self, Stdout, Write},
@@ -23,7 +23,7 @@ use crate::{
 /// Rows of a table that is printed.
 const TABLE_ROWS_MAX: usize = 1_000;
 
-/// Rows that cannot be written as they were asked for.
+/// Rows that cannot be written as requested.
 #[derive(Debug, thiserror::Error)]
 enum NotWritten {
     #[error("the answer cannot be written: {0}")]
@@ -62,7 +62,7 @@ pub(super) enum Answer {
         schema: SchemaRef,
         batches: Vec<RecordBatch>,
     },
-    /// Rows in a file or on standard output, and whether the reader of the latter is gone.
+    /// Rows in a file or on standard output, and whether the reader of the latter has closed the pipe.
     Rows {
         writer: RowsWriter,
         format: RowsFormat,
@@ -70,14 +70,14 @@ pub(super) enum Answer {
     },
 }
 
-/// Whoever reads standard output: one who went away (`| head`) is no failure, a disk that refuses is one.
+/// Writer to standard output: a closed pipe (`| head`) is not a failure, a refusal of the disk is.
 struct Reader {
     out: Stdout,
     is_gone: Arc<AtomicBool>,
 }
 
 impl Reader {
-    /// What was done of something of which nothing is left to do once the reader is gone.
+    /// The result of an operation; `gone` if the pipe was closed.
     fn or_gone<T>(&self, done: io::Result<T>, gone: T) -> io::Result<T> {
         match done {
             Err(error) if error.kind() == io::ErrorKind::BrokenPipe => {
@@ -125,7 +125,7 @@ impl Answer {
         })
     }
 
-    /// An answer in a file, which appears when it is whole.
+    /// An answer in a file, which appears once it is complete.
     pub(super) fn in_file(path: &Path, schema: &SchemaRef) -> Result<Self> {
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
         let (format, schema) = match ending.to_str() {
@@ -143,7 +143,7 @@ impl Answer {
         })
     }
 
-    /// Takes rows, and says whether it wants more.
+    /// Accepts rows; returns whether more are wanted.
     pub(super) fn take(&mut self, batch: RecordBatch) -> Result<bool> {
         match self {
             Self::Table { batches, .. } => {
@@ -180,7 +180,7 @@ fn rows(batches: &[RecordBatch]) -> usize {
     batches.iter().map(RecordBatch::num_rows).sum()
 }
 
-/// Prints the first rows; a note on standard error says that there are more.
+/// Prints the first rows; a note on standard error reports that there are more.
 fn print_table(schema: SchemaRef, batches: &[RecordBatch]) -> Result<()> {
     let mut left = TABLE_ROWS_MAX;
     let shown: Vec<RecordBatch> = batches
