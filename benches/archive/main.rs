@@ -174,7 +174,10 @@ impl Archive {
     fn lines_mapped(&self) -> u64 {
         let of_file = |path: &PathBuf| {
             let file = fs::File::open(path).unwrap();
-            #[allow(unsafe_code, reason = "no other process shortens the files of the benchmark")]
+            #[allow(
+                unsafe_code,
+                reason = "no other process shortens the files of the benchmark"
+            )]
             // SAFETY: the map is read only, and only this program uses the files.
             let map = unsafe { memmap2::Mmap::map(&file) }.unwrap();
             let records = map[LABEL_BYTES..].chunks_exact(RECORD_BYTES);

@@ -62,7 +62,7 @@ pub(super) struct CalibrationLoop<'a> {
 
 impl Stage for CalibrationLoop<'_> {
     const NAME: &'static str = "calibration_loop";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     const CALLS: &'static [Called] = &[
         called::<MatchTies<'_>>(),
         called::<MapSurface<'_>>(),

@@ -123,7 +123,8 @@ impl<'a> Check<'a> {
     fn all(&mut self, config: &SiteConfig) -> Flow<()> {
         let prepared = prepare(self, config)?;
         if !config.ties.files.is_empty() {
-            ties_of_files(self, config)?;
+            let times = self.usable(&prepared.images);
+            ties_of_files(self, config, &times)?;
         }
         if let KernelSource::Sets(sets) = &config.kernels.source {
             for (index, set) in sets.iter().enumerate() {

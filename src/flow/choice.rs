@@ -69,6 +69,7 @@ impl Input for RivalKernelSets<'_> {
 
 impl Stage for ChooseKernels<'_> {
     const NAME: &'static str = "choose_kernels";
+    const METHOD: u32 = 2;
     type Output = KernelChoice;
     stage_inputs!(fingerprint);
 

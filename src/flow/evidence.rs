@@ -78,7 +78,8 @@ pub(super) fn warnings(config: &SiteConfig, site: &Site) -> Result<Vec<String>> 
     for image in &site.images {
         let times = image.times.value()?;
         let remarks = times.remarks.iter();
-        warnings.extend(remarks.map(|remark| format!("image {}: {remark}", times.id)));
+        let remarks = remarks.filter(|remark| !remark.is_beyond_accuracy());
+        warnings.extend(remarks.map(|remark| format!("image {}: {}", times.id, remark.text)));
     }
     warnings.extend(same_exposures(&site.images)?);
     if has_angles(config) {
@@ -166,8 +167,10 @@ fn same_exposures(images: &[SiteImage]) -> Result<Vec<String>> {
 
 fn judged_images(images: &[SiteImage]) -> Result<Vec<JudgedImage<'_>>> {
     let images = images.iter().map(|image| {
+        let times = image.times.value()?;
         Ok(JudgedImage {
-            id: &image.times.value()?.id,
+            id: &times.id,
+            disagreements: &times.remarks,
             orientation: image.orientation.value()?,
             model: image.model.value()?,
         })

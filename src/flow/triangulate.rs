@@ -25,6 +25,7 @@ use crate::{
         reorient::Reorient,
         site_image::{SiteImage, SiteImages},
         tabulate_kernels::TabulateKernels,
+        tag_times::ImageTimes,
     },
 };
 
@@ -58,7 +59,12 @@ fn ties<D: Driver>(flow: &mut D, config: &SiteConfig, site: &Site) -> Flow<Optio
     let read = if config.ties.files.is_empty() {
         None
     } else {
-        Some(ties_of_files(flow, config)?)
+        let times: Vec<_> = site
+            .images
+            .iter()
+            .map(|image| image.times.clone())
+            .collect();
+        Some(ties_of_files(flow, config, &times)?)
     };
     if config.ties.matched {
         matched(flow, config, site, read.as_ref()).map(Some)
@@ -68,12 +74,17 @@ fn ties<D: Driver>(flow: &mut D, config: &SiteConfig, site: &Site) -> Flow<Optio
 }
 
 /// The tie points of the site's files.
-pub(super) fn ties_of_files<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Output<Ties>> {
+pub(super) fn ties_of_files<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    times: &[Output<ImageTimes>],
+) -> Flow<Output<Ties>> {
     let files = flow.hash(ReadTies::NAME, &config.ties.files)?;
     flow.stage(&ReadTies {
         ties: &config.ties,
         files: TieFiles(&files),
         images: ImageNames(&config.images),
+        times: InOrder(times),
     })
 }
 

@@ -78,8 +78,7 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
             after.map_or_else(nothing, |after| {
                 format!("{after}; residuals {} σ", label(along, 2))
             }),
-            "how well the images agree along track; not a measure of height or position"
-                .to_owned(),
+            "how well the images agree along track; not a measure of height or position".to_owned(),
         ],
         [
             "agreement with MOLA, height".to_owned(),

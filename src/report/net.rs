@@ -351,10 +351,8 @@ fn controls(net: &Triangulation) -> Result<String> {
 fn precision(config: &NetConfig, net: &Triangulation) -> String {
     let totals = &net.totals;
     let sigma = match totals.tie_sigma_m {
-        None => {
-            "The standard deviation of an image is not determined: there is no redundancy."
-                .to_owned()
-        }
+        None => "The standard deviation of an image is not determined: there is no redundancy."
+            .to_owned(),
         Some(sigma_m) => {
             let source = if totals.tie_sigma_given {
                 "as given"

@@ -201,8 +201,7 @@ pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
             ],
         );
     }
-    let words =
-        "Shown: the redundancy number r; detectable by Baarda's test (3.29, power 80 %): 4.13 σ/√r.";
+    let words = "Shown: the redundancy number r; detectable by Baarda's test (3.29, power 80 %): 4.13 σ/√r.";
     let table = table.finish() + &paragraph(words);
     sentences + &folded("Redundancy by kind of observation", &table)
 }

@@ -81,7 +81,7 @@ impl Input for Required<'_> {
 
 impl Stage for DescribeKernels<'_> {
     const NAME: &'static str = "describe_kernels";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     type Output = KernelDescription;
     stage_inputs!(fingerprint);
 

@@ -161,7 +161,7 @@ stage_inputs! {
 
 impl Stage for FitSensorModel<'_> {
     const NAME: &'static str = "fit_sensor_model";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     type Output = SensorModel;
     stage_inputs!(fingerprint);
 

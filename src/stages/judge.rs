@@ -18,6 +18,7 @@ use super::{
     map_surface::SurfaceAccount,
     orientation::Orientation,
     read_ties::Ties,
+    tag_times::Disagreement,
 };
 use crate::{
     config::{LimitsConfig, OrientationConfig, RangeCheckConfig},
@@ -64,6 +65,8 @@ pub struct JudgedImage<'a> {
     pub orientation: &'a Orientation,
     /// Its sensor models.
     pub model: &'a SensorModel,
+    /// Disagreements of its label, clock and mounting.
+    pub disagreements: &'a [Disagreement],
 }
 
 /// The evidence on an adjustment.
@@ -118,8 +121,11 @@ impl Evidence<'_> {
             }
         }
         for image in self.images {
+            let beyond = image.disagreements.iter();
+            let beyond = beyond.filter(|of| of.is_beyond_accuracy());
             let of_orientation = image.orientation.invalid_because.iter();
-            for reason in of_orientation.chain(&image.model.invalid_because) {
+            let all = beyond.map(|of| &of.text).chain(of_orientation);
+            for reason in all.chain(&image.model.invalid_because) {
                 reasons.push(format!("image {}: {reason}", image.id));
             }
         }

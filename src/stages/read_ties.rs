@@ -15,11 +15,12 @@ use crate::{
     error::{Cause, Kind, Result},
     files::{HashedFile, file_name, hash_file},
     pds,
-    stage::{InOrder, Input, Inputs, Stage},
+    stage::{InOrder, Input, Inputs, Output, Stage},
     stage_inputs,
-    ties::{MatchedPair, TiePoint},
+    ties::{MatchedPair, TieMeasure, TiePoint},
 };
 
+use super::tag_times::ImageTimes;
 use repeats::SharedPlaces;
 
 /// Complaints kept with their text; all are counted.
@@ -61,6 +62,55 @@ enum TiesError {
     NoImage { found: String, expected: String },
     #[error("tie points: {0}; expected at most half of the points at such positions")]
     SharedPlaces(SharedPlaces),
+    #[error("{0}")]
+    Outside(Outside),
+}
+
+/// Measurements outside the delivered image. They were made in another file, so that those inside may be displaced too.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "image {image}: {count} of {all} measurements lie outside the delivered image, for example tie point {point} at \
+     line {line:.2}, sample {sample:.2}; expected lines 0 to {lines} and samples 0 to {samples}"
+)]
+struct Outside {
+    image: String,
+    count: usize,
+    all: usize,
+    point: String,
+    line: f64,
+    sample: f64,
+    lines: u32,
+    samples: u32,
+}
+
+impl Outside {
+    /// The measurements of `points` in the image with this index that lie outside it, if any do.
+    fn of(points: &[TiePoint], index: usize, times: &ImageTimes) -> Option<Self> {
+        let (lines, samples) = (times.lines_delivered, times.samples);
+        let within = |measure: &TieMeasure| {
+            (0.0..=f64::from(lines)).contains(&measure.line)
+                && (0.0..=f64::from(samples)).contains(&measure.sample)
+        };
+        let measures = points.iter().flat_map(|point| {
+            let measures = point.measures.iter();
+            measures
+                .filter(|measure| measure.image == index)
+                .map(move |measure| (point, measure))
+        });
+        let all = measures.clone().count();
+        let mut outside = measures.filter(|(_, measure)| !within(measure));
+        let (point, measure) = outside.next()?;
+        Some(Self {
+            image: times.id.clone(),
+            count: 1 + outside.count(),
+            all,
+            point: point.id.clone(),
+            line: measure.line,
+            sample: measure.sample,
+            lines,
+            samples,
+        })
+    }
 }
 
 impl Cause for TiesError {
@@ -76,6 +126,10 @@ impl Cause for TiesError {
             }
             Self::NoImage { .. } => {
                 "set images.serial_number of each image to its name in the file"
+            }
+            Self::Outside(_) => {
+                "measure tie points in the delivered file, whose first line and sample begin at 0; check lines_delivered if it \
+                 is set"
             }
             Self::SharedPlaces(_) => {
                 "each image position belongs to one tie point: check how the table was made"
@@ -94,6 +148,8 @@ stage_inputs! {
         pub files: TieFiles<'a>,
         /// The images.
         pub images: ImageNames<'a>,
+        /// Line times of the images, whose size bounds their measurements; an image without any is not checked.
+        pub times: InOrder<'a, Output<ImageTimes>>,
     }
 }
 
@@ -123,13 +179,15 @@ impl Input for ImageNames<'_> {
 
 impl Stage for ReadTies<'_> {
     const NAME: &'static str = "read_ties";
-    const METHOD: u32 = 4;
+    const METHOD: u32 = 5;
     const CHECKED: bool = true;
     type Output = Ties;
     stage_inputs!(fingerprint);
 
     fn run(&self, _stop: &AtomicBool) -> Result<Ties> {
-        read_ties(self.ties, self.images.0)
+        let times = self.times.0.iter().map(Output::value);
+        let times: Vec<&ImageTimes> = times.collect::<Result<_>>()?;
+        read_ties(self.ties, self.images.0, &times)
     }
 
     fn findings(&self, ties: &Ties) -> Vec<String> {
@@ -152,8 +210,9 @@ impl Stage for ReadTies<'_> {
 ///
 /// # Errors
 /// A file that is neither a table nor a network, or has no readable record; no measurement at all; none in an image of
-/// the site; none that joins two of them; most points measured at places of other points.
-pub fn read_ties(ties: &TiesConfig, images: &[ImageConfig]) -> Result<Ties> {
+/// the site; none that joins two of them; most points measured at places of other points; a measurement outside the
+/// delivered lines or the samples of an image with `times`.
+pub fn read_ties(ties: &TiesConfig, images: &[ImageConfig], times: &[&ImageTimes]) -> Result<Ties> {
     let names: BTreeMap<&str, usize> = images
         .iter()
         .map(ImageConfig::name_in_ties)
@@ -192,6 +251,12 @@ pub fn read_ties(ties: &TiesConfig, images: &[ImageConfig]) -> Result<Ties> {
     if read.multi_image() == 0 {
         let points = read.points.len();
         return Err(TiesError::NoneJoins { points }.into());
+    }
+    for (index, image) in images.iter().enumerate() {
+        if let Some(times) = times.iter().find(|times| times.id == image.id) {
+            let outside = Outside::of(&read.points, index, times);
+            outside.map_or(Ok(()), |outside| Err(TiesError::Outside(outside)))?;
+        }
     }
     read.remarks.extend(repeats::leave_out(&mut read.points));
     let name = |image: usize| images.get(image).map_or("", |image| &*image.id);
@@ -334,6 +399,7 @@ mod tests {
                 matched: false,
             },
             images,
+            &[],
         )
     }
 
@@ -399,7 +465,9 @@ mod tests {
         assert_eq!(again.points, ties.points);
         assert_eq!(
             again.remarks,
-            ["3 repeat the measurements of another point and are omitted, for example 1 those of 1"]
+            [
+                "3 repeat the measurements of another point and are omitted, for example 1 those of 1"
+            ]
         );
         // One place of A, two of B.
         let text = format!("{HEADER}{}", rows.replace("3,A,5,5", "3,A,1,1"));

@@ -48,7 +48,7 @@ stage_inputs! {
 
 impl Stage for SampleOrientation<'_> {
     const NAME: &'static str = "sample_orientation";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     type Output = Orientation;
     stage_inputs!(fingerprint);
 

@@ -105,7 +105,7 @@ impl Input for KnownPlaces<'_> {
 
 impl Stage for SearchFootprints<'_> {
     const NAME: &'static str = STAGE;
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     const CHECKED: bool = true;
     type Output = SearchResult;
     stage_inputs!(fingerprint);

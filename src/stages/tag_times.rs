@@ -12,6 +12,7 @@ use std::sync::atomic::AtomicBool;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use agreement::Disagreement;
 use agreement::{mounting_agrees, of_one_clock, of_one_product, start_agrees, stop_agrees};
 use detector::{PartOfLine, fits_detector};
 use error::ImageError;
@@ -67,7 +68,7 @@ pub struct ImageTimes {
     /// What the reader should know, one sentence each.
     pub notes: Vec<String>,
     /// Disagreements that must be weighed, one sentence each.
-    pub remarks: Vec<String>,
+    pub remarks: Vec<Disagreement>,
     /// Support data that its orientation comes from; `None` for an image that kernels orient.
     pub support: Option<SupportFile>,
 }
@@ -173,7 +174,7 @@ stage_inputs! {
 
 impl Stage for TagTimes<'_> {
     const NAME: &'static str = "tag_times";
-    const METHOD: u32 = 7;
+    const METHOD: u32 = 8;
     const CHECKED: bool = true;
     type Output = ImageTimes;
     stage_inputs!(fingerprint);
@@ -194,7 +195,7 @@ impl Stage for TagTimes<'_> {
     fn findings(&self, times: &ImageTimes) -> Vec<String> {
         let remarks = times.remarks.iter();
         remarks
-            .map(|remark| format!("image {}: {remark}", times.id))
+            .map(|remark| format!("image {}: {}", times.id, remark.text))
             .collect()
     }
 }
@@ -261,7 +262,7 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
             samples,
             crosstrack: crosstrack_summing,
         };
-        remarks.push(part.on_first_pixel(&image.id, tells_lines)?);
+        remarks.push(part.on_first_pixel(&image.id, tells_lines)?.into());
     }
     of_one_clock(image, instrument.spacecraft, fields.sclk_start.as_deref())?;
     let told = start_time(image, &fields, session, &mut notes, &mut remarks)?;
@@ -274,6 +275,7 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
     let (line_times, exposure_s, start_from) =
         pieces.line_times(of_file, tells_lines, told, &mut remarks)?;
     let start = line_times.start();
+    session.require_published_utc(start)?;
     // Without the camera's frame, the orientation stage reports what is missing.
     if let Ok(mounting) = session.mounting(&instrument, start) {
         remarks.extend(mounting_agrees(&instrument, mounting.matrix()));
@@ -287,7 +289,7 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
             .map_or(Ok(start), |utc| session.utc_to_et(utc))?;
         let of_lines = (lines_header, line_times.mean_period_s());
         let remark = stop_agrees(&image.id, start, stop, of_lines)?;
-        remarks.extend(remark);
+        remarks.extend(remark.map(Disagreement::from));
     }
     Ok(ImageTimes {
         id: image.id.clone(),
@@ -392,7 +394,7 @@ fn start_time(
     fields: &ImageFields,
     session: &Session,
     notes: &mut Vec<String>,
-    remarks: &mut Vec<String>,
+    remarks: &mut Vec<Disagreement>,
 ) -> Result<Option<(Et, StartFrom)>> {
     let utc = fields.utc_start.as_deref();
     let from_utc = match utc {

@@ -27,12 +27,16 @@ stage_inputs! {
 /// One string per footprint: ISO 8601 without a zone letter.
 impl Stage for TagUtc<'_> {
     const NAME: &'static str = "tag_utc";
+    const METHOD: u32 = 2;
     type Output = Vec<String>;
     stage_inputs!(fingerprint);
 
     fn run(&self, stop: &AtomicBool) -> Result<Vec<String>> {
         let session = self.kernels.session()?;
         let instants = self.converted.value()?.footprints.et_s.iter();
+        if let Some(last_s) = instants.clone().copied().reduce(f64::max) {
+            session.require_published_utc(Et::from_seconds(last_s))?;
+        }
         let utc = instants.map(|et_s| {
             Stopped::check(stop)?;
             session.et_to_utc_with(Et::from_seconds(*et_s), SHOT_UTC_DECIMALS)

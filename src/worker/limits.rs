@@ -51,7 +51,9 @@ pub(super) fn keep_to(task: &Task) {
         .open("/proc/self/oom_score_adj")
         .and_then(|mut file| file.write_all(OUT_OF_MEMORY_SCORE));
     if let Err(error) = score {
-        tracing::warn!("the worker is not the first process to be killed when memory runs out: {error}");
+        tracing::warn!(
+            "the worker is not the first process to be killed when memory runs out: {error}"
+        );
     }
     // The only failure is an existing pool; none exists.
     let _ = rayon::ThreadPoolBuilder::new()

@@ -80,14 +80,33 @@ const MISTAKES: &[Mistake] = &[
     (
         "clock_0_9_s_off",
         |case| label(case, CLOCK, "669788296:077"),
-        End::Remark,
+        End::Invalid,
         "\n  image E02-02016: clock 669788296:077 is 0.895 s away from UTC 2001-03-23T04:17:44.58, 2.7 km on the ground",
     ),
     (
         "leap_second_missing",
         |case| case.replace("kernels/leapseconds.tls", "32,   @1999-JAN-1", ""),
-        End::Remark,
-        "a difference of a whole second may be a leap second that the kernels lack",
+        End::Error(3),
+        "leapseconds.tls: the start of 1999-01-01 UTC is -1.000 s away from the published time scale",
+    ),
+    (
+        "leap_second_missing_and_no_clock",
+        |case| {
+            case.replace("kernels/leapseconds.tls", "32,   @1999-JAN-1", "");
+            label(
+                case,
+                &format!("SPACECRAFT_CLOCK_START_COUNT = \"{CLOCK}\""),
+                "",
+            );
+        },
+        End::Error(3),
+        "leapseconds.tls: the start of 1999-01-01 UTC is -1.000 s away from the published time scale",
+    ),
+    (
+        "amplitude_of_relativity_times_100",
+        |case| case.replace("kernels/leapseconds.tls", "1.657D-3", "1.657D-1"),
+        End::Error(3),
+        "away from the published time scale",
     ),
     (
         "mounting_of_a_withdrawn_kernel",
@@ -95,7 +114,7 @@ const MISTAKES: &[Mistake] = &[
             let (flight, withdrawn) = ("( -0.11463   0.07162", "(  0.06700  -0.01200");
             case.replace("kernels/moc.ti", flight, withdrawn);
         },
-        End::Remark,
+        End::Invalid,
         "the mounting of MOC narrow angle in the kernels differs by 0.2000° from its instrument file, 1.3 km on the ground",
     ),
     (
@@ -278,6 +297,34 @@ const MISTAKES: &[Mistake] = &[
         },
         End::Error(3),
         "are measured at the position of another point",
+    ),
+    (
+        "ties_beyond_the_delivered_lines",
+        |case| {
+            ties(case, |[id, image, sample, line]| {
+                let line: f64 = line.parse().unwrap();
+                format!("{id},{image},{sample},{}", line + 384.0)
+            });
+        },
+        End::Error(3),
+        "measurements lie outside the delivered image",
+    ),
+    (
+        "ties_before_the_first_sample",
+        |case| {
+            ties(case, |[id, image, sample, line]| {
+                let sample: f64 = sample.parse().unwrap();
+                format!("{id},{image},{},{line}", sample - 300.0)
+            });
+        },
+        End::Error(3),
+        "measurements lie outside the delivered image",
+    ),
+    (
+        "fewer_lines_delivered_than_measured",
+        |case| site(case, "lines_delivered = 7680", "lines_delivered = 3000"),
+        End::Error(3),
+        "expected lines 0 to 3000",
     ),
     (
         "ties_without_numbers",

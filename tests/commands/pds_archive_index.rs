@@ -384,7 +384,7 @@ fn a_folder_that_is_away_for_a_while_keeps_its_entries() {
     assert!(is_well && said.contains("2 of them read now"), "{said}");
     fs::rename(&volume, &away).unwrap();
     let (is_well, said) = index();
-    assert!(!is_well && said.contains("0 gone"), "{said}");
+    assert!(!is_well && said.contains("0 removed"), "{said}");
     fs::rename(&away, &volume).unwrap();
     let (is_well, said) = index();
     assert!(is_well && said.contains("2 files"), "{said}");

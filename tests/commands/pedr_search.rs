@@ -175,7 +175,7 @@ fn an_index_changes_no_byte_and_is_brought_up_to_date() {
     assert!(fs::read(&without).unwrap() == fs::read(&with).unwrap());
     let (code, said) = index(&[]);
     assert!(
-        code == Some(0) && said.contains(" 0 of them read now, 0 gone"),
+        code == Some(0) && said.contains(" 0 of them read now, 0 removed"),
         "{said}"
     );
     assert_eq!(index(&["--verify"]).0, Some(0));

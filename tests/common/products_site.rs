@@ -173,6 +173,7 @@ impl Site {
             id: &self.times.id,
             orientation: &self.orientation,
             model: &self.model,
+            disagreements: &self.times.remarks,
         }];
         let searched = !self.config.pedr.files.is_empty();
         let verdict = judge(&Evidence {

@@ -211,7 +211,8 @@ impl Cause for IoError {
     fn advice_on_configured(&self) -> String {
         let advice = self.advice();
         if self.source.kind() == std::io::ErrorKind::NotFound {
-            return advice + "; relative paths in a configuration are relative to the folder of that file";
+            return advice
+                + "; relative paths in a configuration are relative to the folder of that file";
         }
         advice
     }

@@ -123,6 +123,17 @@ pub enum SpiceError {
         /// The part of the kernel that holds it, as the end of the sentence.
         part: String,
     },
+    /// UTC of the kernels is not the published one.
+    #[error(
+        "the start of {day} UTC is {off_s:+.3} s away from the published time scale (IERS, Bulletin C); expected at most \
+         0.001 s"
+    )]
+    OtherUtc {
+        /// The first day that shows it.
+        day: String,
+        /// Instant by the kernels minus the published one, seconds.
+        off_s: f64,
+    },
     /// The kernels' motion cannot be tabulated to the tolerance.
     #[error(
         "trajectory near {near}: {error_m} m off with pieces of {piece_s} s; required {tolerance_m} m"
@@ -221,6 +232,9 @@ impl Cause for SpiceError {
             }
             Self::NotFinite { .. } => {
                 "fetch the kernel again, or leave it out of the list: this part of it holds NaN or infinity"
+            }
+            Self::OtherUtc { .. } => {
+                "fetch the current leap-second kernel from NAIF (naif0012.tls): this one lacks a leap second or was changed"
             }
             Self::NoConvergence { .. } => {
                 "check the SPK for jumps there, or allow a larger tolerance"

@@ -36,6 +36,7 @@ mod error;
 mod ffi;
 mod gaps;
 mod kernels;
+mod leap_seconds;
 mod metakernel;
 mod needs;
 mod origin;

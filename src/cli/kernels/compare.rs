@@ -246,7 +246,9 @@ fn print_table(comparison: &Comparison, unit: f64, attitude: Option<&AttitudeCom
     let closest = &comparison.closest().set;
     let tied: Vec<&str> = comparison.tied_sets().collect();
     if let [_, _] = &*comparison.deviations {
-        output::line("  two sets are equally far from their mean: a third set is needed to choose one");
+        output::line(
+            "  two sets are equally far from their mean: a third set is needed to choose one",
+        );
     } else if tied.is_empty() {
         output::line(format_args!("  closest to the mean of all: {closest}"));
     } else {
@@ -265,6 +267,9 @@ fn print_table(comparison: &Comparison, unit: f64, attitude: Option<&AttitudeCom
         output::line(format_args!("  pulls the mean towards itself: {}", far.set));
     }
     if let Some(far) = comparison.decided_by() {
-        output::line(format_args!("  the choice of the closest set depends on {}", far.set));
+        output::line(format_args!(
+            "  the choice of the closest set depends on {}",
+            far.set
+        ));
     }
 }

@@ -42,9 +42,7 @@ pub fn difference_page(sites: &[&RunDifference], not_compared: &[String]) -> Res
         of_each("Kernels, stages and products", sites, |site| {
             Ok(inputs::items(site))
         })?,
-        of_each("Notes and problems", sites, |site| {
-            Ok(inputs::texts(site))
-        })?,
+        of_each("Notes and problems", sites, |site| Ok(inputs::texts(site)))?,
     ];
     Ok(html::page(&title, &(lead + &list(not_compared)), &sections))
 }

@@ -53,7 +53,7 @@ stage_inputs! {
 
 impl Stage for Adjust<'_> {
     const NAME: &'static str = "adjust";
-    const METHOD: u32 = 7;
+    const METHOD: u32 = 8;
     type Output = Adjusted;
     stage_inputs!(fingerprint);
 

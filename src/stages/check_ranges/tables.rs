@@ -44,6 +44,7 @@ stage_inputs! {
 
 impl Stage for CheckTableRanges<'_> {
     const NAME: &'static str = "check_ranges";
+    const METHOD: u32 = 2;
     type Output = RangeCheck;
     stage_inputs!(fingerprint);
 

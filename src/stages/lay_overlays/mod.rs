@@ -151,6 +151,7 @@ impl Input for MeasuredTies<'_> {
 
 impl Stage for LayOverlays<'_> {
     const NAME: &'static str = "lay_overlays";
+    const METHOD: u32 = 2;
     type Output = Overlays;
     stage_inputs!(fingerprint);
 

@@ -112,7 +112,7 @@ impl Cause for MatchError {
 
 impl Stage for MatchTies<'_> {
     const NAME: &'static str = "match_ties";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     type Output = Ties;
     stage_inputs!(fingerprint);
 

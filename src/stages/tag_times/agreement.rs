@@ -1,6 +1,7 @@
 //! What is stated twice about an image must agree: its product, its clock and UTC, its stop time and lines.
 
 use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
 
 use super::StartFrom;
 use crate::{
@@ -25,11 +26,42 @@ const TOLERANCE_S: f64 = 1.0;
 /// Ground speed of the spacecraft, metres per second: converts times into distances.
 const GROUND_SPEED_M_S: f64 = 3_000.0;
 
+/// Largest displacement on the ground that stays a remark, metres: the position of a site is stated within 110 m per axis,
+/// and one of the two statements is used without proof.
+const DISPLACEMENT_MAX_M: f64 = 100.0;
+
 /// Mountings of a camera in kernels and instrument file that differ by more than this contradict each other, radians: 4
 /// m on the ground, a hundred times the rounding of angles in kernels.
 const MOUNTING_RAD: f64 = 1e-5;
 /// Height of the mapping orbit, metres: converts angles into distances on the ground.
 const HEIGHT_M: f64 = 380_000.0;
+
+/// Two statements about an image that differ by less than an error.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Disagreement {
+    /// One sentence.
+    pub text: String,
+    /// How far the difference displaces the image on the ground, metres; 0 where it does not displace it.
+    pub ground_m: f64,
+}
+
+impl Disagreement {
+    /// Whether the displacement exceeds what the stated accuracy covers.
+    #[must_use]
+    pub fn is_beyond_accuracy(&self) -> bool {
+        // Written so that NaN counts.
+        !(self.ground_m <= DISPLACEMENT_MAX_M)
+    }
+}
+
+impl From<String> for Disagreement {
+    fn from(text: String) -> Self {
+        Self {
+            text,
+            ground_m: 0.0,
+        }
+    }
+}
 
 /// Two statements of which one belongs to another image.
 #[derive(Debug, thiserror::Error)]
@@ -159,7 +191,7 @@ pub(super) fn start_agrees(
     image: &str,
     (sclk, start): (&str, Et),
     (utc, utc_start): (&str, Et),
-) -> Result<Option<String>, Contradiction> {
+) -> Result<Option<Disagreement>, Contradiction> {
     let apart_s = start.since(utc_start).abs();
     // Written so that NaN contradicts.
     if !(apart_s <= TOLERANCE_S) {
@@ -175,12 +207,14 @@ pub(super) fn start_agrees(
     } else {
         ""
     };
-    Ok((apart_s > close_s(utc)).then(|| {
-        format!(
+    let ground_m = apart_s * GROUND_SPEED_M_S;
+    Ok((apart_s > close_s(utc)).then(|| Disagreement {
+        text: format!(
             "clock {sclk} is {apart_s:.3} s away from UTC {utc}, {} on the ground; labels agree within 0.005 s, and \
              the clock is used{lacks_second}",
-            ground(apart_s * GROUND_SPEED_M_S)
-        )
+            ground(ground_m)
+        ),
+        ground_m,
     }))
 }
 
@@ -190,7 +224,7 @@ pub(super) fn pieces_agree(
     first: Et,
     (told, from): (Et, StartFrom),
     close_s: f64,
-) -> Result<Option<String>, Contradiction> {
+) -> Result<Option<Disagreement>, Contradiction> {
     let apart_s = first.since(told).abs();
     let told = match from {
         StartFrom::Sclk => "sclk_start",
@@ -204,11 +238,13 @@ pub(super) fn pieces_agree(
             apart_s,
         });
     }
-    Ok((apart_s > close_s).then(|| {
-        format!(
+    let ground_m = apart_s * GROUND_SPEED_M_S;
+    Ok((apart_s > close_s).then(|| Disagreement {
+        text: format!(
             "the first of its exposures begins {apart_s:.3} s away from {told}, {} on the ground; the exposures are used",
-            ground(apart_s * GROUND_SPEED_M_S)
-        )
+            ground(ground_m)
+        ),
+        ground_m,
     }))
 }
 
@@ -257,18 +293,20 @@ pub(super) fn stop_agrees(
 }
 
 /// A remark on a camera whose mounting differs between the kernels and its instrument file.
-pub(super) fn mounting_agrees(camera: &Instrument, kernels: &Matrix3<f64>) -> Option<String> {
+pub(super) fn mounting_agrees(camera: &Instrument, kernels: &Matrix3<f64>) -> Option<Disagreement> {
     let turn = kernels * bus_to_camera(&camera.mounting).transpose();
     let turn_rad = rotation_vector(&turn).norm();
     // Written so that NaN is reported.
-    (!(turn_rad <= MOUNTING_RAD)).then(|| {
-        format!(
+    let ground_m = turn_rad * HEIGHT_M;
+    (!(turn_rad <= MOUNTING_RAD)).then(|| Disagreement {
+        text: format!(
             "the mounting of {} in the kernels differs by {:.4}° from its instrument file, {} on the ground; the \
              kernels are used",
             camera.name,
             turn_rad / RADIANS_PER_DEGREE,
-            ground(turn_rad * HEIGHT_M)
-        )
+            ground(ground_m)
+        ),
+        ground_m,
     })
 }
 
@@ -303,7 +341,7 @@ mod tests {
     }
 
     /// The remark on a start `apart_s` after its UTC.
-    fn start(apart_s: f64, utc: &str) -> Result<Option<String>, Contradiction> {
+    fn start(apart_s: f64, utc: &str) -> Result<Option<Disagreement>, Contradiction> {
         let at = Et::from_seconds;
         start_agrees(
             "i",
@@ -319,12 +357,15 @@ mod tests {
             assert_eq!(start(close_s, UTC).unwrap(), None, "{close_s} s");
         }
         let remark = start(-0.9, UTC).unwrap().unwrap();
+        assert!(remark.is_beyond_accuracy());
         assert!(
             remark
+                .text
                 .contains("is 0.900 s away from UTC 2001-03-23T04:17:44.58, 2.7 km on the ground"),
-            "{remark}"
+            "{remark:?}"
         );
-        assert!(start(0.021, UTC).unwrap().unwrap().contains("63 m"));
+        let small = start(0.021, UTC).unwrap().unwrap();
+        assert!(small.text.contains("63 m") && !small.is_beyond_accuracy());
         assert!(start(1.001, UTC).is_err());
         assert!(start(f64::NAN, UTC).is_err());
         assert_eq!(start(0.6, "2001-03-23T04:17:44Z").unwrap(), None);

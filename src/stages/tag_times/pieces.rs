@@ -2,7 +2,7 @@
 
 use super::{
     StartFrom,
-    agreement::{CLOSE_S, piece_follows, pieces_agree},
+    agreement::{CLOSE_S, Disagreement, piece_follows, pieces_agree},
     error::ImageError,
 };
 use crate::{
@@ -37,7 +37,7 @@ impl Pieces<'_> {
         rows: Option<&RowTimes>,
         in_rows: bool,
         told: Option<(Et, StartFrom)>,
-        remarks: &mut Vec<String>,
+        remarks: &mut Vec<Disagreement>,
     ) -> Result<(LineTimes, f64, StartFrom)> {
         let (times, exposure_s, from) = if let Some(exposures) = &self.image.exposures {
             let (times, exposure_s) = self.listed(exposures, told, remarks)?;
@@ -79,7 +79,7 @@ impl Pieces<'_> {
         &self,
         exposures: &[ExposurePiece],
         told: Option<(Et, StartFrom)>,
-        remarks: &mut Vec<String>,
+        remarks: &mut Vec<Disagreement>,
     ) -> Result<(LineTimes, f64)> {
         let times = line_times_of(exposures, self.lines)?;
         self.require_duration(times.duration_s(), times.mean_period_s())?;
@@ -88,7 +88,7 @@ impl Pieces<'_> {
         }
         let pieces: Vec<_> = times.pieces().collect();
         for [piece, next] in pieces.array_windows() {
-            remarks.extend(piece_follows(piece, next));
+            remarks.extend(piece_follows(piece, next).map(Disagreement::from));
         }
         let exposure_s = self.first_exposure_s(&times);
         Ok((times, exposure_s))
@@ -101,7 +101,7 @@ impl Pieces<'_> {
         &self,
         rows: &RowTimes,
         told: Option<(Et, StartFrom)>,
-        remarks: &mut Vec<String>,
+        remarks: &mut Vec<Disagreement>,
     ) -> Result<(LineTimes, f64)> {
         if rows.lines != self.lines {
             return Err(Error::from(ImageError::LinesOfFile {
@@ -112,7 +112,7 @@ impl Pieces<'_> {
         }
         let times = LineTimes::of_pieces(rows.lines, &rows.pieces)?;
         self.require_duration(times.duration_s(), times.mean_period_s())?;
-        remarks.extend_from_slice(&rows.remarks);
+        remarks.extend(rows.remarks.iter().cloned().map(Disagreement::from));
         if let Some(told) = told {
             remarks.extend(pieces_agree(
                 &self.image.id,

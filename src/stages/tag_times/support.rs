@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{ImageTimes, StartFrom};
+use super::{Disagreement, ImageTimes, StartFrom};
 use crate::{
     body::Body,
     config::ImageConfig,
@@ -75,6 +75,7 @@ pub(super) fn supported(
 ) -> Result<ImageTimes> {
     let (said, file) = SupportFile::read(body, image, path, hashed)?;
     let start = said.line_times.start();
+    session.require_published_utc(start)?;
     let period_s = said.line_times.mean_period_s();
     let remark = file.tables.frame_remark(body, &file.name, start);
     Ok(ImageTimes {
@@ -90,7 +91,7 @@ pub(super) fn supported(
         samples: said.samples,
         first_detector: said.first_detector,
         notes: vec![file.note()],
-        remarks: remark.into_iter().collect(),
+        remarks: remark.map(Disagreement::from).into_iter().collect(),
         instrument: said.instrument,
         line_times: said.line_times,
         support: Some(file),

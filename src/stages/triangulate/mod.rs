@@ -64,7 +64,7 @@ impl Input for NetFiles<'_> {
 
 impl Stage for Triangulate<'_> {
     const NAME: &'static str = "triangulate";
-    const METHOD: u32 = 6;
+    const METHOD: u32 = 7;
     type Output = Triangulation;
     stage_inputs!(fingerprint);
 

@@ -175,6 +175,7 @@ impl Site {
                 id: &times.id,
                 orientation,
                 model,
+                disagreements: &times.remarks,
             }
         }
         let oriented = self.orientations.iter().zip(&self.models);

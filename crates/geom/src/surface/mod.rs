@@ -106,7 +106,9 @@ pub enum SurfaceError {
         shots: usize,
     },
     /// Shots or options without a positive definite covariance.
-    #[error("laser shots do not determine a surface: a coordinate or a standard deviation is not a number")]
+    #[error(
+        "laser shots do not determine a surface: a coordinate or a standard deviation is not a number"
+    )]
     NotANumber,
 }
 

@@ -197,7 +197,8 @@ impl<W: Workers> Engine<W> {
             return Ok(());
         }
         self.core.shared.write(|transaction| {
-            for job in waited {
+            // Read again: a request or an ended attempt may have queued some of them since.
+            for job in due_waiting(transaction, now_ms)? {
                 advance(
                     transaction,
                     now_ms,
