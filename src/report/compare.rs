@@ -68,7 +68,7 @@ fn lead(comparison: &KernelComparison) -> String {
     let (tone, headline) = if let [_, _] = &*orbit.deviations {
         // By the rule, two sets are always equally close.
         let headline = format!(
-            "Two kernel sets, {} m apart (root mean square): a third is needed to tell which is better.",
+            "Two kernel sets, {} m apart (root mean square): a third set is required to decide which is better.",
             label(orbit.difference(0, 1).rms, 3)
         );
         (Tone::Remarks, headline)

@@ -21,3 +21,4 @@ mod pedr_table;
 mod report_diff;
 mod report_diff_refused;
 mod rerun;
+mod words;
