@@ -222,7 +222,7 @@ fn the_metakernel_lists_the_adjusted_kernels_last_and_the_comments_say_the_rule(
     };
     for name in ["adjusted/E02-02016.bsp", "adjusted/E02-02016.bc"] {
         let comment = comment(name);
-        assert!(comment.contains("stands at t - 1.150 s"), "{name}");
+        assert!(comment.contains("is stored at t - 1.150 s"), "{name}");
         assert!(comment.contains("load the file as it is"), "{name}");
     }
     // Outside the image with its padding the original kernels rule, as before.
