@@ -41,8 +41,7 @@ pub struct Checked {
 /// The PEDR files are searched as in a run: only shots in the windows determine the required times. If all inputs are
 /// valid, all stages run as in a run, and causes that would make its products invalid are failures too.
 ///
-/// * `hashes` – kernels that are known there are not read again for the check of their content; nothing is added to
-/// them
+/// * `hashes` – kernels that are known there are not read again for the check of their content; nothing is added
 #[must_use]
 pub fn check_site(config: &SiteConfig, hashes: &HashCache) -> Checked {
     let mut check = Check::of(config, hashes.files());

@@ -174,9 +174,10 @@ fn site_files_of_the_front_pages_are_valid() {
     let is_whole = |block: &&&str| block.trim().starts_with("site = ");
     let whole = blocks.iter().find(is_whole).unwrap();
     for block in &blocks {
-        let site = match is_whole(&block) {
-            true => (*block).to_owned(),
-            false => format!("{whole}\n{block}"),
+        let site = if is_whole(&block) {
+            (*block).to_owned()
+        } else {
+            format!("{whole}\n{block}")
         };
         // The files that an example names do not exist, and one of tie points needs more images than the shortest site has.
         let failure = config::parse(&site, &checkout().join("sites/site.toml")).unwrap_err();

@@ -1,7 +1,7 @@
 //! Exposure times of the lines of an image: a table of pieces, each with its line period.
 //!
-//! A line coordinate counts lines from the top edge of the first line, so that the centre of line `i` (from 0) is `i
-//! + 0.5`. The sensor models of Shan et al. measure time in another unit: [`LineTimes::offset`], seconds from the
+//! A line coordinate counts lines from the top edge of the first line, so that the centre of line `i` (from 0) is at
+//! `i + 0.5`. The sensor models of Shan et al. measure time in another unit: [`LineTimes::offset`], seconds from the
 //! middle of the exposure over the mean line period. In an image of one piece this is the line coordinate less half
 //! the number of lines. If the exposure changes inside an image the two differ, but positions and attitudes are as
 //! smooth over the offset as over time.
