@@ -108,8 +108,12 @@ impl<W: Workers> Core<W> {
         let of_work = subject.to_owned();
         let mut work = tokio::spawn(async move {
             let log = core.scratch();
+            // Also if the work panics: otherwise no work on this subject would ever begin again.
+            let _free = Free {
+                core: &core,
+                subject: &of_work,
+            };
             let ended = core.workers.work(task, limits, &log, cancel, |_| ()).await;
-            core.stuck().remove(&of_work);
             let _ = fs::remove_file(log);
             ended
         });
@@ -144,6 +148,21 @@ impl<W: Workers> Core<W> {
 
     fn stuck(&self) -> MutexGuard<'_, BTreeSet<String>> {
         self.stuck.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Frees a subject for other work when it is dropped.
+struct Free<'a, W> {
+    core: &'a Core<W>,
+    subject: &'a str,
+}
+
+impl<W> Drop for Free<'_, W> {
+    fn drop(&mut self) {
+        let stuck = self.core.stuck.lock();
+        stuck
+            .unwrap_or_else(PoisonError::into_inner)
+            .remove(self.subject);
     }
 }
 

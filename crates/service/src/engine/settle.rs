@@ -12,10 +12,11 @@ use crate::{
         files::{FileRow, FileState, knows_coverage, put_coverage, put_file},
     },
     worker::{
-        parent::Ended,
+        parent::{Ended, How},
         protocol::{Answer, Hashed, Probed, What},
     },
 };
+use areograph_base::error::Kind;
 use areograph_store::files::file_name;
 
 /// Files that one process hashes, and kernels that one process opens.
@@ -91,11 +92,19 @@ async fn read_part<W: Workers>(
     };
     let read: Vec<(FileRow, Hashed)> = part.into_iter().zip(hashed).collect();
     for kernels in read.chunks(PROBED_TOGETHER) {
-        let problems = probe_together(core, number, kernels).await?;
+        let opened = probe_together(core, number, kernels).await?;
         let now_ms = core.now_ms();
         core.shared.write(|transaction| {
-            for ((file, hashed), problem) in kernels.iter().zip(&problems) {
-                let file = judged(file, hashed, problem.as_ref(), round, now_ms);
+            for ((file, hashed), opened) in kernels.iter().zip(&opened) {
+                let problem = match opened {
+                    Opened::Usable => None,
+                    Opened::Faulty(problem) => Some(problem),
+                    Opened::Unknown(why) => {
+                        tracing::warn!("{} could not be checked: {why}", file.path);
+                        continue;
+                    }
+                };
+                let file = judged(file, hashed, problem, round, now_ms);
                 if let Some(note) = &file.1 {
                     tracing::info!("{note}");
                     let data = json!({ "path": file_name(Path::new(&file.0.path)), "text": note });
@@ -163,13 +172,30 @@ fn is_kernel(path: &str) -> bool {
     ending.is_some_and(|ending| KERNELS.contains(&ending))
 }
 
-/// The reason for which each of these files is not a usable kernel; none for other files, or known content.
+/// What opening a file as a kernel shows.
+#[derive(Debug, Clone)]
+enum Opened {
+    /// It is a usable kernel, no kernel, or its content is known.
+    Usable,
+    /// It is not usable, for this reason.
+    Faulty(String),
+    /// The worker was lost for a reason that implies nothing about the file, which is checked again in the next round.
+    Unknown(String),
+}
+
+impl From<Option<String>> for Opened {
+    fn from(problem: Option<String>) -> Self {
+        problem.map_or(Self::Usable, Self::Faulty)
+    }
+}
+
+/// Opens those of the files that are kernels with unknown content.
 async fn probe_together<W: Workers>(
     core: &Arc<Core<W>>,
     number: usize,
     files: &[(FileRow, Hashed)],
-) -> Stored<Vec<Option<String>>> {
-    let mut problems = vec![None; files.len()];
+) -> Stored<Vec<Opened>> {
+    let mut opened = vec![Opened::Usable; files.len()];
     let mut unknown = Vec::new();
     for (place, (file, hashed)) in files.iter().enumerate() {
         let Some(blake3) = hashed.blake3.as_ref().filter(|_| is_kernel(&file.path)) else {
@@ -186,28 +212,46 @@ async fn probe_together<W: Workers>(
     match probe(core, number, unknown.iter().map(path).collect()).await? {
         Ok(found) => {
             for (place, problem) in unknown.into_iter().zip(found) {
-                problems[place] = problem;
+                opened[place] = problem.into();
             }
         }
         // One of them crashes CSPICE: it is identified by opening each alone.
         Err(_) => {
             for place in unknown {
-                problems[place] = match probe(core, number, vec![path(&place)]).await? {
-                    Ok(mut found) => found.pop().flatten(),
-                    Err(why) => Some(why),
+                opened[place] = match probe(core, number, vec![path(&place)]).await? {
+                    Ok(mut found) => found.pop().flatten().into(),
+                    Err(ended) if is_of_kernel(&ended) => Opened::Faulty(words(&ended)),
+                    Err(ended) => Opened::Unknown(words(&ended)),
                 };
             }
         }
     }
-    Ok(problems)
+    Ok(opened)
 }
 
-/// Has kernels opened, and records their coverage; returns the fault of each, or the reason for a missing answer.
+/// Whether a worker that opened a single kernel, and did not report on it, ended because of that kernel: CSPICE crashed,
+/// ended the process or did not return. A worker that was stopped, was not started or fell silent implies nothing.
+fn is_of_kernel(ended: &Ended) -> bool {
+    match (&ended.answer, &ended.how) {
+        (Some(Ok(_)), _) => true,
+        (Some(Err(failure)), _) => {
+            let of_machine = [Kind::Io, Kind::Interrupted].map(Kind::exit_code);
+            !of_machine.contains(&failure.code)
+        }
+        (None, how) => matches!(
+            how,
+            How::Signalled(_) | How::Exited(_) | How::DeadlinePassed | How::Garbled(_)
+        ),
+    }
+}
+
+/// Has kernels opened, and records their coverage; returns the fault of each, or how the worker ended without a report
+/// on every kernel.
 async fn probe<W: Workers>(
     core: &Arc<Core<W>>,
     number: usize,
     paths: Vec<String>,
-) -> Stored<Result<Vec<Option<String>>, String>> {
+) -> Stored<Result<Vec<Option<String>>, Ended>> {
     if paths.is_empty() {
         return Ok(Ok(Vec::new()));
     }
@@ -216,10 +260,16 @@ async fn probe<W: Workers>(
     let what = What::Probe { files };
     let ended = core.ask(&format!("probe {number}"), what, LIMIT).await;
     let Some(Ok(Answer::Probe { kernels })) = &ended.answer else {
-        return Ok(Err(words(&ended)));
+        return Ok(Err(ended));
     };
     if kernels.len() != count {
-        return Ok(Err("the worker did not report every kernel".to_owned()));
+        let how = How::Garbled("it does not report every kernel".to_owned());
+        let answer = None;
+        return Ok(Err(Ended {
+            how,
+            answer,
+            ..ended
+        }));
     }
     core.shared.write(|transaction| {
         for Probed {

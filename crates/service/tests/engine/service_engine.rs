@@ -7,7 +7,7 @@
 
 use crate::fake;
 
-use std::sync::Arc;
+use std::sync::{Arc, atomic::Ordering};
 
 use areograph_service::{
     database::{Ask, CauseKind, CauseRow, Priority, ask, ask_cancel},
@@ -183,6 +183,20 @@ fn a_kernel_that_is_not_whole_or_crashes_cspice_is_named_and_the_site_keeps_its_
     world.put("kernels/a.bsp", "whole");
     life.go_on(&world, 60, 15);
     assert_eq!(later_jobs(&life), [("a".to_owned(), JobState::Succeeded)]);
+}
+
+#[test]
+fn a_kernel_whose_check_was_interrupted_is_checked_again() {
+    let (world, life) = two_sites("");
+    world.put("kernels/a.bsp", "another");
+    // With others, then alone.
+    world.lost.store(2, Ordering::SeqCst);
+    life.go_on(&world, 60, 30);
+    assert_eq!(world.lost.load(Ordering::SeqCst), 0);
+    let bad = life.ask("SELECT path FROM file_version WHERE state = 'bad'");
+    assert_eq!(bad, [""; 0]);
+    assert_eq!(later_jobs(&life), [("a".to_owned(), JobState::Succeeded)]);
+    assert_eq!(world.current("a"), world.clean("a"));
 }
 
 #[test]

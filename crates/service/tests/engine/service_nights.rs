@@ -115,6 +115,21 @@ fn calm(world: &World, life: &Life) {
     life.go_on(world, 1800, 6);
 }
 
+/// What the database says of a site: its row, folders, files, last jobs and events.
+fn account(life: &Life, site: &str) -> String {
+    let questions = [
+        format!("SELECT format('site round %d, stale since %d: %s; %s', round, stale_since_ms, stale_because, last_note) FROM site WHERE name = '{site}'"),
+        "SELECT format('root %s %s since %d: %s', path, state, since_ms, detail) FROM root".to_owned(),
+        "SELECT format('file %s %s round %d changed %d: %s %s', path, state, round, changed_ms, substr(blake3, 1, 8), detail) FROM file_version".to_owned(),
+        format!("SELECT format('input %s %s', path, substr(blake3, 1, 8)) FROM site_input WHERE site = '{site}'"),
+        format!("SELECT format('job %d %s created %d ended %d, not before %d: %s', id, state, created_ms, ended_ms, not_before_ms, outcome) FROM job WHERE site = '{site}' AND id > (SELECT max(id) FROM job) - 40"),
+        "SELECT format('event %d at %d: %s %s %d %s', seq, at_ms, kind, site, job, data) FROM event WHERE seq > (SELECT max(seq) FROM event) - 80".to_owned(),
+        "SELECT format('fact %s = %s', name, value) FROM fact".to_owned(),
+    ];
+    let answers = questions.iter().flat_map(|question| life.ask(question));
+    answers.collect::<Vec<_>>().join("\n")
+}
+
 fn nights_in(zone: &str, begin: &str, seed: u64) {
     let more = format!(
         "[schedule]\ncron = \"30 2 * * *\"\nzone = \"{zone}\"\n[changes]\nscan_interval_s = 1800.0\nquiet_period_s = 3600.0\n\
@@ -138,7 +153,8 @@ fn nights_in(zone: &str, begin: &str, seed: u64) {
             assert_eq!(
                 world.current(site),
                 world.clean(site),
-                "{zone}, night {number}, {site}"
+                "{zone}, night {number}, {site}\n{}",
+                account(&life, site)
             );
         }
         let open: Vec<_> = life

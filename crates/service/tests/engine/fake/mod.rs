@@ -63,6 +63,8 @@ pub(crate) struct World {
     pub(crate) fates: Mutex<Vec<Fate>>,
     /// Permanent fate of the workers of one site.
     pub(crate) fate_of: Mutex<BTreeMap<String, Fate>>,
+    /// How many of the next workers that open kernels are lost without a reason in the kernels.
+    pub(crate) lost: AtomicU64,
     /// Every run that was kept: its job and attempt.
     pub(crate) kept: Mutex<Vec<(i64, i64)>>,
     /// Every started worker, by its purpose.
@@ -85,6 +87,7 @@ impl World {
             away: Mutex::default(),
             fates: Mutex::default(),
             fate_of: Mutex::default(),
+            lost: AtomicU64::new(0),
             kept: Mutex::default(),
             started: Mutex::default(),
             clock: Clock::set_to(now_ms),

@@ -1,6 +1,12 @@
 //! Work of simulated workers.
 
-use std::{fs, io::Write as _, path::Path, sync::Arc, time::Duration};
+use std::{
+    fs,
+    io::Write as _,
+    path::Path,
+    sync::{Arc, atomic::Ordering},
+    time::Duration,
+};
 
 use areograph_service::{
     engine::workers::Workers,
@@ -109,6 +115,17 @@ impl Played {
                 answered(Answer::Hash {
                     files: read.collect(),
                 })
+            }
+            What::Probe { .. }
+                if self
+                    .0
+                    .lost
+                    .fetch_update(Ordering::SeqCst, Ordering::SeqCst, |left| {
+                        left.checked_sub(1)
+                    })
+                    .is_ok() =>
+            {
+                failed(130, "interrupted")
             }
             What::Probe { files } => {
                 let texts: Vec<String> = files
