@@ -69,6 +69,14 @@ pub struct JudgedImage<'a> {
     pub disagreements: &'a [Disagreement],
 }
 
+impl<'a> JudgedImage<'a> {
+    /// The disagreements that make the site invalid.
+    fn contradictions(&self) -> impl Iterator<Item = &'a Disagreement> {
+        let all = self.disagreements.iter();
+        all.filter(|of| of.is_beyond_accuracy())
+    }
+}
+
 /// The evidence on an adjustment.
 #[derive(Debug, Clone, Copy)]
 pub struct AdjustmentEvidence<'a> {
@@ -121,10 +129,11 @@ impl Evidence<'_> {
             }
         }
         for image in self.images {
-            let beyond = image.disagreements.iter();
-            let beyond = beyond.filter(|of| of.is_beyond_accuracy());
             let of_orientation = image.orientation.invalid_because.iter();
-            let all = beyond.map(|of| &of.text).chain(of_orientation);
+            let all = image
+                .contradictions()
+                .map(|of| &of.text)
+                .chain(of_orientation);
             for reason in all.chain(&image.model.invalid_because) {
                 reasons.push(format!("image {}: {reason}", image.id));
             }

@@ -74,7 +74,7 @@ fn quarters() -> impl Iterator<Item = (String, i32)> {
 }
 
 impl Session {
-    /// Requires that UTC of the kernels is the published one up to `until`.
+    /// Requires that UTC of the kernels is the published one up to `until`, within 1 ms. Dates after 2026 are not checked.
     ///
     /// # Errors
     /// [`SpiceError::OtherUtc`] with the leap-second kernel: it is older than the data, or its constants are not those of

@@ -11,7 +11,7 @@ use crate::{
     config::LimitsConfig,
     stages::{
         check_heights::HeightCheck, check_ranges::ProfileRanges, compare_pairs::PairComparison,
-        orientation::InterpolationCheck, tag_times::Disagreement,
+        orientation::InterpolationCheck,
     },
     units::RADIANS_PER_ARCSECOND,
 };
@@ -41,10 +41,8 @@ pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
     if evidence.adjustment_failure.is_some() {
         checks.push(Check::told(CheckKind::AdjustmentMade, "", Fail));
     }
-    let contradicted = evidence.images.iter().filter(|image| {
-        let mut of_image = image.disagreements.iter();
-        of_image.any(Disagreement::is_beyond_accuracy)
-    });
+    let images = evidence.images.iter();
+    let contradicted = images.filter(|image| image.contradictions().next().is_some());
     checks.extend(contradicted.map(|image| Check::told(CheckKind::Contradiction, image.id, Fail)));
     checks.extend(of_ranges(evidence));
     checks.extend(clock(evidence));
