@@ -112,6 +112,7 @@ fn calibrate_by(
         orbit: &orbit,
         laboratory: &laboratory,
         state: &work.state,
+        covariance: &work.covariance,
     };
     let (mut validation, mut validation_noise) = (Vec::new(), Vec::new());
     for of in &config.validation {
