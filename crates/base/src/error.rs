@@ -9,6 +9,8 @@ use std::{
     sync::atomic::{AtomicBool, Ordering},
 };
 
+pub use areograph_derive::Cause;
+
 /// Kinds of failure; each is an exit code of the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
@@ -37,7 +39,7 @@ impl Kind {
     }
 }
 
-/// A cause of failure, with its kind and advice.
+/// A cause of failure, with its kind and advice; derived, with `#[cause(Kind: "advice")]` below thiserror's `#[error]`.
 pub trait Cause: std::error::Error + Send + Sync + 'static {
     /// The kind of this failure.
     fn kind(&self) -> Kind;
@@ -219,8 +221,9 @@ impl Cause for IoError {
 }
 
 /// The user stopped the program, and the running stage was abandoned.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("interrupted")]
+#[cause(Interrupted: "run again: finished stages are kept")]
 pub struct Stopped;
 
 impl Stopped {
@@ -234,16 +237,6 @@ impl Stopped {
         } else {
             Ok(())
         }
-    }
-}
-
-impl Cause for Stopped {
-    fn kind(&self) -> Kind {
-        Kind::Interrupted
-    }
-
-    fn advice(&self) -> String {
-        "run again: finished stages are kept".to_owned()
     }
 }
 

@@ -49,8 +49,8 @@ impl Sources {
         let mut files = Vec::new();
         files_below(root, &mut files);
         files.retain(|file| !file.ends_with("main.rs"));
-        // The smallest crate, `sql`, has five.
-        assert!(files.len() >= 5, "the sources were not found");
+        // The smallest crate, `derive`, has one.
+        assert!(!files.is_empty(), "the sources were not found");
         let texts = files.iter().map(|file| {
             let text = fs::read_to_string(file).unwrap();
             (module_of(file.strip_prefix(root).unwrap()), text)
