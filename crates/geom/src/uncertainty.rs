@@ -8,7 +8,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use areograph_base::error::{Cause, Kind};
+use areograph_base::error::Cause;
 
 /// Mean and standard deviation of the reprojection residuals of one image.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -98,13 +98,16 @@ pub struct UncertaintyBudget {
 }
 
 /// Invalid input.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, Cause)]
+#[cause(Input)]
 pub enum BudgetError {
     /// No site.
     #[error("no stereo pair has residuals; expected at least one")]
+    #[cause("intersect tie points of at least one stereo pair first")]
     NoSites,
     /// A number outside its range.
     #[error("{what} is {value}, expected {expected}")]
+    #[cause("check the geometry and the residuals of the stereo pairs")]
     Value {
         /// Which number.
         what: &'static str,
@@ -113,20 +116,6 @@ pub enum BudgetError {
         /// The expected value.
         expected: &'static str,
     },
-}
-
-impl Cause for BudgetError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::NoSites => "intersect tie points of at least one stereo pair first",
-            Self::Value { .. } => "check the geometry and the residuals of the stereo pairs",
-        }
-        .to_owned()
-    }
 }
 
 /// The budget of one or more stereo pairs; intermediate results are not rounded.
