@@ -4,7 +4,7 @@
 //! The parser is tolerant: text that is not an assignment is skipped, so that binary data may follow a label and the
 //! valid part of a damaged one is kept.
 
-use areograph_base::error::{Cause, Kind};
+use areograph_base::error::Cause;
 
 /// Bytes of a file that are parsed; labels have a few kilobytes.
 pub const LABEL_BYTES_MAX: usize = 1 << 20;
@@ -45,13 +45,16 @@ pub struct Label {
 }
 
 /// An invalid label.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Cause)]
+#[cause(Input)]
 pub enum LabelError {
     /// No assignment.
     #[error("no label found: expected lines KEY = value in the first {LABEL_BYTES_MAX} bytes")]
+    #[cause("give a PDS3 label (.lbl, .imq) or an ISIS label (.lbl, .cub)")]
     NoLabel,
     /// An invalid value.
     #[error("{key} is {value:?}; expected {expected}")]
+    #[cause("correct the label, or write the key in the image's table of the configuration")]
     Value {
         /// The keyword.
         key: String,
@@ -62,9 +65,11 @@ pub enum LabelError {
     },
     /// No statement marks the end of the label.
     #[error("the label has no END; expected that statement after its last line")]
+    #[cause("fetch the file again: its label is truncated or damaged")]
     NoEnd,
     /// Two values under one keyword.
     #[error("{key} appears in the label as {first:?} and as {second:?}; expected one value")]
+    #[cause("determine which of the two values is correct, and keep only that one in the label")]
     Twice {
         /// The keyword.
         key: String,
@@ -75,6 +80,9 @@ pub enum LabelError {
     },
     /// An image of another mission or target, or one that is map-projected.
     #[error("{key} is {value:?}; expected {expected}")]
+    #[cause(
+        "give the label of an image of Mars that the camera's spacecraft took, without a map projection"
+    )]
     OtherImage {
         /// The keyword.
         key: String,
@@ -85,6 +93,9 @@ pub enum LabelError {
     },
     /// Two values that belong to different images.
     #[error("{} is {:?}, but {} is {:?}; expected values of one image", .keys[0], .values[0], .keys[1], .values[1])]
+    #[cause(
+        "check that files and labels are not exchanged or renamed; one of them belongs to another image"
+    )]
     Contradiction {
         /// Their keywords.
         keys: [String; 2],
@@ -93,42 +104,16 @@ pub enum LabelError {
     },
     /// Another instrument's image.
     #[error("instrument is {found:?}; expected {}", listed(known))]
+    #[cause(
+        "set `instrument` in the image's table to the camera that took it: a camera known to areograph, or an \
+         instrument file"
+    )]
     Instrument {
         /// Instrument and filter of the label.
         found: String,
         /// Instruments of the known cameras.
         known: Vec<String>,
     },
-}
-
-impl Cause for LabelError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::NoLabel => "give a PDS3 label (.lbl, .imq) or an ISIS label (.lbl, .cub)",
-            Self::NoEnd => "fetch the file again: its label is truncated or damaged",
-            Self::Twice { .. } => {
-                "determine which of the two values is correct, and keep only that one in the label"
-            }
-            Self::OtherImage { .. } => {
-                "give the label of an image of Mars that the camera's spacecraft took, without a map projection"
-            }
-            Self::Value { .. } => {
-                "correct the label, or write the key in the image's table of the configuration"
-            }
-            Self::Instrument { .. } => {
-                "set `instrument` in the image's table to the camera that took it: a camera known to areograph, or an instrument \
-                 file"
-            }
-            Self::Contradiction { .. } => {
-                "check that files and labels are not exchanged or renamed; one of them belongs to another image"
-            }
-        }
-        .to_owned()
-    }
 }
 
 /// `a, b or c`.

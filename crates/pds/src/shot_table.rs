@@ -10,7 +10,7 @@ pub use self::columns::ShotColumns;
 use self::columns::{Fields, is_header};
 use areograph_base::{
     body::Body,
-    error::{Cause, IoError, Kind, Locate, Result},
+    error::{Cause, IoError, Locate, Result},
     time::Et,
 };
 use areograph_geom::ellipsoid::spherical_to_xyz_m;
@@ -57,38 +57,28 @@ pub struct RowComplaint {
 }
 
 /// A table without a readable shot.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Input)]
 enum ShotTableError {
     #[error("no column is called \"{name}\" (shots.columns.{key}); the first row has {}", found.join(", "))]
+    #[cause("write the name of the column as in the table, or its number, from 1")]
     Column {
         key: &'static str,
         name: String,
         found: Vec<String>,
     },
     #[error("the table cannot be read: {0}")]
+    #[cause("give a comma-separated text table with one shot per row")]
     Table(String),
     #[error("none of its {rows} rows is a valid shot; line {}: {}", first.line, first.text)]
+    #[cause(
+        "compare shots.columns (or shots.layout) with the table: the column and the unit of each quantity; also check \
+         body"
+    )]
     Unreadable { rows: u64, first: RowComplaint },
     #[error("it has no rows")]
+    #[cause(like = Table)]
     Empty,
-}
-
-impl Cause for ShotTableError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Column { .. } => "write the name of the column as in the table, or its number, from 1",
-            Self::Table(_) | Self::Empty => "give a comma-separated text table with one shot per row",
-            Self::Unreadable { .. } => {
-                "compare shots.columns (or shots.layout) with the table: the column and the unit of each quantity; also check \
-                 body"
-            }
-        }
-        .to_owned()
-    }
 }
 
 /// Reads the table at `path` and passes every shot, or the fault of its row, to `take`, in order.
