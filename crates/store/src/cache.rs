@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use super::atomic;
 use crate::stage::{Inputs, Output, Provenance, Reason};
 use areograph_base::{
-    error::{Cause, Kind, Locate, Result},
+    error::{Cause, Locate, Result},
     stored::whole,
 };
 
@@ -35,21 +35,12 @@ struct Head {
 }
 
 /// A stage output that cannot be stored.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("the output of {stage} cannot be stored: {source}")]
+#[cause(Bug: "this is a bug in areograph; please report it with the configuration")]
 struct Unstorable {
     stage: String,
     source: postcard::Error,
-}
-
-impl Cause for Unstorable {
-    fn kind(&self) -> Kind {
-        Kind::Bug
-    }
-
-    fn advice(&self) -> String {
-        "this is a bug in areograph; please report it with the configuration".to_owned()
-    }
 }
 
 impl StageCache {

@@ -19,7 +19,7 @@ pub use self::known::{Identity, KnownFile, KnownFiles};
 pub use self::outputs::require_apart;
 pub use self::staged::{StagedFile, TEMPORARY};
 use areograph_base::{
-    error::{Cause, IoError, Kind, Locate, Result},
+    error::{Cause, IoError, Locate, Result},
     watch::Watch,
 };
 
@@ -60,21 +60,12 @@ struct SeenFile {
 }
 
 /// A file that differs from what was read earlier in the run.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("the file changed while it was in use: its hash was {was} and is {is}")]
+#[cause(Input: "run again when no other program is writing to the input files")]
 struct ChangedFile {
     was: String,
     is: String,
-}
-
-impl Cause for ChangedFile {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "run again when no other program is writing to the input files".to_owned()
-    }
 }
 
 /// A file outside the permitted folders.
@@ -86,19 +77,10 @@ pub struct Outside {
 }
 
 /// An input file that a run must not read.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("is not read here; expected {0}")]
+#[cause(Configuration: "move the file below one of these folders, or have its folder added to them")]
 struct NotAdmitted(Outside);
-
-impl Cause for NotAdmitted {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        "move the file below one of these folders, or have its folder added to them".to_owned()
-    }
-}
 
 /// Why the file must not be read, if it lies below none of the folders `roots`, links followed. Without folders there
 /// is no restriction.
@@ -367,6 +349,8 @@ pub fn short_hash(blake3: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use areograph_base::error::Kind;
+
     use super::*;
 
     #[test]

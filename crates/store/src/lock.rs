@@ -7,7 +7,7 @@ use std::{
 
 use super::publish::{CACHE, STAGING};
 use crate::files::TEMPORARY;
-use areograph_base::error::{Cause, Error, IoError, Kind, Locate, Result};
+use areograph_base::error::{Cause, Error, IoError, Locate, Result};
 
 /// Held while a run works in a site's folder; the system releases it when the process ends for any reason.
 #[derive(Debug)]
@@ -16,8 +16,9 @@ pub struct SiteLock {
 }
 
 /// Another run is using the folder.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("another run is using this folder")]
+#[cause(Io: "wait for it, or give this run another --out")]
 pub struct Busy;
 
 impl Busy {
@@ -26,16 +27,6 @@ impl Busy {
     pub fn is_cause_of(failure: &Error) -> bool {
         let cause: &(dyn std::error::Error + 'static) = &*failure.cause;
         cause.is::<Self>()
-    }
-}
-
-impl Cause for Busy {
-    fn kind(&self) -> Kind {
-        Kind::Io
-    }
-
-    fn advice(&self) -> String {
-        "wait for it, or give this run another --out".to_owned()
     }
 }
 

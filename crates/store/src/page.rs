@@ -10,40 +10,29 @@ use super::{
     atomic,
     publish::{JOURNAL, read_manifest},
 };
-use areograph_base::error::{Cause, IoError, Kind, Locate, Result};
+use areograph_base::error::{Cause, IoError, Locate, Result};
 
 /// File of the page over all sites, in the folder that holds the sites' folders.
 pub const SITES_PAGE: &str = "index.html";
 
 /// Why a page must not be written to a path.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Configuration)]
 pub enum PageError {
     /// It would replace something other than a file.
     #[error("is {found}; a page can replace a regular file only")]
+    #[cause("name a file for --page, in a folder that exists")]
     NotAFile {
         /// The existing entry.
         found: &'static str,
     },
     /// The next run, and every check of the products, would find a foreign file.
     #[error("belongs to the products in {}", .folder.display())]
+    #[cause("name a file outside the folders of products for --page")]
     Product {
         /// A site's folder, or the one that holds the sites' folders.
         folder: PathBuf,
     },
-}
-
-impl Cause for PageError {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::NotAFile { .. } => "name a file for --page, in a folder that exists",
-            Self::Product { .. } => "name a file outside the folders of products for --page",
-        }
-        .to_owned()
-    }
 }
 
 /// A path to which a page may be written.

@@ -20,7 +20,7 @@ use super::{
     manifest::{Manifest, ProductEntry},
 };
 use crate::files::{hash_file, short_hash};
-use areograph_base::error::{Cause, IoError, Kind, Locate, Result};
+use areograph_base::error::{Cause, IoError, Locate, Result};
 
 /// Name of the manifest in a site's folder.
 pub const MANIFEST: &str = "manifest.json";
@@ -130,21 +130,12 @@ pub fn entries(staging: &Path, files: &[(PathBuf, u64)]) -> Result<Vec<ProductEn
 }
 
 /// Products of another kind in the folder, which a publication would remove.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("the folder contains other products: {name}, made by {stage}")]
+#[cause(Configuration: "give it another name, or its products another folder (--out)")]
 struct OtherKind {
     name: String,
     stage: String,
-}
-
-impl Cause for OtherKind {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        "give it another name, or its products another folder (--out)".to_owned()
-    }
 }
 
 /// Ensures that existing products in the folder were made by the same flow, identified by one of its stages.
@@ -262,19 +253,10 @@ fn remove_if_there(path: &Path) -> Result<()> {
 }
 
 /// A manifest that cannot be written.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("the manifest cannot be written as JSON: {0}")]
+#[cause(Bug: "this is a bug in areograph; please report it with the configuration")]
 struct Unwritable(serde_json::Error);
-
-impl Cause for Unwritable {
-    fn kind(&self) -> Kind {
-        Kind::Bug
-    }
-
-    fn advice(&self) -> String {
-        "this is a bug in areograph; please report it with the configuration".to_owned()
-    }
-}
 
 fn manifest_bytes(manifest: &Manifest) -> Result<Vec<u8>> {
     let mut bytes = serde_json::to_vec_pretty(manifest).map_err(Unwritable)?;

@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf, absolute},
 };
 
-use areograph_base::error::{Cause, Kind, Locate, Result};
+use areograph_base::error::{Cause, Locate, Result};
 
 /// Identity of a file, independent of its names.
 #[derive(Debug, PartialEq, Eq)]
@@ -32,22 +32,13 @@ impl Place {
 }
 
 /// A file that would be overwritten.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Configuration: "give the file to write another name or folder")]
 enum Overwritten {
     #[error("would be written over the input {0}; expected a different file")]
     Input(PathBuf),
     #[error("would be written twice, also as {0}; expected a different file for each output")]
     Output(PathBuf),
-}
-
-impl Cause for Overwritten {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        "give the file to write another name or folder".to_owned()
-    }
 }
 
 /// Ensures that no file of `outputs` is one of `inputs` or another output, under any name or link. Files that do not
@@ -79,21 +70,11 @@ pub fn require_apart<'a>(
 }
 
 /// An entry that a file would replace.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("is {0}; expected a file or a new path")]
+#[cause(Configuration: "name a file in a folder: a file is written under a temporary name and then renamed, which \
+    would replace the existing entry")]
 struct NotAFile(&'static str);
-
-impl Cause for NotAFile {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        "name a file in a folder: a file is written under a temporary name and then renamed, which would replace the existing \
-         entry"
-            .to_owned()
-    }
-}
 
 /// Ensures that `path` is free or a regular file.
 ///
