@@ -13,7 +13,7 @@ use super::{
     shared::Shared,
     worker::process::ProcessIdentity,
 };
-use areograph_base::error::{Cause, IoError, Kind, Locate as _, Result};
+use areograph_base::error::{Cause, IoError, Locate as _, Result};
 use areograph_config::{ServiceConfig, load_service};
 
 /// A started service, which owns its state folder for the lifetime of this value.
@@ -28,33 +28,22 @@ pub struct Started {
 }
 
 /// An address, or a change, that a service rejects.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Configuration)]
 enum Refused {
     #[error("{0} is not a loopback address")]
+    #[cause(
+        "listen on 127.0.0.1, or set http.behind_tls_proxy = \"yes\" behind a proxy that encrypts"
+    )]
     Public(SocketAddr),
     #[error("{0} changed")]
+    #[cause("restart the service, or put the former value back")]
     NeedsRestart(&'static str),
     #[error("inputs.{0}: {1} is not an existing folder, and this service has never seen it")]
+    #[cause(
+        "correct the path, or mount the folder; a folder that was seen once may be unavailable later"
+    )]
     NeverSeen(&'static str, String),
-}
-
-impl Cause for Refused {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Public(_) => {
-                "listen on 127.0.0.1, or set http.behind_tls_proxy = \"yes\" behind a proxy that encrypts"
-            }
-            Self::NeedsRestart(_) => "restart the service, or put the former value back",
-            Self::NeverSeen(..) => {
-                "correct the path, or mount the folder; a folder that was seen once may be unavailable later"
-            }
-        }
-        .to_owned()
-    }
 }
 
 /// Reads and checks the configuration `file`, with another address if one is stated.

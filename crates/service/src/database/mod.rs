@@ -22,7 +22,7 @@ use std::{
 
 use rusqlite::{Connection, OpenFlags, OptionalExtension as _, Transaction, TransactionBehavior};
 
-use areograph_base::error::{Cause, IoError, Kind, Locate as _, Result};
+use areograph_base::error::{Cause, IoError, Locate as _, Result};
 
 pub use causes::{CauseKind, CauseRow, add_cause, causes};
 pub use events::{About, Event, append, events_after, newest_event};
@@ -48,28 +48,35 @@ pub struct Database {
 }
 
 /// Errors of the database.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 pub enum DatabaseError {
     /// An error of SQLite.
     #[error("the database of the service: {0}")]
+    #[cause(Io: "check the disk of the state folder; the service tries again")]
     Sqlite(#[source] rusqlite::Error),
     /// The file is damaged.
     #[error("the database is damaged: {0}")]
+    #[cause(Input: "put the newest copy from the folder copies in its place, or make a new one from the products: \
+        areograph service rebuild")]
     Damaged(String),
     /// A newer areograph wrote it.
     #[error("the database has layout {found}; this areograph supports layouts up to {VERSION}")]
+    #[cause(Input: "start the newer areograph, or put back a copy of its layout")]
     Newer {
         /// Its layout.
         found: i64,
     },
     /// A path that the database cannot store.
     #[error("the path {} is not UTF-8", .0.display())]
+    #[cause(Input: "give the file another name")]
     Path(PathBuf),
     /// The system has no random numbers.
     #[error("random numbers are not available: {0}")]
+    #[cause(Io: "check that the system has a source of random numbers")]
     NoRandom(String),
     /// An invalid transition of a job.
     #[error(transparent)]
+    #[cause(Bug: "this is a bug in areograph; please report it with the log")]
     Transition(#[from] WrongTransition),
 }
 
@@ -80,31 +87,6 @@ impl From<rusqlite::Error> for DatabaseError {
             Some(DatabaseCorrupt | NotADatabase) => Self::Damaged(error.to_string()),
             _ => Self::Sqlite(error),
         }
-    }
-}
-
-impl Cause for DatabaseError {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::Sqlite(_) | Self::NoRandom(_) => Kind::Io,
-            Self::Damaged(_) | Self::Newer { .. } | Self::Path(_) => Kind::Input,
-            Self::Transition(_) => Kind::Bug,
-        }
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Path(_) => "give the file another name",
-            Self::NoRandom(_) => "check that the system has a source of random numbers",
-            Self::Sqlite(_) => "check the disk of the state folder; the service tries again",
-            Self::Damaged(_) => {
-                "put the newest copy from the folder copies in its place, or make a new one from the products: \
-                 areograph service rebuild"
-            }
-            Self::Newer { .. } => "start the newer areograph, or put back a copy of its layout",
-            Self::Transition(_) => "this is a bug in areograph; please report it with the log",
-        }
-        .to_owned()
     }
 }
 
@@ -251,6 +233,8 @@ fn copy(connection: &Connection, path: &Path) -> Stored<()> {
 
 #[cfg(test)]
 mod tests {
+    use areograph_base::error::Kind;
+
     use super::*;
 
     #[test]

@@ -13,7 +13,7 @@ use crate::{
     database::runs::RunRow,
     worker::run_folder::{RUN_RECORD, RunRecord, remove},
 };
-use areograph_base::error::{Cause, IoError, Kind, Locate as _, Result};
+use areograph_base::error::{Cause, IoError, Locate as _, Result};
 use areograph_store::{
     atomic::sync_folder, manifest::Manifest, publish::MANIFEST, published::read_published,
 };
@@ -39,24 +39,15 @@ pub struct Published {
 }
 
 /// The folder contains another run than expected.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error(
     "this run belongs to job {job}, attempt {attempt}, and is named {run}; expected the run of its folder"
 )]
+#[cause(Input: "move the folder away; the site is run again")]
 struct Foreign {
     job: i64,
     attempt: i64,
     run: String,
-}
-
-impl Cause for Foreign {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "move the folder away; the site is run again".to_owned()
-    }
 }
 
 /// Reads a run and checks every product against its manifest.
