@@ -20,7 +20,7 @@ use tokio::{
 use super::{output, report};
 use crate::{
     config::service_example,
-    error::{Cause, Error, IoError, Kind, Locate as _},
+    error::{Cause, Error, IoError, Locate as _},
     scene::{SceneOptions, write_scene},
     service::{
         clock::Clock,
@@ -71,19 +71,10 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
 }
 
 /// The folder has a configuration.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("a configuration already exists")]
+#[cause(Configuration: "serve this configuration, or name another folder")]
 struct Exists;
-
-impl Cause for Exists {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        "serve this configuration, or name another folder".to_owned()
-    }
-}
 
 fn init(folder: &Path) -> Result<(), Error> {
     let path = folder.join(FILE);

@@ -7,7 +7,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use super::output;
 use crate::{
     config::{ServiceConfig, load_service},
-    error::{Cause, Error, Kind, Locate as _},
+    error::{Cause, Error, Locate as _},
     service::{
         clock::{Clock, utc_text},
         database::Database,
@@ -94,26 +94,15 @@ enum RoleName {
     Operate,
 }
 
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Configuration)]
 enum Unfit {
     #[error("unknown token {0}")]
+    #[cause("list the tokens with `areograph service token list`")]
     NoToken(String),
     #[error("already exists")]
+    #[cause("name a file that does not exist")]
     FileExists,
-}
-
-impl Cause for Unfit {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::NoToken(_) => "list the tokens with `areograph service token list`",
-            Self::FileExists => "name a file that does not exist",
-        }
-        .to_owned()
-    }
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::{
     config::SiteConfig,
-    error::{Cause, Kind, Locate, Result},
+    error::{Cause, Locate, Result},
     products::position_kernel,
     spice::PATH_LENGTH_MAX,
     store::publish::staging_path,
@@ -14,10 +14,12 @@ use crate::{
 const PART_LENGTH_MAX: usize = 255;
 
 /// Why no products can be written into a folder.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Configuration)]
 pub enum OutError {
     /// Metakernels and CSPICE cannot name files in it.
     #[error("--out is {out:?}: it {holds}; expected UTF-8 without control characters")]
+    #[cause("name a folder without such characters for --out")]
     Unspeakable {
         /// The folder.
         out: PathBuf,
@@ -28,6 +30,7 @@ pub enum OutError {
     #[error(
         "--out has a path component of {bytes} bytes, {part:.20}…; expected at most {PART_LENGTH_MAX}"
     )]
+    #[cause("name a folder with a shorter path for --out; a relative path counts as it is written")]
     LongPart {
         /// The part.
         part: String,
@@ -39,26 +42,11 @@ pub enum OutError {
         "with --out the path of a product, {}, is {} bytes long while it is written; CSPICE accepts at most {PATH_LENGTH_MAX}",
         .product.display(), .product.as_os_str().len()
     )]
+    #[cause(like = LongPart)]
     LongPath {
         /// The product.
         product: PathBuf,
     },
-}
-
-impl Cause for OutError {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Unspeakable { .. } => "name a folder without such characters for --out",
-            Self::LongPart { .. } | Self::LongPath { .. } => {
-                "name a folder with a shorter path for --out; a relative path counts as it is written"
-            }
-        }
-        .to_owned()
-    }
 }
 
 /// Ensures that the paths of all products of `sites` in `out` can be written.

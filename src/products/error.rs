@@ -1,9 +1,10 @@
 //! Errors of writing products; each is a bug in areograph.
 
-use crate::error::{Cause, Kind};
+use crate::error::Cause;
 
 /// A product that would be wrong, or is wrong.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Bug: "report this with the site's configuration and the log")]
 pub(crate) enum ProductError {
     /// A value that no reader of the product could use.
     #[error("{what} is not a finite number")]
@@ -17,6 +18,9 @@ pub(crate) enum ProductError {
     },
     /// The file differs from what was written.
     #[error("read back differently: {what}")]
+    #[cause(
+        "check the disk and run again; if it happens again, report it with the site's configuration"
+    )]
     ReadBack { what: String },
     /// A library refused to encode or draw.
     #[error("cannot {action}: {reason}")]
@@ -40,21 +44,5 @@ impl ProductError {
         Self::ReadBack {
             what: error.to_string(),
         }
-    }
-}
-
-impl Cause for ProductError {
-    fn kind(&self) -> Kind {
-        Kind::Bug
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::ReadBack { .. } => {
-                "check the disk and run again; if it happens again, report it with the site's configuration"
-            }
-            _ => "report this with the site's configuration and the log",
-        }
-        .to_owned()
     }
 }

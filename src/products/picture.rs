@@ -59,23 +59,13 @@ impl Cause for PictureError {
 }
 
 /// A picture too large for its format.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("{width} × {height} pixels make a TIFF of {bytes} bytes; expected at most 4294967295")]
+#[cause(Input: "write a PNG; if the image is not so large, `areograph image info` lists its errors")]
 struct TooLarge {
     width: u32,
     height: u32,
     bytes: u64,
-}
-
-impl Cause for TooLarge {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "write a PNG; if the image is not so large, `areograph image info` lists its errors"
-            .to_owned()
-    }
 }
 
 impl From<png::EncodingError> for PictureError {

@@ -23,7 +23,7 @@ use super::{
 };
 use crate::{
     body::Body,
-    error::{Cause, IoError, Kind, Locate, Result},
+    error::{Cause, IoError, Locate, Result},
     files::StagedFile,
 };
 
@@ -42,35 +42,17 @@ pub enum RowsFormat {
 }
 
 /// Columns that cannot be written.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 enum RowsError {
     #[error("the column {name} holds {holds}; expected a number, a flag or text in each row")]
+    #[cause(Configuration: "write Parquet, which also holds lists and groups, or select other columns")]
     Column { name: String, holds: String },
     #[error("the column {GEOMETRY} is missing or holds no points")]
+    #[cause(Input: "regenerate products of another version of areograph with this version")]
     NoPoints,
     #[error("columns of these rows differ from those of earlier rows")]
+    #[cause(like = NoPoints)]
     Differ,
-}
-
-impl Cause for RowsError {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::Column { .. } => Kind::Configuration,
-            Self::NoPoints | Self::Differ => Kind::Input,
-        }
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Column { .. } => {
-                "write Parquet, which also holds lists and groups, or select other columns"
-            }
-            Self::NoPoints | Self::Differ => {
-                "regenerate products of another version of areograph with this version"
-            }
-        }
-        .to_owned()
-    }
 }
 
 /// Destination of rows.

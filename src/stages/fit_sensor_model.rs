@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::orientation::{InterpolationCheck, Orientation, OrientationSample};
 use crate::{
     config::OrientationConfig,
-    error::{Cause, Kind, Result},
+    error::{Cause, Result},
     geom::{
         attitude::{OmegaPhiKappa, matrix_of_rotation_vector, rotation_vector, unwrap_angles},
         ellipsoid::ray_meets_ellipsoid,
@@ -125,24 +125,15 @@ impl RotationVectorModel {
 }
 
 /// Samples that do not determine the polynomials.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error(
     "image {image}: {samples} orientation samples do not determine a polynomial of order {order}"
 )]
+#[cause(Input: "raise orientation.intervals, and check that the image has more than a few lines")]
 struct Undetermined {
     image: String,
     samples: usize,
     order: usize,
-}
-
-impl Cause for Undetermined {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "raise orientation.intervals, and check that the image has more than a few lines".to_owned()
-    }
 }
 
 stage_inputs! {

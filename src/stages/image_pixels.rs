@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::{site_image::SiteImage, tag_times::ImageTimes};
 use crate::{
     config::all_instruments,
-    error::{Cause, Kind, Locate as _, Result},
+    error::{Cause, Locate as _, Result},
     files::HashedFile,
     instruments::Instrument,
     pds::{
@@ -96,10 +96,14 @@ impl PixelFiles<'_> {
 }
 
 /// Pixels that belong to another image.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Input)]
 enum PixelsError {
     #[error(
         "image {image}: its pixels are those of product {product}; expected {expected}, which its identifier names"
+    )]
+    #[cause(
+        "check that images.pixels are not exchanged, and are all of the image; and its lines_delivered, if it is given"
     )]
     Product {
         image: String,
@@ -109,6 +113,9 @@ enum PixelsError {
     #[error(
         "image {image}: the exposure of its pixels begins at clock {clock}; expected {expected}, the clock of the image"
     )]
+    #[cause(
+        "check that images.pixels are not exchanged, and the clock of the image's label or keys"
+    )]
     Clock {
         image: String,
         clock: String,
@@ -116,6 +123,9 @@ enum PixelsError {
     },
     #[error(
         "image {image}: its pixels are those of camera {found}; expected {expected}, the camera of the image"
+    )]
+    #[cause(
+        "check that images.pixels are not exchanged, and the label or the exposures of the image"
     )]
     Camera {
         image: String,
@@ -126,65 +136,42 @@ enum PixelsError {
         "image {image}: the exposure of its pixels begins at ET {found_s:.3} s; expected {expected_s:.3} s, the start \
          of the image"
     )]
+    #[cause(like = Camera)]
     Start {
         image: String,
         found_s: f64,
         expected_s: f64,
     },
     #[error("image {image}: its pixels are map-projected; expected the unprojected image")]
+    #[cause("give the unprojected cube, or the file of the archive (.imq, .img)")]
     Map { image: String },
     #[error(
         "images {} and {}: the pixels of both are {} lines of {} samples, without a label that identifies the image; \
          expected a label in one of them",
         images[0], images[1], size[0], size[1]
     )]
+    #[cause(
+        "give the file of the archive (.imq, .img) or the cube of ISIS for one of the images: otherwise exchanged \
+         pictures cannot be distinguished from orientation errors"
+    )]
     Alike { images: [String; 2], size: [u32; 2] },
     #[error(
         "image {image}: label and pixels of one file contradict each other: {first} ({count} contradictions in all)"
     )]
+    #[cause("fetch the file again, label and pixels in one: either may be of another image")]
     Contradiction {
         image: String,
         first: String,
         count: usize,
     },
     #[error("image {image}: its pixels have {found} {what}; expected {expected}")]
+    #[cause(like = Product)]
     Size {
         image: String,
         what: &'static str,
         found: u32,
         expected: String,
     },
-}
-
-impl Cause for PixelsError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Product { .. } | Self::Size { .. } => {
-                "check that images.pixels are not exchanged, and are all of the image; and its lines_delivered, if it is given"
-            }
-            Self::Contradiction { .. } => {
-                "fetch the file again, label and pixels in one: either may be of another image"
-            }
-            Self::Map { .. } => {
-                "give the unprojected cube, or the file of the archive (.imq, .img)"
-            }
-            Self::Alike { .. } => {
-                "give the file of the archive (.imq, .img) or the cube of ISIS for one of the images: otherwise \
-                 exchanged pictures cannot be distinguished from orientation errors"
-            }
-            Self::Camera { .. } | Self::Start { .. } => {
-                "check that images.pixels are not exchanged, and the label or the exposures of the image"
-            }
-            Self::Clock { .. } => {
-                "check that images.pixels are not exchanged, and the clock of the image's label or keys"
-            }
-        }
-        .to_owned()
-    }
 }
 
 fn open_pixels(path: &Path, times: &ImageTimes) -> Result<PixelFile> {

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use crate::{
     body::Body,
-    error::{Cause, Kind, Locate as _, Result},
+    error::{Cause, Locate as _, Result},
     geom::{
         ellipsoid::Spherical,
         intersection::Ray,
@@ -31,21 +31,12 @@ pub struct LineCamera {
 }
 
 /// Support data that do not form an orientation.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("image {image}: {problem}")]
+#[cause(Input: "check the support data: they must be those of an image that sees the ground")]
 pub(in crate::stages) struct NoSight {
     pub(in crate::stages) image: String,
     pub(in crate::stages) problem: String,
-}
-
-impl Cause for NoSight {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "check the support data: they must be those of an image that sees the ground".to_owned()
-    }
 }
 
 impl LineCamera {

@@ -4,7 +4,7 @@ use nalgebra::{Vector2, Vector3};
 
 use super::{fit_sensor_model::SensorModel, orientation::Orientation, tag_times::ImageTimes};
 use crate::{
-    error::{Cause, Kind, Result},
+    error::{Cause, Result},
     geom::{
         oriented_camera::OrientedCamera,
         pushbroom::{
@@ -30,21 +30,12 @@ pub struct OrientedImage<'a> {
 }
 
 /// Samples that do not form an orientation.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("image {image}: {error}")]
+#[cause(Input: "raise orientation.intervals, and check the kernels of the image's time")]
 struct NoOrientation {
     image: String,
     error: SamplesError,
-}
-
-impl Cause for NoOrientation {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "raise orientation.intervals, and check the kernels of the image's time".to_owned()
-    }
 }
 
 impl<'a> OrientedImage<'a> {

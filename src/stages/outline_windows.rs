@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     config::{KernelsConfig, OrientationConfig, PointingConfig, WindowConfig},
-    error::{Cause, Kind, Result},
+    error::{Cause, Result},
     geom::{image_outline::widened, window::WindowShape},
     spice::KernelView,
     stage::{InOrder, Input, Inputs, Output, Stage},
@@ -17,21 +17,12 @@ use crate::{
 };
 
 /// An image whose edges do not all see Mars.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("window {window}: a corner of image {image} sees no ground")]
+#[cause(Input: "give this window its own edges or polygon")]
 struct NoGround {
     window: String,
     image: String,
-}
-
-impl Cause for NoGround {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "give this window its own edges or polygon".to_owned()
-    }
 }
 
 stage_inputs! {

@@ -11,7 +11,7 @@ use super::{outline_windows::Windows, search_footprints::SearchResult};
 use crate::{
     body::{Body, Datum},
     config::{ShotColumns, ShotTableConfig, WindowConfig},
-    error::{Cause, Kind, Result, Stopped},
+    error::{Cause, Result, Stopped},
     files::{HashedFile, file_name},
     footprints::{Footprint, Footprints, SourceFile},
     geom::{
@@ -98,19 +98,10 @@ impl Stage for ReadShots<'_> {
 }
 
 /// More tables than footprints can index.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("{0} tables of shots; expected at most {max}", max = u16::MAX)]
+#[cause(Configuration: "name only the tables of the site in shots.files")]
 struct TooManyTables(usize);
-
-impl Cause for TooManyTables {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        "name only the tables of the site in shots.files".to_owned()
-    }
-}
 
 /// Reads `tables`, each with its columns, for shots of `body` in any of `windows`.
 ///

@@ -17,7 +17,7 @@ use super::{
     tag_times::ImageTimes,
 };
 use crate::{
-    error::{Cause, Kind, Result},
+    error::{Cause, Result},
     frames::{Position, Rotation},
     geom::{
         attitude::matrix_of_rotation_vector,
@@ -43,12 +43,14 @@ pub struct LineCorrection {
 }
 
 /// An orientation that cannot be corrected.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, Cause)]
+#[cause(Bug: "report this with the site's configuration and the log")]
 enum ReorientError {
     #[error(
         "image {image}: lines shifted by {shift_lines:.3} lines need the orientation over {required}; expected within \
          the camera tables, {known}"
     )]
+    #[cause(Input: "check the image's start time, or give its time bias a smaller standard deviation")]
     Shift {
         image: String,
         shift_lines: f64,
@@ -67,25 +69,6 @@ enum ReorientError {
     NoTables { image: String, nodes: usize },
     #[error("image {image}: {source}")]
     Samples { image: String, source: SamplesError },
-}
-
-impl Cause for ReorientError {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::Shift { .. } => Kind::Input,
-            _ => Kind::Bug,
-        }
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Shift { .. } => {
-                "check the image's start time, or give its time bias a smaller standard deviation"
-            }
-            _ => "report this with the site's configuration and the log",
-        }
-        .to_owned()
-    }
 }
 
 stage_inputs! {

@@ -18,7 +18,7 @@ pub use crate::pds::archive::ShotRejection;
 use crate::{
     altimetry::DatumChoice,
     config::{PedrConfig, WindowConfig},
-    error::{Cause, Error, Kind, Locate, Result},
+    error::{Cause, Error, Locate, Result},
     files::{HashedFile, file_name},
     footprints::{AsRead, Footprints, SourceFile},
     geom::window::Region,
@@ -55,19 +55,10 @@ pub struct SearchResult {
 }
 
 /// More files than footprints can index.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("{0} PEDR files; expected at most {max}", max = u16::MAX)]
+#[cause(Configuration: "name only the files of the site's orbits in pedr.files")]
 struct TooManyFiles(usize);
-
-impl Cause for TooManyFiles {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        "name only the files of the site's orbits in pedr.files".to_owned()
-    }
-}
 
 stage_inputs! {
     /// PEDR files, the filter of their shots, and the windows.

@@ -11,7 +11,7 @@ use clap::Args;
 
 use crate::cli::output;
 use crate::{
-    error::{Cause, Error, IoError, Kind, Locate as _},
+    error::{Cause, Error, IoError, Locate as _},
     files::{Identity, hash_file, short_hash},
     pds::archive::{INDEX, Index, IndexedFile, Listing},
     store::atomic,
@@ -33,38 +33,19 @@ pub(super) struct Arguments {
 }
 
 /// A file that changed without a trace in the file system.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("its content differs from the index, although size and times match: hash {was}, now {is}")]
+#[cause(Input: "fetch the file again: the disk may be failing; the index now describes the present content")]
 struct Altered {
     was: String,
     is: String,
 }
 
-impl Cause for Altered {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "fetch the file again: the disk may be failing; the index now describes the present content"
-            .to_owned()
-    }
-}
-
 /// The index could not be put into bytes.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("the index cannot be encoded")]
+#[cause(Bug: "this is a bug in areograph; please report it")]
 struct NotEncoded;
-
-impl Cause for NotEncoded {
-    fn kind(&self) -> Kind {
-        Kind::Bug
-    }
-
-    fn advice(&self) -> String {
-        "this is a bug in areograph; please report it".to_owned()
-    }
-}
 
 /// Indexing cannot be interrupted gracefully; killing it is harmless.
 static RUN_ON: AtomicBool = AtomicBool::new(false);

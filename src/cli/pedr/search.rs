@@ -10,7 +10,7 @@ pub(super) use self::arguments::Arguments;
 use crate::cli::{output, stop::Signals};
 use crate::{
     config::WindowConfig,
-    error::{Cause, Error, Kind, Result},
+    error::{Cause, Error, Result},
     files::file_name,
     footprints::{AsRead, Footprints, SourceFile},
     geom::window::Region,
@@ -20,25 +20,16 @@ use crate::{
 };
 
 /// Rows that are not in time order, or that an earlier file contains as well.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error(
     "{rows} rows are not in time order, the first in record {record}, after a shot of {before}"
 )]
+#[cause(Input: "if both files contain the same orbits, name only one of them: otherwise the answer contains their \
+    shots twice")]
 struct NotInOrder {
     rows: u64,
     record: u32,
     before: String,
-}
-
-impl Cause for NotInOrder {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "if both files contain the same orbits, name only one of them: otherwise the answer contains their shots twice"
-            .to_owned()
-    }
 }
 
 /// Complaints that are printed and kept with their text; all are counted.

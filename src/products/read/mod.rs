@@ -16,10 +16,11 @@ pub use footprints::{FootprintRows, read_footprints};
 pub use orientation::{SampleRow, read_samples};
 pub use ties::read_adjusted_ties;
 
-use crate::error::{Cause, Kind};
+use crate::error::Cause;
 
 /// A complete product, but not in the form that this version writes.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Input: "regenerate products of another version of areograph with this version")]
 pub(super) enum ReadError {
     /// Not Parquet, or not the document.
     #[error("cannot be read as {what}: {reason}")]
@@ -43,15 +44,5 @@ impl ReadError {
             what,
             reason: error.to_string(),
         }
-    }
-}
-
-impl Cause for ReadError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "regenerate products of another version of areograph with this version".to_owned()
     }
 }

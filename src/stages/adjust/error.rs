@@ -1,7 +1,7 @@
 //! Why a site cannot be adjusted.
 
 use crate::{
-    error::{Cause, Kind},
+    error::Cause,
     geom::{bundle::BundleError, pushbroom::Unseen},
 };
 
@@ -9,10 +9,12 @@ use crate::{
 pub(super) const CONTRADICTION: f64 = 10.0;
 
 /// Why a site cannot be adjusted.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, Cause)]
+#[cause(Input)]
 pub enum AdjustError {
     /// No tie point could be intersected.
     #[error("none of {ties} tie points has a ground point; {first}")]
+    #[cause("check that the images overlap and that the tie points belong to them")]
     NoTies {
         /// Tie points.
         ties: usize,
@@ -21,10 +23,17 @@ pub enum AdjustError {
     },
     /// The network as a whole.
     #[error("{0}")]
+    #[cause(
+        "check the input of the adjustment, and give orientations and footprints finite standard deviations"
+    )]
     Network(BundleError),
     /// The steps do not converge.
     #[error(
         "the adjustment did not converge after {steps} steps (weighted sum of squares {weighted_squares:.3e}) with {held_by}"
+    )]
+    #[cause(
+        "lower these standard deviations where they exceed the uncertainty of the kernels; otherwise check the tie \
+         points and the images' times and kernels: the observations have no common solution"
     )]
     NotConverged {
         /// Steps taken.
@@ -36,6 +45,7 @@ pub enum AdjustError {
     },
     /// An invalid standard deviation, coordinate or number.
     #[error("{what} is {value}, expected {expected}")]
+    #[cause("correct this value, or leave out the item that it belongs to")]
     Value {
         /// The quantity, with its image, point or profile.
         what: String,
@@ -46,12 +56,17 @@ pub enum AdjustError {
     },
     /// The observations do not separate unknowns.
     #[error("the network is singular: the observations do not separate {0}")]
+    #[cause(
+        "give these unknowns finite standard deviations in [adjustment], or smaller ones, or hold them fixed with 0"
+    )]
     Singular(String),
     /// A shot occurs twice.
     #[error("two shots have the identifier {0}")]
+    #[cause("leave out the second file, or renumber the shots")]
     DuplicateShot(String),
     /// An orientation that sees no ground.
     #[error("image {image}: its orientation sees no ground: {unseen}")]
+    #[cause("check the orientation samples of the image")]
     Blind {
         /// Identifier of the image.
         image: String,
@@ -62,30 +77,13 @@ pub enum AdjustError {
     #[error(
         "{what} contradicts the rest of the network: standardised residual {standardised:.1}, expected at most {CONTRADICTION}"
     )]
+    #[cause(
+        "check the datum, the clock and the units of this value, or raise its standard deviation"
+    )]
     Contradiction {
         /// The initial value.
         what: String,
         /// Its standardised residual, without sign.
         standardised: f64,
     },
-}
-
-impl Cause for AdjustError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::NoTies { .. } => "check that the images overlap and that the tie points belong to them",
-            Self::NotConverged { .. } => "lower these standard deviations where they exceed the uncertainty of the kernels; otherwise check the tie points and the images' times and kernels: the observations have no common solution",
-            Self::Network(_) => "check the input of the adjustment, and give orientations and footprints finite standard deviations",
-            Self::Value { .. } => "correct this value, or leave out the item that it belongs to",
-            Self::Singular(_) => "give these unknowns finite standard deviations in [adjustment], or smaller ones, or hold them fixed with 0",
-            Self::DuplicateShot(_) => "leave out the second file, or renumber the shots",
-            Self::Blind { .. } => "check the orientation samples of the image",
-            Self::Contradiction { .. } => "check the datum, the clock and the units of this value, or raise its standard deviation",
-        }
-        .to_owned()
-    }
 }

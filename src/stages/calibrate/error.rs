@@ -1,14 +1,19 @@
 //! Why a calibration fails, with the names of cameras and points.
 
-use crate::error::{Cause, Kind};
+use crate::error::Cause;
 
 /// A failed calibration.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, Cause)]
+#[cause(Input)]
 pub enum CalibrateError {
     /// Two images are mounted on different frames.
     #[error(
         "camera {camera} is mounted on frame {found} (instrument_pointing.time_dependent_frames), camera {first} on \
          {expected}; expected one frame, that of the spacecraft"
+    )]
+    #[cause(
+        "write the support data so that instrument_pointing ends in the spacecraft's frame and constant_rotation leads \
+         from there to the camera"
     )]
     OtherFrame {
         /// The camera.
@@ -24,6 +29,9 @@ pub enum CalibrateError {
     #[error(
         "cameras {first} and {second} have the same sensor, {sensor}; expected support data of different lines"
     )]
+    #[cause(
+        "name_sensor distinguishes the lines of the camera: check the files of cameras.isd and validation.isd"
+    )]
     SameSensor {
         /// A camera.
         first: String,
@@ -34,6 +42,7 @@ pub enum CalibrateError {
     },
     /// No axis of the spacecraft is near nadir, or near the direction of flight.
     #[error("no axis of the spacecraft lies within {limit_deg} degrees of {what}")]
+    #[cause(like = OtherFrame)]
     NoAxis {
         /// The direction.
         what: &'static str,
@@ -44,12 +53,14 @@ pub enum CalibrateError {
     #[error(
         "camera {camera} looks up or across: its look directions are not tangents about the axis that looks down"
     )]
+    #[cause(like = OtherFrame)]
     LooksUp {
         /// The camera.
         camera: String,
     },
     /// A table names an unknown camera.
     #[error("point {point} is in camera {camera:?}; expected one of {expected}")]
+    #[cause("use the camera identifiers of the configuration in the table")]
     UnknownCamera {
         /// The point.
         point: String,
@@ -62,6 +73,7 @@ pub enum CalibrateError {
     #[error(
         "{found} usable tie points link camera {camera} to another; expected at least {expected} for every camera"
     )]
+    #[cause("measure more points that are visible in several lines")]
     TooFewTies {
         /// The camera that has fewest.
         camera: String,
@@ -74,6 +86,10 @@ pub enum CalibrateError {
     #[error(
         "{found} control points are usable, {held_back} are withheld; expected at least {expected} of each"
     )]
+    #[cause(
+        "give more laser points, or leave out the table control: without control only differential parameters are \
+         estimated"
+    )]
     TooFewControls {
         /// How many there are.
         found: usize,
@@ -84,6 +100,10 @@ pub enum CalibrateError {
     },
     /// Most points do not fit.
     #[error("{misfits} of {all} {what} do not fit the support data, for example {point}: {why}")]
+    #[cause(
+        "check that every camera has the support data of its own image and is not exchanged with another, that samples \
+         count from the edge from which the support data count them, and that places are of the same epoch and body"
+    )]
     Misfit {
         /// `tie points` or `control points`.
         what: &'static str,
@@ -100,12 +120,14 @@ pub enum CalibrateError {
     #[error(
         "control point {point} has two places; expected one longitude, latitude and radius in all its rows"
     )]
+    #[cause("give every laser point a unique name")]
     TwoPlaces {
         /// The point.
         point: String,
     },
     /// An orbit of the validation has another number of files, or another sensor.
     #[error("validation {orbit}: no support data of {sensor}, the sensor of camera {camera}")]
+    #[cause(like = SameSensor)]
     NoSupport {
         /// The orbit.
         orbit: String,
@@ -116,6 +138,7 @@ pub enum CalibrateError {
     },
     /// The calibrated cameras cannot see a control point.
     #[error("control point {point} cannot validate the calibration: {problem}")]
+    #[cause("check the position of this point and its lines and samples")]
     Unseen {
         /// The point.
         point: String,
@@ -124,6 +147,7 @@ pub enum CalibrateError {
     },
     /// Another orbit has too little laser control.
     #[error("validation {orbit}: {found} control points are usable; expected at least {expected}")]
+    #[cause("give this orbit more laser points, or leave it out of [[validation]]")]
     ThinValidation {
         /// The orbit.
         orbit: String,
@@ -136,6 +160,9 @@ pub enum CalibrateError {
     #[error(
         "validation {orbit}: {file} has the same bytes as a file of the calibration itself; expected files of another orbit"
     )]
+    #[cause(
+        "data used in a calibration cannot validate it: give files of another orbit, or leave this one out"
+    )]
     SameFile {
         /// The orbit.
         orbit: String,
@@ -146,6 +173,10 @@ pub enum CalibrateError {
     #[error(
         "validation {orbit}: camera {camera} looks {off_px:.2} px away from its direction in the orbit of the \
          calibration; expected one mounting and one focal plane within {limit_px} px"
+    )]
+    #[cause(
+        "give support data that have the same mounting, focal length and focal plane: the calibration is an offset \
+         from them"
     )]
     OtherMounting {
         /// The orbit.
@@ -159,51 +190,14 @@ pub enum CalibrateError {
     },
     /// The adjustment fails.
     #[error("step {step}: {problem}")]
+    #[cause(
+        "check that ties and laser points were measured in these images and cover them, and check their standard \
+         deviations"
+    )]
     Adjustment {
         /// Which step.
         step: &'static str,
         /// The problem.
         problem: String,
     },
-}
-
-impl Cause for CalibrateError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::OtherFrame { .. } | Self::NoAxis { .. } | Self::LooksUp { .. } => {
-                "write the support data so that instrument_pointing ends in the spacecraft's frame and constant_rotation leads \
-                 from there to the camera"
-            }
-            Self::SameSensor { .. } | Self::NoSupport { .. } => {
-                "name_sensor distinguishes the lines of the camera: check the files of cameras.isd and validation.isd"
-            }
-            Self::UnknownCamera { .. } => "use the camera identifiers of the configuration in the table",
-            Self::TooFewTies { .. } => "measure more points that are visible in several lines",
-            Self::TooFewControls { .. } => {
-                "give more laser points, or leave out the table control: without control only differential parameters are \
-                 estimated"
-            }
-            Self::Misfit { .. } => {
-                "check that every camera has the support data of its own image and is not exchanged with another, that samples \
-                 count from the edge from which the support data count them, and that places are of the same epoch and body"
-            }
-            Self::ThinValidation { .. } => {
-                "give this orbit more laser points, or leave it out of [[validation]]"
-            }
-            Self::SameFile { .. } => {
-                "data used in a calibration cannot validate it: give files of another orbit, or leave this one out"
-            }
-            Self::TwoPlaces { .. } => "give every laser point a unique name",
-            Self::Unseen { .. } => "check the position of this point and its lines and samples",
-            Self::OtherMounting { .. } => {
-                "give support data that have the same mounting, focal length and focal plane: the calibration is an offset from them"
-            }
-            Self::Adjustment { .. } => "check that ties and laser points were measured in these images and cover them, and check their standard deviations",
-        }
-        .to_owned()
-    }
 }

@@ -24,7 +24,7 @@ use super::{convert_datum::Converted, group_profiles::Profile};
 use crate::{
     altimetry::MolaClock,
     config::RangeCheckConfig,
-    error::{Cause, Kind, Result},
+    error::{Cause, Result},
     footprints::{Footprint, Footprints},
     frames::BodyFixed,
     geom::{
@@ -196,21 +196,12 @@ impl ProfileRanges {
 }
 
 /// A shot outside the tabulated trajectory.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("profile {profile}: no spacecraft position at {at}, the time of a shot")]
+#[cause(Coverage: "add a spacecraft ephemeris (SPK) that covers the PEDR files")]
 struct OutsideTrajectory {
     profile: String,
     at: Et,
-}
-
-impl Cause for OutsideTrajectory {
-    fn kind(&self) -> Kind {
-        Kind::Coverage
-    }
-
-    fn advice(&self) -> String {
-        "add a spacecraft ephemeris (SPK) that covers the PEDR files".to_owned()
-    }
 }
 
 /// Checks the ranges of every profile against `trajectory`.

@@ -16,7 +16,7 @@ use super::{read_ties::Ties, site_image::SiteImages};
 use crate::{
     body::Body,
     config::IntersectionConfig,
-    error::{Cause, Kind, Result},
+    error::{Cause, Result},
     frames::{BodyFixed, Position},
     geom::{
         intersection::{
@@ -149,21 +149,12 @@ pub enum TieRejection {
 }
 
 /// An orientation that sees no ground.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, Cause)]
 #[error("image {image}: its orientation sees no ground: {unseen}")]
+#[cause(Input: "check the orientation samples of the image")]
 struct BlindImage {
     image: String,
     unseen: Unseen,
-}
-
-impl Cause for BlindImage {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "check the orientation samples of the image".to_owned()
-    }
 }
 
 /// A measurement in focal coordinates.

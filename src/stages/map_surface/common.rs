@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::{ground::Ground, level::Level, search::HALF};
 use crate::{
     body::Body,
-    error::{Cause, Kind},
+    error::Cause,
     stages::{
         image_view::{Prediction, View},
         shot_heights::Heights,
@@ -25,40 +25,30 @@ const CELLS_MAX: usize = 1 << 24;
 const CONVERGENCE_MIN_RAD: f64 = 0.01;
 
 /// A pair that gives no surface.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Input)]
 pub(super) enum PairError {
     #[error("images {} and {} do not overlap according to their orientation", images[0], images[1])]
+    #[cause(
+        "name two images of a stereo pair in surface.images, and check their kernels and times"
+    )]
     NothingInCommon { images: [String; 2] },
     #[error(
         "images {} and {} look from nearly the same direction: their rays converge by {degrees:.2} degrees, expected at least 0.57",
         images[0], images[1]
     )]
+    #[cause(like = NothingInCommon)]
     Parallel { images: [String; 2], degrees: f64 },
     #[error(
         "surface.cell_m is {cell_m}; expected at least {least_m:.1}, a pixel of the coarser image"
     )]
+    #[cause("use about three pixels: details smaller than the compared areas are not resolved")]
     Fine { cell_m: f64, least_m: f64 },
     #[error(
         "surface.cell_m is {cell_m}: the common ground of the images has {cells} cells of this size; expected at most {CELLS_MAX}"
     )]
+    #[cause("give larger cells")]
     TooLarge { cell_m: f64, cells: usize },
-}
-
-impl Cause for PairError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::NothingInCommon { .. } | Self::Parallel { .. } => {
-                "name two images of a stereo pair in surface.images, and check their kernels and times"
-            }
-            Self::Fine { .. } => "use about three pixels: details smaller than the compared areas are not resolved",
-            Self::TooLarge { .. } => "give larger cells",
-        }
-        .to_owned()
-    }
 }
 
 /// The overlap of two images.

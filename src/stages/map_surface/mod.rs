@@ -39,7 +39,7 @@ use super::{
 use crate::{
     body::Body,
     config::{MolaSurfaceConfig, SurfaceConfig},
-    error::{Cause, Kind, Result},
+    error::{Cause, Result},
     geom::pushbroom::{CameraModel, Unseen},
     stage::{Input, Inputs, Output, Stage},
     stage_inputs,
@@ -96,26 +96,15 @@ impl Input for AdjustmentOfImages<'_> {
 }
 
 /// No surface can be made.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Input)]
 enum SurfaceError {
     #[error("image {image}: its orientation sees no ground: {unseen}")]
+    #[cause("check the kernels and times of the image")]
     Unseen { image: String, unseen: Unseen },
     #[error("{found} images have pixels; expected two, or their identifiers in surface.images")]
+    #[cause("name two images with images.pixels in surface.images")]
     NotTwo { found: usize },
-}
-
-impl Cause for SurfaceError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Unseen { .. } => "check the kernels and times of the image",
-            Self::NotTwo { .. } => "name two images with images.pixels in surface.images",
-        }
-        .to_owned()
-    }
 }
 
 /// Result of a cell.

@@ -1,14 +1,16 @@
 //! Why matching fails.
 
-use crate::error::{Cause, Kind};
+use crate::error::Cause;
 
 /// A failed match.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, Cause)]
+#[cause(Input)]
 pub enum MatchError {
     /// Two files hold the same shots.
     #[error(
         "holds shots that {other} also holds; every shot counts once, otherwise held-out shots would take part in the match"
     )]
+    #[cause("name only one of the two files")]
     SharedShots {
         /// The other file.
         other: String,
@@ -16,6 +18,9 @@ pub enum MatchError {
     /// No shot lies on the model.
     #[error(
         "no shot lies on {ground}, which reaches from {west:.3} to {east:.3} degrees east and from {south:.3} to {north:.3} degrees of latitude"
+    )]
+    #[cause(
+        "name PEDR files of passes over it, and check its position: longitudes are east, latitudes areocentric"
     )]
     NoShots {
         /// The ground.
@@ -29,20 +34,4 @@ pub enum MatchError {
         /// North.
         north: f64,
     },
-}
-
-impl Cause for MatchError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::SharedShots { .. } => "name only one of the two files",
-            Self::NoShots { .. } => {
-                "name PEDR files of passes over it, and check its position: longitudes are east, latitudes areocentric"
-            }
-        }
-        .to_owned()
-    }
 }

@@ -29,7 +29,7 @@ use super::{
     tag_times::ImageTimes,
 };
 use crate::{
-    error::{Cause, Kind, Result},
+    error::{Cause, Result},
     geom::pushbroom::{CameraModel, Unseen},
     stage::{Input, Inputs, Output, Round, Stage},
     stage_inputs,
@@ -80,34 +80,21 @@ impl Input for TiesOfFiles<'_> {
 }
 
 /// A failed match.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Input)]
 enum MatchError {
     #[error("image {image}: its orientation sees no ground: {unseen}")]
+    #[cause("check that the site's images overlap, and check their kernels and times")]
     Unseen { image: String, unseen: Unseen },
     #[error("no two images with pixels show the same ground by their orientation")]
+    #[cause(like = Unseen)]
     NothingInCommon,
     #[error("no tie point was found: {0}")]
+    #[cause(
+        "check that images.pixels belong to these images, and that both show the same ground; if the orientation \
+         errors exceed the margin, check start times, or give larger standard deviations in [adjustment]"
+    )]
     NothingMatched(String),
-}
-
-impl Cause for MatchError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Unseen { .. } | Self::NothingInCommon => {
-                "check that the site's images overlap, and check their kernels and times"
-            }
-            Self::NothingMatched(_) => {
-                "check that images.pixels belong to these images, and that both show the same ground; if the \
-                 orientation errors exceed the margin, check start times, or give larger standard deviations \
-                 in [adjustment]"
-            }
-        }
-        .to_owned()
-    }
 }
 
 impl Stage for MatchTies<'_> {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{Ties, repeats::SharedPlaces};
 use crate::{
-    error::{Cause, Kind},
+    error::Cause,
     stages::tag_times::ImageTimes,
     ties::{TieMeasure, TiePoint},
 };
@@ -13,17 +13,26 @@ use crate::{
 const NAMES_QUOTED: usize = 5;
 
 /// Tie points that belong to other images.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Input)]
 pub(super) enum TiesError {
     #[error("no tie point file holds a measurement")]
+    #[cause("give files with measurements in ties.files")]
     Empty,
     #[error("{points} tie points, none of them measured in two images of the site")]
+    #[cause("measure tie points in at least two images, or leave out the table ties")]
     NoneJoins { points: usize },
     #[error("tie points are measured in {found}; expected images of the site: {expected}")]
+    #[cause("set images.serial_number of each image to its name in the file")]
     NoImage { found: String, expected: String },
     #[error("tie points: {0}; expected at most half of the points at such positions")]
+    #[cause("each image position belongs to one tie point: check how the table was made")]
     SharedPlaces(SharedPlaces),
     #[error("{0}")]
+    #[cause(
+        "measure tie points in the delivered file, whose first line and sample begin at 0; check lines_delivered if it \
+         is set"
+    )]
     Outside(Outside),
 }
 
@@ -71,32 +80,6 @@ impl Outside {
             lines,
             samples,
         })
-    }
-}
-
-impl Cause for TiesError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Empty => "give files with measurements in ties.files",
-            Self::NoneJoins { .. } => {
-                "measure tie points in at least two images, or leave out the table ties"
-            }
-            Self::NoImage { .. } => {
-                "set images.serial_number of each image to its name in the file"
-            }
-            Self::Outside(_) => {
-                "measure tie points in the delivered file, whose first line and sample begin at 0; check lines_delivered if it \
-                 is set"
-            }
-            Self::SharedPlaces(_) => {
-                "each image position belongs to one tie point: check how the table was made"
-            }
-        }
-        .to_owned()
     }
 }
 

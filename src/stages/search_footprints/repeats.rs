@@ -3,18 +3,20 @@
 use std::path::PathBuf;
 
 use crate::{
-    error::{Cause, Error, Kind, Result},
+    error::{Cause, Error, Result},
     footprints::{AsRead, Footprints},
     pds::archive::Seen,
     time::Et,
 };
 
 /// Two files with the same shots, of which neither is a copy of the other.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error(
     "holds {shots} shot(s) in the windows that {other} holds as well, the first in record {record} \
      (there in record {other_record}, orbit {orbit}) at {at}"
 )]
+#[cause(Input: "name only one of the two in pedr.files: every shot counts once, and areograph cannot decide which \
+    version of an orbit is meant")]
 struct SharedShots {
     shots: usize,
     other: String,
@@ -22,18 +24,6 @@ struct SharedShots {
     other_record: u32,
     orbit: u32,
     at: Et,
-}
-
-impl Cause for SharedShots {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "name only one of the two in pedr.files: every shot counts once, and areograph cannot decide which version of \
-         an orbit is meant"
-            .to_owned()
-    }
 }
 
 /// Makes sure that no two files hold the same shot; `file` is an index into `paths`.

@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 use super::{orientation::Orientation, tag_times::ImageTimes};
 use crate::{
     config::{KernelsConfig, PointingConfig},
-    error::{Cause, Kind, Result},
+    error::{Cause, Result},
     geom::{light_time::LightTime, pushbroom::SamplesError},
     spice::{KernelView, Session, State},
     stage::{InOrder, Output, Stage},
@@ -101,28 +101,17 @@ impl Stage for TabulateKernels<'_> {
 }
 
 /// An orientation that kernels cannot hold.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Bug)]
 enum TabulateError {
     #[error("image {image}: {source}")]
+    #[cause("report this with the site's configuration and the log")]
     Samples { image: String, source: SamplesError },
     #[error("read back differently: {what}")]
+    #[cause(
+        "check the disk and run again; if it happens again, report it with the site's configuration"
+    )]
     ReadBack { what: String },
-}
-
-impl Cause for TabulateError {
-    fn kind(&self) -> Kind {
-        Kind::Bug
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Samples { .. } => "report this with the site's configuration and the log",
-            Self::ReadBack { .. } => {
-                "check the disk and run again; if it happens again, report it with the site's configuration"
-            }
-        }
-        .to_owned()
-    }
 }
 
 /// States and attitudes around one of `images`, whose adjusted orientation is `orientation`.

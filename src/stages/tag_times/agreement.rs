@@ -7,7 +7,7 @@ use super::StartFrom;
 use crate::{
     config::ImageConfig,
     constants::Spacecraft,
-    error::{Cause, Kind},
+    error::Cause,
     geom::attitude::{bus_to_camera, rotation_vector},
     instruments::Instrument,
     line_times::LinePiece,
@@ -64,10 +64,14 @@ impl From<String> for Disagreement {
 }
 
 /// Two statements of which one belongs to another image.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Input)]
 pub(super) enum Contradiction {
     #[error(
         "image {image}: the label is that of product {product}; expected {expected}, which its identifier names"
+    )]
+    #[cause(
+        "check that labels are not exchanged; an identifier that names no product is valid with any label"
     )]
     Product {
         image: String,
@@ -77,6 +81,9 @@ pub(super) enum Contradiction {
     #[error(
         "image {image}: the clock of serial number {serial} differs from {sclk}; expected agreement within {TOLERANCE_S} s"
     )]
+    #[cause(
+        "check that labels or serial numbers are not exchanged; ISIS writes the clock of the label into the latter"
+    )]
     Serial {
         image: String,
         serial: String,
@@ -84,6 +91,10 @@ pub(super) enum Contradiction {
     },
     #[error(
         "image {image}: clock {sclk} is {apart_s:.3} s away from UTC {utc}; expected at most {TOLERANCE_S} s"
+    )]
+    #[cause(
+        "check which of the two belongs to this image, and that no leap second before it is missing in the kernels; \
+         the run would use the clock"
     )]
     Start {
         image: String,
@@ -95,6 +106,7 @@ pub(super) enum Contradiction {
         "image {image}: the first of its exposures begins {apart_s:.3} s away from its {told}; expected at most \
          {TOLERANCE_S} s"
     )]
+    #[cause("check which of the two belongs to this image: the run would use the exposures")]
     Exposures {
         image: String,
         told: &'static str,
@@ -104,40 +116,15 @@ pub(super) enum Contradiction {
         "image {image}: STOP_TIME {stop} is {after_s:.3} s after the start, but its lines take {duration_s:.3} s; \
          expected them to agree"
     )]
+    #[cause(
+        "check start and stop time, lines, exposure and downtrack summing; one of them belongs to another image"
+    )]
     Stop {
         image: String,
         stop: String,
         after_s: f64,
         duration_s: f64,
     },
-}
-
-impl Cause for Contradiction {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Product { .. } => {
-                "check that labels are not exchanged; an identifier that names no product is valid with any label"
-            }
-            Self::Serial { .. } => {
-                "check that labels or serial numbers are not exchanged; ISIS writes the clock of the label into the latter"
-            }
-            Self::Start { .. } => {
-                "check which of the two belongs to this image, and that no leap second before it is missing in the \
-                 kernels; the run would use the clock"
-            }
-            Self::Exposures { .. } => {
-                "check which of the two belongs to this image: the run would use the exposures"
-            }
-            Self::Stop { .. } => {
-                "check start and stop time, lines, exposure and downtrack summing; one of them belongs to another image"
-            }
-        }
-        .to_owned()
-    }
 }
 
 /// The product of the label must be the one that the image's identifier names, where both name a product.

@@ -1,14 +1,18 @@
 //! Summing and samples of an image against the detector of its camera.
 
 use crate::{
-    error::{Cause, Kind, Result},
+    error::{Cause, Result},
     instruments::Instrument,
 };
 
 /// An image that its camera cannot have taken.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Input)]
 enum DetectorError {
     #[error("image {image}: {key} is {summing}; expected 1 to {max}, as {instrument} sums")]
+    #[cause(
+        "check summing, samples and first detector, and check that the image is of this camera"
+    )]
     Summing {
         image: String,
         key: &'static str,
@@ -20,6 +24,7 @@ enum DetectorError {
         "image {image}: crosstrack_summing {code} of {instrument} denotes summing that varies over the line; \
          expected one summing for all samples"
     )]
+    #[cause("leave the image out: its samples differ in width, which areograph does not model")]
     VariableSumming {
         image: String,
         code: u32,
@@ -29,6 +34,7 @@ enum DetectorError {
         "image {image}: {samples} samples of {crosstrack} pixels from pixel {first} end at {end}; expected at most \
          {pixels}, the pixels of {instrument}"
     )]
+    #[cause(like = Summing)]
     Detector {
         image: String,
         samples: u32,
@@ -42,6 +48,10 @@ enum DetectorError {
         "image {image}: its {samples} samples of {crosstrack} pixels cover only part of the {pixels} pixels of \
          {instrument}, and its first pixel is unknown; expected first_detector"
     )]
+    #[cause(
+        "add `first_detector` to the image's table: ISIS and ALE assume the first pixel, first_detector = 0; a file \
+         whose first columns were removed begins that many pixels later"
+    )]
     FirstPixel {
         image: String,
         samples: u32,
@@ -49,30 +59,6 @@ enum DetectorError {
         instrument: String,
         pixels: u32,
     },
-}
-
-impl Cause for DetectorError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Summing { .. } | Self::Detector { .. } => {
-                "check summing, samples and first detector, and check that the image is of this camera"
-                    .to_owned()
-            }
-            Self::FirstPixel { .. } => {
-                "add `first_detector` to the image's table: ISIS and ALE assume the first pixel, first_detector = 0; \
-                 a file whose first columns were removed begins that many pixels later"
-                    .to_owned()
-            }
-            Self::VariableSumming { .. } => {
-                "leave the image out: its samples differ in width, which areograph does not model"
-                    .to_owned()
-            }
-        }
-    }
 }
 
 /// Checks that `instrument` supports this summing, and that its detector covers these samples.

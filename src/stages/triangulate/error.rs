@@ -1,18 +1,21 @@
 //! Why a net has no solution, with the names of its pictures and points.
 
 use crate::{
-    error::{Cause, Kind},
+    error::Cause,
     geom::plane::{FilmError, PlaneError},
 };
 
 /// A net without a solution.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, Cause)]
+#[cause(Input)]
 pub enum NetError {
     /// The tables hold no measurement.
     #[error("no table holds a measurement")]
+    #[cause("give tables with measurements in measurements.files")]
     NoMeasurement,
     /// Fewer than two controls that a picture shows.
     #[error("controls measured in a picture: {found}; expected two or more")]
+    #[cause("give at least two controls, named as the points of the measurements")]
     TooFewControls {
         /// How many there are.
         found: usize,
@@ -21,6 +24,9 @@ pub enum NetError {
     #[error(
         "UnderconnectedPicture: {what} {name} has ties and controls: {ties}; expected two or more at different places, \
          in a part of the net with two controls"
+    )]
+    #[cause(
+        "measure more points that it shares with its neighbours, or leave its measurements out"
     )]
     Underconnected {
         /// `picture` or `brick`.
@@ -32,6 +38,9 @@ pub enum NetError {
     },
     /// Two points of a picture have one place.
     #[error("points {first} and {second} have the same place in picture {picture}")]
+    #[cause(
+        "points at the same place are one point: give both the same name, or correct one of them"
+    )]
     EqualPoints {
         /// The picture.
         picture: String,
@@ -42,6 +51,7 @@ pub enum NetError {
     },
     /// Two controls have one place.
     #[error("controls {first} and {second} have the same place on the map")]
+    #[cause(like = EqualPoints)]
     EqualControls {
         /// One point.
         first: String,
@@ -50,16 +60,23 @@ pub enum NetError {
     },
     /// A picture is a mirror image.
     #[error("picture {picture} is a mirror image compared with its neighbours")]
+    #[cause(
+        "change the sign of one coordinate of this picture, which may have been measured from the back of the film"
+    )]
     MirroredPicture {
         /// The picture.
         picture: String,
     },
     /// All pictures are mirror images.
     #[error("the pictures are a mirror image of the controls")]
+    #[cause("set measurements.y_axis to the direction of y in the pictures")]
     MirroredFigure,
     /// A picture differs in size from its table.
     #[error(
         "WrongUnits: a unit of picture {picture} is {found_m:.4e} m on the ground; expected {expected_m:.4e} m within a factor of 2"
+    )]
+    #[cause(
+        "check metres_per_unit of the picture, and the units in which controls and measurements are given"
     )]
     WrongUnits {
         /// The picture.
@@ -73,6 +90,7 @@ pub enum NetError {
     #[error(
         "WrongUnits: control {point} is {x_m:.4e} m east and {y_m:.4e} m north; the map reaches {limit_m:.4e} m"
     )]
+    #[cause("check the unit in the column name, x_m or x_km, and the map of the configuration")]
     BeyondTheMap {
         /// The point.
         point: String,
@@ -85,54 +103,20 @@ pub enum NetError {
     },
     /// A control outside the area of the projection.
     #[error("control {point} lies outside the area of the projection")]
+    #[cause("choose another projection in the table map")]
     NotOnTheMap {
         /// The point.
         point: String,
     },
     /// Ticks that give no correction.
     #[error("the film of picture {picture}: {problem}")]
+    #[cause("give the four corner ticks of the picture, and either no or all four mid-edge ticks")]
     Film {
         /// The picture.
         picture: String,
         /// The problem.
         problem: String,
     },
-}
-
-impl Cause for NetError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::NoMeasurement => "give tables with measurements in measurements.files",
-            Self::TooFewControls { .. } => {
-                "give at least two controls, named as the points of the measurements"
-            }
-            Self::Underconnected { .. } => {
-                "measure more points that it shares with its neighbours, or leave its measurements out"
-            }
-            Self::EqualPoints { .. } | Self::EqualControls { .. } => {
-                "points at the same place are one point: give both the same name, or correct one of them"
-            }
-            Self::MirroredPicture { .. } => {
-                "change the sign of one coordinate of this picture, which may have been measured from the back of the film"
-            }
-            Self::MirroredFigure => "set measurements.y_axis to the direction of y in the pictures",
-            Self::WrongUnits { .. } => {
-                "check metres_per_unit of the picture, and the units in which controls and measurements are given"
-            }
-            Self::BeyondTheMap { .. } => {
-                "check the unit in the column name, x_m or x_km, and the map of the configuration"
-            }
-            Self::NotOnTheMap { .. } => "choose another projection in the table map",
-            Self::Film { .. } => {
-                "give the four corner ticks of the picture, and either no or all four mid-edge ticks"
-            }
-        }
-        .to_owned()
-    }
 }
 
 /// Gives failures of the solver their names.

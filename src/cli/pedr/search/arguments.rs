@@ -7,7 +7,7 @@ use clap::{ArgGroup, Args, ValueEnum};
 use crate::{
     altimetry::ShotFilter,
     cli::{pedr::filter::FilterArguments, windows::WindowArguments},
-    error::{Cause, Error, Kind, Result},
+    error::{Cause, Error, Result},
     files::require_apart,
     pds::archive::Source,
     products::RowsFormat,
@@ -72,41 +72,27 @@ impl Format {
 }
 
 /// Errors of the command line.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Configuration)]
 pub(super) enum Usage {
     #[error("{0:?} is not a time interval")]
+    #[cause(
+        "write A..B with seconds past J2000 (-25000000..-24990000), or with UTC \
+         (1999-03-16T00:00:00..1999-03-17T00:00:00) and --leap-seconds"
+    )]
     Time(String),
     #[error("{0}; expected the extension .parquet, .csv or .geojson")]
+    #[cause("give --format, or name the file with one of these extensions")]
     Ending(String),
     #[error("{out}: the extension does not match --format {format}")]
+    #[cause("leave out --format, or name the file with the extension of this format")]
     OtherEnding { out: String, format: String },
     #[error("{0}: --format count only counts shots and writes no file")]
+    #[cause("leave out --out to print counts, or leave out --format to write shots")]
     Count(String),
     #[error("{0:?} is not a file; expected the values of a filter in one list")]
+    #[cause("separate values by commas (--classes 0,1), or repeat the filter for each value")]
     Value(String),
-}
-
-impl Cause for Usage {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Time(_) => {
-                "write A..B with seconds past J2000 (-25000000..-24990000), or with UTC (1999-03-16T00:00:00..1999-03-17T00:00:00) and --leap-seconds"
-            }
-            Self::Ending(_) => "give --format, or name the file with one of these extensions",
-            Self::OtherEnding { .. } => {
-                "leave out --format, or name the file with the extension of this format"
-            }
-            Self::Count(_) => {
-                "leave out --out to print counts, or leave out --format to write shots"
-            }
-            Self::Value(_) => "separate values by commas (--classes 0,1), or repeat the filter for each value",
-        }
-        .to_owned()
-    }
 }
 
 impl Arguments {
