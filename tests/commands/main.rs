@@ -1,5 +1,6 @@
 //! The commands as a user types them: their results, messages and exit codes.
 
+mod advice;
 mod bad_input;
 #[path = "../common/mod.rs"]
 mod common;
