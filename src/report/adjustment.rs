@@ -213,7 +213,8 @@ fn observations(summary: &AdjustmentSummary) -> String {
 fn outside(summary: &AdjustmentSummary) -> String {
     let listed = |is_outside: fn(&TypeSummary) -> bool| {
         let found = summary.types.iter().filter(|of| is_outside(of));
-        let found = found.map(|of| format!("{} {}", of.kind.words(), label(of.variance_component, 3)));
+        let found =
+            found.map(|of| format!("{} {}", of.kind.words(), label(of.variance_component, 3)));
         found.collect::<Vec<String>>().join(", ")
     };
     let sentences = [

@@ -53,7 +53,8 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
 }
 
 /// In place of accuracies that rest on a priori values of another spacecraft.
-pub(super) const NOT_STATED: &str = "not stated: the a priori accuracy is that of another spacecraft";
+pub(super) const NOT_STATED: &str =
+    "not stated: the a priori accuracy is that of another spacecraft";
 
 /// The three statements of accuracy, and their basis.
 fn statements(

@@ -91,7 +91,7 @@ pub fn sites_page(sites: &[SiteLine]) -> Result<String> {
         Tone::Good
     };
     let fidelity = format!(
-        "<p>{}: every number that the papers print, with areograph's beside it.</p>\n",
+        "<p>{}: numbers that the papers print, with areograph's beside them, by kind of evidence.</p>\n",
         link(FIDELITY_FILE, "Fidelity to the papers")
     );
     let words = paragraph(

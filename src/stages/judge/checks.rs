@@ -299,12 +299,21 @@ fn components(of: &AdjustmentEvidence<'_>) -> Option<Check> {
         .map(|found| {
             let [least, _] = found.variance_component_limits;
             let value = found.variance_component;
-            format!("{} {value:.3}, by chance at least {least:.2}", found.kind.words())
+            format!(
+                "{} {value:.3}, by chance at least {least:.2}",
+                found.kind.words()
+            )
         })
         .collect();
     let tested = of.other_components().map(|found| {
         let [_, most] = found.variance_component_limits;
-        Check::new(kind, found.kind.words(), found.variance_component, most, Warning)
+        Check::new(
+            kind,
+            found.kind.words(),
+            found.variance_component,
+            most,
+            Warning,
+        )
     });
     let mut check = Check::worst(tested)?;
     if !below.is_empty() {
