@@ -292,8 +292,11 @@ struct ImageDocument<'a> {
     time_bias_s: Option<(f64, f64)>,
 }
 
+/// Path of the document below the products of a site.
+pub const ADJUSTMENT: &str = "adjustment.json";
+
 pub(super) static DOCUMENT: Declaration = Declaration {
-    path: "adjustment.json",
+    path: ADJUSTMENT,
     what: "tie points intersected before and after the adjustment, every pair of images compared, the adjustment itself",
     readers: "scripts",
     rows: "adjusted points",

@@ -54,8 +54,6 @@ pub struct PairComparison {
     pub pixel_size_m: [f64; 2],
     /// Reprojection residuals of the tie points in each image.
     pub residuals: [ResidualMoments; 2],
-    /// Those of the first image minus those of the second, tie point by tie point, in mean line spacings of both.
-    pub apart: ResidualMoments,
     /// Along-track parallax of the tie points, metres, mean, from their reprojection residuals in both images.
     pub along_track_parallax_m: f64,
     /// Footprints against tie points; `None` where tie points determine no transformation.
@@ -268,11 +266,10 @@ impl<'a> Shared<'a> {
                 away_m.norm() / focal_length_px
             })
         });
-        let apart = apart(&self.points, line_spacing_m, pixel_size_m);
         let budget = budget_input(
             PairResiduals {
                 images: residuals,
-                apart,
+                apart: apart(&self.points, line_spacing_m, pixel_size_m),
             },
             footprints.as_ref(),
             line_spacing_m,
@@ -286,7 +283,6 @@ impl<'a> Shared<'a> {
             line_spacing_m,
             pixel_size_m,
             residuals,
-            apart,
             along_track_parallax_m: (residuals[0].mean_x * line_spacing_m[0]
                 - residuals[1].mean_x * line_spacing_m[1])
                 .abs(),

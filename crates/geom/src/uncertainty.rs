@@ -91,35 +91,6 @@ pub struct BudgetInput {
     pub height_over_base: f64,
 }
 
-impl BudgetInput {
-    /// All sites of several inputs, as the paper pools its three: with the means of their pixel sizes and geometries.
-    /// Misregistrations are pooled in pixels.
-    #[must_use]
-    pub fn pooled(inputs: &[Self]) -> Self {
-        let mean = |values: &mut dyn Iterator<Item = f64>| {
-            let (count, sum) = values.fold((0.0, 0.0), |(count, sum), of| (count + 1.0, sum + of));
-            sum / count
-        };
-        let pixel_size_m = mean(&mut inputs.iter().map(|of| of.pixel_size_m));
-        let observed: Option<Vec<[f64; 2]>> = inputs
-            .iter()
-            .map(|of| {
-                let found = of.misregistration?;
-                Some([found.mean_m, found.rms_m].map(|metres| metres / of.pixel_size_m))
-            })
-            .collect();
-        Self {
-            sites: inputs.iter().flat_map(|of| &of.sites).copied().collect(),
-            misregistration: observed.map(|of| Misregistration {
-                mean_m: pixel_size_m * mean(&mut of.iter().map(|px| px[0])),
-                rms_m: pixel_size_m * mean(&mut of.iter().map(|px| px[1].powi(2))).sqrt(),
-            }),
-            pixel_size_m,
-            height_over_base: mean(&mut inputs.iter().map(|of| of.height_over_base)),
-        }
-    }
-}
-
 /// Planimetric and height uncertainty from one reading of the across-track input.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
@@ -186,6 +157,62 @@ pub struct UncertaintyBudget {
     pub equation_5: SignedBudget,
 }
 
+impl UncertaintyBudget {
+    /// The budget of all pairs, as the paper pools its three sites: squares averaged, across the track its averages. The
+    /// pixel and the geometry are the means of all. `None` without a budget.
+    #[must_use]
+    pub fn pooled(budgets: &[Self]) -> Option<Self> {
+        let mean =
+            |of: &dyn Fn(&Self) -> f64| budgets.iter().map(of).sum::<f64>() / budgets.len() as f64;
+        let root = |of: &dyn Fn(&Self) -> f64| mean(&|budget| of(budget).powi(2)).sqrt();
+        let all_have = |of: fn(&Self) -> Option<f64>| {
+            let known = budgets.iter().all(|budget| of(budget).is_some());
+            known.then(|| root(&|budget| of(budget).unwrap_or_default()))
+        };
+        if budgets.is_empty() {
+            return None;
+        }
+        let pixel_size_m = mean(&|of| of.equation_7.planimetric_m / of.equation_7.planimetric_px);
+        let height_over_base = mean(&|of| of.equation_7.height_px / of.equation_7.across_px);
+        let along_px = root(&|of| of.along_px);
+        let total_along_px = all_have(|of| of.total_along_px);
+        let signed_px = root(&|of| of.equation_5.along_px);
+        let point = |along_px: f64, across_px: f64| {
+            point_uncertainty(along_px, across_px, height_over_base, pixel_size_m)
+        };
+        Some(Self {
+            along_px,
+            total_along_px,
+            ground: ground_part(total_along_px, along_px),
+            paper_average: point(along_px, mean(&|of| of.paper_average.across_px)),
+            equation_7: point(along_px, root(&|of| of.equation_7.across_px)),
+            equation_5: SignedBudget {
+                along_px: signed_px,
+                unexplained_px: all_have(|of| of.equation_5.unexplained_px),
+                point: point(signed_px, root(&|of| of.equation_5.point.across_px)),
+            },
+        })
+    }
+}
+
+/// Equations 8 and 9.
+fn point_uncertainty(
+    along_px: f64,
+    across_px: f64,
+    height_over_base: f64,
+    pixel_size_m: f64,
+) -> PointUncertainty {
+    let planimetric_px = along_px.hypot(across_px);
+    let height_px = height_over_base * across_px;
+    PointUncertainty {
+        across_px,
+        planimetric_px,
+        planimetric_m: planimetric_px * pixel_size_m,
+        height_px,
+        height_m: height_px * pixel_size_m,
+    }
+}
+
 /// Invalid input.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BudgetError {
@@ -238,15 +265,12 @@ pub fn uncertainty_budget(input: &BudgetInput) -> Result<UncertaintyBudget, Budg
     let average_y = images().map(ResidualMoments::size_y).sum::<f64>() / (2.0 * sites);
     let along_px = summed(ResidualMoments::size_x);
     let point = |along_px: f64, across_px: f64| {
-        let planimetric_px = along_px.hypot(across_px);
-        let height_px = input.height_over_base * across_px;
-        PointUncertainty {
+        point_uncertainty(
+            along_px,
             across_px,
-            planimetric_px,
-            planimetric_m: planimetric_px * input.pixel_size_m,
-            height_px,
-            height_m: height_px * input.pixel_size_m,
-        }
+            input.height_over_base,
+            input.pixel_size_m,
+        )
     };
     let of_pixel = |metres: f64| metres / input.pixel_size_m;
     let total_along_px = input.misregistration.map(|of| of_pixel(of.rms_m));

@@ -1,6 +1,6 @@
 //! Input of the uncertainty budget of a pair.
 
-use super::{FootprintsByTies, PairComparison, over_footprints};
+use super::{FootprintsByTies, over_footprints};
 use crate::{
     geom::{
         statistics::Summary,
@@ -8,23 +8,6 @@ use crate::{
     },
     stages::intersect::{IntersectedPoint, MeasureResidual},
 };
-
-impl PairComparison {
-    /// Input of the budget, for budgets of several pairs.
-    #[must_use]
-    pub fn budget_input(&self) -> BudgetInput {
-        let residuals = PairResiduals {
-            images: self.residuals,
-            apart: self.apart,
-        };
-        budget_input(
-            residuals,
-            self.footprints.as_ref(),
-            self.line_spacing_m,
-            self.height_over_base,
-        )
-    }
-}
 
 /// A pixel of the budget is the mean line spacing of both images along the flight.
 pub(super) fn budget_input(

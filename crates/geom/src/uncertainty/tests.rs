@@ -129,27 +129,50 @@ fn exact_footprints_contribute_nothing() {
 #[test]
 fn sites_pooled_are_the_budget_of_all() {
     let all = table_5();
-    let each: Vec<BudgetInput> = (all.sites.iter())
-        .map(|site| BudgetInput {
-            sites: vec![*site],
-            ..all.clone()
+    let each: Vec<UncertaintyBudget> = (all.sites.iter())
+        .map(|site| {
+            let input = BudgetInput {
+                sites: vec![*site],
+                ..all.clone()
+            };
+            uncertainty_budget(&input).unwrap()
         })
         .collect();
-    let pooled = uncertainty_budget(&BudgetInput::pooled(&each)).unwrap();
+    let pooled = UncertaintyBudget::pooled(&each).unwrap();
     let expected = uncertainty_budget(&all).unwrap();
-    close(pooled.along_px, expected.along_px);
-    close(pooled.equation_5.along_px, expected.equation_5.along_px);
+    for (pooled, expected) in [
+        (pooled.along_px, expected.along_px),
+        (pooled.equation_5.along_px, expected.equation_5.along_px),
+        (
+            pooled.paper_average.height_m,
+            expected.paper_average.height_m,
+        ),
+        (
+            pooled.equation_7.planimetric_m,
+            expected.equation_7.planimetric_m,
+        ),
+        (
+            pooled.equation_5.point.height_m,
+            expected.equation_5.point.height_m,
+        ),
+    ] {
+        close(pooled, expected);
+    }
     close(
         pooled.total_along_px.unwrap(),
         expected.total_along_px.unwrap(),
     );
+    assert_eq!(
+        std::mem::discriminant(&pooled.ground),
+        std::mem::discriminant(&expected.ground)
+    );
     // One site alone has another one: Gusev 35.28 px.
-    close(uncertainty_budget(&each[1]).unwrap().along_px, 35.277);
+    close(each[1].along_px, 35.276);
     let mut unseen = each;
-    unseen[0].misregistration = None;
-    assert_eq!(BudgetInput::pooled(&unseen).misregistration, None);
-    // Without a pair the means are not numbers, which the budget refuses.
-    assert!(uncertainty_budget(&BudgetInput::pooled(&[])).is_err());
+    unseen[0].total_along_px = None;
+    let pooled = UncertaintyBudget::pooled(&unseen).unwrap();
+    assert_eq!(pooled.ground, GroundPart::NotObserved);
+    assert_eq!(UncertaintyBudget::pooled(&[]), None);
 }
 
 #[test]
