@@ -487,12 +487,12 @@ fn several_pairs_are_pooled_as_the_sites_of_the_paper() {
     assert_eq!(table(&site.page(), "The same with").len(), 2);
     let mut other = site.pairs[0].clone();
     other.images = other.images.map(|image| format!("{image}-b"));
-    other.footprints = None;
+    other.budget.as_mut().unwrap().total_along_px = None;
     site.pairs.push(other);
     let page = site.page();
     let rows = table(&page, "The same with");
     let last = &rows[rows.len() - 1];
-    assert_eq!([&*last[0], &*last[2]], ["all 2 pairs", "–"]);
+    assert_eq!([&*last[0], &*last[2]], ["all: 2 pairs", "–"]);
     // Both pairs have the same tie points.
     agree(
         &last[3],

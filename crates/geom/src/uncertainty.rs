@@ -172,8 +172,11 @@ impl UncertaintyBudget {
         if budgets.is_empty() {
             return None;
         }
-        let pixel_size_m = mean(&|of| of.equation_7.planimetric_m / of.equation_7.planimetric_px);
-        let height_over_base = mean(&|of| of.equation_7.height_px / of.equation_7.across_px);
+        let ratio = |one: f64, other: f64| if other > 0.0 { one / other } else { 0.0 };
+        let of_plan = |of: &PointUncertainty| ratio(of.planimetric_m, of.planimetric_px);
+        let of_height = |of: &PointUncertainty| ratio(of.height_px, of.across_px);
+        let pixel_size_m = mean(&|of| of_plan(&of.equation_7));
+        let height_over_base = mean(&|of| of_height(&of.equation_7));
         let along_px = root(&|of| of.along_px);
         let total_along_px = all_have(|of| of.total_along_px);
         let signed_px = root(&|of| of.equation_5.along_px);

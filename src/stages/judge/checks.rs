@@ -317,7 +317,7 @@ fn components(of: &AdjustmentEvidence<'_>) -> Option<Check> {
     });
     let mut check = Check::worst(tested)?;
     if !below.is_empty() {
-        check.subject += &format!("; a priori σ larger than the scatter: {}", below.join("; "));
+        check.subject += &format!("; below their interval: {}", below.join("; "));
     }
     Some(check)
 }

@@ -13,7 +13,7 @@ use areograph::{
 
 use super::{
     recipe::Normals,
-    row::{Account, Comparison, Kind, Paper, Row, derived, number},
+    row::{Account, Comparison, Kind, Paper, Row, beyond_reach, derived, number},
 };
 
 pub(crate) static PAPER: Paper = Paper {
@@ -274,6 +274,7 @@ fn gross_controls() -> Vec<Comparison> {
         )
         .between(98.0, 100.0),
         number("rms of the other ten, km", "0.8", mean_m / 1e3, 2).share(0.15),
+        beyond_reach("largest of the other ten, km", "2.1"),
     ]
 }
 

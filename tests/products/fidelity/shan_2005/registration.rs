@@ -166,11 +166,11 @@ pub(super) static ROWS: [Row; 7] = [
         kind: Kind::ClosedLoop,
         place: "results",
         what: "point 74 of ap19215 left where 73 is right; 109 and 108 of ap18933",
-        account: Account::InPart {
+        account: Account::Agrees {
             from: "circular orbit, E02-00665, a clock that is off by the time between two shots",
             ours: same_place,
         },
-        note: "Closed loop. The images themselves were compared by eye.",
+        note: "A shift of time that is put in comes back as one footprint. The images themselves were compared by eye.",
     },
     Row {
         id: "S05-48",
