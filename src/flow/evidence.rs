@@ -10,6 +10,7 @@ use crate::{
     instruments::Instrument,
     stage::Output,
     stages::{
+        adjust::accuracy_withheld,
         judge::{AdjustmentEvidence, Evidence, JudgedImage, Verdict, judge},
         lay_overlays::ShownImage,
         site_image::SiteImage,
@@ -88,6 +89,11 @@ pub(super) fn warnings(config: &SiteConfig, site: &Site) -> Result<Vec<String>> 
     if let Some(ties) = &site.ties {
         let remarks = ties.value()?.remarks.iter();
         warnings.extend(remarks.map(|remark| format!("tie points: {remark}")));
+    }
+    if site.adjustment.is_some() {
+        let times = site.images.iter().map(|image| image.times.value());
+        let times = times.collect::<Result<Vec<_>>>()?;
+        warnings.extend(accuracy_withheld(config, times));
     }
     for (id, image) in shown(site)? {
         let damage = image.damage();

@@ -70,7 +70,9 @@ const DEFINITIONS: [(&str, &str); 12] = [
     (
         "budget",
         "eq. 5 to 9 of Shan et al. 2005; pixels are the mean line spacing of the pair. paper_average takes the average of \
-         the images' across-track residuals as the paper computes, equation_7 their sum of squares as its eq. 7 states",
+         the images' across-track residuals as the paper computes, equation_7 their sum of squares as its eq. 7 states; \
+         both add the means of the images in quadrature. equation_5 has the differences of the images tie point by tie \
+         point, where means of opposite sign add up, and the mean misregistration that they leave unexplained",
     ),
     (
         "correction, sigmas",
@@ -290,8 +292,11 @@ struct ImageDocument<'a> {
     time_bias_s: Option<(f64, f64)>,
 }
 
+/// Path of the document below the products of a site.
+pub const ADJUSTMENT: &str = "adjustment.json";
+
 pub(super) static DOCUMENT: Declaration = Declaration {
-    path: "adjustment.json",
+    path: ADJUSTMENT,
     what: "tie points intersected before and after the adjustment, every pair of images compared, the adjustment itself",
     readers: "scripts",
     rows: "adjusted points",

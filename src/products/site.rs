@@ -13,7 +13,7 @@ use crate::{
     frames::BodyFixed,
     spice::{KernelSet, RequiredCoverage},
     stages::{
-        adjust::{Adjusted, CorrectedPoint, PointKind},
+        adjust::{Adjusted, CorrectedPoint, PointKind, accuracy_withheld},
         check_heights::HeightCheck,
         check_ranges::{ProfileRanges, RangeCheck},
         compare_pairs::PairComparison,
@@ -165,6 +165,11 @@ impl<'a> SiteProducts<'a> {
     pub(crate) fn adjustment(&self) -> Option<(GeometricProducts<'a>, AdjustmentProducts<'a>)> {
         let geometric = self.geometric?;
         Some((geometric, geometric.adjustment?))
+    }
+
+    /// Why absolute accuracies are withheld, if they are.
+    pub(crate) fn accuracy_withheld(&self) -> Option<String> {
+        accuracy_withheld(self.config, self.images.iter().map(|image| image.times))
     }
 
     /// Identifiers of the windows in `mask`, separated by semicolons.

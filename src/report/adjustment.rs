@@ -13,7 +13,7 @@ use crate::{
     error::Result,
     geom::statistics::BAARDA_LIMIT,
     products::{AdjustmentProducts, GeometricProducts, SiteProducts},
-    stages::adjust::{Adjusted, AdjustmentSummary, ObservationType, WORSE_THAN_CONFIGURED},
+    stages::adjust::{Adjusted, AdjustmentSummary, TypeSummary, WORSE_THAN_CONFIGURED},
 };
 
 /// Iterations that the axis of the convergence has room for at least, so that its labels are whole numbers.
@@ -38,7 +38,7 @@ fn write(
     let adjusted = adjustment.adjusted;
     let summary = &adjusted.summary;
     let mut html = overview(adjusted);
-    html += &reliability::absolute(geometric, adjustment);
+    html += &reliability::absolute(site, geometric, adjustment);
     html += &format!(
         "<div class=\"plots\">\n{}</div>\n",
         residuals::distribution(adjusted)?
@@ -151,22 +151,6 @@ fn convergence(adjusted: &Adjusted) -> Plot {
     }
 }
 
-/// A kind of observation in words.
-const fn kind(of: ObservationType) -> &'static str {
-    match of {
-        ObservationType::TieAlong => "tie points in images, along the track",
-        ObservationType::TieAcross => "tie points in images, across the track",
-        ObservationType::MolaHeight => "heights by the MOLA surface",
-        ObservationType::MolaImage => "image coordinates of MOLA",
-        ObservationType::MolaRange => "MOLA ranges",
-        ObservationType::Orientation => "initial orientation",
-        ObservationType::MolaGround => "ground coordinates of MOLA",
-        ObservationType::TieGround => "given coordinates of tie points",
-        ObservationType::Bias => "time and range biases",
-        ObservationType::LaserSpot => "the laser in simultaneous images, by the mounting",
-    }
-}
-
 fn observations(summary: &AdjustmentSummary) -> String {
     let mut table = Table::new(
         "Observations by kind",
@@ -203,7 +187,7 @@ fn observations(summary: &AdjustmentSummary) -> String {
             &format!("adjustment.json#/adjustment/summary/types/{index}"),
             true,
             [
-                kind(of.kind).into(),
+                of.kind.words().into(),
                 Cell::from(whole(of.observations)).told("/observations"),
                 Cell::from(label(of.redundancy, 1)).told("/redundancy"),
                 format!("{} %", label(each, 1)).into(),
@@ -222,5 +206,30 @@ fn observations(summary: &AdjustmentSummary) -> String {
         "Variance component: √(vᵀPv / redundancy), 1 where the a priori σ is right; by chance: its 99 % interval, lower for \
          heights with robust weights. Beyond {BAARDA_LIMIT}: failed Baarda's test, by chance 1 in 1000."
     );
-    table.finish() + &paragraph(&words)
+    table.finish() + &paragraph(&words) + &outside(summary)
+}
+
+/// The components that are outside their own interval, and what follows.
+fn outside(summary: &AdjustmentSummary) -> String {
+    let listed = |is_outside: fn(&TypeSummary) -> bool| {
+        let found = summary.types.iter().filter(|of| is_outside(of));
+        let found =
+            found.map(|of| format!("{} {}", of.kind.words(), label(of.variance_component, 3)));
+        found.collect::<Vec<String>>().join(", ")
+    };
+    let sentences = [
+        (
+            listed(TypeSummary::is_above_chance),
+            "Above their interval, so that a priori standard deviations are too small",
+        ),
+        (
+            listed(TypeSummary::is_below_chance),
+            "Below their interval, so that a priori standard deviations are larger than the scatter, or robust weights reduce \
+             it; covariances are not reduced",
+        ),
+    ];
+    let found = sentences.into_iter().filter(|(kinds, _)| !kinds.is_empty());
+    found
+        .map(|(kinds, words)| paragraph(&format!("{words}: {kinds}.")))
+        .collect()
 }

@@ -152,6 +152,7 @@ const fn section(kind: CheckKind) -> Option<&'static Section> {
         CheckKind::ParallaxAfter | CheckKind::ParallaxBefore => &misregistration::SECTION,
         CheckKind::TieResidualsAlong
         | CheckKind::TieResidualsAcross
+        | CheckKind::VarianceComponents
         | CheckKind::TiesRejected
         | CheckKind::TiesUsed
         | CheckKind::ImagesJoined

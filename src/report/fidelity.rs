@@ -15,10 +15,31 @@ pub const FIDELITY_FILE: &str = "fidelity.html";
 pub struct Fidelity {
     /// Introduction to the list, by paragraphs.
     pub rules: Vec<String>,
-    /// Each verdict: the word, its number of rows, its meaning.
-    pub verdicts: Vec<(&'static str, usize, &'static str)>,
+    /// Each kind of row with its counts, the strongest first.
+    pub kinds: Vec<FidelityKind>,
     /// The papers.
     pub papers: Vec<FidelityPaper>,
+}
+
+/// A kind of row.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FidelityKind {
+    /// The word.
+    pub name: &'static str,
+    /// Its meaning.
+    pub meaning: &'static str,
+    /// The word for agreement in a row of this kind; only evidence is met.
+    pub agrees: &'static str,
+    /// Rows that agree, that agree in part, that are explained, and without a number of ours.
+    pub counts: [usize; 4],
+}
+
+impl FidelityKind {
+    /// All its rows.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.counts.iter().sum()
+    }
 }
 
 /// A paper.
@@ -37,12 +58,16 @@ pub struct FidelityPaper {
 pub struct FidelityRow {
     /// Identifier.
     pub id: &'static str,
+    /// The kind: what stands beside the print.
+    pub kind: &'static str,
     /// Section or table of the paper.
     pub place: &'static str,
     /// Description of the printed numbers.
     pub what: &'static str,
     /// Its numbers, each with the printed one, ours and the tolerance in a line.
     pub numbers: Vec<String>,
+    /// The same of numbers that the paper does not print.
+    pub derived: Vec<String>,
     /// Source of ours.
     pub from: String,
     /// The verdict.
@@ -66,28 +91,40 @@ fn embedded_style() -> String {
 pub fn fidelity_page(fidelity: &Fidelity) -> String {
     let rules: String = fidelity.rules.iter().map(|rule| paragraph(rule)).collect();
     let sections: Vec<Section> = fidelity.papers.iter().map(section).collect();
-    let lead = rules + &verdicts(fidelity);
+    let lead = rules + &kinds(fidelity);
     let page = page("Fidelity to the papers", &lead, &sections);
     page.replacen(&embedded_style(), LINKED_STYLE, 1)
 }
 
-fn verdicts(fidelity: &Fidelity) -> String {
+fn kinds(fidelity: &Fidelity) -> String {
     let mut table = Table::new(
-        "Rows by verdict",
+        "Rows by kind",
         &[
-            Column::Text("verdict"),
+            Column::Text("kind"),
             Column::Number("rows"),
+            Column::Number("agree"),
+            Column::Number("in part"),
+            Column::Number("explained"),
+            Column::Number("no number of ours"),
             Column::Text("meaning"),
         ],
     );
-    let mut all = 0;
-    for (word, rows, meaning) in &fidelity.verdicts {
-        all += rows;
+    for kind in &fidelity.kinds {
+        let [agree, in_part, explained, without] = kind.counts;
         table.row(
             true,
-            [(*word).into(), rows.to_string().into(), (*meaning).into()],
+            [
+                kind.name.into(),
+                kind.rows().to_string().into(),
+                format!("{agree} {}", kind.agrees).into(),
+                in_part.to_string().into(),
+                explained.to_string().into(),
+                without.to_string().into(),
+                kind.meaning.into(),
+            ],
         );
     }
+    let all: usize = fidelity.kinds.iter().map(FidelityKind::rows).sum();
     table.row(true, ["all".into(), all.to_string().into()]);
     format!("<div class=\"stacked\">\n{}</div>\n", table.finish())
 }
@@ -97,24 +134,25 @@ fn section(paper: &FidelityPaper) -> Section {
         paper.name,
         &[
             Column::Text("row"),
+            Column::Text("kind: verdict"),
             Column::Text("place"),
             Column::Text("what"),
             Column::Text("printed; ours (tolerance)"),
-            Column::Text("verdict"),
+            Column::Text("not printed: derived, or of another paper; ours"),
             Column::Text("ours from"),
             Column::Text("notes"),
         ],
     );
     for row in &paper.rows {
-        let numbers: Vec<String> = row.numbers.iter().map(|number| escape(number)).collect();
         table.row(
             true,
             [
                 row.id.into(),
+                labelled("kind: verdict", &format!("{}: {}", row.kind, row.verdict)),
                 row.place.into(),
                 row.what.into(),
-                Cell::Html(numbers.join("<br>")),
-                labelled("verdict", row.verdict),
+                lines("", &row.numbers),
+                lines("not printed", &row.derived),
                 labelled("ours from", &row.from),
                 row.note.into(),
             ],
@@ -126,6 +164,17 @@ fn section(paper: &FidelityPaper) -> Section {
         table.finish()
     );
     Section::new(paper.name, paragraph(paper.citation) + &rows)
+}
+
+/// A cell with a line for each number.
+fn lines(label: &str, numbers: &[String]) -> Cell {
+    let numbers: Vec<String> = numbers.iter().map(|number| escape(number)).collect();
+    let numbers = numbers.join("<br>");
+    Cell::Html(if label.is_empty() || numbers.is_empty() {
+        numbers
+    } else {
+        format!("<span class=\"label\">{label}: </span>{numbers}")
+    })
 }
 
 /// A cell with a label for layouts without column heads.

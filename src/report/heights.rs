@@ -16,7 +16,7 @@ use super::{
 use crate::{
     error::Result,
     footprints::AdjustmentModel,
-    products::{AdjustmentProducts, GeometricProducts},
+    products::{AdjustmentProducts, GeometricProducts, SiteProducts},
     stages::{
         check_heights::{HeightCheck, SurfaceFigures},
         compare_pairs::PairComparison,
@@ -29,13 +29,13 @@ pub(super) const SECTION: Section = Section {
     appears: |site| site.geometric.is_some(),
     write: |site| {
         let geometric = site.geometric.iter();
-        geometric.map(write).collect()
+        geometric.map(|geometric| write(site, geometric)).collect()
     },
 };
 
-fn write(geometric: &GeometricProducts) -> Result<String> {
+fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
     let adjustment = geometric.adjustment.as_ref();
-    let mut html = adjustment.map_or_else(String::new, |of| statements(geometric, of));
+    let mut html = adjustment.map_or_else(String::new, |of| statements(site, geometric, of));
     if let Ok(surface) = &geometric.heights.surface {
         html += &heading("Heights against the MOLA surface");
         html += &compared(geometric);
@@ -52,8 +52,16 @@ fn write(geometric: &GeometricProducts) -> Result<String> {
     Ok(html)
 }
 
+/// In place of accuracies that rest on a priori values of another spacecraft.
+pub(super) const NOT_STATED: &str =
+    "not stated: the a priori accuracy is that of another spacecraft";
+
 /// The three statements of accuracy, and their basis.
-fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
+fn statements(
+    site: &SiteProducts,
+    geometric: &GeometricProducts,
+    adjustment: &AdjustmentProducts,
+) -> String {
     let mut table = Table::new(
         "Accuracy of the tie points",
         &[
@@ -70,7 +78,10 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
         |pair: &PairComparison| format!("{} m", label(pair.along_track_parallax_m.abs(), 1));
     let [along, _] = adjustment.adjusted.summary.tie_components;
     let after = worst.and_then(|pair| pair.after).map(parallax);
-    let [height, place] = absolute(geometric, adjustment);
+    let [height, place] = match site.accuracy_withheld() {
+        Some(_) => [0, 1].map(|_| NOT_STATED.to_owned()),
+        None => absolute(geometric, adjustment),
+    };
     let statements = [
         [
             "internal agreement".to_owned(),

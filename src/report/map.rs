@@ -170,7 +170,11 @@ impl Sheet {
         );
         let view = view.with_ratio(ratio);
         let adjustment = site.adjustment();
-        let ties = adjustment.iter().flat_map(|(_, of)| of.adjusted_ties());
+        // Ellipses by the a priori accuracy of another spacecraft would state what is withheld elsewhere.
+        let stated = adjustment
+            .iter()
+            .filter(|_| site.accuracy_withheld().is_none());
+        let ties = stated.flat_map(|(_, of)| of.adjusted_ties());
         Self {
             map,
             ellipses: Ellipses::of(ties, view.width_m()),

@@ -30,7 +30,11 @@ const CORRELATED_SHOWN: usize = 12;
 const BLUNDERS_SHOWN: usize = 20;
 
 /// Determined and undetermined quantities of the adjustment, with numbers.
-pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
+pub(super) fn absolute(
+    site: &SiteProducts,
+    geometric: &GeometricProducts,
+    adjustment: &AdjustmentProducts,
+) -> String {
     const MOVED: [&str; 3] = [
         "adjustment.json#/adjustment/summary/ties/corrections_m/0/mean",
         "adjustment.json#/adjustment/summary/ties/corrections_m/1/mean",
@@ -57,6 +61,10 @@ pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentPro
         .collect();
     numbers.push((registration.to_owned(), ""));
     let determined = match &adjustment.adjusted.heights {
+        Some(_) if site.accuracy_withheld().is_some() => {
+            "heights follow MOLA; absolute accuracies are not stated, because the a priori accuracy of orbit and attitude is \
+             that of another spacecraft"
+        }
         Some(heights) => {
             let [east_m, north_m, up_m] = heights.mean_sigma_m;
             numbers.push((label(up_m, 1), SIGMA[2]));

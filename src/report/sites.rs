@@ -8,8 +8,9 @@ use super::{
     numbers::{number, whole},
     sites_map::{self, Place},
     source::told,
+    uncertainty,
 };
-use crate::{body::Body, error::Result};
+use crate::{body::Body, error::Result, geom::uncertainty::UncertaintyBudget};
 
 /// Entry of one site on the page.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,6 +45,8 @@ pub struct SiteSummary {
     pub body: Body,
     /// East longitude and areocentric latitude of the middle of the first window that is a box, degrees.
     pub place_deg: Option<(f64, f64)>,
+    /// The uncertainty budget of each of its pairs before the adjustment.
+    pub budgets: Vec<UncertaintyBudget>,
     /// Results of the previous products.
     pub earlier: Option<Earlier>,
     /// When the products were published.
@@ -91,13 +94,15 @@ pub fn sites_page(sites: &[SiteLine]) -> Result<String> {
         Tone::Good
     };
     let fidelity = format!(
-        "<p>{}: every number that the papers print, with areograph's beside it.</p>\n",
+        "<p>{}: numbers that the papers print, with areograph's beside them, by kind of evidence.</p>\n",
         link(FIDELITY_FILE, "Fidelity to the papers")
     );
     let words = paragraph(
         "Heights off: median height of the tie points against the laser surface. Images apart: along track, the worst pair. \
          Range − distance: the largest mean of a profile.",
     );
+    let budgets = sites.iter().filter_map(|site| site.products.as_ref());
+    let budgets: Vec<UncertaintyBudget> = budgets.flat_map(|of| of.budgets.clone()).collect();
     let maps = Body::WORDS.map(|(_, body)| sites_map::figure(body, &places(sites, body)));
     let maps: String = maps.into_iter().collect::<Result<_>>()?;
     let maps = format!("<div class=\"plots\">\n{maps}</div>\n");
@@ -106,6 +111,7 @@ pub fn sites_page(sites: &[SiteLine]) -> Result<String> {
         maps,
         table(sites),
         words,
+        uncertainty::of_all_sites(&budgets),
         fidelity,
     ];
     Ok(page("Sites", &lead.concat(), &[]))
@@ -346,6 +352,7 @@ mod tests {
             height_off_m: [None, None],
             body: Body::Mars,
             place_deg: Some((175.3, -14.6)),
+            budgets: Vec::new(),
             earlier: None,
             finished_utc: "2026-01-01T00:00:00Z".to_owned(),
             version: "1".to_owned(),

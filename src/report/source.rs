@@ -4,7 +4,7 @@
 //! page: `<document>#<JSON pointer>`, or the pointer alone, below the `data-in` of the table's row. A leading `|`
 //! stands for the size of the value, a trailing `*<factor>` for another unit. A missing value is a dash.
 
-use super::html::{escape, from_places};
+use super::html::{Cell, escape, from_places};
 
 /// `text`, whose numbers are those at `places`, as HTML.
 pub(super) fn told(text: &str, places: &str) -> String {
@@ -29,6 +29,14 @@ pub(super) fn filled(words: &str, numbers: &[(String, &str)]) -> String {
         html += &escape(piece);
     }
     html
+}
+
+/// `cell` without its places, for a number that no product has.
+pub(super) fn untold(cell: Cell) -> Cell {
+    match cell {
+        Cell::Told(cell, _) => untold(*cell),
+        cell => cell,
+    }
 }
 
 /// A member's name as a part of a JSON pointer; a space, which separates places, is encoded as in addresses.

@@ -222,6 +222,14 @@ const HEIGHTS: &str = "adjustment.json#/adjustment/heights";
 fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
     let (geometric, adjustment) = site.adjustment()?;
     let heights = adjustment.adjusted.heights.as_ref()?;
+    if site.accuracy_withheld().is_some() {
+        return Some(KeyNumber {
+            what: "Absolute accuracy, 1 σ",
+            value: "not stated".to_owned(),
+            note: "the a priori accuracy of orbit and attitude is that of another spacecraft; see the remarks"
+                .to_owned(),
+        });
+    }
     let [east_m, north_m, up_m] = heights.mean_sigma_m;
     Some(KeyNumber {
         what: "Absolute accuracy, 1 σ",

@@ -1,6 +1,7 @@
 //! Every pair of images: its geometry, the disagreement of footprints and tie points in it, and the resulting
 //! uncertainty of ground points.
 
+mod budget;
 mod footprint_heights;
 
 use std::{collections::BTreeMap, sync::atomic::AtomicBool};
@@ -25,13 +26,14 @@ use crate::{
         oriented_camera::OrientedCamera,
         pushbroom::{CameraModel, ExteriorOrientation},
         statistics::Summary,
-        uncertainty::{BudgetInput, ResidualMoments, UncertaintyBudget, uncertainty_budget},
+        uncertainty::{PairResiduals, ResidualMoments, UncertaintyBudget, uncertainty_budget},
     },
     stage::{Output, Round, Stage},
     stage_inputs,
     ties::TiePoint,
 };
 
+use budget::{apart, budget_input, moments_of};
 pub use footprint_heights::FootprintHeight;
 use footprint_heights::footprint_heights;
 
@@ -134,7 +136,7 @@ stage_inputs! {
 
 impl Stage for ComparePairs<'_> {
     const NAME: &'static str = "compare_pairs";
-    const METHOD: u32 = 4;
+    const METHOD: u32 = 5;
     type Output = Vec<PairComparison>;
     stage_inputs!(fingerprint);
 
@@ -257,36 +259,36 @@ impl<'a> Shared<'a> {
             let height_m = 0.5 * (a_m.norm() + b_m.norm()) - point.ground.xyz_m.norm();
             height_m / (b_m - a_m).norm()
         });
-        let budget = mola_spacing_m.map(|mola_spacing_m| {
-            uncertainty_budget(&BudgetInput {
-                sites: vec![residuals],
-                mola_spacing_m,
-                // A pixel is the mean line spacing of both images along the flight.
-                pixel_size_m: 0.5 * (line_spacing_m[0] + line_spacing_m[1]),
-                height_over_base,
+        let pixel_size_m = [0, 1].map(|at| {
+            let focal_length_px = pair[at].detector.focal_length_px;
+            self.each(|point, measures| {
+                let away_m = position_m(measures, at) - point.ground.xyz_m;
+                away_m.norm() / focal_length_px
             })
-            .map_err(|error| error.to_string())
         });
+        let budget = budget_input(
+            PairResiduals {
+                images: residuals,
+                apart: apart(&self.points, line_spacing_m, pixel_size_m),
+            },
+            footprints.as_ref(),
+            line_spacing_m,
+            height_over_base,
+        );
         PairComparison {
             images: pair.map(|image| image.id.clone()),
             ties: u32::try_from(self.points.len()).unwrap_or(u32::MAX),
             convergence_rad: self.each(|point, _| point.convergence_rad),
             height_over_base,
             line_spacing_m,
-            pixel_size_m: [0, 1].map(|at| {
-                let focal_length_px = pair[at].detector.focal_length_px;
-                self.each(|point, measures| {
-                    let away_m = position_m(measures, at) - point.ground.xyz_m;
-                    away_m.norm() / focal_length_px
-                })
-            }),
+            pixel_size_m,
             residuals,
             along_track_parallax_m: (residuals[0].mean_x * line_spacing_m[0]
                 - residuals[1].mean_x * line_spacing_m[1])
                 .abs(),
             footprints,
             mola_spacing_m,
-            budget: budget.unwrap_or_else(|| Err("there are no footprints".to_owned())),
+            budget: uncertainty_budget(&budget).map_err(|error| error.to_string()),
         }
     }
 
@@ -295,13 +297,7 @@ impl<'a> Shared<'a> {
             let values: Vec<f64> = self.points.iter().map(|(_, m)| pick(&m[at])).collect();
             Summary::of(&values)
         };
-        let (along, across) = (of(|m| m.reprojection_lines), of(|m| m.reprojection_px));
-        ResidualMoments {
-            mean_x: along.mean,
-            deviation_x: along.standard_deviation,
-            mean_y: across.mean,
-            deviation_y: across.standard_deviation,
-        }
+        moments_of(&of(|m| m.reprojection_lines), &of(|m| m.reprojection_px))
     }
 }
 

@@ -24,6 +24,7 @@
 //! Yoon & Shan 2004. Image coordinates of footprints are computed from the orientation that is being
 //! adjusted; with small standard deviations they would hold the misregistration in place.
 
+mod a_priori;
 mod adjusted;
 mod attitude_clock;
 mod blunders;
@@ -43,6 +44,7 @@ mod stage;
 mod summary;
 mod words;
 
+pub use a_priori::accuracy_withheld;
 pub use adjusted::{
     Adjusted, CorrectedImage, CorrectedPoint, ImageResidual, RangeResidual, ScalarResidual,
 };

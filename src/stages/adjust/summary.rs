@@ -54,6 +54,25 @@ pub enum ObservationType {
     LaserSpot,
 }
 
+impl ObservationType {
+    /// The kind in words.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::TieAlong => "tie points in images, along the track",
+            Self::TieAcross => "tie points in images, across the track",
+            Self::MolaHeight => "heights by the MOLA surface",
+            Self::MolaImage => "image coordinates of MOLA",
+            Self::MolaRange => "MOLA ranges",
+            Self::Orientation => "initial orientation",
+            Self::MolaGround => "ground coordinates of MOLA",
+            Self::TieGround => "given coordinates of tie points",
+            Self::Bias => "time and range biases",
+            Self::LaserSpot => "the laser in simultaneous images, by the mounting",
+        }
+    }
+}
+
 /// Residual statistics of one kind of observation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TypeSummary {
@@ -77,6 +96,23 @@ pub struct TypeSummary {
     pub variance_component_limits: [f64; 2],
     /// Observations whose standardised residual exceeds 3.29.
     pub beyond_limit: usize,
+}
+
+impl TypeSummary {
+    /// Whether its residuals are larger than chance explains: its standard deviations are too small, or a model fails.
+    #[must_use]
+    pub fn is_above_chance(&self) -> bool {
+        let [_, most] = self.variance_component_limits;
+        // Written so that NaN counts.
+        most > 0.0 && !(self.variance_component <= most)
+    }
+
+    /// Whether they are smaller: its standard deviations are larger than the scatter.
+    #[must_use]
+    pub fn is_below_chance(&self) -> bool {
+        let [least, most] = self.variance_component_limits;
+        most > 0.0 && self.variance_component < least
+    }
 }
 
 /// Coordinates of one kind of point.

@@ -254,6 +254,32 @@ impl AdjustmentEvidence<'_> {
             })
     }
 
+    /// Kinds of observation other than tie points with enough redundancy for a test.
+    pub(super) fn other_components(&self) -> impl Iterator<Item = &TypeSummary> {
+        let types = self.adjusted.summary.types.iter();
+        let others = types.filter(|of| {
+            !matches!(
+                of.kind,
+                ObservationType::TieAlong | ObservationType::TieAcross
+            )
+        });
+        others.filter(|of| of.variance_component_limits[1] > 0.0)
+    }
+
+    /// Those whose residuals are larger than chance explains.
+    fn components_above(&self) -> impl Iterator<Item = String> {
+        let above = self.other_components().filter(|of| of.is_above_chance());
+        above.map(|of| {
+            let [_, most] = of.variance_component_limits;
+            format!(
+                "residuals of {} are {:.2} times their a priori standard deviations, by chance at most {most:.2}: these are too \
+                 small, or a model does not hold",
+                of.kind.words(),
+                of.variance_component
+            )
+        })
+    }
+
     /// Images without a tie point in the adjustment.
     pub(super) fn untied(&self) -> Vec<String> {
         let views = self.adjusted.views.iter();
@@ -304,7 +330,8 @@ impl AdjustmentEvidence<'_> {
         if self.adjusted.summary.model == AdjustmentModel::Published {
             remarks.push(
                 "the adjustment follows the published model (adjustment.model): its heights are not controlled, and \
-                 its standard deviations state only the agreement between the images"
+                 its standard deviations state only the agreement between the images; across the track it departs from the \
+                 paper (decision 0010)"
                     .to_owned(),
             );
         }
@@ -352,6 +379,7 @@ impl AdjustmentEvidence<'_> {
                 )),
             }
         }
+        remarks.extend(self.components_above());
         for image in self.untied() {
             remarks.push(format!(
                 "image {image} has no tie point in the adjustment: no measurement in it tests or corrects its orientation"

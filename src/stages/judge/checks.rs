@@ -259,6 +259,7 @@ fn of_ties(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> {
         Some(found) => Check::new(kind, "", found, limits.sigma0_max, Warning),
         None => Check::told(kind, "untested: no redundancy", Warning),
     }));
+    checks.extend(components(of));
     checks.extend(joined(of));
     let share = of.left_out() as f64 / of.ties.multi_image().max(1) as f64;
     let broken = if share > REJECTED_SHARE_FAIL {
@@ -286,6 +287,39 @@ fn of_ties(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> {
     checks.extend(Check::worst(corrections));
     checks.extend(boresight(of, limits));
     checks
+}
+
+/// The variance component, among those of the other kinds of observation, that uses most of what chance explains. The
+/// subject has those below their interval as well: these are no fault, but the page shows them.
+fn components(of: &AdjustmentEvidence<'_>) -> Option<Check> {
+    let kind = CheckKind::VarianceComponents;
+    let below: Vec<String> = of
+        .other_components()
+        .filter(|found| found.is_below_chance())
+        .map(|found| {
+            let [least, _] = found.variance_component_limits;
+            let value = found.variance_component;
+            format!(
+                "{} {value:.3}, by chance at least {least:.2}",
+                found.kind.words()
+            )
+        })
+        .collect();
+    let tested = of.other_components().map(|found| {
+        let [_, most] = found.variance_component_limits;
+        Check::new(
+            kind,
+            found.kind.words(),
+            found.variance_component,
+            most,
+            Warning,
+        )
+    });
+    let mut check = Check::worst(tested)?;
+    if !below.is_empty() {
+        check.subject += &format!("; below their interval: {}", below.join("; "));
+    }
+    Some(check)
 }
 
 /// How many images and pairs the adjustment joins, and which it does not.

@@ -17,7 +17,7 @@
 //! of all are rejected, and where fewer than half agree, all of it is.
 //!
 //! # Source
-//! Li et al. 2023, section 3.2: segments, relief filter, clusters, similarity (eq. 16–18). Points that the paper leaves
+//! Li et al. 2023, sections 2.2.2 and 2.2.3: segments, relief filter, clusters, similarity (eq. 16–18). Points that the paper leaves
 //! open and departures from it are documented at the constants.
 
 mod clusters;

@@ -31,7 +31,7 @@ use super::common::mission::{mission, site_run};
 pub(crate) struct Site {
     pub(crate) published: String,
     pub(crate) manifest: serde_json::Value,
-    config: SiteConfig,
+    pub(crate) config: SiteConfig,
     kernels: KernelSet,
     pub(crate) times: Vec<ImageTimes>,
     converted: Converted,
@@ -214,7 +214,7 @@ impl Site {
         with(&evidence, &adjustment)
     }
 
-    fn verdict(&self) -> Verdict {
+    pub(crate) fn verdict(&self) -> Verdict {
         self.judged(|evidence, _| judge(evidence))
     }
 

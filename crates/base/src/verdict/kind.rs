@@ -57,6 +57,9 @@ pub enum CheckKind {
     TieResidualsAlong,
     /// The same across the track.
     TieResidualsAcross,
+    /// Standard deviation of unit weight of the other kinds of observation, the one that exceeds most of what chance
+    /// explains.
+    VarianceComponents,
     /// Share of the tie points that took no part in the adjustment.
     TiesRejected,
     /// Tie points that took part in the adjustment.
@@ -151,6 +154,7 @@ impl CheckKind {
             Self::ParallaxBefore => "Along-track parallax, before",
             Self::TieResidualsAlong => "Tie residuals along track",
             Self::TieResidualsAcross => "Tie residuals across track",
+            Self::VarianceComponents => "Variance component, other observations",
             Self::TiesRejected => "Tie points rejected",
             Self::TiesUsed => "Tie points used",
             Self::Correction => "Largest orientation correction",
@@ -219,6 +223,7 @@ impl CheckKind {
             | Self::SurfaceSpread
             | Self::TieResidualsAlong
             | Self::TieResidualsAcross
+            | Self::VarianceComponents
             | Self::Correction
             | Self::Boresight
             | Self::HeldBackPlane
@@ -291,6 +296,7 @@ impl CheckKind {
             | Self::Decoding
             | Self::PositionRmse
             | Self::LinesAgree
+            | Self::VarianceComponents
             | Self::HeldBackPlane
             | Self::HeldBackHeight
             | Self::ControlPlane
