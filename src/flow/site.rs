@@ -12,7 +12,7 @@ use super::{
     triangulate::{is_of_adjustment, triangulate},
 };
 use crate::{
-    config::{ImageConfig, SiteConfig, WindowConfig},
+    config::{ImageConfig, ShotLayout, ShotTableConfig, SiteConfig, WindowConfig},
     footprints::Footprints,
     geom::window::WindowShape,
     kernel_source::KernelSource,
@@ -225,10 +225,17 @@ pub(super) fn orient<D: Driver>(
             range_check: &config.range_check,
         })?
     } else {
+        let view = if has_spacecraft(config) {
+            Ok(KernelView::all(Some(&KernelSet::default())))
+        } else {
+            KernelView::positions(kernels.as_ref())
+        };
+        let view = flow.attempt(CheckTableRanges::NAME, view)?;
         flow.stage(&CheckTableRanges {
             converted: &converted,
             profiles: &profiles,
             images: InOrder(&images),
+            kernels: &view.unwrap_or_else(|| KernelView::all(None)),
             mola_clock: &config.mola_clock,
             range_check: &config.range_check,
         })?
@@ -264,6 +271,12 @@ pub(super) fn orient<D: Driver>(
         surface: None,
         adjustment_failure: None,
     })
+}
+
+/// Whether all tables of shots have positions of the spacecraft.
+fn has_spacecraft(config: &SiteConfig) -> bool {
+    let has_none = |table: &ShotTableConfig| table.layout == Some(ShotLayout::OdePedr);
+    !config.shots.iter().any(has_none)
 }
 
 /// Orientation of every image by the kernels, or by its support data.

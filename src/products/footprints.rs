@@ -14,7 +14,10 @@ use super::{
 use crate::{
     footprints::Footprints,
     frames::BodyFixed,
-    geom::ellipsoid::{AreocentricLatitude, spherical_to_xyz_m},
+    geom::{
+        ellipsoid::{AreocentricLatitude, spherical_to_xyz_m},
+        range_residuals::has_own_spacecraft,
+    },
     schema::DocumentSchema,
 };
 
@@ -431,6 +434,12 @@ fn spacecraft<'a>() -> Vec<Column<Shot<'a>>> {
             Unit::Degree,
             "off-nadir angle of the laser, degrees",
             |shot: &Shot| degrees(shot.get(|of| &of.off_nadir_rad)),
+        ),
+        column(
+            "nadir_by_range",
+            Unit::None,
+            "whether the file has no position of the spacecraft: it is then on the radius through the footprint, at range_m",
+            |shot: &Shot| !has_own_spacecraft(&shot.footprints.row(shot.row)),
         ),
     ]
 }

@@ -16,7 +16,10 @@ use crate::{
     altimetry::MolaClock,
     config::RangeCheckConfig,
     footprints::Footprint,
-    geom::statistics::{Summary, Trend},
+    geom::{
+        range_residuals::has_own_spacecraft,
+        statistics::{Summary, Trend},
+    },
     schema::DocumentSchema,
     stages::{
         check_ranges::{BiasScan, ProfileRanges, ScannedRadius, ShotResiduals},
@@ -134,8 +137,13 @@ struct ProfileDocument<'a> {
     et_start_s: f64,
     et_stop_s: f64,
     simultaneous: Vec<SimultaneousImage<'a>>,
+    /// Whether it has enough shots to be compared with the limits.
+    judged: bool,
     valid: bool,
     invalid_because: &'a [String],
+    /// Shots of tables without a position of the spacecraft: put on the radius through the footprint at the range, it tests
+    /// nothing.
+    shots_nadir_by_range: u32,
     range_minus_distance_m: Summary,
     /// Mean without outliers: the one compared with the limit.
     mean_without_outliers_m: f64,
@@ -228,6 +236,16 @@ fn columns<'a>() -> Vec<Column<RangedShot<'a>>> {
             of(&shot.site.ranges.shots)[shot.at]
         })
     }
+    /// The same where the file has a spacecraft.
+    fn own<'a>(
+        name: &'static str,
+        description: &'static str,
+        of: fn(&ShotResiduals) -> &Vec<f64>,
+    ) -> Column<RangedShot<'a>> {
+        column(name, Unit::Metre, description, move |shot: &RangedShot| {
+            Some(of(&shot.site.ranges.shots)[shot.at]).filter(|of| !of.is_nan())
+        })
+    }
     let definition = |index: usize| DEFINITIONS[index].1;
     vec![
         column(
@@ -257,14 +275,14 @@ fn columns<'a>() -> Vec<Column<RangedShot<'a>>> {
         residual("range_minus_distance_crossover_m", definition(1), |shots| {
             &shots.range_minus_distance_crossover_m
         }),
-        residual("decoding_m", definition(2), |shots| &shots.decoding_m),
-        residual("spacecraft_radial_m", definition(3), |shots| {
+        own("decoding_m", definition(2), |shots| &shots.decoding_m),
+        own("spacecraft_radial_m", definition(3), |shots| {
             &shots.spacecraft_radial_m
         }),
-        residual("spacecraft_along_m", definition(3), |shots| {
+        own("spacecraft_along_m", definition(3), |shots| {
             &shots.spacecraft_along_m
         }),
-        residual("spacecraft_cross_m", definition(3), |shots| {
+        own("spacecraft_cross_m", definition(3), |shots| {
             &shots.spacecraft_cross_m
         }),
         column(
@@ -349,8 +367,10 @@ fn profile_document<'a>(
                 })
             })
             .collect(),
+        judged: ranges.is_judged(&site.config.range_check),
         valid: ranges.invalid_because.is_empty(),
         invalid_because: &ranges.invalid_because,
+        shots_nadir_by_range: nadir_by_range(site, profile),
         range_minus_distance_m: ranges.range_minus_distance_m,
         mean_without_outliers_m: ranges.mean_without_outliers_m,
         range_minus_distance_crossover_m: ranges.range_minus_distance_crossover_m,
@@ -363,6 +383,19 @@ fn profile_document<'a>(
         outliers: ranges.outliers,
         bias_scan: ranges.scan.as_ref().map(scan_document),
     }
+}
+
+/// Shots without a spacecraft of their own, of tables.
+fn nadir_by_range(site: &SiteProducts, profile: &Profile) -> u32 {
+    if site.config.shots.is_empty() {
+        return 0;
+    }
+    let shots = profile
+        .rows
+        .iter()
+        .map(|row| site.footprints.row(*row as usize));
+    let without = shots.filter(|shot| !has_own_spacecraft(shot)).count();
+    u32::try_from(without).unwrap_or(u32::MAX)
 }
 
 fn scan_document(scan: &BiasScan) -> Scan<'_> {

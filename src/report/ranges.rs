@@ -27,6 +27,9 @@ fn write(site: &SiteProducts) -> Result<String> {
     if site.profiles.is_empty() {
         return Ok(paragraph("No profile."));
     }
+    if site.ranges.profiles.iter().all(|of| !of.is_tested()) {
+        return Ok(untested(site));
+    }
     let figures = format!("<div class=\"plots\">\n{}</div>\n", plots::figures(site)?);
     if many(site) {
         let title = format!("Tables of all {} profiles", whole(site.profiles.len()));
@@ -41,6 +44,27 @@ fn write(site: &SiteProducts) -> Result<String> {
         &(limits(site) + &three_ways(site)),
     );
     Ok(statistics(site) + &ways + &heading("Along the profiles") + &figures)
+}
+
+/// What is stated where no range is compared with anything.
+fn untested(site: &SiteProducts) -> String {
+    let mut table = Table::new(
+        "Profiles whose ranges are not tested",
+        &[
+            Column::Number("profiles"),
+            Column::Number("shots in profiles"),
+        ],
+    );
+    let shots: usize = site.profiles.iter().map(|of| of.rows.len()).sum();
+    table.row(
+        true,
+        [whole(site.profiles.len()).into(), whole(shots).into()],
+    );
+    paragraph(
+        "The range check tests nothing: the tables have no position of the spacecraft, and no kernels cover the shots. The \
+         spacecraft is put on the radius through the footprint at the range (nadir by range); its distance from the \
+         footprint is the range.",
+    ) + &table.finish()
 }
 
 /// Millimetres suffice for ranges recorded in centimetres.
@@ -65,10 +89,8 @@ fn all_profiles(site: &SiteProducts) -> String {
         ],
     );
     let profiles = &site.ranges.profiles;
-    let means: Vec<f64> = profiles
-        .iter()
-        .map(|of| of.mean_without_outliers_m)
-        .collect();
+    let measured = profiles.iter().filter(|of| of.measured() > 0);
+    let means: Vec<f64> = measured.map(|of| of.mean_without_outliers_m).collect();
     let means = Summary::of(&means);
     let invalid = profiles
         .iter()
@@ -122,7 +144,6 @@ fn statistics(site: &SiteProducts) -> String {
     );
     for (index, (profile, ranges)) in site.profiles.iter().zip(&site.ranges.profiles).enumerate() {
         let main = &ranges.range_minus_distance_m;
-        let shots_share = f64::from(limits.shots_min) / f64::from(main.n.max(1));
         let outlier_share = f64::from(ranges.outliers) / f64::from(main.n.max(1));
         let images: Vec<String> = profile
             .simultaneous
@@ -133,15 +154,16 @@ fn statistics(site: &SiteProducts) -> String {
             })
             .collect();
         let valid = ranges.invalid_because.is_empty();
-        let of_main = |value: f64, name: &str| {
-            Cell::from(metres(value)).told(format!("/range_minus_distance_m/{name}"))
+        let of_main = |value: f64, name: &str| match main.n {
+            0 => Cell::from("–"),
+            _ => Cell::from(metres(value)).told(format!("/range_minus_distance_m/{name}")),
         };
         table.row_of(
             &place(index),
             valid,
             [
                 (&profile.id).into(),
-                Cell::Limited(whole(main.n), shots_share).told("/range_minus_distance_m/n"),
+                Cell::from(whole(main.n)).told("/range_minus_distance_m/n"),
                 of_main(main.mean, "mean"),
                 of_main(main.standard_deviation, "standard_deviation"),
                 of_main(main.median, "median"),
@@ -155,7 +177,12 @@ fn statistics(site: &SiteProducts) -> String {
                 .told("/outliers"),
                 trend(ranges),
                 dash_for_none(images.join(", ")).into(),
-                if valid { "valid" } else { "invalid" }.into(),
+                match (valid, ranges.is_judged(limits)) {
+                    (false, _) => "invalid",
+                    (true, false) => "not judged",
+                    (true, true) => "valid",
+                }
+                .into(),
             ],
         );
     }
@@ -166,7 +193,7 @@ fn statistics(site: &SiteProducts) -> String {
 fn limits(site: &SiteProducts) -> String {
     let limits = &site.config.range_check;
     sentence(
-        "Limits: at least {} shots, at most {} % outliers (beyond {} robust σ of the median). Bars: share of a limit that is used.",
+        "Judged: profiles of at least {} shots. Limits: at most {} % outliers (beyond {} robust σ of the median). Bars: share of a limit that is used.",
         &[
             (
                 limits.shots_min.to_string(),
@@ -216,6 +243,14 @@ pub(super) fn place(profile: usize) -> String {
     format!("ranges.json#/profiles/{profile}")
 }
 
+/// A mean in the table of three ways; a dash without values.
+fn known(of: &Summary, name: &str) -> Cell {
+    match of.n {
+        0 => Cell::from("–"),
+        _ => Cell::from(metres(of.mean)).told(format!("/{name}/mean")),
+    }
+}
+
 fn three_ways(site: &SiteProducts) -> String {
     let limits = &site.config.range_check;
     let mut table = Table::new(
@@ -235,28 +270,36 @@ fn three_ways(site: &SiteProducts) -> String {
     for (index, ranges) in site.ranges.profiles.iter().enumerate() {
         let mean_m = ranges.mean_without_outliers_m;
         let decoding_m = ranges.decoding_without_outliers_m;
-        let [radial, along, cross] =
-            [(0, "radial"), (1, "along"), (2, "cross")].map(|(at, axis)| {
-                Cell::from(metres(ranges.spacecraft_m[at].mean))
-                    .told(format!("/spacecraft_{axis}_m/mean"))
-            });
-        let mean =
-            |of: &Summary, name: &str| Cell::from(metres(of.mean)).told(format!("/{name}/mean"));
+        let [radial, along, cross] = [(0, "radial"), (1, "along"), (2, "cross")]
+            .map(|(at, axis)| known(&ranges.spacecraft_m[at], &format!("spacecraft_{axis}_m")));
+        let limited = |of: &Summary, mean_m: f64, limit_m: f64, name: &str| match of.n {
+            0 => Cell::from("–"),
+            _ => Cell::Limited(metres(mean_m), mean_m.abs() / limit_m).told(format!("/{name}")),
+        };
+        let (by_kernels, by_own) = (&ranges.range_minus_distance_m, &ranges.decoding_m);
         table.row_of(
             &place(index),
             true,
             [
                 (&ranges.profile).into(),
-                mean(&ranges.range_minus_distance_m, "range_minus_distance_m"),
-                Cell::Limited(metres(mean_m), mean_m.abs() / limits.mean_max_m)
-                    .told("/mean_without_outliers_m"),
-                mean(
+                known(by_kernels, "range_minus_distance_m"),
+                limited(
+                    by_kernels,
+                    mean_m,
+                    limits.mean_max_m,
+                    "mean_without_outliers_m",
+                ),
+                known(
                     &ranges.range_minus_distance_crossover_m,
                     "range_minus_distance_crossover_m",
                 ),
-                mean(&ranges.decoding_m, "decoding_m"),
-                Cell::Limited(metres(decoding_m), decoding_m.abs() / limits.decoding_max_m)
-                    .told("/decoding_without_outliers_m"),
+                known(by_own, "decoding_m"),
+                limited(
+                    by_own,
+                    decoding_m,
+                    limits.decoding_max_m,
+                    "decoding_without_outliers_m",
+                ),
                 radial,
                 along,
                 cross,

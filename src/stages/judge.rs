@@ -5,6 +5,7 @@
 
 mod adjustment;
 mod checks;
+mod ranges;
 mod surface;
 
 pub use areograph_base::verdict::{Check, CheckKind, CheckOutcome, Verdict};
@@ -128,6 +129,7 @@ impl Evidence<'_> {
                 reasons.push(format!("profile {}: {reason}", profile.profile));
             }
         }
+        reasons.extend(ranges::invalid_because(self));
         for image in self.images {
             let of_orientation = image.orientation.invalid_because.iter();
             let all = image
@@ -164,6 +166,7 @@ impl Evidence<'_> {
             let notes = image.orientation.notes.iter();
             remarks.extend(notes.map(|note| format!("image {}: {note}", image.id)));
         }
+        remarks.extend(ranges::remarks(self));
         let configured_s = self.clock_correction_s;
         for ranges in &self.ranges.profiles {
             let doubt = ranges

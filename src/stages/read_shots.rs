@@ -2,7 +2,7 @@
 //! altimeters.
 
 use std::{
-    collections::{BTreeMap, HashSet},
+    collections::{BTreeMap, BTreeSet},
     path::Path,
     sync::atomic::AtomicBool,
 };
@@ -10,18 +10,19 @@ use std::{
 use super::{outline_windows::Windows, search_footprints::SearchResult};
 use crate::{
     body::{Body, Datum},
-    config::{ShotColumns, ShotTableConfig, WindowConfig},
+    config::{ShotColumns, ShotLayout, ShotTableConfig, WindowConfig},
     error::{Cause, Result, Stopped},
     files::{HashedFile, file_name},
     footprints::{Footprint, Footprints, SourceFile},
     geom::{
         body_rotation::convert_datum,
-        ellipsoid::{Spherical, on_ellipsoid_m, spherical_to_xyz_m},
+        ellipsoid::{Spherical, spherical_to_xyz_m},
         window::Region,
     },
     pds::{
+        archive::{Repetition, ShotRejection, TableRows, repetition_complaint},
         pedr::{Complaint, Reason},
-        shot_table::{self, RowComplaint, ShotRow, read_shot_table},
+        shot_table::{self, RowComplaint, ShotRow, TableColumns, read_shot_table},
     },
     spice::KernelView,
     stage::{InOrder, Input, Inputs, Stage},
@@ -32,8 +33,10 @@ use crate::{
 
 /// Complaints kept with their text; all are counted.
 const COMPLAINTS_MAX: usize = 1_000;
-/// Classification of ground returns, as in the PEDR: a table holds no others.
+/// Classification of ground returns, as in the PEDR: others are rejected.
 const GROUND: i16 = 1;
+/// From this attitude flag on, attitude is unknown for the shot or for a part of its frame.
+const NO_ATTITUDE: u16 = 2;
 
 stage_inputs! {
     /// Tables of shots, and the windows.
@@ -126,8 +129,9 @@ pub fn read_shots(
         body,
         regions: &regions,
         correction_s,
-        seen: HashSet::new(),
+        seen: TableRows::default(),
         repeated: 0,
+        layouts: BTreeSet::new(),
         result: empty(body),
     };
     for (index, (table, file)) in (0_u16..).zip(tables) {
@@ -138,8 +142,9 @@ pub fn read_shots(
             datum,
             blake3: file.blake3.clone(),
         });
-        let (path, columns) = (&file.path, columns_of(table.columns()));
-        read_shot_table(path, &columns, body, utc, |row| {
+        let (path, columns) = (&file.path, columns_of(table));
+        gathered.layouts.insert(columns == TableColumns::OdePedr);
+        read_shot_table(path, &columns, body, Some(utc), |row| {
             Stopped::check(stop)?;
             gathered.take(index, datum, path, row);
             Ok(())
@@ -149,7 +154,14 @@ pub fn read_shots(
 }
 
 /// The columns of the configuration, in the type of the reader of tables.
-fn columns_of(columns: ShotColumns) -> shot_table::ShotColumns {
+fn columns_of(table: &ShotTableConfig) -> TableColumns {
+    if table.layout == Some(ShotLayout::OdePedr) {
+        return TableColumns::OdePedr;
+    }
+    TableColumns::Assigned(assigned(table.columns()))
+}
+
+fn assigned(columns: ShotColumns) -> shot_table::ShotColumns {
     shot_table::ShotColumns {
         utc: columns.utc,
         et_s: columns.et_s,
@@ -185,10 +197,12 @@ struct Gathered<'a> {
     body: Body,
     regions: &'a [Region],
     correction_s: f64,
-    /// Instant and place of every shot in a window.
-    seen: HashSet<[u64; 4]>,
+    /// The shots in the windows.
+    seen: TableRows,
     /// Rows that repeat another one.
     repeated: u64,
+    /// Whether tables are of the Orbital Data Explorer: of the tables so far.
+    layouts: BTreeSet<bool>,
     result: SearchResult,
 }
 
@@ -202,7 +216,7 @@ impl Gathered<'_> {
     ) {
         self.result.frames_read += 1;
         match row {
-            Ok(row) => self.shot(file, datum, &row),
+            Ok(row) => self.shot(file, datum, path, &row),
             Err(complaint) => self.complain(path, complaint),
         }
     }
@@ -220,19 +234,34 @@ impl Gathered<'_> {
         }
     }
 
-    fn shot(&mut self, file: u16, datum: Datum, row: &ShotRow) {
+    fn shot(&mut self, file: u16, datum: Datum, path: &Path, row: &ShotRow) {
         self.result.shots_read += 1;
         let windows = self.windows(datum, row);
         if windows == 0 {
             return;
         }
-        let what = [row.et_s, row.longitude_rad, row.latitude_rad, row.radius_m];
-        if !self.seen.insert(what.map(f64::to_bits)) {
-            self.repeated += 1;
-            return;
+        match self.seen.take(file, row) {
+            Repetition::New => {}
+            Repetition::Same => {
+                self.repeated += 1;
+                return;
+            }
+            Repetition::Other(earlier, line) => {
+                let earlier = &self.result.footprints.files[usize::from(earlier)].name;
+                let complaint = repetition_complaint(row.line, earlier, line);
+                return self.complain(path, complaint);
+            }
         }
-        let shot = self.footprint(file, windows, row);
-        self.result.footprints.push(&shot);
+        let shot = Footprint {
+            windows,
+            ..row.footprint(self.body, file, self.correction_s)
+        };
+        if shot.class == GROUND {
+            self.result.footprints.push(&shot);
+        } else {
+            let rejected = &mut self.result.rejected;
+            *rejected.entry(ShotRejection::Class).or_default() += 1;
+        }
     }
 
     /// The windows that hold the shot, as bits.
@@ -251,54 +280,33 @@ impl Gathered<'_> {
         holding.fold(0, |windows, (bit, _)| windows | 1 << bit)
     }
 
-    /// The columns of a shot; values that a table lacks are those of a ground return of one laser.
-    fn footprint(&self, file: u16, windows: u64, row: &ShotRow) -> Footprint {
-        let direction = spherical_to_xyz_m(row.longitude_rad, row.latitude_rad, 1.0);
-        let [
-            spacecraft_longitude_rad,
-            spacecraft_latitude_rad,
-            spacecraft_radius_m,
-        ] = row.spacecraft;
-        let spacecraft_m = spherical_to_xyz_m(
-            spacecraft_longitude_rad,
-            spacecraft_latitude_rad,
-            spacecraft_radius_m,
-        );
-        let away_m = spacecraft_m - row.radius_m * direction;
-        Footprint {
-            et_tag_s: row.et_s,
-            et_s: row.et_s + self.correction_s,
-            orbit: row.orbit,
-            file,
-            record: row.line,
-            shot: 1,
-            longitude_rad: wrap_two_pi(row.longitude_rad),
-            latitude_rad: row.latitude_rad,
-            radius_m: row.radius_m,
-            // No table holds crossover corrections.
-            radius_crossover_m: row.radius_m,
-            areoid_radius_m: on_ellipsoid_m(self.body.model(), &direction).norm(),
-            range_m: row.range_m,
-            spacecraft_longitude_rad: wrap_two_pi(spacecraft_longitude_rad),
-            spacecraft_latitude_rad,
-            spacecraft_radius_m,
-            off_nadir_rad: away_m.angle(&spacecraft_m),
-            channel: 1,
-            class: GROUND,
-            attitude_flag: 0,
-            orbit_quality: 0,
-            windows,
-        }
-    }
-
     fn finish(self, tables: usize) -> SearchResult {
         let mut result = self.result;
         let plural = if tables == 1 { "" } else { "s" };
         let mut notes = vec![format!(
-            "{tables} table{plural} of laser shots: {} rows; heights above the ellipsoid are used as topography, and \
-             radii are not corrected by crossovers",
-            result.frames_read
+            "{tables} table{plural} of laser shots: {} rows{}",
+            result.frames_read,
+            if self.layouts.contains(&false) {
+                "; heights above the ellipsoid are used as topography, and radii are not corrected by crossovers"
+            } else {
+                ""
+            }
         )];
+        if self.layouts.contains(&true) {
+            notes.push(
+                "Tables of the Orbital Data Explorer: planet_rad, corrected by crossovers, is both radii, and topography is \
+                 that of the table; the spacecraft is put on the radius through the footprint at the range (nadir by \
+                 range), because the tables have no position of it"
+                    .to_owned(),
+            );
+            let flags = result.footprints.attitude_flag.iter();
+            let unknown = flags.filter(|flag| **flag >= NO_ATTITUDE).count();
+            if unknown > 0 {
+                notes.push(format!(
+                    "{unknown} shots in the windows have attitude flag 2 or 3: their place assumes a nadir look"
+                ));
+            }
+        }
         if self.repeated > 0 {
             notes.push(format!(
                 "{} rows in the windows repeat another one and are counted once",

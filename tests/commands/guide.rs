@@ -27,7 +27,7 @@ const WORDS: [(&str, usize); 3] = [
 ];
 
 /// Starts of commands that other tests run, with what runs them.
-const ELSEWHERE: [(&str, &str); 10] = [
+const ELSEWHERE: [(&str, &str); 12] = [
     ("scripts/", "continuous integration"),
     ("cargo run", "compiled as an example with the tests"),
     (
@@ -47,6 +47,14 @@ const ELSEWHERE: [(&str, &str); 10] = [
     ),
     ("areograph scene mission-images", "crates/scene: matching"),
     ("areograph image", "tests/commands/image_commands.rs"),
+    (
+        "areograph pedr info gusev/",
+        "tests/real/ode_tables.rs, with real tables",
+    ),
+    (
+        "areograph pedr search gusev/",
+        "tests/real/ode_tables.rs, with real tables",
+    ),
 ];
 
 /// What a pair has beside the shortest site file, for the examples of tie points and terrain.

@@ -30,7 +30,7 @@ use super::{
     pedr::PedrConfig,
     pointing::{PointingConfig, has_turned_sign},
     range_check::RangeCheckConfig,
-    shots::{SHOTS, ShotTableConfig},
+    shots::{SHOTS, ShotLayout, ShotTableConfig},
     surface::SurfaceConfig,
     ties::{IntersectionConfig, TiesConfig},
     windows::{WINDOWS, WINDOWS_MAX, WindowConfig},
@@ -109,7 +109,14 @@ impl SiteConfig {
             body: self.body,
             altimeter: &self.altimeter.name,
             has_tables: !self.shots.is_empty(),
+            has_areoid: self.shots.is_empty() || self.has_areoid_in_tables(),
         }
+    }
+
+    /// Whether all tables of shots have heights above the areoid.
+    fn has_areoid_in_tables(&self) -> bool {
+        let of_tables = |table: &ShotTableConfig| table.layout == Some(ShotLayout::OdePedr);
+        self.shots.iter().all(of_tables)
     }
 
     /// Whether the site has laser shots, of PEDR files or of tables.
@@ -248,6 +255,15 @@ fn other_bodies(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     }
     if body == Body::Mars {
         return;
+    }
+    for table in keys.entries(&["shots"]) {
+        let layout = table.get("layout");
+        if let Some(layout) = layout.filter(|of| of.get_ref().as_str() == Some("ode_pedr")) {
+            let expected =
+                format!("the layout of a table of {body}: this one holds shots of MOLA at Mars");
+            keys.review()
+                .refuse(layout.span(), "shots.layout", expected);
+        }
     }
     let only_at_mars = format!("no such entry on {body}: it belongs to Mars Global Surveyor");
     for table in ["pedr", "mola_clock", "pointing"] {

@@ -10,6 +10,7 @@ use std::{
 use clap::Args;
 use serde_json::json;
 
+use super::tables;
 use crate::{
     altimetry::{BiasScope, MolaClock, TagSign},
     cli::{output, progress::duration, stop::Signals},
@@ -103,6 +104,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
             .num_threads(usize::from(threads.get()))
             .build_global();
     }
+    tables::refuse(&arguments.paths)?;
     let signals = Signals::heard()?;
     let telling = Telling::new();
     let request = ArchiveRequest {

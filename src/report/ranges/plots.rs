@@ -60,7 +60,10 @@ pub(super) fn figures(site: &SiteProducts) -> Result<String> {
 
 /// Mean and spread of every profile.
 fn all_profiles(site: &SiteProducts) -> Plot {
-    let profiles = || (1_u32..).zip(&site.ranges.profiles);
+    let profiles = || {
+        let numbered = (1_u32..).zip(&site.ranges.profiles);
+        numbered.filter(|(_, of)| of.measured() > 0)
+    };
     let means = profiles().map(|(number, of)| (f64::from(number), of.mean_without_outliers_m));
     let spreads = profiles().flat_map(|(number, of)| {
         let (mean_m, spread_m) = (of.mean_without_outliers_m, of.range_minus_distance_m.nmad);
@@ -90,11 +93,9 @@ fn all_profiles(site: &SiteProducts) -> Plot {
 
 /// The smallest or largest mean.
 fn extreme(site: &SiteProducts, of: fn(f64, f64) -> f64) -> f64 {
-    let means = site
-        .ranges
-        .profiles
-        .iter()
-        .map(|ranges| ranges.mean_without_outliers_m);
+    let profiles = site.ranges.profiles.iter();
+    let measured = profiles.filter(|ranges| ranges.measured() > 0);
+    let means = measured.map(|ranges| ranges.mean_without_outliers_m);
     means.reduce(of).unwrap_or_default()
 }
 

@@ -128,6 +128,10 @@ impl Adjust<'_> {
         let checked = self.ranges.value()?.profiles.iter();
         let mut orbits_m = BTreeMap::new();
         for (profile, ranges) in self.profiles.value()?.iter().zip(checked) {
+            // Tables may have no positions of it.
+            if ranges.spacecraft_m[0].n == 0 {
+                continue;
+            }
             let off_m = ranges.spacecraft_m.each_ref().map(|axis| axis.mean);
             for image in &profile.simultaneous {
                 orbits_m.entry(image.image).or_insert_with(|| off_m.into());

@@ -44,18 +44,19 @@ impl RangeFigures {
         largest(shares).unwrap_or(f64::NAN)
     }
 
-    /// Every broken limit, in words; `explain` gives the likely cause of an orbit difference.
+    /// Every broken limit, in words; `explain` gives the likely cause of an orbit difference. Too few shots are not
+    /// compared with the other limits.
     #[must_use]
     pub fn broken_limits(
         &self,
         limits: &RangeCheckConfig,
         explain: impl FnOnce() -> String,
     ) -> Vec<String> {
-        let mut broken = Vec::new();
         let n = self.n;
         if n < limits.shots_min {
-            broken.push(format!("{n} shots; limit at least {}", limits.shots_min));
+            return Vec::new();
         }
+        let mut broken = Vec::new();
         for (name, [with_outliers_m, mean_m], limit_m) in [
             ("range − distance", self.mean_m, limits.mean_max_m),
             (

@@ -41,7 +41,7 @@ use crate::{
 pub use figures::RangeFigures;
 pub use residuals::ShotResiduals;
 pub use scan::{BiasScan, ScannedRadius};
-pub use tables::{CheckTableRanges, check_table_ranges};
+pub use tables::{CheckTableRanges, Spacecraft, check_table_ranges};
 
 /// Residuals of every shot, and statistics of every profile.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -72,7 +72,7 @@ stage_inputs! {
 
 impl Stage for CheckRanges<'_> {
     const NAME: &'static str = "check_ranges";
-    const METHOD: u32 = 8;
+    const METHOD: u32 = 9;
     type Output = RangeCheck;
     stage_inputs!(fingerprint);
 
@@ -162,11 +162,23 @@ pub struct ProfileRanges {
     pub outliers: u32,
     /// Scan over assumed clock biases; `None` when there are too few shots for one.
     pub scan: Option<BiasScan>,
-    /// Why the profile breaks the limits of the configuration; empty when it is valid.
+    /// Why the profile breaks the limits of the configuration; empty when it is valid, or too short to be judged.
     pub invalid_because: Vec<String>,
 }
 
 impl ProfileRanges {
+    /// Whether it has enough shots to be judged: a window may clip a profile to a few shots.
+    #[must_use]
+    pub const fn is_judged(&self, limits: &RangeCheckConfig) -> bool {
+        self.shots >= limits.shots_min
+    }
+
+    /// Whether its ranges are compared with any position of the spacecraft.
+    #[must_use]
+    pub const fn is_tested(&self) -> bool {
+        self.range_minus_distance_m.n > 0 || self.decoding_m.n > 0
+    }
+
     /// Shots whose residuals are known.
     #[must_use]
     pub const fn measured(&self) -> usize {
@@ -272,6 +284,11 @@ fn statistics(
     footprints: &Footprints<BodyFixed>,
 ) -> ProfileRanges {
     let summary = |column: &[f64]| Summary::of(&column[first..]);
+    // Shots of tables may have no spacecraft of their own; where the kernels are not finite, range − distance is not either.
+    let of_own = |column: &[f64]| {
+        let known = column[first..].iter().copied().filter(|of| !of.is_nan());
+        Summary::of(&known.collect::<Vec<_>>())
+    };
     let seconds: Vec<f64> = shots.row[first..]
         .iter()
         .map(|row| Et::from_seconds(footprints.et_s[*row as usize]).since(profile.interval.start))
@@ -291,9 +308,9 @@ fn statistics(
         range_minus_distance_crossover_m: summary(&shots.range_minus_distance_crossover_m),
         decoding_m: summary(&shots.decoding_m),
         spacecraft_m: [
-            summary(&shots.spacecraft_radial_m),
-            summary(&shots.spacecraft_along_m),
-            summary(&shots.spacecraft_cross_m),
+            of_own(&shots.spacecraft_radial_m),
+            of_own(&shots.spacecraft_along_m),
+            of_own(&shots.spacecraft_cross_m),
         ],
         mean_without_outliers_m: mean_without(&shots.range_minus_distance_m),
         decoding_without_outliers_m: mean_without(&shots.decoding_m),

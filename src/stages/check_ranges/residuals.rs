@@ -15,7 +15,7 @@ pub struct ShotResiduals {
     pub range_minus_distance_m: Vec<f64>,
     /// Range − |SPK spacecraft − crossover-corrected footprint|.
     pub range_minus_distance_crossover_m: Vec<f64>,
-    /// Range − |PEDR spacecraft − raw footprint|.
+    /// Range − |PEDR spacecraft − raw footprint|; NaN, as below, for shots of tables without a spacecraft.
     pub decoding_m: Vec<f64>,
     /// PEDR spacecraft − SPK spacecraft, away from Mars.
     pub spacecraft_radial_m: Vec<f64>,

@@ -1,12 +1,18 @@
-//! The range check of shots of tables, for whose spacecraft there are no kernels: measured range against the table's
-//! own spacecraft, and against the spacecraft of images with its laser, where one was exposed at that time.
+//! The range check of shots of tables: measured range against the table's own spacecraft, and against the spacecraft of
+//! images with its laser, where one was exposed at that time.
 //!
-//! `ImageTimes::has_laser` marks such images. No other stage after `search_footprints` distinguishes tables from PEDR
-//! files.
+//! A table without positions of the spacecraft (`has_own_spacecraft`) is compared with the kernels, where these cover a
+//! profile; else its ranges are not tested. For other tables no kernels are read.
+//!
+//! `ImageTimes::has_laser` marks images with the laser. No other stage after `search_footprints` distinguishes tables
+//! from PEDR files.
 
 use std::sync::atomic::AtomicBool;
 
-use super::{ProfileRanges, RangeCheck, ShotResiduals, statistics};
+use super::{
+    ProfileRanges, RangeCheck, ShotResiduals, TRAJECTORY_TOLERANCE_M, statistics,
+    trajectory_reach_s,
+};
 use crate::{
     altimetry::MolaClock,
     config::RangeCheckConfig,
@@ -16,14 +22,16 @@ use crate::{
     geom::{
         orbit_axes::radial_along_cross,
         range_residuals::{
-            RangeResiduals, SpacecraftState, footprint, own_spacecraft, range_residual_m,
+            RangeResiduals, SpacecraftState, footprint, has_own_spacecraft, own_spacecraft,
+            range_residual_m,
         },
         statistics::{Summary, outliers},
     },
+    spice::{KernelRole, KernelView, Trajectory},
     stage::{InOrder, Output, Stage},
     stage_inputs,
     stages::{convert_datum::Converted, group_profiles::Profile, tag_times::ImageTimes},
-    time::Et,
+    time::{Et, Interval, Intervals},
 };
 
 stage_inputs! {
@@ -35,6 +43,8 @@ stage_inputs! {
         pub profiles: &'a Output<Vec<Profile>>,
         /// The images.
         pub images: InOrder<'a, Output<ImageTimes>>,
+        /// Kernels for the spacecraft of tables that have no position of it; else none.
+        pub kernels: &'a KernelView,
         /// The clock of the altimeter.
         pub mola_clock: &'a MolaClock,
         /// Limits.
@@ -44,17 +54,22 @@ stage_inputs! {
 
 impl Stage for CheckTableRanges<'_> {
     const NAME: &'static str = "check_ranges";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     type Output = RangeCheck;
     stage_inputs!(fingerprint);
 
     fn run(&self, stop: &AtomicBool) -> Result<RangeCheck> {
         let images = self.images.0.iter().map(Output::value);
         let images = images.collect::<Result<Vec<_>>>()?;
+        let profiles = self.profiles.value()?;
+        let reach_s = trajectory_reach_s(self.range_check, self.mola_clock);
         check_table_ranges(
             &self.converted.value()?.footprints,
-            self.profiles.value()?,
-            &images,
+            profiles,
+            Spacecraft {
+                images: &images,
+                kernels: trajectory(self.kernels, profiles, reach_s)?.as_ref(),
+            },
             self.mola_clock,
             self.range_check,
             stop,
@@ -62,7 +77,40 @@ impl Stage for CheckTableRanges<'_> {
     }
 }
 
-/// Checks the ranges of every profile against the spacecraft of the table, and against that of support data.
+/// Positions of the spacecraft other than those of the tables.
+#[derive(Debug, Clone, Copy)]
+pub struct Spacecraft<'a> {
+    /// Images, some of which may have the laser.
+    pub images: &'a [&'a ImageTimes],
+    /// The trajectory by the kernels, where they cover profiles.
+    pub kernels: Option<&'a Trajectory>,
+}
+
+/// The trajectory over the profiles that the kernels cover; `None` without an ephemeris.
+fn trajectory(
+    kernels: &KernelView,
+    profiles: &[Profile],
+    reach_s: f64,
+) -> Result<Option<Trajectory>> {
+    let all = kernels.kernels().map_or(&[][..], |set| set.kernels());
+    if !all.iter().any(|kernel| kernel.role == KernelRole::Spk) {
+        return Ok(None);
+    }
+    let session = kernels.session()?;
+    let held = &session.coverage()?.spk;
+    let reach = profiles
+        .iter()
+        .map(|profile| profile.interval.padded(reach_s));
+    let is_held = |interval: &Interval| {
+        let open = Intervals::union_of([*interval]).without(held);
+        open.as_slice().is_empty()
+    };
+    let covered = Intervals::union_of(reach.filter(is_held));
+    let tabulated = session.trajectory(&covered, TRAJECTORY_TOLERANCE_M)?;
+    Ok((!covered.as_slice().is_empty()).then_some(tabulated))
+}
+
+/// Checks the ranges of every profile against the spacecraft of the table, and against that of support data or kernels.
 ///
 /// Residuals exist for shots that both cover; the table's own spacecraft is judged by all shots.
 ///
@@ -71,7 +119,7 @@ impl Stage for CheckTableRanges<'_> {
 pub fn check_table_ranges(
     footprints: &Footprints<BodyFixed>,
     profiles: &[Profile],
-    images: &[&ImageTimes],
+    spacecraft: Spacecraft<'_>,
     clock: &MolaClock,
     limits: &RangeCheckConfig,
     stop: &AtomicBool,
@@ -84,8 +132,13 @@ pub fn check_table_ranges(
         for row in &profile.rows {
             let shot = footprints.row(*row as usize);
             let at = clock.spacecraft_time(shot.et_tag_s);
-            if let Some(spacecraft) = images.iter().find_map(|image| spacecraft(image, at)) {
-                shots.push(index, *row, &RangeResiduals::of(&shot, &spacecraft));
+            let is_own = has_own_spacecraft(&shot);
+            if let Some(state) = spacecraft.state(at, is_own) {
+                let mut residuals = RangeResiduals::of(&shot, &state);
+                if !is_own {
+                    residuals.forget_own();
+                }
+                shots.push(index, *row, &residuals);
             }
         }
         let flags = outliers(&shots.range_minus_distance_m[first..], limits.outlier_sigma);
@@ -99,12 +152,26 @@ pub fn check_table_ranges(
     Ok(RangeCheck {
         shots,
         profiles: checked,
-        trajectory_error_m: 0.0,
+        trajectory_error_m: spacecraft.kernels.map_or(0.0, Trajectory::max_error_m),
     })
 }
 
+impl Spacecraft<'_> {
+    /// The spacecraft at an instant, if known.
+    ///
+    /// * `is_own` – whether the table has a position of it: then no kernels are read
+    fn state(&self, at: Et, is_own: bool) -> Option<SpacecraftState> {
+        let of_image = self.images.iter().find_map(|image| of_image(image, at));
+        let kernels = self.kernels.filter(|_| !is_own);
+        of_image.or_else(|| {
+            let (position, velocity_m_s) = kernels?.state(at)?;
+            Some(SpacecraftState::of(at, &position, &velocity_m_s))
+        })
+    }
+}
+
 /// The spacecraft of an image with the laser at an instant, within the time of its support data.
-fn spacecraft(image: &ImageTimes, at: Et) -> Option<SpacecraftState> {
+fn of_image(image: &ImageTimes, at: Et) -> Option<SpacecraftState> {
     let support = image.support.as_ref().filter(|support| support.has_laser)?;
     let tables = &support.tables;
     if !tables.span().contains(at) {
@@ -119,15 +186,15 @@ fn spacecraft(image: &ImageTimes, at: Et) -> Option<SpacecraftState> {
     })
 }
 
-/// Adds the table's own spacecraft to the statistics of a profile, by all of its shots.
+/// Adds the table's own spacecraft to the statistics of a profile, by all of its shots that have one.
 fn by_own_spacecraft(
     ranges: &mut ProfileRanges,
     footprints: &Footprints<BodyFixed>,
     profile: &Profile,
     limits: &RangeCheckConfig,
 ) {
-    let residuals = profile.rows.iter().map(|row| {
-        let shot = footprints.row(*row as usize);
+    let shots = profile.rows.iter().map(|row| footprints.row(*row as usize));
+    let residuals = shots.filter(has_own_spacecraft).map(|shot| {
         let ground = footprint(&shot, shot.radius_m);
         range_residual_m(shot.range_m, &own_spacecraft(&shot), &ground)
     });

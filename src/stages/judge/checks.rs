@@ -68,7 +68,10 @@ pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
 
 fn of_ranges(evidence: &Evidence<'_>) -> Vec<Check> {
     let limits = evidence.range_limits;
-    let shots = |of: &ProfileRanges| f64::from(of.shots);
+    let judged = || {
+        let profiles = evidence.ranges.profiles.iter();
+        profiles.filter(|of| of.is_judged(limits))
+    };
     let quantities: [Quantity<ProfileRanges>; 3] = [
         (
             CheckKind::RangeMean,
@@ -86,28 +89,57 @@ fn of_ranges(evidence: &Evidence<'_>) -> Vec<Check> {
             limits.decoding_max_m,
         ),
     ];
-    // Shots of tables may have no spacecraft position other than their own.
-    let measured = |kind: CheckKind, of: &ProfileRanges| {
-        let of_two = matches!(kind, CheckKind::RangeMean | CheckKind::OrbitsApart);
-        !of_two || of.range_minus_distance_m.n > 0
+    // Shots of tables may have no spacecraft position other than their own, or none of their own.
+    let measured = |kind: CheckKind, of: &ProfileRanges| match kind {
+        CheckKind::OrbitsApart => of.spacecraft_m[0].n > 0,
+        CheckKind::Decoding => of.decoding_m.n > 0,
+        _ => of.range_minus_distance_m.n > 0,
     };
     let worst = |kind: CheckKind, value: &dyn Fn(&ProfileRanges) -> f64, limit: f64| {
-        let profiles = evidence.ranges.profiles.iter();
-        let profiles = profiles.filter(|of| measured(kind, of));
+        let profiles = judged().filter(|of| measured(kind, of));
         Check::worst(profiles.map(|of| Check::new(kind, &*of.profile, value(of), limit, Fail)))
     };
     let mut checks: Vec<Option<Check>> = quantities
         .into_iter()
         .map(|(kind, value, limit)| worst(kind, &value, limit))
         .collect();
-    let outliers = evidence.ranges.profiles.iter().map(|of| {
-        let share = f64::from(of.outliers) / shots(of).max(1.0);
+    let outliers = judged().filter(|of| of.is_tested()).map(|of| {
+        let share = f64::from(of.outliers) / f64::from(of.shots.max(1));
         let limit = limits.outlier_share_max;
         Check::of_share(CheckKind::RangeOutliers, &*of.profile, share, limit, Fail)
     });
     checks.push(Check::worst(outliers));
-    checks.push(worst(CheckKind::Shots, &shots, f64::from(limits.shots_min)));
+    checks.extend(of_lengths(evidence));
     checks.into_iter().flatten().collect()
+}
+
+/// Whether a profile is long enough to be judged, and whether ranges are tested at all.
+fn of_lengths(evidence: &Evidence<'_>) -> [Option<Check>; 2] {
+    let profiles = &evidence.ranges.profiles;
+    let tested = evidence.is_tested();
+    let longest = profiles.iter().reduce(|longest, of| {
+        if of.shots > longest.shots {
+            of
+        } else {
+            longest
+        }
+    });
+    let shots = longest.map(|of| {
+        let least = f64::from(evidence.range_limits.shots_min);
+        let broken = if tested { Fail } else { Warning };
+        Check::new(
+            CheckKind::Shots,
+            &*of.profile,
+            f64::from(of.shots),
+            least,
+            broken,
+        )
+    });
+    let untested = (!tested && !profiles.is_empty()).then(|| {
+        let subject = "not tested: no position of the spacecraft";
+        Check::told(CheckKind::RangeMean, subject, Warning)
+    });
+    [untested, shots]
 }
 
 /// The clock correction by the ranges against the configured one.

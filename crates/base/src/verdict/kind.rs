@@ -28,7 +28,7 @@ pub enum CheckKind {
     Decoding,
     /// Share of outliers among the ranges of a profile.
     RangeOutliers,
-    /// Shots of a profile.
+    /// Shots of the longest profile.
     Shots,
     /// Clock correction of least spread minus the configured one.
     ClockCorrection,
@@ -148,7 +148,7 @@ impl CheckKind {
             Self::OrbitsApart => "Orbit of the PEDR against kernels",
             Self::Decoding => "Range − distance, orbit of the PEDR",
             Self::RangeOutliers => "Outliers among ranges",
-            Self::Shots => "Shots in a profile",
+            Self::Shots => "Shots in the longest profile",
             Self::ClockCorrection => "Clock correction, best − configured",
             Self::ParallaxAfter => "Along-track parallax, adjusted",
             Self::ParallaxBefore => "Along-track parallax, before",

@@ -38,7 +38,8 @@ fn read(text: impl AsRef<[u8]>, columns: &ShotColumns) -> Result<Rows> {
         "2010-01-27" => Ok(Et::from_seconds(1.0)),
         _ => Err(ShotTableError::Empty.into()),
     };
-    read_shot_table(&path, columns, Body::Moon, &utc, |row| {
+    let columns = TableColumns::Assigned(columns.clone());
+    read_shot_table(&path, &columns, Body::Moon, Some(&utc), |row| {
         rows.push(row);
         Ok(())
     })?;

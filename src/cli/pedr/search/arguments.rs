@@ -9,7 +9,6 @@ use crate::{
     cli::{pedr::filter::FilterArguments, windows::WindowArguments},
     error::{Cause, Error, Result},
     files::require_apart,
-    pds::archive::Source,
     products::RowsFormat,
     spice::{KernelSet, Session},
     time::{Et, Interval},
@@ -26,7 +25,7 @@ use crate::{
 #[command(verbatim_doc_comment)]
 #[command(group = ArgGroup::new("where").required(true).multiple(true).args(["boxes", "polygons", "windows"]))]
 pub(in crate::cli::pedr) struct Arguments {
-    /// PEDR files, and folders with .b files in and below them.
+    /// PEDR files, and folders with .b files in and below them; or tables of the Orbital Data Explorer's PEDR query.
     #[arg(required = true, value_name = "PATH")]
     pub(super) paths: Vec<PathBuf>,
     #[command(flatten)]
@@ -137,7 +136,7 @@ impl Arguments {
     ///
     /// # Errors
     /// An output is one of these files, or a file of windows or leap seconds.
-    pub(super) fn require_apart(&self, sources: &[Source], failures: &[Error]) -> Result<()> {
+    pub(super) fn require_apart(&self, read: &[&Path], failures: &[Error]) -> Result<()> {
         // The request is stored in a file beside the CSV.
         let beside = self.out.as_ref().map(|out| {
             let mut name = out.clone().into_os_string();
@@ -146,7 +145,6 @@ impl Arguments {
         });
         let is_csv = self.format()? == Some(RowsFormat::Csv);
         let outputs = self.out.iter().chain(beside.iter().filter(|_| is_csv));
-        let read = sources.iter().map(Source::path);
         let unread = failures
             .iter()
             .filter_map(|failure| failure.file.as_deref());
@@ -154,7 +152,7 @@ impl Arguments {
         let asked = asked.chain(self.leap_seconds.as_deref());
         require_apart(
             outputs.map(PathBuf::as_path),
-            read.chain(unread).chain(asked),
+            read.iter().copied().chain(unread).chain(asked),
         )
     }
 
