@@ -111,7 +111,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
             if file.exists() {
                 return Err(Unfit::FileExists).in_file(file);
             }
-            database(&load(config)?)?.copy_to(file).in_file(file)?;
+            existing(&load(config)?)?.copy_to(file).in_file(file)?;
             output::line(format_args!("copied to {}", file.display()));
             Ok(())
         }
@@ -142,6 +142,11 @@ fn database(config: &ServiceConfig) -> Result<Database, Error> {
     Database::open(&config.outputs.state)
 }
 
+/// The same, but no new one.
+fn existing(config: &ServiceConfig) -> Result<Database, Error> {
+    Database::open_existing(&config.outputs.state)
+}
+
 fn token(command: &TokenCommand) -> Result<(), Error> {
     let now_ms = Clock::default().now_ms();
     match command {
@@ -162,7 +167,7 @@ fn token(command: &TokenCommand) -> Result<(), Error> {
             Ok(())
         }
         TokenCommand::List { config } => {
-            let found = database(&load(config)?)?.read(tokens).in_file(config)?;
+            let found = existing(&load(config)?)?.read(tokens).in_file(config)?;
             for token in found {
                 let ends = match (token.revoked_ms, token.expires_ms) {
                     (Some(at_ms), _) => format!("revoked {}", utc_text(at_ms)),
@@ -181,7 +186,7 @@ fn token(command: &TokenCommand) -> Result<(), Error> {
             Ok(())
         }
         TokenCommand::Revoke { config, id } => {
-            let revoked = database(&load(config)?)?
+            let revoked = existing(&load(config)?)?
                 .write(|transaction| revoke_token(transaction, now_ms, id))
                 .in_file(config)?;
             if revoked {

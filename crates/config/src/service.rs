@@ -135,6 +135,8 @@ declare_table! {
         sweep_limit_s: f64 = key(from_to(0.1, 3600.0)).or(30.0),
         /// Interval at which all files are read again, even if the file system reports no change, days; 0 never.
         scrub_days: f64 = key(from_to(0.0, 3660.0)).or(7.0),
+        /// Rate at which published products are read again, mebibytes per second: after a night, while no site runs.
+        scrub_mib_per_s: f64 = key(from_to(0.1, 100_000.0)).or(32.0),
     }
 }
 
@@ -294,12 +296,16 @@ pub enum AlertKind {
     RootBack,
     /// The disk is nearly full.
     DiskLow,
+    /// A published product does not match its manifest.
+    ProductDamaged,
+    /// The database was lost, and made again from the products.
+    DatabaseLost,
     /// A night is over.
     NightComplete,
 }
 
 impl AlertKind {
-    const WORDS: [(&'static str, Self, &'static str); 9] = [
+    const WORDS: [(&'static str, Self, &'static str); 11] = [
         (
             "failed",
             Self::Failed,
@@ -324,6 +330,16 @@ impl AlertKind {
         ),
         ("root_back", Self::RootBack, "a folder of inputs is back"),
         ("disk_low", Self::DiskLow, "the disk is nearly full"),
+        (
+            "product_damaged",
+            Self::ProductDamaged,
+            "a published product does not match its manifest",
+        ),
+        (
+            "database_lost",
+            Self::DatabaseLost,
+            "the database was lost, and made again from the products",
+        ),
         (
             "night_complete",
             Self::NightComplete,

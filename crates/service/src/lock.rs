@@ -8,7 +8,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::clock::utc_text;
+use super::{clock::utc_text, private::create_folder};
 use areograph_base::error::{Cause, IoError, Locate as _, Result};
 
 /// Name of the lock in the state folder.
@@ -75,7 +75,7 @@ impl ServiceLock {
     /// # Errors
     /// Another process holds it; the folder is on a network file system, or cannot be written.
     pub fn take(folder: &Path, owner: &Owner) -> Result<Self> {
-        fs::create_dir_all(folder)
+        create_folder(folder)
             .map_err(IoError::on("create the folder"))
             .in_file(folder)?;
         if let Some(network) = network_file_system(folder) {

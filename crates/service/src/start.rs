@@ -10,6 +10,7 @@ use super::{
     database::{About, Database, Stored, append, files::roots, service::put_service},
     engine::{folders::folders, schedule::Schedule},
     lock::{Owner, ServiceLock},
+    recover::{examine, is_lost},
     shared::Shared,
     worker::process::ProcessIdentity,
 };
@@ -77,7 +78,8 @@ pub fn configuration(
 /// Starts a service; `command` is the name shown to other processes.
 ///
 /// # Errors
-/// Another service uses the same state folder; the database is damaged or newer; a disk error.
+/// Another service uses the same state folder; the database is damaged, newer, or that of another service; a disk
+/// error.
 pub fn start(config: ServiceConfig, command: &str, clock: Clock) -> Result<Started> {
     let state = config.outputs.state.clone();
     let owner = Owner {
@@ -87,12 +89,13 @@ pub fn start(config: ServiceConfig, command: &str, clock: Clock) -> Result<Start
         started_ms: clock.now_ms(),
     };
     let lock = ServiceLock::take(&state, &owner)?;
-    for folder in [&config.outputs.products, &state] {
-        std::fs::create_dir_all(folder)
-            .map_err(IoError::on("create the folder"))
-            .in_file(folder)?;
-    }
+    let products = &config.outputs.products;
+    std::fs::create_dir_all(products)
+        .map_err(IoError::on("create the folder"))
+        .in_file(products)?;
     let database = Database::open(&state)?;
+    examine(&database, products)?;
+    let lost = database.read(is_lost).in_file(&state)?;
     database
         .read(|connection| seen(connection, &config))
         .in_file(&state)??;
@@ -100,6 +103,7 @@ pub fn start(config: ServiceConfig, command: &str, clock: Clock) -> Result<Start
         .map_err(IoError::on("find"))
         .in_file("areograph")?;
     let shared = Shared::new(config, database, clock, program).in_file(&state)?;
+    shared.set_recovering(lost);
     Ok(Started {
         shared,
         lock,

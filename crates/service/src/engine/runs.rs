@@ -50,11 +50,27 @@ struct Foreign {
     run: String,
 }
 
+/// A manifest that differs from the one that was published.
+#[derive(Debug, thiserror::Error, Cause)]
+#[error("the manifest is not the one that was published")]
+#[cause(Input: "restore it from a copy, or move the folder of the run away")]
+struct Altered;
+
 /// Reads a run and checks every product against its manifest.
 ///
 /// # Errors
 /// It is incomplete, or belongs to another attempt; a disk error.
 pub fn read_run(folder: &Path) -> Result<Published> {
+    let published = identify_run(folder)?;
+    read_published(folder)?;
+    Ok(published)
+}
+
+/// Reads the manifest of a run, but no product.
+///
+/// # Errors
+/// It belongs to another attempt, or its manifest is not the one that was published; a disk error.
+pub fn identify_run(folder: &Path) -> Result<Published> {
     let path = folder.join(RUN_RECORD);
     let read = |path: &Path| fs::read(path).map_err(IoError::on("read")).in_file(path);
     let by: RunRecord = serde_json::from_slice(&read(&path)?)
@@ -66,12 +82,19 @@ pub fn read_run(folder: &Path) -> Result<Published> {
         } = by;
         return Err(Foreign { job, attempt, run }).in_file(folder);
     }
-    let manifest = read_published(folder)?;
-    let bytes = read(&folder.join(MANIFEST))?;
+    let path = folder.join(MANIFEST);
+    let bytes = read(&path)?;
+    let manifest_blake3 = blake3::hash(&bytes).to_hex().to_string();
+    if by.manifest_blake3 != manifest_blake3 {
+        return Err(Altered).in_file(path);
+    }
+    let manifest = serde_json::from_slice(&bytes)
+        .map_err(|error| IoError::on("read")(error.into()))
+        .in_file(path)?;
     Ok(Published {
         by,
         manifest,
-        manifest_blake3: blake3::hash(&bytes).to_hex().to_string(),
+        manifest_blake3,
     })
 }
 
