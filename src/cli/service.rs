@@ -108,7 +108,7 @@ enum Unfit {
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     match &arguments.command {
         Command::Backup { config, file } => {
-            if file.exists() {
+            if file.symlink_metadata().is_ok() {
                 return Err(Unfit::FileExists).in_file(file);
             }
             existing(&load(config)?)?.copy_to(file).in_file(file)?;

@@ -16,7 +16,10 @@ use crate::{
     footprints::Footprints,
     geom::window::WindowShape,
     kernel_source::KernelSource,
-    pds::archive::{Index, Indexes},
+    pds::{
+        SizedFile,
+        archive::{Index, Indexes},
+    },
     spice::{KernelSet, KernelView, RequiredCoverage},
     stage::{InOrder, Output, Round, Stage},
     stages::{
@@ -70,7 +73,11 @@ pub(super) fn prepare<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Prep
         let kernels = &KernelView::text(clocks.as_ref());
         let tag = |image: &ImageConfig| {
             let source = image.source().map_or(&[][..], std::slice::from_ref);
-            let source = flow.hash(TagTimes::NAME, source)?.pop();
+            let kind = match &image.isd {
+                Some(_) => SizedFile::SupportData,
+                None => SizedFile::Label,
+            };
+            let source = flow.hash_sized(TagTimes::NAME, kind, source)?.pop();
             let (label, support) = match &image.isd {
                 Some(_) => (None, source),
                 None => (source, None),
@@ -117,7 +124,8 @@ fn found<D: Driver>(
     images: &[Output<ImageTimes>],
     clocks: Option<&KernelSet>,
 ) -> Flow<Output<SearchResult>> {
-    let files = flow.hash(SearchFootprints::NAME, &config.pedr.files)?;
+    let (stage, kind) = (SearchFootprints::NAME, SizedFile::Pedr);
+    let files = flow.hash_sized(stage, kind, &config.pedr.files)?;
     let tables = config.shots.iter();
     let tables = tables.map(|table| flow.hash(ReadShots::NAME, &table.files));
     let tables = tables.collect::<Flow<Vec<_>>>()?;

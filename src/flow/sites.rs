@@ -20,7 +20,7 @@ use crate::{
     store::{
         atomic,
         manifest::{Manifest, figures},
-        page::SITES_PAGE,
+        page::{PAGE, SITES_PAGE},
         publish::{PREVIOUS, has_work, last_failure, read_manifest, read_previous},
     },
 };
@@ -60,12 +60,9 @@ pub fn publish_sites(out: &Path) -> Result<PathBuf> {
             failure,
         })
         .collect();
-    atomic::write(
-        &out.join(FIDELITY_FILE),
-        published_fidelity_page().as_bytes(),
-    )?;
+    put(&out.join(FIDELITY_FILE), &published_fidelity_page())?;
     let page = out.join(SITES_PAGE);
-    atomic::write(&page, sites_page(&lines)?.as_bytes())?;
+    put(&page, &sites_page(&lines)?)?;
     Ok(page)
 }
 
@@ -82,6 +79,14 @@ fn budgets(folder: &Path) -> Vec<UncertaintyBudget> {
     budgets
         .filter_map(|budget| UncertaintyBudget::deserialize(budget).ok())
         .collect()
+}
+
+/// Writes a page, unless the file holds it: a folder in which nothing changes may be read-only.
+fn put(path: &Path, page: &str) -> Result<()> {
+    if fs::read(path).is_ok_and(|found| found == page.as_bytes()) {
+        return Ok(());
+    }
+    atomic::replace(path, page.as_bytes(), PAGE)
 }
 
 /// The body of the site; Mars if its file does not name one.

@@ -13,19 +13,22 @@ use serde_json::{Value, json};
 use super::{
     coordinates::frame,
     error::ProductError,
+    files::to_value,
     footprints::{Shot, ShotNames, columns},
     geoparquet::geo_metadata,
     parquet,
-    rows_file::{GEOMETRY, RowsFormat, RowsWriter},
+    rows_file::{GEOMETRY, RowsFormat, RowsWriter, SEARCH},
     table::Table,
 };
 use crate::{
     body::Body,
     error::{Locate, Result},
+    files::{Mark, MarkAt, require_own},
     footprints::{AsRead, Footprints, SourceFile},
     frames::BodyFixed,
     pds::archive::WindowLists,
     stages::convert_datum::convert_at_tags,
+    store::atomic,
 };
 
 /// The column of the bounding box of each point, and its parts: readers of GeoParquet use it to skip rows.
@@ -34,8 +37,6 @@ const BBOX_PARTS: [&str; 4] = ["xmin", "ymin", "xmax", "ymax"];
 /// Columns that shots are selected by: a search may keep several values of each, so that GIS has them too; and their
 /// positions.
 const ALSO_IN_GIS: [&str; 4] = ["channel", "class", "attitude_flag", GEOMETRY];
-/// The key of the query, and of the completeness of its answer.
-const SEARCH: &str = "areograph_search";
 
 /// Shots that are written together: enough for all threads, few compared with the memory of a search.
 const ROWS_AT_ONCE: usize = 32_768;
@@ -102,13 +103,16 @@ impl ShotsFile {
     /// * `window_ids` – identifiers of the windows
     ///
     /// # Errors
-    /// Errors of the disk.
+    /// Errors of the disk; a file that is no earlier answer of a search.
     pub fn create(
         path: &Path,
         format: RowsFormat,
         sources: Vec<SourceFile>,
         window_ids: Vec<String>,
     ) -> Result<Self> {
+        if format == RowsFormat::Csv {
+            require_own(&beside(path), &REQUEST)?;
+        }
         let bare = parquet::schema(&table(Vec::new(), format));
         let schema = match format {
             RowsFormat::Parquet => with_bbox(&bare),
@@ -116,7 +120,7 @@ impl ShotsFile {
         };
         Ok(Self {
             path: path.to_owned(),
-            rows: RowsWriter::create(path, format, SchemaRef::clone(&schema))?,
+            rows: RowsWriter::replacing(path, format, SchemaRef::clone(&schema))?,
             format,
             schema,
             sources,
@@ -193,14 +197,33 @@ impl ShotsFile {
                 notes.splice(0..0, [("geo", geo), ("frame", frame)]);
             }
             RowsFormat::Csv => {
-                let mut beside = self.path.into_os_string();
-                beside.push(".json");
-                super::files::write_json(&PathBuf::from(beside), search)?;
+                let beside = beside(&self.path);
+                let text = format!("{:#}\n", to_value(search).in_file(&beside)?);
+                atomic::replace(&beside, text.as_bytes(), REQUEST)?;
             }
             RowsFormat::GeoJson => {}
         }
         self.rows.finish(notes)
     }
+}
+
+/// The file of the request beside a CSV.
+fn beside(path: &Path) -> PathBuf {
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".json");
+    PathBuf::from(beside)
+}
+
+/// How an earlier such file is recognised.
+const REQUEST: Mark = Mark {
+    what: "the request of an earlier search",
+    at: MarkAt::Content(is_request),
+};
+
+fn is_request(path: &Path) -> bool {
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let request: Value = serde_json::from_str(&text).unwrap_or_default();
+    request["areograph"].is_string() && request["all_records_judged"].is_boolean()
 }
 
 /// These columns and the bounding box.

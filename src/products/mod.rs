@@ -87,7 +87,7 @@ pub use page::REPORT;
 pub use page_data::{PAGE_DATA, PageData};
 pub use picture::{PictureFile, PictureFormat, PictureHead};
 pub use product::{Pages, Product};
-pub use rows_file::{Out, RowsFormat, RowsWriter};
+pub use rows_file::{Out, RowsFormat, RowsWriter, SQL};
 #[cfg(feature = "sql")]
 pub use shot_columns::ShotColumns;
 pub use site::{AdjustmentProducts, GeometricProducts, ImageProducts, Program, SiteProducts};

@@ -3,12 +3,14 @@
 mod png_lines;
 mod tiff_tiles;
 
-use std::path::Path;
+use std::{fs::File, io::BufReader, path::Path};
+
+use tiff::{decoder::Decoder, tags::Tag};
 
 use self::{png_lines::PngLines, tiff_tiles::TiffTiles};
 use crate::{
     error::{Cause, IoError, Kind, Locate as _, Result},
-    files::StagedFile,
+    files::{Mark, MarkAt, StagedFile},
 };
 
 /// Format of a picture.
@@ -20,6 +22,31 @@ pub enum PictureFormat {
     Tiff,
 }
 
+/// Name of the first note of every picture, by which areograph recognises it.
+const SOFTWARE: &str = "Software";
+
+impl PictureFormat {
+    /// How an earlier picture is recognised.
+    const fn mark(self) -> Mark {
+        Mark {
+            what: "a picture that this command wrote",
+            at: match self {
+                Self::Png => MarkAt::Head("Software\0areograph ", 4096),
+                Self::Tiff => MarkAt::Content(is_own_tiff),
+            },
+        }
+    }
+}
+
+fn is_own_tiff(path: &Path) -> bool {
+    let decoder = File::open(path).map(|file| Decoder::new(BufReader::new(file)));
+    let Ok(Ok(mut decoder)) = decoder else {
+        return false;
+    };
+    let description = decoder.get_tag_ascii_string(Tag::ImageDescription);
+    description.is_ok_and(|text| text.starts_with("Software: areograph "))
+}
+
 /// Size and contents of a picture.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PictureHead {
@@ -29,7 +56,7 @@ pub struct PictureHead {
     pub height: u32,
     /// Whether a pixel has 16 bits instead of 8.
     pub is_deep: bool,
-    /// Descriptions, one `name: text` each.
+    /// Descriptions, one `name: text` each; the program is described by itself.
     pub notes: Vec<(&'static str, String)>,
 }
 
@@ -106,8 +133,10 @@ impl PictureFile {
     /// Creates a picture beside `path`.
     ///
     /// # Errors
-    /// The folder cannot be written; a TIFF of more than 4 GiB.
-    pub fn create(path: &Path, format: PictureFormat, head: PictureHead) -> Result<Self> {
+    /// The folder cannot be written; an existing file that is no such picture; a TIFF of more than 4 GiB.
+    pub fn create(path: &Path, format: PictureFormat, mut head: PictureHead) -> Result<Self> {
+        let software = format!("areograph {}", env!("CARGO_PKG_VERSION"));
+        head.notes.insert(0, (SOFTWARE, software));
         if format == PictureFormat::Tiff {
             let (width, height, bytes) = (head.width, head.height, tiff_tiles::bytes_of(&head));
             if u32::try_from(bytes).is_err() {
@@ -119,7 +148,7 @@ impl PictureFile {
                 return Err(too_large).in_file(path);
             }
         }
-        let file = StagedFile::create(path)?;
+        let file = StagedFile::replacing(path, format.mark())?;
         let handle = file.writer()?;
         let writer = match format {
             PictureFormat::Png => {

@@ -2,7 +2,7 @@
 
 use std::{
     fs::File,
-    io::{BufWriter, Write},
+    io::{BufWriter, Read as _, Write},
     path::Path,
 };
 
@@ -24,11 +24,16 @@ use super::{
 use crate::{
     body::Body,
     error::{Cause, IoError, Locate, Result},
-    files::StagedFile,
+    files::{Mark, MarkAt, StagedFile},
 };
 
 /// The column of points in well-known binary.
 pub(super) const GEOMETRY: &str = "geometry";
+
+/// Keys of the metadata of Parquet files by which an answer is recognised: that of a search, and of an SQL query.
+pub(super) const SEARCH: &str = "areograph_search";
+/// See [`SEARCH`].
+pub const SQL: &str = "areograph_sql";
 
 /// Format of rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,6 +44,44 @@ pub enum RowsFormat {
     Csv,
     /// GeoJSON points on Mars: those of the column `geometry` with all columns except those of bytes.
     GeoJson,
+}
+
+impl RowsFormat {
+    /// How an earlier answer in this format is recognised.
+    const fn mark(self) -> Mark {
+        Mark {
+            what: "an earlier answer of this command",
+            at: match self {
+                Self::Parquet => MarkAt::Content(is_answer),
+                Self::Csv => MarkAt::List,
+                Self::GeoJson => MarkAt::Content(is_collection_of_shots),
+            },
+        }
+    }
+}
+
+/// Whether the metadata of a Parquet file states a search or a query.
+fn is_answer(path: &Path) -> bool {
+    let Ok(Ok(reader)) = File::open(path).map(ParquetRecordBatchReaderBuilder::try_new) else {
+        return false;
+    };
+    let metadata = reader.metadata().file_metadata().key_value_metadata();
+    let mut entries = metadata.into_iter().flatten();
+    entries.any(|entry| [SEARCH, SQL].contains(&&*entry.key))
+}
+
+/// Whether the file begins as a collection of found shots does.
+fn is_collection_of_shots(path: &Path) -> bool {
+    let Ok(head) = shots_head() else {
+        return false;
+    };
+    let mut found = vec![0; head.len()];
+    let read = File::open(path).and_then(|mut file| file.read_exact(&mut found));
+    read.is_ok() && found == head.as_bytes()
+}
+
+fn shots_head() -> std::result::Result<String, ProductError> {
+    geojson::head_of("shots", Body::Mars, frame(Body::Mars), None)
 }
 
 /// Columns that cannot be written.
@@ -73,12 +116,24 @@ enum Form {
 }
 
 impl RowsWriter {
-    /// Begins the file `path` with rows of these columns.
+    /// Begins the file `path`, in a folder of areograph itself, with rows of these columns.
     ///
     /// # Errors
     /// Errors of the disk.
     pub fn create(path: &Path, format: RowsFormat, schema: SchemaRef) -> Result<Self> {
-        let staged = StagedFile::create(path)?;
+        Self::staged(StagedFile::create(path)?, format, schema)
+    }
+
+    /// The same at a path of the user, where only an earlier answer in this format is replaced.
+    ///
+    /// # Errors
+    /// Errors of the disk; a file that is no such answer.
+    pub fn replacing(path: &Path, format: RowsFormat, schema: SchemaRef) -> Result<Self> {
+        Self::staged(StagedFile::replacing(path, format.mark())?, format, schema)
+    }
+
+    fn staged(staged: StagedFile, format: RowsFormat, schema: SchemaRef) -> Result<Self> {
+        let path = staged.path().to_owned();
         let writer = Self::new(Box::new(staged.writer()?), format, schema).in_file(path)?;
         Ok(Self {
             staged: Some(staged),
@@ -103,10 +158,7 @@ impl RowsWriter {
             }
             RowsFormat::GeoJson => {
                 let mut out = BufWriter::new(out);
-                put(
-                    &mut out,
-                    geojson::head_of("shots", Body::Mars, frame(Body::Mars), None)?,
-                )?;
+                put(&mut out, shots_head()?)?;
                 Form::GeoJson(out)
             }
         };

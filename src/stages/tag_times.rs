@@ -174,7 +174,7 @@ stage_inputs! {
 
 impl Stage for TagTimes<'_> {
     const NAME: &'static str = "tag_times";
-    const METHOD: u32 = 8;
+    const METHOD: u32 = 9;
     const CHECKED: bool = true;
     type Output = ImageTimes;
     stage_inputs!(fingerprint);
@@ -233,6 +233,8 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
     let session = &session.of(instrument.spacecraft);
     let utc_stop = label.as_ref().and_then(|label| label.utc_stop.clone());
     let tells_lines = label.is_some() && !instrument.spacecraft.labels_tell_clock;
+    let damage = label.iter().flat_map(|label| label.remarks.clone());
+    remarks.extend(damage.map(Disagreement::from));
     let (of_label, label_lines) =
         label.map_or_else(Default::default, |label| (label.fields, label.lines));
     let fields = merged(&image.fields, of_label, &mut notes);

@@ -22,7 +22,7 @@ use super::{
     declare::{Keys, declare_table, key, no_repeats, of_the_file, table, tables},
     forms::{any_text, lower_case_identifier, words},
     images::{IMAGES, ImageConfig},
-    instruments::{ALTIMETER, usual_altimeter, usual_instrument},
+    instruments::{ALTIMETER, built_in_altimeters, usual_altimeter, usual_instrument},
     kernels::KernelsConfig,
     limits::LimitsConfig,
     mola_surface::MolaSurfaceConfig,
@@ -148,6 +148,7 @@ fn across_tables(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         ]})
     });
     something_to_do(site, keys);
+    altimeter_of_pedr(site, keys);
     other_bodies(site, keys);
     serial_numbers(keys);
     pointing_of_instruments(site, keys);
@@ -237,6 +238,22 @@ fn something_to_do(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
             "pedr",
             "a table pedr (or tables [[shots]]), tables [[images]], or both: a site without either has nothing to do",
         ),
+    }
+}
+
+/// PEDR files are those of MOLA; a file that describes MOLA with other numbers may be named.
+fn altimeter_of_pedr(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
+    let usual = usual_altimeter();
+    let is_other = |known: &Altimeter| {
+        let same = known.id == site.altimeter.id || known.name == site.altimeter.name;
+        known.id != usual.id && same
+    };
+    if keys.span_of("pedr").is_some() && built_in_altimeters().iter().any(is_other) {
+        let name = &usual.name;
+        keys.refuse(
+            "altimeter",
+            format!("{}, whose shots PEDR files hold; shots of others than {name} come in tables [[shots]]", usual.id),
+        );
     }
 }
 

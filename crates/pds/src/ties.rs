@@ -6,7 +6,7 @@ mod network;
 
 use std::{collections::BTreeMap, fs, path::Path};
 
-use super::label::LabelError;
+use super::{file_size::SizedFile, label::LabelError};
 use areograph_base::{
     error::{Cause, IoError, Locate, Result},
     ties::{KnownGround, TieMeasure, TiePoint},
@@ -77,6 +77,7 @@ enum TieError {
 /// # Errors
 /// The file cannot be read; a binary network; no network; missing columns; no readable record.
 pub fn read_ties(path: &Path) -> Result<TieFile> {
+    SizedFile::Ties.require(path)?;
     let bytes = fs::read(path).map_err(IoError::on("read")).in_file(path)?;
     let table = path
         .extension()

@@ -3,6 +3,8 @@
 
 mod known;
 mod outputs;
+mod own;
+mod partial;
 mod staged;
 
 use std::{
@@ -16,8 +18,10 @@ use std::{
 use rayon::prelude::*;
 
 pub use self::known::{Identity, KnownFile, KnownFiles};
-pub use self::outputs::require_apart;
-pub use self::staged::{StagedFile, TEMPORARY};
+pub use self::outputs::{overlap, real_path, require_apart};
+pub use self::own::{Mark, MarkAt, require_own};
+pub use self::partial::{ASIDE, PartialFolder, TEMPORARY, remove_abandoned};
+pub use self::staged::StagedFile;
 use areograph_base::{
     error::{Cause, IoError, Locate, Result},
     watch::Watch,

@@ -8,12 +8,19 @@ use std::{
 
 use super::{
     atomic,
+    files::{Mark, MarkAt, require_own},
     publish::{JOURNAL, read_manifest},
 };
 use areograph_base::error::{Cause, IoError, Locate, Result};
 
 /// File of the page over all sites, in the folder that holds the sites' folders.
 pub const SITES_PAGE: &str = "index.html";
+
+/// Pages of areograph: those of products, differences and comparisons end with the same line.
+pub const PAGE: Mark = Mark {
+    what: "a page that areograph wrote",
+    at: MarkAt::Tail("<footer>Made by areograph ", 200),
+};
 
 /// Why a page must not be written to a path.
 #[derive(Debug, thiserror::Error, Cause)]
@@ -43,7 +50,8 @@ impl PagePath {
     /// Checks the path before the work whose result the page will show.
     ///
     /// # Errors
-    /// [`PageError`] for anything but a regular file, and for products; [`IoError`] if its folder cannot be found.
+    /// [`PageError`] for anything but a regular file, and for products; a file that is no page of areograph;
+    /// [`IoError`] if its folder cannot be found.
     pub fn new(path: &Path) -> Result<Self> {
         check(path).in_file(path)?;
         Ok(Self(path.to_owned()))
@@ -55,7 +63,7 @@ impl PagePath {
     /// As [`Self::new`], if the path has changed meanwhile; [`IoError`] if the system refuses to write.
     pub fn write(&self, page: &str) -> Result<()> {
         check(&self.0).in_file(&self.0)?;
-        atomic::write(&self.0, page.as_bytes())
+        atomic::replace(&self.0, page.as_bytes(), PAGE)
     }
 }
 
@@ -84,7 +92,7 @@ fn check(path: &Path) -> Result<()> {
             folder: folder.to_owned(),
         }
         .into()),
-        None => Ok(()),
+        None => require_own(path, &PAGE),
     }
 }
 

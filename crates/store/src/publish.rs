@@ -17,6 +17,7 @@ use rayon::prelude::*;
 
 use super::{
     atomic,
+    cache::stored,
     manifest::{Manifest, ProductEntry},
 };
 use crate::files::{hash_file, short_hash};
@@ -32,7 +33,10 @@ const PUBLISH: &str = "publish";
 pub const CACHE: &str = ".cache";
 
 /// Name of the folder of incomplete products.
-pub(super) const STAGING: &str = ".staging";
+const STAGING: &str = ".staging";
+
+/// Empty file by which that folder is recognised.
+const STAGING_MARK: &str = ".areograph";
 
 /// Paths below the site's folder that a publication in progress may have created or will remove.
 pub(super) const JOURNAL: &str = ".publishing";
@@ -97,7 +101,23 @@ pub fn staging(site_folder: &Path) -> Result<Staging> {
     fs::create_dir(&folder)
         .map_err(IoError::on("create the folder"))
         .in_file(&folder)?;
-    Ok(Staging { folder })
+    let staging = Staging { folder };
+    let mark = staging.join(STAGING_MARK);
+    fs::File::create(&mark)
+        .map_err(IoError::on("create"))
+        .in_file(&mark)?;
+    Ok(staging)
+}
+
+/// Removes the incomplete products of a killed run; a folder of another program remains.
+pub(super) fn remove_staging(site_folder: &Path) {
+    let folder = site_folder.join(STAGING);
+    // Files that cannot be removed are reported when publishing.
+    let _ = if folder.join(STAGING_MARK).is_file() {
+        fs::remove_dir_all(folder)
+    } else {
+        fs::remove_dir(folder)
+    };
 }
 
 /// Whether a run ever worked in the folder: it contains stored stages or a publication in progress.
@@ -158,10 +178,74 @@ fn require_same_kind(site_folder: &Path, next: &Manifest) -> Result<()> {
     }
 }
 
+/// A file in the place of a product that no record of areograph names.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "is in the place of a product and was not written by areograph; expected a new path, or a product of an earlier run"
+)]
+struct InPlaceOfProduct;
+
+impl Cause for InPlaceOfProduct {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        "move the file away, or give the products another folder (--out)".to_owned()
+    }
+}
+
+/// Ensures that a publication replaces only products, or files that equal them.
+fn refuse_foreign(site_folder: &Path, next: &Manifest, earlier: &BTreeSet<String>) -> Result<()> {
+    let mut known = earlier.clone();
+    let records = [
+        read_previous(site_folder),
+        stored::<String>(&site_folder.join(CACHE), PUBLISH)
+            .and_then(|text| serde_json::from_str(&text).ok()),
+    ];
+    let records: Vec<Manifest> = records.into_iter().flatten().collect();
+    let of_records = records.iter().flat_map(|record| &record.products);
+    known.extend(of_records.map(|product| product.path.clone()));
+    let manifest = site_folder.join(MANIFEST);
+    known.extend(paths_of_damaged(&manifest));
+    if known.is_empty() && fs::symlink_metadata(&manifest).is_ok() {
+        return Err(InPlaceOfProduct).in_file(manifest);
+    }
+    for product in &next.products {
+        let path = site_folder.join(&product.path);
+        if known.contains(&product.path) || fs::symlink_metadata(&path).is_err() {
+            continue;
+        }
+        if hash_file(&path)
+            .ok()
+            .is_none_or(|(blake3, _)| blake3 != product.blake3)
+        {
+            return Err(InPlaceOfProduct).in_file(path);
+        }
+    }
+    Ok(())
+}
+
+/// Products that a manifest of areograph names, even if it cannot be parsed.
+fn paths_of_damaged(manifest: &Path) -> Vec<String> {
+    let bytes = fs::read(manifest).unwrap_or_default();
+    let text = String::from_utf8_lossy(&bytes);
+    let path_of = |line: &str| {
+        let path = line.trim().strip_prefix("\"path\": \"")?;
+        Some(path.trim_end_matches(',').trim_end_matches('"').to_owned())
+    };
+    if text.contains("\"tool\": \"areograph\"") {
+        text.lines().filter_map(path_of).collect()
+    } else {
+        Vec::new()
+    }
+}
+
 /// Renames staged products into place, removes earlier ones that are no longer made, writes the manifest last.
 ///
 /// # Errors
-/// Products of another kind; a file that cannot be renamed or removed: publishing again repairs the folder.
+/// Products of another kind; a file in the place of a product that areograph did not write; a file that cannot be
+/// renamed or removed: publishing again repairs the folder.
 pub fn publish(site_folder: &Path, staging: &Path, manifest: &Manifest) -> Result<()> {
     require_same_kind(site_folder, manifest)?;
     let made: BTreeSet<&str> = manifest
@@ -170,6 +254,7 @@ pub fn publish(site_folder: &Path, staging: &Path, manifest: &Manifest) -> Resul
         .map(|product| &*product.path)
         .collect();
     let earlier = earlier_products(site_folder);
+    refuse_foreign(site_folder, manifest, &earlier)?;
     let concerned: Vec<&str> = made
         .iter()
         .copied()

@@ -159,10 +159,7 @@ fn each(image: &PixelFile, mut show: impl FnMut(&Strip) -> Result<()>) -> Result
 
 fn notes(image: &PixelFile, calibration: Option<&Calibration>) -> Vec<(&'static str, String)> {
     let label = image.label();
-    let mut notes = vec![(
-        "Software",
-        format!("areograph {}", env!("CARGO_PKG_VERSION")),
-    )];
+    let mut notes = Vec::new();
     let product = label.and_then(|label| label.product_id.clone());
     notes.extend(product.map(|product| ("Title", product)));
     if let Some(calibration) = calibration {

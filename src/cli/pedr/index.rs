@@ -12,8 +12,8 @@ use clap::Args;
 use crate::cli::output;
 use crate::{
     error::{Cause, Error, IoError, Locate as _},
-    files::{Identity, hash_file, short_hash},
-    pds::archive::{INDEX, Index, IndexedFile, Listing},
+    files::{Identity, hash_file, require_own, short_hash},
+    pds::archive::{INDEX, INDEX_MARK, Index, IndexedFile, Listing},
     store::atomic,
 };
 
@@ -61,6 +61,7 @@ struct Outcome {
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let path = arguments.folder.join(INDEX);
+    require_own(&path, &INDEX_MARK)?;
     let earlier = Index::read(&path).unwrap_or_default();
     let listing = Listing::below(&arguments.folder);
     let unseen = unseen(&earlier, &arguments.folder, &listing.failures);
@@ -82,7 +83,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let (files, read, bytes) = (outcome.files.len(), outcome.read, outcome.bytes);
     let index: Index = unseen.into_iter().chain(outcome.files).collect();
     let encoded = index.encode().ok_or(NotEncoded).in_file(&path)?;
-    atomic::write(&path, &encoded)?;
+    atomic::replace(&path, &encoded, INDEX_MARK)?;
     output::line(format_args!(
         "{}: {files} files of {bytes} bytes, {read} of them read now, {gone} removed; {} bytes",
         path.display(),

@@ -12,7 +12,7 @@ use clap::{Args, ValueEnum};
 use crate::{
     cli::{output, stop::Signals},
     error::{Cause, IoError, Locate as _, Result, Stopped},
-    files::{StagedFile, require_apart},
+    files::{Mark, MarkAt, StagedFile, require_apart},
     pds::{
         pedr::{Complaint, File},
         pedr_table::{Preferences, Rules, Table, Variant},
@@ -86,6 +86,11 @@ struct OneName(PathBuf, PathBuf);
 
 /// Default preferences file.
 const PREFERENCES: &str = "PEDR2TAB.PRM";
+/// Tables have the bytes of pedr2tab, with no place for a mark.
+const TABLE: Mark = Mark {
+    what: "a table that areograph wrote",
+    at: MarkAt::List,
+};
 /// Complaints printed of a file; all are counted.
 const COMPLAINTS_PRINTED: usize = 20;
 
@@ -264,7 +269,7 @@ struct Output {
 
 impl Output {
     fn create(path: &Path) -> Result<Self> {
-        let file = StagedFile::create(path)?;
+        let file = StagedFile::replacing(path, TABLE)?;
         let writer = BufWriter::new(file.writer()?);
         Ok(Self { file, writer })
     }

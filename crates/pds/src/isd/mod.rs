@@ -31,6 +31,7 @@ pub use self::{
     tables::{Rotations, States},
     target::ForeignBody,
 };
+use super::file_size::SizedFile;
 use areograph_base::{
     error::{IoError, Locate, Result},
     image::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN},
@@ -106,6 +107,7 @@ pub fn read_isd(path: &Path) -> Result<ImageSupport> {
         let max = BYTES_MAX;
         return Err(IsdError::TooLarge { bytes, max }).in_file(path);
     }
+    SizedFile::SupportData.require(path)?;
     let text = fs::read(path).map_err(IoError::on("read")).in_file(path)?;
     parse(&text).in_file(path)
 }

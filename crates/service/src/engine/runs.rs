@@ -117,8 +117,15 @@ pub fn current(site_folder: &Path) -> Option<String> {
 pub fn make_current(site_folder: &Path, run: &str) -> Result<()> {
     let fresh = site_folder.join(format!(".{CURRENT}-{run}"));
     let _ = fs::remove_file(&fresh);
-    symlink(PathBuf::from("runs").join(run), &fresh)
-        .and_then(|()| fs::rename(&fresh, site_folder.join(CURRENT)))
+    let place = site_folder.join(CURRENT);
+    // Only the service makes links here: another entry is not its own.
+    let is_free = fs::symlink_metadata(&place).map_or(Ok(()), |found| {
+        let foreign = || std::io::Error::from(std::io::ErrorKind::AlreadyExists);
+        found.is_symlink().then_some(()).ok_or_else(foreign)
+    });
+    is_free
+        .and_then(|()| symlink(PathBuf::from("runs").join(run), &fresh))
+        .and_then(|()| fs::rename(&fresh, place))
         .map_err(IoError::on("link"))
         .in_file(site_folder.join(CURRENT))?;
     sync_folder(site_folder);

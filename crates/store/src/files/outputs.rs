@@ -3,7 +3,7 @@
 use std::{
     fs,
     os::unix::fs::MetadataExt as _,
-    path::{Path, PathBuf, absolute},
+    path::{Component, Path, PathBuf, absolute},
 };
 
 use areograph_base::error::{Cause, Locate, Result};
@@ -69,6 +69,38 @@ pub fn require_apart<'a>(
     Ok(())
 }
 
+/// A path without links, `.` and `..`; parts that do not exist yet remain as they are written.
+#[must_use]
+pub fn real_path(path: &Path) -> PathBuf {
+    let path = if path.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        path
+    };
+    let whole = absolute(path).unwrap_or_else(|_| path.to_owned());
+    let mut missing = Vec::new();
+    for existing in whole.ancestors() {
+        if let Ok(real) = existing.canonicalize() {
+            return missing.into_iter().rev().fold(real, |mut path, part| {
+                match part {
+                    Component::ParentDir => drop(path.pop()),
+                    part => path.push(part),
+                }
+                path
+            });
+        }
+        missing.extend(existing.components().next_back());
+    }
+    whole
+}
+
+/// Whether one of two folders is or holds the other, under any name or link.
+#[must_use]
+pub fn overlap(one: &Path, other: &Path) -> bool {
+    let (one, other) = (real_path(one), real_path(other));
+    one.starts_with(&other) || other.starts_with(&one)
+}
+
 /// An entry that a file would replace.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("is {0}; expected a file or a new path")]
@@ -96,4 +128,25 @@ pub(super) fn require_replaceable(path: &Path) -> Result<()> {
         _ => "a device",
     };
     Err(NotAFile(what)).in_file(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_overlap_under_every_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        fs::create_dir_all(path("kernels/spk")).unwrap();
+        std::os::unix::fs::symlink(path("kernels"), path("linked")).unwrap();
+        assert!(overlap(
+            &path("kernels"),
+            &path("kernels/spk/../new/products")
+        ));
+        assert!(overlap(&path("linked/new"), &path("kernels")));
+        assert!(overlap(&path("kernels"), &path(".")));
+        assert!(!overlap(&path("kernels"), &path("kernels.new")));
+        assert!(!overlap(&path("kernels/spk"), &path("linked/spk/../new")));
+    }
 }

@@ -16,7 +16,7 @@ use super::Format;
 use crate::cli::output;
 use crate::{
     error::{Cause, Locate as _, Result},
-    products::{RowsFormat, RowsWriter},
+    products::{RowsFormat, RowsWriter, SQL},
     sql::{as_table, as_text, as_text_schema},
 };
 
@@ -122,7 +122,7 @@ impl Answer {
             }
         };
         Ok(Self::Rows {
-            writer: RowsWriter::create(path, format, schema)?,
+            writer: RowsWriter::replacing(path, format, schema)?,
             format,
             is_gone: Arc::default(),
         })
@@ -153,10 +153,12 @@ impl Answer {
     }
 
     /// Ends the answer.
-    pub(super) fn finish(self) -> Result<()> {
+    ///
+    /// * `question` – the query, for the metadata of Parquet
+    pub(super) fn finish(self, question: &str) -> Result<()> {
         match self {
             Self::Table { schema, batches } => print_table(schema, &batches),
-            Self::Rows { writer, .. } => writer.finish(Vec::new()).map(drop),
+            Self::Rows { writer, .. } => writer.finish(vec![(SQL, question.to_owned())]).map(drop),
         }
     }
 }
