@@ -20,6 +20,7 @@ use crate::{
     spice::{KernelSet, KernelView, RequiredCoverage},
     stage::{InOrder, Output, Round, Stage},
     stages::{
+        check_beam::CheckBeam,
         check_ranges::{CheckRanges, CheckTableRanges},
         convert_datum::ConvertDatum,
         describe_kernels::{DescribeKernels, Required},
@@ -28,6 +29,7 @@ use crate::{
         outline_windows::{OutlineWindows, Windows},
         read_shots::{ReadShots, ShotFiles},
         sample_orientation::SampleOrientation,
+        site_image::SiteImages,
         search_footprints::{KnownPlaces, PedrFiles, SearchFootprints, SearchResult},
         tag_times::{ImageTimes, TagTimes},
         tag_utc::TagUtc,
@@ -246,6 +248,13 @@ pub(super) fn orient<D: Driver>(
     };
     let shots = (&converted, &profiles);
     let images = registered(flow, config, Round::Initial, &images, orientations, shots)?;
+    let beam = flow.stage(&CheckBeam {
+        images: SiteImages(&images),
+        converted: &converted,
+        profiles: &profiles,
+        altimeter: &config.altimeter,
+        mola_clock: &config.mola_clock,
+    })?;
     Ok(Site {
         found,
         converted,
@@ -257,6 +266,7 @@ pub(super) fn orient<D: Driver>(
         described,
         ranges,
         images,
+        beam,
         ties: None,
         intersection: None,
         adjustment: None,

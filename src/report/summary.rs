@@ -44,14 +44,27 @@ pub(super) fn lead(site: &SiteProducts) -> Result<String> {
         )
     };
     let found = format!(
-        "{}{}<div class=\"first\">\n<div>{}</div>\n<div>{}</div>\n</div>\n{remarks}",
+        "{}{}{}<div class=\"first\">\n<div>{}</div>\n<div>{}</div>\n</div>\n{remarks}",
         verdict(tone, &headline(site), &first_of(reasons)),
         numbers(site),
+        untested(&site.verdict.untested),
         checks::table(site),
         map::first(site)?,
     );
     // The user's text is not changed.
     Ok(about(site) + &site.config.wording().of(found))
+}
+
+/// Errors that no datum of the site can show.
+fn untested(phrases: &[String]) -> String {
+    if phrases.is_empty() {
+        return String::new();
+    }
+    let phrases: Vec<String> = phrases.iter().map(|phrase| escape(phrase)).collect();
+    format!(
+        "<p class=\"note\"><b>Not tested by anything here:</b> {}.</p>\n",
+        phrases.join("; ")
+    )
 }
 
 fn headline(site: &SiteProducts) -> String {

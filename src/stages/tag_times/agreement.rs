@@ -263,16 +263,21 @@ pub(super) fn piece_follows(piece: &LinePiece, next: &LinePiece) -> Option<Strin
     })
 }
 
-/// A remark on a stop time that does not agree with the lines.
+/// A stop time that does not agree with the lines, those of the header and those delivered.
+///
+/// The period of the lines and the stop time are two statements of which the period is used without proof: a difference
+/// displaces the last line. A stop time of the delivered lines is a remark.
 pub(super) fn stop_agrees(
     image: &str,
     start: Et,
     (utc, stop): (&str, Et),
-    (lines, line_period_s): (u32, f64),
-) -> Result<Option<String>, Contradiction> {
-    let (after_s, duration_s) = (stop.since(start), f64::from(lines) * line_period_s);
+    ([lines, delivered], line_period_s): ([u32; 2], f64),
+) -> Result<Option<Disagreement>, Contradiction> {
+    let after_s = stop.since(start);
+    let [duration_s, delivered_s] = [lines, delivered].map(|count| f64::from(count) * line_period_s);
     let apart_s = (after_s - duration_s).abs();
-    if apart_s <= close_s(utc) + line_period_s {
+    let close_s = close_s(utc) + line_period_s;
+    if apart_s <= close_s {
         return Ok(None);
     }
     let alike = after_s <= 2.0 * duration_s && duration_s <= 2.0 * after_s;
@@ -285,11 +290,21 @@ pub(super) fn stop_agrees(
             duration_s,
         });
     }
-    Ok(Some(format!(
-        "STOP_TIME {utc} is {after_s:.3} s after the start, but {lines} lines of {:.4} ms take {duration_s:.3} s; lines, \
-         exposure or summing may not be those of the image",
-        line_period_s / SECONDS_PER_MS
-    )))
+    let is_of_delivered = (after_s - delivered_s).abs() <= close_s;
+    let ground_m = if is_of_delivered {
+        0.0
+    } else {
+        apart_s * GROUND_SPEED_M_S
+    };
+    Ok(Some(Disagreement {
+        text: format!(
+            "STOP_TIME {utc} is {after_s:.3} s after the start, but {lines} lines of {:.4} ms take {duration_s:.3} s, {} on the \
+             ground; lines, exposure or summing may not be those of the image",
+            line_period_s / SECONDS_PER_MS,
+            ground(apart_s * GROUND_SPEED_M_S)
+        ),
+        ground_m,
+    }))
 }
 
 /// A remark on a camera whose mounting differs between the kernels and its instrument file.
@@ -375,7 +390,7 @@ mod tests {
     fn a_stop_time_belongs_to_the_lines() {
         let stop = |after_s: f64| {
             let at = Et::from_seconds;
-            let lines = (8_064, 0.001_446_201);
+            let lines = ([8_064, 7_680], 0.001_446_201);
             stop_agrees(
                 "i",
                 at(5.0),
@@ -385,8 +400,12 @@ mod tests {
         };
         assert_eq!(stop(11.658).unwrap(), None);
         // The lines that the file lacks, of this image and of one with half as many.
-        assert!(stop(11.107).unwrap().unwrap().contains("take 11.662 s"));
-        assert!(stop(22.0).unwrap().is_some());
+        let delivered = stop(11.107).unwrap().unwrap();
+        assert!(delivered.text.contains("take 11.662 s"), "{delivered:?}");
+        assert!(!delivered.is_beyond_accuracy());
+        for displaced_s in [22.0, 13.662, 11.662 / 1.2] {
+            assert!(stop(displaced_s).unwrap().unwrap().is_beyond_accuracy());
+        }
         for contradicting_s in [3_611.658, -0.1, 5.0, 24.0, f64::NAN] {
             assert!(stop(contradicting_s).is_err(), "{contradicting_s} s");
         }

@@ -90,6 +90,7 @@ pub(super) fn supported(
         lines_delivered: said.line_times.lines(),
         samples: said.samples,
         first_detector: said.first_detector,
+        has_stop_time: false,
         notes: vec![file.note()],
         remarks: remark.map(Disagreement::from).into_iter().collect(),
         instrument: said.instrument,
