@@ -6,8 +6,8 @@ use crate::{
     spice::{KernelSet, RequiredCoverage},
     stage::Output,
     stages::{
-        adjust::Adjusted, check_beam::ImageBeam, check_heights::HeightCheck, check_ranges::RangeCheck,
-        compare_pairs::PairComparison, convert_datum::Converted,
+        adjust::Adjusted, check_beam::ImageBeam, check_heights::HeightCheck,
+        check_ranges::RangeCheck, compare_pairs::PairComparison, convert_datum::Converted,
         describe_kernels::KernelDescription, group_profiles::Profile, intersect::IntersectedTies,
         lay_overlays::Overlays, map_surface::Surface, read_ties::Ties,
         search_footprints::SearchResult, site_image::SiteImage, tabulate_kernels::KernelTables,

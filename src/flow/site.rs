@@ -29,8 +29,8 @@ use crate::{
         outline_windows::{OutlineWindows, Windows},
         read_shots::{ReadShots, ShotFiles},
         sample_orientation::SampleOrientation,
-        site_image::SiteImages,
         search_footprints::{KnownPlaces, PedrFiles, SearchFootprints, SearchResult},
+        site_image::SiteImages,
         tag_times::{ImageTimes, TagTimes},
         tag_utc::TagUtc,
     },
@@ -216,13 +216,14 @@ pub(super) fn orient<D: Driver>(
         images,
         required,
     } = prepared;
+    let view = KernelView::positions(kernels.as_ref());
+    let view = flow.attempt(CheckRanges::NAME, view)?;
+    let view = &view.unwrap_or_else(|| KernelView::all(None));
     let ranges = if config.shots.is_empty() {
-        let view = KernelView::positions(kernels.as_ref());
-        let view = flow.attempt(CheckRanges::NAME, view)?;
         flow.stage(&CheckRanges {
             converted: &converted,
             profiles: &profiles,
-            kernels: &view.unwrap_or_else(|| KernelView::all(None)),
+            kernels: view,
             mola_clock: &config.mola_clock,
             range_check: &config.range_check,
         })?
@@ -231,6 +232,7 @@ pub(super) fn orient<D: Driver>(
             converted: &converted,
             profiles: &profiles,
             images: InOrder(&images),
+            kernels: view,
             mola_clock: &config.mola_clock,
             range_check: &config.range_check,
         })?

@@ -160,12 +160,12 @@ const fn section(kind: CheckKind) -> Option<&'static Section> {
         CheckKind::PositionRmse
         | CheckKind::PointingRmse
         | CheckKind::TableError
-        | CheckKind::BoresightMeets => &images::SECTION
+        | CheckKind::BoresightMeets => &images::SECTION,
         CheckKind::SurfaceFilled | CheckKind::SurfaceHeight | CheckKind::SurfaceSpread => {
             &surface::SECTION
         }
         CheckKind::Attitude | CheckKind::BeamAlong | CheckKind::BeamAcross => &timeline::SECTION,
-        CheckKind::FootprintsInside => &registration::SECTION,
+        CheckKind::FootprintsInside | CheckKind::SupportPosition => &registration::SECTION,
         CheckKind::SkippedRecords => &notes::SECTION,
         // Of the whole, or of nets, calibrations and matches, whose pages have no such sections.
         CheckKind::AdjustmentMade

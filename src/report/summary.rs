@@ -62,7 +62,7 @@ fn untested(phrases: &[String]) -> String {
     }
     let phrases: Vec<String> = phrases.iter().map(|phrase| escape(phrase)).collect();
     format!(
-        "<p class=\"note\"><b>Not tested by anything here:</b> {}.</p>\n",
+        "<p class=\"about\"><b>Not tested by anything here:</b> {}.</p>\n",
         phrases.join("; ")
     )
 }

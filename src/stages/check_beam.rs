@@ -17,17 +17,22 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    convert_datum::Converted, group_profiles::Profile, oriented::OrientedImage,
-    register::RegisteredPoints, site_image::SiteImages, tag_times::ImageTimes,
+    convert_datum::Converted,
+    group_profiles::Profile,
+    oriented::OrientedImage,
+    register::RegisteredPoints,
+    site_image::SiteImages,
+    tag_times::{ImageTimes, SupportFile},
 };
 use crate::{
     altimetry::MolaClock,
+    config::all_instruments,
     error::Result,
     footprints::{Footprint, Footprints},
     frames::BodyFixed,
     geom::{
         attitude::bus_to_camera,
-        pushbroom::CameraModel,
+        pushbroom::{CameraModel, ExteriorOrientation as _, Pose},
         range_residuals::{footprint, own_spacecraft},
         statistics::Summary,
     },
@@ -67,6 +72,8 @@ pub struct Beam {
     pub spread_rad: [f64; 2],
     /// Mean range, metres.
     pub range_m: f64,
+    /// Median distance between the spacecraft of the altimeter's file and the perspective centre, metres.
+    pub apart_m: f64,
     /// Rotation rate of the bus in inertial space, radians per second.
     pub turn_rad_s: f64,
     /// Bias of the altimeter's clock, seconds, whose sign and scope are not published.
@@ -177,11 +184,10 @@ impl Placed<'_> {
         clock_s: f64,
     ) -> std::result::Result<Beam, BeamGap> {
         let image = self.oriented.image;
-        if image.support.is_some() {
-            return Err(BeamGap::Support);
-        }
-        if !image.has_laser() {
-            return Err(BeamGap::OtherSpacecraft);
+        match &image.support {
+            Some(support) if !knows_bus(image, support) => return Err(BeamGap::Support),
+            None if !image.has_laser() => return Err(BeamGap::OtherSpacecraft),
+            _ => {}
         }
         let axes = laser.axes_in_bus().ok_or(BeamGap::NoBeam)?;
         if shots.is_empty() {
@@ -191,6 +197,7 @@ impl Placed<'_> {
             .map(|index| (self.points.row[index], self.points.inside[index]))
             .collect();
         let (mut angles_rad, mut ranges_m) = ([Vec::new(), Vec::new()], Vec::new());
+        let mut apart_m = Vec::new();
         let (mut expected_inside, mut inside_count) = (0, 0);
         for row in shots {
             let shot = footprints.row(*row as usize);
@@ -199,6 +206,7 @@ impl Placed<'_> {
                 column.push(angle);
             }
             ranges_m.push(shot.range_m);
+            apart_m.push((own_spacecraft(&shot).xyz_m - self.pose(&shot).position_m).norm());
             if self.is_expected(&shot, &axes) {
                 expected_inside += 1;
                 inside_count += u32::from(inside.get(row).is_some_and(|is| *is));
@@ -210,11 +218,19 @@ impl Placed<'_> {
             angles_rad: of_axes.map(|axis| axis.median),
             spread_rad: of_axes.map(|axis| axis.nmad),
             range_m: Summary::of(&ranges_m).mean,
+            apart_m: Summary::of(&apart_m).median,
             turn_rad_s: self.turn_rad_s,
             clock_s,
             expected_inside,
             inside: inside_count,
         })
+    }
+
+    /// The camera at the instant of a shot.
+    fn pose(&self, shot: &Footprint) -> Pose {
+        let instant = Et::from_seconds(shot.et_s);
+        let line = self.oriented.image.line_offset(instant);
+        self.oriented.orientation(CameraModel::Samples).pose(line)
     }
 
     /// Angles of the beam of a shot from its mounting, along and across the track, by the attitude at its instant.
@@ -224,12 +240,8 @@ impl Placed<'_> {
     /// corrected instant: within the bias of the clock they rotate by 8e-6 rad.
     fn angles_rad(&self, shot: &Footprint, axes: &Matrix3<f64>) -> [f64; 2] {
         let beam_m = footprint(shot, shot.radius_m).xyz_m - own_spacecraft(shot).xyz_m;
-        let line = self
-            .oriented
-            .image
-            .line_offset(Et::from_seconds(shot.et_s));
-        let pose = self.oriented.orientation(CameraModel::Samples).pose(line);
-        let in_bus = self.bus_to_camera.tr_mul(&(pose.mars_to_camera * beam_m));
+        let in_camera = self.pose(shot).mars_to_camera * beam_m;
+        let in_bus = self.bus_to_camera.tr_mul(&in_camera);
         let [along, across, beam] = [0, 1, 2].map(|axis| axes.column(axis).dot(&in_bus));
         [along.atan2(beam), across.atan2(beam)]
     }
@@ -249,6 +261,15 @@ impl Placed<'_> {
         let ends = [0.0, delivered].map(|line| image.line_times.et(line).seconds());
         is_on_line && shot.et_s >= ends[0] + reach_s && shot.et_s <= ends[1] - reach_s
     }
+}
+
+/// Whether support data contain the attitude of the bus with the laser: they name its spacecraft and its frame.
+fn knows_bus(image: &ImageTimes, support: &SupportFile) -> bool {
+    let camera = &image.instrument;
+    let mut cameras = all_instruments().iter();
+    camera.spacecraft.has_laser()
+        && support.is_of(camera.spacecraft)
+        && cameras.any(|of| of.spacecraft.has_laser() && of.naif.bus == camera.naif.bus)
 }
 
 /// Mean rate of rotation, radians per second.

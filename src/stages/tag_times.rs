@@ -14,9 +14,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use agreement::Disagreement;
-use agreement::{
-    mounting_agrees, of_one_clock, of_one_product, start_agrees, stop_agrees,
-};
+use agreement::{mounting_agrees, of_one_clock, of_one_product, start_agrees, stop_agrees};
 use camera::camera_agrees;
 use detector::{PartOfLine, fits_detector};
 use error::ImageError;
@@ -26,7 +24,10 @@ use support::supported;
 
 use crate::{
     body::Body,
-    config::{ImageConfig, PointingConfig, UsedBias, all_instruments, built_in_instruments, usual_instrument},
+    config::{
+        ImageConfig, PointingConfig, UsedBias, all_instruments, built_in_instruments,
+        usual_instrument,
+    },
     error::{Locate, Result},
     files::HashedFile,
     geom::pushbroom::Detector,
@@ -270,7 +271,7 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
         };
         remarks.push(part.on_first_pixel(&image.id, tells_lines)?.into());
     }
-    remarks.extend(camera_agrees(&instrument, all_instruments()).map(Disagreement::from));
+    remarks.extend(camera_agrees(&instrument, all_instruments()));
     of_one_clock(image, instrument.spacecraft, fields.sclk_start.as_deref())?;
     let told = start_time(image, &fields, session, &mut notes, &mut remarks)?;
     let pieces = Pieces {
@@ -355,7 +356,7 @@ fn labelled(image: &ImageConfig) -> Result<(Instrument, Option<ImageLabel>)> {
         None => built_in_instruments(),
     };
     let label = read_label(path, cameras)?;
-    of_one_product(image, label.product_id.as_deref())?;
+    of_one_product(image, ("label is", label.product_id.as_deref()))?;
     Ok((label.instrument.clone(), Some(label)))
 }
 

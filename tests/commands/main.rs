@@ -5,6 +5,7 @@ mod bad_input;
 mod common;
 mod compare_kernels;
 mod contradictions;
+mod contradictions_attitude;
 mod damaged_kernels;
 mod example_kernels;
 mod geometric;

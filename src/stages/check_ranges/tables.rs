@@ -1,14 +1,18 @@
-//! The range check of shots of tables, for whose spacecraft there are no kernels: measured range against the table's
-//! own spacecraft, and against the spacecraft of images with its laser, where one was exposed at that time.
+//! The range check of shots of tables: measured range against the table's own spacecraft, and against the spacecraft of
+//! images with its laser, where one was exposed at that time, or else against that of the kernels, where they cover it.
 //!
 //! `ImageTimes::has_laser` marks such images. No other stage after `search_footprints` distinguishes tables from PEDR
 //! files.
 
 use std::sync::atomic::AtomicBool;
 
-use super::{ProfileRanges, RangeCheck, ShotResiduals, statistics};
+use super::{
+    ProfileRanges, RangeCheck, ShotResiduals, TRAJECTORY_MARGIN_S, TRAJECTORY_TOLERANCE_M,
+    statistics,
+};
 use crate::{
     altimetry::MolaClock,
+    body::Body,
     config::RangeCheckConfig,
     error::{Result, Stopped},
     footprints::Footprints,
@@ -20,10 +24,11 @@ use crate::{
         },
         statistics::{Summary, outliers},
     },
+    spice::{KernelRole, KernelView, Trajectory},
     stage::{InOrder, Output, Stage},
     stage_inputs,
     stages::{convert_datum::Converted, group_profiles::Profile, tag_times::ImageTimes},
-    time::Et,
+    time::{Et, Intervals},
 };
 
 stage_inputs! {
@@ -35,6 +40,8 @@ stage_inputs! {
         pub profiles: &'a Output<Vec<Profile>>,
         /// The images.
         pub images: InOrder<'a, Output<ImageTimes>>,
+        /// Kernels that positions may depend on.
+        pub kernels: &'a KernelView,
         /// The clock of the altimeter.
         pub mola_clock: &'a MolaClock,
         /// Limits.
@@ -44,7 +51,7 @@ stage_inputs! {
 
 impl Stage for CheckTableRanges<'_> {
     const NAME: &'static str = "check_ranges";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     type Output = RangeCheck;
     stage_inputs!(fingerprint);
 
@@ -55,6 +62,7 @@ impl Stage for CheckTableRanges<'_> {
             &self.converted.value()?.footprints,
             self.profiles.value()?,
             &images,
+            self.trajectory()?.as_ref(),
             self.mola_clock,
             self.range_check,
             stop,
@@ -62,9 +70,37 @@ impl Stage for CheckTableRanges<'_> {
     }
 }
 
+impl CheckTableRanges<'_> {
+    /// The orbit of the spacecraft with the laser, as far as the kernels cover the shots; `None` where they cover none, and
+    /// at other bodies.
+    fn trajectory(&self) -> Result<Option<Trajectory>> {
+        let body = self.converted.value()?.footprints.body;
+        let Some(kernels) = self.kernels.kernels() else {
+            return Ok(None);
+        };
+        let has_orbit = kernels
+            .kernels()
+            .iter()
+            .any(|of| of.role == KernelRole::Spk);
+        if body != Body::Mars || !has_orbit {
+            return Ok(None);
+        }
+        let session = self.kernels.session()?;
+        let reach_s = self.mola_clock.bias_s + TRAJECTORY_MARGIN_S;
+        let profiles = self.profiles.value()?.iter();
+        let shots = Intervals::union_of(profiles.map(|of| of.interval.padded(reach_s)));
+        let covered = shots.intersection(&session.coverage()?.spk);
+        if covered.as_slice().is_empty() {
+            return Ok(None);
+        }
+        let trajectory = session.trajectory(&covered, TRAJECTORY_TOLERANCE_M)?;
+        Ok(Some(trajectory))
+    }
+}
+
 /// Checks the ranges of every profile against the spacecraft of the table, and against that of support data.
 ///
-/// Residuals exist for shots that both cover; the table's own spacecraft is judged by all shots.
+/// Residuals exist for shots that support data or kernels cover; the table's own spacecraft is judged by all shots.
 ///
 /// # Errors
 /// [`Stopped`].
@@ -72,6 +108,7 @@ pub fn check_table_ranges(
     footprints: &Footprints<BodyFixed>,
     profiles: &[Profile],
     images: &[&ImageTimes],
+    kernels: Option<&Trajectory>,
     clock: &MolaClock,
     limits: &RangeCheckConfig,
     stop: &AtomicBool,
@@ -84,7 +121,12 @@ pub fn check_table_ranges(
         for row in &profile.rows {
             let shot = footprints.row(*row as usize);
             let at = clock.spacecraft_time(shot.et_tag_s);
-            if let Some(spacecraft) = images.iter().find_map(|image| spacecraft(image, at)) {
+            let of_images = images.iter().find_map(|image| spacecraft(image, at));
+            let of_kernels = || {
+                let (position, velocity_m_s) = kernels?.state(at)?;
+                Some(SpacecraftState::of(at, &position, &velocity_m_s))
+            };
+            if let Some(spacecraft) = of_images.or_else(of_kernels) {
                 shots.push(index, *row, &RangeResiduals::of(&shot, &spacecraft));
             }
         }
@@ -92,7 +134,9 @@ pub fn check_table_ranges(
         shots.outlier.extend(flags);
         let mut ranges = statistics(profile, &shots, first, None, footprints);
         by_own_spacecraft(&mut ranges, footprints, profile, limits);
-        let explain = || "the support data hold a different orbit from the table's".to_owned();
+        let explain = || {
+            "support data or kernels hold a different orbit from the table's, or its times or radii are others".to_owned()
+        };
         ranges.invalid_because = ranges.figures().broken_limits(limits, explain);
         checked.push(ranges);
     }

@@ -17,6 +17,8 @@ use crate::{
 const PER_MILLI: f64 = 1e3;
 /// At least this share of the footprints that the mountings place in an image must lie in it.
 const INSIDE_SHARE_MIN: f64 = 0.5;
+/// Support data may contain apparent positions, up to this far from geometric ones, metres.
+const APPARENT_M: f64 = 330.0;
 /// Fewer expected footprints do not test an orientation.
 const EXPECTED_MIN: u32 = 5;
 
@@ -195,6 +197,19 @@ impl BeamEvidence<'_> {
     }
 }
 
+/// Images of support data with the distance of their position from the spacecraft of the altimeter's file, metres, and
+/// the limit.
+fn support_positions<'a>(evidence: &'a Evidence<'_>) -> impl Iterator<Item = (&'a str, f64, f64)> {
+    let limit_m = APPARENT_M + evidence.range_limits.orbit_max_m;
+    let images = evidence.images.iter();
+    let of_support = images.filter(|image| image.times.support.is_some());
+    of_support.filter_map(move |image| {
+        let mut beams = evidence.beam.beams();
+        let (_, beam) = beams.find(|(of, _)| of.image == image.id())?;
+        Some((image.id(), beam.apart_m, limit_m))
+    })
+}
+
 pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
     let (beam, limit_sigma) = (&evidence.beam, evidence.limits.correction_max_sigma);
     let deviations = beam.deviations();
@@ -213,7 +228,11 @@ pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
         let kind = CheckKind::BoresightMeets;
         Check::new(kind, image.id(), met as f64, samples.len() as f64, broken)
     });
+    let positions = support_positions(evidence).map(|(image, apart_m, limit_m)| {
+        Check::new(CheckKind::SupportPosition, image, apart_m, limit_m, Fail)
+    });
     let all = [
+        Check::worst(positions),
         of_axis(0),
         of_axis(1),
         Check::worst(inside),
@@ -244,6 +263,15 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
                 "image {}: {} of {} simultaneous footprints lie in it by the kernels, where the mountings of camera and laser \
                  place all of them, expected at least {least:.0}; check attitude, frames and times",
                 image.image, of.inside, of.expected_inside
+            ));
+        }
+    }
+    for (image, apart_m, limit_m) in support_positions(evidence) {
+        // Written so that NaN counts.
+        if !(apart_m <= limit_m) {
+            reasons.push(format!(
+                "image {image}: its support data place the spacecraft {apart_m:.0} m from its position in the PEDR, expected \
+                 at most {limit_m:.0} m; check that they are those of this image, and their frame"
             ));
         }
     }

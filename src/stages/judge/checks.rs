@@ -43,7 +43,8 @@ pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
     }
     let images = evidence.images.iter();
     let contradicted = images.filter(|image| image.contradictions().next().is_some());
-    checks.extend(contradicted.map(|image| Check::told(CheckKind::Contradiction, image.id(), Fail)));
+    checks
+        .extend(contradicted.map(|image| Check::told(CheckKind::Contradiction, image.id(), Fail)));
     checks.extend(of_ranges(evidence));
     checks.extend(clock(evidence));
     checks.extend(beam::checks(evidence));

@@ -15,10 +15,15 @@ pub(super) fn untested(evidence: &Evidence<'_>) -> Vec<String> {
     if !of_labels.is_empty() {
         phrases.push(match (has_ties, of_labels.len()) {
             (true, 2..) => "an error that the start times of all images share".to_owned(),
-            _ => format!("an error that clock and UTC in the label of {} share", listed(&of_labels)),
+            _ => format!(
+                "an error that clock and UTC in the label of {} share",
+                listed(&of_labels)
+            ),
         });
     }
-    let endless = of_labels.into_iter().filter(|image| !image.times.has_stop_time);
+    let endless = of_labels
+        .into_iter()
+        .filter(|image| !image.times.has_stop_time);
     let endless: Vec<&JudgedImage> = endless.collect();
     if !has_ties && !endless.is_empty() {
         phrases.push(format!(
@@ -27,7 +32,7 @@ pub(super) fn untested(evidence: &Evidence<'_>) -> Vec<String> {
         ));
     }
     if of_support > 0 && !has_ties {
-        phrases.push("times, positions and attitude of support data".to_owned());
+        phrases.push("line times of support data".to_owned());
     }
     if !evidence.images.is_empty() {
         phrases.push(

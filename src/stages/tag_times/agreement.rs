@@ -34,7 +34,7 @@ const DISPLACEMENT_MAX_M: f64 = 100.0;
 /// m on the ground, a hundred times the rounding of angles in kernels.
 const MOUNTING_RAD: f64 = 1e-5;
 /// Height of the mapping orbit, metres: converts angles into distances on the ground.
-const HEIGHT_M: f64 = 380_000.0;
+pub(super) const HEIGHT_M: f64 = 380_000.0;
 
 /// Two statements about an image that differ by less than an error.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -67,10 +67,11 @@ impl From<String> for Disagreement {
 #[derive(Debug, thiserror::Error)]
 pub(super) enum Contradiction {
     #[error(
-        "image {image}: the label is that of product {product}; expected {expected}, which its identifier names"
+        "image {image}: the {source_is} that of product {product}; expected {expected}, which its identifier names"
     )]
     Product {
         image: String,
+        source_is: &'static str,
         product: String,
         expected: String,
     },
@@ -120,7 +121,7 @@ impl Cause for Contradiction {
     fn advice(&self) -> String {
         match self {
             Self::Product { .. } => {
-                "check that labels are not exchanged; an identifier that names no product is valid with any label"
+                "check that labels or support data are not exchanged; an identifier that names no product is valid with any of them"
             }
             Self::Serial { .. } => {
                 "check that labels or serial numbers are not exchanged; ISIS writes the clock of the label into the latter"
@@ -140,10 +141,11 @@ impl Cause for Contradiction {
     }
 }
 
-/// The product of the label must be the one that the image's identifier names, where both name a product.
+/// The product of the label or of support data must be the one that the image's identifier names, where both name a
+/// product.
 pub(super) fn of_one_product(
     image: &ImageConfig,
-    product: Option<&str>,
+    (source_is, product): (&'static str, Option<&str>),
 ) -> Result<(), Contradiction> {
     let (Some(product), Some(named)) = (product, product_named(&image.id)) else {
         return Ok(());
@@ -151,6 +153,7 @@ pub(super) fn of_one_product(
     match product_named(product) {
         Some(found) if found != named => Err(Contradiction::Product {
             image: image.id.clone(),
+            source_is,
             product: product.to_owned(),
             expected: named,
         }),
@@ -274,7 +277,8 @@ pub(super) fn stop_agrees(
     ([lines, delivered], line_period_s): ([u32; 2], f64),
 ) -> Result<Option<Disagreement>, Contradiction> {
     let after_s = stop.since(start);
-    let [duration_s, delivered_s] = [lines, delivered].map(|count| f64::from(count) * line_period_s);
+    let [duration_s, delivered_s] =
+        [lines, delivered].map(|count| f64::from(count) * line_period_s);
     let apart_s = (after_s - duration_s).abs();
     let close_s = close_s(utc) + line_period_s;
     if apart_s <= close_s {
@@ -334,7 +338,7 @@ fn close_s(utc: &str) -> f64 {
     written_s.max(CLOSE_S)
 }
 
-fn ground(metres: f64) -> String {
+pub(super) fn ground(metres: f64) -> String {
     if metres < 1_000.0 {
         format!("{metres:.0} m")
     } else {
@@ -413,11 +417,11 @@ mod tests {
 
     #[test]
     fn identifier_and_serial_number_are_those_of_the_label() {
-        let label = Some("E02/02016");
+        let label = ("label is", Some("E02/02016"));
         for id in ["E02-02016", "e0202016_part", "nadir"] {
             assert!(of_one_product(&image(id, None), label).is_ok(), "{id}");
         }
-        assert!(of_one_product(&image("E02-01301", None), None).is_ok());
+        assert!(of_one_product(&image("E02-01301", None), ("label is", None)).is_ok());
         assert_eq!(
             of_one_product(&image("E02-01301", None), label)
                 .unwrap_err()

@@ -34,6 +34,8 @@ pub enum CheckKind {
     ClockCorrection,
     /// Footprints of simultaneous shots in an image, of those that the mountings of camera and laser place in it.
     FootprintsInside,
+    /// Distance between the spacecraft of support data and of the altimeter's file.
+    SupportPosition,
     /// Angle along the track between the beam in the altimeter's file and its mounting by the attitude of the images.
     BeamAlong,
     /// The same across the track.
@@ -156,6 +158,7 @@ impl CheckKind {
             Self::Shots => "Shots in a profile",
             Self::ClockCorrection => "Clock correction, best − configured",
             Self::FootprintsInside => "Simultaneous footprints in the image",
+            Self::SupportPosition => "Position in support data against the PEDR",
             Self::BeamAlong => "Laser beam by the attitude, along track",
             Self::BeamAcross => "Laser beam by the attitude, across track",
             Self::BoresightMeets => "Boresight meets the body (epochs)",
@@ -208,6 +211,7 @@ impl CheckKind {
             | Self::SurfaceHeight
             | Self::RangeMean
             | Self::OrbitsApart
+            | Self::SupportPosition
             | Self::Decoding
             | Self::ParallaxAfter
             | Self::ParallaxBefore
