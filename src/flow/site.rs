@@ -286,13 +286,12 @@ fn orientations<D: Driver>(
     kernels: &KernelView,
 ) -> Flow<Vec<Output<Orientation>>> {
     let images = config.images.iter().zip(images);
-    let none = &KernelView::all(Some(&KernelSet::default()));
     let sample = |(image, times): (&ImageConfig, _)| {
         flow.stage(&SampleOrientation {
             image: &image.id,
             times,
-            // Support data replace the kernels.
-            kernels: if image.isd.is_some() { none } else { kernels },
+            // Support data replace the kernels, and are compared with them.
+            kernels,
             coverage: &config.kernels,
             pointing: &config.pointing,
             orientation: &config.orientation,

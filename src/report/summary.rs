@@ -247,18 +247,30 @@ fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
             ),
             &format!("{HEIGHTS}/mean_sigma_m/0 {HEIGHTS}/mean_sigma_m/1 {HEIGHTS}/mean_sigma_m/2"),
         ),
-        note: escape(&if is_open(&geometric, &adjustment) {
-            format!(
-                "by {}; see accuracy for open points",
-                place_by(&geometric, &adjustment)
-            )
-        } else {
-            format!(
-                "position by {}, height by MOLA",
-                place_by(&geometric, &adjustment)
-            )
-        }),
+        note: escape(
+            &(if is_open(&geometric, &adjustment) {
+                format!(
+                    "by {}; see accuracy for open points",
+                    place_by(&geometric, &adjustment)
+                )
+            } else {
+                format!(
+                    "position by {}, height by MOLA",
+                    place_by(&geometric, &adjustment)
+                )
+            } + untested_attitude(site)),
+        ),
     })
+}
+
+/// A clause where nothing tests an attitude error that all images share.
+fn untested_attitude(site: &SiteProducts) -> &'static str {
+    let mut checks = site.verdict.checks.iter();
+    if checks.any(|check| check.kind == CheckKind::BeamAcross) {
+        ""
+    } else {
+        "; no simultaneous shot tests the attitude"
+    }
 }
 
 /// Ranges, if there are profiles.

@@ -1,6 +1,7 @@
 //! Exterior orientation of an image: position and rotation of the camera at equally spaced epochs, by kernels or by
 //! support data.
 
+mod against_kernels;
 mod camera_tables;
 mod conventions;
 mod support;
@@ -48,7 +49,7 @@ stage_inputs! {
 
 impl Stage for SampleOrientation<'_> {
     const NAME: &'static str = "sample_orientation";
-    const METHOD: u32 = 4;
+    const METHOD: u32 = 5;
     type Output = Orientation;
     stage_inputs!(fingerprint);
 
@@ -60,7 +61,11 @@ impl Stage for SampleOrientation<'_> {
         let times = self.times.value()?;
         if let Some(support) = &times.support {
             let epochs = epochs(times, self.orientation.intervals);
-            return support_orientation(times, &support.tables, &epochs);
+            let mut orientation = support_orientation(times, &support.tables, &epochs)?;
+            orientation
+                .invalid_because
+                .extend(self.contradiction(times)?);
+            return Ok(orientation);
         }
         sample_orientation(
             self.kernels.session()?,
@@ -80,7 +85,8 @@ impl Stage for SampleOrientation<'_> {
         if let Some(support) = &times.support {
             let epochs = epochs(times, self.orientation.intervals);
             let sampled = support_orientation(times, &support.tables, &epochs);
-            return vec![sampled.map(|_| finding(times, &[]))];
+            let invalid = sampled.and_then(|_| self.contradiction(times));
+            return vec![invalid.map(|reason| finding(times, reason.as_slice()))];
         }
         let session = self.kernels.session();
         let invalid = session.and_then(|session| {
@@ -93,6 +99,13 @@ impl Stage for SampleOrientation<'_> {
             )
         });
         vec![invalid.map(|reasons| finding(times, &reasons))]
+    }
+}
+
+impl SampleOrientation<'_> {
+    /// The contradiction of support data with the kernels beside them.
+    fn contradiction(&self, times: &ImageTimes) -> Result<Option<String>> {
+        against_kernels::contradiction(times, self.kernels, self.coverage, self.pointing)
     }
 }
 
