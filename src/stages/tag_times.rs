@@ -356,7 +356,7 @@ fn labelled(image: &ImageConfig) -> Result<(Instrument, Option<ImageLabel>)> {
         None => built_in_instruments(),
     };
     let label = read_label(path, cameras)?;
-    of_one_product(image, ("label is", label.product_id.as_deref()))?;
+    of_one_product(image, ("label is that", label.product_id.as_deref()))?;
     Ok((label.instrument.clone(), Some(label)))
 }
 

@@ -47,7 +47,10 @@ impl SupportFile {
     ) -> Result<(ImageSupport, Self)> {
         let said = read_isd(path)?;
         said.sees(body, &image.id)?;
-        of_one_product(image, ("support data are", said.identifier.as_deref()))?;
+        of_one_product(
+            image,
+            ("support data are those", said.identifier.as_deref()),
+        )?;
         let file = Self {
             name: file_name(path),
             bytes: hashed.map_or(0, |file| file.bytes),
