@@ -273,6 +273,7 @@ fn outcome_json(outcome: &Outcome) -> serde_json::Value {
             "valid": manifest.verdict.valid,
             "reasons": manifest.verdict.reasons,
             "remarks": manifest.verdict.remarks,
+            "untested": manifest.verdict.untested,
             "checks": manifest.verdict.checks,
             "figures": manifest.figures,
             "counts": manifest.counts,

@@ -16,7 +16,7 @@ use crate::{
     stage::Output,
     stages::{
         adjust::accuracy_withheld,
-        judge::{AdjustmentEvidence, Evidence, JudgedImage, Verdict, judge},
+        judge::{AdjustmentEvidence, BeamEvidence, Evidence, JudgedImage, Verdict, judge},
         lay_overlays::ShownImage,
         site_image::SiteImage,
     },
@@ -61,6 +61,11 @@ pub(super) fn judged(
         ranges: site.ranges.value()?,
         clock_correction_s: config.mola_clock.correction_s(),
         images: &images,
+        beam: BeamEvidence {
+            images: site.beam.value()?,
+            adjustment: &config.adjustment,
+            surface: &config.mola_surface,
+        },
         warnings,
         complaints,
         adjustment,
@@ -224,10 +229,8 @@ fn empty_pedr_files(config: &SiteConfig, site: &Site) -> Result<Option<String>> 
 
 fn judged_images(images: &[SiteImage]) -> Result<Vec<JudgedImage<'_>>> {
     let images = images.iter().map(|image| {
-        let times = image.times.value()?;
         Ok(JudgedImage {
-            id: &times.id,
-            disagreements: &times.remarks,
+            times: image.times.value()?,
             orientation: image.orientation.value()?,
             model: image.model.value()?,
         })

@@ -23,6 +23,7 @@ use crate::{
     spice::{KernelSet, KernelView, RequiredCoverage},
     stage::{InOrder, Output, Round, Stage},
     stages::{
+        check_beam::CheckBeam,
         check_ranges::{CheckRanges, CheckTableRanges},
         convert_datum::ConvertDatum,
         describe_kernels::{DescribeKernels, Required},
@@ -32,6 +33,7 @@ use crate::{
         read_shots::{ReadShots, ShotFiles},
         sample_orientation::SampleOrientation,
         search_footprints::{KnownPlaces, PedrFiles, SearchFootprints, SearchResult},
+        site_image::SiteImages,
         tag_times::{ImageTimes, TagTimes},
         tag_utc::TagUtc,
     },
@@ -222,28 +224,23 @@ pub(super) fn orient<D: Driver>(
         images,
         required,
     } = prepared;
+    let view = KernelView::positions(kernels.as_ref());
+    let view = flow.attempt(CheckRanges::NAME, view)?;
+    let view = &view.unwrap_or_else(|| KernelView::all(None));
     let ranges = if config.shots.is_empty() {
-        let view = KernelView::positions(kernels.as_ref());
-        let view = flow.attempt(CheckRanges::NAME, view)?;
         flow.stage(&CheckRanges {
             converted: &converted,
             profiles: &profiles,
-            kernels: &view.unwrap_or_else(|| KernelView::all(None)),
+            kernels: view,
             mola_clock: &config.mola_clock,
             range_check: &config.range_check,
         })?
     } else {
-        let view = if has_spacecraft(config) {
-            Ok(KernelView::all(Some(&KernelSet::default())))
-        } else {
-            KernelView::positions(kernels.as_ref())
-        };
-        let view = flow.attempt(CheckTableRanges::NAME, view)?;
         flow.stage(&CheckTableRanges {
             converted: &converted,
             profiles: &profiles,
             images: InOrder(&images),
-            kernels: &view.unwrap_or_else(|| KernelView::all(None)),
+            kernels: view,
             mola_clock: &config.mola_clock,
             range_check: &config.range_check,
         })?
@@ -261,6 +258,13 @@ pub(super) fn orient<D: Driver>(
     };
     let shots = (&converted, &profiles);
     let images = registered(flow, config, Round::Initial, &images, orientations, shots)?;
+    let beam = flow.stage(&CheckBeam {
+        images: SiteImages(&images),
+        converted: &converted,
+        profiles: &profiles,
+        altimeter: &config.altimeter,
+        mola_clock: &config.mola_clock,
+    })?;
     Ok(Site {
         found,
         converted,
@@ -272,6 +276,7 @@ pub(super) fn orient<D: Driver>(
         described,
         ranges,
         images,
+        beam,
         ties: None,
         intersection: None,
         adjustment: None,
@@ -279,12 +284,6 @@ pub(super) fn orient<D: Driver>(
         surface: None,
         adjustment_failure: None,
     })
-}
-
-/// Whether all tables of shots have positions of the spacecraft.
-fn has_spacecraft(config: &SiteConfig) -> bool {
-    let has_none = |table: &ShotTableConfig| table.layout == Some(ShotLayout::OdePedr);
-    !config.shots.iter().any(has_none)
 }
 
 /// Orientation of every image by the kernels, or by its support data.
@@ -295,13 +294,12 @@ fn orientations<D: Driver>(
     kernels: &KernelView,
 ) -> Flow<Vec<Output<Orientation>>> {
     let images = config.images.iter().zip(images);
-    let none = &KernelView::all(Some(&KernelSet::default()));
     let sample = |(image, times): (&ImageConfig, _)| {
         flow.stage(&SampleOrientation {
             image: &image.id,
             times,
-            // Support data replace the kernels.
-            kernels: if image.isd.is_some() { none } else { kernels },
+            // Support data replace the kernels, and are compared with them.
+            kernels,
             coverage: &config.kernels,
             pointing: &config.pointing,
             orientation: &config.orientation,

@@ -5,7 +5,7 @@ use super::{
     html::{Cell, Column, Table, Tone, escape, link},
     images, misregistration, notes,
     numbers::{number, signed, whole},
-    ranges, scan,
+    ranges, registration, scan,
     section::Section,
     selection, surface, timeline,
 };
@@ -158,13 +158,15 @@ const fn section(kind: CheckKind) -> Option<&'static Section> {
         | CheckKind::ImagesJoined
         | CheckKind::PairsJoined
         | CheckKind::Correction => &adjustment::SECTION,
-        CheckKind::PositionRmse | CheckKind::PointingRmse | CheckKind::TableError => {
-            &images::SECTION
-        }
+        CheckKind::PositionRmse
+        | CheckKind::PointingRmse
+        | CheckKind::TableError
+        | CheckKind::BoresightMeets => &images::SECTION,
         CheckKind::SurfaceFilled | CheckKind::SurfaceHeight | CheckKind::SurfaceSpread => {
             &surface::SECTION
         }
-        CheckKind::Attitude => &timeline::SECTION,
+        CheckKind::Attitude | CheckKind::BeamAlong | CheckKind::BeamAcross => &timeline::SECTION,
+        CheckKind::FootprintsInside | CheckKind::SupportPosition => &registration::SECTION,
         CheckKind::SkippedRecords => &notes::SECTION,
         // Of the whole, or of nets, calibrations and matches, whose pages have no such sections.
         CheckKind::AdjustmentMade

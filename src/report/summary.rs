@@ -44,14 +44,27 @@ pub(super) fn lead(site: &SiteProducts) -> Result<String> {
         )
     };
     let found = format!(
-        "{}{}<div class=\"first\">\n<div>{}</div>\n<div>{}</div>\n</div>\n{remarks}",
+        "{}{}{}<div class=\"first\">\n<div>{}</div>\n<div>{}</div>\n</div>\n{remarks}",
         verdict(tone, &headline(site), &first_of(reasons)),
         numbers(site),
+        untested(&site.verdict.untested),
         checks::table(site),
         map::first(site)?,
     );
     // The user's text is not changed.
     Ok(about(site) + &site.config.wording().of(found))
+}
+
+/// Errors that no datum of the site can show.
+fn untested(phrases: &[String]) -> String {
+    if phrases.is_empty() {
+        return String::new();
+    }
+    let phrases: Vec<String> = phrases.iter().map(|phrase| escape(phrase)).collect();
+    format!(
+        "<p class=\"about\"><b>Not tested by anything here:</b> {}.</p>\n",
+        phrases.join("; ")
+    )
 }
 
 fn headline(site: &SiteProducts) -> String {
@@ -242,18 +255,30 @@ fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
             ),
             &format!("{HEIGHTS}/mean_sigma_m/0 {HEIGHTS}/mean_sigma_m/1 {HEIGHTS}/mean_sigma_m/2"),
         ),
-        note: escape(&if is_open(&geometric, &adjustment) {
-            format!(
-                "by {}; see accuracy for open points",
-                place_by(&geometric, &adjustment)
-            )
-        } else {
-            format!(
-                "position by {}, height by MOLA",
-                place_by(&geometric, &adjustment)
-            )
-        }),
+        note: escape(
+            &(if is_open(&geometric, &adjustment) {
+                format!(
+                    "by {}; see accuracy for open points",
+                    place_by(&geometric, &adjustment)
+                )
+            } else {
+                format!(
+                    "position by {}, height by MOLA",
+                    place_by(&geometric, &adjustment)
+                )
+            } + untested_attitude(site)),
+        ),
     })
+}
+
+/// A clause where nothing tests an attitude error that all images share.
+fn untested_attitude(site: &SiteProducts) -> &'static str {
+    let mut checks = site.verdict.checks.iter();
+    if checks.any(|check| check.kind == CheckKind::BeamAcross) {
+        ""
+    } else {
+        "; no simultaneous shot tests the attitude"
+    }
 }
 
 /// Ranges, if there are profiles.

@@ -4,11 +4,14 @@
 //! manifest stores them; pages, messages and run comparisons show them and judge nothing.
 
 mod adjustment;
+mod beam;
 mod checks;
 mod ranges;
 mod surface;
+mod untested;
 
 pub use areograph_base::verdict::{Check, CheckKind, CheckOutcome, Verdict};
+pub use beam::BeamEvidence;
 
 use super::{
     adjust::Adjusted,
@@ -19,7 +22,7 @@ use super::{
     map_surface::SurfaceAccount,
     orientation::Orientation,
     read_ties::Ties,
-    tag_times::Disagreement,
+    tag_times::{Disagreement, ImageTimes},
 };
 use crate::{
     config::{LimitsConfig, OrientationConfig, RangeCheckConfig},
@@ -45,6 +48,8 @@ pub struct Evidence<'a> {
     pub clock_correction_s: f64,
     /// The images with the orientation of the kernels.
     pub images: &'a [JudgedImage<'a>],
+    /// The beam of the laser by the attitude of the images.
+    pub beam: BeamEvidence<'a>,
     /// Faults of the kernels, one sentence each.
     pub warnings: &'a [String],
     /// Faults of skipped records, one sentence each.
@@ -60,20 +65,23 @@ pub struct Evidence<'a> {
 /// An image that is judged.
 #[derive(Debug, Clone, Copy)]
 pub struct JudgedImage<'a> {
-    /// Identifier.
-    pub id: &'a str,
+    /// Its line times, with the disagreements of its label, clock and mounting.
+    pub times: &'a ImageTimes,
     /// Its orientation.
     pub orientation: &'a Orientation,
     /// Its sensor models.
     pub model: &'a SensorModel,
-    /// Disagreements of its label, clock and mounting.
-    pub disagreements: &'a [Disagreement],
 }
 
 impl<'a> JudgedImage<'a> {
+    /// Identifier.
+    pub(super) fn id(&self) -> &'a str {
+        &self.times.id
+    }
+
     /// The disagreements that make the site invalid.
     fn contradictions(&self) -> impl Iterator<Item = &'a Disagreement> {
-        let all = self.disagreements.iter();
+        let all = self.times.remarks.iter();
         all.filter(|of| of.is_beyond_accuracy())
     }
 }
@@ -109,6 +117,7 @@ pub fn judge(evidence: &Evidence<'_>) -> Verdict {
     Verdict {
         reasons: verdict.reasons.into_iter().map(said).collect(),
         remarks: verdict.remarks.into_iter().map(said).collect(),
+        untested: untested::untested(evidence).into_iter().map(said).collect(),
         ..verdict
     }
 }
@@ -137,9 +146,10 @@ impl Evidence<'_> {
                 .map(|of| &of.text)
                 .chain(of_orientation);
             for reason in all.chain(&image.model.invalid_because) {
-                reasons.push(format!("image {}: {reason}", image.id));
+                reasons.push(format!("image {}: {reason}", image.id()));
             }
         }
+        reasons.extend(beam::invalid_because(self));
         reasons.extend(
             self.adjustment
                 .iter()
@@ -164,9 +174,10 @@ impl Evidence<'_> {
         }
         for image in self.images {
             let notes = image.orientation.notes.iter();
-            remarks.extend(notes.map(|note| format!("image {}: {note}", image.id)));
+            remarks.extend(notes.map(|note| format!("image {}: {note}", image.id())));
         }
         remarks.extend(ranges::remarks(self));
+        remarks.extend(beam::remarks(self));
         let configured_s = self.clock_correction_s;
         for ranges in &self.ranges.profiles {
             let doubt = ranges

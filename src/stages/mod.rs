@@ -8,6 +8,7 @@
 pub mod adjust;
 pub mod calibrate;
 pub mod check_archive;
+pub mod check_beam;
 pub mod check_heights;
 pub mod check_ranges;
 pub mod compare_kernels;

@@ -1,6 +1,7 @@
 //! Exterior orientation of an image: position and rotation of the camera at equally spaced epochs, by kernels or by
 //! support data.
 
+mod against_kernels;
 mod camera_tables;
 mod conventions;
 mod support;
@@ -48,7 +49,7 @@ stage_inputs! {
 
 impl Stage for SampleOrientation<'_> {
     const NAME: &'static str = "sample_orientation";
-    const METHOD: u32 = 4;
+    const METHOD: u32 = 5;
     type Output = Orientation;
     stage_inputs!(fingerprint);
 
@@ -60,7 +61,11 @@ impl Stage for SampleOrientation<'_> {
         let times = self.times.value()?;
         if let Some(support) = &times.support {
             let epochs = epochs(times, self.orientation.intervals);
-            return support_orientation(times, &support.tables, &epochs);
+            let mut orientation = support_orientation(times, &support.tables, &epochs)?;
+            orientation
+                .invalid_because
+                .extend(self.contradiction(times)?);
+            return Ok(orientation);
         }
         sample_orientation(
             self.kernels.session()?,
@@ -74,13 +79,17 @@ impl Stage for SampleOrientation<'_> {
     /// Whether position and attitude can be read throughout the image, and are valid.
     fn examine(&self) -> Vec<Result<String>> {
         // Failures of times or kernels have been reported.
-        let (Some(times), Some(_)) = (self.times.get(), self.kernels.kernels()) else {
+        let Some(times) = self.times.get() else {
             return Vec::new();
         };
         if let Some(support) = &times.support {
             let epochs = epochs(times, self.orientation.intervals);
             let sampled = support_orientation(times, &support.tables, &epochs);
-            return vec![sampled.map(|_| finding(times, &[]))];
+            let invalid = sampled.and_then(|_| self.contradiction(times));
+            return vec![invalid.map(|reason| finding(times, reason.as_slice()))];
+        }
+        if self.kernels.kernels().is_none() {
+            return Vec::new();
         }
         let session = self.kernels.session();
         let invalid = session.and_then(|session| {
@@ -93,6 +102,13 @@ impl Stage for SampleOrientation<'_> {
             )
         });
         vec![invalid.map(|reasons| finding(times, &reasons))]
+    }
+}
+
+impl SampleOrientation<'_> {
+    /// The contradiction of support data with the kernels beside them.
+    fn contradiction(&self, times: &ImageTimes) -> Result<Option<String>> {
+        against_kernels::contradiction(times, self.kernels, self.coverage, self.pointing)
     }
 }
 

@@ -2,6 +2,7 @@
 //! data, which contain them.
 
 mod agreement;
+mod camera;
 mod detector;
 mod error;
 mod pieces;
@@ -14,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 pub use agreement::Disagreement;
 use agreement::{mounting_agrees, of_one_clock, of_one_product, start_agrees, stop_agrees};
+use camera::camera_agrees;
 use detector::{PartOfLine, fits_detector};
 use error::ImageError;
 use pieces::{Pieces, rows_of};
@@ -22,7 +24,10 @@ use support::supported;
 
 use crate::{
     body::Body,
-    config::{ImageConfig, PointingConfig, UsedBias, built_in_instruments, usual_instrument},
+    config::{
+        ImageConfig, PointingConfig, UsedBias, all_instruments, built_in_instruments,
+        usual_instrument,
+    },
     error::{Locate, Result},
     files::HashedFile,
     geom::pushbroom::Detector,
@@ -65,6 +70,8 @@ pub struct ImageTimes {
     pub samples: u32,
     /// First detector pixel, counted from 0.
     pub first_detector: u32,
+    /// Whether its label states the end of its lines, with which their period was compared.
+    pub has_stop_time: bool,
     /// What the reader should know, one sentence each.
     pub notes: Vec<String>,
     /// Disagreements that must be weighed, one sentence each.
@@ -266,6 +273,7 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
         };
         remarks.push(part.on_first_pixel(&image.id, tells_lines)?.into());
     }
+    remarks.extend(camera_agrees(&instrument, all_instruments()));
     of_one_clock(image, instrument.spacecraft, fields.sclk_start.as_deref())?;
     let told = start_time(image, &fields, session, &mut notes, &mut remarks)?;
     let pieces = Pieces {
@@ -289,9 +297,8 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
             .utc_start
             .as_deref()
             .map_or(Ok(start), |utc| session.utc_to_et(utc))?;
-        let of_lines = (lines_header, line_times.mean_period_s());
-        let remark = stop_agrees(&image.id, start, stop, of_lines)?;
-        remarks.extend(remark.map(Disagreement::from));
+        let of_lines = ([lines_header, lines_delivered], line_times.mean_period_s());
+        remarks.extend(stop_agrees(&image.id, start, stop, of_lines)?);
     }
     Ok(ImageTimes {
         id: image.id.clone(),
@@ -308,6 +315,7 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
         lines_delivered,
         samples,
         first_detector,
+        has_stop_time: utc_stop.is_some(),
         notes,
         remarks,
         support: None,
@@ -350,7 +358,7 @@ fn labelled(image: &ImageConfig) -> Result<(Instrument, Option<ImageLabel>)> {
         None => built_in_instruments(),
     };
     let label = read_label(path, cameras)?;
-    of_one_product(image, label.product_id.as_deref())?;
+    of_one_product(image, ("label is that", label.product_id.as_deref()))?;
     Ok((label.instrument.clone(), Some(label)))
 }
 

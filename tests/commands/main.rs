@@ -6,6 +6,7 @@ mod bad_input;
 mod common;
 mod compare_kernels;
 mod contradictions;
+mod contradictions_attitude;
 mod damaged_kernels;
 mod example_kernels;
 mod foreign_files;

@@ -271,6 +271,7 @@ mod tests {
             lines_delivered: lines,
             samples: 512,
             first_detector: 0,
+            has_stop_time: true,
             support: None,
             notes: Vec::new(),
             remarks: Vec::new(),

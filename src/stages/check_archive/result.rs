@@ -182,6 +182,7 @@ impl ArchiveRanges {
             valid: reasons.is_empty(),
             reasons,
             remarks,
+            untested: Vec::new(),
             checks: Vec::new(),
         }
     }

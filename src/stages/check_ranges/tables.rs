@@ -1,8 +1,8 @@
 //! The range check of shots of tables: measured range against the table's own spacecraft, and against the spacecraft of
-//! images with its laser, where one was exposed at that time.
+//! images with its laser, where one was exposed at that time, or else against that of the kernels, where they cover it.
 //!
-//! A table without positions of the spacecraft (`has_own_spacecraft`) is compared with the kernels, where these cover a
-//! profile; else its ranges are not tested. For other tables no kernels are read.
+//! A table without positions of the spacecraft (`has_own_spacecraft`) is compared with the kernels alone, where these
+//! cover a profile; else its ranges are not tested.
 //!
 //! `ImageTimes::has_laser` marks images with the laser. No other stage after `search_footprints` distinguishes tables
 //! from PEDR files.
@@ -15,6 +15,7 @@ use super::{
 };
 use crate::{
     altimetry::MolaClock,
+    body::Body,
     config::RangeCheckConfig,
     error::{Result, Stopped},
     footprints::Footprints,
@@ -43,7 +44,7 @@ stage_inputs! {
         pub profiles: &'a Output<Vec<Profile>>,
         /// The images.
         pub images: InOrder<'a, Output<ImageTimes>>,
-        /// Kernels for the spacecraft of tables that have no position of it; else none.
+        /// Kernels that positions may depend on.
         pub kernels: &'a KernelView,
         /// The clock of the altimeter.
         pub mola_clock: &'a MolaClock,
@@ -68,12 +69,36 @@ impl Stage for CheckTableRanges<'_> {
             profiles,
             Spacecraft {
                 images: &images,
-                kernels: trajectory(self.kernels, profiles, reach_s)?.as_ref(),
+                kernels: self.trajectory(reach_s)?.as_ref(),
             },
             self.mola_clock,
             self.range_check,
             stop,
         )
+    }
+}
+
+impl CheckTableRanges<'_> {
+    /// The orbit of the spacecraft with the laser over the profiles that the kernels cover; `None` where they cover
+    /// none, and at other bodies.
+    fn trajectory(&self, reach_s: f64) -> Result<Option<Trajectory>> {
+        let body = self.converted.value()?.footprints.body;
+        let all = self.kernels.kernels().map_or(&[][..], |set| set.kernels());
+        let has_orbit = all.iter().any(|kernel| kernel.role == KernelRole::Spk);
+        if body != Body::Mars || !has_orbit {
+            return Ok(None);
+        }
+        let session = self.kernels.session()?;
+        let held = &session.coverage()?.spk;
+        let profiles = self.profiles.value()?.iter();
+        let reach = profiles.map(|profile| profile.interval.padded(reach_s));
+        let is_held = |interval: &Interval| {
+            let open = Intervals::union_of([*interval]).without(held);
+            open.as_slice().is_empty()
+        };
+        let covered = Intervals::union_of(reach.filter(is_held));
+        let tabulated = session.trajectory(&covered, TRAJECTORY_TOLERANCE_M)?;
+        Ok((!covered.as_slice().is_empty()).then_some(tabulated))
     }
 }
 
@@ -86,33 +111,9 @@ pub struct Spacecraft<'a> {
     pub kernels: Option<&'a Trajectory>,
 }
 
-/// The trajectory over the profiles that the kernels cover; `None` without an ephemeris.
-fn trajectory(
-    kernels: &KernelView,
-    profiles: &[Profile],
-    reach_s: f64,
-) -> Result<Option<Trajectory>> {
-    let all = kernels.kernels().map_or(&[][..], |set| set.kernels());
-    if !all.iter().any(|kernel| kernel.role == KernelRole::Spk) {
-        return Ok(None);
-    }
-    let session = kernels.session()?;
-    let held = &session.coverage()?.spk;
-    let reach = profiles
-        .iter()
-        .map(|profile| profile.interval.padded(reach_s));
-    let is_held = |interval: &Interval| {
-        let open = Intervals::union_of([*interval]).without(held);
-        open.as_slice().is_empty()
-    };
-    let covered = Intervals::union_of(reach.filter(is_held));
-    let tabulated = session.trajectory(&covered, TRAJECTORY_TOLERANCE_M)?;
-    Ok((!covered.as_slice().is_empty()).then_some(tabulated))
-}
-
 /// Checks the ranges of every profile against the spacecraft of the table, and against that of support data or kernels.
 ///
-/// Residuals exist for shots that both cover; the table's own spacecraft is judged by all shots.
+/// Residuals exist for shots that support data or kernels cover; the table's own spacecraft is judged by all shots.
 ///
 /// # Errors
 /// [`Stopped`].
@@ -132,10 +133,9 @@ pub fn check_table_ranges(
         for row in &profile.rows {
             let shot = footprints.row(*row as usize);
             let at = clock.spacecraft_time(shot.et_tag_s);
-            let is_own = has_own_spacecraft(&shot);
-            if let Some(state) = spacecraft.state(at, is_own) {
+            if let Some(state) = spacecraft.state(at) {
                 let mut residuals = RangeResiduals::of(&shot, &state);
-                if !is_own {
+                if !has_own_spacecraft(&shot) {
                     residuals.forget_own();
                 }
                 shots.push(index, *row, &residuals);
@@ -145,7 +145,9 @@ pub fn check_table_ranges(
         shots.outlier.extend(flags);
         let mut ranges = statistics(profile, &shots, first, None, footprints);
         by_own_spacecraft(&mut ranges, footprints, profile, limits);
-        let explain = || "the support data hold a different orbit from the table's".to_owned();
+        let explain = || {
+            "support data or kernels hold a different orbit from the table's, or its times or radii are others".to_owned()
+        };
         ranges.invalid_because = ranges.figures().broken_limits(limits, explain);
         checked.push(ranges);
     }
@@ -157,14 +159,11 @@ pub fn check_table_ranges(
 }
 
 impl Spacecraft<'_> {
-    /// The spacecraft at an instant, if known.
-    ///
-    /// * `is_own` – whether the table has a position of it: then no kernels are read
-    fn state(&self, at: Et, is_own: bool) -> Option<SpacecraftState> {
+    /// The spacecraft at an instant, if known: that of an image, else that of the kernels.
+    fn state(&self, at: Et) -> Option<SpacecraftState> {
         let of_image = self.images.iter().find_map(|image| of_image(image, at));
-        let kernels = self.kernels.filter(|_| !is_own);
         of_image.or_else(|| {
-            let (position, velocity_m_s) = kernels?.state(at)?;
+            let (position, velocity_m_s) = self.kernels?.state(at)?;
             Some(SpacecraftState::of(at, &position, &velocity_m_s))
         })
     }

@@ -31,7 +31,7 @@ impl AdjustmentEvidence<'_> {
     pub(super) fn invalid_because(&self, limits: &LimitsConfig) -> Vec<String> {
         let mut invalid = self.heights_off(limits);
         let reasons = |image: &JudgedImage| -> Vec<String> {
-            let id = image.id;
+            let id = image.id();
             // Faults of the orientation of the kernels are reported with it.
             let of_model = image.model.invalid_because.iter();
             of_model

@@ -5,7 +5,7 @@ use super::{
     CheckOutcome::{self, Fail, Pass, Warning},
     Evidence, JudgedImage,
     adjustment::{HEIGHT_LOOSE_M, HEIGHT_OUTLIERS_FEW},
-    clock_limit_s, surface,
+    beam, clock_limit_s, surface,
 };
 use crate::{
     config::LimitsConfig,
@@ -43,9 +43,11 @@ pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
     }
     let images = evidence.images.iter();
     let contradicted = images.filter(|image| image.contradictions().next().is_some());
-    checks.extend(contradicted.map(|image| Check::told(CheckKind::Contradiction, image.id, Fail)));
+    checks
+        .extend(contradicted.map(|image| Check::told(CheckKind::Contradiction, image.id(), Fail)));
     checks.extend(of_ranges(evidence));
     checks.extend(clock(evidence));
+    checks.extend(beam::checks(evidence));
     let adjusted = evidence.adjustment.iter().flat_map(|of| of.images);
     checks.extend(of_images(evidence, adjusted));
     if let Some(adjustment) = &evidence.adjustment {
@@ -168,8 +170,8 @@ fn of_images<'a>(
     let images: Vec<(String, &JudgedImage)> = evidence
         .images
         .iter()
-        .map(|image| (image.id.to_owned(), image))
-        .chain(adjusted.map(|image| (format!("{}, adjusted", image.id), image)))
+        .map(|image| (image.id().to_owned(), image))
+        .chain(adjusted.map(|image| (format!("{}, adjusted", image.id()), image)))
         .collect();
     let limits = evidence.orientation_limits;
     let quantities: [Quantity<JudgedImage>; 3] = [
@@ -208,7 +210,7 @@ fn of_images<'a>(
         } else {
             Warning
         };
-        Check::told(CheckKind::Attitude, image.id, outcome)
+        Check::told(CheckKind::Attitude, image.id(), outcome)
     });
     checks.extend(Check::worst(attitudes));
     checks

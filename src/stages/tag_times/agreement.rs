@@ -34,7 +34,7 @@ const DISPLACEMENT_MAX_M: f64 = 100.0;
 /// m on the ground, a hundred times the rounding of angles in kernels.
 const MOUNTING_RAD: f64 = 1e-5;
 /// Height of the mapping orbit, metres: converts angles into distances on the ground.
-const HEIGHT_M: f64 = 380_000.0;
+pub(super) const HEIGHT_M: f64 = 380_000.0;
 
 /// Two statements about an image that differ by less than an error.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -68,13 +68,15 @@ impl From<String> for Disagreement {
 #[cause(Input)]
 pub(super) enum Contradiction {
     #[error(
-        "image {image}: the label is that of product {product}; expected {expected}, which its identifier names"
+        "image {image}: the {source_is} of product {product}; expected {expected}, which its identifier names"
     )]
     #[cause(
-        "check that labels are not exchanged; an identifier that names no product is valid with any label"
+        "check that labels or support data are not exchanged; an identifier that names no product is valid with any of \
+         them"
     )]
     Product {
         image: String,
+        source_is: &'static str,
         product: String,
         expected: String,
     },
@@ -127,10 +129,11 @@ pub(super) enum Contradiction {
     },
 }
 
-/// The product of the label must be the one that the image's identifier names, where both name a product.
+/// The product of the label or of support data must be the one that the image's identifier names, where both name a
+/// product.
 pub(super) fn of_one_product(
     image: &ImageConfig,
-    product: Option<&str>,
+    (source_is, product): (&'static str, Option<&str>),
 ) -> Result<(), Contradiction> {
     let (Some(product), Some(named)) = (product, product_named(&image.id)) else {
         return Ok(());
@@ -138,6 +141,7 @@ pub(super) fn of_one_product(
     match product_named(product) {
         Some(found) if found != named => Err(Contradiction::Product {
             image: image.id.clone(),
+            source_is,
             product: product.to_owned(),
             expected: named,
         }),
@@ -250,16 +254,22 @@ pub(super) fn piece_follows(piece: &LinePiece, next: &LinePiece) -> Option<Strin
     })
 }
 
-/// A remark on a stop time that does not agree with the lines.
+/// A stop time that does not agree with the lines, those of the header and those delivered.
+///
+/// The period of the lines and the stop time are two statements of which the period is used without proof: a difference
+/// displaces the last line. A stop time of the delivered lines is a remark.
 pub(super) fn stop_agrees(
     image: &str,
     start: Et,
     (utc, stop): (&str, Et),
-    (lines, line_period_s): (u32, f64),
-) -> Result<Option<String>, Contradiction> {
-    let (after_s, duration_s) = (stop.since(start), f64::from(lines) * line_period_s);
+    ([lines, delivered], line_period_s): ([u32; 2], f64),
+) -> Result<Option<Disagreement>, Contradiction> {
+    let after_s = stop.since(start);
+    let [duration_s, delivered_s] =
+        [lines, delivered].map(|count| f64::from(count) * line_period_s);
     let apart_s = (after_s - duration_s).abs();
-    if apart_s <= close_s(utc) + line_period_s {
+    let close_s = close_s(utc) + line_period_s;
+    if apart_s <= close_s {
         return Ok(None);
     }
     let alike = after_s <= 2.0 * duration_s && duration_s <= 2.0 * after_s;
@@ -272,11 +282,21 @@ pub(super) fn stop_agrees(
             duration_s,
         });
     }
-    Ok(Some(format!(
-        "STOP_TIME {utc} is {after_s:.3} s after the start, but {lines} lines of {:.4} ms take {duration_s:.3} s; lines, \
-         exposure or summing may not be those of the image",
-        line_period_s / SECONDS_PER_MS
-    )))
+    let is_of_delivered = (after_s - delivered_s).abs() <= close_s;
+    let ground_m = if is_of_delivered {
+        0.0
+    } else {
+        apart_s * GROUND_SPEED_M_S
+    };
+    Ok(Some(Disagreement {
+        text: format!(
+            "STOP_TIME {utc} is {after_s:.3} s after the start, but {lines} lines of {:.4} ms take {duration_s:.3} s, {} on the \
+             ground; lines, exposure or summing may not be those of the image",
+            line_period_s / SECONDS_PER_MS,
+            ground(apart_s * GROUND_SPEED_M_S)
+        ),
+        ground_m,
+    }))
 }
 
 /// A remark on a camera whose mounting differs between the kernels and its instrument file.
@@ -306,7 +326,7 @@ fn close_s(utc: &str) -> f64 {
     written_s.max(CLOSE_S)
 }
 
-fn ground(metres: f64) -> String {
+pub(super) fn ground(metres: f64) -> String {
     if metres < 1_000.0 {
         format!("{metres:.0} m")
     } else {
@@ -362,7 +382,7 @@ mod tests {
     fn a_stop_time_belongs_to_the_lines() {
         let stop = |after_s: f64| {
             let at = Et::from_seconds;
-            let lines = (8_064, 0.001_446_201);
+            let lines = ([8_064, 7_680], 0.001_446_201);
             stop_agrees(
                 "i",
                 at(5.0),
@@ -372,8 +392,12 @@ mod tests {
         };
         assert_eq!(stop(11.658).unwrap(), None);
         // The lines that the file lacks, of this image and of one with half as many.
-        assert!(stop(11.107).unwrap().unwrap().contains("take 11.662 s"));
-        assert!(stop(22.0).unwrap().is_some());
+        let delivered = stop(11.107).unwrap().unwrap();
+        assert!(delivered.text.contains("take 11.662 s"), "{delivered:?}");
+        assert!(!delivered.is_beyond_accuracy());
+        for displaced_s in [22.0, 13.662, 11.662 / 1.2] {
+            assert!(stop(displaced_s).unwrap().unwrap().is_beyond_accuracy());
+        }
         for contradicting_s in [3_611.658, -0.1, 5.0, 24.0, f64::NAN] {
             assert!(stop(contradicting_s).is_err(), "{contradicting_s} s");
         }
@@ -381,11 +405,11 @@ mod tests {
 
     #[test]
     fn identifier_and_serial_number_are_those_of_the_label() {
-        let label = Some("E02/02016");
+        let label = ("label is that", Some("E02/02016"));
         for id in ["E02-02016", "e0202016_part", "nadir"] {
             assert!(of_one_product(&image(id, None), label).is_ok(), "{id}");
         }
-        assert!(of_one_product(&image("E02-01301", None), None).is_ok());
+        assert!(of_one_product(&image("E02-01301", None), ("label is that", None)).is_ok());
         assert_eq!(
             of_one_product(&image("E02-01301", None), label)
                 .unwrap_err()

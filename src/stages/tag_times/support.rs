@@ -4,10 +4,13 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Disagreement, ImageTimes, StartFrom};
+use super::{
+    Disagreement, ImageTimes, StartFrom, agreement::of_one_product, camera::camera_agrees,
+};
 use crate::{
     body::Body,
-    config::ImageConfig,
+    config::{ImageConfig, all_instruments},
+    constants::Spacecraft,
     error::Result,
     files::{HashedFile, file_name},
     pds::isd::{ImageSupport, SupportTables, read_isd},
@@ -44,6 +47,10 @@ impl SupportFile {
     ) -> Result<(ImageSupport, Self)> {
         let said = read_isd(path)?;
         said.sees(body, &image.id)?;
+        of_one_product(
+            image,
+            ("support data are those", said.identifier.as_deref()),
+        )?;
         let file = Self {
             name: file_name(path),
             bytes: hashed.map_or(0, |file| file.bytes),
@@ -53,6 +60,12 @@ impl SupportFile {
             tables: said.tables.clone(),
         };
         Ok((said, file))
+    }
+
+    /// Whether it names this spacecraft.
+    #[must_use]
+    pub fn is_of(&self, spacecraft: &Spacecraft) -> bool {
+        spacecraft.label_name.eq_ignore_ascii_case(&self.platform)
     }
 
     /// A note on what is used from the file.
@@ -77,7 +90,12 @@ pub(super) fn supported(
     let start = said.line_times.start();
     session.require_published_utc(start)?;
     let period_s = said.line_times.mean_period_s();
-    let remark = file.tables.frame_remark(body, &file.name, start);
+    let turned = file.tables.frame_remark(body, &file.name, start);
+    let mut remarks: Vec<Disagreement> = turned.map(Disagreement::from).into_iter().collect();
+    // A number of NAIF is that of its spacecraft only.
+    if file.is_of(said.instrument.spacecraft) {
+        remarks.extend(camera_agrees(&said.instrument, all_instruments()));
+    }
     Ok(ImageTimes {
         id: image.id.clone(),
         body,
@@ -90,8 +108,9 @@ pub(super) fn supported(
         lines_delivered: said.line_times.lines(),
         samples: said.samples,
         first_detector: said.first_detector,
+        has_stop_time: false,
         notes: vec![file.note()],
-        remarks: remark.map(Disagreement::from).into_iter().collect(),
+        remarks,
         instrument: said.instrument,
         line_times: said.line_times,
         support: Some(file),

@@ -32,6 +32,16 @@ pub enum CheckKind {
     Shots,
     /// Clock correction of least spread minus the configured one.
     ClockCorrection,
+    /// Footprints of simultaneous shots in an image, of those that the mountings of camera and laser place in it.
+    FootprintsInside,
+    /// Distance between the spacecraft of support data and of the altimeter's file.
+    SupportPosition,
+    /// Angle along the track between the beam in the altimeter's file and its mounting by the attitude of the images.
+    BeamAlong,
+    /// The same across the track.
+    BeamAcross,
+    /// Epochs of an image at which its boresight meets the body.
+    BoresightMeets,
     /// Median height of tie points above the MOLA surface, adjusted: MOLA is part of a default adjustment.
     HeightAfter,
     /// Share of tie points that lie farther from the MOLA surface than 3.29 of their standard deviations, or were
@@ -150,6 +160,11 @@ impl CheckKind {
             Self::RangeOutliers => "Outliers among ranges",
             Self::Shots => "Shots in the longest profile",
             Self::ClockCorrection => "Clock correction, best − configured",
+            Self::FootprintsInside => "Simultaneous footprints in the image",
+            Self::SupportPosition => "Position in support data against the PEDR",
+            Self::BeamAlong => "Laser beam by the attitude, along track",
+            Self::BeamAcross => "Laser beam by the attitude, across track",
+            Self::BoresightMeets => "Boresight meets the body (epochs)",
             Self::ParallaxAfter => "Along-track parallax, adjusted",
             Self::ParallaxBefore => "Along-track parallax, before",
             Self::TieResidualsAlong => "Tie residuals along track",
@@ -200,6 +215,7 @@ impl CheckKind {
             | Self::SurfaceHeight
             | Self::RangeMean
             | Self::OrbitsApart
+            | Self::SupportPosition
             | Self::Decoding
             | Self::ParallaxAfter
             | Self::ParallaxBefore
@@ -231,12 +247,15 @@ impl CheckKind {
             | Self::ControlPlane
             | Self::ControlHeight
             | Self::OtherOrbits => "σ",
+            Self::BeamAlong | Self::BeamAcross => "mrad",
             Self::RoundShift => "cells",
             Self::ClockCorrection => "s",
             Self::PointingRmse => "″",
             Self::TableError | Self::LinesAgree | Self::CameraMoved => "px",
             Self::Contradiction
             | Self::Footprints
+            | Self::FootprintsInside
+            | Self::BoresightMeets
             | Self::AdjustmentMade
             | Self::ImagesJoined
             | Self::PairsJoined
@@ -257,6 +276,8 @@ impl CheckKind {
         matches!(
             self,
             Self::Footprints
+                | Self::FootprintsInside
+                | Self::BoresightMeets
                 | Self::ImagesJoined
                 | Self::PairsJoined
                 | Self::Shots
@@ -280,6 +301,8 @@ impl CheckKind {
                 | Self::RangeMean
                 | Self::Decoding
                 | Self::ClockCorrection
+                | Self::BeamAlong
+                | Self::BeamAcross
                 | Self::ParallaxAfter
                 | Self::ParallaxBefore
                 | Self::ProfilesApart
@@ -294,6 +317,8 @@ impl CheckKind {
             Self::ClockCorrection | Self::TableError => 4,
             Self::RangeMean
             | Self::Decoding
+            | Self::BeamAlong
+            | Self::BeamAcross
             | Self::PositionRmse
             | Self::LinesAgree
             | Self::VarianceComponents

@@ -76,6 +76,8 @@ pub struct ImageSupport {
     pub target: Option<i64>,
     /// Name of the spacecraft.
     pub platform: String,
+    /// Identifier of the image, where it is stated.
+    pub identifier: Option<String>,
     /// Positions and rotations.
     pub tables: SupportTables,
 }
@@ -150,6 +152,8 @@ fn parse(text: &[u8]) -> Result<ImageSupport> {
         radii_m,
         target: target(&document)?,
         platform: document.text("name_platform")?.to_owned(),
+        // An identifier of another kind, as a number, names no product.
+        identifier: document.text("image_identifier").ok().map(str::to_owned),
         tables,
     })
 }
