@@ -223,7 +223,22 @@ fn sight(of: &Calibration) -> String {
         };
         table.row(true, [shares.join(" ").into(), sigma.into()]);
     }
-    paragraph(&words) + &table.finish()
+    paragraph(&words) + &table.finish() + &on_ground(of)
+}
+
+/// The test of ties against the ground.
+fn on_ground(of: &Calibration) -> String {
+    let Some((ground, limit_m)) = of.tie_ground.and_then(|of| Some((of, of.limit_m?))) else {
+        return paragraph(
+            "Ties do not show measurements that are wrong along the flight, and their heights were not tested.",
+        );
+    };
+    paragraph(&format!(
+        "Ties do not show measurements that are wrong along the flight: these change heights. The heights of {} tie points were \
+         compared with the ground between laser points. Those farther from it than {limit_m:.0} m (median of {:.1} standard \
+         deviations) were left out; smaller errors are not identified.",
+        ground.tested, ground.limit_sigmas
+    ))
 }
 
 /// Three significant digits.
@@ -277,7 +292,9 @@ fn cameras(of: &Calibration) -> String {
 
 fn validation(of: &Calibration) -> String {
     if of.validation.is_empty() {
-        return paragraph("No other orbit was given ([[validation]]).");
+        return paragraph(
+            "No other orbit was given ([[validation]]). An error common to all laser points is not tested.",
+        );
     }
     let mut table = Table::new(
         "Other orbits without and with the calibration, as in tables 6 and 7 of Li et al. 2023",
@@ -298,5 +315,32 @@ fn validation(of: &Calibration) -> String {
             table.row(true, cells);
         }
     }
-    table.finish()
+    table.finish() + &offsets(of)
+}
+
+/// Mean offsets of control, and what they leave untested.
+fn offsets(of: &Calibration) -> String {
+    let mut table = Table::new(
+        "Mean offset of control with the calibration",
+        &[
+            Column::Text("orbit"),
+            Column::Text("control"),
+            Column::Number("offset, m"),
+            Column::Number("σ of the mean, m"),
+            Column::Number("limit, m"),
+        ],
+    );
+    for orbit in &of.validation {
+        for offset in &orbit.offsets {
+            let camera = offset.camera.as_ref();
+            let what = camera.map_or_else(|| "height".to_owned(), |of| format!("plane, {of}"));
+            let metres = [offset.offset_m, offset.mean_sigma_m, offset.limit_m];
+            let mut cells: Vec<Cell> = vec![(&orbit.orbit).into(), what.into()];
+            cells.extend(metres.map(|of| label(of, 1).into()));
+            table.row(true, cells);
+        }
+    }
+    let words = "The σ of the mean contains measurement and laser. The limit leaves room for constant errors of the orbits. An \
+                 error common to the laser points of all orbits, such as another reference sphere, is not tested.";
+    table.finish() + &paragraph(words)
 }

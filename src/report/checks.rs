@@ -193,7 +193,10 @@ const fn section(kind: CheckKind) -> Option<&'static Section> {
         | CheckKind::MeasurementsFlagged
         | CheckKind::ControlsKept
         | CheckKind::ControlsRefused
-        | CheckKind::Seams => return None,
+        | CheckKind::Seams
+        | CheckKind::PictureScale
+        | CheckKind::ControlStretch
+        | CheckKind::OtherOrbitsOffset => return None,
     })
 }
 

@@ -11,6 +11,7 @@
 
 use crate::common;
 
+mod blunders;
 mod refused;
 
 use std::{fs, path::Path, sync::atomic::AtomicBool};

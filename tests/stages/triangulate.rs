@@ -12,6 +12,8 @@
 
 use crate::common;
 
+mod sound;
+
 use std::{
     collections::{BTreeMap, BTreeSet},
     fs,

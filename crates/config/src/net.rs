@@ -127,8 +127,8 @@ declare_table! {
     /// A priori data of the pictures. Without this table the pictures are those of the measurements.
     pub struct PicturesConfig {
         /// Paths or globs of tables (.csv), one row per picture: `picture`, and where known `brick`, the name of its
-        /// brick, and `metres_per_unit`, the size of a unit of its coordinates on the ground, from which the adjusted
-        /// one may differ by a factor of 2.
+        /// brick, and `metres_per_unit`, the size of a unit of its coordinates on the ground, which tests the scale
+        /// of the controls: where the adjusted one differs by more than 2 %, the net is invalid.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs).or(Vec::new()).unused(r#"["pictures.csv"]"#),
     }

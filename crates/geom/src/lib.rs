@@ -52,6 +52,7 @@ pub mod pushbroom;
 pub mod random;
 pub mod range_residuals;
 pub mod robust;
+pub mod scattered_heights;
 pub mod statistics;
 pub mod surface;
 pub mod uncertainty;

@@ -16,7 +16,7 @@ use crate::{
     stages::{
         calibrate::{
             CalibrationRound, CalibrationStep, CameraResult, HeldBack, PixelsAndMetres, Rounds,
-            Scatter, ValidationResult, Value,
+            Scatter, TieGround, ValidationResult, Value,
         },
         judge::Verdict,
     },
@@ -63,6 +63,9 @@ struct Document<'a> {
     drift_m_per_line: [Value; 3],
     /// Offset angles as determined by ties only.
     tie_sight: TieSightDocument,
+    /// Test of heights of tie points against the ground between laser points; absent where these are too few.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tie_ground: Option<TieGround>,
     /// Figures before, and after every step.
     steps: &'a [CalibrationStep],
     /// The rounds of a calibration from pixels (other members are of the last); absent where points were read from
@@ -213,6 +216,7 @@ impl<'a> Document<'a> {
             cameras: result.cameras.iter().map(camera).collect(),
             drift_m_per_line: result.drift_m_per_line,
             tie_sight: tie_sight(&result.tie_sight),
+            tie_ground: result.tie_ground,
             steps: &result.steps,
             rounds: result.rounds.as_ref().map(rounds),
             held_back: result.held_back.as_ref(),

@@ -1,10 +1,14 @@
 //! Tests of a calibration by other orbits, which are independent of it.
 
-use super::result::{CameraResult, PointKind, ValidationResult};
+use super::result::{CameraResult, ControlOffset, PointKind, ValidationResult};
 use crate::stages::judge::{Check, CheckKind, CheckOutcome};
 
 /// A figure of control may worsen by this many standard deviations of measurement and laser.
 const WORSE_MAX: f64 = 3.0;
+/// The control of another orbit may be off on average by this many standard deviations of one of its points. The mean
+/// itself is far better known: this is what constant errors of two orbits may differ by, which no point separates from
+/// an error of the control that made the calibration.
+pub(super) const OFFSET_MAX: f64 = 1.5;
 /// Growth of tie residuals above which a remark states it.
 const TIES_WORSE: f64 = 1.05;
 /// Remaining share of an error of control above which a remark states it.
@@ -34,6 +38,8 @@ pub(super) struct Elsewhere {
     pub(super) remarks: Vec<String>,
     /// Of every figure of control in every orbit.
     pub(super) checks: Vec<Check>,
+    /// Of every mean offset.
+    pub(super) offsets: Vec<Check>,
 }
 
 /// Compares every orbit without the calibration and with it.
@@ -47,8 +53,10 @@ pub(super) fn elsewhere(
     let mut found = Elsewhere::default();
     for (orbit, noise) in validation.iter().zip(noise) {
         found.remarks.extend(ties(orbit, cameras));
+        let mut is_worse = false;
         for compared in control(orbit, *noise, cameras, &mut found.remarks) {
             found.checks.push(compared.check(&orbit.orbit));
+            is_worse |= compared.reason().is_some();
             match compared.reason() {
                 Some(reason) => found
                     .reasons
@@ -61,8 +69,52 @@ pub(super) fn elsewhere(
                 None => {}
             }
         }
+        found
+            .offsets
+            .extend(orbit.offsets.iter().map(|of| of.check(&orbit.orbit)));
+        if !is_worse {
+            let reasons = orbit.offsets.iter().filter_map(ControlOffset::reason);
+            let reasons = reasons.map(|reason| format!("orbit {}: {reason}", orbit.orbit));
+            found.reasons.extend(reasons);
+        }
     }
     found
+}
+
+impl ControlOffset {
+    fn words(&self) -> String {
+        self.camera.as_ref().map_or_else(
+            || "in height".to_owned(),
+            |camera| format!("in the plane of camera {camera}"),
+        )
+    }
+
+    fn check(&self, orbit: &str) -> Check {
+        let subject = format!("{orbit}: control {}", self.words());
+        let sigmas = self.offset_m / self.point_sigma_m;
+        Check::new(
+            CheckKind::OtherOrbitsOffset,
+            subject,
+            sigmas,
+            OFFSET_MAX,
+            CheckOutcome::Fail,
+        )
+    }
+
+    fn reason(&self) -> Option<String> {
+        // Written so that NaN counts.
+        (!(self.offset_m <= self.limit_m)).then(|| {
+            format!(
+                "control {} is off by {:.0} m ± {:.0} m on average with the calibration; expected at most {:.0} m, {OFFSET_MAX} standard \
+                 deviations of one of its points: the laser points of both orbits contradict each other, or the orbits do; check datum \
+                 and reference sphere of both",
+                self.words(),
+                self.offset_m,
+                self.mean_sigma_m,
+                self.limit_m
+            )
+        })
+    }
 }
 
 /// Ties that the calibration makes worse.

@@ -38,6 +38,8 @@ pub(super) struct Evidence<'a> {
     pub(super) validation_noise: &'a [Noise],
     /// Points, and those that were left out: ties, then control.
     pub(super) left_out: [[usize; 2]; 2],
+    /// What no point tests.
+    pub(super) untested: Vec<String>,
     /// A priori knowledge.
     pub(super) known: Known,
     /// Remarks on the body's frame in the support data.
@@ -103,6 +105,7 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
     remarks.extend(elsewhere.remarks);
     let mut checks = checks(of);
     checks.extend(Check::worst(elsewhere.checks.into_iter()));
+    checks.extend(Check::worst(elsewhere.offsets.into_iter()));
     Verdict::of(reasons, remarks, checks)
 }
 
@@ -246,7 +249,7 @@ fn coarse(held_back: &HeldBack, known: Known) -> Option<String> {
 }
 
 fn remarks(of: &Evidence<'_>) -> Vec<String> {
-    let mut remarks = of.of_frames.clone();
+    let mut remarks = [&*of.of_frames, &*of.untested].concat();
     let mut say = |when: bool, text: String| {
         if when {
             remarks.push(text);

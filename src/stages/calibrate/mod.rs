@@ -9,6 +9,7 @@ mod elsewhere;
 mod error;
 mod geometry;
 mod given;
+mod ground;
 mod judge;
 mod measure;
 mod outcome;
@@ -34,9 +35,9 @@ pub use demands::CONTROLS_MIN;
 pub use error::CalibrateError;
 pub use given::GivenPoints;
 pub use result::{
-    Calibration, CalibrationRound, CalibrationStep, CameraResult, ControlFigures, Figures,
-    HeldBack, ImageResult, PixelsAndMetres, PointKind, PointResult, Rounds, Scatter, Scattered,
-    TieFigures, ValidationResult, Value,
+    Calibration, CalibrationRound, CalibrationStep, CameraResult, ControlFigures, ControlOffset,
+    Figures, HeldBack, ImageResult, PixelsAndMetres, PointKind, PointResult, Rounds, Scatter,
+    Scattered, TieFigures, TieGround, ValidationResult, Value,
 };
 pub use run::calibrate_given;
 
@@ -82,7 +83,7 @@ impl Input for CalibrationFiles<'_> {
 
 impl Stage for Calibrate<'_> {
     const NAME: &'static str = "calibrate";
-    const METHOD: u32 = 6;
+    const METHOD: u32 = 7;
     type Output = Calibration;
     stage_inputs!(fingerprint);
 

@@ -201,7 +201,7 @@ impl Outcome<'_> {
 
     pub(super) fn points(&self) -> Vec<PointResult> {
         let result = |of: &OrbitPoint| {
-            let placed = self.placed(of);
+            let placed = self.placed(of).filter(|_| !of.left_out);
             let place = placed.map(|(place_m, _)| {
                 let radius_m = place_m.norm();
                 let latitude = (place_m.z / radius_m).clamp(-1.0, 1.0).asin();

@@ -16,6 +16,8 @@ pub struct Calibration {
     pub drift_m_per_line: [Value; 3],
     /// Sensitivity of ties to the offset angles.
     pub tie_sight: TieSight,
+    /// The test of ties against the ground between laser points; `None` where these are too few.
+    pub tie_ground: Option<TieGround>,
     /// The figures before the first and after every step.
     pub steps: Vec<CalibrationStep>,
     /// Scatter of the control that was used; `None` without control.
@@ -36,6 +38,19 @@ pub struct Calibration {
     pub complaints: Vec<String>,
     /// Number of all complaints.
     pub complaint_count: u64,
+}
+
+/// The test of heights of tie points against the ground between laser points.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TieGround {
+    /// Tie points that were tested last.
+    pub tested: u64,
+    /// Height above or below the ground, in standard deviations, beyond which a tie point is left out.
+    #[schemars(range(min = 0.0))]
+    pub limit_sigmas: f64,
+    /// The same in metres, for the median of the tie points: smaller errors along the flight are not identified.
+    #[serde(skip_serializing_if = "crate::stored::is_left_out")]
+    pub limit_m: Option<f64>,
 }
 
 /// A number and its standard deviation.
@@ -260,6 +275,28 @@ pub struct ValidationResult {
     pub before: Figures,
     /// With the calibration, unchanged.
     pub after: Figures,
+    /// Mean offsets of its control with the calibration: in the plane of every camera, and in height.
+    pub offsets: Vec<ControlOffset>,
+}
+
+/// Mean offset of the control of another orbit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ControlOffset {
+    /// The camera in whose plane it is; absent for height.
+    #[serde(skip_serializing_if = "crate::stored::is_left_out")]
+    pub camera: Option<String>,
+    /// Length of the mean offset in the plane, or of the mean height above the laser, metres.
+    #[schemars(range(min = 0.0))]
+    pub offset_m: f64,
+    /// Standard deviation of one control point by measurement and laser, metres.
+    #[schemars(range(min = 0.0))]
+    pub point_sigma_m: f64,
+    /// Standard deviation of the mean, metres: errors of the orbit and of the calibration are additional.
+    #[schemars(range(min = 0.0))]
+    pub mean_sigma_m: f64,
+    /// The largest permitted offset, metres.
+    #[schemars(range(min = 0.0))]
+    pub limit_m: f64,
 }
 
 /// Use of a point.
@@ -296,7 +333,7 @@ pub struct PointResult {
     /// Whether it was left out.
     pub left_out: bool,
     /// East longitude, latitude, radians, and radius, metres, intersected from its images; `None` where they are too
-    /// few.
+    /// few, and for a point that was left out.
     pub place: Option<[f64; 3]>,
     /// Standard deviations east, north and up, metres.
     pub sigma_m: Option<[f64; 3]>,

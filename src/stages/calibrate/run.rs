@@ -8,11 +8,12 @@ use super::{
     error::CalibrateError,
     geometry::{CameraImage, Laboratory, Orbit},
     given::GivenPoints,
+    ground::{ground, off_ground, untested},
     judge::{Evidence, Known, judge},
     measure::figures,
     outcome::{self, Outcome},
     read::{OrbitPoint, PointSource, points_of},
-    result::{Calibration, CalibrationStep, PointKind},
+    result::{Calibration, CalibrationStep, PointKind, TieGround},
     tables::Complaints,
     validate::{Calibrated, validate},
 };
@@ -47,6 +48,8 @@ struct Work<'a> {
     steps: Vec<CalibrationStep>,
     state: CalibrationState,
     covariance: DMatrix<f64>,
+    /// The test of ties against the ground; `None` where it is not possible.
+    tie_ground: Option<TieGround>,
 }
 
 /// Calibrates the lines of a camera by the tables of its configuration.
@@ -95,6 +98,7 @@ fn calibrate_by(
         steps: Vec::new(),
         state,
         covariance: DMatrix::zeros(parameters, parameters),
+        tie_ground: None,
     };
     work.tell("before", "nothing", 0);
     let sight =
@@ -139,6 +143,7 @@ fn calibrate_by(
         validation: &validation,
         validation_noise: &validation_noise,
         left_out: left_out(&work.points),
+        untested: untested_words(&work),
         known: known(config, &orbit),
         of_frames: (orbit.images.iter().zip(&names))
             .filter_map(|(image, name)| image.frame_remark(config.body, name))
@@ -153,6 +158,7 @@ fn calibrate_by(
             config.a_priori.orbit_bias_m,
         ),
         tie_sight: sight,
+        tie_ground: work.tie_ground,
         points: outcome.points(),
         images: outcome.images(),
         cameras,
@@ -175,6 +181,20 @@ fn left_out(points: &[OrbitPoint]) -> [[usize; 2]; 2] {
             .filter(|of| (of.kind == PointKind::Tie) == tie);
         [of.clone().count(), of.filter(|of| of.left_out).count()]
     })
+}
+
+/// What no point tests, in words.
+fn untested_words(work: &Work<'_>) -> Vec<String> {
+    if !work.points.iter().any(|of| of.is(PointKind::Control)) {
+        // A reason states that there is no control.
+        return Vec::new();
+    }
+    let ground = work.tie_ground.is_none().then(|| untested(&work.points));
+    let orbit = work.config.validation.is_empty().then(|| {
+        "no other orbit ([[validation]]): an error common to all laser points, such as another reference sphere, is not tested"
+            .to_owned()
+    });
+    ground.into_iter().chain(orbit).collect()
 }
 
 fn known(config: &CalibrationConfig, orbit: &Orbit) -> Known {
@@ -336,7 +356,29 @@ impl Work<'_> {
                 }
             }
         }
-        any
+        self.leave_out_off_ground(complaints) || any
+    }
+
+    /// Leaves out ties whose heights contradict the ground between laser points.
+    fn leave_out_off_ground(&mut self, complaints: &mut Complaints) -> bool {
+        let Some(ground) = ground(&self.points) else {
+            self.tie_ground = None;
+            return false;
+        };
+        let (off, tested) = off_ground(&self.points, &ground, &self.state, &self.covariance);
+        self.tie_ground = (tested.tested > 0).then_some(tested);
+        for of in &off {
+            let point = &mut self.points[of.index];
+            point.left_out = true;
+            complaints.tell(format!(
+                "{}: its height is {:+.0} m from the ground between laser points, {:.1} standard deviations: a measurement is wrong along \
+                 the flight; left out",
+                point.name,
+                of.above_m,
+                of.sigmas.abs()
+            ));
+        }
+        !off.is_empty()
     }
 }
 

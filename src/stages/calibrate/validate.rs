@@ -1,15 +1,15 @@
 //! Other orbits, to which the calibration is applied unchanged.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector2};
 
 use super::{
     demands::{CONTROLS_MIN, belong_together, enough_ties},
-    elsewhere::Noise,
+    elsewhere::{Noise, OFFSET_MAX},
     error::CalibrateError,
     geometry::{CameraImage, Laboratory, Orbit},
     measure::{Squares, figures},
     read::{OrbitPoint, PointSource, points_of},
-    result::{PointKind, ValidationResult},
+    result::{ControlOffset, PointKind, ValidationResult},
     tables::Complaints,
 };
 use crate::{
@@ -17,7 +17,7 @@ use crate::{
     config::{CalibrationConfig, ValidationConfig},
     error::Result,
     files::{file_name, hash_file},
-    geom::calibration::CalibrationState,
+    geom::{calibration::CalibrationState, ellipsoid::local_axes},
 };
 
 /// Largest difference between the laboratory's geometry of two orbits, pixels: files are written with fifteen digits.
@@ -67,12 +67,71 @@ pub(super) fn validate(
         cameras: calibrated.state.cameras.clone(),
         ..CalibrationState::default()
     };
+    let noise = noise(&points, &unchanged);
     let result = ValidationResult {
         orbit: of.id.clone(),
         before: figures(&points, &laboratory.state, &pixels),
         after: figures(&points, &unchanged, &pixels),
+        offsets: offsets(&points, &unchanged, names, noise),
     };
-    Ok((result, noise(&points, &unchanged)))
+    Ok((result, noise))
+}
+
+/// Mean offsets of control under a calibration: in the plane of every camera, and in height.
+fn offsets(
+    points: &[OrbitPoint],
+    state: &CalibrationState,
+    names: &[String],
+    noise: Noise,
+) -> Vec<ControlOffset> {
+    let mut planes = vec![Mean::default(); names.len()];
+    let mut heights = Mean::default();
+    for of in points.iter().filter(|of| of.is(PointKind::Control)) {
+        let Some(known) = &of.point.known else {
+            continue;
+        };
+        for sight in &of.point.sights {
+            if let Some(seen_m) = sight.at_radius(state, known.place_m.norm()) {
+                let off_m = local_axes(&known.place_m) * (seen_m - known.place_m);
+                planes[sight.camera].add(off_m.xy());
+            }
+        }
+        if let Ok(place_m) = of.point.unaided().place(state) {
+            let above_m = place_m.norm() - known.place_m.norm();
+            heights.add(Vector2::new(above_m, 0.0));
+        }
+    }
+    let cameras = names.iter().zip(planes);
+    let planes = cameras.map(|(name, mean)| mean.offset(Some(name.clone()), noise.plane_m));
+    let height = heights.offset(None, noise.height_m);
+    planes.chain([height]).flatten().collect()
+}
+
+/// Sum of offsets.
+#[derive(Debug, Clone, Copy, Default)]
+struct Mean {
+    sum_m: Vector2<f64>,
+    count: u32,
+}
+
+impl Mean {
+    fn add(&mut self, off_m: Vector2<f64>) {
+        self.sum_m += off_m;
+        self.count += 1;
+    }
+
+    /// The mean with its limit; `None` without points or without their standard deviation.
+    fn offset(self, camera: Option<String>, point_sigma_m: Option<f64>) -> Option<ControlOffset> {
+        let point_sigma_m = point_sigma_m.filter(|_| self.count > 0)?;
+        let count = f64::from(self.count);
+        Some(ControlOffset {
+            camera,
+            offset_m: self.sum_m.norm() / count,
+            point_sigma_m,
+            mean_sigma_m: point_sigma_m / count.sqrt(),
+            limit_m: OFFSET_MAX * point_sigma_m,
+        })
+    }
 }
 
 /// Checks that an orbit shares no file with the calibration, by content.

@@ -1,6 +1,9 @@
 //! The verdict on a net.
 
-use super::result::{BrickResult, ControlResult, Seams, Totals};
+use super::{
+    result::{BrickResult, ControlResult, Seams, Totals},
+    scales::Scales,
+};
 use crate::stages::judge::{
     Check, CheckKind,
     CheckOutcome::{Fail, Warning},
@@ -16,6 +19,7 @@ pub(super) struct Evidence<'a> {
     pub(super) bricks: &'a [BrickResult],
     pub(super) seams: Option<&'a Seams>,
     pub(super) controls: &'a [ControlResult],
+    pub(super) scales: &'a Scales,
     pub(super) measurements: usize,
     pub(super) complaints: u64,
     pub(super) remarks: &'a [String],
@@ -24,7 +28,7 @@ pub(super) struct Evidence<'a> {
 /// Largest share of flagged measurements in a good net: two in a thousand exceed the limit by chance.
 const FLAGGED_MAX: f64 = 0.01;
 
-/// A net is invalid without redundancy, or with too many blunders.
+/// A net is invalid without redundancy, with too many blunders, or on controls of another scale or shape.
 pub(super) fn judge(of: &Evidence) -> Verdict {
     let totals = of.totals;
     let mut reasons = Vec::new();
@@ -40,6 +44,7 @@ pub(super) fn judge(of: &Evidence) -> Verdict {
             totals.removed, of.measurements
         ));
     }
+    reasons.extend(of.scales.reasons());
     Verdict::of(reasons, remarks(of), checks(of))
 }
 
@@ -95,6 +100,7 @@ fn checks(of: &Evidence) -> Vec<Check> {
             Warning,
         )
     }));
+    checks.extend(of.scales.checks());
     checks
 }
 
@@ -161,5 +167,6 @@ fn remarks(of: &Evidence) -> Vec<String> {
             ),
         );
     }
+    remarks.extend(of.scales.remarks());
     remarks
 }

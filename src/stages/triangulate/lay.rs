@@ -10,7 +10,7 @@ use crate::{
     config::{Blunders, NetConfig},
     geom::plane::{
         Block, Blunder, Figure, Net, Place, PlaneError, Scaled, brick, bricks_as_pictures, clean,
-        extend, grow_bricks, same_hand, scale,
+        extend, grow_bricks, same_hand, scale, settle_bricks,
     },
 };
 
@@ -29,28 +29,50 @@ pub(super) struct Laid {
     pub(super) remarks: Vec<String>,
 }
 
-/// Lays the bricks; bricks that areograph formed and that are not connected become one.
+/// Lays the bricks. Pictures that hang on one point in their brick are tied in another; bricks that are still not
+/// connected become one.
 pub(super) fn lay_with_fallback(
     config: &NetConfig,
     data: &NetData,
     names: &Names,
 ) -> Result<Laid, NetError> {
     let named = data.bricks.iter().any(|brick| !brick.is_empty());
-    let bricks = if named {
+    let mut bricks = if named {
         by_name(data)
     } else {
         by_growth(data, config.triangulation.brick_pictures as usize)
     };
+    let moved = settle(data, &mut bricks);
     match lay(config, data, names, &bricks) {
-        Err(NetError::Underconnected { .. }) if !named && bricks.len() > 1 => {
+        Err(NetError::Underconnected { .. }) if bricks.len() > 1 => {
             let all = vec![("1".to_owned(), (0..data.net.pictures).collect())];
             let mut laid = lay(config, data, names, &all)?;
             let text = "the pictures are not connected in bricks and were tied as one brick";
             laid.remarks.push(text.to_owned());
             Ok(laid)
         }
+        Ok(mut laid) => {
+            // Only names that a table gives are missed.
+            laid.remarks.extend(moved.into_iter().filter(|_| named));
+            Ok(laid)
+        }
         laid => laid,
     }
+}
+
+/// Moves pictures that hang on one point in their brick, and states each.
+fn settle(data: &NetData, bricks: &mut Bricks) -> Vec<String> {
+    let (names, mut pictures): (Vec<String>, Vec<Vec<usize>>) = bricks.drain(..).unzip();
+    let moved = settle_bricks(&data.net, &mut pictures);
+    let words = moved.iter().map(|of| {
+        format!(
+            "picture {} shares fewer than two points with the rest of brick {} and was tied in brick {}",
+            data.pictures[of.picture], names[of.from], names[of.to]
+        )
+    });
+    let words = words.collect();
+    *bricks = names.into_iter().zip(pictures).collect();
+    words
 }
 
 type Bricks = Vec<(String, Vec<usize>)>;

@@ -7,6 +7,7 @@ mod place;
 mod read;
 mod result;
 mod run;
+mod scales;
 mod spread;
 mod write;
 
@@ -64,7 +65,7 @@ impl Input for NetFiles<'_> {
 
 impl Stage for Triangulate<'_> {
     const NAME: &'static str = "triangulate";
-    const METHOD: u32 = 7;
+    const METHOD: u32 = 8;
     type Output = Triangulation;
     stage_inputs!(fingerprint);
 

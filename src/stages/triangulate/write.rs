@@ -11,6 +11,7 @@ use super::{
         BrickResult, ControlResult, Deviation, MeasurementResult, PictureResult, PointResult,
         Seams, ShrinkageResult, Totals, Triangulation,
     },
+    scales::{Scales, SizeCheck},
     spread::{half_side, largest, rms, rms_of_both},
 };
 use crate::{
@@ -29,6 +30,7 @@ pub(super) struct Report<'a> {
     pub(super) data: &'a NetData,
     pub(super) laid: &'a Laid,
     pub(super) placed: &'a Placed,
+    pub(super) sizes: &'a [SizeCheck],
 }
 
 impl Report<'_> {
@@ -50,6 +52,7 @@ impl Report<'_> {
             bricks: &bricks,
             seams: seams.as_ref(),
             controls: &controls,
+            scales: &Scales::of(self.sizes, &pictures, self.laid),
             measurements: measurements.len(),
             complaints: self.data.complaint_count,
             remarks: &remarks,

@@ -1,7 +1,8 @@
 //! Nets without a solution are refused by name.
 
 use areograph::geom::plane::{
-    Measurement, Net, Place, PlaneError, brick, find_mirrored, grow_bricks, solve,
+    Control, Measurement, Moved, Net, Place, PlaneError, brick, find_mirrored, grow_bricks,
+    same_hand, settle_bricks, solve,
 };
 
 use super::{TERTIARY, nine};
@@ -163,4 +164,156 @@ fn a_brick_in_two_pieces_names_the_picture_in_the_net() {
             ties: 0
         }
     );
+}
+
+/// Noise keeps the equations of a part that hangs on one point from being singular; the part is named all the same.
+#[test]
+fn a_part_that_hangs_on_one_point_is_named_in_spite_of_noise() {
+    let scene = nine(250.0).simulate(1);
+    let mut net = scene.net.clone();
+    let east = |picture: usize| picture % 3 == 2;
+    let views = |point: usize| {
+        let of = scene.net.measurements.iter();
+        of.filter(move |of| of.point == point).map(|of| of.picture)
+    };
+    let both = |point: usize| views(point).any(east) && views(point).any(|of| !east(of));
+    let hinge = (0..net.points).find(|point| both(*point)).unwrap();
+    net.measurements
+        .retain(|of| !east(of.picture) || of.point == hinge || !both(of.point));
+    let eastern = |point: usize| views(point).any(east);
+    net.controls.retain(|control| !eastern(control.point));
+    let PlaneError::UnderconnectedPicture { picture, .. } = failure(&net) else {
+        unreachable!("another failure");
+    };
+    assert!(east(picture), "{picture}");
+}
+
+/// Four pictures of which every two share one point are rigid, though no two share more.
+#[test]
+fn pictures_that_hold_each_other_by_single_points_are_solved() {
+    let at = |point: usize| Place::new((point * point % 7) as f64, (3 * point % 5) as f64);
+    let mut net = Net {
+        pictures: 4,
+        points: 8,
+        ..Net::default()
+    };
+    let mut point = 0;
+    for one in 0..4 {
+        for two in one + 1..4 {
+            for picture in [one, two] {
+                let at = at(point);
+                net.measurements.push(Measurement { picture, point, at });
+            }
+            point += 1;
+        }
+    }
+    // The first picture has a second control.
+    net.measurements.push(Measurement {
+        picture: 0,
+        point: 6,
+        at: at(6),
+    });
+    for point in [0, 6] {
+        net.controls.push(Control {
+            point,
+            at: at(point),
+            weight: 1.0,
+        });
+    }
+    let solution = solve(&net).unwrap();
+    for similarity in solution.pictures {
+        // Exact data leave rounding.
+        assert!(
+            (similarity.turn - Place::new(1.0, 0.0)).norm() < 1e-9,
+            "{similarity:?}"
+        );
+    }
+}
+
+/// Three points that two pictures have in common, one of them wrong, may fit a mirror image better: other pictures outvote
+/// them.
+#[test]
+fn a_wrong_point_does_not_mirror_a_picture() {
+    // Errors of a hundredth of a unit, over pictures of ten.
+    let place = |picture: usize, point: usize| {
+        let noise = |of: usize| 0.01 * ((of * 37 % 17) as f64 / 8.0 - 1.0);
+        Place::new((7 * point % 11) as f64, (5 * point % 13) as f64)
+            + Place::new(noise(3 * point + picture), noise(5 * point + 2 * picture))
+    };
+    let mut net = Net {
+        pictures: 3,
+        points: 20,
+        ..Net::default()
+    };
+    let mut measure = |picture: usize, points: std::ops::Range<usize>| {
+        for point in points {
+            let at = place(picture, point);
+            net.measurements.push(Measurement { picture, point, at });
+        }
+    };
+    // Twelve points in the first two pictures, of the third picture three in the first and five in the second.
+    measure(0, 0..15);
+    measure(1, 0..12);
+    measure(1, 15..20);
+    measure(2, 12..20);
+    assert_eq!(find_mirrored(&net), Ok(()));
+    // Point 12 as a mirror at the line of points 13 and 14 has it.
+    let (foot, along) = (place(2, 13), place(2, 14) - place(2, 13));
+    for measured in &mut net.measurements {
+        if (measured.picture, measured.point) == (2, 12) {
+            measured.at = foot + ((measured.at - foot) / along).conj() * along;
+        }
+    }
+    let pair: Vec<(Place, Place)> = (12..15)
+        .map(|point| {
+            let of = |picture: usize| {
+                let of = net.measurements.iter();
+                let mut of = of.filter(|of| (of.picture, of.point) == (picture, point));
+                of.next().unwrap().at
+            };
+            (of(0), of(2))
+        })
+        .collect();
+    assert_eq!(same_hand(&pair), Some(false));
+    assert_eq!(find_mirrored(&net), Ok(()));
+    // Without the second picture nothing speaks for the third.
+    net.measurements.retain(|of| of.picture != 1);
+    assert_eq!(
+        find_mirrored(&net),
+        Err(PlaneError::MirroredPicture { picture: 2 })
+    );
+}
+
+/// A picture that hangs on one point in its brick is tied in the brick that holds it.
+#[test]
+fn a_picture_that_hangs_on_one_point_is_tied_in_another_brick() {
+    let scene = TERTIARY.simulate(1);
+    let mut net = scene.net.clone();
+    // The column of pictures 4, 9, …, 24 is a brick; the last keeps one point of it.
+    let mut bricks = vec![
+        (0..25).filter(|of| of % 5 != 4).collect::<Vec<_>>(),
+        (0..25).filter(|of| of % 5 == 4).collect(),
+    ];
+    let of_brick: Vec<usize> = net
+        .measurements
+        .iter()
+        .filter(|of| [14, 19].contains(&of.picture))
+        .map(|of| of.point)
+        .collect();
+    let mut first = None;
+    net.measurements.retain(|of| {
+        let common = of.picture == 24 && of_brick.contains(&of.point);
+        !common || *first.get_or_insert(of.point) == of.point
+    });
+    let pictures = bricks[1].clone();
+    assert!(matches!(
+        brick(&net, &pictures),
+        Err(PlaneError::UnderconnectedPicture { picture: 24, .. })
+    ));
+    let moved = settle_bricks(&net, &mut bricks);
+    let (picture, from, to) = (24, 1, 0);
+    assert_eq!(moved, [Moved { picture, from, to }]);
+    for pictures in &bricks {
+        brick(&net, pictures).unwrap();
+    }
 }

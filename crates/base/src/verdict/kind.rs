@@ -135,6 +135,12 @@ pub enum CheckKind {
     ControlsRefused,
     /// Differences of bricks at their seams.
     Seams,
+    /// Scale of a picture by the controls against its stated scale.
+    PictureScale,
+    /// Stretch of the controls of a net against its pictures.
+    ControlStretch,
+    /// Mean offset of the control of an orbit that was not used in a calibration, in standard deviations of one point.
+    OtherOrbitsOffset,
 }
 
 impl CheckKind {
@@ -202,6 +208,9 @@ impl CheckKind {
             Self::ControlsKept => "Controls kept",
             Self::ControlsRefused => "Controls left out",
             Self::Seams => "Misfit of bricks at their seams",
+            Self::PictureScale => "Scale of a picture against metres_per_unit",
+            Self::ControlStretch => "Stretch of the controls",
+            Self::OtherOrbitsOffset => "Control of other orbits, mean offset",
         }
     }
 
@@ -234,7 +243,9 @@ impl CheckKind {
             | Self::UnitsAgree
             | Self::RoundControl
             | Self::MeasurementsRemoved
-            | Self::MeasurementsFlagged => "%",
+            | Self::MeasurementsFlagged
+            | Self::PictureScale
+            | Self::ControlStretch => "%",
             Self::ProfilesApart
             | Self::SurfaceSpread
             | Self::TieResidualsAlong
@@ -246,7 +257,8 @@ impl CheckKind {
             | Self::HeldBackHeight
             | Self::ControlPlane
             | Self::ControlHeight
-            | Self::OtherOrbits => "σ",
+            | Self::OtherOrbits
+            | Self::OtherOrbitsOffset => "σ",
             Self::BeamAlong | Self::BeamAcross => "mrad",
             Self::RoundShift => "cells",
             Self::ClockCorrection => "s",
@@ -326,6 +338,7 @@ impl CheckKind {
             | Self::HeldBackHeight
             | Self::ControlPlane
             | Self::ControlHeight
+            | Self::OtherOrbitsOffset
             | Self::RoundShift => 2,
             _ => 1,
         }

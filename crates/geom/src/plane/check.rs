@@ -3,13 +3,14 @@
 use super::{
     Place,
     net::{Net, PlaneError},
+    rigid::rigid_parts,
 };
 
 /// Points closer than this share of the whole extent are coincident.
 const EQUAL: f64 = 1e-9;
 
 /// Checks that every picture is tied to the net, every part of the net to two controls, and that no two points
-/// coincide.
+/// coincide. Parts that hang on one point are those of [`loose_picture`].
 ///
 /// # Errors
 /// [`PlaneError`]; for a part without controls its first picture.
@@ -53,6 +54,32 @@ pub fn check(net: &Net) -> Result<(), PlaneError> {
         let ties = ties[picture];
         Err(PlaneError::UnderconnectedPicture { picture, ties })
     })
+}
+
+/// The first picture of the smallest part that shares fewer than two points with the others and the controls, with the
+/// number of its ties and controls; `None` where the net is rigid.
+pub(super) fn loose_picture(net: &Net) -> Option<PlaneError> {
+    let map = net.pictures;
+    let (by_point, control_of) = (net.by_point(), net.control_of());
+    let points: Vec<Vec<usize>> = by_point
+        .iter()
+        .zip(&control_of)
+        .map(|(measured, control)| {
+            let pictures = measured.iter();
+            let pictures = pictures.map(|index| net.measurements[*index].picture);
+            pictures.chain(control.map(|_| map)).collect()
+        })
+        .collect();
+    let part = rigid_parts(net.pictures + 1, &points);
+    let mut size = vec![0; net.pictures + 1];
+    for part in &part {
+        size[*part] += 1;
+    }
+    let apart = (0..net.pictures).filter(|picture| part[*picture] != part[map]);
+    let picture = apart.min_by_key(|picture| size[part[*picture]])?;
+    let ties = points.iter().filter(|of| of.len() > 1);
+    let ties = ties.filter(|of| of.contains(&picture)).count();
+    Some(PlaneError::UnderconnectedPicture { picture, ties })
 }
 
 fn equal_points(net: &Net) -> Result<(), PlaneError> {

@@ -8,51 +8,38 @@ use super::{
     net::{Net, PlaneError},
 };
 
-/// Squares left by one handedness over those left by the other, below which the handedness is certain.
-const CERTAIN: f64 = 0.1;
+/// Logarithm of a likelihood ratio above which a handedness is certain: chance exceeds it once in a thousand.
+///
+/// Of three points, one of them wrong, or all nearly on a line, the mirrored fit is the better one by a factor of ten in
+/// every tenth case.
+const CERTAIN: f64 = 7.0;
 /// Below this share of the squares of the coordinates, a residual is rounding.
 const EXACT: f64 = 1e-18;
 
 /// Finds a picture, or the whole figure, of the wrong handedness.
 ///
-/// Each pair of pictures with three points in common is compared by a similarity and by a mirrored one; where one of
-/// them leaves a tenth of the squares of the other, the relative handedness of the pictures is decided. Among connected
-/// pictures the minority is mirrored.
+/// Each pair of pictures with three points in common is compared by a similarity and by a mirrored one. The logarithm
+/// of the ratio of their likelihoods is the evidence of the pair. The handedness of all pictures is that on which the
+/// evidence of all pairs agrees best; among connected pictures the minority is mirrored, where the evidence against it
+/// is certain. A pair with a wrong point is thus outvoted by the others.
 ///
 /// # Errors
 /// [`PlaneError::MirroredPicture`].
 pub fn find_mirrored(net: &Net) -> Result<(), PlaneError> {
-    let hands = hands(net);
-    let mut neighbours: Vec<Vec<(usize, bool)>> = vec![Vec::new(); net.pictures];
-    for ((one, two), same) in hands {
-        neighbours[one].push((two, same));
-        neighbours[two].push((one, same));
-    }
-    let mut hand: Vec<Option<bool>> = vec![None; net.pictures];
-    for start in 0..net.pictures {
-        if hand[start].is_some() {
-            continue;
-        }
-        hand[start] = Some(true);
-        let (mut part, mut next) = (vec![start], 0);
-        while let Some(&picture) = part.get(next) {
-            next += 1;
-            for &(other, same) in &neighbours[picture] {
-                if hand[other].is_none() {
-                    hand[other] = hand[picture].map(|of| of == same);
-                    part.push(other);
-                }
-            }
-        }
-        let turned = |picture: &&usize| hand[**picture] == Some(false);
-        let others = part.iter().filter(turned).count();
-        let wrong = 2 * others > part.len();
-        let mirrored = part
-            .iter()
-            .filter(|picture| hand[**picture] == Some(wrong))
-            .min();
-        if others > 0
-            && let Some(&picture) = mirrored
+    let evidence = evidence_of_pairs(net);
+    let mut hands = Hands::spanning(net.pictures, &evidence);
+    hands.improve(&evidence);
+    for part in hands.parts() {
+        let turned = part.iter().filter(|picture| hands.turned[**picture]);
+        let wrong = 2 * turned.count() <= part.len();
+        let is_wrong = |picture: &usize| hands.turned[*picture] == wrong;
+        // What the labels gain over a part of one hand.
+        let against = evidence.iter().filter(|((one, two), _)| {
+            hands.part[*one] == hands.part[part[0]] && hands.turned[*one] != hands.turned[*two]
+        });
+        let gain: f64 = against.map(|(_, evidence)| -evidence).sum();
+        if let Some(&picture) = part.iter().filter(|picture| is_wrong(picture)).min()
+            && gain > CERTAIN
         {
             return Err(PlaneError::MirroredPicture { picture });
         }
@@ -60,8 +47,8 @@ pub fn find_mirrored(net: &Net) -> Result<(), PlaneError> {
     Ok(())
 }
 
-/// Whether pairs of pictures have the same handedness, where that is certain.
-fn hands(net: &Net) -> BTreeMap<(usize, usize), bool> {
+/// Evidence of pairs of pictures that they have the same handedness; negative where they have not.
+fn evidence_of_pairs(net: &Net) -> BTreeMap<(usize, usize), f64> {
     let mut shared: BTreeMap<(usize, usize), Vec<(Place, Place)>> = BTreeMap::new();
     for measured in net.by_point().iter() {
         for (index, one) in measured.iter().enumerate() {
@@ -77,38 +64,95 @@ fn hands(net: &Net) -> BTreeMap<(usize, usize), bool> {
     }
     shared
         .into_iter()
-        .filter_map(|(pictures, places)| Some((pictures, same_hand(&places)?)))
+        .filter_map(|(pictures, places)| Some((pictures, evidence(&places)?)))
         .collect()
+}
+
+/// Whether each picture is turned against the first of its part.
+struct Hands {
+    turned: Vec<bool>,
+    part: Vec<usize>,
+}
+
+impl Hands {
+    /// The handedness along the pairs of most evidence that connect the pictures.
+    fn spanning(pictures: usize, evidence: &BTreeMap<(usize, usize), f64>) -> Self {
+        let mut pairs: Vec<(&(usize, usize), &f64)> = evidence.iter().collect();
+        pairs.sort_by(|(_, one), (_, two)| two.abs().total_cmp(&one.abs()));
+        let mut hands = Self {
+            turned: vec![false; pictures],
+            part: (0..pictures).collect(),
+        };
+        for ((one, two), evidence) in pairs {
+            let [into, from] = [hands.part[*one], hands.part[*two]];
+            if into == from {
+                continue;
+            }
+            let differ = (*evidence < 0.0) != (hands.turned[*one] != hands.turned[*two]);
+            for picture in 0..pictures {
+                if hands.part[picture] == from {
+                    hands.part[picture] = into;
+                    hands.turned[picture] ^= differ;
+                }
+            }
+        }
+        hands
+    }
+
+    /// Turns single pictures as long as the pairs agree better.
+    fn improve(&mut self, evidence: &BTreeMap<(usize, usize), f64>) {
+        // Each turn gains; a bound for rounding.
+        for _ in 0..self.turned.len() {
+            let mut agreement = vec![0.0; self.turned.len()];
+            for ((one, two), evidence) in evidence {
+                let differ = self.turned[*one] != self.turned[*two];
+                let agrees = if differ { -evidence } else { *evidence };
+                agreement[*one] += agrees;
+                agreement[*two] += agrees;
+            }
+            let worst = (0..agreement.len()).min_by(|a, b| agreement[*a].total_cmp(&agreement[*b]));
+            let Some(worst) = worst.filter(|worst| agreement[*worst] < 0.0) else {
+                return;
+            };
+            self.turned[worst] ^= true;
+        }
+    }
+
+    /// The connected pictures, each part ascending.
+    fn parts(&self) -> impl Iterator<Item = Vec<usize>> {
+        let mut parts: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (picture, part) in self.part.iter().enumerate() {
+            parts.entry(*part).or_default().push(picture);
+        }
+        parts.into_values()
+    }
 }
 
 /// Whether points have the same handedness in two pictures; `None` where fewer than three points, or their spread, do
 /// not decide it.
 #[must_use]
 pub fn same_hand(places: &[(Place, Place)]) -> Option<bool> {
+    let evidence = evidence(places)?;
+    (evidence.abs() > CERTAIN).then_some(evidence > 0.0)
+}
+
+/// Logarithm of the likelihood of points under a similarity over that under a mirrored one, for normal errors of an
+/// unknown standard deviation: `(n − 2) ln(squares mirrored / squares)`. `None` for fewer than three points.
+fn evidence(places: &[(Place, Place)]) -> Option<f64> {
     if places.len() < 3 {
         return None;
     }
     let (from, to): (Vec<Place>, Vec<Place>) = places.iter().copied().unzip();
     let mirrored: Vec<Place> = from.iter().map(Place::conj).collect();
+    let size: f64 = to.iter().map(Place::norm_sqr).sum();
     let left = |from: &[Place]| -> Option<f64> {
         let fitted = fit_similarity(from, &to)?;
         let rests = from.iter().zip(&to);
-        Some(
-            rests
-                .map(|(from, to)| (to - fitted.map(*from)).norm_sqr())
-                .sum(),
-        )
+        let squares: f64 = rests
+            .map(|(from, to)| (to - fitted.map(*from)).norm_sqr())
+            .sum();
+        Some(squares.max(EXACT * size))
     };
     let (same, other) = (left(&from)?, left(&mirrored)?);
-    let size: f64 = to.iter().map(Place::norm_sqr).sum();
-    if same.max(other) <= EXACT * size {
-        return None;
-    }
-    if same < CERTAIN * other {
-        Some(true)
-    } else if other < CERTAIN * same {
-        Some(false)
-    } else {
-        None
-    }
+    Some((places.len() - 2) as f64 * (other / same).ln())
 }

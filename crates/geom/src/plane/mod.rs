@@ -32,9 +32,11 @@ mod grow;
 mod inverse;
 mod mirror;
 mod net;
+mod rigid;
 mod shrinkage;
 mod similarity;
 mod solve;
+mod stretch;
 
 /// A position in a picture or on a map: `x + i y`.
 pub type Place = nalgebra::Complex<f64>;
@@ -47,6 +49,8 @@ pub use film::{CornerZero, FilmError, FourCorners, box_centre};
 pub use grow::grow_bricks;
 pub use mirror::{find_mirrored, same_hand};
 pub use net::{Control, Measurement, Net, PlaneError};
+pub use rigid::{Moved, settle_bricks};
 pub use shrinkage::{Shrinkage, shrinkage_factor};
 pub use similarity::{Similarity, ToPicture, projection_floor_m};
 pub use solve::{Precision, Redundancy, Solution, solve};
+pub use stretch::{Stretch, stretch};
