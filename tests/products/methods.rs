@@ -265,7 +265,6 @@ fn what_calls_functions_of_stages_lists_them() {
         of_room.filter(|of| of.stage.is_some()).collect::<Vec<_>>()
     };
     let mut missing = Vec::new();
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     for of in &declared {
         let room = of.room();
         if of.stage.is_none() && room[0] == "flow" {
@@ -273,7 +272,7 @@ fn what_calls_functions_of_stages_lists_them() {
             continue;
         }
         for module in sources.modules().filter(|module| module.starts_with(&room)) {
-            let path = root.join(module.join("/"));
+            let path = sources::path_of(module);
             let text = fs::read_to_string(path.with_extension("rs"))
                 .or_else(|_| fs::read_to_string(path.join("mod.rs")))
                 .unwrap();
@@ -295,7 +294,7 @@ fn what_calls_functions_of_stages_lists_them() {
                 {
                     let path = module.join("/");
                     missing.push(format!(
-                        "{}: src/{path} calls {item} of {}",
+                        "{}: {path} calls {item} of {}",
                         of.declared,
                         other.join("/")
                     ));

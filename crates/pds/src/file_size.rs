@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use areograph_base::error::{Cause, Kind, Locate as _, Result};
+use areograph_base::error::{Cause, Locate as _, Result};
 
 /// Kinds of input files with a largest size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,20 +58,12 @@ impl SizedFile {
 }
 
 /// A file that is larger than any of its kind.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("has {bytes} bytes; expected at most {bytes_max} for {kind}")]
+#[cause(Input: "name the right file, or fetch it again: this one is damaged or of another kind")]
 struct TooLarge {
     bytes: u64,
     bytes_max: u64,
     kind: &'static str,
 }
 
-impl Cause for TooLarge {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "name the right file, or fetch it again: this one is damaged or of another kind".to_owned()
-    }
-}

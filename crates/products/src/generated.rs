@@ -45,7 +45,7 @@ fn contents() -> impl Iterator<Item = &'static Content> {
 #[must_use]
 pub fn documentation() -> String {
     let mut text = "# Products\n\n\
-        Generated from the declarations in `src/products`; `tests/products/generated.rs` reports when it is stale.\n\n\
+        Generated from the declarations in `crates/products/src`; `tests/products/generated.rs` reports when it is stale.\n\n\
         Paths are relative to the site's folder, `<image>` stands for the identifier of an image. `manifest.json`, which \
         is written last, records what all of them were made from.\n\n\
         | file | what it is | for | one for | rows | schema |\n|---|---|---|---|---|---|\n"

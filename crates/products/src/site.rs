@@ -162,7 +162,7 @@ impl<'a> SiteProducts<'a> {
     }
 
     /// The tie points and their adjustment; `None` without an adjustment.
-    pub(crate) fn adjustment(&self) -> Option<(GeometricProducts<'a>, AdjustmentProducts<'a>)> {
+    pub fn adjustment(&self) -> Option<(GeometricProducts<'a>, AdjustmentProducts<'a>)> {
         let geometric = self.geometric?;
         Some((geometric, geometric.adjustment?))
     }

@@ -4,7 +4,7 @@ use super::html::{Cell, Column, STYLE, Section, Table, escape, page, paragraph};
 
 /// The page of this version, which `tests/products/fidelity.rs` makes and checks; its style is that of all pages, by a
 /// link.
-const FIDELITY_PAGE: &str = include_str!("../../docs/fidelity.html");
+const FIDELITY_PAGE: &str = include_str!("../../../docs/fidelity.html");
 /// From `docs/` to the style of all pages.
 const LINKED_STYLE: &str = "<link rel=\"stylesheet\" href=\"../crates/base/src/style.css\">\n";
 /// File of the page, in the folder that holds the sites' folders.

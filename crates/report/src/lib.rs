@@ -26,6 +26,7 @@ mod convergence;
 mod corrections;
 mod correlation;
 mod diff;
+pub mod difference;
 mod fidelity;
 mod graticule;
 mod heights;

@@ -295,14 +295,11 @@ impl Sink for HandOn {
 }
 
 #[cfg(test)]
-#[path = "../../pds/src/archive/distinct/cases.rs"]
-mod cases;
-
-#[cfg(test)]
 mod tests {
+    use areograph_testing::shot_cases::CASES;
     use datafusion::arrow::datatypes::Schema;
 
-    use super::{cases::CASES, *};
+    use super::*;
 
     #[derive(Debug)]
     struct NoColumns;

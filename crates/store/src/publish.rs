@@ -179,21 +179,12 @@ fn require_same_kind(site_folder: &Path, next: &Manifest) -> Result<()> {
 }
 
 /// A file in the place of a product that no record of areograph names.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error(
     "is in the place of a product and was not written by areograph; expected a new path, or a product of an earlier run"
 )]
+#[cause(Configuration: "move the file away, or give the products another folder (--out)")]
 struct InPlaceOfProduct;
-
-impl Cause for InPlaceOfProduct {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        "move the file away, or give the products another folder (--out)".to_owned()
-    }
-}
 
 /// Ensures that a publication replaces only products, or files that equal them.
 fn refuse_foreign(site_folder: &Path, next: &Manifest, earlier: &BTreeSet<String>) -> Result<()> {

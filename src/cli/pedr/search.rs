@@ -265,7 +265,7 @@ impl Sink for Answer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stages::shot_cases::{CASES, Case, source};
+    use areograph_testing::shot_cases::{CASES, Case, source};
 
     fn is_in_order(case: &Case) -> bool {
         let tags_s: Vec<f64> = (0..case.files.len())

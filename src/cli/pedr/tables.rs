@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use crate::{
     body::Body,
-    error::{Cause, Error, Kind, Result},
+    error::{Cause, Error, Result},
     files::{file_name, hash_file},
     pds::{
         archive::SearchedTable,
@@ -20,32 +20,21 @@ use crate::{
 };
 
 /// Tables where they cannot be used.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Configuration)]
 enum Misplaced {
     #[error(
         "a table of the Orbital Data Explorer, beside files that are not; expected one kind of files"
     )]
+    #[cause("search tables and PEDR files separately")]
     Mixed,
     #[error(
         "a table of the Orbital Data Explorer, without positions of the spacecraft; expected PEDR files"
     )]
+    #[cause(
+        "name the table in [[shots]] of a site, with layout = \"ode_pedr\" and kernels: its range check compares them"
+    )]
     NotPedr,
-}
-
-impl Cause for Misplaced {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Mixed => "search tables and PEDR files separately",
-            Self::NotPedr => {
-                "name the table in [[shots]] of a site, with layout = \"ode_pedr\" and kernels: its range check compares them"
-            }
-        }
-        .to_owned()
-    }
 }
 
 /// The first table among these paths, and whether all of them are tables.

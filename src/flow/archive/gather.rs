@@ -156,7 +156,9 @@ pub(super) fn file_failure(failure: &Error) -> FileFailure {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{pds::archive::spans, stages::shot_cases::CASES};
+    use areograph_testing::shot_cases::CASES;
+
+    use crate::pds::archive::spans;
 
     #[test]
     fn a_file_with_shots_of_an_earlier_one_is_left_out() {

@@ -7,8 +7,6 @@
 //! Within a file, the longest chain of frames without a common shot is kept. Rows of tables that repeat a shot are
 //! counted once (`table_rows.rs`).
 
-#[cfg(test)]
-mod cases;
 mod table_rows;
 
 use std::collections::BTreeMap;
@@ -166,7 +164,9 @@ impl Copies {
 
 #[cfg(test)]
 mod tests {
-    use super::{cases::CASES, *};
+    use areograph_testing::shot_cases::CASES;
+
+    use super::*;
 
     #[test]
     fn shots_one_by_one_and_spans_give_the_same() {

@@ -10,7 +10,7 @@ mod pictures;
 use serde_json::{Map, Value, json};
 
 use self::marks::{MarkedFootprint, footprints};
-pub(crate) use self::pictures::{Picture, anaglyph, piece, strip};
+pub use self::pictures::{Picture, anaglyph, piece, strip};
 use super::{
     files::{read, write_bytes, write_json},
     product::{Content, Context, Declaration, Role, Write},

@@ -21,24 +21,24 @@ const LEVELS: u8 = 16;
 
 /// A picture as PNG.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Picture {
+pub struct Picture {
     /// Pixels of a row.
-    pub(crate) width: u32,
+    pub width: u32,
     /// Rows.
-    pub(crate) height: u32,
+    pub height: u32,
     /// Lines and samples of the image that are one pixel; 1 in a piece.
-    pub(crate) reduction: u32,
+    pub reduction: u32,
     /// Interval of the marked footprints.
-    pub(crate) step: usize,
+    pub step: usize,
     /// The file.
-    pub(crate) png: Vec<u8>,
+    pub png: Vec<u8>,
 }
 
 /// A whole image with its footprints, of limited size; `None` for an image without known pixels.
 ///
 /// # Errors
 /// A picture that the library rejects, which is a bug in areograph.
-pub(crate) fn strip(site: &SiteProducts, image: usize, pixels_max: u64) -> Result<Option<Picture>> {
+pub fn strip(site: &SiteProducts, image: usize, pixels_max: u64) -> Result<Option<Picture>> {
     let Some(look) = site
         .overlays
         .and_then(|overlays| overlays.quick_look(image))
@@ -87,7 +87,7 @@ pub(crate) fn strip(site: &SiteProducts, image: usize, pixels_max: u64) -> Resul
 ///
 /// # Errors
 /// A picture that the library rejects, which is a bug in areograph.
-pub(crate) fn piece(chip: &Chip) -> Result<Picture> {
+pub fn piece(chip: &Chip) -> Result<Picture> {
     let mut canvas = Canvas::new(&chip.pixels, EDGES, range_dn(&chip.pixels));
     for (mark, at) in &chip.marks {
         canvas.mark(*mark, *at);
@@ -99,7 +99,7 @@ pub(crate) fn piece(chip: &Chip) -> Result<Picture> {
 ///
 /// # Errors
 /// A picture that the library rejects, which is a bug in areograph.
-pub(crate) fn anaglyph(first: &Chip, second: &Chip) -> Result<Picture> {
+pub fn anaglyph(first: &Chip, second: &Chip) -> Result<Picture> {
     let levels = [first, second].map(|chip| levels(&chip.pixels));
     let pixels =
         first.pixels.iter().zip(&second.pixels).map(|(one, other)| {

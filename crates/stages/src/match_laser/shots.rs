@@ -246,7 +246,7 @@ pub(super) fn is_kept(grid: &HeightGrid, segment: &[Shot], options: &MatchOption
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shot_cases::{CASES, path, source};
+    use areograph_testing::shot_cases::{CASES, path, source};
 
     #[test]
     fn files_with_the_same_shots_are_refused() {

@@ -58,7 +58,7 @@ pub(super) fn require_distinct(footprints: &Footprints<AsRead>, paths: &[PathBuf
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shot_cases::{CASES, path};
+    use areograph_testing::shot_cases::{CASES, path};
 
     #[test]
     fn files_with_the_same_shots_are_refused() {

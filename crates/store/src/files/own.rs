@@ -48,21 +48,12 @@ pub enum MarkAt {
 }
 
 /// A file that a command must not replace.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("is {found}; expected a new path, or {expected}")]
+#[cause(Configuration: "name another file; if this one is not needed any more, remove it first")]
 struct Foreign {
     found: String,
     expected: &'static str,
-}
-
-impl Cause for Foreign {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        "name another file; if this one is not needed any more, remove it first".to_owned()
-    }
 }
 
 /// Ensures that `path` is free, an empty file, or a file with this mark that is not a product.

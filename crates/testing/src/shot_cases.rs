@@ -1,14 +1,21 @@
 //! Files with and without common shots: cases that every caller must handle.
 
+use std::path::PathBuf;
+
+use areograph_base::{
+    body::Datum,
+    footprints::{AsRead, Footprint, Footprints, SourceFile},
+};
+
 /// Successive shots 0.1 s apart: microseconds from the start to the first one, and how many.
-type Run = (i64, u32);
+pub type Run = (i64, u32);
 
 /// Some files, in the order in which they are searched.
-pub(crate) struct Case {
-    pub(crate) name: &'static str,
-    pub(crate) files: &'static [&'static [Run]],
+pub struct Case {
+    pub name: &'static str,
+    pub files: &'static [&'static [Run]],
     /// The first two files with a common shot.
-    pub(crate) shared: Option<[usize; 2]>,
+    pub shared: Option<[usize; 2]>,
 }
 
 /// A time tag of the mission with all its digits, microseconds.
@@ -16,7 +23,7 @@ const START_US: i64 = 38_593_125_159_870;
 
 impl Case {
     /// Time tags of a file, ET seconds.
-    pub(crate) fn tags_s(&self, file: usize) -> Vec<f64> {
+    pub fn tags_s(&self, file: usize) -> Vec<f64> {
         let tag_s = |first_us: i64, shot: u32| {
             (START_US + first_us + 100_000 * i64::from(shot)) as f64 * 1e-6
         };
@@ -26,7 +33,7 @@ impl Case {
     }
 }
 
-pub(crate) const CASES: &[Case] = &[
+pub const CASES: &[Case] = &[
     Case {
         name: "a copy",
         files: &[&[(0, 40)], &[(0, 40)]],
@@ -124,3 +131,51 @@ pub(crate) const CASES: &[Case] = &[
         shared: None,
     },
 ];
+
+/// File `file`, with its own name.
+pub fn source(file: usize) -> SourceFile {
+    SourceFile {
+        name: format!("file{file}.b"),
+        version: None,
+        datum: Datum::Iau2000,
+        blake3: String::new(),
+    }
+}
+
+/// Its path.
+pub fn path(file: usize) -> PathBuf {
+    PathBuf::from(source(file).name)
+}
+
+impl Case {
+    /// The shots of file `file`.
+    pub fn footprints(&self, file: usize) -> Footprints<AsRead> {
+        let mut footprints = Footprints::new(Vec::new());
+        for et_tag_s in self.tags_s(file) {
+            footprints.push(&Footprint {
+                et_tag_s,
+                et_s: et_tag_s,
+                orbit: 1,
+                file: u16::try_from(file).unwrap(),
+                record: 1,
+                shot: 1,
+                longitude_rad: 0.0,
+                latitude_rad: 0.0,
+                radius_m: 3_396_190.0,
+                radius_crossover_m: 3_396_190.0,
+                areoid_radius_m: 3_396_190.0,
+                range_m: 400_000.0,
+                spacecraft_longitude_rad: 0.0,
+                spacecraft_latitude_rad: 0.0,
+                spacecraft_radius_m: 3_796_190.0,
+                off_nadir_rad: 0.0,
+                channel: 1,
+                class: 1,
+                attitude_flag: 0,
+                orbit_quality: 1,
+                windows: 1,
+            });
+        }
+        footprints
+    }
+}
