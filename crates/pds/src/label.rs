@@ -161,6 +161,8 @@ pub fn parse_whole(bytes: &[u8]) -> Result<Label, LabelError> {
     let mut label = Label::default();
     let mut groups: Vec<(String, usize)> = Vec::new();
     let mut blocks = 0;
+    // ISIS breaks long values after a hyphen.
+    let mut is_broken = false;
     while let Some(word) = scanner.word() {
         let key = word.to_ascii_uppercase();
         let (before_word, after_word) = (scanner.word_at, scanner.at);
@@ -177,7 +179,11 @@ pub fn parse_whole(bytes: &[u8]) -> Result<Label, LabelError> {
                 _ if key.starts_with(SFDU) || key.starts_with([',', ')', '}']) => {}
                 _ if label.unread.len() < UNREAD_MAX => {
                     let (line, text) = scanner.line_at(before_word);
-                    label.unread.push(UnreadLine { line, text });
+                    let goes_on = is_broken && text.ends_with('-');
+                    if !is_broken {
+                        label.unread.push(UnreadLine { line, text });
+                    }
+                    is_broken = goes_on;
                 }
                 _ => {}
             }
@@ -187,6 +193,7 @@ pub fn parse_whole(bytes: &[u8]) -> Result<Label, LabelError> {
             continue;
         }
         let (value, unit) = scanner.value();
+        is_broken = value.ends_with('-');
         match key.as_str() {
             "OBJECT" | "GROUP" | "BEGIN_OBJECT" | "BEGIN_GROUP" => {
                 // Every entry repeats its group's name, so invalid text must not lengthen it.
@@ -290,8 +297,9 @@ mod tests {
 
     #[test]
     fn text_that_is_no_statement_is_kept_with_its_line() {
-        let label =
-            parse(b"A = 1\r\nCLOCK ? \"6:028\"\r\nB = 2 metres\nC = ((1, 2), (3, 4))\nEND\nD\n");
+        let label = parse(
+            b"A = 1\r\nCLOCK ? \"6:028\"\r\nB = 2 metres\nC = ((1, 2), (3, 4))\nD = a-\n  b-\n  c\nEND\nD\n",
+        );
         let unread = |line, text: &str| UnreadLine {
             line,
             text: text.to_owned(),
