@@ -32,7 +32,7 @@ use crate::{
     frames::BodyFixed,
     geom::{
         attitude::bus_to_camera,
-        pushbroom::{CameraModel, ExteriorOrientation as _, Pose},
+        pushbroom::{CameraModel, Pose},
         range_residuals::{footprint, own_spacecraft},
         statistics::Summary,
     },
