@@ -35,7 +35,7 @@ use areograph_base::{
 use areograph_config::all_instruments;
 use areograph_geom::{
     attitude::bus_to_camera,
-    pushbroom::{CameraModel, ExteriorOrientation as _, Pose},
+    pushbroom::{CameraModel, Pose},
     range_residuals::{footprint, own_spacecraft},
     statistics::Summary,
 };

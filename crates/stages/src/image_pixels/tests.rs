@@ -54,7 +54,6 @@ fn archive(pixels: &[u8]) -> Vec<u8> {
         exposure_s: 5e-4,
         summing: 2,
         first_detector: 0,
-        has_stop_time: true,
         samples: SAMPLES,
         pixels,
         coding: Coding::Raw,

@@ -149,7 +149,7 @@ impl BeamEvidence<'_> {
             .collect();
         let count = tested.len() as f64;
         for axis in 0..AXES.len() {
-            let (mut sum_rad, mut variance, mut common_rad) = (0.0, 0.0, 0.0_f64);
+            let (mut sum_rad, mut variance, mut common_rad) = (0.0, 0.0_f64, 0.0_f64);
             let (mut shots, mut range_m) = (0, 0.0);
             for (image, beam) in &tested {
                 let own_rad = self.own_sigmas_rad(image, beam)[axis];

@@ -53,7 +53,8 @@ pub(super) fn untested(evidence: &Evidence<'_>) -> Vec<String> {
 /// Attitudes that no beam tests: with tie points, which test one image against the other, only if no image has one.
 fn attitude(evidence: &Evidence<'_>) -> Option<String> {
     let is_tested = |image: &&JudgedImage| evidence.beam.tests(image.id());
-    let (tested, blind): (Vec<_>, Vec<_>) = evidence.images.iter().partition(is_tested);
+    let (tested, blind): (Vec<&JudgedImage>, Vec<&JudgedImage>) =
+        evidence.images.iter().partition(is_tested);
     let first = blind.first()?;
     if evidence.adjustment.is_some() && !tested.is_empty() {
         return None;

@@ -11,7 +11,7 @@ use std::{
 };
 
 use super::outputs::require_replaceable;
-use areograph_base::error::{Cause, IoError, Kind, Locate, Result};
+use areograph_base::error::{Cause, IoError, Locate, Result};
 
 /// List of written files, in their folder.
 const LIST: &str = ".areograph";
@@ -212,6 +212,8 @@ pub(super) fn enlist(file: &File, path: &Path) -> Result<()> {
 #[cfg(test)]
 #[allow(clippy::disallowed_methods, reason = "files of a test")]
 mod tests {
+    use areograph_base::error::Kind;
+
     use super::*;
     use crate::files::StagedFile;
 
