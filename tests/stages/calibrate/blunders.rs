@@ -121,23 +121,34 @@ fn height(found: &Calibration) -> &ControlOffset {
     offsets.iter().find(|of| of.camera.is_none()).unwrap()
 }
 
-/// The other sphere, half of the difference and a quarter, in the control of one orbit.
+/// The other sphere in the control of one orbit, and half of the difference. What the other orbit can show is the limit
+/// of its offset: constant errors of the two orbits, which no point separates from that, differ in this scene by some 25 m
+/// in height.
 #[test]
 fn control_of_another_sphere_contradicts_another_orbit() {
     for seed in seeds() {
+        let sound = height(&of(seed, |_| {}).0.unwrap()).clone();
         for by_m in [50.0, 100.0, 190.0, -190.0] {
             let (found, _) = of(seed, |folder| higher(folder, CONTROL, by_m));
             let found = found.unwrap();
             let offset = height(&found);
-            println!(
-                "seed {seed}, {by_m} m: {offset:?}, valid {}",
-                found.verdict.valid
-            );
+            let valid = found.verdict.valid;
+            println!("seed {seed}, {by_m} m: {offset:?}, valid {valid}");
             let reasons = found.verdict.reasons.concat();
-            assert!(
-                !found.verdict.valid && reasons.contains("orbit i818: control in height"),
-                "seed {seed}, {by_m} m: {:?}",
+            let is_named = reasons.contains("orbit i818: control in height");
+            assert_eq!(
+                valid,
+                offset.offset_m <= offset.limit_m,
+                "{:?}",
                 found.verdict
+            );
+            assert_eq!(is_named, !valid, "{:?}", found.verdict);
+            assert!(!valid || by_m.abs() < 100.0, "seed {seed}, {by_m} m");
+            // The error arrives in the offset whole, but for what the calibration's own scale takes of it.
+            let change_m = (offset.offset_m - sound.offset_m).abs();
+            assert!(
+                change_m > by_m.abs() - 2.0 * sound.offset_m - 10.0,
+                "seed {seed}, {by_m} m: {change_m} m"
             );
         }
         // In both orbits no point shows it.

@@ -50,7 +50,7 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "left_out",
             Unit::None,
-            "whether it was rejected",
+            "whether it was rejected; position and standard deviations are then empty",
             |row: &Row| row.left_out,
         ),
         column(

@@ -105,9 +105,9 @@ impl ControlOffset {
         // Written so that NaN counts.
         (!(self.offset_m <= self.limit_m)).then(|| {
             format!(
-                "control {} is off by {:.0} m ± {:.0} m on average with the calibration; expected at most {:.0} m, {OFFSET_MAX} standard \
-                 deviations of one of its points: the laser points of both orbits contradict each other, or the orbits do; check datum \
-                 and reference sphere of both",
+                "control {} is off by {:.0} m ± {:.0} m on average with the calibration; expected at most {:.0} m, {OFFSET_MAX} \
+                 standard deviations of one of its points: the laser points of both orbits contradict each other, or the \
+                 orbits do; check datum and reference sphere of both",
                 self.words(),
                 self.offset_m,
                 self.mean_sigma_m,

@@ -17,7 +17,7 @@ const SIZE_FACTOR: f64 = 2.0;
 /// hundredth at the worst, and the focal length, known to a thousandth.
 const SCALE_MAX: f64 = 0.02;
 /// The same in standard deviations of the adjusted scale, where those are larger: few and coarse controls.
-const SCALE_SIGMAS: f64 = 4.0;
+const SCALE_SIGMAS: f64 = 3.0;
 /// Stretch that two maps of one net may have.
 const STRETCH_MAX: f64 = 0.01;
 /// Probability that errors of the controls feign a stretch.
