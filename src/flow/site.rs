@@ -12,7 +12,7 @@ use super::{
     triangulate::{is_of_adjustment, triangulate},
 };
 use crate::{
-    config::{ImageConfig, ShotLayout, ShotTableConfig, SiteConfig, WindowConfig},
+    config::{ImageConfig, SiteConfig, WindowConfig},
     footprints::Footprints,
     geom::window::WindowShape,
     kernel_source::KernelSource,

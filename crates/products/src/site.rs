@@ -168,7 +168,8 @@ impl<'a> SiteProducts<'a> {
     }
 
     /// Why absolute accuracies are withheld, if they are.
-    pub(crate) fn accuracy_withheld(&self) -> Option<String> {
+    #[must_use]
+    pub fn accuracy_withheld(&self) -> Option<String> {
         accuracy_withheld(self.config, self.images.iter().map(|image| image.times))
     }
 
