@@ -70,7 +70,8 @@ pub use calibration::calibration_page;
 pub use compare::{KernelComparison, comparison_page};
 pub use diff::difference_page;
 pub use fidelity::{
-    FIDELITY_FILE, Fidelity, FidelityPaper, FidelityRow, fidelity_page, published_fidelity_page,
+    FIDELITY_FILE, Fidelity, FidelityKind, FidelityPaper, FidelityRow, fidelity_page,
+    published_fidelity_page,
 };
 pub use html::STYLE;
 pub use laser_match::match_page;

@@ -149,6 +149,9 @@ fn points() -> Vec<Comparison> {
     ]
 }
 
+/// Control points in plan of a camera, pixels and metres.
+const PLANE: [fn(&PixelsAndMetres) -> Option<f64>; 2] = [|of| of.plane_px, |of| of.plane_m];
+
 /// The scene's control points of a step.
 fn of_step(step: &str) -> (&'static Figures, &'static ControlFigures) {
     let step = SCENE.1.steps.iter().find(|of| of.step == step).unwrap();
@@ -158,7 +161,7 @@ fn of_step(step: &str) -> (&'static Figures, &'static ControlFigures) {
 
 fn before() -> Vec<Comparison> {
     let (figures, control) = of_step("before");
-    let [plane_px, plane_m] = [|of: &PixelsAndMetres| of.plane_px, |of| of.plane_m];
+    let [plane_px, plane_m] = PLANE;
     vec![
         // The offset angles of the scene are chosen to give the size that is printed.
         number("ties across, px", "12.081", across_px(figures), 1).share(0.05),
@@ -170,7 +173,7 @@ fn before() -> Vec<Comparison> {
 
 fn after() -> Vec<Comparison> {
     let (figures, control) = of_step("joint");
-    let [plane_px, plane_m] = [|of: &PixelsAndMetres| of.plane_px, |of| of.plane_m];
+    let [plane_px, plane_m] = PLANE;
     vec![
         // No worse than the print: noise of the scene's measurements and control is its own.
         number("ties across, px", "0.298", across_px(figures), 3).at_most(0.298),
