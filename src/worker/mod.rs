@@ -248,10 +248,10 @@ fn panicked(panic: &(dyn Any + Send)) -> Failure {
     ))
 }
 
-/// A failure that only another configuration of the service resolves.
+/// A refusal of the system to start the worker's threads.
 fn unfit(text: String) -> Failure {
     Failure {
-        code: Kind::Configuration.exit_code(),
+        code: Kind::Io.exit_code(),
         ..bug(text)
     }
 }

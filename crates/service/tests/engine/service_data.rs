@@ -61,8 +61,12 @@ fn remove_database(world: &World) {
     }
 }
 
+/// Alerts that concern data, the oldest first.
 fn alerts(life: &Life) -> Vec<String> {
-    life.ask("SELECT json_extract(data, '$.alert') FROM event WHERE kind = 'alert' AND json_extract(data, '$.alert') <> 'night_complete' ORDER BY seq")
+    life.ask(
+        "SELECT json_extract(data, '$.alert') AS alert FROM event
+         WHERE kind = 'alert' AND alert IN ('product_damaged', 'database_lost') ORDER BY seq",
+    )
 }
 
 #[test]
