@@ -40,7 +40,9 @@ pub enum OutError {
         "the output folder {} overlaps the input folder {}; expected folders apart from each other",
         .out.display(), .input.display()
     )]
-    #[cause("name a folder for the products (--out) that neither holds inputs nor lies in a folder of inputs")]
+    #[cause(
+        "name a folder for the products (--out) that neither holds inputs nor lies in a folder of inputs"
+    )]
     Overlap {
         /// The folder of all products, or that of the site's.
         out: PathBuf,

@@ -66,4 +66,3 @@ struct TooLarge {
     bytes_max: u64,
     kind: &'static str,
 }
-

@@ -76,10 +76,7 @@ impl Invented {
     }
 
     /// A camera that flies north and looks at the ground below the first one; `off_m` away from there, north and east.
-    pub(crate) fn camera(
-        number: usize,
-        off_m: [f64; 2],
-    ) -> OrientedCamera<SampledOrientation> {
+    pub(crate) fn camera(number: usize, off_m: [f64; 2]) -> OrientedCamera<SampledOrientation> {
         let poses: Vec<(f64, Pose)> = (0..=30)
             .map(|step| {
                 let x_lines = f64::from(LINES) * (f64::from(step) / 30.0 - 0.5);

@@ -37,7 +37,8 @@ impl Golden {
 
     /// Another test compares the text file of this name.
     pub fn leave(&mut self, name: &str) {
-        self.compared.insert(self.folder.join(name).with_extension("txt"));
+        self.compared
+            .insert(self.folder.join(name).with_extension("txt"));
     }
 
     /// Fails with every difference, and with text files that were not compared.

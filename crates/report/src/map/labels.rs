@@ -105,12 +105,7 @@ impl Labels {
 
     /// Names a mark: beside it, or farther off at the end of a line; omits the name and returns false if there is no
     /// room at all.
-    pub(crate) fn place_around(
-        &mut self,
-        text: &str,
-        colour: RGBColor,
-        mark: (i32, i32),
-    ) -> bool {
+    pub(crate) fn place_around(&mut self, text: &str, colour: RGBColor, mark: (i32, i32)) -> bool {
         let placed = BESIDE
             .iter()
             .any(|far| self.place(text, colour, around(text, mark, *far).into_iter()));

@@ -54,9 +54,7 @@ impl<'a> BeforeAfter<'a> {
     }
 
     /// Each state with its name.
-    pub(crate) fn states(
-        &self,
-    ) -> impl Iterator<Item = (&'static str, &'a PairComparison)> {
+    pub(crate) fn states(&self) -> impl Iterator<Item = (&'static str, &'a PairComparison)> {
         let after = self.after.map(|pair| ("after", pair));
         [("before", self.before)].into_iter().chain(after)
     }

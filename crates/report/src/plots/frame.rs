@@ -20,11 +20,7 @@ impl Frame {
     }
 
     /// The part of a segment inside, by its parameters along it (Liang and Barsky 1984).
-    pub(crate) fn clip(
-        &self,
-        from: (f64, f64),
-        to: (f64, f64),
-    ) -> Option<[(f64, f64); 2]> {
+    pub(crate) fn clip(&self, from: (f64, f64), to: (f64, f64)) -> Option<[(f64, f64); 2]> {
         let (dx, dy) = (to.0 - from.0, to.1 - from.1);
         let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
         for (step, room) in [

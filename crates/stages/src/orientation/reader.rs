@@ -31,11 +31,7 @@ impl CameraReader<'_> {
     ///
     /// # Errors
     /// A gap, named with its ends and the kernels beside it.
-    pub(crate) fn require_coverage(
-        &self,
-        image: &ImageTimes,
-        padding_s: f64,
-    ) -> Result<()> {
+    pub(crate) fn require_coverage(&self, image: &ImageTimes, padding_s: f64) -> Result<()> {
         let (session, exposures) = (self.session, image.exposures());
         session.require_position(self.light_time.read_over(exposures.padded(padding_s)))?;
         session.require_attitude(exposures, self.bias, padding_s, self.tolerance_s)
@@ -46,10 +42,7 @@ impl CameraReader<'_> {
         self.session.attitude(lookup, exposure, self.tolerance_s)
     }
 
-    pub(crate) fn inertial_to_camera(
-        &self,
-        exposure: Et,
-    ) -> Result<Rotation<J2000, CameraFrame>> {
+    pub(crate) fn inertial_to_camera(&self, exposure: Et) -> Result<Rotation<J2000, CameraFrame>> {
         let attitude = self.attitude(exposure)?;
         let mounting = self.session.mounting(self.instrument, exposure)?;
         Ok(mounting * attitude.inertial_to_bus)
