@@ -3,7 +3,7 @@
 use std::{fs::File, io::Write as _};
 
 use super::*;
-use areograph_base::units::RADIANS_PER_DEGREE;
+use areograph_base::{error::Kind, units::RADIANS_PER_DEGREE};
 
 /// Columns of a table by name.
 fn named() -> ShotColumns {
