@@ -62,9 +62,10 @@ impl Owner {
 
     /// The alternative to the end of its process, if it has pages.
     fn page_or(&self) -> String {
-        match &*self.address {
-            "" => String::new(),
-            address => format!("open http://{address}, or "),
+        if self.address.is_empty() {
+            String::new()
+        } else {
+            format!("open http://{}, or ", self.address)
         }
     }
 }

@@ -213,11 +213,10 @@ fn kind_of(short: &str) -> Kind {
 
 /// The advice on an error of CSPICE, by its short message.
 fn advice_on(short: &str) -> &'static str {
-    match kind_of(short) {
-        Kind::Coverage => {
-            "add kernels that cover this time; `areograph kernels coverage` shows the coverage"
-        }
-        _ => "check the value and the kernels that NAIF's message names",
+    if kind_of(short) == Kind::Coverage {
+        "add kernels that cover this time; `areograph kernels coverage` shows the coverage"
+    } else {
+        "check the value and the kernels that NAIF's message names"
     }
 }
 
