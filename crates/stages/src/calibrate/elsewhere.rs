@@ -9,6 +9,8 @@ const WORSE_MAX: f64 = 3.0;
 /// itself is far better known: this is what constant errors of two orbits may differ by, which no point separates from
 /// an error of the control that made the calibration.
 pub(super) const OFFSET_MAX: f64 = 1.5;
+/// And by this many standard deviations of the calibration itself.
+pub(super) const CALIBRATION_SIGMAS: f64 = 3.0;
 /// Growth of tie residuals above which a remark states it.
 const TIES_WORSE: f64 = 1.05;
 /// Remaining share of an error of control above which a remark states it.
@@ -91,12 +93,12 @@ impl ControlOffset {
 
     fn check(&self, orbit: &str) -> Check {
         let subject = format!("{orbit}: control {}", self.words());
-        let sigmas = self.offset_m / self.point_sigma_m;
+        let [sigmas, limit] = [self.offset_m, self.limit_m].map(|of| of / self.point_sigma_m);
         Check::new(
             CheckKind::OtherOrbitsOffset,
             subject,
             sigmas,
-            OFFSET_MAX,
+            limit,
             CheckOutcome::Fail,
         )
     }
@@ -106,7 +108,7 @@ impl ControlOffset {
         (!(self.offset_m <= self.limit_m)).then(|| {
             format!(
                 "control {} is off by {:.0} m ± {:.0} m on average with the calibration; expected at most {:.0} m, {OFFSET_MAX} \
-                 standard deviations of one of its points: the laser points of both orbits contradict each other, or the \
+                 standard deviations of one of its points and {CALIBRATION_SIGMAS} of the calibration: the laser points of both orbits contradict each other, or the \
                  orbits do; check datum and reference sphere of both",
                 self.words(),
                 self.offset_m,

@@ -292,9 +292,13 @@ pub struct ControlOffset {
     /// Standard deviation of one control point by measurement and laser, metres.
     #[schemars(range(min = 0.0))]
     pub point_sigma_m: f64,
-    /// Standard deviation of the mean, metres: errors of the orbit and of the calibration are additional.
+    /// Standard deviation of the mean by measurement and laser, metres: errors of the orbit and of the calibration are
+    /// additional.
     #[schemars(range(min = 0.0))]
     pub mean_sigma_m: f64,
+    /// Standard deviation by the calibration, metres.
+    #[schemars(range(min = 0.0))]
+    pub calibration_sigma_m: f64,
     /// The largest permitted offset, metres.
     #[schemars(range(min = 0.0))]
     pub limit_m: f64,

@@ -8,7 +8,7 @@ use super::{
     error::CalibrateError,
     geometry::{CameraImage, Laboratory, Orbit},
     given::GivenPoints,
-    ground::{ground, off_ground, untested},
+    ground::{off_ground, untested},
     judge::{Evidence, Known, judge},
     measure::figures,
     outcome::{self, Outcome},
@@ -110,6 +110,7 @@ fn calibrate_by(
         orbit: &orbit,
         laboratory: &laboratory,
         state: &work.state,
+        covariance: &work.covariance,
     };
     let (mut validation, mut validation_noise) = (Vec::new(), Vec::new());
     for of in &config.validation {
@@ -359,11 +360,11 @@ impl Work<'_> {
 
     /// Leaves out ties whose heights contradict the ground between laser points.
     fn leave_out_off_ground(&mut self, complaints: &mut Complaints) -> bool {
-        let Some(ground) = ground(&self.points) else {
+        let found = off_ground(&self.points, &self.state, &self.covariance);
+        let Some((off, tested)) = found else {
             self.tie_ground = None;
             return false;
         };
-        let (off, tested) = off_ground(&self.points, &ground, &self.state, &self.covariance);
         self.tie_ground = (tested.tested > 0).then_some(tested);
         for of in &off {
             let point = &mut self.points[of.index];

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, Vector2};
 
 use super::{
     demands::{CONTROLS_MIN, belong_together, enough_ties},
-    elsewhere::{Noise, OFFSET_MAX},
+    elsewhere::{CALIBRATION_SIGMAS, Noise, OFFSET_MAX},
     error::CalibrateError,
     geometry::{CameraImage, Laboratory, Orbit},
     measure::{Squares, figures},
@@ -14,7 +14,7 @@ use super::{
 };
 use areograph_base::{body::Body, error::Result};
 use areograph_config::{CalibrationConfig, ValidationConfig};
-use areograph_geom::{calibration::CalibrationState, ellipsoid::local_axes};
+use areograph_geom::{calibration::{CalibrationState, Missed, TookPart}, ellipsoid::local_axes};
 use areograph_store::files::{file_name, hash_file};
 
 /// Largest difference between the laboratory's geometry of two orbits, pixels: files are written with fifteen digits.
@@ -28,6 +28,7 @@ pub(super) struct Calibrated<'a> {
     pub(super) orbit: &'a Orbit,
     pub(super) laboratory: &'a Laboratory,
     pub(super) state: &'a CalibrationState,
+    pub(super) covariance: &'a DMatrix<f64>,
 }
 
 /// Figures of another orbit before and with the calibration.
@@ -69,7 +70,13 @@ pub(super) fn validate(
         orbit: of.id.clone(),
         before: figures(&points, &laboratory.state, &pixels),
         after: figures(&points, &unchanged, &pixels),
-        offsets: offsets(&points, &unchanged, names, noise),
+        offsets: offsets(
+            &points,
+            &unchanged,
+            names,
+            noise,
+            calibration_shares(&points, &unchanged, calibrated.covariance),
+        ),
     };
     Ok((result, noise))
 }
@@ -80,6 +87,7 @@ fn offsets(
     state: &CalibrationState,
     names: &[String],
     noise: Noise,
+    [plane_share, height_share]: [f64; 2],
 ) -> Vec<ControlOffset> {
     let mut planes = vec![Mean::default(); names.len()];
     let mut heights = Mean::default();
@@ -99,9 +107,31 @@ fn offsets(
         }
     }
     let cameras = names.iter().zip(planes);
-    let planes = cameras.map(|(name, mean)| mean.offset(Some(name.clone()), noise.plane_m));
-    let height = heights.offset(None, noise.height_m);
+    let planes =
+        cameras.map(|(name, mean)| mean.offset(Some(name.clone()), noise.plane_m, plane_share));
+    let height = heights.offset(None, noise.height_m, height_share);
     planes.chain([height]).flatten().collect()
+}
+
+/// Variances of control in the plane and in height by the errors of the cameras, over those of measurement and laser:
+/// means over the points. The orbit has a drift of its own.
+fn calibration_shares(
+    points: &[OrbitPoint],
+    state: &CalibrationState,
+    covariance: &DMatrix<f64>,
+) -> [f64; 2] {
+    let mut of_cameras = covariance.clone();
+    let drift = of_cameras.nrows() - 3;
+    of_cameras.rows_mut(drift, 3).fill(0.0);
+    of_cameras.columns_mut(drift, 3).fill(0.0);
+    let (mut plane, mut height) = (Missed::default(), Missed::default());
+    for of in points.iter().filter(|of| of.is(PointKind::Control)) {
+        if let Ok(Some(misfit)) = of.point.misfit(state, &of_cameras, TookPart::No) {
+            plane = plane.and(misfit.plane);
+            height = height.and(misfit.height.unwrap_or_default());
+        }
+    }
+    [plane, height].map(|of| (of.expected / of.free.max(1.0) - 1.0).max(0.0))
 }
 
 /// Sum of offsets.
@@ -118,15 +148,24 @@ impl Mean {
     }
 
     /// The mean with its limit; `None` without points or without their standard deviation.
-    fn offset(self, camera: Option<String>, point_sigma_m: Option<f64>) -> Option<ControlOffset> {
+    ///
+    /// * `share` – variance by the calibration over that of a point
+    fn offset(
+        self,
+        camera: Option<String>,
+        point_sigma_m: Option<f64>,
+        share: f64,
+    ) -> Option<ControlOffset> {
         let point_sigma_m = point_sigma_m.filter(|_| self.count > 0)?;
         let count = f64::from(self.count);
+        let calibration_sigma_m = point_sigma_m * share.sqrt();
         Some(ControlOffset {
             camera,
             offset_m: self.sum_m.norm() / count,
             point_sigma_m,
             mean_sigma_m: point_sigma_m / count.sqrt(),
-            limit_m: OFFSET_MAX * point_sigma_m,
+            calibration_sigma_m,
+            limit_m: (OFFSET_MAX * point_sigma_m).hypot(CALIBRATION_SIGMAS * calibration_sigma_m),
         })
     }
 }
