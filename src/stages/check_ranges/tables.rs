@@ -146,7 +146,11 @@ pub fn check_table_ranges(
         let mut ranges = statistics(profile, &shots, first, None, footprints);
         by_own_spacecraft(&mut ranges, footprints, profile, limits);
         let explain = || "the support data hold a different orbit from the table's".to_owned();
-        ranges.invalid_because = ranges.figures().broken_limits(limits, explain);
+        let limits = RangeCheckConfig {
+            mean_max_m: ranges.mean_max_m(limits),
+            ..limits.clone()
+        };
+        ranges.invalid_because = ranges.figures().broken_limits(&limits, explain);
         checked.push(ranges);
     }
     Ok(RangeCheck {
