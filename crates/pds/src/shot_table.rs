@@ -192,6 +192,8 @@ pub fn read_shot_table(
         .has_headers(false)
         .flexible(true)
         .trim(csv::Trim::All)
+        // Ends of lines of two characters would be counted one record late.
+        .terminator(csv::Terminator::Any(b'\n'))
         .from_reader(file);
     let mut record = StringRecord::new();
     let mut known = Known::Unread(columns);
@@ -203,7 +205,8 @@ pub fn read_shot_table(
         .map_err(|error| ShotTableError::Table(error.to_string()))
         .in_file(path)?
     {
-        if known.is_heading(&record).in_file(path)? {
+        let is_blank = record.len() == 1 && record[0].is_empty();
+        if is_blank || known.is_heading(&record).in_file(path)? {
             continue;
         }
         let line = record.position().map_or(0, csv::Position::line);

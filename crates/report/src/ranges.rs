@@ -286,7 +286,7 @@ fn three_ways(site: &SiteProducts) -> String {
                 limited(
                     by_kernels,
                     mean_m,
-                    limits.mean_max_m,
+                    ranges.mean_max_m(limits),
                     "mean_without_outliers_m",
                 ),
                 known(

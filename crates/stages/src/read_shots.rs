@@ -72,7 +72,7 @@ impl Input for ShotFiles<'_> {
 
 impl Stage for ReadShots<'_> {
     const NAME: &'static str = "search_footprints";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     const CHECKED: bool = true;
     type Output = SearchResult;
     stage_inputs!(fingerprint);

@@ -161,6 +161,17 @@ fn every_bad_row_is_told_with_its_line_and_the_good_ones_are_kept() {
 }
 
 #[test]
+fn lines_with_ends_of_two_characters_are_counted() {
+    let rows = read(format!("{HEADER}\r\n\r\n{ROW}\r\nx\r\n"), &named()).unwrap();
+    let line = |row: &std::result::Result<ShotRow, RowComplaint>| match row {
+        Ok(row) => row.line,
+        Err(complaint) => complaint.line,
+    };
+    let lines: Vec<u32> = rows.iter().map(line).collect();
+    assert_eq!(lines, [3, 4]);
+}
+
+#[test]
 fn tables_that_hold_no_shot_are_refused() {
     let refused = |text: &str, expected: &str| {
         let failure = read(text, &named()).unwrap_err();

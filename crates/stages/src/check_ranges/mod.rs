@@ -175,6 +175,19 @@ impl ProfileRanges {
         self.shots >= limits.shots_min
     }
 
+    /// Largest |mean| of range − distance, metres.
+    ///
+    /// Tables without a spacecraft have radii corrected by crossovers: these move footprints by metres, of some orbits by
+    /// tens of metres, and not the ranges, so that the limit is that of two orbits.
+    #[must_use]
+    pub fn mean_max_m(&self, limits: &RangeCheckConfig) -> f64 {
+        if self.decoding_m.n == 0 {
+            limits.mean_max_m.max(limits.orbit_max_m)
+        } else {
+            limits.mean_max_m
+        }
+    }
+
     /// Whether its ranges are compared with any position of the spacecraft.
     #[must_use]
     pub const fn is_tested(&self) -> bool {

@@ -97,7 +97,13 @@ fn of_ranges(evidence: &Evidence<'_>) -> Vec<Check> {
     };
     let worst = |kind: CheckKind, value: &dyn Fn(&ProfileRanges) -> f64, limit: f64| {
         let profiles = judged().filter(|of| measured(kind, of));
-        Check::worst(profiles.map(|of| Check::new(kind, &*of.profile, value(of), limit, Fail)))
+        Check::worst(profiles.map(|of| {
+            let limit = match kind {
+                CheckKind::RangeMean => of.mean_max_m(limits),
+                _ => limit,
+            };
+            Check::new(kind, &*of.profile, value(of), limit, Fail)
+        }))
     };
     let mut checks: Vec<Option<Check>> = quantities
         .into_iter()

@@ -57,17 +57,25 @@ pub(super) fn remarks(evidence: &Evidence<'_>) -> Vec<String> {
             named.collect::<Vec<_>>().join(", ")
         ));
     }
-    remarks.extend(short.iter().filter_map(|of| far_off(of, limits)));
+    remarks.extend(profiles.iter().filter_map(|of| far_off(of, limits)));
     remarks
 }
 
-/// A short profile whose mean is beyond the limit: too few shots to decide, but a reader must know.
+/// A profile whose mean is beyond the limit, but does not make the site invalid: it is too short, or its radii are corrected
+/// by crossovers.
 fn far_off(of: &ProfileRanges, limits: &RangeCheckConfig) -> Option<String> {
     let mean_m = of.mean_without_outliers_m;
+    let why = if of.is_judged(limits) {
+        "radii corrected by crossovers"
+    } else {
+        "not judged"
+    };
+    let is_open = of.invalid_because.is_empty()
+        && (!of.is_judged(limits) || of.mean_max_m(limits) > limits.mean_max_m);
     // Written so that NaN counts.
-    (of.measured() > 0 && !(mean_m.abs() <= limits.mean_max_m)).then(|| {
+    (is_open && of.measured() > 0 && !(mean_m.abs() <= limits.mean_max_m)).then(|| {
         format!(
-            "profile {}, not judged: mean of range − distance {} m by {} shots; limit ±{} m",
+            "profile {}, {why}: mean of range − distance {} m by {} shots; limit ±{} m",
             of.profile,
             signed(mean_m, 3),
             of.measured(),
