@@ -147,19 +147,14 @@ pub fn check_table_ranges(
         shots.outlier.extend(flags);
         let mut ranges = statistics(profile, &shots, first, None, footprints);
         by_own_spacecraft(&mut ranges, footprints, profile, limits);
-<<<<<<< HEAD:crates/stages/src/check_ranges/tables.rs
         let explain = || {
             "support data or kernels hold a different orbit from the table's, or its times or radii are others".to_owned()
         };
-        ranges.invalid_because = ranges.figures().broken_limits(limits, explain);
-=======
-        let explain = || "the support data hold a different orbit from the table's".to_owned();
         let limits = RangeCheckConfig {
             mean_max_m: ranges.mean_max_m(limits),
             ..limits.clone()
         };
         ranges.invalid_because = ranges.figures().broken_limits(&limits, explain);
->>>>>>> ode:src/stages/check_ranges/tables.rs
         checked.push(ranges);
     }
     Ok(RangeCheck {
