@@ -14,7 +14,10 @@ use super::{
 };
 use areograph_base::{body::Body, error::Result};
 use areograph_config::{CalibrationConfig, ValidationConfig};
-use areograph_geom::{calibration::{CalibrationState, Missed, TookPart}, ellipsoid::local_axes};
+use areograph_geom::{
+    calibration::{CalibrationState, Missed, TookPart},
+    ellipsoid::local_axes,
+};
 use areograph_store::files::{file_name, hash_file};
 
 /// Largest difference between the laboratory's geometry of two orbits, pixels: files are written with fifteen digits.
