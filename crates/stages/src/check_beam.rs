@@ -36,7 +36,7 @@ use areograph_config::all_instruments;
 use areograph_geom::{
     attitude::bus_to_camera,
     pushbroom::{CameraModel, Pose},
-    range_residuals::{footprint, own_spacecraft},
+    range_residuals::{footprint, has_own_spacecraft, own_spacecraft},
     statistics::Summary,
 };
 use areograph_store::{
@@ -98,6 +98,8 @@ pub enum BeamGap {
     NoBeam,
     /// No shot of the site falls within its exposure.
     NoShot,
+    /// Shots of tables without positions of the spacecraft have no direction of their own.
+    NoPosition,
 }
 
 impl fmt::Display for BeamGap {
@@ -107,6 +109,7 @@ impl fmt::Display for BeamGap {
             Self::OtherSpacecraft => "another spacecraft carries the laser",
             Self::NoBeam => "the altimeter file does not state where the beam points (beam.bus)",
             Self::NoShot => "no shot was fired during its exposure",
+            Self::NoPosition => "its shots do not state the position of the spacecraft",
         })
     }
 }
@@ -195,13 +198,18 @@ impl Placed<'_> {
         if shots.is_empty() {
             return Err(BeamGap::NoShot);
         }
+        let is_directed = |row: &u32| has_own_spacecraft(&footprints.row(*row as usize));
+        let shots: Vec<u32> = shots.iter().copied().filter(is_directed).collect();
+        if shots.is_empty() {
+            return Err(BeamGap::NoPosition);
+        }
         let inside: BTreeMap<u32, bool> = (0..self.points.len())
             .map(|index| (self.points.row[index], self.points.inside[index]))
             .collect();
         let (mut angles_rad, mut ranges_m) = ([Vec::new(), Vec::new()], Vec::new());
         let mut apart_m = Vec::new();
         let (mut expected_inside, mut inside_count) = (0, 0);
-        for row in shots {
+        for row in &shots {
             let shot = footprints.row(*row as usize);
             let angles = self.angles_rad(&shot, &axes);
             for (column, angle) in angles_rad.iter_mut().zip(angles) {
