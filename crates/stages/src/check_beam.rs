@@ -198,7 +198,12 @@ impl Placed<'_> {
         if shots.is_empty() {
             return Err(BeamGap::NoShot);
         }
-        let is_directed = |row: &u32| has_own_spacecraft(&footprints.row(*row as usize));
+        // A PEDR file always states the spacecraft: at nadir it lies on the radius of the footprint.
+        let is_directed = |row: &u32| {
+            let shot = footprints.row(*row as usize);
+            let file = footprints.files.get(usize::from(shot.file));
+            file.is_some_and(|file| file.version.is_some()) || has_own_spacecraft(&shot)
+        };
         let shots: Vec<u32> = shots.iter().copied().filter(is_directed).collect();
         if shots.is_empty() {
             return Err(BeamGap::NoPosition);
