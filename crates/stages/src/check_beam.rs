@@ -65,6 +65,8 @@ pub struct ImageBeam {
 /// Beam of the simultaneous shots of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Beam {
+    /// Middle of the image, ET seconds.
+    pub middle_et_s: f64,
     /// Shots that were fired while the image was exposed.
     pub shots: u32,
     /// Median angles from the mounting of the laser to the beam, radians: along the track (towards X of the bus) and
@@ -229,6 +231,7 @@ impl Placed<'_> {
         }
         let of_axes = angles_rad.each_ref().map(|column| Summary::of(column));
         Ok(Beam {
+            middle_et_s: image.middle().seconds(),
             shots: u32::try_from(shots.len()).unwrap_or(u32::MAX),
             angles_rad: of_axes.map(|axis| axis.median),
             spread_rad: of_axes.map(|axis| axis.nmad),
