@@ -36,7 +36,7 @@ use areograph_config::all_instruments;
 use areograph_geom::{
     attitude::bus_to_camera,
     pushbroom::{CameraModel, Pose},
-    range_residuals::{footprint, own_spacecraft},
+    range_residuals::{footprint, has_own_spacecraft, own_spacecraft},
     statistics::Summary,
 };
 use areograph_store::{
@@ -65,6 +65,8 @@ pub struct ImageBeam {
 /// Beam of the simultaneous shots of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Beam {
+    /// Middle of the image, ET seconds.
+    pub middle_et_s: f64,
     /// Shots that were fired while the image was exposed.
     pub shots: u32,
     /// Median angles from the mounting of the laser to the beam, radians: along the track (towards X of the bus) and
@@ -98,6 +100,8 @@ pub enum BeamGap {
     NoBeam,
     /// No shot of the site falls within its exposure.
     NoShot,
+    /// Shots of tables without positions of the spacecraft have no direction of their own.
+    NoPosition,
 }
 
 impl fmt::Display for BeamGap {
@@ -107,6 +111,7 @@ impl fmt::Display for BeamGap {
             Self::OtherSpacecraft => "another spacecraft carries the laser",
             Self::NoBeam => "the altimeter file does not state where the beam points (beam.bus)",
             Self::NoShot => "no shot was fired during its exposure",
+            Self::NoPosition => "its shots do not state the position of the spacecraft",
         })
     }
 }
@@ -195,13 +200,23 @@ impl Placed<'_> {
         if shots.is_empty() {
             return Err(BeamGap::NoShot);
         }
+        // A PEDR file always states the spacecraft: at nadir it lies on the radius of the footprint.
+        let is_directed = |row: &u32| {
+            let shot = footprints.row(*row as usize);
+            let file = footprints.files.get(usize::from(shot.file));
+            file.is_some_and(|file| file.version.is_some()) || has_own_spacecraft(&shot)
+        };
+        let shots: Vec<u32> = shots.iter().copied().filter(is_directed).collect();
+        if shots.is_empty() {
+            return Err(BeamGap::NoPosition);
+        }
         let inside: BTreeMap<u32, bool> = (0..self.points.len())
             .map(|index| (self.points.row[index], self.points.inside[index]))
             .collect();
         let (mut angles_rad, mut ranges_m) = ([Vec::new(), Vec::new()], Vec::new());
         let mut apart_m = Vec::new();
         let (mut expected_inside, mut inside_count) = (0, 0);
-        for row in shots {
+        for row in &shots {
             let shot = footprints.row(*row as usize);
             let angles = self.angles_rad(&shot, &axes);
             for (column, angle) in angles_rad.iter_mut().zip(angles) {
@@ -216,6 +231,7 @@ impl Placed<'_> {
         }
         let of_axes = angles_rad.each_ref().map(|column| Summary::of(column));
         Ok(Beam {
+            middle_et_s: image.middle().seconds(),
             shots: u32::try_from(shots.len()).unwrap_or(u32::MAX),
             angles_rad: of_axes.map(|axis| axis.median),
             spread_rad: of_axes.map(|axis| axis.nmad),

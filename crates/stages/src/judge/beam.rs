@@ -16,6 +16,8 @@ const PER_MILLI: f64 = 1e3;
 const INSIDE_SHARE_MIN: f64 = 0.5;
 /// Support data may contain apparent positions, up to this far from geometric ones, metres.
 const APPARENT_M: f64 = 330.0;
+/// Images whose middles are closer in time are of one pass, seconds: they share the error of the attitude and the profile.
+const PASS_S: f64 = 600.0;
 /// Fewer expected footprints do not test an orientation.
 const EXPECTED_MIN: u32 = 5;
 
@@ -140,43 +142,61 @@ impl BeamEvidence<'_> {
         [boresight_rad.hypot(clocks_rad), boresight_rad]
     }
 
-    /// Every image along both axes, then the mean of all.
-    fn deviations(&self) -> Vec<Deviation> {
-        let mut deviations = Vec::new();
-        let tested: Vec<_> = self
-            .beams()
-            .filter(|(image, _)| self.tests(&image.image))
-            .collect();
-        let count = tested.len() as f64;
-        for axis in 0..AXES.len() {
-            let (mut sum_rad, mut variance, mut common_rad) = (0.0, 0.0_f64, 0.0_f64);
-            let (mut shots, mut range_m) = (0, 0.0);
-            for (image, beam) in &tested {
-                let own_rad = self.own_sigmas_rad(image, beam)[axis];
-                let shared_rad = self.common_sigmas_rad(beam.turn_rad_s, beam.clock_s)[axis];
-                sum_rad += beam.angles_rad[axis];
-                variance += own_rad * own_rad;
-                common_rad = common_rad.max(shared_rad);
-                shots += beam.shots;
-                range_m += beam.range_m / count;
-                deviations.push(Deviation {
-                    axis,
-                    subjects: vec![image.image.clone()],
-                    shots: beam.shots,
-                    angle_rad: beam.angles_rad[axis],
-                    sigma_rad: own_rad.hypot(shared_rad),
-                    range_m: beam.range_m,
-                });
+    /// The images that the beam tests, by pass.
+    fn passes(&self) -> Vec<Vec<(&ImageBeam, &Beam)>> {
+        let mut passes: Vec<Vec<(&ImageBeam, &Beam)>> = Vec::new();
+        for (image, beam) in self.beams().filter(|(of, _)| self.tests(&of.image)) {
+            let at_s = beam.middle_et_s;
+            let mut known = passes.iter_mut();
+            match known.find(|pass| (pass[0].1.middle_et_s - at_s).abs() <= PASS_S) {
+                Some(pass) => pass.push((image, beam)),
+                None => passes.push(vec![(image, beam)]),
             }
-            if tested.len() > 1 {
-                deviations.push(Deviation {
-                    axis,
-                    subjects: tested.iter().map(|(of, _)| of.image.clone()).collect(),
-                    shots,
-                    angle_rad: sum_rad / count,
-                    sigma_rad: (variance.sqrt() / count).hypot(common_rad),
-                    range_m,
-                });
+        }
+        passes
+    }
+
+    /// Every image along both axes, then the mean of all passes.
+    fn deviations(&self) -> Vec<Deviation> {
+        let passes = self.passes();
+        let count = passes.len() as f64;
+        let mut deviations = Vec::new();
+        for axis in 0..AXES.len() {
+            let (mut variance, mut common_rad) = (0.0_f64, 0.0_f64);
+            let mut mean = Deviation {
+                axis,
+                subjects: Vec::new(),
+                shots: 0,
+                angle_rad: 0.0,
+                sigma_rad: 0.0,
+                range_m: 0.0,
+            };
+            for pass in &passes {
+                let share = 1.0 / (count * pass.len() as f64);
+                let mut largest_rad = 0.0_f64;
+                for (image, beam) in pass {
+                    let own_rad = self.own_sigmas_rad(image, beam)[axis];
+                    let shared_rad = self.common_sigmas_rad(beam.turn_rad_s, beam.clock_s)[axis];
+                    largest_rad = largest_rad.max(own_rad);
+                    common_rad = common_rad.max(shared_rad);
+                    mean.subjects.push(image.image.clone());
+                    mean.shots += beam.shots;
+                    mean.angle_rad += share * beam.angles_rad[axis];
+                    mean.range_m += share * beam.range_m;
+                    deviations.push(Deviation {
+                        axis,
+                        subjects: vec![image.image.clone()],
+                        shots: beam.shots,
+                        angle_rad: beam.angles_rad[axis],
+                        sigma_rad: own_rad.hypot(shared_rad),
+                        range_m: beam.range_m,
+                    });
+                }
+                variance += largest_rad * largest_rad;
+            }
+            if passes.len() > 1 {
+                mean.sigma_rad = (variance.sqrt() / count).hypot(common_rad);
+                deviations.push(mean);
             }
         }
         deviations
