@@ -7,11 +7,7 @@
 //! The root names these crates by their rooms: `crate::geom` is `areograph_geom`.
 
 pub mod cli;
-pub mod difference;
 pub mod flow;
-pub mod products;
-pub mod report;
-pub mod stages;
 pub mod worker;
 
 pub use areograph_base::{
@@ -21,9 +17,12 @@ pub use areograph_base::{
 pub use areograph_config as config;
 pub use areograph_geom::{self as geom, imaging};
 pub use areograph_pds as pds;
+pub use areograph_products as products;
+pub use areograph_report::{self as report, difference};
 pub use areograph_scene as scene;
 pub use areograph_service as service;
 pub use areograph_spice as spice;
 #[cfg(feature = "sql")]
 pub use areograph_sql as sql;
+pub use areograph_stages as stages;
 pub use areograph_store::{self as store, files, stage, stage_inputs};

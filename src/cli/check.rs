@@ -8,7 +8,7 @@ use serde_json::json;
 use super::{load_sites, output};
 use crate::{
     error::{Error, Kind},
-    flow::{Checked, check_site},
+    flow::{Checked, check_out, check_site},
     store::hashes::HashCache,
 };
 
@@ -24,7 +24,8 @@ pub(super) struct Arguments {
     /// Site files (TOML).
     #[arg(required = true, value_name = "SITE.toml")]
     sites: Vec<PathBuf>,
-    /// Folder of products; kernels that a run into it has read are not read again if they did not change.
+    /// Folder of products of a run, which must be apart from the inputs; kernels that a run into it has read are not read
+    /// again if they did not change.
     #[arg(long, default_value = "out")]
     out: PathBuf,
     /// Read every input file again, even if it did not change.
@@ -40,7 +41,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let mut failures = Vec::new();
     let mut answers = Vec::new();
     for site in load_sites(&arguments.sites)? {
-        let checked = check_site(&site, &hashes);
+        let mut checked = check_site(&site, &hashes);
+        let out = check_out(&arguments.out, std::slice::from_ref(&site));
+        checked.failures.splice(0..0, out.err());
         if arguments.json {
             answers.push(answer(&site.site, &checked));
         } else {

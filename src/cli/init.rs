@@ -11,7 +11,7 @@ use clap::Args;
 use super::{output, windows::edges};
 use crate::{
     config::{NewSite, built_in_instruments, parse},
-    error::{Cause, Error, IoError, Kind, Locate as _},
+    error::{Cause, Error, IoError, Locate as _},
     files::file_name,
     pds::{product_named, read_label},
     store::atomic,
@@ -56,28 +56,15 @@ pub(super) struct Arguments {
 }
 
 /// Why no site file is written.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Configuration)]
 enum Refused {
     #[error("already exists")]
+    #[cause("name another folder, another --site, or remove the file")]
     Exists,
     #[error("missing: {0}")]
+    #[cause("give the options of `areograph init --help`, or answer on a terminal")]
     Missing(&'static str),
-}
-
-impl Cause for Refused {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Exists => "name another folder, another --site, or remove the file",
-            Self::Missing(_) => {
-                "give the options of `areograph init --help`, or answer on a terminal"
-            }
-        }
-        .to_owned()
-    }
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {

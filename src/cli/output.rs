@@ -6,14 +6,21 @@ use std::{
     sync::OnceLock,
 };
 
-use crate::error::IoError;
+use crate::error::{IoError, printable};
+
+/// Control characters of answers and messages themselves; others come from paths and files.
+const LAYOUT: &str = "\n\t";
 
 /// Why part of the output was lost.
 static LOST: OnceLock<Error> = OnceLock::new();
 
 /// Prints a line of the output. A closed pipe (`| head`) is not a failure.
 pub(super) fn line(text: impl Display) {
-    told(writeln!(stdout().lock(), "{text}"));
+    told(writeln!(
+        stdout().lock(),
+        "{}",
+        printable(&text.to_string(), LAYOUT)
+    ));
 }
 
 /// Prints text unchanged.
@@ -24,13 +31,15 @@ pub(super) fn text(text: &[u8]) {
 /// Prints a failure.
 pub(super) fn error(failure: impl Display) {
     // If standard error fails too, the exit code still reports the failure.
-    let _ = writeln!(stderr().lock(), "error: {failure}");
+    let failure = failure.to_string();
+    let _ = writeln!(stderr().lock(), "error: {}", printable(&failure, LAYOUT));
 }
 
 /// Prints a warning of a command that succeeded.
 pub(super) fn warning(text: impl Display) {
     // As for failures.
-    let _ = writeln!(stderr().lock(), "warning: {text}");
+    let text = text.to_string();
+    let _ = writeln!(stderr().lock(), "warning: {}", printable(&text, LAYOUT));
 }
 
 /// Prints JSON for scripts.

@@ -9,6 +9,7 @@ mod search;
 #[cfg(feature = "sql")]
 mod sql;
 mod tab;
+mod tables;
 
 use std::process::ExitCode;
 

@@ -13,7 +13,7 @@ use tokio::{sync::Semaphore, task::JoinHandle};
 use super::{load_sites, open, output, plan, progress::Progress, report, stop::on_signals};
 use crate::{
     config::SiteConfig,
-    error::{Error, Kind},
+    error::{Cause, Error, Kind},
     flow::{
         Ending, Observer, PUBLISH, RunOptions, SiteOutcome, check_out, publish_sites, run_site,
         stages,
@@ -188,20 +188,10 @@ fn flatten(joined: Result<Outcome, tokio::task::JoinError>) -> Outcome {
     joined.unwrap_or_else(|error| Err(Panicked(error.to_string()).into()))
 }
 
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("internal error of areograph: {0}")]
+#[cause(Bug: "please report it with the configuration; the next run detects and repairs incomplete products")]
 struct Panicked(String);
-
-impl crate::error::Cause for Panicked {
-    fn kind(&self) -> Kind {
-        Kind::Bug
-    }
-
-    fn advice(&self) -> String {
-        "please report it with the configuration; the next run detects and repairs incomplete products"
-            .to_owned()
-    }
-}
 
 fn exit_code(outcome: &Outcome) -> u8 {
     match outcome {
@@ -283,6 +273,7 @@ fn outcome_json(outcome: &Outcome) -> serde_json::Value {
             "valid": manifest.verdict.valid,
             "reasons": manifest.verdict.reasons,
             "remarks": manifest.verdict.remarks,
+            "untested": manifest.verdict.untested,
             "checks": manifest.verdict.checks,
             "figures": manifest.figures,
             "counts": manifest.counts,

@@ -20,7 +20,7 @@ use tokio::{
 use super::{output, report};
 use crate::{
     config::service_example,
-    error::{Cause, Error, IoError, Kind, Locate as _},
+    error::{Cause, Error, IoError, Locate as _},
     scene::{SceneOptions, write_scene},
     service::{
         clock::Clock,
@@ -71,19 +71,10 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
 }
 
 /// The folder has a configuration.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("a configuration already exists")]
+#[cause(Configuration: "serve this configuration, or name another folder")]
 struct Exists;
-
-impl Cause for Exists {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        "serve this configuration, or name another folder".to_owned()
-    }
-}
 
 fn init(folder: &Path) -> Result<(), Error> {
     let path = folder.join(FILE);
@@ -136,16 +127,23 @@ fn serve(file: &Path, listen: Option<SocketAddr>) -> Result<(), Error> {
     let workers = Processes {
         program: shared.program.clone(),
     };
-    let engine = Engine::new(Arc::clone(&shared), workers, Random::default())?;
+    // Pages answer from the beginning: a lost database may take minutes to be made again.
     let served = pages.spawn(http::serve(listener, Arc::clone(&shared)));
-    work.block_on(async {
-        let engine = Arc::new(engine);
+    let worked: Result<(), Error> = work.block_on(async {
         tokio::spawn(obey(Arc::clone(&shared), listen));
-        tokio::spawn(tell_life(Arc::clone(&engine)));
         output::line(format_args!("listening at http://{address}"));
         let _ = sd_notify::notify(&[NotifyState::Ready]);
+        let engine = begin(&shared, workers).await?;
+        let turning = Arc::clone(&engine);
+        tokio::spawn(tell_life(move || turning.turns()));
         engine.run().await;
+        Ok(())
     });
+    if worked.is_err() {
+        work.shutdown_background();
+        pages.shutdown_background();
+        return worked;
+    }
     // If pages can no longer be served, the service continues its work until it is stopped.
     let served = pages.block_on(served);
     work.shutdown_background();
@@ -154,6 +152,19 @@ fn serve(file: &Path, listen: Option<SocketAddr>) -> Result<(), Error> {
         tracing::error!("serving the pages failed: {panicked}");
         Ok(())
     })
+}
+
+/// Begins the engine, which first takes over the state of an earlier service.
+async fn begin(shared: &Arc<Shared>, workers: Processes) -> Result<Arc<Engine<Processes>>, Error> {
+    let (taking, lasting) = (Arc::clone(shared), Arc::clone(shared));
+    let life = tokio::spawn(tell_life(move || lasting.progress()));
+    let engine =
+        tokio::task::spawn_blocking(move || Engine::new(taking, workers, Random::default()));
+    let engine = engine.await;
+    life.abort();
+    let engine =
+        engine.map_err(|panicked| IoError::on("begin")(std::io::Error::other(panicked)))?;
+    engine.map(Arc::new)
 }
 
 /// Shuts the service down at SIGTERM or SIGINT, by force at the second signal or after a delay; reloads the
@@ -191,8 +202,8 @@ async fn obey(shared: Arc<Shared>, listen: Option<SocketAddr>) {
     std::process::exit(0);
 }
 
-/// Reports to the service manager that the engine is alive.
-async fn tell_life(engine: Arc<Engine<Processes>>) {
+/// Reports to the service manager that work goes on, as a growing number shows.
+async fn tell_life(work: impl Fn() -> u64) {
     let Some(patience) = sd_notify::watchdog_enabled() else {
         return;
     };
@@ -200,8 +211,8 @@ async fn tell_life(engine: Arc<Engine<Processes>>) {
     let mut seen = None;
     loop {
         ticks.tick().await;
-        let turns = engine.turns();
-        if seen.replace(turns) != Some(turns) {
+        let done = work();
+        if seen.replace(done) != Some(done) {
             let _ = sd_notify::notify(&[NotifyState::Watchdog]);
         }
     }

@@ -7,7 +7,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use super::output;
 use crate::{
     config::{ServiceConfig, load_service},
-    error::{Cause, Error, Kind, Locate as _},
+    error::{Cause, Error, Locate as _},
     service::{
         clock::{Clock, utc_text},
         database::Database,
@@ -94,35 +94,24 @@ enum RoleName {
     Operate,
 }
 
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Configuration)]
 enum Unfit {
     #[error("unknown token {0}")]
+    #[cause("list the tokens with `areograph service token list`")]
     NoToken(String),
     #[error("already exists")]
+    #[cause("name a file that does not exist")]
     FileExists,
-}
-
-impl Cause for Unfit {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::NoToken(_) => "list the tokens with `areograph service token list`",
-            Self::FileExists => "name a file that does not exist",
-        }
-        .to_owned()
-    }
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     match &arguments.command {
         Command::Backup { config, file } => {
-            if file.exists() {
+            if file.symlink_metadata().is_ok() {
                 return Err(Unfit::FileExists).in_file(file);
             }
-            database(&load(config)?)?.copy_to(file).in_file(file)?;
+            existing(&load(config)?)?.copy_to(file).in_file(file)?;
             output::line(format_args!("copied to {}", file.display()));
             Ok(())
         }
@@ -153,6 +142,11 @@ fn database(config: &ServiceConfig) -> Result<Database, Error> {
     Database::open(&config.outputs.state)
 }
 
+/// The same, but no new one.
+fn existing(config: &ServiceConfig) -> Result<Database, Error> {
+    Database::open_existing(&config.outputs.state)
+}
+
 fn token(command: &TokenCommand) -> Result<(), Error> {
     let now_ms = Clock::default().now_ms();
     match command {
@@ -173,7 +167,7 @@ fn token(command: &TokenCommand) -> Result<(), Error> {
             Ok(())
         }
         TokenCommand::List { config } => {
-            let found = database(&load(config)?)?.read(tokens).in_file(config)?;
+            let found = existing(&load(config)?)?.read(tokens).in_file(config)?;
             for token in found {
                 let ends = match (token.revoked_ms, token.expires_ms) {
                     (Some(at_ms), _) => format!("revoked {}", utc_text(at_ms)),
@@ -192,7 +186,7 @@ fn token(command: &TokenCommand) -> Result<(), Error> {
             Ok(())
         }
         TokenCommand::Revoke { config, id } => {
-            let revoked = database(&load(config)?)?
+            let revoked = existing(&load(config)?)?
                 .write(|transaction| revoke_token(transaction, now_ms, id))
                 .in_file(config)?;
             if revoked {

@@ -103,19 +103,10 @@ pub struct ArchiveOutcome {
 }
 
 /// No file to check.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("no PEDR file (*.b) to check")]
+#[cause(Input: "name the folder of the PEDR files, or files (AP#####v.B)")]
 struct NoFiles;
-
-impl Cause for NoFiles {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "name the folder of the PEDR files, or files (AP#####v.B)".to_owned()
-    }
-}
 
 /// The limits of a check: those of a site file, with a coarser scan.
 #[must_use]

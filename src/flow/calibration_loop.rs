@@ -8,7 +8,7 @@
 //! shot remains on one side in all rounds.
 //!
 //! # Source
-//! Li et al. 2023, figure 4. The paper ends "until accuracy converges"; `Rounds::is_converged` defines convergence.
+//! Li et al. 2023, figure 1. The paper ends "until accuracy converges"; `Rounds::is_converged` defines convergence.
 
 mod refused;
 

@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     config::SiteConfig,
-    error::{Cause, Error, Kind, Locate, Result},
+    error::{Cause, Error, Locate, Result},
     files::{HashedFile, InputFiles},
     kernel_source::KernelSource,
     spice::RequiredCoverage,
@@ -77,20 +77,11 @@ pub fn rival_sets(config: &SiteConfig) -> Result<Vec<RivalSet>> {
 }
 
 /// The products of a run would be invalid.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("products would be invalid: {reason}")]
+#[cause(Validation: "a run still writes the products, marks them as invalid, and reports the numbers")]
 struct WouldBeInvalid {
     reason: String,
-}
-
-impl Cause for WouldBeInvalid {
-    fn kind(&self) -> Kind {
-        Kind::Validation
-    }
-
-    fn advice(&self) -> String {
-        "a run still writes the products, marks them as invalid, and reports the numbers".to_owned()
-    }
 }
 
 struct Check<'a> {

@@ -7,7 +7,7 @@ mod uncovered;
 
 use crate::{
     constants::SPACECRAFT,
-    error::{Cause, Kind, Locate, Result},
+    error::{Cause, Locate, Result},
     spice::{Coverage, KernelSet, RequiredCoverage, Session},
     stages::compare_kernels::{
         AttitudeComparison, AttitudeSample, Comparison, compare_attitudes, compare_orbits,
@@ -77,44 +77,26 @@ impl Compared {
 }
 
 /// Sets that cannot be compared.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 enum CompareError {
     #[error("kernel set {other} contains the same kernels as {first}")]
+    #[cause(Configuration: "name each set once")]
     Same { first: String, other: String },
     #[error("the kernel sets have no common coverage of the position of {}; {held}", SPACECRAFT.name)]
+    #[cause(Coverage: "see `areograph kernels coverage` for each set, and leave out the set that does not cover this \
+        time")]
     NothingInCommon { held: String },
     #[error(
         "the clocks of the kernel sets {first} and {other} differ: {reading} is {apart_s} s later in {other}"
     )]
+    #[cause(Input: "give all sets the same leap-second (.tls) and spacecraft clock (.tsc) kernels: times of images \
+        depend on them")]
     Clocks {
         first: String,
         other: String,
         reading: String,
         apart_s: f64,
     },
-}
-
-impl Cause for CompareError {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::Same { .. } => Kind::Configuration,
-            Self::NothingInCommon { .. } => Kind::Coverage,
-            Self::Clocks { .. } => Kind::Input,
-        }
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Same { .. } => "name each set once",
-            Self::NothingInCommon { .. } => {
-                "see `areograph kernels coverage` for each set, and leave out the set that does not cover this time"
-            }
-            Self::Clocks { .. } => {
-                "give all sets the same leap-second (.tls) and spacecraft clock (.tsc) kernels: times of images depend on them"
-            }
-        }
-        .to_owned()
-    }
 }
 
 /// Compares the orbits, and where possible the attitudes, of at least two sets.

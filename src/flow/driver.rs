@@ -7,6 +7,7 @@ use crate::{
     config::SiteConfig,
     error::{Error, Locate, Result},
     files::{HashedFile, InputFiles},
+    pds::SizedFile,
     spice::RequiredCoverage,
     stage::{Output, Provenance, Reason, Stage},
     stages::{group_profiles::Profile, tag_times::ImageTimes},
@@ -60,6 +61,21 @@ pub(super) trait Driver {
     fn hash(&mut self, stage: &'static str, paths: &[PathBuf]) -> Flow<Vec<HashedFile>> {
         self.enter(stage)?;
         Ok(self.files().hash_all(paths, self.stop()).in_stage(stage)?)
+    }
+
+    /// The same for files of a kind with a largest size; a larger one is not read.
+    fn hash_sized(
+        &mut self,
+        stage: &'static str,
+        kind: SizedFile,
+        paths: &[PathBuf],
+    ) -> Flow<Vec<HashedFile>> {
+        self.enter(stage)?;
+        let sized = paths.iter().try_for_each(|path| kind.require(path));
+        match self.attempt(stage, sized)? {
+            Some(()) => self.hash(stage, paths),
+            None => Ok(Vec::new()),
+        }
     }
 
     /// The images with which profiles may be simultaneous.

@@ -1,16 +1,22 @@
 //! Evidence for the verdict, and notes for readers of the products.
 
-use std::collections::BTreeMap;
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    ffi::OsStr,
+    path::Path,
+};
 
 use super::outputs::Site;
 use crate::{
     config::SiteConfig,
     error::Result,
+    footprints::SourceFile,
     geom::pushbroom::CameraModel,
     instruments::Instrument,
     stage::Output,
     stages::{
-        judge::{AdjustmentEvidence, Evidence, JudgedImage, Verdict, judge},
+        adjust::accuracy_withheld,
+        judge::{AdjustmentEvidence, BeamEvidence, Evidence, JudgedImage, Verdict, judge},
         lay_overlays::ShownImage,
         site_image::SiteImage,
     },
@@ -55,6 +61,11 @@ pub(super) fn judged(
         ranges: site.ranges.value()?,
         clock_correction_s: config.mola_clock.correction_s(),
         images: &images,
+        beam: BeamEvidence {
+            images: site.beam.value()?,
+            adjustment: &config.adjustment,
+            surface: &config.mola_surface,
+        },
         warnings,
         complaints,
         adjustment,
@@ -82,12 +93,18 @@ pub(super) fn warnings(config: &SiteConfig, site: &Site) -> Result<Vec<String>> 
         warnings.extend(remarks.map(|remark| format!("image {}: {}", times.id, remark.text)));
     }
     warnings.extend(same_exposures(&site.images)?);
+    warnings.extend(empty_pedr_files(config, site)?);
     if has_angles(config) {
         warnings.extend(gimbal_locks(&site.images)?);
     }
     if let Some(ties) = &site.ties {
         let remarks = ties.value()?.remarks.iter();
         warnings.extend(remarks.map(|remark| format!("tie points: {remark}")));
+    }
+    if site.adjustment.is_some() {
+        let times = site.images.iter().map(|image| image.times.value());
+        let times = times.collect::<Result<Vec<_>>>()?;
+        warnings.extend(accuracy_withheld(config, times));
     }
     for (id, image) in shown(site)? {
         let damage = image.damage();
@@ -165,12 +182,55 @@ fn same_exposures(images: &[SiteImage]) -> Result<Vec<String>> {
     Ok(same)
 }
 
+/// PEDR files without a shot in the windows: each that the site file names, and those of patterns of which most files
+/// have shots. A pattern of which most have none searches an archive.
+fn empty_pedr_files(config: &SiteConfig, site: &Site) -> Result<Option<String>> {
+    let footprints = &site.converted.value()?.footprints;
+    let with_shots: BTreeSet<u16> = footprints.file.iter().copied().collect();
+    let files = footprints.files.iter().zip(0_u16..);
+    let files: Vec<(&SourceFile, bool)> = files
+        .map(|(file, index)| (file, with_shots.contains(&index)))
+        .collect();
+    let full: BTreeSet<&str> = files
+        .iter()
+        .filter(|(_, has_shots)| *has_shots)
+        .map(|(file, _)| &*file.blake3)
+        .collect();
+    if full.is_empty() || config.pedr.files.is_empty() {
+        return Ok(None);
+    }
+    let written = config.keys.get("pedr.files");
+    let written = written.and_then(|text| serde_json::from_str::<Vec<String>>(text).ok());
+    let written = written.unwrap_or_default();
+    let is_named = |name: &str| {
+        let mut paths = written.iter().map(Path::new);
+        paths.any(|path| path.file_name() == Some(OsStr::new(name)))
+    };
+    // A copy of a file with shots was read once.
+    let (named, matched): (Vec<_>, Vec<_>) = files
+        .iter()
+        .map(|(file, _)| (&*file.name, full.contains(&*file.blake3)))
+        .partition(|(name, _)| is_named(name));
+    let matched_full = matched.iter().filter(|(_, is_full)| *is_full).count();
+    let is_archive = 2 * matched_full < matched.len();
+    let matched = matched.into_iter().filter(|_| !is_archive);
+    let empty = named.into_iter().chain(matched);
+    let empty: Vec<&str> = empty
+        .filter(|(_, is_full)| !is_full)
+        .map(|(name, _)| name)
+        .collect();
+    Ok((!empty.is_empty()).then(|| {
+        format!(
+            "no shot in the windows comes from {}: check that each is a PEDR file of this site's orbits",
+            empty.join(", ")
+        )
+    }))
+}
+
 fn judged_images(images: &[SiteImage]) -> Result<Vec<JudgedImage<'_>>> {
     let images = images.iter().map(|image| {
-        let times = image.times.value()?;
         Ok(JudgedImage {
-            id: &times.id,
-            disagreements: &times.remarks,
+            times: image.times.value()?,
             orientation: image.orientation.value()?,
             model: image.model.value()?,
         })

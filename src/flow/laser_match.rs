@@ -10,7 +10,7 @@ use super::{
     single::{Single, SingleOutcome, Told, made},
 };
 use crate::{
-    error::{Cause, Kind, Locate as _, Result},
+    error::{Cause, Locate as _, Result},
     pds::archive::Listing,
     products::{MatchProducts, write_match_products},
     report::match_page,
@@ -25,19 +25,10 @@ const METHOD: u32 = 3;
 const NAME: &str = "pedr_match";
 
 /// No file to search.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("no PEDR file (*.b) to search")]
+#[cause(Input: "name PEDR files (AP#####v.B), or folders that contain them")]
 struct NoFiles;
-
-impl Cause for NoFiles {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "name PEDR files (AP#####v.B), or folders that contain them".to_owned()
-    }
-}
 
 /// Matches laser profiles with a terrain model and publishes the products in the folder `out`, if an input has
 /// changed since the last run. `request.pedr` may name folders too.

@@ -184,7 +184,9 @@ fn matched(ties: &Ties) -> BTreeMap<String, u64> {
 /// The largest figures of the site.
 fn figures_of(site: &Site) -> Result<BTreeMap<String, f64>> {
     let profiles = site.ranges.value()?.profiles.iter();
-    let means = profiles.map(|ranges| ranges.mean_without_outliers_m.abs());
+    // Ranges of tables may have nothing to be compared with.
+    let measured = profiles.filter(|ranges| ranges.measured() > 0);
+    let means = measured.map(|ranges| ranges.mean_without_outliers_m.abs());
     let models = site.images.iter().map(|image| image.model.value());
     let models = models.collect::<Result<Vec<_>>>()?;
     let positions = models

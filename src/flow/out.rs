@@ -1,33 +1,59 @@
 //! Checks, before any stage runs, whether products can be written into a folder.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 use crate::{
     config::SiteConfig,
-    error::{Cause, Kind, Locate, Result},
+    error::{Cause, Locate, Result},
+    files::{overlap, real_path, require_own},
+    kernel_source::{KernelList, KernelSource},
     products::position_kernel,
+    report::FIDELITY_FILE,
     spice::PATH_LENGTH_MAX,
-    store::publish::staging_path,
+    store::{
+        page::{PAGE, SITES_PAGE},
+        publish::staging_path,
+    },
 };
 
 /// Longest component of a path that common file systems accept, bytes.
 const PART_LENGTH_MAX: usize = 255;
 
 /// Why no products can be written into a folder.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Configuration)]
 pub enum OutError {
     /// Metakernels and CSPICE cannot name files in it.
     #[error("--out is {out:?}: it {holds}; expected UTF-8 without control characters")]
+    #[cause("name a folder without such characters for --out")]
     Unspeakable {
         /// The folder.
         out: PathBuf,
         /// The obstacle.
         holds: &'static str,
     },
+    /// Products would be inputs of the next run, or inputs lie among products.
+    #[error(
+        "the output folder {} overlaps the input folder {}; expected folders apart from each other",
+        .out.display(), .input.display()
+    )]
+    #[cause(
+        "name a folder for the products (--out) that neither holds inputs nor lies in a folder of inputs"
+    )]
+    Overlap {
+        /// The folder of all products, or that of the site's.
+        out: PathBuf,
+        /// A folder of inputs.
+        input: PathBuf,
+    },
     /// No file system accepts it.
     #[error(
         "--out has a path component of {bytes} bytes, {part:.20}…; expected at most {PART_LENGTH_MAX}"
     )]
+    #[cause("name a folder with a shorter path for --out; a relative path counts as it is written")]
     LongPart {
         /// The part.
         part: String,
@@ -39,34 +65,25 @@ pub enum OutError {
         "with --out the path of a product, {}, is {} bytes long while it is written; CSPICE accepts at most {PATH_LENGTH_MAX}",
         .product.display(), .product.as_os_str().len()
     )]
+    #[cause(like = LongPart)]
     LongPath {
         /// The product.
         product: PathBuf,
     },
 }
 
-impl Cause for OutError {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Unspeakable { .. } => "name a folder without such characters for --out",
-            Self::LongPart { .. } | Self::LongPath { .. } => {
-                "name a folder with a shorter path for --out; a relative path counts as it is written"
-            }
-        }
-        .to_owned()
-    }
-}
-
-/// Ensures that the paths of all products of `sites` in `out` can be written.
+/// Ensures that the products of `sites` can be written into `out`, and replace no input.
 ///
 /// # Errors
-/// [`OutError`], of kind configuration.
+/// [`OutError`], of kind configuration; a page over all sites would replace a file that areograph did not write.
 pub fn check_out(out: &Path, sites: &[SiteConfig]) -> Result<()> {
     check_out_path(out)?;
+    for page in [SITES_PAGE, FIDELITY_FILE] {
+        require_own(&out.join(page), &PAGE)?;
+    }
+    for site in sites {
+        check_apart(out, site).in_site(&site.site)?;
+    }
     for site in sites.iter().filter(|site| site.ties.are_there()) {
         let staging = staging_path(&out.join(&site.site));
         let ids = site.images.iter().map(|image| &*image.id);
@@ -77,6 +94,63 @@ pub fn check_out(out: &Path, sites: &[SiteConfig]) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Ensures that products and inputs of a site are in separate folders.
+///
+/// A folder that is searched for kernels, with its subfolders, holds no products and is not among them. Products are
+/// not in the folder of a single input either, unless the site file is in or below it: then it is the folder of
+/// everything.
+fn check_apart(out: &Path, site: &SiteConfig) -> std::result::Result<(), OutError> {
+    let products = out.join(&site.site);
+    let apart = |meet: bool, out: &Path, input: &Path| {
+        let overlap = || OutError::Overlap {
+            out: out.to_owned(),
+            input: input.to_owned(),
+        };
+        if meet { Err(overlap()) } else { Ok(()) }
+    };
+    if let KernelSource::Root(selection) = &site.kernels.source {
+        let root = &selection.root;
+        apart(overlap(&products, root), &products, root)?;
+        apart(real_path(out).starts_with(real_path(root)), out, root)?;
+    }
+    let folder_of = |path: &Path| match path.parent() {
+        Some(folder) if folder != Path::new("") => folder.to_owned(),
+        _ => PathBuf::from("."),
+    };
+    let of_site = real_path(&folder_of(&site.file));
+    let (real_out, real_products) = (real_path(out), real_path(&products));
+    let folders: BTreeSet<PathBuf> = inputs(site).into_iter().map(folder_of).collect();
+    for folder in &folders {
+        let real = real_path(folder);
+        apart(real.starts_with(&real_products), &products, folder)?;
+        let is_common = of_site.starts_with(&real);
+        apart(!is_common && real_out.starts_with(&real), out, folder)?;
+    }
+    Ok(())
+}
+
+fn of_list(list: &KernelList) -> &[PathBuf] {
+    match list {
+        KernelList::Metakernel(path) => std::slice::from_ref(path),
+        KernelList::Files(paths) => paths,
+    }
+}
+
+/// The files that the site names.
+fn inputs(site: &SiteConfig) -> Vec<&Path> {
+    let kernels: Vec<&PathBuf> = match &site.kernels.source {
+        KernelSource::Listed(list) => of_list(list).iter().collect(),
+        KernelSource::Root(_) => Vec::new(),
+        KernelSource::Sets(sets) => sets.iter().flat_map(|set| of_list(&set.list)).collect(),
+    };
+    let images = site.images.iter();
+    let images = images.flat_map(|image| image.source().into_iter().chain(&image.pixels));
+    let tables = site.shots.iter().flat_map(|table| &table.files);
+    let files = site.pedr.files.iter().chain(tables).chain(&site.ties.files);
+    let all = files.chain(images).chain(kernels);
+    all.map(PathBuf::as_path).collect()
 }
 
 /// Ensures that file systems and metakernels accept the path of a folder.

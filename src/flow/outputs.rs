@@ -6,8 +6,8 @@ use crate::{
     spice::{KernelSet, RequiredCoverage},
     stage::Output,
     stages::{
-        adjust::Adjusted, check_heights::HeightCheck, check_ranges::RangeCheck,
-        compare_pairs::PairComparison, convert_datum::Converted,
+        adjust::Adjusted, check_beam::ImageBeam, check_heights::HeightCheck,
+        check_ranges::RangeCheck, compare_pairs::PairComparison, convert_datum::Converted,
         describe_kernels::KernelDescription, group_profiles::Profile, intersect::IntersectedTies,
         lay_overlays::Overlays, map_surface::Surface, read_ties::Ties,
         search_footprints::SearchResult, site_image::SiteImage, tabulate_kernels::KernelTables,
@@ -41,6 +41,8 @@ pub(super) struct Site {
     pub(super) ranges: Output<RangeCheck>,
     /// In the order of the configuration.
     pub(super) images: Vec<SiteImage>,
+    /// Of the same images.
+    pub(super) beam: Output<Vec<ImageBeam>>,
     /// `None` for a site without tie point files.
     pub(super) ties: Option<Output<Ties>>,
     /// With the orientation of the kernels; `None` if it failed.

@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::{
-    error::{Cause, Kind, Locate, Result},
+    error::{Cause, Locate, Result},
     products::{PAGE_DATA, PageData, REPORT},
     report,
     store::{
@@ -18,19 +18,11 @@ use crate::{
 };
 
 /// The page differs from the published one, although its content is unchanged.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("the page made from these products differs from the published one")]
+#[cause(Input: "it was made by another build of this version: run the site again, or write the page elsewhere with \
+    --page")]
 struct OtherPage;
-
-impl Cause for OtherPage {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "it was made by another build of this version: run the site again, or write the page elsewhere with --page".to_owned()
-    }
-}
 
 /// A rebuilt page.
 #[derive(Debug)]

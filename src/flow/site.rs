@@ -16,10 +16,14 @@ use crate::{
     footprints::Footprints,
     geom::window::WindowShape,
     kernel_source::KernelSource,
-    pds::archive::{Index, Indexes},
+    pds::{
+        SizedFile,
+        archive::{Index, Indexes},
+    },
     spice::{KernelSet, KernelView, RequiredCoverage},
     stage::{InOrder, Output, Round, Stage},
     stages::{
+        check_beam::CheckBeam,
         check_ranges::{CheckRanges, CheckTableRanges},
         convert_datum::ConvertDatum,
         describe_kernels::{DescribeKernels, Required},
@@ -29,6 +33,7 @@ use crate::{
         read_shots::{ReadShots, ShotFiles},
         sample_orientation::SampleOrientation,
         search_footprints::{KnownPlaces, PedrFiles, SearchFootprints, SearchResult},
+        site_image::SiteImages,
         tag_times::{ImageTimes, TagTimes},
         tag_utc::TagUtc,
     },
@@ -70,7 +75,11 @@ pub(super) fn prepare<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Prep
         let kernels = &KernelView::text(clocks.as_ref());
         let tag = |image: &ImageConfig| {
             let source = image.source().map_or(&[][..], std::slice::from_ref);
-            let source = flow.hash(TagTimes::NAME, source)?.pop();
+            let kind = match &image.isd {
+                Some(_) => SizedFile::SupportData,
+                None => SizedFile::Label,
+            };
+            let source = flow.hash_sized(TagTimes::NAME, kind, source)?.pop();
             let (label, support) = match &image.isd {
                 Some(_) => (None, source),
                 None => (source, None),
@@ -117,7 +126,8 @@ fn found<D: Driver>(
     images: &[Output<ImageTimes>],
     clocks: Option<&KernelSet>,
 ) -> Flow<Output<SearchResult>> {
-    let files = flow.hash(SearchFootprints::NAME, &config.pedr.files)?;
+    let (stage, kind) = (SearchFootprints::NAME, SizedFile::Pedr);
+    let files = flow.hash_sized(stage, kind, &config.pedr.files)?;
     let tables = config.shots.iter();
     let tables = tables.map(|table| flow.hash(ReadShots::NAME, &table.files));
     let tables = tables.collect::<Flow<Vec<_>>>()?;
@@ -214,13 +224,14 @@ pub(super) fn orient<D: Driver>(
         images,
         required,
     } = prepared;
+    let view = KernelView::positions(kernels.as_ref());
+    let view = flow.attempt(CheckRanges::NAME, view)?;
+    let view = &view.unwrap_or_else(|| KernelView::all(None));
     let ranges = if config.shots.is_empty() {
-        let view = KernelView::positions(kernels.as_ref());
-        let view = flow.attempt(CheckRanges::NAME, view)?;
         flow.stage(&CheckRanges {
             converted: &converted,
             profiles: &profiles,
-            kernels: &view.unwrap_or_else(|| KernelView::all(None)),
+            kernels: view,
             mola_clock: &config.mola_clock,
             range_check: &config.range_check,
         })?
@@ -229,6 +240,7 @@ pub(super) fn orient<D: Driver>(
             converted: &converted,
             profiles: &profiles,
             images: InOrder(&images),
+            kernels: view,
             mola_clock: &config.mola_clock,
             range_check: &config.range_check,
         })?
@@ -246,6 +258,13 @@ pub(super) fn orient<D: Driver>(
     };
     let shots = (&converted, &profiles);
     let images = registered(flow, config, Round::Initial, &images, orientations, shots)?;
+    let beam = flow.stage(&CheckBeam {
+        images: SiteImages(&images),
+        converted: &converted,
+        profiles: &profiles,
+        altimeter: &config.altimeter,
+        mola_clock: &config.mola_clock,
+    })?;
     Ok(Site {
         found,
         converted,
@@ -257,6 +276,7 @@ pub(super) fn orient<D: Driver>(
         described,
         ranges,
         images,
+        beam,
         ties: None,
         intersection: None,
         adjustment: None,
@@ -274,13 +294,12 @@ fn orientations<D: Driver>(
     kernels: &KernelView,
 ) -> Flow<Vec<Output<Orientation>>> {
     let images = config.images.iter().zip(images);
-    let none = &KernelView::all(Some(&KernelSet::default()));
     let sample = |(image, times): (&ImageConfig, _)| {
         flow.stage(&SampleOrientation {
             image: &image.id,
             times,
-            // Support data replace the kernels.
-            kernels: if image.isd.is_some() { none } else { kernels },
+            // Support data replace the kernels, and are compared with them.
+            kernels,
             coverage: &config.kernels,
             pointing: &config.pointing,
             orientation: &config.orientation,

@@ -8,15 +8,19 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use serde::Deserialize as _;
+
 use crate::{
     body::Body,
     error::{IoError, Locate, Result},
+    geom::uncertainty::UncertaintyBudget,
+    products::ADJUSTMENT,
     report::{Earlier, FIDELITY_FILE, SiteLine, SiteSummary, published_fidelity_page, sites_page},
     stages::judge::CheckKind,
     store::{
         atomic,
         manifest::{Manifest, figures},
-        page::SITES_PAGE,
+        page::{PAGE, SITES_PAGE},
         publish::{PREVIOUS, has_work, last_failure, read_manifest, read_previous},
     },
 };
@@ -39,6 +43,7 @@ pub fn publish_sites(out: &Path) -> Result<PathBuf> {
         // Folders in which no run ever worked are ignored.
         if manifest.is_some() || has_work(&folder) {
             let products = manifest.as_ref().map(|manifest| SiteSummary {
+                budgets: budgets(&folder),
                 earlier: read_previous(&folder)
                     .as_ref()
                     .map(|manifest| earlier(manifest, &name)),
@@ -55,13 +60,33 @@ pub fn publish_sites(out: &Path) -> Result<PathBuf> {
             failure,
         })
         .collect();
-    atomic::write(
-        &out.join(FIDELITY_FILE),
-        published_fidelity_page().as_bytes(),
-    )?;
+    put(&out.join(FIDELITY_FILE), &published_fidelity_page())?;
     let page = out.join(SITES_PAGE);
-    atomic::write(&page, sites_page(&lines)?.as_bytes())?;
+    put(&page, &sites_page(&lines)?)?;
     Ok(page)
+}
+
+/// The budgets of the pairs before the adjustment by the products in `folder`; those of an earlier version, or without an
+/// adjustment, have none.
+fn budgets(folder: &Path) -> Vec<UncertaintyBudget> {
+    let document = fs::read(folder.join(ADJUSTMENT)).ok();
+    let document: Option<serde_json::Value> =
+        document.and_then(|bytes| serde_json::from_slice(&bytes).ok());
+    let pairs = document
+        .as_ref()
+        .and_then(|of| of["before"]["pairs"].as_array());
+    let budgets = pairs.into_iter().flatten().map(|pair| &pair["budget"]);
+    budgets
+        .filter_map(|budget| UncertaintyBudget::deserialize(budget).ok())
+        .collect()
+}
+
+/// Writes a page, unless the file holds it: a folder in which nothing changes may be read-only.
+fn put(path: &Path, page: &str) -> Result<()> {
+    if fs::read(path).is_ok_and(|found| found == page.as_bytes()) {
+        return Ok(());
+    }
+    atomic::replace(path, page.as_bytes(), PAGE)
 }
 
 /// The body of the site; Mars if its file does not name one.
@@ -138,8 +163,40 @@ fn summary(manifest: &Manifest) -> SiteSummary {
         ],
         body: body(&manifest.configuration.keys),
         place_deg: place_deg(&manifest.configuration.keys),
+        budgets: Vec::new(),
         earlier: None,
         finished_utc: manifest.finished_utc.clone(),
         version: manifest.version.clone(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn budgets_are_those_of_the_document_before_the_adjustment() {
+        let point = serde_json::json!({
+            "across_px": 1.0, "planimetric_px": 2.0, "planimetric_m": 10.0, "height_px": 2.5, "height_m": 12.5
+        });
+        let budget = serde_json::json!({
+            "along_px": 41.0, "total_along_px": 74.0, "ground": {"resolved": {"along_px": 61.6}},
+            "paper_average": point, "equation_7": point,
+            "equation_5": {"along_px": 54.6, "unexplained_px": 0.3, "point": point}
+        });
+        let document = serde_json::json!({
+            "before": {"pairs": [{"budget": budget}, {"no_budget_because": "no pair"}]},
+            "after": {"pairs": [{"budget": budget}]}
+        });
+        let folder = tempfile::tempdir().unwrap();
+        assert!(budgets(folder.path()).is_empty());
+        fs::write(folder.path().join(ADJUSTMENT), document.to_string()).unwrap();
+        let found = budgets(folder.path());
+        assert_eq!(found.len(), 1);
+        assert_eq!(found[0].equation_5.unexplained_px, Some(0.3));
+        // A document of an earlier version has no equation 5.
+        let earlier = document.to_string().replace("equation_5", "equation");
+        fs::write(folder.path().join(ADJUSTMENT), earlier).unwrap();
+        assert!(budgets(folder.path()).is_empty());
     }
 }

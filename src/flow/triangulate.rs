@@ -11,6 +11,7 @@ use super::{
 use crate::{
     config::SiteConfig,
     error::{Error, Kind},
+    pds::SizedFile,
     spice::{KernelSet, KernelView},
     stage::{InOrder, Output, Round, Stage},
     stages::{
@@ -79,7 +80,7 @@ pub(super) fn ties_of_files<D: Driver>(
     config: &SiteConfig,
     times: &[Output<ImageTimes>],
 ) -> Flow<Output<Ties>> {
-    let files = flow.hash(ReadTies::NAME, &config.ties.files)?;
+    let files = flow.hash_sized(ReadTies::NAME, SizedFile::Ties, &config.ties.files)?;
     flow.stage(&ReadTies {
         ties: &config.ties,
         files: TieFiles(&files),

@@ -28,7 +28,10 @@ pub(super) fn end_with(parent: Option<u32>) -> bool {
 
 /// Limits the resources of the worker to those of its task. Refusals of the system are reported; the task can be done
 /// without the limits.
-pub(super) fn keep_to(task: &Task) {
+///
+/// # Errors
+/// The limit of memory does not admit the threads of the task.
+pub(super) fn keep_to(task: &Task) -> Result<(), String> {
     // Limits the data, not the address space: large files are mapped.
     let memory = u64::from(task.memory_mib) << 20;
     for (resource, limit, what) in [
@@ -55,8 +58,13 @@ pub(super) fn keep_to(task: &Task) {
             "the worker is not the first process to be killed when memory runs out: {error}"
         );
     }
-    // The only failure is an existing pool; none exists.
-    let _ = rayon::ThreadPoolBuilder::new()
+    rayon::ThreadPoolBuilder::new()
         .num_threads(usize::from(task.threads))
-        .build_global();
+        .build_global()
+        .map_err(|error| {
+            format!(
+                "the {} threads of workers.threads cannot be started within workers.memory_mib = {}: {error}",
+                task.threads, task.memory_mib
+            )
+        })
 }

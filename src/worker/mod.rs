@@ -83,7 +83,9 @@ pub fn main(parent: Option<u32>) -> ExitCode {
     if let Err(error) = threads {
         return fail(&voice, bug(format!("no thread can be started: {error}")));
     }
-    limits::keep_to(&task);
+    if let Err(text) = limits::keep_to(&task) {
+        return fail(&voice, unfit(text));
+    }
     let worker = Worker {
         hashes: HashCache::new(&task.hashes_file, false),
         roots: task
@@ -244,6 +246,14 @@ fn panicked(panic: &(dyn Any + Send)) -> Failure {
         "internal error of areograph: {}",
         text.unwrap_or("for no stated reason")
     ))
+}
+
+/// A refusal of the system to start the worker's threads.
+fn unfit(text: String) -> Failure {
+    Failure {
+        code: Kind::Io.exit_code(),
+        ..bug(text)
+    }
 }
 
 /// A failure that no input causes: of areograph, or of the service.

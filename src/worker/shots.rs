@@ -13,7 +13,7 @@ use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchR
 use serde_json::Value;
 
 use crate::{
-    error::{Cause, Error, IoError, Kind, Locate, Result, Stopped},
+    error::{Cause, Error, IoError, Locate, Result, Stopped},
     geom::window::Region,
     products::{RowsFormat, RowsWriter},
     store::publish::read_manifest,
@@ -28,42 +28,26 @@ const PLACE: [&str; 2] = ["longitude_deg", "latitude_deg"];
 const SITE: &str = "site";
 
 /// Why shots cannot be searched.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 enum ShotsError {
     /// Unknown format.
     #[error("unknown format {0}; expected csv, geojson or parquet")]
+    #[cause(Configuration: "correct the format or the polygon")]
     Format(String),
     /// A region without area.
     #[error(
         "a polygon of {0} corners; expected 3 or more, longitudes -180 to 360 and latitudes -90 to 90 degrees"
     )]
+    #[cause(like = Format)]
     Polygon(usize),
     /// A folder without a run.
     #[error("contains no products")]
+    #[cause(Input: "run the site")]
     NoRun,
     /// A product that this program did not write, or that a library rejects.
     #[error("cannot be {0}")]
+    #[cause(Input: "products of another version of areograph must be made again by this version")]
     Parquet(String),
-}
-
-impl Cause for ShotsError {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::Format(_) | Self::Polygon(_) => Kind::Configuration,
-            Self::NoRun | Self::Parquet(_) => Kind::Input,
-        }
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Format(_) | Self::Polygon(_) => "correct the format or the polygon",
-            Self::NoRun => "run the site",
-            Self::Parquet(_) => {
-                "products of another version of areograph must be made again by this version"
-            }
-        }
-        .to_owned()
-    }
 }
 
 fn refused<E: std::fmt::Display>(action: &'static str) -> impl Fn(E) -> Error {

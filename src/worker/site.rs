@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::Worker;
 use crate::{
     config::{Loaded, load_within},
-    error::{Cause, Kind, Locate, Result},
+    error::{Cause, Locate, Result},
     files::HashedFile,
     flow::{Ending, PUBLISH, RunOptions, StageReason, check_out, plan_site, run_site},
     geom::window::{Region, bounds_rad},
@@ -17,37 +17,19 @@ use crate::{
 };
 
 /// A site file whose keys differ from those that the service recorded.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("its keys have the hash {is}; expected {seen}, the hash that the service recorded")]
+#[cause(Input: "run again after the service has detected the change")]
 struct OtherKeys {
     is: String,
     seen: String,
 }
 
-impl Cause for OtherKeys {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "run again after the service has detected the change".to_owned()
-    }
-}
-
 /// A run that ended before its products were written.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("the run ended after {0}; expected products")]
+#[cause(Bug: "this is a bug in areograph; please report it with the configuration")]
 struct NoProducts(String);
-
-impl Cause for NoProducts {
-    fn kind(&self) -> Kind {
-        Kind::Bug
-    }
-
-    fn advice(&self) -> String {
-        "this is a bug in areograph; please report it with the configuration".to_owned()
-    }
-}
 
 impl Worker {
     /// Runs the site of the task and keeps its products as a run.

@@ -27,7 +27,7 @@ const WORDS: [(&str, usize); 3] = [
 ];
 
 /// Starts of commands that other tests run, with what runs them.
-const ELSEWHERE: [(&str, &str); 10] = [
+const ELSEWHERE: [(&str, &str); 12] = [
     ("scripts/", "continuous integration"),
     ("cargo run", "compiled as an example with the tests"),
     (
@@ -47,6 +47,14 @@ const ELSEWHERE: [(&str, &str); 10] = [
     ),
     ("areograph scene mission-images", "crates/scene: matching"),
     ("areograph image", "tests/commands/image_commands.rs"),
+    (
+        "areograph pedr info gusev/",
+        "tests/real/ode_tables.rs, with real tables",
+    ),
+    (
+        "areograph pedr search gusev/",
+        "tests/real/ode_tables.rs, with real tables",
+    ),
 ];
 
 /// What a pair has beside the shortest site file, for the examples of tie points and terrain.
@@ -115,8 +123,40 @@ fn commands(page: &Path) -> Vec<String> {
     commands
 }
 
+/// The entry of [`ELSEWHERE`] that a command belongs to.
+fn elsewhere(command: &str) -> Option<&'static str> {
+    let whole = format!("{command} ");
+    let mut starts = ELSEWHERE.iter().map(|(start, _)| *start);
+    starts.find(|start| whole.starts_with(start))
+}
+
 #[test]
-fn commands_of_the_front_pages_work_as_they_stand() {
+fn commands_that_are_tested_elsewhere_exist() {
+    let mut left = BTreeSet::new();
+    for command in pages().iter().flat_map(|page| commands(page)) {
+        let Some(start) = elsewhere(&command) else {
+            continue;
+        };
+        let script = start.starts_with("scripts/");
+        let name = command.split(' ').next().unwrap();
+        assert!(!script || checkout().join(name).exists(), "{command}");
+        left.insert(start);
+    }
+    assert_eq!(left.len(), ELSEWHERE.len(), "of ELSEWHERE only {left:?}");
+}
+
+#[test]
+fn commands_of_the_first_front_pages_work_as_they_stand() {
+    commands_work(|page| page % 2 == 0);
+}
+
+#[test]
+fn commands_of_the_other_front_pages_work_as_they_stand() {
+    commands_work(|page| page % 2 == 1);
+}
+
+/// Every command of the pages with these numbers ends as expected.
+fn commands_work(is_meant: impl Fn(usize) -> bool) {
     let folder = tempfile::tempdir().unwrap();
     let program = PathBuf::from(areograph().get_program());
     let path = format!(
@@ -127,21 +167,16 @@ fn commands_of_the_front_pages_work_as_they_stand() {
     // A window of many, which the chapter on the archive names.
     let windows =
         "[[windows]]\nid = \"gale\"\nlongitude_deg = [137.0, 138.0]\nlatitude_deg = [-5.5, -4.0]\n";
-    let (mut run, mut left) = (0, BTreeSet::new());
-    for page in pages() {
+    let mut run = 0;
+    let pages = pages().into_iter().enumerate();
+    for (_, page) in pages.filter(|(number, _)| is_meant(*number)) {
         // No page needs what the commands of another one wrote.
         let folder = folder.path().join(page.file_stem().unwrap());
         fs::create_dir(&folder).unwrap();
         symlink(mission(), folder.join("mission")).unwrap();
         fs::write(folder.join("many.toml"), windows).unwrap();
         for command in commands(&page) {
-            let whole = format!("{command} ");
-            let of = |(start, _): &&(&str, &str)| whole.starts_with(start);
-            if let Some((start, _)) = ELSEWHERE.iter().find(of) {
-                let script = start.starts_with("scripts/");
-                let name = command.split(' ').next().unwrap();
-                assert!(!script || checkout().join(name).exists(), "{command}");
-                left.insert(*start);
+            if elsewhere(&command).is_some() {
                 continue;
             }
             let ends = ENDS.iter().find(|(start, _)| command.starts_with(start));
@@ -161,8 +196,7 @@ fn commands_of_the_front_pages_work_as_they_stand() {
             run += 1;
         }
     }
-    assert!(run >= 20, "only {run} commands were found");
-    assert_eq!(left.len(), ELSEWHERE.len(), "of ELSEWHERE only {left:?}");
+    assert!(run >= 8, "only {run} commands were found");
 }
 
 #[test]

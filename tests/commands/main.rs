@@ -1,17 +1,23 @@
 //! The commands as a user types them: their results, messages and exit codes.
 
+mod advice;
 mod bad_input;
 #[path = "../common/mod.rs"]
 mod common;
 mod compare_kernels;
 mod contradictions;
+mod contradictions_attitude;
 mod damaged_kernels;
 mod example_kernels;
+mod foreign_files;
 mod geometric;
 mod guide;
 mod hash_cache;
 mod image_commands;
 mod init;
+mod inputs_apart;
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
+mod killed_writers;
 mod mission;
 mod pds_archive_index;
 mod pds_records;

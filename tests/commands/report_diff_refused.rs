@@ -105,10 +105,10 @@ fn outputs_that_cannot_be_compared_are_refused() {
     assert_messages("report_diff_refused", &told);
 }
 
-/// A page replaces a regular file or nothing, and makes no folders.
+/// A page replaces an earlier page or nothing, and makes no folders.
 #[test]
 #[cfg(unix)]
-fn pages_are_written_over_files_that_are_no_products() {
+fn pages_are_written_over_pages_that_are_no_products() {
     use std::os::unix::fs::symlink;
     let case = after_a_first_run();
     case.write("notes.html", "old");
@@ -124,6 +124,8 @@ fn pages_are_written_over_files_that_are_no_products() {
         "pipe",
         "/dev/null",
         "none/page.html",
+        "notes.html",
+        "kernels/nav.tm",
         "notes.html/page.html",
         "out/case/report/index.html",
         "out/case/new.html",
@@ -139,7 +141,7 @@ fn pages_are_written_over_files_that_are_no_products() {
     assert!(mission::products(&case.path("out")) == before);
     assert!(case.path("link.html").is_symlink() && !case.path("none").exists());
     assert_eq!(case.read("notes.html"), b"old");
-    for place in ["notes.html", "out/difference.html"] {
+    for place in ["new.html", "new.html", "out/difference.html"] {
         let outcome = page(place);
         assert!(outcome.starts_with("exit 0\n"), "{outcome}");
         assert!(case.read(place).starts_with(b"<!DOCTYPE html>"), "{place}");

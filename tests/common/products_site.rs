@@ -30,7 +30,7 @@ use areograph::{
         describe_kernels::KernelLine,
         fit_sensor_model::{SensorModel, fit_sensor_model},
         group_profiles::{Profile, group_profiles},
-        judge::{Evidence, JudgedImage, judge},
+        judge::{BeamEvidence, Evidence, JudgedImage, judge},
         register::{ImageRegistration, register},
         sample_orientation::{
             BoresightGround, CameraTables, GroundPoint, InterpolationCheck, LightTimeEffect,
@@ -170,10 +170,9 @@ impl Site {
             registration: &self.registration,
         }];
         let judged = [JudgedImage {
-            id: &self.times.id,
+            times: &self.times,
             orientation: &self.orientation,
             model: &self.model,
-            disagreements: &self.times.remarks,
         }];
         let searched = !self.config.pedr.files.is_empty();
         let verdict = judge(&Evidence {
@@ -185,6 +184,11 @@ impl Site {
             orientation_limits: &self.config.orientation,
             clock_correction_s: self.config.mola_clock.correction_s(),
             images: if image { &judged } else { &[] },
+            beam: BeamEvidence {
+                images: &[],
+                adjustment: &self.config.adjustment,
+                surface: &self.config.mola_surface,
+            },
             warnings: &self.warnings,
             complaints: &self.complaints,
             adjustment: None,
@@ -323,6 +327,7 @@ fn image_times() -> ImageTimes {
         lines_delivered: 1280,
         samples: 256,
         first_detector: 0,
+        has_stop_time: true,
         notes: vec!["256 of 1536 header lines are not in the delivered file".to_owned()],
         remarks: Vec::new(),
         support: None,

@@ -5,6 +5,7 @@ mod common;
 mod exchange_isd;
 mod hrsc_images;
 mod hrsc_orientation;
+mod ode_tables;
 mod real_adjustment;
 mod real_orientation;
 mod real_ranges;

@@ -31,7 +31,7 @@ use common::{
     mission::{areograph, succeed},
     number,
 };
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::{Value, json};
 
@@ -121,6 +121,74 @@ fn a_site_of_its_own_support_data_comes_out_as_by_kernels() {
     let ran = case.stages_run();
     assert_eq!(ran[0], "tag_times/E02-01301");
     assert!(!ran.contains(&"tag_times/E02-02016".to_owned()), "{ran:?}");
+}
+
+/// Support data that are not those of their image, and what the message must state.
+type Mistake = (&'static str, fn(&mut Value), i32, &'static str);
+
+const MISTAKES: [Mistake; 4] = [
+    (
+        "turned by 10 mrad",
+        |isd| {
+            let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.010);
+            for row in isd["instrument_pointing"]["quaternions"]
+                .as_array_mut()
+                .unwrap()
+            {
+                let [w, x, y, z] = [0, 1, 2, 3].map(|part| number(&row[part]));
+                let turned = turn.into_inner() * Quaternion::new(w, x, y, z);
+                *row = json!([turned.w, turned.i, turned.j, turned.k]);
+            }
+        },
+        5,
+        "support data and kernels contradict each other in its middle: boresights differ by 10.0",
+    ),
+    (
+        "a kilometre away along each axis",
+        |isd| {
+            let rows = isd["instrument_position"]["positions"]
+                .as_array_mut()
+                .unwrap();
+            for coordinate in rows.iter_mut().flat_map(|row| row.as_array_mut().unwrap()) {
+                // Kilometres.
+                *coordinate = json!(number(coordinate) + 1.0);
+            }
+        },
+        5,
+        "its support data place the spacecraft 17",
+    ),
+    (
+        "another detector",
+        |isd| {
+            let centre = &mut isd["detector_center"]["sample"];
+            *centre = json!(number(centre) + 500.0);
+        },
+        5,
+        "its camera differs in detector.boresight_px from the built-in file of MOC narrow angle, whose frame it names, 7",
+    ),
+    (
+        "those of another image",
+        |isd| isd["image_identifier"] = json!("E02-02016"),
+        3,
+        "the support data are those of product E02-02016; expected E0201301",
+    ),
+];
+
+#[test]
+fn support_data_are_compared_with_the_kernels_shots_and_cameras_beside_them() {
+    let case = pair_with_support_data();
+    let good = json(&case.path("isd/E02-01301.json"));
+    for (mistake, change, code, part) in MISTAKES {
+        let mut isd = good.clone();
+        change(&mut isd);
+        case.write("isd/E02-01301.json", isd.to_string());
+        let found = case.outcome(case.run());
+        assert!(
+            found.starts_with(&format!("exit {code}\n")),
+            "{mistake}: {found}"
+        );
+        assert!(found.contains(part), "{mistake}: {found}");
+    }
 }
 
 #[test]

@@ -374,4 +374,28 @@ fn shots_of_a_table_at_mars_come_out_as_those_of_pedr_files() {
             assert!((expected - found).abs() < 1e-5, "{expected} {found}"); // pixels: a micrometre in place
         }
     }
+    a_table_on_another_sphere_contradicts_the_kernels(&case);
+}
+
+/// Ranges and their own spacecraft agree when all radii are 200 m too large; the orbit of the kernels does not.
+fn a_table_on_another_sphere_contradicts_the_kernels(case: &Case) {
+    let text = String::from_utf8(case.read("shots.csv")).unwrap();
+    let head = text.lines().next().unwrap();
+    let columns = ["radius_m", "spacecraft_radius_m"];
+    let columns = columns.map(|name| head.split(',').position(|column| column == name).unwrap());
+    let mut lines = vec![head.to_owned()];
+    lines.extend(text.lines().skip(1).map(|line| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        for column in columns {
+            cells[column] = format!("{:.3}", cells[column].parse::<f64>().unwrap() + 200.0);
+        }
+        cells.join(",")
+    }));
+    case.write("shots.csv", lines.join("\n"));
+    let mut command = case.areograph();
+    command.args(["--quiet", "run", "site.toml", "--out", "by_table"]);
+    let found = case.outcome(command);
+    assert!(found.starts_with("exit 5"), "{found}");
+    let expected = "differs by 200 m from the kernels' (+200 m up";
+    assert!(found.contains(expected), "{found}");
 }

@@ -3,7 +3,9 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod service_commands;
+mod service_data;
 mod service_http;
+mod service_http_data;
 mod service_http_hostile;
 mod service_http_many;
 mod service_run;

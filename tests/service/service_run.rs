@@ -225,7 +225,7 @@ fn other_version(kernel: &[u8], name: [u8; 4]) -> Vec<u8> {
 }
 
 #[test]
-fn changes_of_files_run_the_sites_that_they_touch() {
+fn a_second_service_is_sent_to_the_first_and_a_touched_file_runs_nothing() {
     let mission = Mission::new();
     let (service, address) = mission.start();
     mission.wait_for_jobs(2);
@@ -245,6 +245,15 @@ fn changes_of_files_run_the_sites_that_they_touch() {
     fs::write(mission.file(OWN), &kernel).unwrap();
     mission.several_sweeps();
     assert_eq!(mission.states().len(), 2, "{}", mission.log());
+    assert_eq!(service.end().code(), Some(0), "{}", mission.log());
+}
+
+#[test]
+fn a_kernel_that_is_copied_slowly_runs_its_site_once() {
+    let mission = Mission::new();
+    let (service, _) = mission.start();
+    mission.wait_for_jobs(2);
+    let kernel = fs::read(mission.file(OWN)).unwrap();
 
     // Copied in slow pieces: used once, at the end, by the one site that reads it, and only in what it touches.
     let other = other_version(&kernel, *b"SLOW");
@@ -287,7 +296,7 @@ fn changes_of_files_run_the_sites_that_they_touch() {
 }
 
 #[test]
-fn a_folder_that_is_away_for_a_while_runs_nothing_and_an_invalid_configuration_is_refused() {
+fn a_folder_that_is_away_for_a_while_runs_nothing() {
     let mission = Mission::new();
     let (service, _) = mission.start();
     mission.wait_for_jobs(2);
@@ -311,6 +320,14 @@ fn a_folder_that_is_away_for_a_while_runs_nothing_and_an_invalid_configuration_i
     let alerts =
         mission.ask("SELECT json_extract(data, '$.alert') FROM event WHERE kind = 'alert'");
     assert_eq!(alerts, ["root_unavailable", "root_back"]);
+    assert_eq!(service.end().code(), Some(0), "{}", mission.log());
+}
+
+#[test]
+fn an_invalid_configuration_is_refused_while_the_service_runs() {
+    let mission = Mission::new();
+    let (service, _) = mission.start();
+    mission.wait_for_jobs(2);
 
     // A configuration that is not valid is refused while the service runs.
     let file = mission.file("areograph.toml");

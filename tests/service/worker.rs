@@ -730,15 +730,21 @@ fn another_parent_ends_a_worker() {
 fn too_little_memory_ends_the_worker_and_not_the_service() {
     let case = Case::new();
     let blake3 = plan(&case).config_blake3;
-    let small = Task {
-        memory_mib: 8,
-        ..run_task(&case, "0001", &blake3)
-    };
-    let (ended, _) = done(&small);
-    let failed = matches!(ended.answer, None | Some(Err(_)));
-    let by_itself = matches!(ended.how, How::Signalled(_) | How::Exited(1..));
-    assert!(failed && by_itself, "{ended:?}");
-    assert!(!case.path("runs").exists());
+    for memory_mib in [8, 32, 64] {
+        let small = Task {
+            memory_mib,
+            ..run_task(&case, "0001", &blake3)
+        };
+        let (ended, _) = done(&small);
+        let by_itself = matches!(ended.how, How::Signalled(_) | How::Exited(1..));
+        let Some(Err(failure)) = &ended.answer else {
+            panic!("{ended:?}");
+        };
+        // What to do is in the message.
+        let named = format!("workers.memory_mib = {memory_mib}");
+        assert!(by_itself && failure.text.contains(&named), "{ended:?}");
+        assert!(!case.path("runs").exists());
+    }
     answered(&run_task(&case, "0002", &blake3));
 }
 

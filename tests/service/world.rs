@@ -344,6 +344,7 @@ fn publish(products: &Path, site: &str, run: &str, valid: bool) -> String {
             valid,
             reasons: Vec::new(),
             remarks: Vec::new(),
+            untested: Vec::new(),
             checks: Vec::new(),
         },
         configuration: ConfigurationEntry {

@@ -4,10 +4,13 @@
 //! [`Error`] carries it upwards and collects site, stage and file on the way.
 
 use std::{
+    borrow::Cow,
     fmt,
     path::PathBuf,
     sync::atomic::{AtomicBool, Ordering},
 };
+
+pub use areograph_derive::Cause;
 
 /// Kinds of failure; each is an exit code of the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -37,7 +40,7 @@ impl Kind {
     }
 }
 
-/// A cause of failure, with its kind and advice.
+/// A cause of failure, with its kind and advice; derived, with `#[cause(Kind: "advice")]` below thiserror's `#[error]`.
 pub trait Cause: std::error::Error + Send + Sync + 'static {
     /// The kind of this failure.
     fn kind(&self) -> Kind;
@@ -118,7 +121,7 @@ impl fmt::Display for Error {
             (None, None) => {}
         }
         if let Some(file) = &self.file {
-            write!(formatter, "{}: ", file.display())?;
+            write!(formatter, "{}: ", printable(&file.to_string_lossy(), ""))?;
         }
         write!(formatter, "{}", self.cause)?;
         // The files of stages are named in a configuration.
@@ -132,6 +135,26 @@ impl fmt::Display for Error {
         }
         Ok(())
     }
+}
+
+/// Text with its control characters escaped, so that a terminal shows and does not obey them.
+///
+/// * `kept` – control characters that remain
+#[must_use]
+pub fn printable<'a>(text: &'a str, kept: &str) -> Cow<'a, str> {
+    let is_escaped = |letter: char| letter.is_control() && !kept.contains(letter);
+    if !text.contains(is_escaped) {
+        return Cow::Borrowed(text);
+    }
+    let mut shown = String::with_capacity(text.len());
+    for letter in text.chars() {
+        if is_escaped(letter) {
+            shown.extend(letter.escape_default());
+        } else {
+            shown.push(letter);
+        }
+    }
+    Cow::Owned(shown)
 }
 
 /// Result of fallible functions above the lowest floor.
@@ -219,8 +242,9 @@ impl Cause for IoError {
 }
 
 /// The user stopped the program, and the running stage was abandoned.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("interrupted")]
+#[cause(Interrupted: "run again: finished stages are kept")]
 pub struct Stopped;
 
 impl Stopped {
@@ -234,16 +258,6 @@ impl Stopped {
         } else {
             Ok(())
         }
-    }
-}
-
-impl Cause for Stopped {
-    fn kind(&self) -> Kind {
-        Kind::Interrupted
-    }
-
-    fn advice(&self) -> String {
-        "run again: finished stages are kept".to_owned()
     }
 }
 
@@ -265,5 +279,17 @@ mod tests {
              what to do: check the path; relative paths in a configuration are relative to the folder of that file"
         );
         assert_eq!(failure.kind().exit_code(), 6);
+    }
+
+    #[test]
+    fn a_path_cannot_command_the_terminal() {
+        let error = IoError::on("read")(std::io::ErrorKind::NotFound.into());
+        let failure = Error::from(error).in_file("a\u{1b}[31m\n\u{9b}b.toml");
+        let shown = failure.to_string();
+        assert!(
+            shown.starts_with(r"a\u{1b}[31m\n\u{9b}b.toml: cannot read"),
+            "{shown}"
+        );
+        assert_eq!(printable("a\tb\n\u{7}", "\t\n"), "a\tb\n\\u{7}");
     }
 }

@@ -13,6 +13,9 @@
 //! assert!((180.0 * RADIANS_PER_DEGREE - std::f64::consts::PI).abs() < 1e-15);
 //! ```
 
+// The derive of causes names this crate, inside it too.
+extern crate self as areograph_base;
+
 pub mod altimetry;
 pub mod body;
 pub mod constants;

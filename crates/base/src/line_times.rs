@@ -24,7 +24,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    error::{Cause, Kind},
+    error::Cause,
     time::{Et, Interval},
 };
 
@@ -66,7 +66,8 @@ struct Piece {
 }
 
 /// Pieces that do not form a table of line times.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, Cause)]
+#[cause(Input: "check first lines, start times and line periods of the image's label")]
 pub enum LineTimesError {
     /// No pieces.
     #[error("the table of line times has no pieces; expected one or more")]
@@ -111,16 +112,6 @@ pub enum LineTimesError {
         /// Overlap, seconds.
         overlap_s: f64,
     },
-}
-
-impl Cause for LineTimesError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "check first lines, start times and line periods of the image's label".to_owned()
-    }
 }
 
 impl Piece {

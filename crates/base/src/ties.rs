@@ -6,7 +6,7 @@ use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    error::{Cause, Kind},
+    error::Cause,
     frames::{BodyFixed, Position},
 };
 
@@ -82,10 +82,11 @@ impl TiePoint<String> {
 }
 
 /// A measurement belongs to an image that does not exist.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Cause)]
 #[error(
     "tie point {tie} is measured in image {image}, counted from 0; expected one of {images} images"
 )]
+#[cause(Bug: "report this with the site's configuration and the log")]
 pub struct UnknownImage {
     /// Identifier of the tie point.
     pub tie: String,
@@ -93,16 +94,6 @@ pub struct UnknownImage {
     pub image: usize,
     /// Number of images.
     pub images: usize,
-}
-
-impl Cause for UnknownImage {
-    fn kind(&self) -> Kind {
-        Kind::Bug
-    }
-
-    fn advice(&self) -> String {
-        "report this with the site's configuration and the log".to_owned()
-    }
 }
 
 /// Ensures that every measurement belongs to one of `images` images.

@@ -20,6 +20,9 @@ pub struct Verdict {
     pub reasons: Vec<String>,
     /// Remarks for the reader although no limit is exceeded.
     pub remarks: Vec<String>,
+    /// Errors that no datum of the run can show, one phrase each.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub untested: Vec<String>,
     /// Every limit with the item that uses most of it, the worst first.
     #[serde(default)]
     pub checks: Vec<Check>,
@@ -45,6 +48,7 @@ impl Verdict {
             valid: reasons.is_empty(),
             reasons,
             remarks,
+            untested: Vec::new(),
             checks,
         }
     }

@@ -9,7 +9,7 @@
 //! ```
 //! use areograph_base::{body::Body, wording::{Wording, with_minus}};
 //!
-//! let lunar = Wording { body: Body::Moon, altimeter: "LOLA", has_tables: true };
+//! let lunar = Wording { body: Body::Moon, altimeter: "LOLA", has_tables: true, has_areoid: false };
 //! assert_eq!(lunar.of("tie points above the MOLA surface"), "tie points above the LOLA surface");
 //! assert_eq!(with_minus("-1.2 m along E02-00665"), "−1.2 m along E02-00665");
 //! ```
@@ -24,12 +24,15 @@ pub const MINUS: char = '\u{2212}';
 /// The altimeter for which texts are written.
 const ALTIMETER: &str = "MOLA";
 
-/// Replacements in texts if shots come from tables: these contain no areoid, and are not PEDR files.
-const TABLES: [(&str, &str); 6] = [
+/// Replacements in texts if shots come from tables, which are not PEDR files.
+const TABLES: [(&str, &str); 4] = [
     ("PEDR files", "tables of shots"),
     ("PEDR file", "table of shots"),
     ("the PEDR", "the table of shots"),
     ("PEDR", "table of shots"),
+];
+/// Replacements if these contain no areoid.
+const NO_AREOID: [(&str, &str); 2] = [
     ("the areoid", "the ellipsoid"),
     ("areoid radius", "radius of the ellipsoid"),
 ];
@@ -43,6 +46,8 @@ pub struct Wording<'a> {
     pub altimeter: &'a str,
     /// Whether shots come from tables.
     pub has_tables: bool,
+    /// Whether shots have heights above the areoid.
+    pub has_areoid: bool,
 }
 
 impl Wording<'_> {
@@ -57,6 +62,11 @@ impl Wording<'_> {
         };
         if self.has_tables {
             for (at_mars, here) in TABLES {
+                say(at_mars, here);
+            }
+        }
+        if !self.has_areoid {
+            for (at_mars, here) in NO_AREOID {
                 say(at_mars, here);
             }
         }
@@ -137,6 +147,7 @@ mod tests {
         body: Body::Moon,
         altimeter: "LOLA",
         has_tables: true,
+        has_areoid: false,
     };
 
     #[test]
@@ -169,6 +180,7 @@ mod tests {
                 body: Body::Mars,
                 altimeter: "MOLA",
                 has_tables: false,
+                has_areoid: true,
             };
             assert!(matches!(at_mars_too.of(at_mars), Cow::Borrowed(_)));
         }
@@ -177,6 +189,7 @@ mod tests {
             body: Body::Mars,
             altimeter: "ALT",
             has_tables: true,
+            has_areoid: false,
         };
         assert_eq!(
             table.of("MOLA, areocentric, IAU 2000"),

@@ -37,7 +37,10 @@ declare_table! {
     /// the paper gives one.
     pub struct AdjustmentConfig: Deserialize {
         /// Control of the adjustment. In the published model, image coordinates of footprints are computed from the
-        /// orientations under adjustment and hold them fixed; it is provided for comparison.
+        /// orientations under adjustment and hold them fixed; it is provided for comparison. Along the track it is that
+        /// of the paper. Across the track it is not: residuals refer to the line that sees the point, where the paper
+        /// uses the measured line. Its mean corrections of MOLA across the track, 2.7 to 3.3 px, are then 0, and its
+        /// unit-weight standard deviation is about half of the printed one.
         model: AdjustmentModel = key(words_of(
             AdjustmentModel::WORDS,
             [

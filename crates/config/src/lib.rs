@@ -94,7 +94,7 @@ pub use unknowns::{PositionUnknowns, RotationUnknowns};
 pub use window_list::{load_windows, require_outlines, window_of_box, window_of_polygon};
 pub use windows::WindowConfig;
 
-use areograph_base::error::{Cause, Error, IoError, Kind, Locate as _};
+use areograph_base::error::{Cause, Error, IoError, Locate as _};
 use declare::{Keys, Table, described};
 use problems::Review;
 use written::Written;
@@ -260,8 +260,9 @@ pub fn schema() -> impl Serialize {
 }
 
 /// Two configurations name the same site, so their products would overwrite each other.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Cause)]
 #[error("site is \"{site}\" in {first} and in {second}; expected one file per site")]
+#[cause(Configuration: "give each site its own identifier: it is also the folder of its products")]
 pub struct DuplicateSite {
     /// The identifier they share.
     pub site: String,
@@ -269,16 +270,6 @@ pub struct DuplicateSite {
     pub first: String,
     /// The file that came later.
     pub second: String,
-}
-
-impl Cause for DuplicateSite {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        "give each site its own identifier: it is also the folder of its products".to_owned()
-    }
 }
 
 /// Sites of one run must have different identifiers.

@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use areograph_base::error::{Cause, Kind};
+use areograph_base::error::Cause;
 use areograph_store::files::outside;
 
 /// Problems reported one by one; for a file with more, the number of the others is reported.
@@ -19,7 +19,8 @@ const EXCERPT_MAX: usize = 60;
 pub(super) const SITE_EXAMPLE: &str = "config/sites/example.toml";
 
 /// Everything that is wrong with one configuration file, in order of place.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Cause)]
+#[cause(Configuration: "correct these entries; {documentation} documents every key with its unit and default")]
 pub struct Problems {
     lines: Vec<String>,
     unlisted: usize,
@@ -50,19 +51,6 @@ impl fmt::Display for Problems {
 }
 
 impl std::error::Error for Problems {}
-
-impl Cause for Problems {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        format!(
-            "correct these entries; {} documents every key with its unit and default",
-            self.documentation
-        )
-    }
-}
 
 /// Position of an entry: a byte range of the text, or the file as a whole.
 type TextSpan = Option<Range<usize>>;

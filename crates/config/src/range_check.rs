@@ -22,7 +22,9 @@ declare_table! {
         outlier_sigma: f64 = key(above_to(0.0, 1000.0)).or(5.0),
         /// Largest share of outliers. The default is our choice.
         outlier_share_max: f64 = key(from_to(0.0, 1.0)).or(0.05),
-        /// Fewest shots. The default is one PEDR frame; the paper's profiles have 71 to 174.
+        /// Fewest shots of a profile that is judged: windows clip profiles, and shorter ones are left out, with a remark. A
+        /// site without a longer one is invalid where ranges can be tested. The default is one PEDR frame; the
+        /// paper's profiles have 71 to 174.
         shots_min: u32 = key(whole_from_to(2, 1_000_000)).or(20),
         /// Largest |mean| of range minus distance to the file's own spacecraft position: a test of
         /// decoding, which needs no kernels. Both come from one orbit solution and agree to about a metre.

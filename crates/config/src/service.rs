@@ -9,6 +9,7 @@ use std::{
 use serde::Serialize;
 
 use areograph_base::error::Error;
+use areograph_store::files::{overlap, real_path};
 
 use super::{
     declare::{
@@ -135,6 +136,8 @@ declare_table! {
         sweep_limit_s: f64 = key(from_to(0.1, 3600.0)).or(30.0),
         /// Interval at which all files are read again, even if the file system reports no change, days; 0 never.
         scrub_days: f64 = key(from_to(0.0, 3660.0)).or(7.0),
+        /// Rate at which published products are read again, mebibytes per second: after a night, while no site runs.
+        scrub_mib_per_s: f64 = key(from_to(0.1, 100_000.0)).or(32.0),
     }
 }
 
@@ -145,8 +148,8 @@ declare_table! {
         count: u16 = key(whole_from_to(1, 256)).or(2),
         /// Threads of each.
         threads: u16 = key(whole_from_to(1, 1024)).or(2),
-        /// Memory that each may take, mebibytes.
-        memory_mib: u32 = key(whole_from_to(64, 1 << 24)).or(8192),
+        /// Memory that each may take, mebibytes. A worker takes about 106 before it reads a site.
+        memory_mib: u32 = key(whole_from_to(512, 1 << 24)).or(8192),
         /// Longest time for a site.
         deadline_s: f64 = key(from_to(1.0, 2_592_000.0)).or(21_600.0),
         /// A worker without a heartbeat for this time is ended.
@@ -294,12 +297,16 @@ pub enum AlertKind {
     RootBack,
     /// The disk is nearly full.
     DiskLow,
+    /// A published product does not match its manifest.
+    ProductDamaged,
+    /// The database was lost, and made again from the products.
+    DatabaseLost,
     /// A night is over.
     NightComplete,
 }
 
 impl AlertKind {
-    const WORDS: [(&'static str, Self, &'static str); 9] = [
+    const WORDS: [(&'static str, Self, &'static str); 11] = [
         (
             "failed",
             Self::Failed,
@@ -324,6 +331,16 @@ impl AlertKind {
         ),
         ("root_back", Self::RootBack, "a folder of inputs is back"),
         ("disk_low", Self::DiskLow, "the disk is nearly full"),
+        (
+            "product_damaged",
+            Self::ProductDamaged,
+            "a published product does not match its manifest",
+        ),
+        (
+            "database_lost",
+            Self::DatabaseLost,
+            "the database was lost, and made again from the products",
+        ),
         (
             "night_complete",
             Self::NightComplete,
@@ -355,6 +372,40 @@ fn across_tables(service: &ServiceConfig, keys: &mut Keys<'_, '_>) {
             "state",
             "another folder than that of the products",
         );
+    }
+    outputs_apart(service, keys);
+}
+
+/// Whether a folder of inputs and one of outputs meet.
+type Meet = fn(&Path, &Path) -> bool;
+
+/// What the service writes must not come back as an input: a run would cause the next one.
+fn outputs_apart(service: &ServiceConfig, keys: &mut Keys<'_, '_>) {
+    let (inputs, outputs) = (&service.inputs, &service.outputs);
+    // Folders of site files are read without their subfolders.
+    let is_below = |input: &Path, output: &Path| real_path(input).starts_with(real_path(output));
+    let folders: [(&str, &Vec<PathBuf>, Meet); 3] = [
+        ("sites", &inputs.sites, is_below),
+        ("kernels", &inputs.kernels, overlap),
+        ("data", &inputs.data, overlap),
+    ];
+    for (name, output) in [("products", &outputs.products), ("state", &outputs.state)] {
+        for (input_name, inputs, meet) in &folders {
+            let Some(input) = inputs.iter().find(|input| meet(input, output)) else {
+                continue;
+            };
+            let (output, input) = (output.display(), input.display());
+            let expected = format!(
+                "folders of inputs and outputs apart from each other: {input} (inputs.{input_name}) and {output} \
+                 (outputs.{name}) overlap"
+            );
+            // A default is not in the file.
+            if keys.writes("outputs", name) {
+                keys.refuse_below("outputs", name, expected);
+            } else {
+                keys.refuse_below("inputs", input_name, expected);
+            }
+        }
     }
 }
 

@@ -24,6 +24,8 @@ pub enum ShotLayout {
     LolaRdr,
     /// `footprints.csv` of a site.
     Areograph,
+    /// MOLA shots of the Orbital Data Explorer, without the position of the spacecraft.
+    OdePedr,
 }
 
 declare_table! {
@@ -40,6 +42,7 @@ declare_table! {
         layout: Option<ShotLayout> = key(words([
             ("lola_rdr", ShotLayout::LolaRdr, "LOLA's reduced data records as the Orbital Data Explorer gives them, 29 columns"),
             ("areograph", ShotLayout::Areograph, "footprints.csv of another site"),
+            ("ode_pedr", ShotLayout::OdePedr, "MOLA shots of the Orbital Data Explorer's PEDR query, ten columns, no spacecraft"),
         ])).unused(r#""lola_rdr""#),
         /// Datum of longitudes and latitudes; without it, that of the products.
         datum: Option<Datum> = key(words([
@@ -122,6 +125,8 @@ impl ShotLayout {
                 orbit: named("orbit"),
                 ..ShotColumns::default()
             },
+            // The reader knows its columns by the heading.
+            Self::OdePedr => ShotColumns::default(),
         }
     }
 }

@@ -22,7 +22,7 @@ use super::{
     declare::{Keys, declare_table, key, no_repeats, of_the_file, table, tables},
     forms::{any_text, lower_case_identifier, words},
     images::{IMAGES, ImageConfig},
-    instruments::{ALTIMETER, usual_altimeter, usual_instrument},
+    instruments::{ALTIMETER, built_in_altimeters, usual_altimeter, usual_instrument},
     kernels::KernelsConfig,
     limits::LimitsConfig,
     mola_surface::MolaSurfaceConfig,
@@ -30,7 +30,7 @@ use super::{
     pedr::PedrConfig,
     pointing::{PointingConfig, has_turned_sign},
     range_check::RangeCheckConfig,
-    shots::{SHOTS, ShotTableConfig},
+    shots::{SHOTS, ShotLayout, ShotTableConfig},
     surface::SurfaceConfig,
     ties::{IntersectionConfig, TiesConfig},
     windows::{WINDOWS, WINDOWS_MAX, WindowConfig},
@@ -109,7 +109,14 @@ impl SiteConfig {
             body: self.body,
             altimeter: &self.altimeter.name,
             has_tables: !self.shots.is_empty(),
+            has_areoid: self.shots.is_empty() || self.has_areoid_in_tables(),
         }
+    }
+
+    /// Whether all tables of shots have heights above the areoid.
+    fn has_areoid_in_tables(&self) -> bool {
+        let of_tables = |table: &ShotTableConfig| table.layout == Some(ShotLayout::OdePedr);
+        self.shots.iter().all(of_tables)
     }
 
     /// Whether the site has laser shots, of PEDR files or of tables.
@@ -141,6 +148,7 @@ fn across_tables(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         ]})
     });
     something_to_do(site, keys);
+    altimeter_of_pedr(site, keys);
     other_bodies(site, keys);
     serial_numbers(keys);
     pointing_of_instruments(site, keys);
@@ -233,6 +241,22 @@ fn something_to_do(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     }
 }
 
+/// PEDR files are those of MOLA; a file that describes MOLA with other numbers may be named.
+fn altimeter_of_pedr(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
+    let usual = usual_altimeter();
+    let is_other = |known: &Altimeter| {
+        let same = known.id == site.altimeter.id || known.name == site.altimeter.name;
+        known.id != usual.id && same
+    };
+    if keys.span_of("pedr").is_some() && built_in_altimeters().iter().any(is_other) {
+        let name = &usual.name;
+        keys.refuse(
+            "altimeter",
+            format!("{}, whose shots PEDR files hold; shots of others than {name} come in tables [[shots]]", usual.id),
+        );
+    }
+}
+
 /// Kernels, labels and PEDR files belong to Mars; a datum belongs to one body.
 fn other_bodies(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     let body = site.body;
@@ -248,6 +272,15 @@ fn other_bodies(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     }
     if body == Body::Mars {
         return;
+    }
+    for table in keys.entries(&["shots"]) {
+        let layout = table.get("layout");
+        if let Some(layout) = layout.filter(|of| of.get_ref().as_str() == Some("ode_pedr")) {
+            let expected =
+                format!("the layout of a table of {body}: this one holds shots of MOLA at Mars");
+            keys.review()
+                .refuse(layout.span(), "shots.layout", expected);
+        }
     }
     let only_at_mars = format!("no such entry on {body}: it belongs to Mars Global Surveyor");
     for table in ["pedr", "mola_clock", "pointing"] {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use areograph_base::{
-    error::{Cause, Error, Kind, Locate as _},
+    error::{Cause, Error, Locate as _},
     units::RADIANS_PER_DEGREE,
 };
 use areograph_geom::window::WindowShape;
@@ -43,38 +43,23 @@ fn require_windows(list: &WindowList, keys: &mut Keys<'_, '_>) {
 }
 
 /// Errors of a window on the command line.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Configuration)]
 enum WindowError {
     #[error("the box has {what}; expected {expected}")]
+    #[cause("write west,east,south,north in degrees, such as 137.0,138.0,-5.5,-4.0")]
     Box {
         what: String,
         expected: &'static str,
     },
     #[error("{0}")]
+    #[cause("correct the file: GeoJSON polygons of east longitude and areocentric latitude")]
     Polygon(String),
     #[error(
         "window {0} is the outline of an image; expected longitude_deg and latitude_deg, or polygon"
     )]
+    #[cause("write a box or polygon: only a run computes the outline of an image")]
     Image(String),
-}
-
-impl Cause for WindowError {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Box { .. } => {
-                "write west,east,south,north in degrees, such as 137.0,138.0,-5.5,-4.0"
-            }
-            Self::Image(_) => "write a box or polygon: only a run computes the outline of an image",
-            Self::Polygon(_) => {
-                "correct the file: GeoJSON polygons of east longitude and areocentric latitude"
-            }
-        }
-        .to_owned()
-    }
 }
 
 /// The windows in the file `path`.

@@ -6,27 +6,17 @@
 
 use nalgebra::{Matrix2x3, Vector2, Vector3};
 
-use areograph_base::error::{Cause, Kind};
+use areograph_base::error::Cause;
 
 /// A point that the camera cannot see because it lies behind the plane of the perspective centre.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, Cause)]
 #[error(
     "the ground point lies {depth_m:.1} m along the boresight; expected a point in front of the camera"
 )]
+#[cause(Input: "check that the point belongs to this image and that positions and angles are in metres and radians")]
 pub struct BehindCamera {
     /// Component of the point along the boresight, metres; not positive, or not a number.
     pub depth_m: f64,
-}
-
-impl Cause for BehindCamera {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "check that the point belongs to this image and that positions and angles are in metres and radians"
-            .to_owned()
-    }
 }
 
 /// Focal-plane coordinates of the point `camera_point_m` in camera components.

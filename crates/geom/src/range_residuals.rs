@@ -42,9 +42,9 @@ pub struct RangeResiduals {
     pub range_minus_distance_m: f64,
     /// Range − |SPK spacecraft − crossover-corrected footprint|.
     pub range_minus_distance_crossover_m: f64,
-    /// Range − |PEDR spacecraft − raw footprint|.
+    /// Range − |PEDR spacecraft − raw footprint|; NaN where the file has no spacecraft.
     pub decoding_m: f64,
-    /// PEDR spacecraft − SPK spacecraft along radial, along-track and cross-track axes.
+    /// PEDR spacecraft − SPK spacecraft along radial, along-track and cross-track axes; NaN as well.
     pub spacecraft_m: Vector3<f64>,
 }
 
@@ -64,6 +64,14 @@ impl RangeResiduals {
             decoding_m: range_residual_m(shot.range_m, &own, &raw),
             spacecraft_m: spacecraft.axes.tr_mul(&difference_m),
         }
+    }
+}
+
+impl RangeResiduals {
+    /// Leaves out what depends on the spacecraft of the file, where it has none.
+    pub fn forget_own(&mut self) {
+        self.decoding_m = f64::NAN;
+        self.spacecraft_m.fill(f64::NAN);
     }
 }
 
@@ -87,6 +95,27 @@ pub fn footprint(shot: &Footprint, radius_m: f64) -> Position<BodyFixed> {
         shot.latitude_rad,
         radius_m,
     ))
+}
+
+/// A spacecraft this close to the radius through the footprint, radians (4 mm), and to its end at the range, metres (half
+/// a digit of tables in centimetres, and rounding), was put there: no laser is pointed and no range measured so well.
+const BY_RANGE_RAD: f64 = 1e-9;
+const BY_RANGE_M: f64 = 0.006;
+
+/// Whether the file states where the spacecraft was.
+///
+/// Otherwise it was put on the radius through the footprint at the range ("nadir by range"), because a table has a range
+/// but no position: its distance from the footprint is then the range, and tests nothing.
+#[must_use]
+pub fn has_own_spacecraft(shot: &Footprint) -> bool {
+    let beside_m = shot.spacecraft_radius_m - (shot.radius_m + shot.range_m);
+    if beside_m.abs() > BY_RANGE_M {
+        return true;
+    }
+    let along = |longitude_rad, latitude_rad| spherical_to_xyz_m(longitude_rad, latitude_rad, 1.0);
+    let up = along(shot.longitude_rad, shot.latitude_rad);
+    let own = along(shot.spacecraft_longitude_rad, shot.spacecraft_latitude_rad);
+    (own - up).norm() > BY_RANGE_RAD
 }
 
 /// The position of the spacecraft in the PEDR file.

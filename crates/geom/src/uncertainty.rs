@@ -3,12 +3,16 @@
 //! # Source
 //! Shan et al. 2005, eq. 5 to 9. Its equation 7 sums the squares of both images; along the track the paper does so,
 //! across the track it takes their average, which reduces height uncertainties by √2. Both readings are given.
+//!
+//! Equation 7 adds the means of both images in quadrature, although by equation 5 (`Δ = Δ1 − Δ2`) means of opposite
+//! sign add up. Equation 6 then assigns to the footprints what is left of their misregistration. The budget by
+//! equation 5 stands beside that of the paper.
 
 #[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use areograph_base::error::{Cause, Kind};
+use areograph_base::error::Cause;
 
 /// Mean and standard deviation of the reprojection residuals of one image.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -38,13 +42,49 @@ impl ResidualMoments {
     }
 }
 
+/// Residuals of a stereo pair.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PairResiduals {
+    /// In the two images.
+    pub images: [ResidualMoments; 2],
+    /// Of the first minus those of the second, point by point (eq. 5).
+    pub apart: ResidualMoments,
+}
+
+impl PairResiduals {
+    /// A pair of which the points are not given. Two rays leave one residual for each point, which they share with
+    /// opposite signs: the correlation of the images is −1, and their standard deviations add up.
+    #[must_use]
+    pub fn of_images(images: [ResidualMoments; 2]) -> Self {
+        let [first, second] = images;
+        Self {
+            images,
+            apart: ResidualMoments {
+                mean_x: first.mean_x - second.mean_x,
+                deviation_x: first.deviation_x + second.deviation_x,
+                mean_y: first.mean_y - second.mean_y,
+                deviation_y: first.deviation_y + second.deviation_y,
+            },
+        }
+    }
+}
+
+/// Observed misregistration of the footprints of a pair along the track, second image minus first by tie points.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Misregistration {
+    /// Mean, metres.
+    pub mean_m: f64,
+    /// Root mean square, metres.
+    pub rms_m: f64,
+}
+
 /// Input of the budget.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BudgetInput {
-    /// Residuals of the two images of each site.
-    pub sites: Vec<[ResidualMoments; 2]>,
-    /// Distance of neighbouring MOLA footprints, metres: the discrepancy of a footprint's two projections.
-    pub mola_spacing_m: f64,
+    /// Residuals of the pair of each site.
+    pub sites: Vec<PairResiduals>,
+    /// The misregistration of footprints; `None` where no footprint is in both images.
+    pub misregistration: Option<Misregistration>,
     /// Ground size of a pixel, metres.
     pub pixel_size_m: f64,
     /// Flying height over base.
@@ -79,6 +119,22 @@ pub enum GroundPart {
     },
     /// Orientation explains more than the whole discrepancy.
     NotResolvable,
+    /// No footprint is in both images.
+    NotObserved,
+}
+
+/// The budget by equation 5, with signs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
+pub struct SignedBudget {
+    /// Along-track discrepancy due to orientation, root mean square of `Δx1 − Δx2`, pixels.
+    pub along_px: f64,
+    /// Mean misregistration of the footprints that the mean discrepancy does not explain, pixels; `None` where no
+    /// footprint is in both images. An error of a footprint in plan moves both projections alike and does not show.
+    #[serde(default, skip_serializing_if = "areograph_base::stored::is_left_out")]
+    pub unexplained_px: Option<f64>,
+    /// Eq. 8 and 9 with these discrepancies.
+    pub point: PointUncertainty,
 }
 
 /// The budget.
@@ -87,24 +143,90 @@ pub enum GroundPart {
 pub struct UncertaintyBudget {
     /// Along-track discrepancy due to orientation, eq. 7, pixels.
     pub along_px: f64,
-    /// Along-track discrepancy of MOLA footprints, pixels.
-    pub total_along_px: f64,
+    /// Observed along-track misregistration of the footprints, root mean square, pixels; `None` where no footprint is in
+    /// both images.
+    #[serde(default, skip_serializing_if = "areograph_base::stored::is_left_out")]
+    pub total_along_px: Option<f64>,
     /// Contribution of the footprints to it, eq. 6.
     pub ground: GroundPart,
     /// Eq. 8 and 9 with the average of the images' across-track residuals, as the paper computes.
     pub paper_average: PointUncertainty,
     /// Eq. 8 and 9 with the sum of squares of both images, as in the paper's eq. 7.
     pub equation_7: PointUncertainty,
+    /// The same by equation 5, where means of opposite sign add up.
+    pub equation_5: SignedBudget,
+}
+
+impl UncertaintyBudget {
+    /// The budget of all pairs, as the paper pools its three sites: squares averaged, across the track its averages. The
+    /// pixel and the geometry are the means of all. `None` without a budget.
+    #[must_use]
+    pub fn pooled(budgets: &[Self]) -> Option<Self> {
+        let mean =
+            |of: &dyn Fn(&Self) -> f64| budgets.iter().map(of).sum::<f64>() / budgets.len() as f64;
+        let root = |of: &dyn Fn(&Self) -> f64| mean(&|budget| of(budget).powi(2)).sqrt();
+        let all_have = |of: fn(&Self) -> Option<f64>| {
+            let known = budgets.iter().all(|budget| of(budget).is_some());
+            known.then(|| root(&|budget| of(budget).unwrap_or_default()))
+        };
+        if budgets.is_empty() {
+            return None;
+        }
+        let ratio = |one: f64, other: f64| if other > 0.0 { one / other } else { 0.0 };
+        let of_plan = |of: &PointUncertainty| ratio(of.planimetric_m, of.planimetric_px);
+        let of_height = |of: &PointUncertainty| ratio(of.height_px, of.across_px);
+        let pixel_size_m = mean(&|of| of_plan(&of.equation_7));
+        let height_over_base = mean(&|of| of_height(&of.equation_7));
+        let along_px = root(&|of| of.along_px);
+        let total_along_px = all_have(|of| of.total_along_px);
+        let signed_px = root(&|of| of.equation_5.along_px);
+        let point = |along_px: f64, across_px: f64| {
+            point_uncertainty(along_px, across_px, height_over_base, pixel_size_m)
+        };
+        Some(Self {
+            along_px,
+            total_along_px,
+            ground: ground_part(total_along_px, along_px),
+            paper_average: point(along_px, mean(&|of| of.paper_average.across_px)),
+            equation_7: point(along_px, root(&|of| of.equation_7.across_px)),
+            equation_5: SignedBudget {
+                along_px: signed_px,
+                unexplained_px: all_have(|of| of.equation_5.unexplained_px),
+                point: point(signed_px, root(&|of| of.equation_5.point.across_px)),
+            },
+        })
+    }
+}
+
+/// Equations 8 and 9.
+fn point_uncertainty(
+    along_px: f64,
+    across_px: f64,
+    height_over_base: f64,
+    pixel_size_m: f64,
+) -> PointUncertainty {
+    let planimetric_px = along_px.hypot(across_px);
+    let height_px = height_over_base * across_px;
+    PointUncertainty {
+        across_px,
+        planimetric_px,
+        planimetric_m: planimetric_px * pixel_size_m,
+        height_px,
+        height_m: height_px * pixel_size_m,
+    }
 }
 
 /// Invalid input.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, Cause)]
+#[cause(Input)]
 pub enum BudgetError {
     /// No site.
     #[error("no stereo pair has residuals; expected at least one")]
+    #[cause("intersect tie points of at least one stereo pair first")]
     NoSites,
     /// A number outside its range.
     #[error("{what} is {value}, expected {expected}")]
+    #[cause("check the geometry and the residuals of the stereo pairs")]
     Value {
         /// Which number.
         what: &'static str,
@@ -115,20 +237,6 @@ pub enum BudgetError {
     },
 }
 
-impl Cause for BudgetError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::NoSites => "intersect tie points of at least one stereo pair first",
-            Self::Value { .. } => "check the geometry and the residuals of the stereo pairs",
-        }
-        .to_owned()
-    }
-}
-
 /// The budget of one or more stereo pairs; intermediate results are not rounded.
 ///
 /// # Errors
@@ -137,43 +245,62 @@ pub fn uncertainty_budget(input: &BudgetInput) -> Result<UncertaintyBudget, Budg
     check(input)?;
     let sites = input.sites.len() as f64;
     // Squares are averaged over the sites, then summed over the two images.
+    let images = || input.sites.iter().flat_map(|site| &site.images);
     let summed = |size: fn(&ResidualMoments) -> f64| {
-        let squares = input
-            .sites
-            .iter()
-            .flatten()
-            .map(|image| size(image).powi(2));
+        let squares = images().map(|image| size(image).powi(2));
         (squares.sum::<f64>() / sites).sqrt()
     };
-    let sizes_y = input.sites.iter().flatten().map(ResidualMoments::size_y);
-    let average_y = sizes_y.sum::<f64>() / (2.0 * sites);
-    let along_px = summed(ResidualMoments::size_x);
-    let total_along_px = input.mola_spacing_m / input.pixel_size_m;
-    let ground_square = total_along_px.powi(2) - along_px.powi(2);
-    let uncertainty = |across_px: f64| {
-        let planimetric_px = along_px.hypot(across_px);
-        let height_px = input.height_over_base * across_px;
-        PointUncertainty {
-            across_px,
-            planimetric_px,
-            planimetric_m: planimetric_px * input.pixel_size_m,
-            height_px,
-            height_m: height_px * input.pixel_size_m,
-        }
+    let apart = |size: fn(&ResidualMoments) -> f64| {
+        let squares = input.sites.iter().map(|site| size(&site.apart).powi(2));
+        (squares.sum::<f64>() / sites).sqrt()
     };
+    let average_y = images().map(ResidualMoments::size_y).sum::<f64>() / (2.0 * sites);
+    let along_px = summed(ResidualMoments::size_x);
+    let point = |along_px: f64, across_px: f64| {
+        point_uncertainty(
+            along_px,
+            across_px,
+            input.height_over_base,
+            input.pixel_size_m,
+        )
+    };
+    let of_pixel = |metres: f64| metres / input.pixel_size_m;
+    let total_along_px = input.misregistration.map(|of| of_pixel(of.rms_m));
+    let signed_px = apart(ResidualMoments::size_x);
+    let mean_x = input
+        .sites
+        .iter()
+        .map(|site| site.apart.mean_x)
+        .sum::<f64>()
+        / sites;
     Ok(UncertaintyBudget {
         along_px,
         total_along_px,
-        ground: if ground_square >= 0.0 {
-            GroundPart::Resolved {
-                along_px: ground_square.sqrt(),
-            }
-        } else {
-            GroundPart::NotResolvable
+        ground: ground_part(total_along_px, along_px),
+        paper_average: point(along_px, average_y),
+        equation_7: point(along_px, summed(ResidualMoments::size_y)),
+        equation_5: SignedBudget {
+            along_px: signed_px,
+            // The misregistration is that of the second image against the first.
+            unexplained_px: input.misregistration.map(|of| of_pixel(of.mean_m) + mean_x),
+            point: point(signed_px, apart(ResidualMoments::size_y)),
         },
-        paper_average: uncertainty(average_y),
-        equation_7: uncertainty(summed(ResidualMoments::size_y)),
     })
+}
+
+/// Equation 6.
+fn ground_part(total_px: Option<f64>, orientation_px: f64) -> GroundPart {
+    let Some(total_px) = total_px else {
+        return GroundPart::NotObserved;
+    };
+    let square = total_px.powi(2) - orientation_px.powi(2);
+    if square >= 0.0 {
+        GroundPart::Resolved {
+            along_px: square.sqrt(),
+        }
+    } else {
+        GroundPart::NotResolvable
+    }
 }
 
 fn check(input: &BudgetInput) -> Result<(), BudgetError> {
@@ -181,7 +308,6 @@ fn check(input: &BudgetInput) -> Result<(), BudgetError> {
         return Err(BudgetError::NoSites);
     }
     for (what, value) in [
-        ("the spacing of footprints, metres,", input.mola_spacing_m),
         ("the size of a pixel, metres,", input.pixel_size_m),
         ("height over base", input.height_over_base),
     ] {
@@ -193,118 +319,32 @@ fn check(input: &BudgetInput) -> Result<(), BudgetError> {
             });
         }
     }
-    for image in input.sites.iter().flatten() {
-        for (what, value) in [
-            ("a residual along the track", image.size_x()),
-            ("a residual across the track", image.size_y()),
-        ] {
-            if !value.is_finite() {
-                return Err(BudgetError::Value {
-                    what,
-                    value,
-                    expected: "a finite number",
-                });
-            }
+    let of_sites = input.sites.iter().flat_map(|site| {
+        let [first, second] = &site.images;
+        [first, second, &site.apart].map(|of| {
+            [
+                ("a residual along the track", of.size_x()),
+                ("a residual across the track", of.size_y()),
+            ]
+        })
+    });
+    let observed = input.misregistration.iter().map(|of| {
+        [
+            ("the misregistration of footprints, metres,", of.mean_m),
+            ("the misregistration of footprints, metres,", of.rms_m),
+        ]
+    });
+    for (what, value) in of_sites.chain(observed).flatten() {
+        if !value.is_finite() {
+            return Err(BudgetError::Value {
+                what,
+                value,
+                expected: "a finite number",
+            });
         }
     }
     Ok(())
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Table 5 of Shan et al. 2005: Eos, Gusev, Isidis.
-    fn table_5() -> BudgetInput {
-        let image = |mean_x, deviation_x, mean_y, deviation_y| ResidualMoments {
-            mean_x,
-            deviation_x,
-            mean_y,
-            deviation_y,
-        };
-        BudgetInput {
-            sites: vec![
-                [
-                    image(-33.82, 17.34, 2.86, 1.36),
-                    image(20.52, 10.17, -1.61, 0.76),
-                ],
-                [
-                    image(-26.25, 0.66, 3.63, 0.27),
-                    image(23.55, 0.59, -2.62, 0.23),
-                ],
-                [
-                    image(34.29, 0.96, -2.57, 0.22),
-                    image(-25.48, 0.72, 2.88, 0.24),
-                ],
-            ],
-            mola_spacing_m: 325.0,
-            pixel_size_m: 4.4,
-            height_over_base: 385.0 / 155.0,
-        }
-    }
-
-    /// Two or three printed decimals of the sheet's arithmetic.
-    fn close(value: f64, expected: f64) {
-        assert!((value - expected).abs() < 0.005, "{value} {expected}");
-    }
-
-    #[test]
-    fn sizes_of_table_5() {
-        let expected = [
-            [(38.006, 3.167), (22.902, 1.780)],
-            [(26.258, 3.640), (23.557, 2.630)],
-            [(34.303, 2.579), (25.490, 2.890)],
-        ];
-        for (site, expected) in table_5()
-            .sites
-            .iter()
-            .flatten()
-            .zip(expected.iter().flatten())
-        {
-            close(site.size_x(), expected.0);
-            close(site.size_y(), expected.1);
-        }
-    }
-
-    #[test]
-    fn the_budget_of_the_paper() {
-        let budget = uncertainty_budget(&table_5()).unwrap();
-        close(budget.along_px, 40.987);
-        close(budget.total_along_px, 73.86);
-        let GroundPart::Resolved { along_px } = budget.ground else {
-            panic!("{budget:?}");
-        };
-        close(along_px, 61.45);
-        close(budget.paper_average.across_px, 2.781);
-        close(budget.equation_7.across_px, 4.015);
-        // 385/155 times the two readings, and the planimetric sums of squares.
-        close(budget.paper_average.height_px, 385.0 / 155.0 * 2.7806);
-        close(budget.equation_7.height_px, 9.973);
-        close(budget.equation_7.height_m, 43.88);
-        close(budget.equation_7.planimetric_px, 41.183);
-        close(budget.equation_7.planimetric_m, 181.21);
-    }
-
-    #[test]
-    fn what_has_no_answer_says_so() {
-        let dense = BudgetInput {
-            mola_spacing_m: 100.0,
-            ..table_5()
-        };
-        let budget = uncertainty_budget(&dense).unwrap();
-        assert_eq!(budget.ground, GroundPart::NotResolvable);
-        let refused = |change: fn(&mut BudgetInput)| {
-            let mut input = table_5();
-            change(&mut input);
-            uncertainty_budget(&input).unwrap_err()
-        };
-        assert_eq!(refused(|input| input.sites.clear()), BudgetError::NoSites);
-        for error in [
-            refused(|input| input.pixel_size_m = 0.0),
-            refused(|input| input.height_over_base = f64::NAN),
-            refused(|input| input.sites[1][0].mean_y = f64::NAN),
-        ] {
-            assert!(matches!(error, BudgetError::Value { .. }), "{error}");
-        }
-    }
-}
+mod tests;

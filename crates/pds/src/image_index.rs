@@ -16,7 +16,7 @@ use chrono::NaiveDateTime;
 use self::columns::{COLUMNS, Column, Fields};
 use super::label::{LABEL_BYTES_MAX, parse};
 use areograph_base::{
-    error::{Cause, IoError, Kind, Locate as _, Result},
+    error::{Cause, IoError, Locate as _, Result},
     units::{METRES_PER_KM, RADIANS_PER_DEGREE, SECONDS_PER_MS},
 };
 
@@ -104,7 +104,8 @@ pub struct ImageIndex {
 }
 
 /// A file that is not an index.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Input: "give cumindex.tab (or imgindex.tab) of a volume of the archive, its .lbl beside it")]
 enum NoIndex {
     #[error("the label has no column {0}")]
     Column(&'static str),
@@ -112,17 +113,6 @@ enum NoIndex {
     Rows { line: u64, text: String },
     #[error("the table is empty")]
     Empty,
-}
-
-impl Cause for NoIndex {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "give cumindex.tab (or imgindex.tab) of a volume of the archive, its .lbl beside it"
-            .to_owned()
-    }
 }
 
 /// Longest accepted row; those of the archive have about 520 bytes.

@@ -21,6 +21,38 @@ pub struct ImageLabel {
     pub utc_stop: Option<String>,
     /// Line times, where each row of the file has its own.
     pub lines: Option<RowTimes>,
+    /// Text that is no statement, and a keyword that only resembles that of the clock, one sentence each.
+    pub remarks: Vec<String>,
+}
+
+/// Keyword of the clock count of the first line.
+pub(super) const CLOCK_KEY: &str = "SPACECRAFT_CLOCK_START_COUNT";
+/// Letters in which a damaged keyword differs from it.
+const CLOCK_KEY_DAMAGE: usize = 2;
+
+/// Damage of a label that was read; `has_clock` – whether it states the clock count.
+pub(super) fn damage(label: &Label, has_clock: bool) -> Vec<String> {
+    let unread = label.unread.iter().map(|unread| {
+        format!(
+            "line {} of the label is not KEY = value: {:?}",
+            unread.line, unread.text
+        )
+    });
+    let mut remarks: Vec<String> = unread.collect();
+    let resembles = |entry: &&Entry| {
+        let pairs = entry.key.chars().zip(CLOCK_KEY.chars());
+        let differing = pairs.filter(|(found, expected)| found != expected).count();
+        entry.key.len() == CLOCK_KEY.len() && (1..=CLOCK_KEY_DAMAGE).contains(&differing)
+    };
+    let resembling = label.entries.iter().find(resembles);
+    if !has_clock && (resembling.is_some() || !remarks.is_empty()) {
+        let instead = resembling.map_or_else(String::new, |entry| format!(", but {}", entry.key));
+        remarks.push(format!(
+            "the damaged label states no {CLOCK_KEY}{instead}: without the key sclk_start the start is that of START_TIME, which \
+             is truncated to 10 ms"
+        ));
+    }
+    remarks
 }
 
 /// Line times of an image from its rows.

@@ -1,13 +1,20 @@
 //! Labels in the Object Description Language of PDS3 and its PVL dialect of ISIS: `KEY = value`,
 //! `OBJECT = …`/`END_OBJECT`, `GROUP = …`/`END_GROUP`, `END`.
 //!
-//! The parser is tolerant: text that is not an assignment is skipped, so that binary data may follow a label and the
+//! The parser is tolerant: text that is not an assignment is set aside, so that binary data may follow a label and the
 //! valid part of a damaged one is kept.
 
-use areograph_base::error::{Cause, Kind};
+mod scanner;
+
+use areograph_base::error::Cause;
+use scanner::Scanner;
 
 /// Bytes of a file that are parsed; labels have a few kilobytes.
 pub const LABEL_BYTES_MAX: usize = 1 << 20;
+/// Lines without an assignment that are kept.
+const UNREAD_MAX: usize = 8;
+/// Start of the mark of an SFDU, which precedes some labels.
+const SFDU: &str = "CCSD";
 
 /// One `KEY = value` of a label.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -42,16 +49,30 @@ pub struct Label {
     pub entries: Vec<Entry>,
     /// Whether the statement `END` follows them.
     pub ended: bool,
+    /// The first lines before it with text that is no statement.
+    pub unread: Vec<UnreadLine>,
+}
+
+/// Text in a label that is no statement.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct UnreadLine {
+    /// Its line, from 1.
+    pub line: usize,
+    /// The text up to the end of the line, shortened.
+    pub text: String,
 }
 
 /// An invalid label.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Cause)]
+#[cause(Input)]
 pub enum LabelError {
     /// No assignment.
     #[error("no label found: expected lines KEY = value in the first {LABEL_BYTES_MAX} bytes")]
+    #[cause("give a PDS3 label (.lbl, .imq) or an ISIS label (.lbl, .cub)")]
     NoLabel,
     /// An invalid value.
     #[error("{key} is {value:?}; expected {expected}")]
+    #[cause("correct the label, or write the key in the image's table of the configuration")]
     Value {
         /// The keyword.
         key: String,
@@ -62,9 +83,11 @@ pub enum LabelError {
     },
     /// No statement marks the end of the label.
     #[error("the label has no END; expected that statement after its last line")]
+    #[cause("fetch the file again: its label is truncated or damaged")]
     NoEnd,
     /// Two values under one keyword.
     #[error("{key} appears in the label as {first:?} and as {second:?}; expected one value")]
+    #[cause("determine which of the two values is correct, and keep only that one in the label")]
     Twice {
         /// The keyword.
         key: String,
@@ -75,6 +98,9 @@ pub enum LabelError {
     },
     /// An image of another mission or target, or one that is map-projected.
     #[error("{key} is {value:?}; expected {expected}")]
+    #[cause(
+        "give the label of an image of Mars that the camera's spacecraft took, without a map projection"
+    )]
     OtherImage {
         /// The keyword.
         key: String,
@@ -85,6 +111,9 @@ pub enum LabelError {
     },
     /// Two values that belong to different images.
     #[error("{} is {:?}, but {} is {:?}; expected values of one image", .keys[0], .values[0], .keys[1], .values[1])]
+    #[cause(
+        "check that files and labels are not exchanged or renamed; one of them belongs to another image"
+    )]
     Contradiction {
         /// Their keywords.
         keys: [String; 2],
@@ -93,42 +122,16 @@ pub enum LabelError {
     },
     /// Another instrument's image.
     #[error("instrument is {found:?}; expected {}", listed(known))]
+    #[cause(
+        "set `instrument` in the image's table to the camera that took it: a camera known to areograph, or an \
+         instrument file"
+    )]
     Instrument {
         /// Instrument and filter of the label.
         found: String,
         /// Instruments of the known cameras.
         known: Vec<String>,
     },
-}
-
-impl Cause for LabelError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::NoLabel => "give a PDS3 label (.lbl, .imq) or an ISIS label (.lbl, .cub)",
-            Self::NoEnd => "fetch the file again: its label is truncated or damaged",
-            Self::Twice { .. } => {
-                "determine which of the two values is correct, and keep only that one in the label"
-            }
-            Self::OtherImage { .. } => {
-                "give the label of an image of Mars that the camera's spacecraft took, without a map projection"
-            }
-            Self::Value { .. } => {
-                "correct the label, or write the key in the image's table of the configuration"
-            }
-            Self::Instrument { .. } => {
-                "set `instrument` in the image's table to the camera that took it: a camera known to areograph, or an instrument \
-                 file"
-            }
-            Self::Contradiction { .. } => {
-                "check that files and labels are not exchanged or renamed; one of them belongs to another image"
-            }
-        }
-        .to_owned()
-    }
 }
 
 /// `a, b or c`.
@@ -154,13 +157,15 @@ pub fn parse(bytes: &[u8]) -> Result<Label, LabelError> {
 /// # Errors
 /// [`LabelError::NoLabel`] when there is no assignment.
 pub fn parse_whole(bytes: &[u8]) -> Result<Label, LabelError> {
-    let mut scanner = Scanner { bytes, at: 0 };
+    let mut scanner = Scanner::new(bytes);
     let mut label = Label::default();
     let mut groups: Vec<(String, usize)> = Vec::new();
     let mut blocks = 0;
+    // ISIS breaks long values after a hyphen.
+    let mut is_broken = false;
     while let Some(word) = scanner.word() {
         let key = word.to_ascii_uppercase();
-        let after_word = scanner.at;
+        let (before_word, after_word) = (scanner.word_at, scanner.at);
         if !(key.starts_with(|first: char| first.is_ascii_alphabetic() || first == '^')
             && scanner.take(b'='))
         {
@@ -170,6 +175,16 @@ pub fn parse_whole(bytes: &[u8]) -> Result<Label, LabelError> {
                     break;
                 }
                 "END_OBJECT" | "END_GROUP" | "ENDOBJECT" | "ENDGROUP" => drop(groups.pop()),
+                // The rest of a value in nested brackets is left over as well.
+                _ if key.starts_with(SFDU) || key.starts_with([',', ')', '}']) => {}
+                _ if label.unread.len() < UNREAD_MAX => {
+                    let (line, text) = scanner.line_at(before_word);
+                    let goes_on = is_broken && text.ends_with('-');
+                    if !is_broken {
+                        label.unread.push(UnreadLine { line, text });
+                    }
+                    is_broken = goes_on;
+                }
                 _ => {}
             }
             // The rest of the line is no assignment either: the mark of an SFDU, or invalid text.
@@ -178,6 +193,7 @@ pub fn parse_whole(bytes: &[u8]) -> Result<Label, LabelError> {
             continue;
         }
         let (value, unit) = scanner.value();
+        is_broken = value.ends_with('-');
         match key.as_str() {
             "OBJECT" | "GROUP" | "BEGIN_OBJECT" | "BEGIN_GROUP" => {
                 // Every entry repeats its group's name, so invalid text must not lengthen it.
@@ -244,99 +260,6 @@ fn only<'a>(mut entries: impl Iterator<Item = &'a Entry>) -> Result<Option<&'a E
     }
 }
 
-/// Scans the bytes of a label; every step advances.
-struct Scanner<'a> {
-    bytes: &'a [u8],
-    at: usize,
-}
-
-impl Scanner<'_> {
-    fn peek(&self) -> Option<u8> {
-        self.bytes.get(self.at).copied()
-    }
-
-    fn take(&mut self, required: u8) -> bool {
-        self.skip_space();
-        let found = self.peek() == Some(required);
-        self.at += usize::from(found);
-        found
-    }
-
-    fn skip_line(&mut self) {
-        let rest = &self.bytes[self.at.min(self.bytes.len())..];
-        self.at += rest
-            .iter()
-            .position(|byte| matches!(byte, b'\n' | b'\r'))
-            .unwrap_or(rest.len());
-    }
-
-    /// Skips white space, `/* … */` and `# …` comments.
-    fn skip_space(&mut self) {
-        while let Some(byte) = self.peek() {
-            if byte.is_ascii_whitespace() || byte == 0 {
-                self.at += 1;
-            } else if byte == b'#' {
-                self.skip_line();
-            } else if self.bytes[self.at..].starts_with(b"/*") {
-                // Comments end with their line, closed or not.
-                let rest = &self.bytes[self.at..];
-                let line = rest.split(|byte| *byte == b'\n').next().unwrap_or(rest);
-                let end = line.windows(2).position(|pair| pair == b"*/");
-                self.at += end.map_or(line.len(), |end| end + 2);
-            } else {
-                break;
-            }
-        }
-    }
-
-    /// The next run of bytes up to white space or `=`; `None` at the end.
-    fn word(&mut self) -> Option<String> {
-        self.skip_space();
-        let rest = self.bytes.get(self.at..).filter(|rest| !rest.is_empty())?;
-        let stops = |byte: &u8| byte.is_ascii_whitespace() || *byte == b'=';
-        // A lone "=" is a word, so that invalid text cannot stop the scan.
-        let length = rest.iter().position(stops).unwrap_or(rest.len()).max(1);
-        self.at += length;
-        Some(String::from_utf8_lossy(&rest[..length]).into_owned())
-    }
-
-    /// A value and its unit.
-    fn value(&mut self) -> (String, Option<String>) {
-        self.skip_space();
-        let value = match self.peek() {
-            Some(quote @ (b'"' | b'\'')) => self.enclosed(quote),
-            Some(b'(') => self.enclosed(b')'),
-            Some(b'{') => self.enclosed(b'}'),
-            Some(_) => self.bare(),
-            None => String::new(),
-        };
-        while matches!(self.peek(), Some(b' ' | b'\t')) {
-            self.at += 1;
-        }
-        let unit = (self.peek() == Some(b'<')).then(|| self.enclosed(b'>').to_ascii_lowercase());
-        (value, unit)
-    }
-
-    /// The text between the byte here and the next `close`, which may be on a later line.
-    fn enclosed(&mut self, close: u8) -> String {
-        let rest = &self.bytes[self.at + 1..];
-        let length = rest.iter().position(|byte| *byte == close);
-        let inside = &rest[..length.unwrap_or(rest.len())];
-        self.at += 1 + inside.len() + usize::from(length.is_some());
-        let text = String::from_utf8_lossy(inside);
-        text.split_whitespace().collect::<Vec<_>>().join(" ")
-    }
-
-    /// A value without quotes: up to white space or a unit, on this line.
-    fn bare(&mut self) -> String {
-        let rest = &self.bytes[self.at..];
-        let stops = |byte: &u8| byte.is_ascii_whitespace() || *byte == b'<';
-        let length = rest.iter().position(stops).unwrap_or(rest.len());
-        self.at += length;
-        String::from_utf8_lossy(&rest[..length]).into_owned()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -369,6 +292,20 @@ mod tests {
         assert!(label.ended);
         let blocks = ["A", "LINES", "D", "E"].map(|key| label.find(key).unwrap().block);
         assert_eq!(blocks, [0, 2, 1, 0]);
+        assert_eq!(label.unread, []);
+    }
+
+    #[test]
+    fn text_that_is_no_statement_is_kept_with_its_line() {
+        let label = parse(
+            b"A = 1\r\nCLOCK ? \"6:028\"\r\nB = 2 metres\nC = ((1, 2), (3, 4))\nD = a-\n  b-\n  c\nEND\nD\n",
+        );
+        let unread = |line, text: &str| UnreadLine {
+            line,
+            text: text.to_owned(),
+        };
+        let expected = [unread(2, "CLOCK ? \"6:028\""), unread(3, "metres")];
+        assert_eq!(label.unwrap().unread, expected);
     }
 
     #[test]

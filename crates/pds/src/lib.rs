@@ -31,6 +31,7 @@
 
 pub mod archive;
 pub mod calibration_tables;
+mod file_size;
 mod hrsc;
 pub mod image_file;
 pub mod image_index;
@@ -48,5 +49,6 @@ pub mod table_rows;
 pub mod terrain_model;
 pub mod ties;
 
+pub use file_size::SizedFile;
 pub use image_label::{ImageLabel, RowTimes};
 pub use read_label::{product_named, read_label};

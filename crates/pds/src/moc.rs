@@ -2,8 +2,8 @@
 
 use super::{
     image_label::{
-        ImageLabel, as_taken, camera, count, either, known, of_mars, optional_count, text,
-        value_error,
+        CLOCK_KEY, ImageLabel, as_taken, camera, count, damage, either, known, of_mars,
+        optional_count, text, value_error,
     },
     label::{Entry, Label, LabelError},
 };
@@ -35,12 +35,9 @@ pub fn image_label(label: &Label, cameras: &[Instrument]) -> Result<ImageLabel, 
         None => optional_count(label.only("FIRSTLINESAMPLE")?, 1)?.map(|first| first - 1),
     };
     let summing = |pds, isis| optional_count(either(label, pds, isis)?, 1);
-    let sclk_start = either(
-        label,
-        "SPACECRAFT_CLOCK_START_COUNT",
-        "SPACECRAFTCLOCKCOUNT",
-    )?;
+    let sclk_start = either(label, CLOCK_KEY, "SPACECRAFTCLOCKCOUNT")?;
     Ok(ImageLabel {
+        remarks: damage(label, sclk_start.is_some()),
         product_id: text(either(label, "PRODUCT_ID", "PRODUCTID")?),
         instrument: instrument.clone(),
         fields: ImageFields {

@@ -26,7 +26,7 @@ use super::{
     read_label::Labelled,
 };
 use areograph_base::{
-    error::{Cause, IoError, Kind, Locate as _, Result},
+    error::{Cause, IoError, Locate as _, Result},
     instruments::Instrument,
 };
 
@@ -58,11 +58,13 @@ enum OtherKind {
 }
 
 /// A file whose pixels cannot be read.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[non_exhaustive]
+#[cause(Input)]
 pub enum PixelFileError {
     /// A value of a label.
     #[error("{key} is {value:?}; expected {expected}")]
+    #[cause("give a cube of one band as ISIS writes it, with the pixels in the file")]
     Value {
         /// The keyword.
         key: &'static str,
@@ -73,6 +75,7 @@ pub enum PixelFileError {
     },
     /// A cube whose pixels end before their last line.
     #[error("the file has {found} bytes; expected {expected}, as its label states")]
+    #[cause("fetch or write the cube again: it is truncated")]
     Short {
         /// Bytes of the file.
         found: u64,
@@ -81,31 +84,16 @@ pub enum PixelFileError {
     },
     /// A picture that its library rejects, or of another kind.
     #[error("{format}: {reason}")]
+    #[cause(
+        "give a whole picture of one band of grey with 8, 16 or 32 bits a pixel, a TIFF without compression, with LZW \
+         or with deflate"
+    )]
     Picture {
         /// Its format.
         format: &'static str,
         /// What is wrong.
         reason: String,
     },
-}
-
-impl Cause for PixelFileError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Value { .. } => {
-                "give a cube of one band as ISIS writes it, with the pixels in the file"
-            }
-            Self::Short { .. } => "fetch or write the cube again: it is truncated",
-            Self::Picture { .. } => {
-                "give a whole picture of one band of grey with 8, 16 or 32 bits a pixel, a TIFF without compression, with LZW or with deflate"
-            }
-        }
-        .to_owned()
-    }
 }
 
 impl PixelFile {

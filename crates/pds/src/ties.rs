@@ -6,9 +6,9 @@ mod network;
 
 use std::{collections::BTreeMap, fs, path::Path};
 
-use super::label::LabelError;
+use super::{file_size::SizedFile, label::LabelError};
 use areograph_base::{
-    error::{Cause, IoError, Kind, Locate, Result},
+    error::{Cause, IoError, Locate, Result},
     ties::{KnownGround, TieMeasure, TiePoint},
 };
 use network::parse_network;
@@ -37,45 +37,39 @@ pub struct TieComplaint {
 }
 
 /// A file without tie points.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Cause)]
+#[cause(Input)]
 enum TieError {
     #[error("this is a binary control network; expected its text form (PVL)")]
+    #[cause("convert it with ISIS: cnetbin2pvl from=control.net to=control.pvl")]
     Binary,
     #[error("no ControlNetwork object found")]
+    #[cause("give an ISIS control network in PVL, or a CSV table")]
     NoNetwork,
     #[error("column {0} is missing; expected point_id, serial_number, sample and line")]
+    #[cause(
+        "give a comma-separated table with a header line; lines and samples count from 1 at the middle of the first \
+         pixel"
+    )]
     Column(&'static str),
     #[error(
         "column {0} is missing; a table has both of line_sigma_px and sample_sigma_px, or neither"
     )]
+    #[cause(like = Column)]
     Sigma(&'static str),
     #[error("the table cannot be read: {0}")]
+    #[cause(like = Column)]
     Table(String),
     #[error("none of its records can be read ({records} in all); record {record}: {text}")]
+    #[cause(like = Column)]
     Unreadable {
         records: usize,
         record: u64,
         text: String,
     },
     #[error(transparent)]
+    #[cause(like = NoNetwork)]
     Label(#[from] LabelError),
-}
-
-impl Cause for TieError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Binary => "convert it with ISIS: cnetbin2pvl from=control.net to=control.pvl",
-            Self::NoNetwork | Self::Label(_) => "give an ISIS control network in PVL, or a CSV table",
-            Self::Column(_) | Self::Sigma(_) | Self::Table(_) | Self::Unreadable { .. } => {
-                "give a comma-separated table with a header line; lines and samples count from 1 at the middle of the first pixel"
-            }
-        }
-        .to_owned()
-    }
 }
 
 /// Reads tie points; a file whose name ends in `.csv` is a table, any other a control network.
@@ -83,6 +77,7 @@ impl Cause for TieError {
 /// # Errors
 /// The file cannot be read; a binary network; no network; missing columns; no readable record.
 pub fn read_ties(path: &Path) -> Result<TieFile> {
+    SizedFile::Ties.require(path)?;
     let bytes = fs::read(path).map_err(IoError::on("read")).in_file(path)?;
     let table = path
         .extension()

@@ -1,26 +1,29 @@
 //! Errors of the scene writer.
 
-use areograph_base::error::{Cause, Kind};
+use areograph_base::error::Cause;
 
 /// Errors of the scene writer.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 pub enum SceneError {
     /// The folder holds something that is not an older scene.
     #[error(
         "the folder is not empty and contains no areograph scene (its file list {list} is missing)"
     )]
+    #[cause(Configuration: "choose an empty or new folder")]
     NotAScene {
         /// File by which a scene is recognised.
         list: &'static str,
     },
     /// The folder holds files outside an older scene.
     #[error("the folder holds {entry}, which `areograph scene` did not write")]
+    #[cause(Configuration: "a new scene would remove it: move it elsewhere, or choose another folder")]
     Foreign {
         /// Path below the folder.
         entry: String,
     },
     /// A file of the older scene has been changed.
     #[error("{file} was changed since `areograph scene` wrote it")]
+    #[cause(like = Foreign)]
     Changed {
         /// Path below the folder.
         file: String,
@@ -29,6 +32,7 @@ pub enum SceneError {
     #[error(
         "no orbit found that shows {image} as planned: last step {step} rad after {iterations} iterations, expected below 1e-13 rad"
     )]
+    #[cause(Bug: "report this with the seed and the kernels that were used")]
     NoOrbit {
         /// Image id.
         image: String,
@@ -39,6 +43,7 @@ pub enum SceneError {
     },
     /// The true orientation of an image is invalid.
     #[error("image {image}: no camera sees its tie points: {error}")]
+    #[cause(like = NoOrbit)]
     NoCamera {
         /// Image id.
         image: String,
@@ -47,6 +52,7 @@ pub enum SceneError {
     },
     /// An image that cannot be rendered or encoded.
     #[error("image {image}: {error}")]
+    #[cause(like = NoOrbit)]
     Image {
         /// Image id.
         image: String,
@@ -55,12 +61,14 @@ pub enum SceneError {
     },
     /// The beam misses Mars.
     #[error("the laser beam misses Mars at ET {et_s:.3}")]
+    #[cause(Input: "the attitude kernels do not point +Z at Mars there; leave them out")]
     BeamMisses {
         /// True time of the shot.
         et_s: f64,
     },
     /// A frame needs an instant that was not tabulated.
     #[error("no beam was tabulated for ET {et_s:.6}")]
+    #[cause(like = NoOrbit)]
     NotTabulated {
         /// The requested true time.
         et_s: f64,
@@ -68,6 +76,7 @@ pub enum SceneError {
     /// An option out of its range: a day shorter than its image or longer than a file may be, more noise than the image
     /// margins allow.
     #[error("{option} is {value}; expected {least} to {most}")]
+    #[cause(Configuration: "choose a value within these bounds")]
     Option {
         /// Name of the option.
         option: &'static str,
@@ -80,46 +89,9 @@ pub enum SceneError {
     },
     /// The kernels do not cover a single stretch of 20 s.
     #[error("the kernels have no interval of {least_s} s or more with both orbit and attitude")]
+    #[cause(Coverage: "check that the metakernel loads SPK for -94 and 499 and CK for -94000 of the same time")]
     NothingToFly {
         /// Shortest stretch of flight, seconds.
         least_s: f64,
     },
-}
-
-impl Cause for SceneError {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::NotAScene { .. }
-            | Self::Foreign { .. }
-            | Self::Changed { .. }
-            | Self::Option { .. } => Kind::Configuration,
-            Self::NoOrbit { .. }
-            | Self::NoCamera { .. }
-            | Self::Image { .. }
-            | Self::NotTabulated { .. } => Kind::Bug,
-            Self::BeamMisses { .. } => Kind::Input,
-            Self::NothingToFly { .. } => Kind::Coverage,
-        }
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::NotAScene { .. } => "choose an empty or new folder",
-            Self::Foreign { .. } | Self::Changed { .. } => {
-                "a new scene would remove it: move it elsewhere, or choose another folder"
-            }
-            Self::NoOrbit { .. }
-            | Self::NoCamera { .. }
-            | Self::Image { .. }
-            | Self::NotTabulated { .. } => {
-                "report this with the seed and the kernels that were used"
-            }
-            Self::BeamMisses { .. } => "the attitude kernels do not point +Z at Mars there; leave them out",
-            Self::Option { .. } => "choose a value within these bounds",
-            Self::NothingToFly { .. } => {
-                "check that the metakernel loads SPK for -94 and 499 and CK for -94000 of the same time"
-            }
-        }
-        .to_owned()
-    }
 }

@@ -8,11 +8,9 @@ use std::{
     path::{self, Path, PathBuf},
 };
 
-use tempfile::TempDir;
-
 use super::error::SceneError;
 use areograph_base::error::{IoError, Locate, Result};
-use areograph_store::files::hash_file;
+use areograph_store::files::{ASIDE, PartialFolder, hash_file};
 
 /// Name of the introductory text.
 const README: &str = "README.txt";
@@ -23,11 +21,12 @@ const LIST: &str = ".scene";
 
 /// A scene being written in a temporary folder beside its final location.
 ///
-/// Dropped unfinished, it leaves nothing; a killed process leaves a folder `.partial-…`.
+/// Dropped unfinished, it leaves nothing; the next scene beside it removes what a killed process left, and puts an older
+/// scene back that it had moved aside.
 pub(super) struct Draft {
     final_place: PathBuf,
     /// Contains the new scene and, during the exchange, the older one.
-    workshop: TempDir,
+    workshop: PartialFolder,
     folder: PathBuf,
 }
 
@@ -43,11 +42,7 @@ impl Draft {
             .in_file(directory)?;
         let parent = final_place.parent().unwrap_or(&final_place);
         let workshop = fs::create_dir_all(parent)
-            .and_then(|()| {
-                tempfile::Builder::new()
-                    .prefix(".partial-")
-                    .tempdir_in(parent)
-            })
+            .and_then(|()| PartialFolder::new_in(parent))
             .map_err(IoError::on("create a folder"))
             .in_file(parent)?;
         // A separate folder: temporary ones are private, a scene is readable by everyone.
@@ -85,7 +80,11 @@ impl Draft {
     pub(super) fn finish(self) -> Result<()> {
         put(&self.folder.join(LIST), &list(&self.folder)?)?;
         refuse_foreign(&self.final_place)?;
-        let older = self.workshop.path().join("older");
+        let aside = self.workshop.path().join(ASIDE);
+        fs::create_dir(&aside)
+            .map_err(IoError::on("create"))
+            .in_file(&aside)?;
+        let older = aside.join(self.final_place.file_name().unwrap_or_default());
         match fs::rename(&self.final_place, &older) {
             Err(error) if error.kind() != ErrorKind::NotFound => {
                 return Err(IoError::on("move the older scene aside")(error))

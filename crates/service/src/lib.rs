@@ -19,13 +19,17 @@
 
 pub mod audit;
 pub mod clock;
+pub mod contents;
 pub mod database;
 pub mod engine;
 pub mod http;
 pub mod instant;
 pub mod lock;
+pub mod private;
 pub mod random;
 pub mod rebuild;
+pub mod record;
+pub mod recover;
 pub mod sessions;
 pub mod shared;
 pub mod start;

@@ -8,8 +8,8 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::clock::utc_text;
-use areograph_base::error::{Cause, IoError, Kind, Locate as _, Result};
+use super::{clock::utc_text, private::create_folder};
+use areograph_base::error::{Cause, IoError, Locate as _, Result};
 
 /// Name of the lock in the state folder.
 const LOCK: &str = "service.lock";
@@ -42,38 +42,31 @@ pub struct Owner {
     pub started_ms: i64,
 }
 
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 enum LockError {
     #[error("{} has been using this folder since {}", .0.words(), utc_text(.0.started_ms))]
+    #[cause(Io: "{}end that process first", _0.page_or())]
     Taken(Owner),
     #[error("another service is using this folder")]
+    #[cause(Io: "end that process first")]
     TakenByUnknown,
     #[error("the folder is on a network file system ({0}), where the database is not safe")]
+    #[cause(Configuration: "give outputs.state a folder on a local disk")]
     Network(&'static str),
-}
-
-impl Cause for LockError {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::Taken(_) | Self::TakenByUnknown => Kind::Io,
-            Self::Network(_) => Kind::Configuration,
-        }
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Taken(owner) if !owner.address.is_empty() => {
-                format!("open http://{}, or end that process first", owner.address)
-            }
-            Self::Taken(_) | Self::TakenByUnknown => "end that process first".to_owned(),
-            Self::Network(_) => "give outputs.state a folder on a local disk".to_owned(),
-        }
-    }
 }
 
 impl Owner {
     fn words(&self) -> String {
         format!("areograph {} (process {})", self.command, self.pid)
+    }
+
+    /// The alternative to the end of its process, if it has pages.
+    fn page_or(&self) -> String {
+        if self.address.is_empty() {
+            String::new()
+        } else {
+            format!("open http://{}, or ", self.address)
+        }
     }
 }
 
@@ -83,7 +76,7 @@ impl ServiceLock {
     /// # Errors
     /// Another process holds it; the folder is on a network file system, or cannot be written.
     pub fn take(folder: &Path, owner: &Owner) -> Result<Self> {
-        fs::create_dir_all(folder)
+        create_folder(folder)
             .map_err(IoError::on("create the folder"))
             .in_file(folder)?;
         if let Some(network) = network_file_system(folder) {
@@ -140,6 +133,8 @@ fn network_file_system(folder: &Path) -> Option<&'static str> {
 
 #[cfg(test)]
 mod tests {
+    use areograph_base::error::Kind;
+
     use super::*;
 
     #[test]

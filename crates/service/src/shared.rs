@@ -2,7 +2,10 @@
 
 use std::{
     path::PathBuf,
-    sync::{Arc, PoisonError, RwLock},
+    sync::{
+        Arc, PoisonError, RwLock,
+        atomic::{AtomicBool, AtomicU64, Ordering},
+    },
 };
 
 use rusqlite::{Connection, Transaction};
@@ -11,6 +14,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::{
     clock::Clock,
+    contents::Contents,
     database::{Database, Stored, newest_event},
 };
 use areograph_config::ServiceConfig;
@@ -22,6 +26,10 @@ pub struct Shared {
     problem: RwLock<Option<String>>,
     database: Database,
     newest: watch::Sender<i64>,
+    recovering: AtomicBool,
+    progress: AtomicU64,
+    /// Contents of products.
+    pub contents: Contents,
     /// The clock.
     pub clock: Clock,
     /// The program of the workers: this one.
@@ -49,6 +57,9 @@ impl Shared {
             problem: RwLock::new(None),
             database,
             newest: watch::Sender::new(newest),
+            recovering: AtomicBool::new(false),
+            progress: AtomicU64::new(0),
+            contents: Contents::default(),
             clock,
             program,
             wake: Notify::new(),
@@ -79,6 +90,28 @@ impl Shared {
     /// Records why the configuration of the file was rejected.
     pub fn set_problem(&self, problem: Option<String>) {
         *self.problem.write().unwrap_or_else(PoisonError::into_inner) = problem;
+    }
+
+    /// Whether runs on the disk are being recorded in a new database.
+    #[must_use]
+    pub fn is_recovering(&self) -> bool {
+        self.recovering.load(Ordering::Acquire)
+    }
+
+    /// Records whether runs on the disk are being recorded in a new database.
+    pub fn set_recovering(&self, recovering: bool) {
+        self.recovering.store(recovering, Ordering::Release);
+    }
+
+    /// A number that grows while runs on the disk are being recorded, as a heartbeat.
+    #[must_use]
+    pub fn progress(&self) -> u64 {
+        self.progress.load(Ordering::Relaxed)
+    }
+
+    /// Records progress.
+    pub fn note_progress(&self) {
+        self.progress.fetch_add(1, Ordering::Relaxed);
     }
 
     /// The current time, milliseconds of UTC since 1970.

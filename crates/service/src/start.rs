@@ -10,10 +10,11 @@ use super::{
     database::{About, Database, Stored, append, files::roots, service::put_service},
     engine::{folders::folders, schedule::Schedule},
     lock::{Owner, ServiceLock},
+    recover::{examine, is_lost},
     shared::Shared,
     worker::process::ProcessIdentity,
 };
-use areograph_base::error::{Cause, IoError, Kind, Locate as _, Result};
+use areograph_base::error::{Cause, IoError, Locate as _, Result};
 use areograph_config::{ServiceConfig, load_service};
 
 /// A started service, which owns its state folder for the lifetime of this value.
@@ -28,33 +29,22 @@ pub struct Started {
 }
 
 /// An address, or a change, that a service rejects.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Configuration)]
 enum Refused {
     #[error("{0} is not a loopback address")]
+    #[cause(
+        "listen on 127.0.0.1, or set http.behind_tls_proxy = \"yes\" behind a proxy that encrypts"
+    )]
     Public(SocketAddr),
     #[error("{0} changed")]
+    #[cause("restart the service, or put the former value back")]
     NeedsRestart(&'static str),
     #[error("inputs.{0}: {1} is not an existing folder, and this service has never seen it")]
+    #[cause(
+        "correct the path, or mount the folder; a folder that was seen once may be unavailable later"
+    )]
     NeverSeen(&'static str, String),
-}
-
-impl Cause for Refused {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Public(_) => {
-                "listen on 127.0.0.1, or set http.behind_tls_proxy = \"yes\" behind a proxy that encrypts"
-            }
-            Self::NeedsRestart(_) => "restart the service, or put the former value back",
-            Self::NeverSeen(..) => {
-                "correct the path, or mount the folder; a folder that was seen once may be unavailable later"
-            }
-        }
-        .to_owned()
-    }
 }
 
 /// Reads and checks the configuration `file`, with another address if one is stated.
@@ -88,7 +78,8 @@ pub fn configuration(
 /// Starts a service; `command` is the name shown to other processes.
 ///
 /// # Errors
-/// Another service uses the same state folder; the database is damaged or newer; a disk error.
+/// Another service uses the same state folder; the database is damaged, newer, or that of another service; a disk
+/// error.
 pub fn start(config: ServiceConfig, command: &str, clock: Clock) -> Result<Started> {
     let state = config.outputs.state.clone();
     let owner = Owner {
@@ -98,12 +89,13 @@ pub fn start(config: ServiceConfig, command: &str, clock: Clock) -> Result<Start
         started_ms: clock.now_ms(),
     };
     let lock = ServiceLock::take(&state, &owner)?;
-    for folder in [&config.outputs.products, &state] {
-        std::fs::create_dir_all(folder)
-            .map_err(IoError::on("create the folder"))
-            .in_file(folder)?;
-    }
+    let products = &config.outputs.products;
+    std::fs::create_dir_all(products)
+        .map_err(IoError::on("create the folder"))
+        .in_file(products)?;
     let database = Database::open(&state)?;
+    examine(&database, products)?;
+    let lost = database.read(is_lost).in_file(&state)?;
     database
         .read(|connection| seen(connection, &config))
         .in_file(&state)??;
@@ -111,6 +103,7 @@ pub fn start(config: ServiceConfig, command: &str, clock: Clock) -> Result<Start
         .map_err(IoError::on("find"))
         .in_file("areograph")?;
     let shared = Shared::new(config, database, clock, program).in_file(&state)?;
+    shared.set_recovering(lost);
     Ok(Started {
         shared,
         lock,

@@ -155,6 +155,12 @@ pub fn note_use(transaction: &Transaction<'_>, now_ms: i64, id: &str) -> Stored<
     Ok(())
 }
 
+/// The identifier in a token's text, if it has the form of one.
+#[must_use]
+pub fn token_name(text: &str) -> Option<&str> {
+    split(text).map(|(id, _)| id)
+}
+
 /// Identifier and secret of a token's text.
 fn split(text: &str) -> Option<(&str, &str)> {
     let (id, secret) = text.strip_prefix(PREFIX)?.split_once('_')?;
@@ -166,7 +172,11 @@ fn hash(secret: &str) -> [u8; 32] {
     Sha256::digest(secret.as_bytes()).into()
 }
 
-fn random_hex<const BYTES: usize>() -> Stored<String> {
+/// Random bytes in hexadecimal digits.
+///
+/// # Errors
+/// The system has no random numbers.
+pub fn random_hex<const BYTES: usize>() -> Stored<String> {
     let mut bytes = [0_u8; BYTES];
     getrandom::fill(&mut bytes).map_err(|error| DatabaseError::NoRandom(error.to_string()))?;
     let digits = bytes.iter().flat_map(|byte| [byte >> 4, byte & 15]);

@@ -6,10 +6,12 @@ use areograph_base::{
 };
 
 /// An error of kernels, of their content, or of a CSPICE call.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Input)]
 pub enum SpiceError {
     /// CSPICE signalled an error.
     #[error("{call}: {short}: {long}")]
+    #[cause(kind_of(short): "{}", advice_on(short))]
     Spice {
         /// The routine called, and its argument where NAIF's text does not state it.
         call: String,
@@ -20,9 +22,11 @@ pub enum SpiceError {
     },
     /// A session is open on this thread already; waiting for it would never end.
     #[error("a SPICE session is already open on this thread")]
+    #[cause(Bug: "report this: a stage opened a second session")]
     SessionOpen,
     /// The file is not a kernel that can be loaded.
     #[error("is {found}; expected {expected}")]
+    #[cause("fetch the kernel again from NAIF, or correct the list of kernels")]
     NotAKernel {
         /// What the file is.
         found: String,
@@ -31,12 +35,14 @@ pub enum SpiceError {
     },
     /// A binary kernel is shorter than its own file record states, or its segment list is broken.
     #[error("damaged binary kernel: {problem}")]
+    #[cause("fetch the kernel again: the copy is incomplete or broken")]
     DamagedKernel {
         /// The problem, with numbers.
         problem: String,
     },
     /// A text does not follow the rules of NAIF text kernels.
     #[error("line {line}: {problem}")]
+    #[cause("correct this line of the text kernel")]
     TextKernel {
         /// Line, counted from 1.
         line: usize,
@@ -45,6 +51,9 @@ pub enum SpiceError {
     },
     /// A metakernel names a file that does not exist.
     #[error("names {name}, which does not exist{candidates}")]
+    #[cause(
+        "correct KERNELS_TO_LOAD or PATH_VALUES; relative paths count from the metakernel's folder"
+    )]
     MissingKernel {
         /// Name with the path symbols replaced.
         name: String,
@@ -53,12 +62,14 @@ pub enum SpiceError {
     },
     /// A folder of kernels lacks a required one.
     #[error("no kernel in this folder {what}")]
+    #[cause("put the missing kernel under kernels.root, or name the kernels one by one")]
     NothingToSelect {
         /// What is missing, for example `defines the MGS clock (SCLK_DATA_TYPE_94)`.
         what: String,
     },
     /// A set of kernels lacks a text kernel that a call needs.
     #[error("no {kernel} in the set{}", without(set, variable))]
+    #[cause(Coverage: "add such a kernel to the set, for example {example}")]
     MissingText {
         /// The kernel that usually holds it.
         kernel: String,
@@ -71,6 +82,7 @@ pub enum SpiceError {
     },
     /// A kernel has changed since it was chosen.
     #[error("kernel changed while it was in use: BLAKE3 was {was}, is {is}")]
+    #[cause("run again when no program is writing to the kernel folder")]
     KernelChanged {
         /// Hash when it was chosen.
         was: String,
@@ -79,6 +91,7 @@ pub enum SpiceError {
     },
     /// A text is too long for CSPICE, or cannot be passed to it.
     #[error("{what} cannot be given to CSPICE: {problem}")]
+    #[cause("use shorter paths without control characters, for example by a link")]
     Unusable {
         /// The kind of text: a path, a clock string, ...
         what: &'static str,
@@ -87,6 +100,7 @@ pub enum SpiceError {
     },
     /// Kernels do not cover the required interval.
     #[error("no {what} of {of} for {gap} ({gap_utc}), required for {required}; {neighbours}")]
+    #[cause(Coverage: "add kernels that fill the gap, or leave out the image or profile that needs it")]
     CoverageGap {
         /// `position` or `attitude`.
         what: &'static str,
@@ -103,6 +117,7 @@ pub enum SpiceError {
     },
     /// No attitude sample within the tolerance.
     #[error("no attitude of {of} within {tolerance_s} s of {kernel_time} (time of the C-kernel)")]
+    #[cause(like = CoverageGap)]
     NoAttitude {
         /// The spacecraft.
         of: String,
@@ -113,6 +128,9 @@ pub enum SpiceError {
     },
     /// A kernel holds NaN or an infinity.
     #[error("{what} at {instant} (UTC {utc}) is not finite{part}")]
+    #[cause(
+        "fetch the kernel again, or leave it out of the list: this part of it holds NaN or infinity"
+    )]
     NotFinite {
         /// The position, velocity or attitude concerned.
         what: String,
@@ -128,6 +146,9 @@ pub enum SpiceError {
         "the start of {day} UTC is {off_s:+.3} s away from the published time scale (IERS, Bulletin C); expected at most \
          0.001 s"
     )]
+    #[cause(
+        "fetch the current leap-second kernel from NAIF (naif0012.tls): this one lacks a leap second or was changed"
+    )]
     OtherUtc {
         /// The first day that shows it.
         day: String,
@@ -138,6 +159,7 @@ pub enum SpiceError {
     #[error(
         "trajectory near {near}: {error_m} m off with pieces of {piece_s} s; required {tolerance_m} m"
     )]
+    #[cause(Coverage: "check the SPK for jumps there, or allow a larger tolerance")]
     NoConvergence {
         /// Where.
         near: Et,
@@ -150,6 +172,7 @@ pub enum SpiceError {
     },
     /// Columns for a kernel writer do not fit together.
     #[error("segment {segment}: {problem}")]
+    #[cause(Bug: "report this: a kernel writer was given columns that do not fit")]
     Segment {
         /// Name of the segment.
         segment: String,
@@ -179,6 +202,24 @@ const COVERAGE_MESSAGES: [&str; 3] = [
     "SPICE(CKINSUFFDATA)",
 ];
 
+/// The kind of an error of CSPICE, by its short message.
+fn kind_of(short: &str) -> Kind {
+    if COVERAGE_MESSAGES.contains(&short) {
+        Kind::Coverage
+    } else {
+        Kind::Input
+    }
+}
+
+/// The advice on an error of CSPICE, by its short message.
+fn advice_on(short: &str) -> &'static str {
+    if kind_of(short) == Kind::Coverage {
+        "add kernels that cover this time; `areograph kernels coverage` shows the coverage"
+    } else {
+        "check the value and the kernels that NAIF's message names"
+    }
+}
+
 impl SpiceError {
     /// The same error of CSPICE, with the `value` that caused it.
     pub(super) fn of(mut self, value: &str) -> Self {
@@ -186,61 +227,5 @@ impl SpiceError {
             *call = format!("{call}(\"{value}\")");
         }
         self
-    }
-}
-
-impl Cause for SpiceError {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::Spice { short, .. } if COVERAGE_MESSAGES.contains(&short.as_str()) => {
-                Kind::Coverage
-            }
-            Self::MissingText { .. }
-            | Self::CoverageGap { .. }
-            | Self::NoAttitude { .. }
-            | Self::NoConvergence { .. } => Kind::Coverage,
-            Self::SessionOpen | Self::Segment { .. } => Kind::Bug,
-            _ => Kind::Input,
-        }
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Spice { .. } if self.kind() == Kind::Coverage => {
-                "add kernels that cover this time; `areograph kernels coverage` shows the coverage"
-            }
-            Self::Spice { .. } => "check the value and the kernels that NAIF's message names",
-            Self::MissingText { example, .. } => {
-                return format!("add such a kernel to the set, for example {example}");
-            }
-            Self::SessionOpen => "report this: a stage opened a second session",
-            Self::NotAKernel { .. } => {
-                "fetch the kernel again from NAIF, or correct the list of kernels"
-            }
-            Self::DamagedKernel { .. } => "fetch the kernel again: the copy is incomplete or broken",
-            Self::TextKernel { .. } => "correct this line of the text kernel",
-            Self::MissingKernel { .. } => {
-                "correct KERNELS_TO_LOAD or PATH_VALUES; relative paths count from the metakernel's folder"
-            }
-            Self::NothingToSelect { .. } => {
-                "put the missing kernel under kernels.root, or name the kernels one by one"
-            }
-            Self::KernelChanged { .. } => "run again when no program is writing to the kernel folder",
-            Self::Unusable { .. } => "use shorter paths without control characters, for example by a link",
-            Self::CoverageGap { .. } | Self::NoAttitude { .. } => {
-                "add kernels that fill the gap, or leave out the image or profile that needs it"
-            }
-            Self::NotFinite { .. } => {
-                "fetch the kernel again, or leave it out of the list: this part of it holds NaN or infinity"
-            }
-            Self::OtherUtc { .. } => {
-                "fetch the current leap-second kernel from NAIF (naif0012.tls): this one lacks a leap second or was changed"
-            }
-            Self::NoConvergence { .. } => {
-                "check the SPK for jumps there, or allow a larger tolerance"
-            }
-            Self::Segment { .. } => "report this: a kernel writer was given columns that do not fit",
-        }
-        .to_owned()
     }
 }

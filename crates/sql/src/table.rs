@@ -28,7 +28,7 @@ use tokio_stream::StreamExt as _;
 
 use super::conditions::Conditions;
 use areograph_base::{
-    error::{Cause, Error, Kind, Locate as _, Result, Stopped},
+    error::{Cause, Error, Locate as _, Result, Stopped},
     footprints::{AsRead, Footprints, SourceFile},
     time::Interval,
 };
@@ -72,22 +72,12 @@ pub struct Tally {
 }
 
 /// Two files hold the same shots.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("record {record} has a shot that is also in {other}: it would be counted twice")]
+#[cause(Input: "if both files hold the same orbits, name only one of them, or select one source_file")]
 struct Overlap {
     record: u32,
     other: String,
-}
-
-impl Cause for Overlap {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "if both files hold the same orbits, name only one of them, or select one source_file"
-            .to_owned()
-    }
 }
 
 /// The shots of an archive with a return, of every class, channel and attitude, in the order of files and records: the
@@ -305,14 +295,11 @@ impl Sink for HandOn {
 }
 
 #[cfg(test)]
-#[path = "../../pds/src/archive/distinct/cases.rs"]
-mod cases;
-
-#[cfg(test)]
 mod tests {
+    use areograph_testing::shot_cases::CASES;
     use datafusion::arrow::datatypes::Schema;
 
-    use super::{cases::CASES, *};
+    use super::*;
 
     #[derive(Debug)]
     struct NoColumns;

@@ -1,11 +1,11 @@
 //! Files appear under their final names complete or not at all.
 //!
-//! Files are written under another name, read back, flushed and renamed. Half-written files of a killed run are removed
-//! under the lock of the next.
+//! Files are written under another name, read back, flushed and renamed. The next command that writes into a folder
+//! removes what a killed one left there.
 
 use std::{fs::File, io::Write as _, path::Path};
 
-use crate::files::StagedFile;
+use crate::files::{Mark, StagedFile};
 use areograph_base::error::{IoError, Locate, Result};
 
 /// Writes `bytes` beside `path` under a temporary name, flushes them to the disk and renames.
@@ -21,10 +21,22 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
 /// # Errors
 /// Those of [`write()`].
 pub fn write_parts(path: &Path, parts: &[&[u8]]) -> Result<()> {
-    let staged = StagedFile::create(path)?;
+    finish(StagedFile::create(path)?, parts)
+}
+
+/// The same at a path of the user, where an existing file is replaced only if it has this mark.
+///
+/// # Errors
+/// Those of [`write()`]; an existing file that areograph did not write.
+pub fn replace(path: &Path, bytes: &[u8], mark: Mark) -> Result<()> {
+    finish(StagedFile::replacing(path, mark)?, &[bytes])
+}
+
+fn finish(staged: StagedFile, parts: &[&[u8]]) -> Result<()> {
+    let path = staged.path().to_owned();
     let mut writer = staged.writer()?;
     let written = parts.iter().try_for_each(|part| writer.write_all(part));
-    written.map_err(IoError::on("write")).in_file(path)?;
+    written.map_err(IoError::on("write")).in_file(&path)?;
     staged.finish()?;
     sync_folder(path.parent().unwrap_or(Path::new(".")));
     Ok(())

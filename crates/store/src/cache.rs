@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use super::atomic;
 use crate::stage::{Inputs, Output, Provenance, Reason};
 use areograph_base::{
-    error::{Cause, Kind, Locate, Result},
+    error::{Cause, Locate, Result},
     stored::whole,
 };
 
@@ -35,21 +35,12 @@ struct Head {
 }
 
 /// A stage output that cannot be stored.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("the output of {stage} cannot be stored: {source}")]
+#[cause(Bug: "this is a bug in areograph; please report it with the configuration")]
 struct Unstorable {
     stage: String,
     source: postcard::Error,
-}
-
-impl Cause for Unstorable {
-    fn kind(&self) -> Kind {
-        Kind::Bug
-    }
-
-    fn advice(&self) -> String {
-        "this is a bug in areograph; please report it with the configuration".to_owned()
-    }
 }
 
 impl StageCache {
@@ -143,7 +134,7 @@ impl StageCache {
         let kept: BTreeSet<PathBuf> = stages.into_iter().map(|stage| self.path(stage)).collect();
         let entries = fs::read_dir(&self.folder).into_iter().flatten().flatten();
         for path in entries.map(|entry| entry.path()) {
-            if !kept.contains(&path) {
+            if !kept.contains(&path) && is_stage_output(&path) {
                 // A file that cannot be removed only occupies space.
                 let _ = fs::remove_file(path);
             }
@@ -153,6 +144,19 @@ impl StageCache {
     fn path(&self, stage: &str) -> PathBuf {
         self.folder.join(stage.replace('/', "+"))
     }
+}
+
+/// Whether the file begins like a stored output; files of other programs are not those of areograph to remove.
+fn is_stage_output(path: &Path) -> bool {
+    let bytes = fs::read(path).unwrap_or_default();
+    postcard::take_from_bytes::<Head>(&bytes).is_ok_and(|(head, _)| head.blake3.len() == 64)
+}
+
+/// The output of the stage with this label in the cache `folder`, whatever its inputs were.
+pub(super) fn stored<T: DeserializeOwned>(folder: &Path, label: &str) -> Option<T> {
+    let bytes = fs::read(StageCache::new(folder, false).path(label)).ok()?;
+    let (_, payload): (Head, &[u8]) = postcard::take_from_bytes(&bytes).ok()?;
+    read(payload)
 }
 
 /// An output, if these bytes are exactly its stored form.

@@ -3,6 +3,8 @@
 
 mod known;
 mod outputs;
+mod own;
+mod partial;
 mod staged;
 
 use std::{
@@ -16,10 +18,12 @@ use std::{
 use rayon::prelude::*;
 
 pub use self::known::{Identity, KnownFile, KnownFiles};
-pub use self::outputs::require_apart;
-pub use self::staged::{StagedFile, TEMPORARY};
+pub use self::outputs::{overlap, real_path, require_apart};
+pub use self::own::{Mark, MarkAt, require_own};
+pub use self::partial::{ASIDE, PartialFolder, TEMPORARY, remove_abandoned};
+pub use self::staged::StagedFile;
 use areograph_base::{
-    error::{Cause, IoError, Kind, Locate, Result},
+    error::{Cause, IoError, Locate, Result},
     watch::Watch,
 };
 
@@ -60,21 +64,12 @@ struct SeenFile {
 }
 
 /// A file that differs from what was read earlier in the run.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("the file changed while it was in use: its hash was {was} and is {is}")]
+#[cause(Input: "run again when no other program is writing to the input files")]
 struct ChangedFile {
     was: String,
     is: String,
-}
-
-impl Cause for ChangedFile {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "run again when no other program is writing to the input files".to_owned()
-    }
 }
 
 /// A file outside the permitted folders.
@@ -86,19 +81,10 @@ pub struct Outside {
 }
 
 /// An input file that a run must not read.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("is not read here; expected {0}")]
+#[cause(Configuration: "move the file below one of these folders, or have its folder added to them")]
 struct NotAdmitted(Outside);
-
-impl Cause for NotAdmitted {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        "move the file below one of these folders, or have its folder added to them".to_owned()
-    }
-}
 
 /// Why the file must not be read, if it lies below none of the folders `roots`, links followed. Without folders there
 /// is no restriction.
@@ -367,6 +353,8 @@ pub fn short_hash(blake3: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use areograph_base::error::Kind;
+
     use super::*;
 
     #[test]

@@ -16,7 +16,7 @@ use std::{
 };
 
 use super::atomic;
-use crate::files::{InputFiles, KnownFile, KnownFiles};
+use crate::files::{InputFiles, KnownFile, KnownFiles, Mark, MarkAt};
 use areograph_base::error::{IoError, Locate, Result};
 
 /// Name of the file in a folder of products.
@@ -25,6 +25,11 @@ pub const HASHES: &str = ".hashes";
 /// Header of the file: its kind, and the form of its entries. BLAKE3 of the rest follows, then the entries in
 /// postcard.
 const HEADER: &[u8] = b"areograph hashes 1\n";
+/// How an earlier file of hashes is recognised.
+const MARK: Mark = Mark {
+    what: "a file of hashes that areograph wrote",
+    at: MarkAt::Start(HEADER),
+};
 /// Bytes of a BLAKE3 hash.
 const HASH_SIZE: usize = 32;
 /// Maximum number of files; the oldest entries are removed first.
@@ -111,7 +116,8 @@ impl HashCache {
             return Ok(());
         };
         let hash = blake3::hash(&entries);
-        atomic::write(&self.path, &[HEADER, hash.as_bytes(), &entries].concat())
+        let bytes = [HEADER, hash.as_bytes(), &entries].concat();
+        atomic::replace(&self.path, &bytes, MARK)
     }
 }
 
@@ -131,7 +137,11 @@ fn read(path: &Path) -> Option<KnownFiles> {
 
 /// The lock in a separate file, since the file of hashes is replaced; `None` if another process does not release it.
 fn wait_for_lock(path: &Path) -> Result<Option<File>> {
-    let file = File::create(path)
+    let file = File::options()
+        .write(true)
+        .create(true)
+        .truncate(false)
+        .open(path)
         .map_err(IoError::on("create"))
         .in_file(path)?;
     for _ in 0..WAITS {

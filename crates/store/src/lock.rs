@@ -1,13 +1,14 @@
 //! Only one process at a time works in a site's folder.
 
 use std::{
-    fs::{self, File, TryLockError},
+    fs::{self, File, OpenOptions, TryLockError},
+    io::ErrorKind,
     path::{Path, PathBuf},
 };
 
-use super::publish::{CACHE, STAGING};
-use crate::files::TEMPORARY;
-use areograph_base::error::{Cause, Error, IoError, Kind, Locate, Result};
+use super::publish::{CACHE, remove_staging};
+use crate::files::remove_abandoned;
+use areograph_base::error::{Cause, Error, IoError, Locate, Result};
 
 /// Held while a run works in a site's folder; the system releases it when the process ends for any reason.
 #[derive(Debug)]
@@ -16,8 +17,9 @@ pub struct SiteLock {
 }
 
 /// Another run is using the folder.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("another run is using this folder")]
+#[cause(Io: "wait for it, or give this run another --out")]
 pub struct Busy;
 
 impl Busy {
@@ -26,16 +28,6 @@ impl Busy {
     pub fn is_cause_of(failure: &Error) -> bool {
         let cause: &(dyn std::error::Error + 'static) = &*failure.cause;
         cause.is::<Self>()
-    }
-}
-
-impl Cause for Busy {
-    fn kind(&self) -> Kind {
-        Kind::Io
-    }
-
-    fn advice(&self) -> String {
-        "wait for it, or give this run another --out".to_owned()
     }
 }
 
@@ -49,29 +41,30 @@ impl SiteLock {
             .map_err(IoError::on("create the folder"))
             .in_file(folder)?;
         let path: PathBuf = folder.join(".lock");
-        let file = File::create(&path)
+        // Its content, if any, is not that of areograph.
+        let file = OpenOptions::new()
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(&path)
+            .or_else(|refused| match refused.kind() {
+                // A run that changes nothing may read products that it cannot write.
+                ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => File::open(&path)
+                    .or_else(|_| File::open(folder))
+                    .map_err(|_| refused),
+                _ => Err(refused),
+            })
             .map_err(IoError::on("create"))
             .in_file(&path)?;
         match file.try_lock() {
             Ok(()) => {
-                remove_temporaries(folder);
-                remove_temporaries(&folder.join(CACHE));
-                // Incomplete products of a killed run; files that cannot be removed are reported when publishing.
-                let _ = fs::remove_dir_all(folder.join(STAGING));
+                remove_abandoned(folder);
+                remove_abandoned(&folder.join(CACHE));
+                remove_staging(folder);
                 Ok(Self { _file: file })
             }
             Err(TryLockError::WouldBlock) => Err(Busy).in_file(folder),
             Err(TryLockError::Error(error)) => Err(IoError::on("lock")(error)).in_file(&path),
-        }
-    }
-}
-
-/// Removes incomplete files of a killed run; no other process works here while the lock is held.
-fn remove_temporaries(folder: &Path) {
-    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-        if entry.file_name().to_string_lossy().starts_with(TEMPORARY) {
-            // A file that cannot be removed does no harm.
-            let _ = fs::remove_file(entry.path());
         }
     }
 }

@@ -8,42 +8,38 @@ use std::{
 
 use super::{
     atomic,
+    files::{Mark, MarkAt, require_own},
     publish::{JOURNAL, read_manifest},
 };
-use areograph_base::error::{Cause, IoError, Kind, Locate, Result};
+use areograph_base::error::{Cause, IoError, Locate, Result};
 
 /// File of the page over all sites, in the folder that holds the sites' folders.
 pub const SITES_PAGE: &str = "index.html";
 
+/// Pages of areograph: those of products, differences and comparisons end with the same line.
+pub const PAGE: Mark = Mark {
+    what: "a page that areograph wrote",
+    at: MarkAt::Tail("<footer>Made by areograph ", 200),
+};
+
 /// Why a page must not be written to a path.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Configuration)]
 pub enum PageError {
     /// It would replace something other than a file.
     #[error("is {found}; a page can replace a regular file only")]
+    #[cause("name a file for --page, in a folder that exists")]
     NotAFile {
         /// The existing entry.
         found: &'static str,
     },
     /// The next run, and every check of the products, would find a foreign file.
     #[error("belongs to the products in {}", .folder.display())]
+    #[cause("name a file outside the folders of products for --page")]
     Product {
         /// A site's folder, or the one that holds the sites' folders.
         folder: PathBuf,
     },
-}
-
-impl Cause for PageError {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::NotAFile { .. } => "name a file for --page, in a folder that exists",
-            Self::Product { .. } => "name a file outside the folders of products for --page",
-        }
-        .to_owned()
-    }
 }
 
 /// A path to which a page may be written.
@@ -54,7 +50,8 @@ impl PagePath {
     /// Checks the path before the work whose result the page will show.
     ///
     /// # Errors
-    /// [`PageError`] for anything but a regular file, and for products; [`IoError`] if its folder cannot be found.
+    /// [`PageError`] for anything but a regular file, and for products; a file that is no page of areograph;
+    /// [`IoError`] if its folder cannot be found.
     pub fn new(path: &Path) -> Result<Self> {
         check(path).in_file(path)?;
         Ok(Self(path.to_owned()))
@@ -66,7 +63,7 @@ impl PagePath {
     /// As [`Self::new`], if the path has changed meanwhile; [`IoError`] if the system refuses to write.
     pub fn write(&self, page: &str) -> Result<()> {
         check(&self.0).in_file(&self.0)?;
-        atomic::write(&self.0, page.as_bytes())
+        atomic::replace(&self.0, page.as_bytes(), PAGE)
     }
 }
 
@@ -95,7 +92,7 @@ fn check(path: &Path) -> Result<()> {
             folder: folder.to_owned(),
         }
         .into()),
-        None => Ok(()),
+        None => require_own(path, &PAGE),
     }
 }
 

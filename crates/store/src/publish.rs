@@ -17,10 +17,11 @@ use rayon::prelude::*;
 
 use super::{
     atomic,
+    cache::stored,
     manifest::{Manifest, ProductEntry},
 };
 use crate::files::{hash_file, short_hash};
-use areograph_base::error::{Cause, IoError, Kind, Locate, Result};
+use areograph_base::error::{Cause, IoError, Locate, Result};
 
 /// Name of the manifest in a site's folder.
 pub const MANIFEST: &str = "manifest.json";
@@ -32,7 +33,10 @@ const PUBLISH: &str = "publish";
 pub const CACHE: &str = ".cache";
 
 /// Name of the folder of incomplete products.
-pub(super) const STAGING: &str = ".staging";
+const STAGING: &str = ".staging";
+
+/// Empty file by which that folder is recognised.
+const STAGING_MARK: &str = ".areograph";
 
 /// Paths below the site's folder that a publication in progress may have created or will remove.
 pub(super) const JOURNAL: &str = ".publishing";
@@ -97,7 +101,23 @@ pub fn staging(site_folder: &Path) -> Result<Staging> {
     fs::create_dir(&folder)
         .map_err(IoError::on("create the folder"))
         .in_file(&folder)?;
-    Ok(Staging { folder })
+    let staging = Staging { folder };
+    let mark = staging.join(STAGING_MARK);
+    fs::File::create(&mark)
+        .map_err(IoError::on("create"))
+        .in_file(&mark)?;
+    Ok(staging)
+}
+
+/// Removes the incomplete products of a killed run; a folder of another program remains.
+pub(super) fn remove_staging(site_folder: &Path) {
+    let folder = site_folder.join(STAGING);
+    // Files that cannot be removed are reported when publishing.
+    let _ = if folder.join(STAGING_MARK).is_file() {
+        fs::remove_dir_all(folder)
+    } else {
+        fs::remove_dir(folder)
+    };
 }
 
 /// Whether a run ever worked in the folder: it contains stored stages or a publication in progress.
@@ -130,21 +150,12 @@ pub fn entries(staging: &Path, files: &[(PathBuf, u64)]) -> Result<Vec<ProductEn
 }
 
 /// Products of another kind in the folder, which a publication would remove.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("the folder contains other products: {name}, made by {stage}")]
+#[cause(Configuration: "give it another name, or its products another folder (--out)")]
 struct OtherKind {
     name: String,
     stage: String,
-}
-
-impl Cause for OtherKind {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        "give it another name, or its products another folder (--out)".to_owned()
-    }
 }
 
 /// Ensures that existing products in the folder were made by the same flow, identified by one of its stages.
@@ -167,10 +178,65 @@ fn require_same_kind(site_folder: &Path, next: &Manifest) -> Result<()> {
     }
 }
 
+/// A file in the place of a product that no record of areograph names.
+#[derive(Debug, thiserror::Error, Cause)]
+#[error(
+    "is in the place of a product and was not written by areograph; expected a new path, or a product of an earlier run"
+)]
+#[cause(Configuration: "move the file away, or give the products another folder (--out)")]
+struct InPlaceOfProduct;
+
+/// Ensures that a publication replaces only products, or files that equal them.
+fn refuse_foreign(site_folder: &Path, next: &Manifest, earlier: &BTreeSet<String>) -> Result<()> {
+    let mut known = earlier.clone();
+    let records = [
+        read_previous(site_folder),
+        stored::<String>(&site_folder.join(CACHE), PUBLISH)
+            .and_then(|text| serde_json::from_str(&text).ok()),
+    ];
+    let records: Vec<Manifest> = records.into_iter().flatten().collect();
+    let of_records = records.iter().flat_map(|record| &record.products);
+    known.extend(of_records.map(|product| product.path.clone()));
+    let manifest = site_folder.join(MANIFEST);
+    known.extend(paths_of_damaged(&manifest));
+    if known.is_empty() && fs::symlink_metadata(&manifest).is_ok() {
+        return Err(InPlaceOfProduct).in_file(manifest);
+    }
+    for product in &next.products {
+        let path = site_folder.join(&product.path);
+        if known.contains(&product.path) || fs::symlink_metadata(&path).is_err() {
+            continue;
+        }
+        if hash_file(&path)
+            .ok()
+            .is_none_or(|(blake3, _)| blake3 != product.blake3)
+        {
+            return Err(InPlaceOfProduct).in_file(path);
+        }
+    }
+    Ok(())
+}
+
+/// Products that a manifest of areograph names, even if it cannot be parsed.
+fn paths_of_damaged(manifest: &Path) -> Vec<String> {
+    let bytes = fs::read(manifest).unwrap_or_default();
+    let text = String::from_utf8_lossy(&bytes);
+    let path_of = |line: &str| {
+        let path = line.trim().strip_prefix("\"path\": \"")?;
+        Some(path.trim_end_matches(',').trim_end_matches('"').to_owned())
+    };
+    if text.contains("\"tool\": \"areograph\"") {
+        text.lines().filter_map(path_of).collect()
+    } else {
+        Vec::new()
+    }
+}
+
 /// Renames staged products into place, removes earlier ones that are no longer made, writes the manifest last.
 ///
 /// # Errors
-/// Products of another kind; a file that cannot be renamed or removed: publishing again repairs the folder.
+/// Products of another kind; a file in the place of a product that areograph did not write; a file that cannot be
+/// renamed or removed: publishing again repairs the folder.
 pub fn publish(site_folder: &Path, staging: &Path, manifest: &Manifest) -> Result<()> {
     require_same_kind(site_folder, manifest)?;
     let made: BTreeSet<&str> = manifest
@@ -179,6 +245,7 @@ pub fn publish(site_folder: &Path, staging: &Path, manifest: &Manifest) -> Resul
         .map(|product| &*product.path)
         .collect();
     let earlier = earlier_products(site_folder);
+    refuse_foreign(site_folder, manifest, &earlier)?;
     let concerned: Vec<&str> = made
         .iter()
         .copied()
@@ -262,19 +329,10 @@ fn remove_if_there(path: &Path) -> Result<()> {
 }
 
 /// A manifest that cannot be written.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("the manifest cannot be written as JSON: {0}")]
+#[cause(Bug: "this is a bug in areograph; please report it with the configuration")]
 struct Unwritable(serde_json::Error);
-
-impl Cause for Unwritable {
-    fn kind(&self) -> Kind {
-        Kind::Bug
-    }
-
-    fn advice(&self) -> String {
-        "this is a bug in areograph; please report it with the configuration".to_owned()
-    }
-}
 
 fn manifest_bytes(manifest: &Manifest) -> Result<Vec<u8>> {
     let mut bytes = serde_json::to_vec_pretty(manifest).map_err(Unwritable)?;

@@ -7,25 +7,30 @@ use super::{
     publish::{JOURNAL, MANIFEST, damaged, has_work, read_manifest},
 };
 use crate::files::short_hash;
-use areograph_base::error::{Cause, IoError, Kind, Locate, Result};
+use areograph_base::error::{Cause, IoError, Locate, Result};
 
 /// Why products in a folder are not to be used.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Input)]
 pub enum PublishedError {
     /// Nothing was published.
     #[error("there is no {MANIFEST}, so there are no products")]
+    #[cause("name a site's folder of products, and run the site to the end")]
     NoManifest,
     /// A run was killed, or is in progress, while files received their final names.
     #[error("the publication of products into this folder was not finished")]
+    #[cause("wait for the run in progress, or run the site again to repair it")]
     Unfinished,
     /// The manifest is damaged, or of a version with other entries.
     #[error("this is not a manifest of areograph {}: {reason}", env!("CARGO_PKG_VERSION"))]
+    #[cause("run the site again: damaged products are written anew")]
     Unreadable {
         /// The parser's reason, with line and column.
         reason: String,
     },
     /// Products of a version that may have computed or stored other results.
     #[error("these are products of areograph {found}; expected {}, the running version", env!("CARGO_PKG_VERSION"))]
+    #[cause("run the site again with this version, or use the other version")]
     OtherVersion {
         /// That version.
         found: String,
@@ -34,6 +39,7 @@ pub enum PublishedError {
     #[error(
         "{found}; expected {expected_bytes} bytes with the BLAKE3 hash {expected} of {MANIFEST}"
     )]
+    #[cause(like = Unreadable)]
     Contradicts {
         /// The existing content.
         found: String,
@@ -44,31 +50,8 @@ pub enum PublishedError {
     },
     /// Another run published meanwhile.
     #[error("the products were published again while they were being read")]
+    #[cause(Io: "try again when the run has finished")]
     Replaced,
-}
-
-impl Cause for PublishedError {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::Replaced => Kind::Io,
-            _ => Kind::Input,
-        }
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::NoManifest => "name a site's folder of products, and run the site to the end",
-            Self::Unfinished => "wait for the run in progress, or run the site again to repair it",
-            Self::Unreadable { .. } | Self::Contradicts { .. } => {
-                "run the site again: damaged products are written anew"
-            }
-            Self::OtherVersion { .. } => {
-                "run the site again with this version, or use the other version"
-            }
-            Self::Replaced => "try again when the run has finished",
-        }
-        .to_owned()
-    }
 }
 
 /// Whether the folder is, or was meant to be, that of a site's products.

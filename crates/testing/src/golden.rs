@@ -35,6 +35,12 @@ impl Golden {
         assert!(self.compared.insert(path), "{name} is compared twice");
     }
 
+    /// Another test compares the text file of this name.
+    pub fn leave(&mut self, name: &str) {
+        self.compared
+            .insert(self.folder.join(name).with_extension("txt"));
+    }
+
     /// Fails with every difference, and with text files that were not compared.
     pub fn finish(mut self) {
         for entry in fs::read_dir(&self.folder).unwrap() {

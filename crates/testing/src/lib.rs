@@ -25,6 +25,7 @@ pub mod orbits;
 pub mod outside;
 pub mod recipe;
 pub mod scene;
+pub mod shot_cases;
 pub mod track;
 
 use std::path::{Path, PathBuf};

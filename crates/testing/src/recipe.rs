@@ -454,19 +454,37 @@ pub fn mola_shift_lines(
     adjustment: &Adjustment,
     image: usize,
 ) -> Summary {
+    let shifts = mola_shifts(simulated, adjustment, image);
+    Summary::of(&shifts.iter().map(|[lines, _]| *lines).collect::<Vec<f64>>())
+}
+
+/// The shifts across the track, pixels against the samples.
+pub fn mola_shift_px(
+    simulated: &Simulated<EulerPolynomial>,
+    adjustment: &Adjustment,
+    image: usize,
+) -> Vec<f64> {
+    let shifts = mola_shifts(simulated, adjustment, image);
+    shifts.iter().map(|[_, px]| *px).collect()
+}
+
+/// Shift of each shot, lines and pixels.
+fn mola_shifts(
+    simulated: &Simulated<EulerPolynomial>,
+    adjustment: &Adjustment,
+    image: usize,
+) -> Vec<[f64; 2]> {
     let entry = &simulated.network.images[image];
     let orientation = adjusted_orientation(simulated, adjustment, image);
     let projector = Projector::new(&orientation, 2.0 * entry.half_lines).unwrap();
     let shots = |view: &&View| view.image == image && view.point < simulated.shots;
-    let shifts: Vec<f64> = simulated
-        .network
-        .views
-        .iter()
+    let views = simulated.network.views.iter();
+    views
         .filter(shots)
         .map(|view| {
             let ground_m = adjustment.points[view.point].unwrap().ground_m;
-            project(&projector, entry.focal_length_px, &ground_m).0 - view.x_lines
+            let (lines, px) = project(&projector, entry.focal_length_px, &ground_m);
+            [lines - view.x_lines, px - view.y_px]
         })
-        .collect();
-    Summary::of(&shifts)
+        .collect()
 }

@@ -7,7 +7,7 @@ use clap::Args;
 use crate::{
     cli::output,
     config::all_instruments,
-    error::{Cause, Kind, Locate as _, Result},
+    error::{Cause, Locate as _, Result},
     files::require_apart,
     pds::{
         image_file::{ImageFile, LineState, OddEven, Radiometry, Strip},
@@ -42,49 +42,22 @@ pub(super) struct Arguments {
 }
 
 /// An unsupported extension.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("{}; expected the extension .png, .tif or .tiff", .0.display())]
+#[cause(Configuration: "name the file with one of these extensions")]
 struct Ending(PathBuf);
 
-impl Cause for Ending {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        "name the file with one of these extensions".to_owned()
-    }
-}
-
 /// An image without a readable line.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("no line of the image can be read")]
+#[cause(Input: "fetch the file again; `areograph image info` lists its errors")]
 struct NoLines;
 
-impl Cause for NoLines {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "fetch the file again; `areograph image info` lists its errors".to_owned()
-    }
-}
-
 /// A radiometric correction of a file whose label does not state gain and offset.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("--calibrate requires an image file of the archive, whose label states gain and offset")]
+#[cause(Configuration: "give the .imq or .img file, or leave out --calibrate")]
 struct NotOfTheArchive;
-
-impl Cause for NotOfTheArchive {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        "give the .imq or .img file, or leave out --calibrate".to_owned()
-    }
-}
 
 /// Margin beyond the range of the pixels for the correction of odd and even samples, DN.
 const ROOM_DN: f64 = 16.0;
@@ -186,10 +159,7 @@ fn each(image: &PixelFile, mut show: impl FnMut(&Strip) -> Result<()>) -> Result
 
 fn notes(image: &PixelFile, calibration: Option<&Calibration>) -> Vec<(&'static str, String)> {
     let label = image.label();
-    let mut notes = vec![(
-        "Software",
-        format!("areograph {}", env!("CARGO_PKG_VERSION")),
-    )];
+    let mut notes = Vec::new();
     let product = label.and_then(|label| label.product_id.clone());
     notes.extend(product.map(|product| ("Title", product)));
     if let Some(calibration) = calibration {

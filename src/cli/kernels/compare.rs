@@ -50,28 +50,15 @@ pub(super) struct Arguments {
 }
 
 /// A command line that does not define a comparison.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Configuration)]
 enum Usage {
     #[error("kernel sets to compare: {count}; expected two or more")]
+    #[cause("name the metakernels of rival sets, or a site with [[kernels.sets]]")]
     TooFew { count: usize },
     #[error("--time is \"{written}\"; expected FROM..TO in UTC, the first earlier than the second")]
+    #[cause("write for example --time 1999-08-24T14:00..1999-08-24T15:00")]
     Time { written: String },
-}
-
-impl Cause for Usage {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::TooFew { .. } => {
-                "name the metakernels of rival sets, or a site with [[kernels.sets]]"
-            }
-            Self::Time { .. } => "write for example --time 1999-08-24T14:00..1999-08-24T15:00",
-        }
-        .to_owned()
-    }
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {

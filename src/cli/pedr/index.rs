@@ -11,9 +11,9 @@ use clap::Args;
 
 use crate::cli::output;
 use crate::{
-    error::{Cause, Error, IoError, Kind, Locate as _},
-    files::{Identity, hash_file, short_hash},
-    pds::archive::{INDEX, Index, IndexedFile, Listing},
+    error::{Cause, Error, IoError, Locate as _},
+    files::{Identity, hash_file, require_own, short_hash},
+    pds::archive::{INDEX, INDEX_MARK, Index, IndexedFile, Listing},
     store::atomic,
 };
 
@@ -33,38 +33,19 @@ pub(super) struct Arguments {
 }
 
 /// A file that changed without a trace in the file system.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("its content differs from the index, although size and times match: hash {was}, now {is}")]
+#[cause(Input: "fetch the file again: the disk may be failing; the index now describes the present content")]
 struct Altered {
     was: String,
     is: String,
 }
 
-impl Cause for Altered {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "fetch the file again: the disk may be failing; the index now describes the present content"
-            .to_owned()
-    }
-}
-
 /// The index could not be put into bytes.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("the index cannot be encoded")]
+#[cause(Bug: "this is a bug in areograph; please report it")]
 struct NotEncoded;
-
-impl Cause for NotEncoded {
-    fn kind(&self) -> Kind {
-        Kind::Bug
-    }
-
-    fn advice(&self) -> String {
-        "this is a bug in areograph; please report it".to_owned()
-    }
-}
 
 /// Indexing cannot be interrupted gracefully; killing it is harmless.
 static RUN_ON: AtomicBool = AtomicBool::new(false);
@@ -80,6 +61,7 @@ struct Outcome {
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let path = arguments.folder.join(INDEX);
+    require_own(&path, &INDEX_MARK)?;
     let earlier = Index::read(&path).unwrap_or_default();
     let listing = Listing::below(&arguments.folder);
     let unseen = unseen(&earlier, &arguments.folder, &listing.failures);
@@ -101,7 +83,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let (files, read, bytes) = (outcome.files.len(), outcome.read, outcome.bytes);
     let index: Index = unseen.into_iter().chain(outcome.files).collect();
     let encoded = index.encode().ok_or(NotEncoded).in_file(&path)?;
-    atomic::write(&path, &encoded)?;
+    atomic::replace(&path, &encoded, INDEX_MARK)?;
     output::line(format_args!(
         "{}: {files} files of {bytes} bytes, {read} of them read now, {gone} removed; {} bytes",
         path.display(),

@@ -9,11 +9,15 @@ use std::{
 use clap::Args;
 use serde_json::{Value, json};
 
+use super::tables::{self, TableCounts};
 use crate::{
     cli::output,
     error::{Error, Locate as _},
     geom::statistics::Summary,
-    pds::pedr::{Counts, File},
+    pds::{
+        pedr::{Counts, File},
+        shot_table::is_ode_pedr,
+    },
     spice::{KernelSet, Session},
     time::Et,
 };
@@ -26,7 +30,7 @@ use crate::{
 #[derive(Debug, Args)]
 #[command(after_help = "Example: areograph pedr info pedr/*.b")]
 pub(super) struct Arguments {
-    /// PEDR files (AP#####v.B).
+    /// PEDR files (AP#####v.B), and tables of the Orbital Data Explorer's PEDR query.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Leap seconds (LSK, such as naif0012.tls): shows the time span in UTC as well.
@@ -49,6 +53,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     };
     let (mut answers, mut useless) = (Vec::new(), Vec::new());
     for path in &arguments.files {
+        if is_ode_pedr(path).unwrap_or(false) {
+            match info_of_table(path, clock.as_ref()) {
+                Ok(answer) if arguments.json => answers.push(answer),
+                Ok(answer) => print(None, &answer),
+                Err(failure) => useless.push(failure),
+            }
+            continue;
+        }
         let file = match File::open(path) {
             Ok(file) => file,
             Err(failure) => {
@@ -61,7 +73,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
         if arguments.json {
             answers.push(answer);
         } else {
-            print(&counts, &answer);
+            print(Some(&counts), &answer);
         }
     }
     if arguments.json {
@@ -102,29 +114,54 @@ fn info(path: &Path, file: &File, clock: Option<&Session>) -> Result<(Counts, Va
         "blake3": file.blake3(),
         "complaints": complaints.iter().map(ToString::to_string).collect::<Vec<_>>(),
     });
-    if let (Some(clock), Some([first_s, last_s])) = (clock, counts.span_s) {
+    tell_utc(&mut answer, clock, counts.span_s)?;
+    Ok((counts, answer))
+}
+
+fn info_of_table(path: &Path, clock: Option<&Session>) -> Result<Value, Error> {
+    let utc = |text: &str| tables::instant(clock, text);
+    let counts = TableCounts::of(path, clock.map(|_| &utc as _))?;
+    let mut answer = counts.tell(path)?;
+    tell_utc(&mut answer, clock, counts.span_s())?;
+    Ok(answer)
+}
+
+/// Adds the time span in UTC, where leap seconds are known.
+fn tell_utc(
+    answer: &mut Value,
+    clock: Option<&Session>,
+    span_s: Option<[f64; 2]>,
+) -> Result<(), Error> {
+    if let (Some(clock), Some([first_s, last_s])) = (clock, span_s) {
         let kernel = &clock.kernels().kernels()[0].path;
         let utc = |et_s| clock.et_to_utc(Et::from_seconds(et_s)).in_file(kernel);
         answer["utc_first"] = utc(first_s)?.into();
         answer["utc_last"] = utc(last_s)?.into();
     }
-    Ok((counts, answer))
+    Ok(())
 }
 
 /// The answer as a table; counts and statistics are on separate lines.
-fn print(counts: &Counts, answer: &Value) {
+///
+/// * `counts` – those of a PEDR file
+fn print(counts: Option<&Counts>, answer: &Value) {
     for (key, value) in answer.as_object().into_iter().flatten() {
-        let counted = match key.as_str() {
-            "shots_by_class" => counted(&counts.shots_by_class),
-            "shots_by_channel" => counted(&counts.shots_by_channel),
-            "shots_by_attitude_flag" => counted(&counts.shots_by_attitude_flag),
-            "shots_by_orbit_model" => counted(&counts.shots_by_orbit_model),
-            "range_minus_distance_m" => {
+        let counted = match (key.as_str(), counts) {
+            ("shots_by_orbit_model", Some(counts)) => counted(&counts.shots_by_orbit_model),
+            ("range_minus_distance_m", Some(counts)) => {
                 statistics("ground", &counts.ground_range_minus_distance_m);
                 statistics("other", &counts.other_range_minus_distance_m);
                 continue;
             }
-            "complaints" => {
+            ("shots_by_class" | "shots_by_channel" | "shots_by_attitude_flag", _) => {
+                let members = value.as_object().into_iter().flatten();
+                counted(
+                    &members
+                        .map(|(of, count)| (of.clone(), count.as_u64().unwrap_or(0)))
+                        .collect(),
+                )
+            }
+            ("complaints", _) => {
                 let texts = value.as_array().map_or(&[][..], Vec::as_slice);
                 line(key, texts.len());
                 for text in texts.iter().take(COMPLAINTS_PRINTED) {

@@ -11,7 +11,7 @@ use crate::{
         report,
         single::{Asked, answer},
     },
-    error::{Cause, Kind},
+    error::Cause,
     flow::run_match,
     stages::match_laser::{MatchImage, MatchOptions, MatchRequest, Similarity},
 };
@@ -91,19 +91,10 @@ enum Measure {
 }
 
 /// One image is given.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("--isd names the images {0:?}; expected two or more with distinct names")]
+#[cause(Configuration: "give --isd NAME=FILE for every image that the model was made from, or for none")]
 struct Images(Vec<String>);
-
-impl Cause for Images {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        "give --isd NAME=FILE for every image that the model was made from, or for none".to_owned()
-    }
-}
 
 fn image(text: &str) -> Result<(String, PathBuf), String> {
     let parts = text.split_once('=');

@@ -10,11 +10,12 @@ use std::{
 use clap::Args;
 use serde_json::json;
 
+use super::tables;
 use crate::{
     altimetry::{BiasScope, MolaClock, TagSign},
     cli::{output, progress::duration, stop::Signals},
     config::usual_altimeter,
-    error::{Cause, Error, Kind},
+    error::{Cause, Error},
     flow::{ArchiveOutcome, ArchiveProgress, ArchiveRequest, check_archive},
 };
 
@@ -58,36 +59,18 @@ pub(super) struct Arguments {
 }
 
 /// An implausible clock bias.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("--clock-bias-s is {0}; expected -10 to 10")]
+#[cause(Configuration: "give the seconds by which time tags are late, 0.117 for MOLA")]
 struct ClockBias(f64);
 
-impl Cause for ClockBias {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        "give the seconds by which time tags are late, 0.117 for MOLA".to_owned()
-    }
-}
-
 /// Profiles that exceed limits, or that could not be checked.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error(
     "the archive is invalid against these kernels, or was checked only in part; products were written"
 )]
+#[cause(Validation: "see the page: it lists the reasons first, then the worst profiles")]
 struct Invalid;
-
-impl Cause for Invalid {
-    fn kind(&self) -> Kind {
-        Kind::Validation
-    }
-
-    fn advice(&self) -> String {
-        "see the page: it lists the reasons first, then the worst profiles".to_owned()
-    }
-}
 
 impl Arguments {
     fn clock(&self) -> Result<MolaClock, ClockBias> {
@@ -121,6 +104,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
             .num_threads(usize::from(threads.get()))
             .build_global();
     }
+    tables::refuse(&arguments.paths)?;
     let signals = Signals::heard()?;
     let telling = Telling::new();
     let request = ArchiveRequest {

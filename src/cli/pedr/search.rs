@@ -2,43 +2,38 @@
 
 mod arguments;
 
-use std::{collections::BTreeMap, path::PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use serde_json::{Value, json};
 
 pub(super) use self::arguments::Arguments;
+use super::tables;
 use crate::cli::{output, stop::Signals};
 use crate::{
     config::WindowConfig,
-    error::{Cause, Error, Kind, Result},
+    error::{Cause, Error, Result},
     files::file_name,
     footprints::{AsRead, Footprints, SourceFile},
     geom::window::Region,
-    pds::archive::{Found, Judged, Opened, Query, Seen, Sink, Source, search},
-    products::ShotsFile,
+    pds::archive::{Found, Judged, Opened, Query, Seen, Sink, Source, search, search_tables},
+    products::{RowsFormat, ShotsFile},
     time::{Et, Interval},
 };
 
 /// Rows that are not in time order, or that an earlier file contains as well.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error(
     "{rows} rows are not in time order, the first in record {record}, after a shot of {before}"
 )]
+#[cause(Input: "if both files contain the same orbits, name only one of them: otherwise the answer contains their \
+    shots twice")]
 struct NotInOrder {
     rows: u64,
     record: u32,
     before: String,
-}
-
-impl Cause for NotInOrder {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "if both files contain the same orbits, name only one of them: otherwise the answer contains their shots twice"
-            .to_owned()
-    }
 }
 
 /// Complaints that are printed and kept with their text; all are counted.
@@ -50,19 +45,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let time = arguments.time()?;
     let signals = Signals::heard()?;
     arguments.check_paths()?;
-    let Opened { sources, failures } = Opened::all(&arguments.paths)?;
-    arguments.require_apart(&sources, &failures)?;
-    let mut answer = Answer {
-        window_ids: windows.iter().map(|window| window.id.clone()).collect(),
-        files: sources.iter().map(Source::file).collect(),
-        counts: vec![0; windows.len()],
-        failures,
-        ..Answer::default()
-    };
-    if let (Some(format), Some(out)) = (format, &arguments.out) {
-        let (sources, window_ids) = (answer.files.clone(), answer.window_ids.clone());
-        answer.file = Some(ShotsFile::create(out, format, sources, window_ids)?);
-    }
     let filter = arguments.filter();
     let regions = windows.iter().map(|window| Region::new(&window.shape));
     let judged = if arguments.check_all {
@@ -71,8 +53,35 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
         Judged::Near
     };
     let query = Query::new(regions.collect(), &filter, judged).within(time);
-    search(&sources, &query, signals.stop(), &mut answer)?;
-    let told = answer.tell(arguments, &windows, &sources, time);
+    let mut answer = Answer {
+        window_ids: windows.iter().map(|window| window.id.clone()).collect(),
+        counts: vec![0; windows.len()],
+        ..Answer::default()
+    };
+    if tables::are_named(&arguments.paths)? {
+        let read: Vec<&Path> = arguments.paths.iter().map(PathBuf::as_path).collect();
+        arguments.require_apart(&read, &[])?;
+        let clock = tables::clock(arguments.leap_seconds.as_deref())?;
+        let utc = |text: &str| tables::instant(clock.as_ref(), text);
+        let utc = clock.as_ref().map(|_| &utc as _);
+        let found = search_tables(&arguments.paths, &query, utc, signals.stop())?;
+        answer.files = found.tables.iter().map(|of| of.file.clone()).collect();
+        answer.told_files = found.tables.iter().map(tables::tell).collect();
+        answer.failures = found.failures;
+        answer.repeated = Some(found.repeated);
+        answer.create(arguments, format)?;
+        answer.found(0, found.found)?;
+    } else {
+        let Opened { sources, failures } = Opened::all(&arguments.paths)?;
+        let read: Vec<&Path> = sources.iter().map(Source::path).collect();
+        arguments.require_apart(&read, &failures)?;
+        answer.files = sources.iter().map(Source::file).collect();
+        answer.told_files = sources.iter().map(tell_of).collect();
+        answer.failures = failures;
+        answer.create(arguments, format)?;
+        search(&sources, &query, signals.stop(), &mut answer)?;
+    }
+    let told = answer.tell(arguments, &windows, time);
     if let Some(file) = answer.file.take() {
         file.finish(&told)?;
     }
@@ -87,11 +96,24 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     answer.end()
 }
 
+/// A file in the answer.
+fn tell_of(source: &Source) -> Value {
+    json!({
+        "file": file_name(source.path()),
+        "records": source.records(),
+        "datum": source.datum(),
+    })
+}
+
 /// Results and failures.
 #[derive(Default)]
 struct Answer {
     file: Option<ShotsFile>,
     files: Vec<SourceFile>,
+    /// The same for readers of the answer.
+    told_files: Vec<Value>,
+    /// Rows of tables that repeat others; `None` in a search of PEDR files.
+    repeated: Option<u64>,
     window_ids: Vec<String>,
     rows: u64,
     /// Shots of each window.
@@ -111,28 +133,26 @@ struct Answer {
 }
 
 impl Answer {
+    /// Creates the file of the shots, if one is requested.
+    fn create(&mut self, arguments: &Arguments, format: Option<RowsFormat>) -> Result<()> {
+        if let (Some(format), Some(out)) = (format, &arguments.out) {
+            let (sources, window_ids) = (self.files.clone(), self.window_ids.clone());
+            self.file = Some(ShotsFile::create(out, format, sources, window_ids)?);
+        }
+        Ok(())
+    }
+
     /// The request, and the completeness of the answer.
     fn tell(
         &self,
         arguments: &Arguments,
         windows: &[WindowConfig],
-        sources: &[Source],
         time: Option<Interval>,
     ) -> Value {
         let windows: Vec<Value> = windows
             .iter()
             .zip(&self.counts)
             .map(|(window, shots)| json!({"id": window.id, "shape": window.shape, "shots": shots}))
-            .collect();
-        let files: Vec<Value> = sources
-            .iter()
-            .map(|source| {
-                json!({
-                    "file": file_name(source.path()),
-                    "records": source.records(),
-                    "datum": source.datum(),
-                })
-            })
             .collect();
         let mut told = json!({
             "complete": self.failures.is_empty() && self.records_left_out == 0,
@@ -148,9 +168,13 @@ impl Answer {
             "rejected": self.rejected,
             "frames_read": self.frames_read,
             "shots_read": self.shots_read,
-            "files": files,
+            "files": self.told_files,
             "areograph": env!("CARGO_PKG_VERSION"),
         });
+        if let Some(repeated) = self.repeated {
+            told["repeated_rows"] = json!(repeated);
+            told["spacecraft"] = json!("nadir by range: the tables have no position of it");
+        }
         if let Some(time) = time {
             let finite = |et: Et| et.seconds().is_finite().then(|| et.seconds());
             let ends = [
@@ -241,7 +265,7 @@ impl Sink for Answer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stages::shot_cases::{CASES, Case, source};
+    use areograph_testing::shot_cases::{CASES, Case, source};
 
     fn is_in_order(case: &Case) -> bool {
         let tags_s: Vec<f64> = (0..case.files.len())

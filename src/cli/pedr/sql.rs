@@ -88,7 +88,7 @@ async fn answer(table: ShotsTable, arguments: &Arguments, stop: &AtomicBool) -> 
             break;
         }
     }
-    answer.finish()
+    answer.finish(&arguments.question)
 }
 
 /// Complaints, on standard error.

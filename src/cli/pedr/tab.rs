@@ -11,8 +11,8 @@ use clap::{Args, ValueEnum};
 
 use crate::{
     cli::{output, stop::Signals},
-    error::{Cause, IoError, Kind, Locate as _, Result, Stopped},
-    files::{StagedFile, require_apart},
+    error::{Cause, IoError, Locate as _, Result, Stopped},
+    files::{Mark, MarkAt, StagedFile, require_apart},
     pds::{
         pedr::{Complaint, File},
         pedr_table::{Preferences, Rules, Table, Variant},
@@ -71,40 +71,26 @@ enum Program {
 }
 
 /// A file that pedr2tab does not accept.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("the label does not begin with CCSD3ZF0")]
+#[cause(Input: "name a PEDR file, or a list of them whose name has no .b; the marker is not required in a list or with \
+    --per-shot")]
 struct NoMarker;
 
-impl Cause for NoMarker {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "name a PEDR file, or a list of them whose name has no .b; the marker is not required in a list or with --per-shot"
-            .to_owned()
-    }
-}
-
 /// Two files whose tables have the same name.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("would be the table of {} and of {}; expected a table for each", .0.display(), .1.display())]
+#[cause(Configuration: "name each file once; print files of one name into different folders (--out), or all into one \
+    table (T before its name in the preferences)")]
 struct OneName(PathBuf, PathBuf);
-
-impl Cause for OneName {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        "name each file once; print files of one name into different folders (--out), or all into one table (T before its \
-         name in the preferences)"
-            .to_owned()
-    }
-}
 
 /// Default preferences file.
 const PREFERENCES: &str = "PEDR2TAB.PRM";
+/// Tables have the bytes of pedr2tab, with no place for a mark.
+const TABLE: Mark = Mark {
+    what: "a table that areograph wrote",
+    at: MarkAt::List,
+};
 /// Complaints printed of a file; all are counted.
 const COMPLAINTS_PRINTED: usize = 20;
 
@@ -283,7 +269,7 @@ struct Output {
 
 impl Output {
     fn create(path: &Path) -> Result<Self> {
-        let file = StagedFile::create(path)?;
+        let file = StagedFile::replacing(path, TABLE)?;
         let writer = BufWriter::new(file.writer()?);
         Ok(Self { file, writer })
     }

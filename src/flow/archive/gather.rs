@@ -7,7 +7,7 @@ use std::{
 
 use super::checker::Results;
 use crate::{
-    error::{Cause, Error, Kind},
+    error::{Cause, Error},
     files::{Identity, file_name},
     pds::archive::{Copies, Seen, Span},
     stages::check_archive::{ArchiveProfile, CheckedFile, FileCopy, FileFailure},
@@ -24,23 +24,13 @@ pub(super) struct Gathered {
 }
 
 /// A file whose shots another file contains as well.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("contains shots of orbit {orbit} that {} contains as well; its shots are left out", .other.display())]
+#[cause(Input: "name only one of the two, or move the other one away: every shot counts once, and areograph cannot \
+    decide which version of an orbit is meant")]
 struct SharedShots {
     orbit: u32,
     other: PathBuf,
-}
-
-impl Cause for SharedShots {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "name only one of the two, or move the other one away: every shot counts once, and areograph cannot decide \
-         which version of an orbit is meant"
-            .to_owned()
-    }
 }
 
 /// Combines results of files; of files that share shots, the first by its path is kept.
@@ -166,7 +156,9 @@ pub(super) fn file_failure(failure: &Error) -> FileFailure {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{pds::archive::spans, stages::shot_cases::CASES};
+    use areograph_testing::shot_cases::CASES;
+
+    use crate::pds::archive::spans;
 
     #[test]
     fn a_file_with_shots_of_an_earlier_one_is_left_out() {

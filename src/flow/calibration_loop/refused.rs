@@ -2,13 +2,14 @@
 
 use crate::{
     config::CameraConfig,
-    error::{Cause, Kind, Locate as _, Result},
+    error::{Cause, Locate as _, Result},
     pds::pixel_file::{PixelFile, Pyramid},
     stages::{calibrate::CONTROLS_MIN, line_camera::LineCamera, match_laser::LaserMatch},
 };
 
 /// Pixels of another image.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Input: "check that cameras.pixels are not exchanged, and are the whole images that cameras.isd describe")]
 enum PixelsError {
     #[error("camera {camera}: its pixels have {} lines of {} samples; expected {} of {}, as in its support data", found[0], found[1], expected[0], expected[1])]
     Size {
@@ -22,39 +23,19 @@ enum PixelsError {
     Missing { camera: String },
 }
 
-impl Cause for PixelsError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "check that cameras.pixels are not exchanged, and are the whole images that cameras.isd describe".to_owned()
-    }
-}
-
 /// Too little laser control was found.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error(
     "{used} of {} units of laser shots match the terrain model of the images, and {judging} of {} withheld units; expected at least \
      {CONTROLS_MIN} of each. {example}", of[0], of[1]
 )]
+#[cause(Input: "check that cameras.pixels are not exchanged and laser.files are passes over this ground with relief; \
+    give more passes, or a larger laser.search_cells if orbit and mounting are farther off")]
 pub(super) struct FewUnits {
     used: usize,
     judging: usize,
     of: [usize; 2],
     example: String,
-}
-
-impl Cause for FewUnits {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "check that cameras.pixels are not exchanged and laser.files are passes over this ground with relief; give more passes, or a larger \
-         laser.search_cells if orbit and mounting are farther off"
-            .to_owned()
-    }
 }
 
 impl FewUnits {

@@ -9,6 +9,28 @@ use std::{
 use areograph_testing::checkout;
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 
+/// Crates that are rooms of the pipeline, above the crates that it is built on.
+pub(crate) const ROOMS: [&str; 3] = ["stages", "products", "report"];
+
+/// The folder with the sources of a crate.
+pub(crate) fn sources_of(room: &str) -> PathBuf {
+    checkout().join("crates").join(room).join("src")
+}
+
+/// The texts of a crate in their folder, by modules.
+fn texts_below(root: &Path) -> Vec<(Module, String)> {
+    let mut files = Vec::new();
+    files_below(root, &mut files);
+    files.retain(|file| !file.ends_with("main.rs"));
+    // The smallest crate, `derive`, has one.
+    assert!(!files.is_empty(), "the sources were not found");
+    let text = |file: &PathBuf| {
+        let module = module_of(file.strip_prefix(root).unwrap());
+        (module, fs::read_to_string(file).unwrap())
+    };
+    files.iter().map(text).collect()
+}
+
 /// A file as its module path: `["spice", "session"]`; `mod.rs` stands for its folder, `lib.rs` is empty.
 pub(crate) type Module = Vec<String>;
 
@@ -39,23 +61,30 @@ pub(crate) struct Use {
 }
 
 impl Sources {
-    /// The sources of the program's own crate; `main.rs` is a crate of its own.
+    /// The sources of the pipeline as one crate: the root package, and the crates of [`ROOMS`] as its rooms. `main.rs` is
+    /// a crate of its own.
     pub(crate) fn of_the_program() -> Self {
-        Self::below(&checkout().join("src"))
+        let mut texts = texts_below(&checkout().join("src"));
+        for room in ROOMS {
+            let own = format!("crate::{room}::");
+            let of_room = texts_below(&sources_of(room)).into_iter();
+            texts.extend(of_room.map(|(module, text)| {
+                let module = [&[room.to_owned()], &*module].concat();
+                (module, text.replace("crate::", &own))
+            }));
+        }
+        let in_one = |(module, mut text): (Module, String)| {
+            for room in ROOMS.iter().chain(&["spice"]) {
+                text = text.replace(&format!("areograph_{room}::"), &format!("crate::{room}::"));
+            }
+            (module, text)
+        };
+        Self::of_texts(texts.into_iter().map(in_one))
     }
 
     /// The sources of a crate in their folder.
     pub(crate) fn below(root: &Path) -> Self {
-        let mut files = Vec::new();
-        files_below(root, &mut files);
-        files.retain(|file| !file.ends_with("main.rs"));
-        // The smallest crate, `sql`, has five.
-        assert!(files.len() >= 5, "the sources were not found");
-        let texts = files.iter().map(|file| {
-            let text = fs::read_to_string(file).unwrap();
-            (module_of(file.strip_prefix(root).unwrap()), text)
-        });
-        Self::of_texts(texts)
+        Self::of_texts(texts_below(root).into_iter())
     }
 
     /// Sources by their modules.

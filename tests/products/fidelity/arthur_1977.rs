@@ -13,7 +13,7 @@ use areograph::{
 
 use super::{
     recipe::Normals,
-    row::{Account, Comparison, Paper, Row, number},
+    row::{Account, Comparison, Kind, Paper, Row, beyond_reach, derived, number},
 };
 
 pub(crate) static PAPER: Paper = Paper {
@@ -131,7 +131,7 @@ fn pictures() -> Vec<Comparison> {
             0,
         )
         .exact(),
-        number(
+        derived(
             "orthographic taken for conformal at 22.5°, m at the edge",
             "not printed",
             projection_floor_m(half_m, gradient, MARS_RADIUS_M),
@@ -227,7 +227,7 @@ fn tie_deviations() -> Vec<Comparison> {
     let rms_m = sum_m / SEEDS as f64;
     vec![
         number("rms, km", "0.25", rms_m / 1e3, 3).share(0.15),
-        number(
+        derived(
             "rms over the noise",
             "not printed",
             rms_m / SECONDARY_NOISE_M,
@@ -274,6 +274,7 @@ fn gross_controls() -> Vec<Comparison> {
         )
         .between(98.0, 100.0),
         number("rms of the other ten, km", "0.8", mean_m / 1e3, 2).share(0.15),
+        beyond_reach("largest of the other ten, km", "2.1"),
     ]
 }
 
@@ -329,8 +330,9 @@ fn film() -> Vec<Comparison> {
 static ROWS: [Row; 15] = [
     Row {
         id: "A77-01",
+        kind: Kind::ClosedLoop,
         place: "introduction",
-        what: "pictures: Mariner about 14° wide; Viking 1°, most tilted 12.5°, 25 × 25 km",
+        what: "pictures: Mariner about 14° wide, overlap of Mariner 9 below 2 %; Viking 1°, most tilted 12.5°, 25 × 25 km",
         account: Account::Input {
             from: "the recipe of the synthetic tertiary net",
             ours: pictures,
@@ -340,9 +342,10 @@ static ROWS: [Row; 15] = [
     },
     Row {
         id: "A77-02",
+        kind: Kind::ClosedLoop,
         place: "equations 2 and 3",
         what: "unknowns of m pictures and n points: 4m + 2n, about 8m; theirs 4 a picture",
-        account: Account::Met {
+        account: Account::Agrees {
             from: "the equations of a synthetic net",
             ours: unknowns,
         },
@@ -350,9 +353,10 @@ static ROWS: [Row; 15] = [
     },
     Row {
         id: "A77-03",
+        kind: Kind::ClosedLoop,
         place: "tie equations",
         what: "coefficients of a point on three pictures",
-        account: Account::Met {
+        account: Account::Agrees {
             from: "deviations of a point that is off in one of three pictures",
             ours: thirds,
         },
@@ -360,6 +364,7 @@ static ROWS: [Row; 15] = [
     },
     Row {
         id: "A77-04",
+        kind: Kind::ClosedLoop,
         place: "block",
         what: "30–40 pictures in a block, 6–10 in a brick, two controls",
         account: Account::Input {
@@ -371,6 +376,7 @@ static ROWS: [Row; 15] = [
     },
     Row {
         id: "A77-05",
+        kind: Kind::Constants,
         place: "primary net",
         what: "its accuracy",
         account: Account::Cited {
@@ -380,9 +386,10 @@ static ROWS: [Row; 15] = [
     },
     Row {
         id: "A77-06",
+        kind: Kind::ClosedLoop,
         place: "secondary net",
         what: "tie deviations of nine pictures in one brick: largest 0.6 (X), 0.9 km (Y), rms about ¼ km",
-        account: Account::MetInPart {
+        account: Account::InPart {
             from: "nine pictures, 200 points, noise of 385 m, 20 seeds",
             ours: tie_deviations,
         },
@@ -390,9 +397,10 @@ static ROWS: [Row; 15] = [
     },
     Row {
         id: "A77-07",
+        kind: Kind::ClosedLoop,
         place: "secondary net, SCALE",
         what: "478 and 483 rejected with 17 and 19 km in Y; then largest 2.1, rms about ±0.8 km",
-        account: Account::MetInPart {
+        account: Account::InPart {
             from: "twelve controls with 0.8 km of noise, two of them off by 17 and 19 km in Y",
             ours: gross_controls,
         },
@@ -400,6 +408,7 @@ static ROWS: [Row; 15] = [
     },
     Row {
         id: "A77-08",
+        kind: Kind::Evidence,
         place: "table 1",
         what: "tie deviations of three bricks: largest δX δY, rms δX δY, m",
         account: Account::Data {
@@ -409,6 +418,7 @@ static ROWS: [Row; 15] = [
     },
     Row {
         id: "A77-09",
+        kind: Kind::Evidence,
         place: "table 1",
         what: "deviations from brick to brick: largest δX δY, rms δX δY, m",
         account: Account::Data {
@@ -418,9 +428,10 @@ static ROWS: [Row; 15] = [
     },
     Row {
         id: "A77-10",
+        kind: Kind::Arithmetic,
         place: "table 2",
         what: "residuals of SCALE in the tertiary net",
-        account: Account::Met {
+        account: Account::Agrees {
             from: "the table's six points, as given minus computed",
             ours: table_2,
         },
@@ -429,9 +440,10 @@ static ROWS: [Row; 15] = [
     },
     Row {
         id: "A77-11",
+        kind: Kind::Arithmetic,
         place: "text on table 2",
         what: "largest residual and rms",
-        account: Account::Met {
+        account: Account::Agrees {
             from: "the table's six points",
             ours: remarks,
         },
@@ -439,6 +451,7 @@ static ROWS: [Row; 15] = [
     },
     Row {
         id: "A77-12",
+        kind: Kind::Constants,
         place: "conclusions",
         what: "precision",
         account: Account::Cited {
@@ -448,9 +461,10 @@ static ROWS: [Row; 15] = [
     },
     Row {
         id: "A77-13",
+        kind: Kind::ClosedLoop,
         place: "shrinkage",
         what: "residuals at two controls point inward, though nothing is redundant",
-        account: Account::Met {
+        account: Account::Agrees {
             from: "nine pictures with 1 km of noise on two controls",
             ours: shrinkage,
         },
@@ -458,9 +472,10 @@ static ROWS: [Row; 15] = [
     },
     Row {
         id: "A77-14",
+        kind: Kind::ClosedLoop,
         place: "film",
         what: "distortion: linear, and quadratic with none at the corners",
-        account: Account::Met {
+        account: Account::Agrees {
             from: "quadratic distortion with its origin at a corner",
             ours: film,
         },
@@ -468,6 +483,7 @@ static ROWS: [Row; 15] = [
     },
     Row {
         id: "A77-15",
+        kind: Kind::Constants,
         place: "measuring",
         what: "monocomparator",
         account: Account::Cited { printed: "5×" },

@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use super::{
     recipe::{
         self, Recipe, Simulated, adjusted_orientation, line_spacing_m, mola_shift_lines,
-        reprojection,
+        mola_shift_px, reprojection,
     },
     scene::{GROUND_RADIUS_M, ORBIT_RADIUS_M, Scene},
     table_2::{Printed, TABLE_2},
@@ -207,10 +207,20 @@ impl Adjusted {
         })
     }
 
-    /// Corrections of MOLA's image coordinates along the track, lines.
-    pub(crate) fn footprints_lines(&self) -> [Summary; 2] {
-        self.pair
-            .ordered(|image| mola_shift_lines(&self.pair.simulated, &self.adjustment, image))
+    /// Corrections of MOLA's image coordinates along the track, lines, and across it, pixels with the papers' sense of y; of
+    /// both images each.
+    pub(crate) fn footprints_moved(&self) -> [[Summary; 2]; 2] {
+        let simulated = &self.pair.simulated;
+        let along =
+            (self.pair).ordered(|image| mola_shift_lines(simulated, &self.adjustment, image));
+        let across = (self.pair)
+            .ordered(|image| -> Vec<f64> { mola_shift_px(simulated, &self.adjustment, image) });
+        // The papers' y runs with the samples, ours against them.
+        let across = across.map(|shifts| {
+            let shifts: Vec<f64> = shifts.into_iter().map(|shift| -shift).collect();
+            Summary::of(&shifts)
+        });
+        [along, across]
     }
 
     /// Corrections of X, Y, Z of the shots, or else of the ties, metres.

@@ -20,6 +20,8 @@ pub(crate) struct Paper {
 pub(crate) struct Row {
     /// Identifier: the paper's prefix and a number.
     pub(crate) id: &'static str,
+    /// What stands beside the print.
+    pub(crate) kind: Kind,
     /// Section or table of the paper.
     pub(crate) place: &'static str,
     /// What is printed there.
@@ -30,17 +32,84 @@ pub(crate) struct Row {
     pub(crate) note: &'static str,
 }
 
+/// What stands beside the print, and so how much an agreement is worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// Data that took no part.
+    Evidence,
+    /// The paper's own prints.
+    Arithmetic,
+    /// Values that everybody has.
+    Constants,
+    /// areograph itself.
+    ClosedLoop,
+}
+
+impl Kind {
+    /// Every kind, the strongest first.
+    pub(crate) const ALL: [Self; 4] = [
+        Self::Evidence,
+        Self::Arithmetic,
+        Self::Constants,
+        Self::ClosedLoop,
+    ];
+
+    pub(crate) const fn words(self) -> &'static str {
+        match self {
+            Self::Evidence => "evidence",
+            Self::Arithmetic => "arithmetic",
+            Self::Constants => "constants",
+            Self::ClosedLoop => "closed loop",
+        }
+    }
+
+    pub(crate) const fn meaning(self) -> &'static str {
+        match self {
+            Self::Evidence => {
+                "the print is compared with data that took no part: real shots, or what code without knowledge of the print finds on \
+                 orbits from first principles"
+            }
+            Self::Arithmetic => "a formula applied to the paper's own prints: it tests the paper",
+            Self::Constants => {
+                "values of instruments and of Mars that are known independently, and givens of the method"
+            }
+            Self::ClosedLoop => {
+                "areograph against itself or its own synthetic mission, which was built with the paper's values"
+            }
+        }
+    }
+
+    /// The word for agreement.
+    pub(crate) const fn agrees(self) -> &'static str {
+        match self {
+            Self::Evidence => "met",
+            Self::Arithmetic => "reproduced",
+            Self::Constants => "consistent",
+            Self::ClosedLoop => "recovered",
+        }
+    }
+
+    const fn agrees_in_part(self) -> &'static str {
+        match self {
+            Self::Evidence => "met in part",
+            Self::Arithmetic => "reproduced in part",
+            Self::Constants => "consistent in part",
+            Self::ClosedLoop => "recovered in part",
+        }
+    }
+}
+
 /// What becomes of a row.
 pub(crate) enum Account {
     /// Ours lies within the tolerance of what is printed.
-    Met {
+    Agrees {
         /// What ours is computed from.
         from: &'static str,
         /// Printed and ours.
         ours: fn() -> Vec<Comparison>,
     },
     /// The same for a part of the row; the rest departs, or needs data or code that are not at hand.
-    MetInPart {
+    InPart {
         /// What ours is computed from.
         from: &'static str,
         /// Printed and ours.
@@ -82,81 +151,44 @@ pub(crate) enum Account {
 /// What a reader takes from a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Verdict {
-    Met,
-    MetInPart,
+    Agrees,
+    InPart,
     Explained,
-    Input,
     NeedsData,
-    Cited,
+    Quoted,
     NotYetComputed,
 }
 
 impl Verdict {
-    /// Every verdict, in the order of the counts.
-    pub(crate) const ALL: [Self; 7] = [
-        Self::Met,
-        Self::MetInPart,
-        Self::Explained,
-        Self::Input,
-        Self::NeedsData,
-        Self::Cited,
-        Self::NotYetComputed,
-    ];
-
-    /// As the page says it.
-    pub(crate) const fn words(self) -> &'static str {
+    /// Columns of the counts: agreement, agreement in part, explained, and rows without a number of ours.
+    pub(crate) const fn column(self) -> usize {
         match self {
-            Self::Met => "met",
-            Self::MetInPart => "met in part",
-            Self::Explained => "explained",
-            Self::Input => "input",
-            Self::NeedsData => "not reproducible (data)",
-            Self::Cited => "not reproducible (cited)",
-            Self::NotYetComputed => "not yet computed",
+            Self::Agrees => 0,
+            Self::InPart => 1,
+            Self::Explained => 2,
+            Self::NeedsData | Self::Quoted | Self::NotYetComputed => 3,
         }
     }
 
-    /// What the word means.
-    pub(crate) const fn meaning(self) -> &'static str {
+    /// As the page says it of a row of this kind.
+    pub(crate) const fn words(self, kind: Kind) -> &'static str {
         match self {
-            Self::Met => {
-                "ours lies within every tolerance that the row states; numbers without one stand there to compare"
-            }
-            Self::MetInPart => {
-                "so does ours in a part of the row; in the rest ours departs and the notes say why, or data are missing, or \
-                 the code that areograph does not have"
-            }
-            Self::Explained => "not met, or contradictory in print; the reason is known and stated",
-            Self::Input => {
-                "a given of the method; ours is what the program uses, and a test says so"
-            }
-            Self::NeedsData => {
-                "needs kernels, altimetry or images of those days that nobody here has: no target"
-            }
-            Self::Cited => "the paper quotes somebody else: nothing to compute",
-            Self::NotYetComputed => "areograph has no code for it yet",
+            Self::Agrees => kind.agrees(),
+            Self::InPart => kind.agrees_in_part(),
+            Self::Explained => "explained",
+            Self::NeedsData => "needs data",
+            Self::Quoted => "quoted",
+            Self::NotYetComputed => "not yet computed",
         }
     }
 }
 
 impl Account {
-    pub(crate) const fn verdict(&self) -> Verdict {
-        match self {
-            Self::Met { .. } => Verdict::Met,
-            Self::MetInPart { .. } => Verdict::MetInPart,
-            Self::Explained { .. } => Verdict::Explained,
-            Self::Input { .. } => Verdict::Input,
-            Self::Data { .. } => Verdict::NeedsData,
-            Self::Cited { .. } => Verdict::Cited,
-            Self::NotYetComputed { .. } => Verdict::NotYetComputed,
-        }
-    }
-
     /// What ours is computed from, and the test that it is used.
     pub(crate) fn inputs(&self) -> String {
         match self {
-            Self::Met { from, .. }
-            | Self::MetInPart { from, .. }
+            Self::Agrees { from, .. }
+            | Self::InPart { from, .. }
             | Self::Explained { from, .. } => (*from).to_owned(),
             Self::Input { from, test, .. } => format!("{from}; tested by {test}"),
             Self::Data { .. } | Self::Cited { .. } | Self::NotYetComputed { .. } => String::new(),
@@ -166,14 +198,15 @@ impl Account {
     /// Printed and ours.
     pub(crate) fn comparisons(&self) -> Vec<Comparison> {
         match self {
-            Self::Met { ours, .. }
-            | Self::MetInPart { ours, .. }
+            Self::Agrees { ours, .. }
+            | Self::InPart { ours, .. }
             | Self::Explained { ours, .. }
             | Self::Input { ours, .. } => ours(),
             Self::Data { printed } | Self::Cited { printed } | Self::NotYetComputed { printed } => {
                 vec![Comparison {
                     of: String::new(),
                     printed: (*printed).to_owned(),
+                    is_derived: false,
                     ours: String::new(),
                     tolerance: String::new(),
                     agreement: Agreement::Shown,
@@ -202,6 +235,8 @@ pub(crate) struct Comparison {
     /// Which of the row's numbers; may be empty where there is but one.
     pub(crate) of: String,
     pub(crate) printed: String,
+    /// Whether the paper does not print this number: it follows from prints, is of another paper, or is absent.
+    pub(crate) is_derived: bool,
     pub(crate) ours: String,
     pub(crate) tolerance: String,
     pub(crate) agreement: Agreement,
@@ -211,6 +246,7 @@ pub(crate) struct Comparison {
 pub(crate) struct Number {
     of: String,
     printed: String,
+    is_derived: bool,
     ours: f64,
     decimals: usize,
 }
@@ -225,8 +261,22 @@ pub(crate) fn number(
     Number {
         of: of.into(),
         printed: printed.into(),
+        is_derived: false,
         ours,
         decimals,
+    }
+}
+
+/// The same where `value` follows from prints, or is printed in another paper.
+pub(crate) fn derived(
+    of: impl Into<String>,
+    value: impl Into<String>,
+    ours: f64,
+    decimals: usize,
+) -> Number {
+    Number {
+        is_derived: true,
+        ..number(of, value, ours, decimals)
     }
 }
 
@@ -249,6 +299,7 @@ impl Number {
         Comparison {
             ours: fixed(self.ours, self.decimals),
             printed: self.printed,
+            is_derived: self.is_derived,
             of: self.of,
             tolerance,
             agreement,
@@ -289,6 +340,18 @@ impl Number {
         self.claim(format!("{low} to {high}"), holds)
     }
 
+    /// Not above `most`, where the paper says "below" or "at most".
+    pub(crate) fn at_most(self, most: f64) -> Comparison {
+        let holds = self.ours <= most;
+        self.claim(format!("at most {most}"), holds)
+    }
+
+    /// Not below `least`.
+    pub(crate) fn at_least(self, least: f64) -> Comparison {
+        let holds = self.ours >= least;
+        self.claim(format!("at least {least}"), holds)
+    }
+
     fn departing(self, holds: bool) -> Comparison {
         let agreement = if holds {
             Agreement::Departs
@@ -321,6 +384,7 @@ pub(crate) fn words(of: &str, printed: &str, ours: &str) -> Comparison {
     Comparison {
         of: of.to_owned(),
         printed: printed.to_owned(),
+        is_derived: false,
         ours: ours.to_owned(),
         tolerance: "same".to_owned(),
         agreement: if printed == ours {
@@ -336,6 +400,7 @@ pub(crate) fn beyond_reach(of: impl Into<String>, printed: impl Into<String>) ->
     Comparison {
         of: of.into(),
         printed: printed.into(),
+        is_derived: false,
         ours: "needs data".to_owned(),
         tolerance: String::new(),
         agreement: Agreement::Shown,
@@ -354,6 +419,28 @@ impl Outcome {
             row,
             comparisons: row.account.comparisons(),
         }
+    }
+
+    fn has(&self, agreement: Agreement) -> bool {
+        let mut all = self.comparisons.iter();
+        all.any(|comparison| comparison.agreement == agreement)
+    }
+
+    pub(crate) fn verdict(&self) -> Verdict {
+        match self.row.account {
+            Account::Input { .. } if self.has(Agreement::Departs) => Verdict::InPart,
+            Account::Agrees { .. } | Account::Input { .. } => Verdict::Agrees,
+            Account::InPart { .. } => Verdict::InPart,
+            Account::Explained { .. } => Verdict::Explained,
+            Account::Data { .. } => Verdict::NeedsData,
+            Account::Cited { .. } => Verdict::Quoted,
+            Account::NotYetComputed { .. } => Verdict::NotYetComputed,
+        }
+    }
+
+    /// As the page says it.
+    pub(crate) fn words(&self) -> &'static str {
+        self.verdict().words(self.row.kind)
     }
 
     /// Why the row does not come out as declared; empty where it does.
@@ -376,26 +463,22 @@ impl Outcome {
                 .unwrap();
             }
         }
-        let has = |agreement| {
-            let mut all = self.comparisons.iter();
-            all.any(|comparison| comparison.agreement == agreement)
-        };
-        let claims = match self.row.account.verdict() {
-            Verdict::Met => has(Agreement::Within) && !has(Agreement::Departs),
+        let (within, departs) = (self.has(Agreement::Within), self.has(Agreement::Departs));
+        let claims = match self.row.account {
+            Account::Agrees { .. } => within && !departs,
             // What the program uses otherwise is explained in the note.
-            Verdict::Input => {
-                has(Agreement::Within) && (!has(Agreement::Departs) || !self.row.note.is_empty())
-            }
-            Verdict::MetInPart => has(Agreement::Within),
-            Verdict::Explained => has(Agreement::Departs),
-            Verdict::NeedsData | Verdict::Cited | Verdict::NotYetComputed => true,
+            Account::Input { .. } => within && (!departs || !self.row.note.is_empty()),
+            // Something must be left out: by departing, or for want of data, as the note says.
+            Account::InPart { .. } => within && (departs || self.has(Agreement::Shown)),
+            Account::Explained { .. } => departs && !self.row.note.is_empty(),
+            Account::Data { .. } | Account::Cited { .. } | Account::NotYetComputed { .. } => true,
         };
         if !claims {
             writeln!(
                 complaint,
                 "{}: its numbers do not make it \"{}\"",
                 self.row.id,
-                self.row.account.verdict().words()
+                self.words()
             )
             .unwrap();
         }

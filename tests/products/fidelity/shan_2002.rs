@@ -9,7 +9,8 @@ use nalgebra::Vector3;
 
 use super::{
     eos_2002::{Ends, FOCAL_LENGTH_PX, LEFT, POINTS_KM, RIGHT},
-    row::{Account, Comparison, Paper, Row, number},
+    real_shots,
+    row::{Account, Comparison, Kind, Paper, Row, derived, number},
     scene::GROUND_RADIUS_M,
     table_2::TABLE_2,
 };
@@ -91,65 +92,71 @@ fn right() -> Vec<Comparison> {
     let radius = |place_km: [f64; 3]| Vector3::from(place_km).norm();
     let end = format!("{:.2}", radius(RIGHT.end_km));
     vec![
-        number(
-            "orbit radius at the start with Y as printed, km",
+        derived(
+            "orbit radius at the start with Y as printed, by that at the end, km",
             end.clone(),
             radius(as_printed),
             2,
         )
         .departs(5.0),
-        number("with Y −2435.358, km", end, radius(RIGHT.start_km), 2).within(1.0),
-        number(
-            "emission at the start, °",
+        derived("with Y −2435.358, km", end, radius(RIGHT.start_km), 2).within(1.0),
+        derived(
+            "emission at the start, 2005, °",
             TABLE_2[0].emission_deg,
             RIGHT.emission_deg(-0.5),
             3,
         )
         .within(0.05),
-        number(
-            "emission at the end, °",
+        derived(
+            "emission at the end, 2005, °",
             TABLE_2[0].emission_deg,
             RIGHT.emission_deg(0.5),
             3,
         )
         .within(0.05),
-        number(
+        derived(
             "look at the start, °",
             "not printed",
             RIGHT.look_deg(-0.5),
             3,
         )
         .between(0.12, 0.13),
-        number("look at the end, °", "not printed", RIGHT.look_deg(0.5), 3).between(0.111, 0.121),
+        derived("look at the end, °", "not printed", RIGHT.look_deg(0.5), 3).between(0.111, 0.121),
     ]
 }
 
 fn left() -> Vec<Comparison> {
     vec![
-        number(
-            "emission, °",
+        derived(
+            "emission, 2005, °",
             TABLE_2[1].emission_deg,
             LEFT.emission_deg(0.0),
             2,
         )
         .departs(1.0),
-        number("look, °", "not printed", LEFT.look_deg(0.0), 2).between(19.71, 19.73),
-        number("speed with 8064 lines, km/s", "3.4", LEFT.speed_km_s(), 3).between(3.393, 3.399),
+        derived("look, °", "not printed", LEFT.look_deg(0.0), 2).between(19.71, 19.73),
+        derived(
+            "speed with 8064 lines, 2005, km/s",
+            "3.4",
+            LEFT.speed_km_s(),
+            3,
+        )
+        .between(3.393, 3.399),
     ]
 }
 
 fn geometry() -> Vec<Comparison> {
     let found = base_and_height();
     vec![
-        number(
+        derived(
             "base across the track, km",
             "not printed",
             found.base_m / 1e3,
             2,
         )
         .between(153.7, 153.9),
-        number("altitude, km", "not printed", found.altitude_m / 1e3, 2).between(380.4, 380.7),
-        number(
+        derived("altitude, km", "not printed", found.altitude_m / 1e3, 2).between(380.4, 380.7),
+        derived(
             "H/B; 2.5 in 2005",
             "2.5",
             found.altitude_m / found.base_m,
@@ -173,16 +180,41 @@ fn points() -> Vec<Comparison> {
     let points = POINTS_KM.iter().zip(seen).zip(POINTS_IN_IMAGE);
     for (([x, y, z], [line, pixel]), [expected_line, expected_pixel]) in points {
         let of = format!("({x:.3}, {y:.3}, {z:.3}) km: line from the middle");
-        all.push(number(of, expected_line, line, 2).within(0.05));
-        all.push(number("its y, px", expected_pixel, pixel, 2).within(0.05));
+        all.push(derived(of, expected_line, line, 2).within(0.05));
+        all.push(derived("its y, px", expected_pixel, pixel, 2).within(0.05));
     }
     let way_m = (Vector3::from(POINTS_KM[9]) - Vector3::from(POINTS_KM[0])).norm() * 1e3;
     let spacing_m = way_m / (seen[9][0] - seen[0][0]);
-    all.push(number("line spacing, m", TABLE_2[0].pixel_m, spacing_m, 3).within(0.05));
+    all.push(derived("line spacing, 2005, m", TABLE_2[0].pixel_m, spacing_m, 3).within(0.05));
+    let half = [
+        0.5 * RIGHT.lines,
+        0.5 * TABLE_2[0].file_samples.parse::<f64>().unwrap(),
+    ];
+    let inside = seen
+        .iter()
+        .filter(|at| at.iter().zip(half).all(|(at, half)| at.abs() <= half));
+    all.push(
+        number(
+            "points that fall into the image",
+            "10",
+            inside.count() as f64,
+            0,
+        )
+        .exact(),
+    );
     let [_, pixel] = image_of(&RIGHT.misprinted().model(), POINTS_KM[0]);
     let of = "y of the first point with the misprinted Y, px";
-    all.push(number(of, "in the image", pixel, 0).shown());
+    all.push(derived(of, "in the image", pixel, 0).shown());
     all
+}
+
+fn areoid() -> Vec<Comparison> {
+    let ellipsoid_km = MARS_IAU2000.equatorial_radius_m / 1e3;
+    let areoid_km = real_shots::areoid_at_the_equator_m() / 1e3;
+    vec![
+        number("radius of the ellipsoid, km", "3396", ellipsoid_km, 2).departs(0.1),
+        number("areoid at 0° N, 0.8° E, km", "3396", areoid_km, 2).departs(0.1),
+    ]
 }
 
 fn spacing() -> Vec<Comparison> {
@@ -203,6 +235,7 @@ fn spacing() -> Vec<Comparison> {
 static ROWS: [Row; 9] = [
     Row {
         id: "S02-01",
+        kind: Kind::Arithmetic,
         place: "table 1",
         what: "orientation of the right image, start and end: X 2743.679, 2749.133; Y −2453.358, −2450.626; Z \
                −895.114, −836.828 km; ω 11.3701, 12.1810; φ −75.9648, −76.8692; κ −126.576, −125.6728 °",
@@ -215,6 +248,7 @@ static ROWS: [Row; 9] = [
     },
     Row {
         id: "S02-02",
+        kind: Kind::Arithmetic,
         place: "table 1",
         what: "orientation of the left image, start and end: X 2638.162, 2640.863; Y −2549.221, −2557.746; Z \
                −891.875, −860.101 km; ω −8.6296, −8.6392; φ −75.9467, −75.9452; κ −124.5666, −124.5345 °",
@@ -227,9 +261,10 @@ static ROWS: [Row; 9] = [
     },
     Row {
         id: "S02-03",
+        kind: Kind::Arithmetic,
         place: "table 1",
         what: "base and height",
-        account: Account::Met {
+        account: Account::Agrees {
             from: "the table, across the flight of the right image",
             ours: geometry,
         },
@@ -237,20 +272,22 @@ static ROWS: [Row; 9] = [
     },
     Row {
         id: "S02-04",
+        kind: Kind::Arithmetic,
         place: "table 2",
         what: "ten MOLA points in E02-02855",
-        account: Account::Met {
+        account: Account::Agrees {
             from: "orientation of first order through table 1 with the corrected Y, 9856 lines, 3500 mm, 39 µm",
             ours: points,
         },
-        note: "Image coordinates are not printed: those beside ours are of an independent computation with the same \
-               formula. All lie in the image, a line of 5.5 m apart.",
+        note: "Image coordinates are not printed: those in the column of numbers not printed are of an independent computation with the \
+               same formula, a test of the code and not of the paper. What the print says is that the points lie in the image.",
     },
     Row {
         id: "S02-05",
+        kind: Kind::Arithmetic,
         place: "table 2",
         what: "spacing of points",
-        account: Account::Met {
+        account: Account::Agrees {
             from: "the ten points; gaps of two and three",
             ours: spacing,
         },
@@ -258,6 +295,7 @@ static ROWS: [Row; 9] = [
     },
     Row {
         id: "S02-06",
+        kind: Kind::Evidence,
         place: "results",
         what: "misregistration",
         account: Account::Data {
@@ -267,20 +305,21 @@ static ROWS: [Row; 9] = [
     },
     Row {
         id: "S02-07",
+        kind: Kind::Constants,
         place: "eq. 4",
         what: "elevation: radius minus areoid, 3396 km",
-        account: Account::Met {
-            from: "equatorial radius of Mars, IAU 2000",
-            ours: || {
-                let radius_km = MARS_IAU2000.equatorial_radius_m / 1e3;
-                vec![number("radius of the datum, km", "3396", radius_km, 2).within(0.5)]
-            },
+        account: Account::Explained {
+            from: "equatorial radius of Mars, IAU 2000; radius minus topography of real shots at the equator",
+            ours: areoid,
         },
-        note: "areograph subtracts the areoid that PEDR files have for each shot. The text turns areocentric \
+        note: "3396 km is the mean equatorial radius of the areoid, not of the ellipsoid; at one longitude the areoid is some hundred \
+               metres off its mean. areograph subtracts the areoid that PEDR files have for each shot. The paper takes radii with \
+               all corrections, crossover residuals among them. The text turns areocentric \
                latitudes to Cartesian coordinates as if they were areographic; areograph does not.",
     },
     Row {
         id: "S02-08",
+        kind: Kind::Constants,
         place: "introduction",
         what: "MGS and MOC",
         account: Account::Cited {
@@ -290,11 +329,12 @@ static ROWS: [Row; 9] = [
     },
     Row {
         id: "S02-09",
+        kind: Kind::Constants,
         place: "introduction",
         what: "results of others",
         account: Account::Cited {
-            printed: "10.01 µm or 200 m; 740 m; MOLA 30–40 m, 5–30 m, 13 m; grids of 1 km, 1/64°, 1/256°; offsets of \
-                      10–20 km, 1.8 km, 4–5 km; 3,000 and 4,000 images",
+            printed: "10.01 µm or 200 m; 740 m; MOLA 30–40 m, 5–30 m, 13 m; grids of 1° × 1° (1999), 1 km, 1/64°, 1/256°; two \
+                      orders of magnitude better than before; offsets of 10–20 km, 1.8 km, 4–5 km; 3,000 and 4,000 images",
         },
         note: "",
     },

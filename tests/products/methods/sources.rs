@@ -1,18 +1,23 @@
 //! The methods that the sources declare: of every `impl Stage`, and of steps that are no stages.
 
 use std::{
+    collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
 };
+
+use areograph_testing::checkout;
+
+use crate::architecture::uses::{ROOMS, sources_of};
 
 /// A method that enters fingerprints.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Declared {
     /// `Stage::NAME`; of other steps nothing.
     pub(crate) stage: Option<String>,
-    /// The type of the stage; of other steps their file below `src`.
+    /// The type of the stage; of other steps their file, by its room.
     pub(crate) declared: String,
-    /// File below `src`.
+    /// File, by its room: `stages/adjust/stage.rs` is in the crate `stages`.
     pub(crate) file: String,
     /// The number.
     pub(crate) method: u32,
@@ -28,16 +33,35 @@ impl Declared {
     }
 }
 
-/// Every method below `src`, in the order of files.
+/// The file of a module, without `.rs` or `/mod.rs`.
+pub(crate) fn path_of(module: &[String]) -> PathBuf {
+    let (room, inner) = module.split_first().unwrap();
+    let folder = if ROOMS.contains(&&**room) {
+        sources_of(room)
+    } else {
+        checkout().join("src").join(room)
+    };
+    folder.join(inner.join("/"))
+}
+
+/// Every method of the pipeline, in the order of files.
 pub(crate) fn declared() -> Vec<Declared> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut files = Vec::new();
-    files_below(&root, &mut files);
-    files.sort();
-    let found = files.iter().flat_map(|path| {
-        let file = path.strip_prefix(&root).unwrap().display().to_string();
-        of_text(&file, &fs::read_to_string(path).unwrap())
-    });
+    let mut files = BTreeMap::new();
+    let mut read = |room: &str, root: &Path| {
+        let mut paths = Vec::new();
+        files_below(root, &mut paths);
+        for path in paths {
+            let file = Path::new(room).join(path.strip_prefix(root).unwrap());
+            files.insert(file.display().to_string(), path);
+        }
+    };
+    read("", &checkout().join("src"));
+    for room in ROOMS {
+        read(room, &sources_of(room));
+    }
+    let found = files
+        .iter()
+        .flat_map(|(file, path)| of_text(file, &fs::read_to_string(path).unwrap()));
     found.collect()
 }
 

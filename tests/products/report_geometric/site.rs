@@ -16,7 +16,7 @@ use areograph::{
         fit_sensor_model::SensorModel,
         group_profiles::Profile,
         intersect::IntersectedTies,
-        judge::{AdjustmentEvidence, Evidence, JudgedImage, Verdict, judge},
+        judge::{AdjustmentEvidence, BeamEvidence, Evidence, JudgedImage, Verdict, judge},
         read_ties::Ties,
         register::ImageRegistration,
         sample_orientation::Orientation,
@@ -31,7 +31,7 @@ use super::common::mission::{mission, site_run};
 pub(crate) struct Site {
     pub(crate) published: String,
     pub(crate) manifest: serde_json::Value,
-    config: SiteConfig,
+    pub(crate) config: SiteConfig,
     kernels: KernelSet,
     pub(crate) times: Vec<ImageTimes>,
     converted: Converted,
@@ -172,10 +172,9 @@ impl Site {
             model: &'a SensorModel,
         ) -> JudgedImage<'a> {
             JudgedImage {
-                id: &times.id,
+                times,
                 orientation,
                 model,
-                disagreements: &times.remarks,
             }
         }
         let oriented = self.orientations.iter().zip(&self.models);
@@ -205,6 +204,11 @@ impl Site {
             ranges: &self.ranges,
             clock_correction_s: self.config.mola_clock.correction_s(),
             images: &images,
+            beam: BeamEvidence {
+                images: &[],
+                adjustment: &self.config.adjustment,
+                surface: &self.config.mola_surface,
+            },
             warnings: &[],
             complaints: &[],
             adjustment: Some(adjustment),
@@ -214,7 +218,7 @@ impl Site {
         with(&evidence, &adjustment)
     }
 
-    fn verdict(&self) -> Verdict {
+    pub(crate) fn verdict(&self) -> Verdict {
         self.judged(|evidence, _| judge(evidence))
     }
 

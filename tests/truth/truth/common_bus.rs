@@ -239,27 +239,40 @@ fn ending(mission: &Path, name: &str, change: impl Fn(String) -> String) -> (i32
     (output.status.code().unwrap(), manifest, out)
 }
 
-#[test]
-fn mistakes_of_laser_and_bus_are_told() {
+/// A realistic mission, written for one test.
+fn realistic() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let mission = scene(folder.path(), 401, &["--realistic"]);
-    let laser = include_str!("../../../config/altimeters/mola.toml");
-    let with_beam = |name: &'static str, beam: &str| {
-        let file = laser.replace("bus = [0.0, 0.0, 1.0]", &format!("bus = {beam}"));
-        assert!(file != laser);
-        fs::write(mission.join(format!("sites/{name}.laser.toml")), file).unwrap();
-        ending(&mission, name, move |text| {
-            format!("altimeter = \"{name}.laser.toml\"\n{text}")
-        })
+    (folder, mission)
+}
+
+const LASER: &str = include_str!("../../../config/altimeters/mola.toml");
+
+/// How the site ends with another laser.
+fn with_laser(mission: &Path, name: &str, file: &str) -> (i32, String, PathBuf) {
+    assert!(file != LASER);
+    fs::write(mission.join(format!("sites/{name}.laser.toml")), file).unwrap();
+    ending(mission, name, |text| {
+        format!("altimeter = \"{name}.laser.toml\"\n{text}")
+    })
+}
+
+/// The camera is mounted 2.0 mrad from the beam across the flight and 1.3 mrad along it: with either sign turned.
+#[test]
+fn a_beam_with_a_turned_sign_contradicts_the_images() {
+    let (_folder, mission) = realistic();
+    let with_beam = |name: &str, beam: &str| {
+        let file = LASER.replace("bus = [0.0, 0.0, 1.0]", &format!("bus = {beam}"));
+        with_laser(&mission, name, &file)
     };
-    // The camera is mounted 2.0 mrad from the beam across the flight and 1.3 mrad along it: with either sign turned.
     let (code, told, _) = with_beam("across", "[0.0, -0.0039934, 1.0]");
     assert!(
         code == 5 && told.contains("laser and images contradict each other"),
         "{told}"
     );
     let (code, told, out) = with_beam("along", "[-0.0025126, 0.0, 1.0]");
-    // Along the flight the laser tells nothing that line times would not hide: the place holds, or it is told.
+    // Along the flight the laser shows nothing that line times would not hide: the place holds, or the contradiction is
+    // reported.
     let site = Judged::of(&mission, &out, "isidis");
     let holds = (0..2).all(|axis| site.mean_m()[axis].abs() < 3.5 * site.mean_sigmas_m[axis]);
     println!("sign turned along the flight: exit {code}, place holds: {holds}");
@@ -267,7 +280,13 @@ fn mistakes_of_laser_and_bus_are_told() {
         holds || (code == 5 && told.contains("laser and images contradict")),
         "{told}"
     );
-    // Shots that are taken for simultaneous with what was exposed five seconds later.
+}
+
+/// Shots that are taken for simultaneous with what was exposed five seconds later; a day without a profile of one
+/// image; and an altimeter whose beam nobody knows.
+#[test]
+fn shots_of_another_time_and_missing_ones_are_reported() {
+    let (_folder, mission) = realistic();
     let (code, told, _) = ending(&mission, "late", |text| {
         text.replace("bias_s = 0.117", "bias_s = 5.0")
     });
@@ -275,7 +294,6 @@ fn mistakes_of_laser_and_bus_are_told() {
         code == 5 && told.contains("laser and images contradict each other"),
         "{told}"
     );
-    // A day without a profile of one image, and an altimeter whose beam nobody knows.
     let (_, told, _) = ending(&mission, "one", |text| {
         let line = text
             .lines()
@@ -288,19 +306,18 @@ fn mistakes_of_laser_and_bus_are_told() {
         told.contains("adjustment.common_bus does not control E02-"),
         "{told}"
     );
-    let (_, told, _) = {
-        let file = &laser[..laser.find("[beam]").unwrap()];
-        fs::write(mission.join("sites/unknown.laser.toml"), file).unwrap();
-        ending(&mission, "unknown", |text| {
-            format!("altimeter = \"unknown.laser.toml\"\n{text}")
-        })
-    };
+    let (_, told, _) = with_laser(&mission, "unknown", &LASER[..LASER.find("[beam]").unwrap()]);
     assert!(
         told.contains("adjustment.common_bus did nothing: the altimeter file does not state"),
         "{told}"
     );
-    // Every frame is recorded 59 m to either side in turn: together they say nothing wrong of laser and profile, and every
-    // one contradicts them.
+}
+
+/// Every frame is recorded 59 m to either side in turn: together they state nothing wrong of laser and profile, and
+/// every one contradicts them. Every fourth 440 m: the images would have to bend, and the network falls apart.
+#[test]
+fn frames_that_contradict_each_other_are_reported() {
+    let (_folder, mission) = realistic();
     let remark = "image coordinates of laser spots exceed 3.29";
     let refused = "contradicts the rest of the network";
     let (_, told, _) = ending(&mission, "sound", |text| text);
@@ -308,7 +325,6 @@ fn mistakes_of_laser_and_bus_are_told() {
     spoil_shots(&mission, 1, 1_000);
     let (_, told, _) = ending(&mission, "spoiled", |text| text);
     assert!(told.contains(remark) && !told.contains(refused), "{told}");
-    // Every fourth 440 m: the images would have to bend, and the network falls apart.
     spoil_shots(&mission, 1, -1_000);
     spoil_shots(&mission, 4, 7_500);
     let (_, told, _) = ending(&mission, "torn", |text| text);

@@ -28,10 +28,20 @@ pub enum CheckKind {
     Decoding,
     /// Share of outliers among the ranges of a profile.
     RangeOutliers,
-    /// Shots of a profile.
+    /// Shots of the longest profile.
     Shots,
     /// Clock correction of least spread minus the configured one.
     ClockCorrection,
+    /// Footprints of simultaneous shots in an image, of those that the mountings of camera and laser place in it.
+    FootprintsInside,
+    /// Distance between the spacecraft of support data and of the altimeter's file.
+    SupportPosition,
+    /// Angle along the track between the beam in the altimeter's file and its mounting by the attitude of the images.
+    BeamAlong,
+    /// The same across the track.
+    BeamAcross,
+    /// Epochs of an image at which its boresight meets the body.
+    BoresightMeets,
     /// Median height of tie points above the MOLA surface, adjusted: MOLA is part of a default adjustment.
     HeightAfter,
     /// Share of tie points that lie farther from the MOLA surface than 3.29 of their standard deviations, or were
@@ -57,6 +67,9 @@ pub enum CheckKind {
     TieResidualsAlong,
     /// The same across the track.
     TieResidualsAcross,
+    /// Standard deviation of unit weight of the other kinds of observation, the one that exceeds most of what chance
+    /// explains.
+    VarianceComponents,
     /// Share of the tie points that took no part in the adjustment.
     TiesRejected,
     /// Tie points that took part in the adjustment.
@@ -151,12 +164,18 @@ impl CheckKind {
             Self::OrbitsApart => "Orbit of the PEDR against kernels",
             Self::Decoding => "Range − distance, orbit of the PEDR",
             Self::RangeOutliers => "Outliers among ranges",
-            Self::Shots => "Shots in a profile",
+            Self::Shots => "Shots in the longest profile",
             Self::ClockCorrection => "Clock correction, best − configured",
+            Self::FootprintsInside => "Simultaneous footprints in the image",
+            Self::SupportPosition => "Position in support data against the PEDR",
+            Self::BeamAlong => "Laser beam by the attitude, along track",
+            Self::BeamAcross => "Laser beam by the attitude, across track",
+            Self::BoresightMeets => "Boresight meets the body (epochs)",
             Self::ParallaxAfter => "Along-track parallax, adjusted",
             Self::ParallaxBefore => "Along-track parallax, before",
             Self::TieResidualsAlong => "Tie residuals along track",
             Self::TieResidualsAcross => "Tie residuals across track",
+            Self::VarianceComponents => "Variance component, other observations",
             Self::TiesRejected => "Tie points rejected",
             Self::TiesUsed => "Tie points used",
             Self::Correction => "Largest orientation correction",
@@ -205,6 +224,7 @@ impl CheckKind {
             | Self::SurfaceHeight
             | Self::RangeMean
             | Self::OrbitsApart
+            | Self::SupportPosition
             | Self::Decoding
             | Self::ParallaxAfter
             | Self::ParallaxBefore
@@ -230,6 +250,7 @@ impl CheckKind {
             | Self::SurfaceSpread
             | Self::TieResidualsAlong
             | Self::TieResidualsAcross
+            | Self::VarianceComponents
             | Self::Correction
             | Self::Boresight
             | Self::HeldBackPlane
@@ -238,12 +259,15 @@ impl CheckKind {
             | Self::ControlHeight
             | Self::OtherOrbits
             | Self::OtherOrbitsOffset => "σ",
+            Self::BeamAlong | Self::BeamAcross => "mrad",
             Self::RoundShift => "cells",
             Self::ClockCorrection => "s",
             Self::PointingRmse => "″",
             Self::TableError | Self::LinesAgree | Self::CameraMoved => "px",
             Self::Contradiction
             | Self::Footprints
+            | Self::FootprintsInside
+            | Self::BoresightMeets
             | Self::AdjustmentMade
             | Self::ImagesJoined
             | Self::PairsJoined
@@ -264,6 +288,8 @@ impl CheckKind {
         matches!(
             self,
             Self::Footprints
+                | Self::FootprintsInside
+                | Self::BoresightMeets
                 | Self::ImagesJoined
                 | Self::PairsJoined
                 | Self::Shots
@@ -287,6 +313,8 @@ impl CheckKind {
                 | Self::RangeMean
                 | Self::Decoding
                 | Self::ClockCorrection
+                | Self::BeamAlong
+                | Self::BeamAcross
                 | Self::ParallaxAfter
                 | Self::ParallaxBefore
                 | Self::ProfilesApart
@@ -301,8 +329,11 @@ impl CheckKind {
             Self::ClockCorrection | Self::TableError => 4,
             Self::RangeMean
             | Self::Decoding
+            | Self::BeamAlong
+            | Self::BeamAcross
             | Self::PositionRmse
             | Self::LinesAgree
+            | Self::VarianceComponents
             | Self::HeldBackPlane
             | Self::HeldBackHeight
             | Self::ControlPlane

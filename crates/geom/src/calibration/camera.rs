@@ -29,7 +29,7 @@ impl Offset {
     /// `R_u = R_φ R_ω R_κ`, from the camera to the axes of the spacecraft.
     ///
     /// # Source
-    /// Li et al. 2023, eq. 4.
+    /// Li et al. 2023, eq. 6.
     #[must_use]
     pub fn rotation(&self) -> Matrix3<f64> {
         let (sp, cp) = self.phi_rad.sin_cos();

@@ -4,14 +4,16 @@
 //! (`pedr/chronology.rs`) withholds records that repeat others.
 //!
 //! Two files with common shots are rejected unless one is a copy of the other; `pedr search` marks rows out of order.
-//! Within a file, the longest chain of frames without a common shot is kept.
+//! Within a file, the longest chain of frames without a common shot is kept. Rows of tables that repeat a shot are
+//! counted once (`table_rows.rs`).
 
-#[cfg(test)]
-mod cases;
+mod table_rows;
 
 use std::collections::BTreeMap;
 
 use areograph_base::body::Datum;
+
+pub use table_rows::{Repetition, TableRows};
 
 /// Shots of two files at most this far apart are the same shot, seconds: half the 0.1 s between two shots of the laser,
 /// plus half the microsecond resolution of PEDR times.
@@ -162,7 +164,9 @@ impl Copies {
 
 #[cfg(test)]
 mod tests {
-    use super::{cases::CASES, *};
+    use areograph_testing::shot_cases::CASES;
+
+    use super::*;
 
     #[test]
     fn shots_one_by_one_and_spans_give_the_same() {

@@ -9,7 +9,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use areograph_base::error::{Cause, Error, IoError, Kind, Locate as _, Result};
+use areograph_base::error::{Cause, Error, IoError, Locate as _, Result};
 
 /// Suffixes that compression programs append to a file name.
 const COMPRESSED: [&str; 7] = ["gz", "z", "zip", "bz2", "xz", "zst", "7z"];
@@ -24,19 +24,10 @@ pub struct Listing {
 }
 
 /// A PEDR file that must be decompressed first.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("a compressed PEDR file; expected {0} beside it")]
+#[cause(Input: "decompress it (gunzip, unzip) in place, or move it out of the archive")]
 struct Compressed(String);
-
-impl Cause for Compressed {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "decompress it (gunzip, unzip) in place, or move it out of the archive".to_owned()
-    }
-}
 
 impl Listing {
     /// The files with the ending `.b`, in upper or lower case, in and below `folder`, links followed. Each folder is

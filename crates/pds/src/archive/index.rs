@@ -20,13 +20,18 @@ use super::{
 };
 use crate::pedr::{Complaint, RULES};
 use areograph_base::body::Datum;
-use areograph_store::files::Identity;
+use areograph_store::files::{Identity, Mark, MarkAt};
 
 /// Name of the index in a folder of the archive.
 pub const INDEX: &str = "areograph-pedr.index";
 /// Start of the index file: type and format version. The BLAKE3 of the remainder follows, then the remainder in
 /// postcard.
 const HEADER: &[u8] = b"areograph pedr index 1\n";
+/// How an earlier index is recognised.
+pub const INDEX_MARK: Mark = Mark {
+    what: "an index that areograph wrote",
+    at: MarkAt::Start(HEADER),
+};
 const HASH_SIZE: usize = 32;
 /// Largest index that is read, bytes: far more than the mission's archive takes.
 const BYTES_MAX: u64 = 1 << 30;

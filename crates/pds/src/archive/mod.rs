@@ -25,12 +25,14 @@ mod query;
 mod scan;
 mod search;
 mod source;
+mod tables;
 
-pub use distinct::{Copies, SAME_SHOT_S, Seen, Span, spans};
+pub use distinct::{Copies, Repetition, SAME_SHOT_S, Seen, Span, TableRows, spans};
 pub use folder::Listing;
 pub use found::{Found, ShotRejection, WindowLists};
-pub use index::{INDEX, Index, IndexedFile, Indexes};
+pub use index::{INDEX, INDEX_MARK, Index, IndexedFile, Indexes};
 pub use opened::Opened;
 pub use query::{Judged, Query};
 pub use search::{Sink, UNUSABLE_MAX, UNUSABLE_SHARE_MAX, search};
 pub use source::Source;
+pub use tables::{FoundInTables, SearchedTable, repetition_complaint, search_tables};

@@ -7,23 +7,14 @@ use rayon::prelude::*;
 use super::{Index, Indexes, Listing, Source};
 use areograph_base::{
     altimetry::DatumChoice,
-    error::{Cause, Error, Kind, Result},
+    error::{Cause, Error, Result},
 };
 
 /// A number of files beyond the range of a search.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("{0} PEDR files; expected 1 to 65535")]
+#[cause(Configuration: "name PEDR files (AP#####v.B), or folders that hold them")]
 struct FileCount(usize);
-
-impl Cause for FileCount {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        "name PEDR files (AP#####v.B), or folders that hold them".to_owned()
-    }
-}
 
 /// Files of an archive that can be searched, and failures of the others.
 #[derive(Debug, Default)]

@@ -30,24 +30,15 @@ pub const UNUSABLE_MAX: u64 = 10;
 pub const UNUSABLE_SHARE_MAX: f64 = 0.01;
 
 /// A file with more than isolated damaged records.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error(
     "{unusable} of {records} records cannot be used; expected at most {UNUSABLE_MAX} and one in a hundred. The first: {first}"
 )]
+#[cause(Input: "the file was damaged in transfer: fetch it again, or leave it out")]
 struct Damaged {
     unusable: u64,
     records: u64,
     first: String,
-}
-
-impl Cause for Damaged {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "the file was damaged in transfer: fetch it again, or leave it out".to_owned()
-    }
 }
 
 /// Unusable records of a file.

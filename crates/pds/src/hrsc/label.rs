@@ -2,8 +2,8 @@
 
 use crate::{
     image_label::{
-        ImageLabel, as_taken, camera, either, known, of_mars, optional_count, other_image, text,
-        value_error,
+        ImageLabel, as_taken, camera, damage, either, known, of_mars, optional_count, other_image,
+        text, value_error,
     },
     label::{Label, LabelError},
 };
@@ -85,6 +85,8 @@ pub(super) fn image_label(label: &Label, cameras: &[Instrument]) -> Result<Image
         },
         utc_stop: text(either(label, "STOP_TIME", "STOPTIME")?),
         lines: None,
+        // Its clock counts are not used.
+        remarks: damage(label, true),
     })
 }
 

@@ -19,16 +19,18 @@ use crate::{
     moc::image_label,
 };
 use areograph_base::{
-    error::{Cause, IoError, Kind, Locate as _, Result},
+    error::{Cause, IoError, Locate as _, Result},
     instruments::Instrument,
 };
 
 /// A file without a readable image.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[non_exhaustive]
+#[cause(Input)]
 pub enum ImageFileError {
     /// A label without an image, or of another object.
     #[error("the label describes no image in this file: {lacking} is missing")]
+    #[cause("give an .imq or .img file of the archive, label and pixels in one file")]
     NoImage {
         /// The missing part.
         lacking: &'static str,
@@ -37,6 +39,7 @@ pub enum ImageFileError {
     #[error(
         "^IMAGE is {pointer:?}; expected a record or byte of this file, which has {bytes} bytes"
     )]
+    #[cause("fetch the file again: it is truncated or damaged")]
     Pointer {
         /// As it was written.
         pointer: String,
@@ -45,6 +48,7 @@ pub enum ImageFileError {
     },
     /// A raster of another kind.
     #[error("{key} is {value:?}; expected {expected}")]
+    #[cause("give an .imq or .img file of the archive, with 8 bits a pixel")]
     Raster {
         /// The keyword.
         key: &'static str,
@@ -55,29 +59,11 @@ pub enum ImageFileError {
     },
     /// No fragment.
     #[error("no fragment of this image at byte {offset} or later")]
+    #[cause(like = Pointer)]
     NoFragment {
         /// Expected location of the first one.
         offset: u64,
     },
-}
-
-impl Cause for ImageFileError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::NoImage { .. } => {
-                "give an .imq or .img file of the archive, label and pixels in one file"
-            }
-            Self::Raster { .. } => "give an .imq or .img file of the archive, with 8 bits a pixel",
-            Self::Pointer { .. } | Self::NoFragment { .. } => {
-                "fetch the file again: it is truncated or damaged"
-            }
-        }
-        .to_owned()
-    }
 }
 
 /// An image file whose label has been read and whose fragments have been found.

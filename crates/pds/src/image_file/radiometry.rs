@@ -9,7 +9,7 @@ use super::{
     strip::{LineState, Strip},
 };
 use areograph_base::{
-    error::{Cause, Kind, Result},
+    error::{Cause, Result},
     units::SECONDS_PER_MS,
 };
 
@@ -65,7 +65,8 @@ const RED: [f64; 3] = [27.676_58, 0.001_336_91, 0.123_262];
 const MAPPING_BEGAN: &str = "1999-04-03T01:00:40.441";
 
 /// An image that does not state its radiometric parameters.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Input: "extract the image without --calibrate")]
 enum NotCalibrated {
     #[error("{key} is {value:?}; expected {expected}")]
     Label {
@@ -77,16 +78,6 @@ enum NotCalibrated {
         "gain and offset change {changes} times within the image; the label has only those of its first line"
     )]
     Changes { changes: u16 },
-}
-
-impl Cause for NotCalibrated {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "extract the image without --calibrate".to_owned()
-    }
 }
 
 /// Radiometric parameters of an image.

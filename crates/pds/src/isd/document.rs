@@ -4,13 +4,15 @@ use std::fmt;
 
 use serde_json::Value;
 
-use areograph_base::error::{Cause, Kind};
+use areograph_base::error::Cause;
 
 /// Maximum number of characters of a value in a message.
 const SHOWN: usize = 60;
 
 /// Invalid support data.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Cause)]
+#[cause(Input: "regenerate the support data with the program that made them (ALE's isd_generate), or configure the \
+    image by label and kernels")]
 pub(super) enum IsdError {
     #[error("not image support data: {0}; expected a JSON document of one object")]
     NotJson(String),
@@ -24,18 +26,6 @@ pub(super) enum IsdError {
         value: String,
         expected: String,
     },
-}
-
-impl Cause for IsdError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "regenerate the support data with the program that made them (ALE's isd_generate), or configure the image by label and \
-         kernels"
-            .to_owned()
-    }
 }
 
 /// An object of a JSON document, and its location.

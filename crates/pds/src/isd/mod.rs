@@ -31,6 +31,7 @@ pub use self::{
     tables::{Rotations, States},
     target::ForeignBody,
 };
+use super::file_size::SizedFile;
 use areograph_base::{
     error::{IoError, Locate, Result},
     image::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN},
@@ -75,6 +76,8 @@ pub struct ImageSupport {
     pub target: Option<i64>,
     /// Name of the spacecraft.
     pub platform: String,
+    /// Identifier of the image, where it is stated.
+    pub identifier: Option<String>,
     /// Positions and rotations.
     pub tables: SupportTables,
 }
@@ -106,6 +109,7 @@ pub fn read_isd(path: &Path) -> Result<ImageSupport> {
         let max = BYTES_MAX;
         return Err(IsdError::TooLarge { bytes, max }).in_file(path);
     }
+    SizedFile::SupportData.require(path)?;
     let text = fs::read(path).map_err(IoError::on("read")).in_file(path)?;
     parse(&text).in_file(path)
 }
@@ -148,6 +152,8 @@ fn parse(text: &[u8]) -> Result<ImageSupport> {
         radii_m,
         target: target(&document)?,
         platform: document.text("name_platform")?.to_owned(),
+        // An identifier of another kind, as a number, names no product.
+        identifier: document.text("image_identifier").ok().map(str::to_owned),
         tables,
     })
 }

@@ -1,19 +1,16 @@
 //! Checks that support data belong to a body, and to its frame.
 
 use super::{ImageSupport, SupportTables};
-use areograph_base::{
-    body::Body,
-    error::{Cause, Kind},
-    time::Et,
-    units::METRES_PER_KM,
-};
+use areograph_base::{body::Body, error::Cause, time::Et, units::METRES_PER_KM};
 use areograph_geom::{attitude::rotation_vector, body_rotation::body_rotation};
 
 /// Tolerance of radii against those of the products' frame, metres: files round them to ten metres.
 const RADIUS_TOLERANCE_M: f64 = 10.0;
 
 /// Support data of another body.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Input: "leave the image out, or set body to that of its support data; the configuration expects {body} \
+    (body = \"{}\")", body.word())]
 pub enum ForeignBody {
     /// Identified by its code.
     #[error(
@@ -46,20 +43,6 @@ pub enum ForeignBody {
         /// Equatorial and polar radius of the other body, metres.
         radii_m: [f64; 2],
     },
-}
-
-impl Cause for ForeignBody {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        let (Self::Code { body, .. } | Self::Radii { body, .. }) = self;
-        format!(
-            "leave the image out, or set body to that of its support data; the configuration expects {body} (body = \"{}\")",
-            body.word()
-        )
-    }
 }
 
 impl ImageSupport {

@@ -14,7 +14,7 @@ use super::{
     chronology::{Misplaced, in_order, misplaced},
     foreign::{Foreign, label_records},
 };
-use areograph_base::error::{Cause, Error, IoError, Kind, Locate, Result};
+use areograph_base::error::{Cause, Error, IoError, Locate, Result};
 use areograph_store::files::file_name;
 
 /// A PEDR file in memory: all of it, or its head and some of its records.
@@ -51,41 +51,21 @@ const STEP: usize = 1_024;
 pub(super) type Chronology = Arc<BTreeMap<usize, Misplaced>>;
 
 /// A path that does not name a regular file.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("not a regular file")]
+#[cause(Input: "name PEDR files (AP#####v.B) in pedr.files, not folders or devices")]
 struct NotAFile;
 
-impl Cause for NotAFile {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "name PEDR files (AP#####v.B) in pedr.files, not folders or devices".to_owned()
-    }
-}
-
 /// A file without a valid record.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("no valid record: {why}")]
+#[cause(Input: "{}", foreign.map_or(
+    "fetch the file again if it is a PEDR file (AP#####v.B), else leave it out",
+    Foreign::advice,
+))]
 struct NoGoodRecord {
     why: String,
     foreign: Option<Foreign>,
-}
-
-impl Cause for NoGoodRecord {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        self.foreign
-            .map_or(
-                "fetch the file again if it is a PEDR file (AP#####v.B), else leave it out",
-                Foreign::advice,
-            )
-            .to_owned()
-    }
 }
 
 /// Opens a regular file.

@@ -1,11 +1,12 @@
 //! Physical values of a frame, as input of a writer.
 
 use super::SHOTS;
-use areograph_base::error::{Cause, Kind};
+use areograph_base::error::Cause;
 
 /// A value does not fit its field of the record.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, Cause)]
 #[error("{field} is {value}; expected {expected}")]
+#[cause(Input: "check the unit of the value: records are written from metres, radians and seconds")]
 pub struct EncodeError {
     /// The field.
     pub field: &'static str,
@@ -13,17 +14,6 @@ pub struct EncodeError {
     pub value: f64,
     /// Expected value.
     pub expected: String,
-}
-
-impl Cause for EncodeError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "check the unit of the value: records are written from metres, radians and seconds"
-            .to_owned()
-    }
 }
 
 /// A frame in metres, radians and seconds, for [`super::Record::from_frame`].

@@ -4,11 +4,7 @@ use std::path::Path;
 
 use super::{LABEL_BYTES, LABEL_RECORDS, RECORD_BYTES};
 use crate::label::{Label, LabelError, parse};
-use areograph_base::{
-    altimetry::DatumChoice,
-    body::Datum,
-    error::{Cause, Kind},
-};
+use areograph_base::{altimetry::DatumChoice, body::Datum, error::Cause};
 
 /// The parts of a name `AP#####v.B`, in upper or lower case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -181,15 +177,22 @@ fn datums_in(text: &str) -> Vec<Datum> {
 }
 
 /// The datum of a file is unknown, or its sources contradict each other.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, Cause)]
+#[cause(Input)]
 pub enum DatumError {
     /// Neither name nor label state it.
     #[error(
         "the datum is unknown: the file name has no version letter A to L and the label names no datum"
     )]
+    #[cause(
+        "set pedr.datum in the configuration (iau1991, iau1994 or iau2000), or restore the archive's file name"
+    )]
     Undecided,
     /// Two sources disagree.
     #[error("{first} implies {first_datum}, but {second} implies {second_datum}")]
+    #[cause(
+        "check whether the file was renamed or converted; version L is iau2000, earlier versions iau1991"
+    )]
     Contradiction {
         /// One source.
         first: DatumSource,
@@ -220,24 +223,6 @@ impl std::fmt::Display for DatumSource {
             Self::Label => formatter.write_str("the label"),
             Self::Configuration => formatter.write_str("pedr.datum in the configuration"),
         }
-    }
-}
-
-impl Cause for DatumError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Undecided => {
-                "set pedr.datum in the configuration (iau1991, iau1994 or iau2000), or restore the archive's file name"
-            }
-            Self::Contradiction { .. } => {
-                "check whether the file was renamed or converted; version L is iau2000, earlier versions iau1991"
-            }
-        }
-        .to_owned()
     }
 }
 

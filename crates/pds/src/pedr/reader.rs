@@ -23,7 +23,7 @@ use super::{
     file::Chronology,
     neighbours::NEIGHBOURS,
 };
-use areograph_base::error::{Cause, IoError, Kind, Locate, Result};
+use areograph_base::error::{Cause, IoError, Locate, Result};
 use areograph_store::files::Identity;
 
 /// Records that are searched for the first valid one.
@@ -56,7 +56,8 @@ pub struct Stretch {
 }
 
 /// A file that has changed since it was opened.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Input: "run again when no other program is writing to the PEDR files")]
 enum Changed {
     #[error("the file ended early while it was read: it had {0} bytes when it was opened")]
     Shorter(u64),
@@ -66,16 +67,6 @@ enum Changed {
     Removed,
     #[error("the file is being written")]
     Young,
-}
-
-impl Cause for Changed {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "run again when no other program is writing to the PEDR files".to_owned()
-    }
 }
 
 impl File {
@@ -380,6 +371,8 @@ fn read_at(handle: &fs::File, buffer: &mut [u8], from: u64, bytes: u64) -> Resul
 
 #[cfg(test)]
 mod tests {
+    use areograph_base::error::Kind;
+
     use super::*;
 
     #[test]

@@ -9,7 +9,7 @@ use std::{
 use super::{LABEL_BYTES, LABEL_RECORDS, RECORD_BYTES, Record};
 use areograph_base::{
     body::Datum,
-    error::{Cause, IoError, Kind, Locate, Result},
+    error::{Cause, IoError, Locate, Result},
 };
 
 /// Data set of every PEDR.
@@ -29,7 +29,8 @@ pub struct LabelInfo {
 }
 
 /// The label does not fit its format.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, Cause)]
+#[cause(Input: "shorten or correct the text that goes into the label")]
 pub(super) enum LabelError {
     /// A version that does not fit into four characters.
     #[error("software version is {0}; expected 0 to 9.99")]
@@ -44,16 +45,6 @@ pub(super) enum LabelError {
         /// Its text.
         text: String,
     },
-}
-
-impl Cause for LabelError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "shorten or correct the text that goes into the label".to_owned()
-    }
 }
 
 impl LabelInfo {

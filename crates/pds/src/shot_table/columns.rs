@@ -1,19 +1,20 @@
 //! Assignment of the columns of a table to quantities and units.
 
+use std::str::FromStr;
+
 use csv::StringRecord;
 
-use super::ShotTableError;
+use super::{ShotTableError, Utc};
 use areograph_base::{
     body::BodyModel,
-    error::Result,
     time::Et,
     units::{METRES_PER_KM, RADIANS_PER_DEGREE},
 };
 use areograph_geom::ellipsoid::{on_ellipsoid_m, spherical_to_xyz_m};
 
 /// Longitudes of either convention, and latitudes, degrees.
-const LONGITUDE_DEG: [f64; 2] = [-360.0, 720.0];
-const LATITUDE_DEG: [f64; 2] = [-90.0, 90.0];
+pub(super) const LONGITUDE_DEG: [f64; 2] = [-360.0, 720.0];
+pub(super) const LATITUDE_DEG: [f64; 2] = [-90.0, 90.0];
 
 /// The column of each quantity: its name in the first row, or its number, from 1.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -52,13 +53,13 @@ pub struct ShotColumns {
 #[derive(Debug, Clone)]
 pub(super) struct Field {
     /// Its key in the configuration, which ends in the unit.
-    key: &'static str,
+    pub(super) key: &'static str,
     /// Its position in a row, from 0.
-    at: usize,
+    pub(super) at: usize,
     /// Factor that converts its numbers to metres or radians.
-    scale: f64,
+    pub(super) scale: f64,
     /// Minimum and maximum of its numbers, as written.
-    limits: Option<[f64; 2]>,
+    pub(super) limits: Option<[f64; 2]>,
 }
 
 /// The columns of a table.
@@ -210,9 +211,7 @@ impl Fields {
         let Some(field) = &self.orbit else {
             return Ok(0);
         };
-        let text = field.text(record)?;
-        text.parse()
-            .map_err(|_| field.refused(text, "a whole number, not negative"))
+        field.whole(record)
     }
 }
 
@@ -236,7 +235,10 @@ pub(super) fn is_header(fields: &Fields, record: &StringRecord) -> bool {
 }
 
 impl Field {
-    fn text<'a>(&self, record: &'a StringRecord) -> std::result::Result<&'a str, String> {
+    pub(super) fn text<'a>(
+        &self,
+        record: &'a StringRecord,
+    ) -> std::result::Result<&'a str, String> {
         record.get(self.at).ok_or_else(|| {
             format!(
                 "the row has {} columns; expected {} in column {}",
@@ -247,12 +249,44 @@ impl Field {
         })
     }
 
-    fn refused(&self, text: &str, expected: &str) -> String {
+    pub(super) fn refused(&self, text: &str, expected: &str) -> String {
         format!(
             "{} (column {}) is \"{text}\"; expected {expected}",
             self.key,
             self.at + 1
         )
+    }
+
+    /// The whole number of a row, not negative.
+    pub(super) fn whole<N: FromStr>(
+        &self,
+        record: &StringRecord,
+    ) -> std::result::Result<N, String> {
+        let text = self.text(record)?;
+        let whole = text.parse().ok().filter(|_| text.parse::<u32>().is_ok());
+        let [_, most] = self.limits.unwrap_or([0.0, f64::MAX]);
+        let is_within = text.parse::<f64>().is_ok_and(|number| number <= most);
+        whole.filter(|_| is_within).ok_or_else(|| {
+            let expected = if most < 1e9 {
+                format!("a whole number from 0 to {most}")
+            } else {
+                "a whole number, not negative".to_owned()
+            };
+            self.refused(text, &expected)
+        })
+    }
+
+    /// The instant of a row that is written in UTC.
+    pub(super) fn instant(
+        &self,
+        record: &StringRecord,
+        utc: Utc<'_>,
+    ) -> std::result::Result<Et, String> {
+        let text = self.text(record)?;
+        utc(text).map_err(|failure| {
+            let expected = format!("UTC such as 2010-01-27T06:19:47.013 ({})", failure.cause);
+            self.refused(text, &expected)
+        })
     }
 
     /// The number of a row in metres or radians.
@@ -300,18 +334,13 @@ impl Time {
         &self,
         record: &StringRecord,
         limits_s: [f64; 2],
-        utc: &dyn Fn(&str) -> Result<Et>,
+        utc: Option<Utc<'_>>,
     ) -> std::result::Result<f64, String> {
-        match self {
-            Self::Et(field) => field.within(record, limits_s),
-            Self::Utc(field) => {
-                let text = field.text(record)?;
-                let et = utc(text).map_err(|failure| {
-                    let expected =
-                        format!("UTC such as 2010-01-27T06:19:47.013 ({})", failure.cause);
-                    field.refused(text, &expected)
-                })?;
-                Ok(et.seconds())
+        match (self, utc) {
+            (Self::Et(field), _) => field.within(record, limits_s),
+            (Self::Utc(field), Some(utc)) => Ok(field.instant(record, utc)?.seconds()),
+            (Self::Utc(field), None) => {
+                Err(field.refused(field.text(record)?, "leap seconds for times in UTC"))
             }
         }
     }

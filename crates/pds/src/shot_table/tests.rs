@@ -3,7 +3,7 @@
 use std::{fs::File, io::Write as _};
 
 use super::*;
-use areograph_base::units::RADIANS_PER_DEGREE;
+use areograph_base::{error::Kind, units::RADIANS_PER_DEGREE};
 
 /// Columns of a table by name.
 fn named() -> ShotColumns {
@@ -38,7 +38,8 @@ fn read(text: impl AsRef<[u8]>, columns: &ShotColumns) -> Result<Rows> {
         "2010-01-27" => Ok(Et::from_seconds(1.0)),
         _ => Err(ShotTableError::Empty.into()),
     };
-    read_shot_table(&path, columns, Body::Moon, &utc, |row| {
+    let columns = TableColumns::Assigned(columns.clone());
+    read_shot_table(&path, &columns, Body::Moon, Some(&utc), |row| {
         rows.push(row);
         Ok(())
     })?;
@@ -157,6 +158,17 @@ fn every_bad_row_is_told_with_its_line_and_the_good_ones_are_kept() {
         let complaint = row.as_ref().unwrap_err();
         assert_eq!((complaint.line, &*complaint.text), (line, expected));
     }
+}
+
+#[test]
+fn lines_with_ends_of_two_characters_are_counted() {
+    let rows = read(format!("{HEADER}\r\n\r\n{ROW}\r\nx\r\n"), &named()).unwrap();
+    let line = |row: &std::result::Result<ShotRow, RowComplaint>| match row {
+        Ok(row) => row.line,
+        Err(complaint) => complaint.line,
+    };
+    let lines: Vec<u32> = rows.iter().map(line).collect();
+    assert_eq!(lines, [3, 4]);
 }
 
 #[test]

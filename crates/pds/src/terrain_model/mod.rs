@@ -10,7 +10,7 @@ use self::keys::{GeoKeys, Map};
 use super::pixel_file::tiff_rows;
 use areograph_base::{
     body::Body,
-    error::{Cause, IoError, Kind, Locate as _, Result},
+    error::{Cause, IoError, Locate as _, Result},
 };
 use areograph_geom::height_grid::HeightGrid;
 
@@ -33,13 +33,22 @@ pub struct HeightsAbove {
 }
 
 /// Reason for the rejection of a terrain model.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, Cause)]
+#[cause(Input)]
 pub enum TerrainModelError {
     /// Its library rejects it, or a tag.
     #[error("{0}")]
+    #[cause(
+        "give a whole GeoTIFF of one band without compression, with LZW or with deflate (gdal_translate -co \
+         COMPRESS=DEFLATE), cut to the area needed (-projwin)"
+    )]
     Tiff(String),
     /// An error in its georeference.
     #[error("{what}: {found}; expected {expected}")]
+    #[cause(
+        "give heights over longitude and latitude or in an equirectangular map about a sphere, in degrees or metres: \
+         gdalwarp -t_srs '+proj=eqc +R=3396190 +units=m'"
+    )]
     Georeference {
         /// Which tag or key.
         what: &'static str,
@@ -50,6 +59,7 @@ pub enum TerrainModelError {
     },
     /// Too many cells.
     #[error("{rows} rows of {columns} cells; expected at most {CELLS_MAX} cells")]
+    #[cause(like = Tiff)]
     TooLarge {
         /// Rows.
         rows: u32,
@@ -58,10 +68,14 @@ pub enum TerrainModelError {
     },
     /// The radius is unknown.
     #[error("no key defines the reference sphere of its heights")]
+    #[cause("state it with --radius-m; Mars has models above 3396000 m and above 3396190 m")]
     NoRadius,
     /// Two different radii.
     #[error(
         "the sphere of its map has a radius of {of_file} m; the stated radius of the heights is {given} m"
+    )]
+    #[cause(
+        "leave --radius-m out, or add --heights-apart if heights refer to another sphere than the map"
     )]
     TwoRadii {
         /// By the file.
@@ -73,6 +87,7 @@ pub enum TerrainModelError {
     #[error(
         "the sphere has a radius of {found} m; expected that of {body}, {expected} m, within 2 %"
     )]
+    #[cause("give a model of this body, its radius in metres")]
     OtherBody {
         /// Its radius.
         found: f64,
@@ -85,6 +100,9 @@ pub enum TerrainModelError {
     #[error(
         "row {row}, column {column} (from 0) has the height {value}; expected metres within {HEIGHT_MAX_M} of the sphere"
     )]
+    #[cause(
+        "set the no-data value of the file (gdal_edit.py -a_nodata), and give heights in metres"
+    )]
     NoHeight {
         /// Row.
         row: usize,
@@ -95,38 +113,8 @@ pub enum TerrainModelError {
     },
     /// No cell has a height.
     #[error("none of its cells has a height")]
+    #[cause("check the file and its no-data value")]
     Empty,
-}
-
-impl Cause for TerrainModelError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Tiff(_) | Self::TooLarge { .. } => {
-                "give a whole GeoTIFF of one band without compression, with LZW or with deflate (gdal_translate -co COMPRESS=DEFLATE), \
-                 cut to the area needed (-projwin)"
-            }
-            Self::Georeference { .. } => {
-                "give heights over longitude and latitude or in an equirectangular map about a sphere, in degrees or metres: \
-                 gdalwarp -t_srs '+proj=eqc +R=3396190 +units=m'"
-            }
-            Self::NoRadius => {
-                "state it with --radius-m; Mars has models above 3396000 m and above 3396190 m"
-            }
-            Self::TwoRadii { .. } => {
-                "leave --radius-m out, or add --heights-apart if heights refer to another sphere than the map"
-            }
-            Self::OtherBody { .. } => "give a model of this body, its radius in metres",
-            Self::NoHeight { .. } => {
-                "set the no-data value of the file (gdal_edit.py -a_nodata), and give heights in metres"
-            }
-            Self::Empty => "check the file and its no-data value",
-        }
-        .to_owned()
-    }
 }
 
 /// Reads a terrain model of `body` into memory.

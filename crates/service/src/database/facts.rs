@@ -13,6 +13,17 @@ pub const SCHEDULE: &str = "schedule";
 /// The last instant at which a night was intended, milliseconds of UTC since 1970.
 pub const INTENDED_MS: &str = "intended_ms";
 
+/// Identity of the service, also in the folder of its products.
+pub const IDENTITY: &str = "identity";
+/// Present while the runs on the disk are not yet recorded in a new database.
+pub const RECOVERING: &str = "recovering";
+/// When the database was made again from the products, milliseconds of UTC since 1970; and the sites and runs found.
+pub const RECOVERED_MS: &str = "recovered_ms";
+/// See [`RECOVERED_MS`].
+pub const RECOVERED_SITES: &str = "recovered_sites";
+/// See [`RECOVERED_MS`].
+pub const RECOVERED_RUNS: &str = "recovered_runs";
+
 /// A value.
 ///
 /// # Errors
@@ -39,5 +50,14 @@ pub fn note(transaction: &Transaction<'_>, name: &str, value: &str) -> Stored<()
         "INSERT INTO fact (name, value) VALUES (?1, ?2) ON CONFLICT (name) DO UPDATE SET value = ?2",
         params![name, value],
     )?;
+    Ok(())
+}
+
+/// Removes a value.
+///
+/// # Errors
+/// SQLite errors.
+pub fn remove(transaction: &Transaction<'_>, name: &str) -> Stored<()> {
+    transaction.execute("DELETE FROM fact WHERE name = ?1", [name])?;
     Ok(())
 }

@@ -7,8 +7,10 @@ mod events;
 pub mod facts;
 pub mod files;
 mod jobs;
+pub mod losses;
 pub mod nights;
 pub mod runs;
+pub mod scrubs;
 pub mod service;
 pub mod shown;
 pub mod sites;
@@ -20,9 +22,10 @@ use std::{
     time::Duration,
 };
 
-use rusqlite::{Connection, OpenFlags, OptionalExtension as _, Transaction, TransactionBehavior};
+use rusqlite::{Connection, OpenFlags, Transaction, TransactionBehavior};
 
-use areograph_base::error::{Cause, IoError, Kind, Locate as _, Result};
+use crate::private::{create_file, create_folder};
+use areograph_base::error::{Cause, IoError, Locate as _, Result};
 
 pub use causes::{CauseKind, CauseRow, add_cause, causes};
 pub use events::{About, Event, append, events_after, newest_event};
@@ -34,7 +37,12 @@ pub use jobs::{
 /// Name of the database in the state folder.
 pub const DATABASE: &str = "areograph.db";
 /// Layout of the tables; a change raises it and adds a step to [`migrate`].
-const VERSION: i64 = 1;
+const VERSION: i64 = 2;
+/// Tables by which a database of the service is recognized.
+const OWN_TABLES: &str = "SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name IN ('service', 'run', 'site', 'token')";
+/// Step from layout 1: when the products of a run were last read, and how many of them do not match its manifest.
+const CHECKED_RUNS: &str = "ALTER TABLE run ADD COLUMN checked_ms INTEGER;
+    ALTER TABLE run ADD COLUMN damaged INTEGER NOT NULL DEFAULT 0;";
 const SCHEMA: &str = include_str!("schema.sql");
 /// Concurrent read connections; a request beyond them opens its own.
 const READERS: usize = 8;
@@ -48,63 +56,70 @@ pub struct Database {
 }
 
 /// Errors of the database.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 pub enum DatabaseError {
     /// An error of SQLite.
-    #[error("the database of the service: {0}")]
+    #[error("the database of the service: {}", plain(.0))]
+    #[cause(Io: "check the disk and the permissions of the state folder")]
     Sqlite(#[source] rusqlite::Error),
+    /// Another program holds a lock.
+    #[error("another program has locked the database")]
+    #[cause(Io: "end the program that has the database open, and start again")]
+    Locked,
+    /// There is no database.
+    #[error("there is no database")]
+    #[cause(Configuration: "start the service once, which creates it")]
+    Missing,
+    /// Something that is not a file has its name.
+    #[error("this is not a file; expected the database of the service")]
+    #[cause(Input: "make a database from the products, which moves it aside: areograph service rebuild")]
+    NotAFile,
+    /// A database without the tables or the layout of the service.
+    #[error("this is not a database of the service: {0}")]
+    #[cause(like = Damaged)]
+    Foreign(String),
     /// The file is damaged.
     #[error("the database is damaged: {0}")]
+    #[cause(Input: "put the newest copy from the folder copies in its place, or make a new one from the products: \
+        areograph service rebuild")]
     Damaged(String),
     /// A newer areograph wrote it.
     #[error("the database has layout {found}; this areograph supports layouts up to {VERSION}")]
+    #[cause(Input: "start the newer areograph, or put back a copy of its layout")]
     Newer {
         /// Its layout.
         found: i64,
     },
     /// A path that the database cannot store.
     #[error("the path {} is not UTF-8", .0.display())]
+    #[cause(Input: "give the file another name")]
     Path(PathBuf),
     /// The system has no random numbers.
     #[error("random numbers are not available: {0}")]
+    #[cause(Io: "check that the system has a source of random numbers")]
     NoRandom(String),
     /// An invalid transition of a job.
     #[error(transparent)]
+    #[cause(Bug: "this is a bug in areograph; please report it with the log")]
     Transition(#[from] WrongTransition),
 }
 
 impl From<rusqlite::Error> for DatabaseError {
     fn from(error: rusqlite::Error) -> Self {
-        use rusqlite::ErrorCode::{DatabaseCorrupt, NotADatabase};
+        use rusqlite::ErrorCode::{DatabaseBusy, DatabaseCorrupt, DatabaseLocked, NotADatabase};
         match error.sqlite_error_code() {
-            Some(DatabaseCorrupt | NotADatabase) => Self::Damaged(error.to_string()),
+            Some(DatabaseCorrupt | NotADatabase) => Self::Damaged(plain(&error)),
+            Some(DatabaseBusy | DatabaseLocked) => Self::Locked,
             _ => Self::Sqlite(error),
         }
     }
 }
 
-impl Cause for DatabaseError {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::Sqlite(_) | Self::NoRandom(_) => Kind::Io,
-            Self::Damaged(_) | Self::Newer { .. } | Self::Path(_) => Kind::Input,
-            Self::Transition(_) => Kind::Bug,
-        }
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Path(_) => "give the file another name",
-            Self::NoRandom(_) => "check that the system has a source of random numbers",
-            Self::Sqlite(_) => "check the disk of the state folder; the service tries again",
-            Self::Damaged(_) => {
-                "put the newest copy from the folder copies in its place, or make a new one from the products: \
-                 areograph service rebuild"
-            }
-            Self::Newer { .. } => "start the newer areograph, or put back a copy of its layout",
-            Self::Transition(_) => "this is a bug in areograph; please report it with the log",
-        }
-        .to_owned()
+/// The message without the statement that failed.
+fn plain(error: &rusqlite::Error) -> String {
+    match error {
+        rusqlite::Error::SqlInputError { msg, .. } => msg.clone(),
+        other => other.to_string(),
     }
 }
 
@@ -117,10 +132,17 @@ impl Database {
     /// # Errors
     /// [`DatabaseError`]; [`IoError`].
     pub fn open(folder: &Path) -> Result<Self> {
-        fs::create_dir_all(folder)
+        create_folder(folder)
             .map_err(IoError::on("create the folder"))
             .in_file(folder)?;
         let path = folder.join(DATABASE);
+        if fs::symlink_metadata(&path).is_ok() && !path.is_file() {
+            return Err(DatabaseError::NotAFile).in_file(path);
+        }
+        // Its log gets the same mode.
+        create_file(&path)
+            .map_err(IoError::on("create"))
+            .in_file(&path)?;
         let mut writer = connect(&path, OpenFlags::default()).in_file(&path)?;
         sound(&writer).in_file(&path)?;
         migrate(&mut writer, folder).in_file(&path)?;
@@ -129,6 +151,18 @@ impl Database {
             writer: Mutex::new(writer),
             readers: Mutex::new(Vec::new()),
         })
+    }
+
+    /// The same for a database that must exist.
+    ///
+    /// # Errors
+    /// As [`Self::open`]; there is none.
+    pub fn open_existing(folder: &Path) -> Result<Self> {
+        let path = folder.join(DATABASE);
+        if fs::symlink_metadata(&path).is_err() {
+            return Err(DatabaseError::Missing).in_file(path);
+        }
+        Self::open(folder)
     }
 
     /// Its path.
@@ -209,7 +243,10 @@ fn connect(path: &Path, flags: OpenFlags) -> Stored<Connection> {
 fn sound(connection: &Connection) -> Stored<()> {
     let found = connection
         .query_row("PRAGMA quick_check(1)", [], |row| row.get::<_, String>(0))
-        .map_err(|error| DatabaseError::Damaged(error.to_string()))?;
+        .map_err(|error| match DatabaseError::from(error) {
+            DatabaseError::Sqlite(error) => DatabaseError::Damaged(plain(&error)),
+            other => other,
+        })?;
     if found == "ok" {
         return Ok(());
     }
@@ -221,36 +258,51 @@ fn migrate(connection: &mut Connection, folder: &Path) -> Stored<()> {
     if found > VERSION {
         return Err(DatabaseError::Newer { found });
     }
+    let count = |sql| connection.query_row(sql, [], |row| row.get::<_, i64>(0));
+    let is_empty = count("SELECT count(*) FROM sqlite_schema")? == 0;
+    if found < 1 && !is_empty {
+        return Err(DatabaseError::Foreign(format!(
+            "its layout is {found}; expected 1 to {VERSION}"
+        )));
+    }
+    if found >= 1 && count(OWN_TABLES)? < 4 {
+        let why = "its tables are those of another program".to_owned();
+        return Err(DatabaseError::Foreign(why));
+    }
     if found == VERSION {
         return Ok(());
     }
-    let table = "SELECT name FROM sqlite_schema LIMIT 1";
-    let any: Option<String> = connection
-        .query_row(table, [], |row| row.get(0))
-        .optional()?;
-    if any.is_some() {
-        copy(
-            connection,
-            &folder.join(format!("before-layout-{VERSION}.db")),
-        )?;
+    if !is_empty {
+        let before = folder.join(format!("before-layout-{VERSION}.db"));
+        copy(connection, &before)?;
     }
     let transaction = connection.transaction()?;
-    if found < 1 {
-        transaction.execute_batch(SCHEMA)?;
+    match found {
+        1 => transaction.execute_batch(CHECKED_RUNS)?,
+        _ => transaction.execute_batch(SCHEMA)?,
     }
     transaction.pragma_update(None, "user_version", VERSION)?;
     transaction.commit()?;
     Ok(())
 }
 
+/// The copy is private; it contains hashes of tokens.
 fn copy(connection: &Connection, path: &Path) -> Stored<()> {
-    let path = path.to_string_lossy();
-    connection.execute("VACUUM INTO ?1", [&*path])?;
+    // SQLite copies into an empty file. It reports one that cannot be created.
+    let is_new = create_file(path).unwrap_or(false);
+    let text = path.to_string_lossy();
+    let copied = connection.execute("VACUUM INTO ?1", [&*text]);
+    if copied.is_err() && is_new {
+        let _ = fs::remove_file(path);
+    }
+    copied?;
     Ok(())
 }
 
 #[cfg(test)]
 mod tests {
+    use areograph_base::error::Kind;
+
     use super::*;
 
     #[test]
@@ -264,7 +316,7 @@ mod tests {
             .unwrap();
         drop(connection);
         let refused = Database::open(folder.path()).unwrap_err().to_string();
-        assert!(refused.contains("has layout 2"), "{refused}");
+        assert!(refused.contains("has layout 3"), "{refused}");
         let mut bytes = fs::read(&path).unwrap();
         bytes[4096..8192].fill(0xff);
         #[allow(clippy::disallowed_methods, reason = "a damaged file for a test")]
@@ -272,6 +324,86 @@ mod tests {
         let refused = Database::open(folder.path()).unwrap_err();
         assert_eq!(refused.kind(), Kind::Input);
         assert!(refused.to_string().contains("is damaged"), "{refused}");
+    }
+
+    #[test]
+    fn what_is_no_database_of_the_service_is_refused_without_sql_and_left_alone() {
+        let refused = |prepare: &dyn Fn(&Path)| {
+            let folder = tempfile::tempdir().unwrap();
+            prepare(&folder.path().join(DATABASE));
+            let refused = Database::open(folder.path()).unwrap_err();
+            let text = refused.to_string();
+            assert!(
+                !text.contains("CREATE") && !text.contains("SELECT"),
+                "{text}"
+            );
+            (refused.kind(), text)
+        };
+        let with = |sql: &'static str| {
+            move |path: &Path| Connection::open(path).unwrap().execute_batch(sql).unwrap()
+        };
+        for prepare in [
+            with("CREATE TABLE a (b)"),
+            with("CREATE TABLE a (b); PRAGMA user_version = 2"),
+        ] {
+            let (kind, text) = refused(&prepare);
+            assert_eq!(kind, Kind::Input, "{text}");
+            assert!(text.contains("not a database of the service"), "{text}");
+            assert!(text.contains("areograph service rebuild"), "{text}");
+        }
+        let (kind, text) = refused(&|path| {
+            drop(Database::open(path.parent().unwrap()).unwrap());
+            with("PRAGMA user_version = 0")(path);
+        });
+        assert_eq!(kind, Kind::Input, "{text}");
+        assert!(text.contains("its layout is 0; expected 1 to 2"), "{text}");
+        let (kind, text) = refused(&|path| fs::create_dir(path).unwrap());
+        assert_eq!(kind, Kind::Input, "{text}");
+        assert!(text.contains("this is not a file"), "{text}");
+        let folder = tempfile::tempdir().unwrap();
+        let missing = Database::open_existing(folder.path()).unwrap_err();
+        assert_eq!(missing.kind(), Kind::Configuration);
+        assert!(!folder.path().join(DATABASE).exists());
+    }
+
+    #[test]
+    fn a_database_of_layout_1_gets_the_present_one_after_a_copy() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(DATABASE);
+        drop(Database::open(folder.path()).unwrap());
+        let former = "ALTER TABLE run DROP COLUMN checked_ms; ALTER TABLE run DROP COLUMN damaged;
+            INSERT INTO fact VALUES ('a', 'b'); PRAGMA user_version = 1";
+        Connection::open(&path)
+            .unwrap()
+            .execute_batch(former)
+            .unwrap();
+        let database = Database::open(folder.path()).unwrap();
+        let found = database.read(|connection| {
+            connection.prepare("SELECT checked_ms, damaged FROM run")?;
+            let sql = "SELECT value FROM fact WHERE name = 'a'";
+            Ok(connection.query_row(sql, [], |row| row.get::<_, String>(0))?)
+        });
+        assert_eq!(found.unwrap(), "b");
+        assert!(folder.path().join("before-layout-2.db").is_file());
+    }
+
+    #[test]
+    fn the_database_and_its_copies_are_private() {
+        use std::os::unix::fs::PermissionsExt as _;
+        let folder = tempfile::tempdir().unwrap();
+        let state = folder.path().join("state");
+        let database = Database::open(&state).unwrap();
+        let copy = folder.path().join("copy.db");
+        database.copy_to(&copy).unwrap();
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
+        assert_eq!(mode(&state), 0o700);
+        for file in [
+            &state.join(DATABASE),
+            &state.join("areograph.db-wal"),
+            &copy,
+        ] {
+            assert_eq!(mode(file), 0o600, "{}", file.display());
+        }
     }
 
     #[test]

@@ -90,6 +90,22 @@ pub fn put_run(transaction: &Transaction<'_>, run: &RunRow) -> Stored<()> {
     Ok(())
 }
 
+/// Reserves the job numbers of runs on the disk, so that they are not reused.
+///
+/// # Errors
+/// SQLite errors.
+pub fn reserve_job(transaction: &Transaction<'_>, job: i64) -> Stored<()> {
+    transaction.execute(
+        "INSERT INTO sqlite_sequence (name, seq) SELECT 'job', 0 WHERE NOT EXISTS (SELECT 1 FROM sqlite_sequence WHERE name = 'job')",
+        [],
+    )?;
+    transaction.execute(
+        "UPDATE sqlite_sequence SET seq = max(seq, ?1) WHERE name = 'job'",
+        [job],
+    )?;
+    Ok(())
+}
+
 /// Records the current run of a site.
 ///
 /// # Errors
@@ -129,6 +145,82 @@ pub fn put_removed(transaction: &Transaction<'_>, run: &str, now_ms: i64) -> Sto
         params![run, now_ms],
     )?;
     Ok(())
+}
+
+/// Records when all products of a run were last read.
+///
+/// # Errors
+/// SQLite errors.
+pub fn put_checked(transaction: &Transaction<'_>, run: &str, now_ms: i64) -> Stored<()> {
+    transaction.execute(
+        "UPDATE run SET checked_ms = ?2 WHERE id = ?1",
+        params![run, now_ms],
+    )?;
+    Ok(())
+}
+
+/// Records how many products of a run do not match its manifest.
+///
+/// # Errors
+/// SQLite errors.
+pub fn put_damaged(transaction: &Transaction<'_>, run: &str, products: i64) -> Stored<()> {
+    transaction.execute(
+        "UPDATE run SET damaged = ?2 WHERE id = ?1",
+        params![run, products],
+    )?;
+    Ok(())
+}
+
+/// Whether the products of a run are kept.
+///
+/// # Errors
+/// SQLite errors.
+pub fn is_kept(connection: &Connection, run: &str) -> Stored<bool> {
+    let mut query =
+        connection.prepare_cached("SELECT 1 FROM run WHERE id = ?1 AND removed_ms IS NULL")?;
+    Ok(query.exists([run])?)
+}
+
+/// How many products of a run do not match its manifest, as far as known.
+///
+/// # Errors
+/// SQLite errors.
+pub fn damaged_products(connection: &Connection, run: &str) -> Stored<i64> {
+    let mut query = connection.prepare_cached("SELECT damaged FROM run WHERE id = ?1")?;
+    let found = query.query_row([run], |row| row.get(0)).optional()?;
+    Ok(found.unwrap_or(0))
+}
+
+/// A run whose products are to be read again.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DueRun {
+    /// Its identifier.
+    pub id: String,
+    /// Its site.
+    pub site: String,
+    /// BLAKE3 of its manifest.
+    pub manifest_blake3: String,
+}
+
+/// The run whose products were read longest ago, before `before_ms`; with `current` only among current runs of sites
+/// with a file.
+///
+/// # Errors
+/// SQLite errors.
+pub fn due_run(connection: &Connection, before_ms: i64, current: bool) -> Stored<Option<DueRun>> {
+    let mut query = connection.prepare_cached(
+        "SELECT id, site, manifest_blake3 FROM run WHERE removed_ms IS NULL AND coalesce(checked_ms, 0) < ?1
+         AND (NOT ?2 OR id IN (SELECT current_run FROM site WHERE enabled))
+         ORDER BY coalesce(checked_ms, 0), id LIMIT 1",
+    )?;
+    let found = query.query_row(params![before_ms, current], |row| {
+        Ok(DueRun {
+            id: row.get(0)?,
+            site: row.get(1)?,
+            manifest_blake3: row.get(2)?,
+        })
+    });
+    Ok(found.optional()?)
 }
 
 /// A run by its identifier.

@@ -88,6 +88,8 @@ CREATE TABLE run (
   reasons TEXT NOT NULL, because TEXT NOT NULL, stages TEXT NOT NULL,
   counts TEXT NOT NULL, figures TEXT NOT NULL, kernels TEXT NOT NULL,
   predecessor TEXT, moved TEXT, published_ms INTEGER NOT NULL, pinned INTEGER NOT NULL DEFAULT 0, removed_ms INTEGER,
+  -- When its products were last read, and how many of them do not match its manifest.
+  checked_ms INTEGER, damaged INTEGER NOT NULL DEFAULT 0,
   UNIQUE (job, attempt)
 ) STRICT;
 CREATE INDEX run_site ON run (site, published_ms);

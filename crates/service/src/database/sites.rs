@@ -77,6 +77,19 @@ pub fn disable_site(transaction: &Transaction<'_>, name: &str) -> Stored<()> {
     Ok(())
 }
 
+/// Records that a site has runs, and that its file has not been read.
+///
+/// # Errors
+/// SQLite errors.
+pub fn put_unread(transaction: &Transaction<'_>, name: &str) -> Stored<()> {
+    let note = "its runs were found on the disk; its site file has not been read yet";
+    transaction.execute(
+        "UPDATE site SET enabled = 0, last_note = ?2 WHERE name = ?1",
+        params![name, note],
+    )?;
+    Ok(())
+}
+
 /// The result of a comparison or plan of a site.
 #[derive(Debug, Clone, Default)]
 pub struct Checked<'a> {

@@ -1,13 +1,14 @@
 //! Reconciliation after a start: workers of an earlier service are ended, their publications are adopted, the rest is
 //! queued again. Links on the disk take precedence over the database.
 
-use rusqlite::Transaction;
+use std::path::Path;
+
 use serde_json::{Value, json};
 
 use super::{
     core::{Core, site_folder},
     ending::{Attempt, finish},
-    runs::{Published, current, finished_ms, read_run, row, run_id, tidy},
+    runs::{Published, current, finished_ms, identify_run, row, run_id, tidy},
     workers::Workers,
 };
 use crate::{
@@ -15,9 +16,10 @@ use crate::{
         Job, Stored, attempts,
         attempts::Attempt as AttemptRow,
         facts, jobs_in,
-        runs::{put_current, put_run, run},
+        runs::{put_current, put_run, reserve_job, run},
         sites::{SiteRow, sites},
     },
+    record::record,
     state::JobState,
     worker::{
         parent::{Ended, How},
@@ -38,9 +40,12 @@ const LOOK: std::time::Duration = std::time::Duration::from_millis(50);
 pub fn adopt<W: Workers>(core: &Core<W>) -> Result<()> {
     let state = core.shared.config().outputs.state.clone();
     adopt_jobs(core).in_file(&state)?;
-    for site in core.shared.read(sites).in_file(&state)? {
-        adopt_runs(core, &site)?;
+    let known = core.shared.read(sites).in_file(&state)?;
+    for site in &known {
+        core.shared.note_progress();
+        adopt_runs(core, site)?;
     }
+    adopt_sites(core, &known)?;
     new_version(core).in_file(&state)
 }
 
@@ -106,7 +111,7 @@ fn adopt_runs<W: Workers>(core: &Core<W>, site: &SiteRow) -> Result<()> {
         if known.in_file(&path)?.is_some() {
             continue;
         }
-        match read_run(&path) {
+        match identify_run(&path) {
             Ok(published) => note(core, &published).in_file(&path)?,
             Err(failure) => tracing::warn!("a run is not adopted: {failure}"),
         }
@@ -123,6 +128,29 @@ fn adopt_runs<W: Workers>(core: &Core<W>, site: &SiteRow) -> Result<()> {
         .in_file(&folder)
 }
 
+/// Records the runs of sites that the database does not know, as after a return to an old copy.
+fn adopt_sites<W: Workers>(core: &Core<W>, known: &[SiteRow]) -> Result<()> {
+    if core.shared.is_recovering() {
+        return Ok(());
+    }
+    let products = core.shared.config().outputs.products.clone();
+    let is_known = |name: &str| known.iter().any(|site| site.name == name);
+    let unknown = |folder: &Path| {
+        let name = folder.file_name().and_then(|name| name.to_str());
+        name.is_some_and(|name| !is_known(name))
+    };
+    let database = core.shared.database();
+    let found = record(database, &products, core.now_ms(), unknown, || false)?;
+    if let Some(found) = found.filter(|found| found.runs > 0) {
+        tracing::warn!(
+            "{} runs of {} unknown sites were found on the disk",
+            found.runs,
+            found.sites
+        );
+    }
+    Ok(())
+}
+
 fn note<W: Workers>(core: &Core<W>, published: &Published) -> Stored<()> {
     let published_ms = finished_ms(&published.manifest).unwrap_or_else(|| core.now_ms());
     let because = json!(["found on the disk when the service started"]);
@@ -135,24 +163,8 @@ fn note<W: Workers>(core: &Core<W>, published: &Published) -> Stored<()> {
     );
     core.shared.write(|transaction| {
         put_run(transaction, &run)?;
-        after_job(transaction, run.job)
+        reserve_job(transaction, run.job)
     })
-}
-
-/// Reserves the job numbers of runs on the disk, so that they are not reused.
-///
-/// # Errors
-/// SQLite errors.
-pub fn after_job(transaction: &Transaction<'_>, job: i64) -> Stored<()> {
-    transaction.execute(
-        "INSERT INTO sqlite_sequence (name, seq) SELECT 'job', 0 WHERE NOT EXISTS (SELECT 1 FROM sqlite_sequence WHERE name = 'job')",
-        [],
-    )?;
-    transaction.execute(
-        "UPDATE sqlite_sequence SET seq = max(seq, ?1) WHERE name = 'job'",
-        [job],
-    )?;
-    Ok(())
 }
 
 /// With another version of areograph every site is planned again.

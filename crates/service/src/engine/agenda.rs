@@ -25,6 +25,9 @@ pub(super) struct Agenda {
     /// Whether runs wait for comparison with their predecessors, and whether one is in progress.
     pub(super) to_compare: bool,
     pub(super) comparison: bool,
+    /// Whether a night ended whose check of products has not begun, and whether one is in progress.
+    pub(super) to_scrub: bool,
+    pub(super) scrub: bool,
     pub(super) has_room: bool,
 }
 

@@ -17,7 +17,7 @@ use crate::{
         About, DatabaseError, Job, Moved, Stored, advance, append,
         attempts::{AttemptEnd, end_attempt},
         causes, give_back, job,
-        runs::{RunRow, put_current, put_run},
+        runs::{RunRow, put_checked, put_current, put_run},
     },
     state::JobState,
     worker::{
@@ -231,6 +231,8 @@ fn after_run(
     run: &RunRow,
 ) -> Stored<(JobState, Moved)> {
     put_run(transaction, run)?;
+    // Its products were read for this.
+    put_checked(transaction, &run.id, now_ms)?;
     let about = About {
         site: Some(&run.site),
         job: Some(run.job),

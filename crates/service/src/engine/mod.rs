@@ -20,6 +20,7 @@ mod agenda;
 pub mod alerts;
 pub mod attempt;
 pub mod core;
+pub mod damage;
 pub mod diffs;
 pub mod disk;
 pub mod ending;

@@ -13,7 +13,7 @@ use crate::{
     database::runs::RunRow,
     worker::run_folder::{RUN_RECORD, RunRecord, remove},
 };
-use areograph_base::error::{Cause, IoError, Kind, Locate as _, Result};
+use areograph_base::error::{Cause, IoError, Locate as _, Result};
 use areograph_store::{
     atomic::sync_folder, manifest::Manifest, publish::MANIFEST, published::read_published,
 };
@@ -39,31 +39,38 @@ pub struct Published {
 }
 
 /// The folder contains another run than expected.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error(
     "this run belongs to job {job}, attempt {attempt}, and is named {run}; expected the run of its folder"
 )]
+#[cause(Input: "move the folder away; the site is run again")]
 struct Foreign {
     job: i64,
     attempt: i64,
     run: String,
 }
 
-impl Cause for Foreign {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "move the folder away; the site is run again".to_owned()
-    }
-}
+/// A manifest that differs from the one that was published.
+#[derive(Debug, thiserror::Error, Cause)]
+#[error("the manifest is not the one that was published")]
+#[cause(Input: "restore it from a copy, or move the folder of the run away")]
+struct Altered;
 
 /// Reads a run and checks every product against its manifest.
 ///
 /// # Errors
 /// It is incomplete, or belongs to another attempt; a disk error.
 pub fn read_run(folder: &Path) -> Result<Published> {
+    let published = identify_run(folder)?;
+    read_published(folder)?;
+    Ok(published)
+}
+
+/// Reads the manifest of a run, but no product.
+///
+/// # Errors
+/// It belongs to another attempt, or its manifest is not the one that was published; a disk error.
+pub fn identify_run(folder: &Path) -> Result<Published> {
     let path = folder.join(RUN_RECORD);
     let read = |path: &Path| fs::read(path).map_err(IoError::on("read")).in_file(path);
     let by: RunRecord = serde_json::from_slice(&read(&path)?)
@@ -75,12 +82,19 @@ pub fn read_run(folder: &Path) -> Result<Published> {
         } = by;
         return Err(Foreign { job, attempt, run }).in_file(folder);
     }
-    let manifest = read_published(folder)?;
-    let bytes = read(&folder.join(MANIFEST))?;
+    let path = folder.join(MANIFEST);
+    let bytes = read(&path)?;
+    let manifest_blake3 = blake3::hash(&bytes).to_hex().to_string();
+    if by.manifest_blake3 != manifest_blake3 {
+        return Err(Altered).in_file(path);
+    }
+    let manifest = serde_json::from_slice(&bytes)
+        .map_err(|error| IoError::on("read")(error.into()))
+        .in_file(path)?;
     Ok(Published {
         by,
         manifest,
-        manifest_blake3: blake3::hash(&bytes).to_hex().to_string(),
+        manifest_blake3,
     })
 }
 
@@ -103,8 +117,15 @@ pub fn current(site_folder: &Path) -> Option<String> {
 pub fn make_current(site_folder: &Path, run: &str) -> Result<()> {
     let fresh = site_folder.join(format!(".{CURRENT}-{run}"));
     let _ = fs::remove_file(&fresh);
-    symlink(PathBuf::from("runs").join(run), &fresh)
-        .and_then(|()| fs::rename(&fresh, site_folder.join(CURRENT)))
+    let place = site_folder.join(CURRENT);
+    // Only the service makes links here: another entry is not its own.
+    let is_free = fs::symlink_metadata(&place).map_or(Ok(()), |found| {
+        let foreign = || std::io::Error::from(std::io::ErrorKind::AlreadyExists);
+        found.is_symlink().then_some(()).ok_or_else(foreign)
+    });
+    is_free
+        .and_then(|()| symlink(PathBuf::from("runs").join(run), &fresh))
+        .and_then(|()| fs::rename(&fresh, place))
         .map_err(IoError::on("link"))
         .in_file(site_folder.join(CURRENT))?;
     sync_folder(site_folder);

@@ -6,7 +6,7 @@ use chrono::{DateTime, Utc};
 use chrono_tz::Tz;
 use croner::Cron;
 
-use areograph_base::error::{Cause, Kind};
+use areograph_base::error::Cause;
 use areograph_config::ScheduleConfig;
 
 /// Most instants examined: a cron of every minute over the longest time to catch up.
@@ -23,21 +23,12 @@ pub struct Schedule {
 }
 
 /// Fields without an instant.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Cause)]
 #[error("schedule.cron is `{cron}`: {reason}")]
+#[cause(Configuration: "give five fields as in `30 2 * * *` that match a future instant")]
 pub struct BadSchedule {
     cron: String,
     reason: String,
-}
-
-impl Cause for BadSchedule {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        "give five fields as in `30 2 * * *` that match a future instant".to_owned()
-    }
 }
 
 /// Due instants.

@@ -1,31 +1,47 @@
 //! Periodic checks: files are read again even if the file system reports no change, and products compared with their
 //! manifests.
 
-use std::{path::Path, sync::Arc, time::Duration};
+use std::{
+    path::Path,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
+use rusqlite::Connection;
 use serde_json::json;
+use tokio::time::sleep;
 
 use super::{
     core::{Core, runs},
+    damage::{Damage, Seen, check_run, note_check},
     retry::milliseconds,
     settle::hashes,
     workers::{Workers, words},
 };
 use crate::{
+    contents::Pace,
     database::{
-        About, Ask, CauseKind, CauseRow, Priority, Stored, active_job, append, ask, facts,
+        About, Stored, append,
         files::{FileRow, FileState, file, oldest_checked, put_file},
-        sites::sites,
+        jobs_in,
+        runs::{DueRun, due_run},
+        scrubs::ScrubPass,
     },
+    recover::is_own,
+    state::JobState,
     worker::protocol::What,
 };
+use areograph_config::ServiceConfig;
 use areograph_store::files::file_name;
-use areograph_store::published::read_published;
 
 /// Files read in one step.
 const STEP: u32 = 16;
 /// Longest time for a step.
 const LIMIT: Duration = Duration::from_mins(30);
+/// Longest time for the products after a night.
+const PASS_MAX: Duration = Duration::from_hours(1);
+/// Time between two looks whether sites still run.
+const PAUSE: Duration = Duration::from_secs(1);
 const SECONDS_PER_DAY: f64 = 86_400.0;
 
 /// Reads a few files again, those read longest ago. A file with changed content settles again.
@@ -89,66 +105,155 @@ pub async fn scrub_files<W: Workers>(core: &Arc<Core<W>>) -> Stored<()> {
     })
 }
 
-/// Compares the products of one site, the one checked longest ago, with their manifest; damaged ones are made again.
+/// Compares the products of one current run, the one read longest ago, with their manifest; damaged ones are made
+/// again.
 ///
 /// # Errors
 /// The database cannot be written.
 pub async fn scrub_products<W: Workers>(core: &Arc<Core<W>>) -> Stored<()> {
-    let Some(before_ms) = before_ms(core) else {
+    let Some(before_ms) = before_ms(core).filter(|_| products_are_there(core)) else {
         return Ok(());
     };
-    let next = core.shared.read(|connection| {
-        let mut next: Option<(i64, String, String)> = None;
-        for site in sites(connection)?.into_iter().filter(|site| site.enabled) {
-            let checked_ms = facts::number(connection, &fact(&site.name))?.unwrap_or(0);
-            let is_next = next
-                .as_ref()
-                .is_none_or(|(oldest_ms, ..)| checked_ms < *oldest_ms);
-            if let Some(run) = site.current_run.filter(|_| is_next) {
-                next = Some((checked_ms, site.name, run));
-            }
-        }
-        Ok(next.filter(|(checked_ms, ..)| *checked_ms < before_ms))
-    })?;
-    let Some((_, site, run)) = next else {
-        return Ok(());
-    };
-    let folder = runs(&core.shared.config().outputs.products, &site).join(&run);
-    let read = tokio::task::spawn_blocking(move || read_published(&folder)).await;
-    let now_ms = core.now_ms();
-    core.shared.write(|transaction| {
-        facts::note(transaction, &fact(&site), &now_ms.to_string())?;
-        let Ok(Err(failure)) = read else {
-            return Ok(());
-        };
-        if active_job(transaction, &site)?.is_some() {
-            return Ok(());
-        }
-        tracing::warn!(site, "{failure}");
-        let text = failure.to_string();
-        let text = text.lines().next().unwrap_or_default();
-        let cause = CauseRow::plain(CauseKind::ProductDamaged, text, now_ms);
-        let asked = Ask {
-            site: &site,
-            priority: Priority::Changed,
-            force: true,
-            night: None,
-            asked_by: None,
-            ready: true,
-            causes: &[cause],
-        };
-        ask(transaction, now_ms, &asked).map(|_| ())
-    })
+    let due = core
+        .shared
+        .read(|connection| due_run(connection, before_ms, true))?;
+    if let Some(run) = due {
+        scrub_run(core, &run, Seen::default()).await?;
+    }
+    Ok(())
 }
 
-fn fact(site: &str) -> String {
-    format!("scrubbed {site}")
+/// After a night: compares the products of all runs, those read longest ago first, with their manifests. It waits while
+/// sites run, and ends after an hour at the latest; the next night continues.
+///
+/// # Errors
+/// The database cannot be written.
+pub async fn scrub_runs<W: Workers>(core: &Arc<Core<W>>) -> Stored<()> {
+    let Some(before_ms) = before_ms(core).filter(|_| products_are_there(core)) else {
+        return Ok(());
+    };
+    let begun = Instant::now();
+    let mut pass = ScrubPass::default();
+    let mut seen = Seen::default();
+    loop {
+        let (busy, due) = core.shared.read(|connection| {
+            Ok((
+                is_at_work(connection)?,
+                due_run(connection, before_ms, false)?,
+            ))
+        })?;
+        let Some(run) = due else {
+            pass.complete = true;
+            break;
+        };
+        if core.shared.ending.is_cancelled() || begun.elapsed() > PASS_MAX {
+            break;
+        }
+        if busy {
+            sleep(PAUSE).await;
+            continue;
+        }
+        let Some(scrubbed) = scrub_run(core, &run, seen).await? else {
+            break;
+        };
+        seen = scrubbed.seen;
+        pass.runs += 1;
+        pass.damaged_runs += i64::from(scrubbed.damaged > 0);
+        pass.bytes += i64::try_from(scrubbed.bytes).unwrap_or(i64::MAX);
+    }
+    pass.ended_ms = core.now_ms();
+    if pass.damaged_runs > 0 || !pass.complete {
+        tracing::warn!("{}", pass.words());
+    } else {
+        tracing::info!("{}", pass.words());
+    }
+    core.shared.write(|transaction| pass.note(transaction))
+}
+
+/// Result of reading the products of a run.
+struct Scrubbed {
+    damaged: i64,
+    bytes: u64,
+    seen: Seen,
+}
+
+/// Reads the products of a run that were not `seen` in this check; `None` if the service ends.
+async fn scrub_run<W: Workers>(
+    core: &Arc<Core<W>>,
+    run: &DueRun,
+    mut seen: Seen,
+) -> Stored<Option<Scrubbed>> {
+    let config = core.shared.config();
+    let folder = runs(&config.outputs.products, &run.site).join(&run.id);
+    let (shared, manifest) = (Arc::clone(&core.shared), run.manifest_blake3.clone());
+    let mut pace = Pace::new(config.changes.scrub_mib_per_s);
+    let read = tokio::task::spawn_blocking(move || {
+        let stops = || shared.ending.is_cancelled();
+        let step = |bytes| pace.step(bytes, stops);
+        let check = check_run(&shared.contents, &folder, &manifest, &mut seen, step);
+        (check, pace.bytes(), seen, folder)
+    });
+    let (check, bytes, seen, folder) = match read.await {
+        Ok((Some(check), bytes, seen, folder)) => (check, bytes, seen, folder),
+        Ok((None, ..)) => return Ok(None),
+        Err(panicked) => {
+            tracing::error!("{panicked}");
+            return Ok(None);
+        }
+    };
+    if !folder.is_dir() {
+        // A run that is being removed is recorded as such a moment later.
+        sleep(PAUSE).await;
+    }
+    let now_ms = core.now_ms();
+    let damage = Damage {
+        site: &run.site,
+        run: &run.id,
+        products: check.damaged,
+        what: &check.what,
+    };
+    core.shared
+        .write(|transaction| note_check(transaction, &config, now_ms, &damage))?;
+    Ok(Some(Scrubbed {
+        damaged: check.damaged,
+        bytes,
+        seen,
+    }))
+}
+
+/// Whether the folder of products is the one of this service: without its disk, nothing is damaged.
+fn products_are_there<W: Workers>(core: &Core<W>) -> bool {
+    let products = core.shared.config().outputs.products.clone();
+    let own = core
+        .shared
+        .read(|connection| is_own(connection, &products))
+        .unwrap_or(false);
+    if !own {
+        tracing::warn!(
+            "{} is not the folder of products of this service: it is not read again",
+            products.display()
+        );
+    }
+    own
+}
+
+fn is_at_work(connection: &Connection) -> Stored<bool> {
+    let states = [JobState::Starting, JobState::Running, JobState::Cancelling];
+    for state in states {
+        if !jobs_in(connection, state)?.is_empty() {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 fn before_ms<W: Workers>(core: &Core<W>) -> Option<i64> {
-    let days = core.shared.config().changes.scrub_days;
-    (days > 0.0).then(|| {
-        core.now_ms()
-            .saturating_sub(milliseconds(days * SECONDS_PER_DAY))
-    })
+    due_before_ms(&core.shared.config(), core.now_ms())
+}
+
+/// What was last read before this instant is due to be read again; `None` if nothing ever is.
+#[must_use]
+pub fn due_before_ms(config: &ServiceConfig, now_ms: i64) -> Option<i64> {
+    let days = config.changes.scrub_days;
+    (days > 0.0).then(|| now_ms.saturating_sub(milliseconds(days * SECONDS_PER_DAY)))
 }

@@ -234,6 +234,8 @@ async fn probe_together<W: Workers>(
 fn is_of_kernel(ended: &Ended) -> bool {
     match (&ended.answer, &ended.how) {
         (Some(Ok(_)), _) => true,
+        // Its limit of memory ended it.
+        (Some(Err(_)), How::Signalled(_)) => false,
         (Some(Err(failure)), _) => {
             let of_machine = [Kind::Io, Kind::Interrupted].map(Kind::exit_code);
             !of_machine.contains(&failure.code)

@@ -29,7 +29,7 @@ use super::{
     retention::{copy_database, remove_runs, trim},
     retry::milliseconds,
     round::{Purpose, round},
-    scrub::{scrub_files, scrub_products},
+    scrub::{scrub_files, scrub_products, scrub_runs},
     sites::SiteBook,
     workers::Workers,
 };
@@ -44,6 +44,7 @@ use crate::{
         service::beat,
     },
     random::Random,
+    recover::recover,
     shared::Shared,
     state::JobState,
     worker::protocol::CancelWhy,
@@ -70,12 +71,14 @@ pub struct Engine<W> {
 }
 
 impl<W: Workers> Engine<W> {
-    /// Creates the engine of a service, after adoption of an earlier one's state.
+    /// Creates the engine of a service, after adoption of an earlier one's state. A lost database is first made again
+    /// from the products.
     ///
     /// # Errors
     /// The database or the folders of state and products cannot be read or written.
     pub fn new(shared: Arc<Shared>, workers: W, random: Random) -> Result<Self> {
         let state = shared.config().outputs.state.clone();
+        recover(&shared)?;
         let core = Arc::new(Core::new(shared, workers, random)?);
         adopt(&core)?;
         let open = core.shared.read(open_night).in_file(&state)?;
@@ -178,6 +181,7 @@ impl<W: Workers> Engine<W> {
         self.see_to_upkeep()?;
         self.see_to_jobs()?;
         self.see_to_comparisons();
+        self.see_to_products();
         self.see_to_letters()
     }
 
@@ -223,7 +227,10 @@ impl<W: Workers> Engine<W> {
             }
             Some(night) if compared => {
                 if end_done(&self.core, night)?.is_some() {
-                    self.agenda().night = None;
+                    {
+                        let mut agenda = self.agenda();
+                        (agenda.night, agenda.to_scrub) = (None, true);
+                    }
                     copy_database(&self.core)?;
                 }
             }
@@ -338,6 +345,24 @@ impl<W: Workers> Engine<W> {
         }
         let agenda = Arc::clone(&self.agenda);
         self.spawn(compare_runs, move |_| lock(&agenda).comparison = false);
+    }
+
+    /// After a night, products are read again.
+    fn see_to_products(&self) {
+        {
+            let mut agenda = self.agenda();
+            if !agenda.to_scrub || agenda.scrub {
+                return;
+            }
+            (agenda.to_scrub, agenda.scrub) = (false, true);
+        }
+        let agenda = Arc::clone(&self.agenda);
+        let scrubs = |core: Arc<Core<W>>| async move {
+            if let Err(error) = scrub_runs(&core).await {
+                tracing::error!("reading products again failed: {error}");
+            }
+        };
+        self.spawn(scrubs, move |_| lock(&agenda).scrub = false);
     }
 
     fn see_to_letters(&self) -> Stored<()> {

@@ -20,6 +20,8 @@ const READS: usize = 8;
 /// Concurrent streams of events.
 pub(super) const STREAMS: usize = 64;
 
+/// Time after which a request is worth repeating while a lost database is made again.
+const RECOVERY_S: u32 = 10;
 /// Concurrent workers for plans and searches.
 const WORKERS: usize = 2;
 
@@ -75,6 +77,17 @@ impl App {
             *kept = (config, hidden);
         }
         Arc::clone(&kept.1)
+    }
+
+    /// The answer to a request for a site or run that is unknown: while a lost database is made again, it may appear.
+    pub(super) fn unknown(&self, detail: &'static str) -> Problem {
+        if self.shared.is_recovering() {
+            return Problem::busy(
+                "The database is being made again from the products. Try again.",
+                RECOVERY_S,
+            );
+        }
+        Problem::not_found(detail)
     }
 
     /// Number of open streams of events.

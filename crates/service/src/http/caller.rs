@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     sessions::{Session, find_session, note_session},
-    tokens::{Role, find_token, note_use},
+    tokens::{Role, find_token, note_use, token_name},
 };
 use areograph_config::HttpConfig;
 
@@ -90,31 +90,15 @@ pub(super) async fn identify(
     }
 }
 
-/// The bearer of a token.
+/// The bearer of a token. A right token is accepted whatever else its address sends; wrong ones are limited.
 pub(super) async fn by_token(app: &App, text: &str, remote: IpAddr) -> Result<Caller, Problem> {
-    let key = Key::Failure(remote);
-    let now = std::time::Instant::now();
-    if let Err(wait_s) = app.rates.look(key.clone(), FAILURES, now) {
-        return Err(Problem {
-            retry_after_s: Some(wait_s),
-            ..Problem::new(
-                StatusCode::TOO_MANY_REQUESTS,
-                "Too many tokens from this address were refused. Wait.",
-            )
-        });
-    }
     let now_ms = app.now_ms();
     let shown: String = text.chars().take(TOKEN_MAX).collect();
     let found = app
         .read(move |connection| find_token(connection, now_ms, &shown))
         .await?;
     let Some(token) = found else {
-        let _ = app.rates.take(key, FAILURES, now);
-        tracing::warn!(remote = %remote, "token refused");
-        return Err(Problem::new(
-            StatusCode::UNAUTHORIZED,
-            "This token is unknown, expired or revoked.",
-        ));
+        return Err(refused(app, text, remote));
     };
     if token
         .used_ms
@@ -130,6 +114,32 @@ pub(super) async fn by_token(app: &App, text: &str, remote: IpAddr) -> Result<Ca
         token: Some(token.id),
         session: None,
     })
+}
+
+/// The answer to a wrong token: limited for each address, and for each token whose identifier it shows.
+fn refused(app: &App, text: &str, remote: IpAddr) -> Problem {
+    let now = std::time::Instant::now();
+    let address = app.rates.take(Key::Failure(remote), FAILURES, now);
+    let token = token_name(text).map(|id| Key::Token(id.to_owned()));
+    // A limited address adds no buckets of tokens.
+    let limited = match (address, token) {
+        (Ok(()), Some(key)) => app.rates.take(key, FAILURES, now),
+        (address, _) => address,
+    };
+    if let Err(wait_s) = limited {
+        return Problem {
+            retry_after_s: Some(wait_s),
+            ..Problem::new(
+                StatusCode::TOO_MANY_REQUESTS,
+                "Too many wrong tokens from this address, or for this token, were refused. Wait.",
+            )
+        };
+    }
+    tracing::warn!(remote = %remote, "token refused");
+    Problem::new(
+        StatusCode::UNAUTHORIZED,
+        "This token is unknown, expired or revoked.",
+    )
 }
 
 async fn by_session(

@@ -17,7 +17,7 @@ use super::{
     app::App,
     caller::{Caller, identify},
     problem::Problem,
-    rate::{Key, READS, WRITES},
+    rate::{Key, READS, Rate, WRITES},
 };
 use crate::tokens::PREFIX;
 
@@ -30,6 +30,8 @@ const TOKEN_PARAMETERS: [&str; 6] = [
     "auth",
     "authorization",
 ];
+/// Address of the form with a token.
+const LOGIN: &str = "/login";
 const FORWARDED_FOR: &str = "x-forwarded-for";
 const FORWARDED: &str = "forwarded";
 
@@ -61,7 +63,10 @@ async fn pass(app: &App, parts: &Parts) -> Result<Caller, Problem> {
     let remote = remote(headers, peer.ip(), &app.config().http.trusted_proxies);
     let caller = identify(app, headers, remote, direct).await?;
     let reads = matches!(parts.method, Method::GET | Method::HEAD);
-    limit(app, &caller, reads)?;
+    // A login is limited by its token: others at the address must not use up its rate.
+    if reads || uri.path() != LOGIN || caller.token.is_some() {
+        limit(app, &caller, reads)?;
+    }
     Ok(caller)
 }
 
@@ -186,6 +191,15 @@ fn limit(app: &App, caller: &Caller, reads: bool) -> Result<(), Problem> {
     } else {
         (Key::Write(name), WRITES)
     };
+    take(app, key, rate)
+}
+
+/// Limits the logins with a token.
+pub(super) fn limit_login(app: &App, token: &str) -> Result<(), Problem> {
+    take(app, Key::Write(token.to_owned()), WRITES)
+}
+
+fn take(app: &App, key: Key, rate: Rate) -> Result<(), Problem> {
     app.rates
         .take(key, rate, Instant::now())
         .map_err(|wait_s| Problem {

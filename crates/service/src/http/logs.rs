@@ -5,7 +5,8 @@ use std::{
     path::Path,
 };
 
-use super::{files::open_below, problem::Problem};
+use super::problem::Problem;
+use crate::contents::open_below;
 
 /// Bytes of a log in one page.
 pub(super) const PIECE: u64 = 256 << 10;
@@ -29,7 +30,7 @@ pub(super) fn log_piece(
 ) -> Result<LogPiece, Problem> {
     let path = Path::new(log);
     let below = path.strip_prefix(state).unwrap_or(path);
-    let Some(mut file) = open_below(state, below)? else {
+    let Some(mut file) = open_below(state, below).map_err(Problem::internal)? else {
         return Ok(LogPiece::default());
     };
     let bytes = file.metadata().map_err(Problem::internal)?.len();

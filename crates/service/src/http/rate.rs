@@ -38,7 +38,10 @@ pub(super) const FAILURES: Rate = Rate {
 pub(super) enum Key {
     Read(String),
     Write(String),
+    /// Wrong tokens of an address.
     Failure(IpAddr),
+    /// Wrong secrets of one token, by its identifier.
+    Token(String),
 }
 
 #[derive(Debug)]
@@ -63,32 +66,6 @@ pub(super) struct Rates(Mutex<HashMap<Key, Bucket>>);
 impl Rates {
     /// Takes one from a bucket; returns the seconds to wait when it is empty.
     pub(super) fn take(&self, key: Key, rate: Rate, now: Instant) -> Result<(), u32> {
-        self.with(key, rate, now, |bucket| {
-            if bucket.left < 1.0 {
-                return Err(wait_s(bucket));
-            }
-            bucket.left -= 1.0;
-            Ok(())
-        })
-    }
-
-    /// Seconds to wait if a bucket is empty.
-    pub(super) fn look(&self, key: Key, rate: Rate, now: Instant) -> Result<(), u32> {
-        self.with(key, rate, now, |bucket| {
-            if bucket.left < 1.0 {
-                return Err(wait_s(bucket));
-            }
-            Ok(())
-        })
-    }
-
-    fn with<T>(
-        &self,
-        key: Key,
-        rate: Rate,
-        now: Instant,
-        work: impl FnOnce(&mut Bucket) -> T,
-    ) -> T {
         let mut buckets = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if buckets.len() >= BUCKETS && !buckets.contains_key(&key) {
             buckets.retain(|_, bucket| {
@@ -106,7 +83,11 @@ impl Rates {
             rate,
         });
         bucket.fill(now);
-        work(bucket)
+        if bucket.left < 1.0 {
+            return Err(wait_s(bucket));
+        }
+        bucket.left -= 1.0;
+        Ok(())
     }
 }
 

@@ -19,6 +19,7 @@ use super::{
     process::{ProcessIdentity, signal_group},
     protocol::{Answer, Cancel, CancelWhy, Failure, Line, PROTOCOL, Task},
 };
+use areograph_base::error::Kind;
 
 /// Waiting times of the service's side, independent of the task.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -119,7 +120,7 @@ pub async fn work(
     mut cancel: watch::Receiver<Option<CancelWhy>>,
     mut heard: impl FnMut(Heard<'_>) + Send,
 ) -> Ended {
-    let mut worker = match Worker::start(program, limits, log).await {
+    let mut worker = match Worker::start(program, task.memory_mib, limits, log).await {
         Ok(worker) => worker,
         Err(error) => {
             return Ended {
@@ -174,7 +175,8 @@ struct Worker {
     lines: LineReader<BufReader<ChildStdout>>,
     /// Whether its standard output is open and valid.
     speaks: bool,
-    log: JoinHandle<std::io::Result<()>>,
+    log: JoinHandle<std::io::Result<bool>>,
+    memory_mib: u32,
     exit: JoinHandle<Option<ExitStatus>>,
     hello: bool,
     hello_by: Instant,
@@ -195,7 +197,12 @@ struct Ending {
 }
 
 impl Worker {
-    async fn start(program: &Path, limits: &WorkerLimits, log: &Path) -> std::io::Result<Self> {
+    async fn start(
+        program: &Path,
+        memory_mib: u32,
+        limits: &WorkerLimits,
+        log: &Path,
+    ) -> std::io::Result<Self> {
         let mut child = fork(program).await?;
         let pid = child.id();
         let (input, output, errors) =
@@ -217,6 +224,7 @@ impl Worker {
             lines: LineReader::new(BufReader::new(ChildStdout::from_std(output)?)),
             speaks: true,
             log: tokio::spawn(async move { log::copy(errors, &log, max_kib).await }),
+            memory_mib,
             exit,
             hello: false,
             hello_by: now + limits.times.hello,
@@ -339,8 +347,9 @@ impl Worker {
             }
         };
         let _ = timeout(drain, rest).await;
+        let mut refused_memory = false;
         match timeout(drain, &mut self.log).await {
-            Ok(Ok(Ok(()))) => {}
+            Ok(Ok(Ok(refused))) => refused_memory = refused,
             // The pipe is still open elsewhere, or the disk is full: the written part of the log is kept.
             Err(_) => self.log.abort(),
             Ok(failed) => tracing::warn!("the log of a worker was not kept: {failed:?}"),
@@ -353,11 +362,29 @@ impl Worker {
             _ if !self.hello => How::NoHello,
             _ => exited(status),
         };
+        if refused_memory && self.answer.is_none() && matches!(how, How::Signalled(_)) {
+            self.answer = Some(Err(out_of_memory(self.memory_mib)));
+        }
         Ended {
             how,
             answer: self.answer,
             rss_peak_kib: self.rss_peak_kib,
         }
+    }
+}
+
+/// The failure of a worker that aborted because its limit refused memory.
+fn out_of_memory(memory_mib: u32) -> Failure {
+    Failure {
+        code: Kind::Configuration.exit_code(),
+        busy: false,
+        site: None,
+        stage: None,
+        file: None,
+        text: format!(
+            "the worker needs more memory than workers.memory_mib = {memory_mib} allows; raise it, and restart or reload the \
+             service"
+        ),
     }
 }
 

@@ -3,10 +3,10 @@
 use std::{
     fs,
     os::unix::fs::MetadataExt as _,
-    path::{Path, PathBuf, absolute},
+    path::{Component, Path, PathBuf, absolute},
 };
 
-use areograph_base::error::{Cause, Kind, Locate, Result};
+use areograph_base::error::{Cause, Locate, Result};
 
 /// Identity of a file, independent of its names.
 #[derive(Debug, PartialEq, Eq)]
@@ -32,22 +32,13 @@ impl Place {
 }
 
 /// A file that would be overwritten.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Configuration: "give the file to write another name or folder")]
 enum Overwritten {
     #[error("would be written over the input {0}; expected a different file")]
     Input(PathBuf),
     #[error("would be written twice, also as {0}; expected a different file for each output")]
     Output(PathBuf),
-}
-
-impl Cause for Overwritten {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        "give the file to write another name or folder".to_owned()
-    }
 }
 
 /// Ensures that no file of `outputs` is one of `inputs` or another output, under any name or link. Files that do not
@@ -78,22 +69,44 @@ pub fn require_apart<'a>(
     Ok(())
 }
 
-/// An entry that a file would replace.
-#[derive(Debug, thiserror::Error)]
-#[error("is {0}; expected a file or a new path")]
-struct NotAFile(&'static str);
-
-impl Cause for NotAFile {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
+/// A path without links, `.` and `..`; parts that do not exist yet remain as they are written.
+#[must_use]
+pub fn real_path(path: &Path) -> PathBuf {
+    let path = if path.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        path
+    };
+    let whole = absolute(path).unwrap_or_else(|_| path.to_owned());
+    let mut missing = Vec::new();
+    for existing in whole.ancestors() {
+        if let Ok(real) = existing.canonicalize() {
+            return missing.into_iter().rev().fold(real, |mut path, part| {
+                match part {
+                    Component::ParentDir => drop(path.pop()),
+                    part => path.push(part),
+                }
+                path
+            });
+        }
+        missing.extend(existing.components().next_back());
     }
-
-    fn advice(&self) -> String {
-        "name a file in a folder: a file is written under a temporary name and then renamed, which would replace the existing \
-         entry"
-            .to_owned()
-    }
+    whole
 }
+
+/// Whether one of two folders is or holds the other, under any name or link.
+#[must_use]
+pub fn overlap(one: &Path, other: &Path) -> bool {
+    let (one, other) = (real_path(one), real_path(other));
+    one.starts_with(&other) || other.starts_with(&one)
+}
+
+/// An entry that a file would replace.
+#[derive(Debug, thiserror::Error, Cause)]
+#[error("is {0}; expected a file or a new path")]
+#[cause(Configuration: "name a file in a folder: a file is written under a temporary name and then renamed, which \
+    would replace the existing entry")]
+struct NotAFile(&'static str);
 
 /// Ensures that `path` is free or a regular file.
 ///
@@ -115,4 +128,25 @@ pub(super) fn require_replaceable(path: &Path) -> Result<()> {
         _ => "a device",
     };
     Err(NotAFile(what)).in_file(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_overlap_under_every_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        fs::create_dir_all(path("kernels/spk")).unwrap();
+        std::os::unix::fs::symlink(path("kernels"), path("linked")).unwrap();
+        assert!(overlap(
+            &path("kernels"),
+            &path("kernels/spk/../new/products")
+        ));
+        assert!(overlap(&path("linked/new"), &path("kernels")));
+        assert!(overlap(&path("kernels"), &path(".")));
+        assert!(!overlap(&path("kernels"), &path("kernels.new")));
+        assert!(!overlap(&path("kernels/spk"), &path("linked/spk/../new")));
+    }
 }

@@ -7,26 +7,42 @@ use std::{
 
 use tempfile::NamedTempFile;
 
-use super::outputs::require_replaceable;
+use super::{
+    outputs::require_replaceable,
+    own::{Mark, MarkAt, enlist, require_own},
+    partial::file_in,
+};
 use areograph_base::error::{IoError, Locate, Result};
-
-/// Prefix of the names of incomplete files.
-pub const TEMPORARY: &str = ".partial-";
 
 /// A file under a temporary name in its final folder; it is removed when dropped, unless it is finished.
 #[derive(Debug)]
 pub struct StagedFile {
     path: PathBuf,
+    /// How an earlier file under its name is recognised; `None` in folders of areograph itself.
+    mark: Option<Mark>,
     temporary: NamedTempFile,
 }
 
 impl StagedFile {
-    /// Creates the file `path`, and its folder if it is missing.
+    /// Creates the file `path`, and its folder if it is missing, in a folder whose files are all those of areograph.
     ///
     /// # Errors
     /// The folder cannot be created or written; another kind of entry has this name.
     pub fn create(path: &Path) -> Result<Self> {
         require_replaceable(path)?;
+        Self::staged(path, None)
+    }
+
+    /// The same at a path of the user, where an existing file is replaced only if it has this mark.
+    ///
+    /// # Errors
+    /// As [`Self::create`], and those of [`require_own`].
+    pub fn replacing(path: &Path, mark: Mark) -> Result<Self> {
+        require_own(path, &mark)?;
+        Self::staged(path, Some(mark))
+    }
+
+    fn staged(path: &Path, mark: Option<Mark>) -> Result<Self> {
         let folder = match path.parent() {
             Some(folder) if folder != Path::new("") => folder,
             _ => Path::new("."),
@@ -34,13 +50,12 @@ impl StagedFile {
         fs::create_dir_all(folder)
             .map_err(IoError::on("create the folder"))
             .in_file(folder)?;
-        let temporary = tempfile::Builder::new()
-            .prefix(TEMPORARY)
-            .tempfile_in(folder)
+        let temporary = file_in(folder)
             .map_err(IoError::on("create a file"))
             .in_file(folder)?;
         Ok(Self {
             path: path.to_owned(),
+            mark,
             temporary,
         })
     }
@@ -72,13 +87,21 @@ impl StagedFile {
     /// Flushes the file to the disk, makes it readable for everyone with access to the folder, and gives it its name.
     ///
     /// # Errors
-    /// The disk is full or refuses; an existing file of this name is then unchanged.
+    /// The disk is full or refuses, or a foreign file has received the name meanwhile; an existing file of this name is
+    /// then unchanged.
     pub fn finish(self) -> Result<()> {
         let file = self.temporary.as_file();
         let synced = file.sync_all().map_err(IoError::on("write"));
         synced.in_file(&self.path)?;
         let readable = make_readable(file).map_err(IoError::on("set permissions of"));
         readable.in_file(&self.path)?;
+        if let Some(mark) = &self.mark {
+            require_own(&self.path, mark)?;
+            if matches!(mark.at, MarkAt::List) {
+                // Before it has its name: a killed command leaves no file that the next one does not know.
+                enlist(&self.reader()?, &self.path)?;
+            }
+        }
         self.temporary
             .persist(&self.path)
             .map_err(|error| IoError::on("rename into place")(error.error))

@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::Called;
 use crate::files::{HashedFile, file_name};
-use areograph_base::error::{Cause, Kind};
+use areograph_base::error::Cause;
 
 /// Value of an input that an earlier stage has not made yet.
 const NOT_KNOWN_YET: &str = "not known yet";
@@ -86,19 +86,10 @@ impl Input for InOrder<'_, HashedFile> {
 }
 
 /// An output whose value was requested before it was made.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("the output of {0} was used before it was made")]
+#[cause(Bug: "this is a bug in areograph; please report it with the configuration")]
 pub(super) struct Pending(pub(super) String);
-
-impl Cause for Pending {
-    fn kind(&self) -> Kind {
-        Kind::Bug
-    }
-
-    fn advice(&self) -> String {
-        "this is a bug in areograph; please report it with the configuration".to_owned()
-    }
-}
 
 impl Inputs {
     /// The inputs of a stage whose method, or output layout, has this number.

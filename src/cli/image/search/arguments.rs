@@ -7,7 +7,7 @@ use clap::{ArgGroup, Args, ValueEnum};
 use crate::{
     cli::{numbers::above_to, windows::WindowArguments},
     config::{WindowConfig, built_in_instruments, load, require_outlines},
-    error::{Cause, Kind, Locate as _, Result},
+    error::{Cause, Locate as _, Result},
     instruments::Instrument,
     pds::image_index::IndexedImage,
     units::RADIANS_PER_DEGREE,
@@ -63,19 +63,10 @@ pub(in crate::cli::image) struct Arguments {
 }
 
 /// An unknown camera.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 #[error("unknown camera {0:?}; expected {known}", known = known_cameras())]
+#[cause(Configuration: "name one of them with --camera, or leave it out for all")]
 struct NoCamera(String);
-
-impl Cause for NoCamera {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        "name one of them with --camera, or leave it out for all".to_owned()
-    }
-}
 
 fn known_cameras() -> String {
     let ids: Vec<&str> = built_in_instruments()

@@ -7,9 +7,8 @@ use clap::{ArgGroup, Args, ValueEnum};
 use crate::{
     altimetry::ShotFilter,
     cli::{pedr::filter::FilterArguments, windows::WindowArguments},
-    error::{Cause, Error, Kind, Result},
+    error::{Cause, Error, Result},
     files::require_apart,
-    pds::archive::Source,
     products::RowsFormat,
     spice::{KernelSet, Session},
     time::{Et, Interval},
@@ -26,7 +25,7 @@ use crate::{
 #[command(verbatim_doc_comment)]
 #[command(group = ArgGroup::new("where").required(true).multiple(true).args(["boxes", "polygons", "windows"]))]
 pub(in crate::cli::pedr) struct Arguments {
-    /// PEDR files, and folders with .b files in and below them.
+    /// PEDR files, and folders with .b files in and below them; or tables of the Orbital Data Explorer's PEDR query.
     #[arg(required = true, value_name = "PATH")]
     pub(super) paths: Vec<PathBuf>,
     #[command(flatten)]
@@ -72,41 +71,27 @@ impl Format {
 }
 
 /// Errors of the command line.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Configuration)]
 pub(super) enum Usage {
     #[error("{0:?} is not a time interval")]
+    #[cause(
+        "write A..B with seconds past J2000 (-25000000..-24990000), or with UTC \
+         (1999-03-16T00:00:00..1999-03-17T00:00:00) and --leap-seconds"
+    )]
     Time(String),
     #[error("{0}; expected the extension .parquet, .csv or .geojson")]
+    #[cause("give --format, or name the file with one of these extensions")]
     Ending(String),
     #[error("{out}: the extension does not match --format {format}")]
+    #[cause("leave out --format, or name the file with the extension of this format")]
     OtherEnding { out: String, format: String },
     #[error("{0}: --format count only counts shots and writes no file")]
+    #[cause("leave out --out to print counts, or leave out --format to write shots")]
     Count(String),
     #[error("{0:?} is not a file; expected the values of a filter in one list")]
+    #[cause("separate values by commas (--classes 0,1), or repeat the filter for each value")]
     Value(String),
-}
-
-impl Cause for Usage {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Time(_) => {
-                "write A..B with seconds past J2000 (-25000000..-24990000), or with UTC (1999-03-16T00:00:00..1999-03-17T00:00:00) and --leap-seconds"
-            }
-            Self::Ending(_) => "give --format, or name the file with one of these extensions",
-            Self::OtherEnding { .. } => {
-                "leave out --format, or name the file with the extension of this format"
-            }
-            Self::Count(_) => {
-                "leave out --out to print counts, or leave out --format to write shots"
-            }
-            Self::Value(_) => "separate values by commas (--classes 0,1), or repeat the filter for each value",
-        }
-        .to_owned()
-    }
 }
 
 impl Arguments {
@@ -151,7 +136,7 @@ impl Arguments {
     ///
     /// # Errors
     /// An output is one of these files, or a file of windows or leap seconds.
-    pub(super) fn require_apart(&self, sources: &[Source], failures: &[Error]) -> Result<()> {
+    pub(super) fn require_apart(&self, read: &[&Path], failures: &[Error]) -> Result<()> {
         // The request is stored in a file beside the CSV.
         let beside = self.out.as_ref().map(|out| {
             let mut name = out.clone().into_os_string();
@@ -160,7 +145,6 @@ impl Arguments {
         });
         let is_csv = self.format()? == Some(RowsFormat::Csv);
         let outputs = self.out.iter().chain(beside.iter().filter(|_| is_csv));
-        let read = sources.iter().map(Source::path);
         let unread = failures
             .iter()
             .filter_map(|failure| failure.file.as_deref());
@@ -168,7 +152,7 @@ impl Arguments {
         let asked = asked.chain(self.leap_seconds.as_deref());
         require_apart(
             outputs.map(PathBuf::as_path),
-            read.chain(unread).chain(asked),
+            read.iter().copied().chain(unread).chain(asked),
         )
     }
 

@@ -15,8 +15,8 @@ use arrow_schema::SchemaRef;
 use super::Format;
 use crate::cli::output;
 use crate::{
-    error::{Cause, Kind, Locate as _, Result},
-    products::{RowsFormat, RowsWriter},
+    error::{Cause, Locate as _, Result},
+    products::{RowsFormat, RowsWriter, SQL},
     sql::{as_table, as_text, as_text_schema},
 };
 
@@ -24,34 +24,19 @@ use crate::{
 const TABLE_ROWS_MAX: usize = 1_000;
 
 /// Rows that cannot be written as requested.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Cause)]
 enum NotWritten {
     #[error("the answer cannot be written: {0}")]
+    #[cause(Io: "write the answer to a file (--out)")]
     Refused(String),
     #[error("has the extension {0:?}; expected parquet or csv")]
+    #[cause(Configuration: "name the file with one of these extensions")]
     Ending(String),
 }
 
 impl NotWritten {
     fn refused(error: impl std::fmt::Display) -> Self {
         Self::Refused(error.to_string())
-    }
-}
-
-impl Cause for NotWritten {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::Refused(_) => Kind::Io,
-            Self::Ending(_) => Kind::Configuration,
-        }
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Refused(_) => "write the answer to a file (--out)",
-            Self::Ending(_) => "name the file with one of these extensions",
-        }
-        .to_owned()
     }
 }
 
@@ -137,7 +122,7 @@ impl Answer {
             }
         };
         Ok(Self::Rows {
-            writer: RowsWriter::create(path, format, schema)?,
+            writer: RowsWriter::replacing(path, format, schema)?,
             format,
             is_gone: Arc::default(),
         })
@@ -168,10 +153,12 @@ impl Answer {
     }
 
     /// Ends the answer.
-    pub(super) fn finish(self) -> Result<()> {
+    ///
+    /// * `question` – the query, for the metadata of Parquet
+    pub(super) fn finish(self, question: &str) -> Result<()> {
         match self {
             Self::Table { schema, batches } => print_table(schema, &batches),
-            Self::Rows { writer, .. } => writer.finish(Vec::new()).map(drop),
+            Self::Rows { writer, .. } => writer.finish(vec![(SQL, question.to_owned())]).map(drop),
         }
     }
 }

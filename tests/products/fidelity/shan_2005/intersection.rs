@@ -4,7 +4,7 @@ use areograph::geom::uncertainty::ResidualMoments;
 
 use super::super::{
     pairs::Site,
-    row::{Account, Comparison, Row, fixed, number},
+    row::{Account, Comparison, Kind, Row, derived, fixed, number},
     table_2::TABLE_2,
 };
 
@@ -94,7 +94,7 @@ fn table(row: usize) -> Vec<Comparison> {
             3,
         );
         all.push(deviation.shown());
-        let skew = number(
+        let skew = derived(
             of("M y / M x of image "),
             fixed(printed.mean_y / printed.mean_x, 3),
             across.mean / along.mean,
@@ -111,25 +111,37 @@ fn sharing() -> Vec<Comparison> {
         let printed = (row.images[0].mean_x / row.images[1].mean_x).abs();
         let law =
             (first.sum / second.sum).powi(2) * second.line_spacing_m() / first.line_spacing_m();
-        let of = format!("{:?}", row.site);
-        number(of, fixed(printed, 3), law, 3).share(0.015)
+        let of = format!("{:?}, a law without the ranges", row.site);
+        derived(of, fixed(printed, 3), law, 3).share(0.015)
     });
     let rigorous = TABLE_5.iter().map(|row| {
         let pair = row.site.intersected();
         let [g1, g2] = pair.pixels_m();
         let [s1, s2] = pair.line_spacings_m();
         let printed = (row.images[0].mean_x / row.images[1].mean_x).abs();
-        let of = format!("{:?}, with the ranges", row.site);
-        number(of, fixed(printed, 3), (g1 / g2).powi(2) * s2 / s1, 3).shown()
+        let of = format!("{:?}, as areograph weights", row.site);
+        // The print has three digits.
+        derived(of, fixed(printed, 3), (g1 / g2).powi(2) * s2 / s1, 3).departs(0.03)
     });
     each.chain(rigorous).collect()
 }
 
 fn remarks() -> Vec<Comparison> {
     let first = &TABLE_5[0].images[0];
+    let others = TABLE_5[1..].iter().flat_map(|row| &row.images);
+    let elsewhere = others.map(|image| image.deviation_x).fold(0.0, f64::max);
     vec![
         number("x, px", "51", first.mean_x.abs() + first.deviation_x, 2).within(0.5),
         number("y, px", "4", first.mean_y.abs() + first.deviation_y, 2).within(0.5),
+        number("σ x of Eos, image 1, px", "17", first.deviation_x, 2).within(0.5),
+        number(
+            "σ x of Eos, image 2, px",
+            "10",
+            TABLE_5[0].images[1].deviation_x,
+            2,
+        )
+        .within(0.5),
+        number("largest σ x elsewhere, below, px", "1", elsewhere, 2).at_most(1.0),
     ]
 }
 
@@ -138,9 +150,10 @@ const FROM: &str = "circular orbits, emission angles of table 2 at the ground, a
 pub(super) static ROWS: [Row; 5] = [
     Row {
         id: "S05-49",
+        kind: Kind::ClosedLoop,
         place: "table 5",
         what: "reprojection residuals at Eos, 162 points",
-        account: Account::MetInPart {
+        account: Account::InPart {
             from: FROM,
             ours: || table(0),
         },
@@ -150,9 +163,10 @@ pub(super) static ROWS: [Row; 5] = [
     },
     Row {
         id: "S05-50",
+        kind: Kind::ClosedLoop,
         place: "table 5",
         what: "reprojection residuals at Gusev, 154 points",
-        account: Account::MetInPart {
+        account: Account::InPart {
             from: FROM,
             ours: || table(1),
         },
@@ -161,9 +175,10 @@ pub(super) static ROWS: [Row; 5] = [
     },
     Row {
         id: "S05-51",
+        kind: Kind::ClosedLoop,
         place: "table 5",
         what: "reprojection residuals at Isidis, 41 points",
-        account: Account::MetInPart {
+        account: Account::InPart {
             from: FROM,
             ours: || table(2),
         },
@@ -171,20 +186,23 @@ pub(super) static ROWS: [Row; 5] = [
     },
     Row {
         id: "S05-52",
+        kind: Kind::Arithmetic,
         place: "table 5",
         what: "how the images share the disagreement, |M x1 / M x2|",
-        account: Account::Met {
-            from: "(sum 1 / sum 2)² · line spacing 2 / line spacing 1",
+        account: Account::Explained {
+            from: "(pixel 1 / pixel 2)² · line spacing 2 / line spacing 1, pixels on the ground; for the law without ranges sums in \
+                   place of pixels",
             ours: sharing,
         },
-        note: "The print follows the law without the ranges; the rigorous one has the pixel's size on the ground. \
-               Ours stays rigorous.",
+        note: "The print follows a law that ignores the slant range, which is computed on this page alone. areograph weights in \
+               focal-plane pixels, whose size on the ground has the range; no `intersection.weighting` gives the print.",
     },
     Row {
         id: "S05-53",
+        kind: Kind::Arithmetic,
         place: "text on table 5",
-        what: "x up to 51 px, y about 4 px",
-        account: Account::Met {
+        what: "x up to 51 px, y about 4 px; σ x below 1 px but for Eos, 17 and 10",
+        account: Account::Agrees {
             from: "M + σ of table 5",
             ours: remarks,
         },

@@ -8,7 +8,7 @@ use areograph::{
 use nalgebra::{Matrix3, Vector3};
 
 use super::super::{
-    row::{Account, Comparison, Number, Row, beyond_reach, fixed, number},
+    row::{Account, Comparison, Kind, Number, Row, beyond_reach, derived, fixed, number},
     scene::Scene,
     table_2::TABLE_2,
 };
@@ -65,7 +65,7 @@ fn positions(image: usize, order: usize, claims: [Claim; 4]) -> Vec<Comparison> 
         let of = format!("order {order}, {name}, m");
         claims[axis](number(of, printed, ours_m[axis], decimals))
     });
-    let norm = number(
+    let norm = derived(
         format!("order {order}, length, m"),
         fixed(printed_m(image, order).norm(), 4),
         ours_m.norm(),
@@ -120,7 +120,7 @@ fn e04_01275() -> Vec<Comparison> {
     };
     let length_m = as_printed.position_rmse_m(1).norm();
     let of = "order 1, length with the 7424 lines of table 2, m";
-    all.push(number(of, fixed(printed_m(1, 1).norm(), 2), length_m, 2).shown());
+    all.push(derived(of, fixed(printed_m(1, 1).norm(), 2), length_m, 2).shown());
     all
 }
 
@@ -277,9 +277,10 @@ fn gain() -> Vec<Comparison> {
 pub(super) static ROWS: [Row; 11] = [
     Row {
         id: "S05-31",
+        kind: Kind::Evidence,
         place: "table 4",
         what: "RMSE of E02-02855",
-        account: Account::MetInPart {
+        account: Account::InPart {
             from: "circular orbit over the site, 31 samples, sum of squares over 31",
             ours: || sound(0, [TWO_PERCENT, TWO_PERCENT, TWO_PERCENT, ONE_PERCENT]),
         },
@@ -287,6 +288,7 @@ pub(super) static ROWS: [Row; 11] = [
     },
     Row {
         id: "S05-32",
+        kind: Kind::Evidence,
         place: "table 4",
         what: "order of the pointing angles",
         account: Account::Explained {
@@ -300,36 +302,41 @@ pub(super) static ROWS: [Row; 11] = [
     },
     Row {
         id: "S05-33",
+        kind: Kind::ClosedLoop,
         place: "table 4",
         what: "RMSE of E04-01275",
-        account: Account::MetInPart {
+        account: Account::InPart {
             from: "as S05-31, 8064 lines",
             ours: e04_01275,
         },
-        note: "The 7424 lines of table 2 give 9.7 m where 11.4 m are printed.",
+        note: "The number of lines is chosen by this row: the 7424 of table 2 give 9.7 m where 11.4 m follow from the print. \
+               Then the length is no evidence; how X, Y and Z share it is.",
     },
     Row {
         id: "S05-34",
+        kind: Kind::Evidence,
         place: "table 4",
         what: "RMSE of E02-00665",
-        account: Account::MetInPart {
+        account: Account::InPart {
             from: "as S05-31, the header's 10496 lines",
             ours: || sound(2, [SHOWN, HALF_A_METRE, SHOWN, ONE_PERCENT]),
         },
-        note: "",
+        note: "Pointing: S05-32.",
     },
     Row {
         id: "S05-35",
+        kind: Kind::Evidence,
         place: "table 4",
         what: "RMSE of E02-01453",
-        account: Account::MetInPart {
+        account: Account::InPart {
             from: "as S05-31",
             ours: || sound(3, [SHOWN, HALF_A_METRE, SHOWN, ONE_PERCENT]),
         },
-        note: "",
+        note: "Pointing: S05-32.",
     },
     Row {
         id: "S05-36",
+        kind: Kind::Evidence,
         place: "table 4",
         what: "RMSE of E02-01301",
         account: Account::Explained {
@@ -341,6 +348,7 @@ pub(super) static ROWS: [Row; 11] = [
     },
     Row {
         id: "S05-37",
+        kind: Kind::Evidence,
         place: "table 4",
         what: "RMSE of E02-02016",
         account: Account::Explained {
@@ -351,6 +359,7 @@ pub(super) static ROWS: [Row; 11] = [
     },
     Row {
         id: "S05-38",
+        kind: Kind::Constants,
         place: "sensor model",
         what: "samples: 30 equal intervals; polynomials of order 1 and 2",
         account: Account::Input {
@@ -362,6 +371,7 @@ pub(super) static ROWS: [Row; 11] = [
     },
     Row {
         id: "S05-39",
+        kind: Kind::Arithmetic,
         place: "text on table 4",
         what: "up to 29 m and 7″; then millimetres and at most 5″",
         account: Account::Explained {
@@ -372,9 +382,10 @@ pub(super) static ROWS: [Row; 11] = [
     },
     Row {
         id: "S05-40",
+        kind: Kind::Arithmetic,
         place: "text on table 4",
         what: "5″ on the ground",
-        account: Account::Met {
+        account: Account::Agrees {
             from: "380 km",
             ours: on_the_ground,
         },
@@ -382,6 +393,7 @@ pub(super) static ROWS: [Row; 11] = [
     },
     Row {
         id: "S05-41",
+        kind: Kind::Arithmetic,
         place: "text on table 4",
         what: "gain in pointing by the second order",
         account: Account::Explained {

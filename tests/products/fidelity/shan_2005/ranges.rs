@@ -1,6 +1,6 @@
 //! Table 3: range minus distance.
 
-use super::super::row::{Account, Comparison, Row, number};
+use super::super::row::{Account, Comparison, Kind, Row, number};
 
 /// Profile's image, shots, mean and standard deviation, metres.
 const TABLE_3: [(&str, u32, f64, f64); 6] = [
@@ -56,6 +56,7 @@ fn conclusions() -> Vec<Comparison> {
 pub(super) static ROWS: [Row; 3] = [
     Row {
         id: "S05-28",
+        kind: Kind::Evidence,
         place: "table 3",
         what: "range minus distance: shots, mean, standard deviation, m",
         account: Account::Data {
@@ -68,6 +69,7 @@ pub(super) static ROWS: [Row; 3] = [
     },
     Row {
         id: "S05-29",
+        kind: Kind::Arithmetic,
         place: "text on table 3",
         what: "standard deviations, means, single shots",
         account: Account::Explained {
@@ -78,6 +80,7 @@ pub(super) static ROWS: [Row; 3] = [
     },
     Row {
         id: "S05-30",
+        kind: Kind::Arithmetic,
         place: "conclusions",
         what: "off nadir to 25 m, nadir about 5 m",
         account: Account::Explained {

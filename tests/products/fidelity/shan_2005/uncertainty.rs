@@ -1,12 +1,13 @@
 //! Equations 5 to 9: how far the two footprints of one point lie apart.
 
 use areograph::geom::uncertainty::{
-    BudgetInput, GroundPart, PointUncertainty, UncertaintyBudget, uncertainty_budget,
+    BudgetInput, GroundPart, Misregistration, PairResiduals, PointUncertainty, UncertaintyBudget,
+    uncertainty_budget,
 };
 
 use super::{
     super::{
-        row::{Account, Comparison, Row, number},
+        row::{Account, Comparison, Kind, Row, derived, number},
         shan_2002,
         table_2::TABLE_2,
     },
@@ -19,8 +20,13 @@ const PIXEL_M: f64 = 4.4;
 /// The budget of the printed table 5.
 fn budget() -> UncertaintyBudget {
     uncertainty_budget(&BudgetInput {
-        sites: TABLE_5.map(|site| site.images).to_vec(),
-        mola_spacing_m: 325.0,
+        sites: TABLE_5
+            .map(|site| PairResiduals::of_images(site.images))
+            .to_vec(),
+        misregistration: Some(Misregistration {
+            mean_m: 325.0,
+            rms_m: 325.0,
+        }),
         pixel_size_m: PIXEL_M,
         height_over_base: 385.0 / 155.0,
     })
@@ -32,12 +38,39 @@ fn rounded(value: f64) -> f64 {
     (value * 10.0).round() / 10.0
 }
 
+/// Mean over the sites of the disagreement of the two means, which have opposite signs.
+fn means_apart_px() -> f64 {
+    let apart = TABLE_5.map(|site| (site.images[0].mean_x - site.images[1].mean_x).abs());
+    apart.iter().sum::<f64>() / 3.0
+}
+
 fn along() -> Vec<Comparison> {
-    vec![number("px", "41.0", budget().along_px, 3).between(40.982, 40.992)]
+    let budget = budget();
+    vec![
+        number("px", "41.0", budget.along_px, 3).between(40.982, 40.992),
+        derived(
+            "by eq. 5, means alone, px",
+            "not printed",
+            means_apart_px(),
+            1,
+        )
+        .shown(),
+        derived(
+            "by eq. 5, with the standard deviations, px",
+            "not printed",
+            budget.equation_5.along_px,
+            1,
+        )
+        .shown(),
+    ]
 }
 
 fn total() -> Vec<Comparison> {
-    vec![number("px", "74.0", budget().total_along_px, 2).within(0.2)]
+    vec![number("px", "74.0", total_px(&budget()), 2).within(0.2)]
+}
+
+fn total_px(budget: &UncertaintyBudget) -> f64 {
+    budget.total_along_px.unwrap()
 }
 
 fn ground() -> Vec<Comparison> {
@@ -46,10 +79,17 @@ fn ground() -> Vec<Comparison> {
         panic!("{budget:?}");
     };
     let with_roundings =
-        (budget.total_along_px.round().powi(2) - rounded(budget.along_px).powi(2)).sqrt();
+        (total_px(&budget).round().powi(2) - rounded(budget.along_px).powi(2)).sqrt();
     vec![
         number("with the paper's roundings, px", "61.6", with_roundings, 3).within(0.005),
         number("unrounded, px", "61.6", along_px, 2).shown(),
+        derived(
+            "with the means by eq. 5, px",
+            "not printed",
+            (total_px(&budget).round().powi(2) - means_apart_px().powi(2)).sqrt(),
+            1,
+        )
+        .shown(),
     ]
 }
 
@@ -92,6 +132,13 @@ fn plan() -> Vec<Comparison> {
             "180.8",
             budget.equation_7.planimetric_m,
             2,
+        )
+        .shown(),
+        derived(
+            "by eq. 5, m",
+            "not printed",
+            budget.equation_5.point.planimetric_m,
+            1,
         )
         .shown(),
     ]
@@ -148,25 +195,36 @@ fn height() -> Vec<Comparison> {
         number("unrounded, m", "30.8", budget.paper_average.height_m, 2).shown(),
         number("by eq. 7 across, px", "7.0", budget.equation_7.height_px, 2).shown(),
         number("by eq. 7 across, m", "30.8", budget.equation_7.height_m, 2).shown(),
+        derived(
+            "by eq. 5 across, m",
+            "not printed",
+            budget.equation_5.point.height_m,
+            1,
+        )
+        .shown(),
     ]
 }
 
 pub(super) static ROWS: [Row; 10] = [
     Row {
         id: "S05-54",
+        kind: Kind::Arithmetic,
         place: "eq. 7",
         what: "D_Δx(EO)",
-        account: Account::Met {
+        account: Account::Agrees {
             from: "table 5: squares averaged over the sites for each image, then added",
             ours: along,
         },
-        note: "Averages of D instead of its square give 40.7.",
+        note: "Averages of D instead of its square give 40.7. Eq. 7 adds the means of both images in quadrature. By the paper's own \
+               eq. 5, Δx = Δx1 − Δx2, means of opposite sign add up: 54.3, 49.8 and 59.8 px. This changes the conclusions that \
+               follow (S05-56, S05-58, S05-62).",
     },
     Row {
         id: "S05-55",
+        kind: Kind::Arithmetic,
         place: "text on eq. 6",
         what: "D_Δx(MOLA total)",
-        account: Account::Met {
+        account: Account::Agrees {
             from: "325 m over 4.4 m",
             ours: total,
         },
@@ -174,16 +232,19 @@ pub(super) static ROWS: [Row; 10] = [
     },
     Row {
         id: "S05-56",
+        kind: Kind::Arithmetic,
         place: "eq. 6",
         what: "D_Δx(MOLA)",
-        account: Account::Met {
+        account: Account::Agrees {
             from: "S05-54 and S05-55",
             ours: ground,
         },
-        note: "",
+        note: "The rest of one MOLA spacing, found by eye, after S05-54: with means of opposite sign added it is 49.9 px. An error of \
+               a footprint in plan moves both of its projections alike, so that the rest is no accuracy of MOLA.",
     },
     Row {
         id: "S05-57",
+        kind: Kind::Arithmetic,
         place: "eq. 7, across the track",
         what: "D_Δy(EO)",
         account: Account::Explained {
@@ -195,19 +256,22 @@ pub(super) static ROWS: [Row; 10] = [
     },
     Row {
         id: "S05-58",
+        kind: Kind::Arithmetic,
         place: "eq. 8",
         what: "D_p",
-        account: Account::Met {
+        account: Account::Agrees {
             from: "S05-54 and S05-57, 4.4 m",
             ours: plan,
         },
-        note: "The gap between the two footprints of one point, not a standard deviation of a point.",
+        note: "The gap between the two footprints of one point, not a standard deviation of a point. By eq. 5 it is larger: \
+               S05-54.",
     },
     Row {
         id: "S05-59",
+        kind: Kind::Arithmetic,
         place: "text on eq. 8",
         what: "mean pixel",
-        account: Account::Met {
+        account: Account::Agrees {
             from: "table 2",
             ours: mean_pixel,
         },
@@ -215,9 +279,10 @@ pub(super) static ROWS: [Row; 10] = [
     },
     Row {
         id: "S05-60",
+        kind: Kind::Arithmetic,
         place: "text on eq. 9",
         what: "height H and base B, across the track",
-        account: Account::Met {
+        account: Account::Agrees {
             from: "table 1 of Shan, Lee & Yoon 2002 (Eos)",
             ours: height_and_base,
         },
@@ -226,9 +291,10 @@ pub(super) static ROWS: [Row; 10] = [
     },
     Row {
         id: "S05-61",
+        kind: Kind::Arithmetic,
         place: "text on eq. 9",
         what: "H/B",
-        account: Account::Met {
+        account: Account::Agrees {
             from: "S05-60",
             ours: height_over_base,
         },
@@ -236,9 +302,10 @@ pub(super) static ROWS: [Row; 10] = [
     },
     Row {
         id: "S05-62",
+        kind: Kind::Arithmetic,
         place: "eq. 9",
         what: "D_h",
-        account: Account::Met {
+        account: Account::Agrees {
             from: "S05-57 and S05-61, 4.4 m",
             ours: height,
         },
@@ -246,6 +313,7 @@ pub(super) static ROWS: [Row; 10] = [
     },
     Row {
         id: "S05-63",
+        kind: Kind::Constants,
         place: "introduction, discussion",
         what: "results of others",
         account: Account::Cited {

@@ -4,6 +4,7 @@ mod inputs;
 mod nights;
 mod runs;
 mod sites;
+mod status;
 mod work;
 
 use rusqlite::Row;
@@ -13,6 +14,7 @@ pub use inputs::{KernelFile, RootFolder, kernel_by_hash, kernels, roots, used_by
 pub use nights::{Night, night, nights};
 pub use runs::{Run, pin_run, run, runs_of_job, runs_of_night, runs_of_site};
 pub use sites::{Site, count_sites, current_runs, site, site_file, sites};
+pub use status::{DamagedRun, DataStatus, DatabaseLoss, ProductStatus, Scrub, data_status};
 pub use work::{Attempt, Totals, attempts, jobs_of_night, last_complete_night_ms, totals};
 
 /// A column of JSON; invalid JSON stays text.

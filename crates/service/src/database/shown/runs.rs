@@ -49,6 +49,10 @@ pub struct Run {
     pub pinned: bool,
     /// When its products were removed because of their age.
     pub removed_utc: Option<Instant>,
+    /// When all its products were last compared with the manifest.
+    pub checked_utc: Option<Instant>,
+    /// Products that do not match the manifest, as far as known; they are withheld.
+    pub damaged: i64,
 }
 
 /// A run by its identifier.
@@ -132,5 +136,7 @@ fn read(row: &Row<'_>) -> rusqlite::Result<Run> {
         published_utc: row.get("published_ms")?,
         pinned: row.get("pinned")?,
         removed_utc: row.get("removed_ms")?,
+        checked_utc: row.get("checked_ms")?,
+        damaged: row.get("damaged")?,
     })
 }

@@ -9,6 +9,7 @@ use axum::{
     response::{IntoResponse as _, Response},
 };
 use tokio::io::{AsyncReadExt as _, AsyncSeekExt as _};
+use tokio_stream::StreamExt as _;
 use tokio_util::io::ReaderStream;
 
 use super::runs::find;
@@ -16,9 +17,10 @@ use crate::http::{
     app::{App, blocking},
     caller::Reader,
     extract::At,
-    files::{Product, difference as difference_page, product},
+    files::{Product, difference as difference_page, is_unwritten, product},
     problem::{Problem, ProblemDocument},
 };
+use areograph_store::files::Identity;
 
 /// Pages of products run no scripts and send nothing; their links to other products work.
 const POLICY: &str = "sandbox allow-same-origin allow-downloads; default-src 'none'; style-src 'unsafe-inline'; img-src data:";
@@ -31,7 +33,7 @@ const SHOWN: [&str; 4] = [
 ];
 
 /// A product of a run: `path` as in its manifest, or `manifest.json`. The tag is the BLAKE3 of the content; ranges are
-/// supported.
+/// supported. A product whose content does not have the hash of the manifest is withheld (409).
 #[utoipa::path(get, path = "/api/v1/runs/{run}/files/{*path}", tag = "runs", params(
     ("run" = String, Path, description = "Identifier of the run", pattern = "^[A-Za-z0-9_-]{1,64}$"),
     ("path" = String, Path, description = "Path of a product as in the manifest; may contain /"),
@@ -49,9 +51,7 @@ pub(super) async fn of_run(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let run = find(&app, &run).await?;
-    let config = app.config();
-    let found = blocking(move || product(&config.outputs.products, &run, &path)).await??;
-    give(found, &headers).await
+    give(product(&app, run, path).await?, &headers).await
 }
 
 /// The page that compares a run with its predecessor.
@@ -76,7 +76,11 @@ pub(super) async fn difference(
 }
 
 async fn give(product: Product, headers: &HeaderMap) -> Result<Response, Problem> {
-    let Product { file, entry } = product;
+    let Product {
+        file,
+        entry,
+        identity,
+    } = product;
     let etag = format!("\"{}\"", entry.blake3);
     if fits(headers, &header::IF_MATCH, &etag) == Some(false) {
         return Err(Problem::new(
@@ -88,9 +92,9 @@ async fn give(product: Product, headers: &HeaderMap) -> Result<Response, Problem
         StatusCode::NOT_MODIFIED.into_response()
     } else {
         match range(headers, &etag, entry.bytes) {
-            Wanted::Whole => part(file, 0, entry.bytes).await?,
+            Wanted::Whole => part(file, &identity, 0, entry.bytes).await?,
             Wanted::Part(first, last) => {
-                let mut answer = part(file, first, last - first + 1).await?;
+                let mut answer = part(file, &identity, first, last - first + 1).await?;
                 *answer.status_mut() = StatusCode::PARTIAL_CONTENT;
                 let range = format!("bytes {first}-{last}/{}", entry.bytes);
                 insert(&mut answer, header::CONTENT_RANGE, &range)?;
@@ -136,12 +140,25 @@ async fn give(product: Product, headers: &HeaderMap) -> Result<Response, Problem
     Ok(answer)
 }
 
-async fn part(file: std::fs::File, first: u64, bytes: u64) -> Result<Response, Problem> {
+/// A part of a file, which ends early, as an error, if the file is written meanwhile.
+async fn part(
+    file: std::fs::File,
+    identity: &Identity,
+    first: u64,
+    bytes: u64,
+) -> Result<Response, Problem> {
+    let (watched, before) = (file.try_clone().map_err(Problem::internal)?, *identity);
     let mut file = tokio::fs::File::from_std(file);
     file.seek(SeekFrom::Start(first))
         .await
         .map_err(Problem::internal)?;
     let stream = ReaderStream::with_capacity(file.take(bytes), 64 << 10);
+    let stream = stream.map(move |chunk| {
+        if is_unwritten(&watched, &before) {
+            return chunk;
+        }
+        Err(std::io::Error::other("the product was written meanwhile"))
+    });
     let mut answer = Body::from_stream(stream).into_response();
     answer
         .headers_mut()

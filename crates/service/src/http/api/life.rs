@@ -12,7 +12,10 @@ use utoipa::ToSchema;
 
 use super::answer::answer_with;
 use crate::{
-    database::shown::{count_sites, last_complete_night_ms, roots, totals},
+    database::shown::{
+        DataStatus, count_sites, data_status, last_complete_night_ms, roots, totals,
+    },
+    engine::scrub::due_before_ms,
     http::{
         app::{App, blocking},
         caller::Reader,
@@ -49,11 +52,13 @@ struct Readiness {
     roots: bool,
     /// Whether the configuration in force is that of the file.
     configuration: bool,
+    /// Whether the runs on the disk are recorded; not while a lost database is made again from the products.
+    runs: bool,
     /// When this was determined.
     at_utc: Instant,
 }
 
-/// Whether the service is operational: database, disks, folders of inputs, configuration.
+/// Whether the service is operational: database, disks, folders of inputs, configuration, records of runs.
 #[utoipa::path(get, path = "/readyz", tag = "life", security(()), responses(
     (status = 200, body = Readiness),
     (status = 503, body = Readiness, description = "The service is not operational"),
@@ -78,9 +83,10 @@ pub(super) async fn ready(State(app): State<Arc<App>>) -> Result<Response, Probl
         disk,
         roots: found.is_ok_and(|roots| roots.iter().all(|root| root.state != "unavailable")),
         configuration: app.shared.problem().is_none(),
+        runs: !app.shared.is_recovering(),
         at_utc: Instant(app.now_ms()),
     };
-    state.ready = state.database && state.disk && state.roots && state.configuration;
+    state.ready = state.database && state.disk && state.roots && state.configuration && state.runs;
     let status = if state.ready {
         StatusCode::OK
     } else {
@@ -95,17 +101,19 @@ pub(super) async fn ready(State(app): State<Arc<App>>) -> Result<Response, Probl
     (status = "4XX", body = ProblemDocument, content_type = "application/problem+json"),
 ))]
 pub(super) async fn metrics(_: Reader, State(app): State<Arc<App>>) -> Result<Response, Problem> {
-    let (totals, sites, night_ms, roots) = app
-        .read(|connection| {
+    let now_ms = app.now_ms();
+    let before_ms = due_before_ms(&app.config(), now_ms);
+    let (totals, sites, night_ms, roots, data) = app
+        .read(move |connection| {
             Ok((
                 totals(connection)?,
                 count_sites(connection)?,
                 last_complete_night_ms(connection)?,
                 roots(connection)?,
+                data_status(connection, before_ms)?,
             ))
         })
         .await?;
-    let now_ms = app.now_ms();
     let age_s =
         |then_ms: Option<i64>| then_ms.map_or(0.0, |then_ms| (now_ms - then_ms) as f64 / 1e3);
     let mut gauges: Vec<Gauge> = totals
@@ -161,6 +169,7 @@ pub(super) async fn metrics(_: Reader, State(app): State<Arc<App>>) -> Result<Re
             app.open_streams() as f64,
         ),
     ]);
+    gauges.extend(of_products(&data));
     if let Some(night_ms) = night_ms {
         let help = "End of the last complete night, seconds of UTC since 1970";
         gauges.push(plain(
@@ -173,4 +182,50 @@ pub(super) async fn metrics(_: Reader, State(app): State<Arc<App>>) -> Result<Re
     let form = HeaderValue::from_static(OPEN_METRICS);
     response.headers_mut().insert(header::CONTENT_TYPE, form);
     Ok(response)
+}
+
+/// Checks of products, and their results.
+fn of_products(data: &DataStatus) -> Vec<Gauge> {
+    let products = &data.products;
+    let plain = Gauge::plain;
+    let mut gauges = vec![
+        plain(
+            "runs_damaged",
+            "Runs with products that do not match the manifest",
+            products.runs_damaged as f64,
+        ),
+        plain(
+            "runs_scrub_due",
+            "Runs whose products were not read for longer than changes.scrub_days",
+            products.runs_due as f64,
+        ),
+    ];
+    if let Some(scrub) = &products.last_scrub {
+        gauges.extend([
+            plain(
+                "last_scrub_seconds",
+                "End of the last check of products after a night, seconds of UTC since 1970",
+                scrub.ended_utc.0 as f64 / 1e3,
+            ),
+            plain(
+                "last_scrub_runs",
+                "Runs whose products that check read",
+                scrub.runs as f64,
+            ),
+            plain("last_scrub_bytes", "Bytes that it read", scrub.bytes as f64),
+            plain(
+                "last_scrub_damaged_runs",
+                "Runs in which it found damaged products",
+                scrub.damaged_runs as f64,
+            ),
+        ]);
+    }
+    if let Some(loss) = &data.database_loss {
+        gauges.push(plain(
+            "database_lost_seconds",
+            "When a lost database was made again from the products, seconds of UTC since 1970",
+            loss.at_utc.0 as f64 / 1e3,
+        ));
+    }
+    gauges
 }

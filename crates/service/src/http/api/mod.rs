@@ -13,6 +13,7 @@ mod plans;
 mod runs;
 mod shots;
 mod sites;
+mod status;
 
 use std::sync::Arc;
 
@@ -93,6 +94,7 @@ fn described() -> OpenApiRouter<Arc<App>> {
         .routes(routes!(nights::one))
         .routes(routes!(kernels::list))
         .routes(routes!(kernels::one))
+        .routes(routes!(status::status))
         .routes(routes!(life::healthy))
         .routes(routes!(life::ready))
         .routes(routes!(life::metrics))

@@ -87,5 +87,5 @@ pub(super) async fn pin_one(
 pub(super) async fn find(app: &App, id: &str) -> Result<Run, Problem> {
     let wanted = name(id)?.to_owned();
     let found = app.read(move |connection| run(connection, &wanted)).await?;
-    found.ok_or_else(|| Problem::not_found("There is no such run."))
+    found.ok_or_else(|| app.unknown("There is no such run."))
 }

@@ -12,18 +12,22 @@ use serde::Deserialize;
 use tokio_util::io::ReaderStream;
 use utoipa::{IntoParams, ToSchema};
 
+use super::runs::find;
 use crate::{
     database::shown::current_runs,
     http::{
         app::App,
         caller::Reader,
         extract::{Asked, body_of, json},
+        files::require_whole,
         problem::{Problem, ProblemDocument},
         work::{ask, place},
     },
     worker::protocol::{Answer, What},
 };
 
+/// The product that is searched.
+const FOOTPRINTS: &str = "footprints.parquet";
 /// Most rows of an answer.
 const ROWS: u64 = 1_000_000;
 /// Most corners of a polygon.
@@ -68,7 +72,7 @@ pub(super) struct Polygon {
     coordinates: Vec<Vec<[f64; 2]>>,
 }
 
-/// Shots of the current runs in a box. The header Areograph-Complete states whether they are complete, or limited to
+/// Shots of the current runs in a box; refused (409) while footprints of one of them are damaged. The header Areograph-Complete states whether they are complete, or limited to
 /// the 1,000,000 rows of an answer.
 #[utoipa::path(get, path = "/api/v1/shots", tag = "shots", params(BoxWanted), responses(
     (status = 200, content(
@@ -175,6 +179,12 @@ async fn search(
     let (media, form) = form(headers)?;
     let place = place(app)?;
     let runs = app.read(current_runs).await?;
+    for (_, id) in &runs {
+        // A current run that the database does not know is refused by the worker.
+        if let Ok(run) = find(app, id).await {
+            require_whole(app, run, FOOTPRINTS).await?;
+        }
+    }
     let config = app.config();
     let products = &config.outputs.products;
     let runs: Vec<PathBuf> = runs

@@ -67,7 +67,7 @@ pub(super) async fn current(
     let found = find(&app, &site).await?;
     let run = found
         .current_run
-        .ok_or_else(|| Problem::not_found("This site has no valid run yet."))?;
+        .ok_or_else(|| app.unknown("This site has no valid run yet."))?;
     if !path
         .bytes()
         .all(|byte| byte.is_ascii_graphic() && !b"%?#\\".contains(&byte))
@@ -84,5 +84,5 @@ pub(super) async fn find(app: &App, site_name: &str) -> Result<Site, Problem> {
     let found = app
         .read(move |connection| site(connection, &wanted))
         .await?;
-    found.ok_or_else(|| Problem::not_found("There is no such site."))
+    found.ok_or_else(|| app.unknown("There is no such site."))
 }

@@ -17,6 +17,7 @@ use crate::{
         app::App,
         caller::{Known, by_token, cookie_name},
         extract::{Asked, Filled},
+        guard::limit_login,
         problem::Problem,
     },
     sessions::{LIFE_MS, close_session, open_session},
@@ -67,6 +68,7 @@ pub(super) async fn enter(
     Filled(entry): Filled<Entry>,
 ) -> Result<Response, Problem> {
     let bearer = by_token(&app, entry.token.trim(), caller.remote).await?;
+    limit_login(&app, &bearer.name())?;
     let (now_ms, earlier) = (app.now_ms(), caller.session);
     let reference = app
         .write(move |transaction| {

@@ -1,5 +1,6 @@
 //! Pages for people: complete without the script, which only keeps them up to date.
 
+mod data;
 mod jobs;
 mod kernels;
 pub(super) mod layout;

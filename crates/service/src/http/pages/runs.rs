@@ -96,7 +96,9 @@ fn run_lead(run: &Run, causes: &[CauseRow], manifest: Option<&Manifest>, times: 
                 " by " a href={ "/jobs/" (run.job) } { "job " (run.job) } ", attempt " (run.attempt) ", areograph " (run.version) "."
                 @if let Some(before) = &run.predecessor { " Previous run: " a href={ "/runs/" (before) } { (before) } "." }
                 @if let Some(removed) = run.removed_utc { " Its products were removed " (times.at(removed)) "." }
+                @else if let Some(checked) = run.checked_utc { " Its products were last read " (times.age(checked)) "." }
             }
+            @if run.damaged > 0 { p { "Products that do not match the manifest, and are withheld: " (run.damaged) "." } }
             (said(&sentences(&run.reasons)))
             @for because in sentences(&run.because) { p { "Because: " (prose(&because)) } }
         @for cause in causes { @if !cause.detail.is_empty() { p { "Because: " (prose(&cause.detail)) } } }

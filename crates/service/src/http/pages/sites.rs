@@ -11,6 +11,7 @@ use maud::{Markup, html};
 use serde::Deserialize;
 
 use super::{
+    data::{attention, last_scrub},
     layout::{Page, form_token, operator},
     map::map,
     parts::{
@@ -22,8 +23,12 @@ use super::{
 use crate::{
     database::{
         JobFilter, jobs,
-        shown::{Night, RootFolder, Run, Site, nights, roots, runs_of_site, site, sites},
+        shown::{
+            DataStatus, Night, RootFolder, Run, Site, data_status, nights, roots, runs_of_site,
+            site, sites,
+        },
     },
+    engine::scrub::due_before_ms,
     http::{
         app::App,
         caller::{Caller, Reader},
@@ -54,7 +59,8 @@ pub(super) async fn home(
     Asked(from): Asked<From>,
 ) -> Result<Response, Problem> {
     let after = from.after.unwrap_or_default();
-    let (found, roots, nights, work) = app
+    let before_ms = due_before_ms(&app.config(), app.now_ms());
+    let (found, roots, nights, work, data) = app
         .read(move |connection| {
             let mut work = Vec::new();
             for state in [
@@ -74,6 +80,7 @@ pub(super) async fn home(
                 roots(connection)?,
                 nights(connection, None, 1)?,
                 work,
+                data_status(connection, before_ms)?,
             ))
         })
         .await?;
@@ -81,8 +88,13 @@ pub(super) async fn home(
     let shown = &found[..found.len().min(SITES as usize)];
     let next = (found.len() > shown.len())
         .then(|| shown.last().map(|site| format!("/?after={}", site.name)));
+    let faults = Faults {
+        configuration: app.shared.problem(),
+        recovering: app.shared.is_recovering(),
+        data: &data,
+    };
     let body = html! {
-        div id="state" data-live="" { (standing(shown, &roots, app.shared.problem().as_deref(), &times)) }
+        div id="state" data-live="" { (standing(shown, &roots, &faults, &times)) }
         section {
             h2 { "Map" }
             div id="map" data-live="" { (map(shown)) }
@@ -94,7 +106,7 @@ pub(super) async fn home(
         }
         section {
             h2 { "Last night" }
-            div id="night" data-live="" { (last_night(nights.first(), &times)) }
+            div id="night" data-live="" { (last_night(nights.first(), &times)) (last_scrub(&data.products, &times)) }
         }
         section {
             h2 { "Work" }
@@ -108,8 +120,16 @@ pub(super) async fn home(
     .answer(&app, &caller, &body))
 }
 
+/// Faults of the service itself.
+struct Faults<'a> {
+    configuration: Option<String>,
+    recovering: bool,
+    data: &'a DataStatus,
+}
+
 /// The box at the top: what needs attention.
-fn standing(sites: &[Site], roots: &[RootFolder], problem: Option<&str>, times: &Times) -> Markup {
+fn standing(sites: &[Site], roots: &[RootFolder], faults: &Faults<'_>, times: &Times) -> Markup {
+    let problem = faults.configuration.as_deref();
     let count = |wanted: &str| {
         sites
             .iter()
@@ -134,6 +154,8 @@ fn standing(sites: &[Site], roots: &[RootFolder], problem: Option<&str>, times: 
         || !wrong.is_empty()
         || refused > 0
         || count("invalid") > 0
+        || faults.recovering
+        || faults.data.products.runs_damaged > 0
     {
         "invalid"
     } else if stale > 0 || count("none") > 0 {
@@ -153,6 +175,7 @@ fn standing(sites: &[Site], roots: &[RootFolder], problem: Option<&str>, times: 
             ul {
                 @for root in &away { li { "The folder " code { (root.path) } " is not available since " (times.at(root.since_utc)) ": " (root.detail) ". Its sites are held; nothing is lost." } }
                 @if let Some(problem) = problem { li { "The changed configuration was rejected; the old one remains in force: " (problem) } }
+                (attention(faults.data, faults.recovering))
                 @for site in &wrong { li { a href={ "/sites/" (site.name) } { (site.name) } ": " (site.problem.as_deref().unwrap_or_default()) } }
                 @if refused > 0 { li { "The newest run of " (counted(refused, "site")) " is not valid; earlier products stay current." } }
                 @if count("remarks") > 0 { li { (count("remarks")) " valid with remarks." } }

@@ -21,13 +21,16 @@ use std::{
     time::Duration,
 };
 
-use areograph_config::parse_service;
+use areograph_base::error::Error;
+use areograph_config::{ServiceConfig, parse_service};
 use areograph_service::{
     clock::Clock,
     database::{Database, Job, JobFilter, jobs},
     engine::Engine,
+    lock::ServiceLock,
     random::Random,
     shared::Shared,
+    start::start,
     state::JobState,
 };
 use areograph_store::files::Identity;
@@ -99,6 +102,16 @@ impl World {
 
     pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
+    }
+
+    pub(crate) fn config(&self) -> ServiceConfig {
+        let text = format!(
+            "[inputs]\nsites = [\"sites\"]\nkernels = [\"kernels\"]\ndata = [\"data\"]\n{}",
+            self.more
+        );
+        parse_service(&text, &self.path("areograph.toml"))
+            .unwrap()
+            .service
     }
 
     fn key(&self, name: &str) -> String {
@@ -194,18 +207,26 @@ pub(crate) struct Life {
     pub(crate) shared: Arc<Shared>,
     pub(crate) engine: Arc<Engine<Played>>,
     pub(crate) runtime: Option<Runtime>,
+    /// Of a service that started as a process does.
+    lock: Option<ServiceLock>,
 }
 
 impl Life {
     pub(crate) fn begin(world: &Arc<World>) -> Self {
-        let text = format!(
-            "[inputs]\nsites = [\"sites\"]\nkernels = [\"kernels\"]\ndata = [\"data\"]\n{}",
-            world.more
-        );
-        let config = parse_service(&text, &world.path("areograph.toml")).unwrap();
-        let database = Database::open(&config.service.outputs.state).unwrap();
+        let config = world.config();
+        let database = Database::open(&config.outputs.state).unwrap();
         let clock = world.clock.clone();
-        let shared = Shared::new(config.service, database, clock, PathBuf::new()).unwrap();
+        let shared = Shared::new(config, database, clock, PathBuf::new()).unwrap();
+        Self::of(world, shared, None)
+    }
+
+    /// Starts as a process does, with all checks of the state folder and of the products.
+    pub(crate) fn start(world: &Arc<World>) -> Result<Self, Error> {
+        let started = start(world.config(), "serve", world.clock.clone())?;
+        Ok(Self::of(world, started.shared, Some(started.lock)))
+    }
+
+    fn of(world: &Arc<World>, shared: Shared, lock: Option<ServiceLock>) -> Self {
         let shared = Arc::new(shared);
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(2)
@@ -218,6 +239,7 @@ impl Life {
             shared,
             engine: Arc::new(engine),
             runtime: Some(runtime),
+            lock,
         }
     }
 

@@ -344,6 +344,7 @@ fn publish(working: &Path, site: &str, product: &str, now_ms: i64) {
             valid: true,
             reasons: Vec::new(),
             remarks: Vec::new(),
+            untested: Vec::new(),
             checks: Vec::new(),
         },
         configuration: ConfigurationEntry {

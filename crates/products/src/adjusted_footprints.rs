@@ -1,0 +1,118 @@
+//! The footprints used in the adjustment, as Parquet.
+
+use std::collections::BTreeMap;
+
+use super::{
+    light_time, parquet,
+    product::{Content, Declaration, Role, Write},
+    table::{Column, Table, Unit, column, meanings},
+};
+use areograph_stages::adjust::{Adjusted, CorrectedPoint, PointKind, RangeResidual};
+
+pub(super) static TABLE: Declaration = Declaration {
+    path: "adjusted_footprints.parquet",
+    what: "the footprints used in the adjustment",
+    readers: "scripts",
+    rows: "footprints",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&shot_columns())),
+    write: Write::Adjustment(|path, of, _, adjustment| {
+        let table = Table::new(shot_columns(), shots(adjustment.adjusted))
+            .in_words(&of.site.config.wording());
+        parquet::write(path, table, light_time::metadata(of.site)).map(Some)
+    }),
+    uses: &[],
+};
+
+/// A footprint used in the adjustment, with its range.
+type Shot<'a> = (&'a CorrectedPoint, Option<&'a RangeResidual>);
+
+fn shots(adjusted: &Adjusted) -> Vec<Shot<'_>> {
+    let ranges: BTreeMap<usize, &RangeResidual> = adjusted
+        .ranges
+        .iter()
+        .map(|range| (range.point, range))
+        .collect();
+    let points = adjusted.points.iter().enumerate();
+    points
+        .filter(|(_, point)| point.kind == PointKind::Shot)
+        .map(|(index, point)| (point, ranges.get(&index).copied()))
+        .collect()
+}
+
+fn shot_columns<'a>() -> Vec<Column<Shot<'a>>> {
+    fn range<'a>(
+        name: &'static str,
+        unit: Unit,
+        description: &'static str,
+        of: fn(&RangeResidual) -> Option<f64>,
+    ) -> Column<Shot<'a>> {
+        column(name, unit, description, move |shot: &Shot| {
+            shot.1.and_then(of)
+        })
+    }
+    let mut columns = vec![column(
+        "footprint",
+        Unit::None,
+        "profile and, after the last colon, row of the footprint in footprints.parquet, counted from 0",
+        |shot: &Shot| shot.0.id.clone(),
+    )];
+    for (axis, [initial, adjusted, sigma]) in [
+        ["x_m", "adjusted_x_m", "sigma_x_m"],
+        ["y_m", "adjusted_y_m", "sigma_y_m"],
+        ["z_m", "adjusted_z_m", "sigma_z_m"],
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        columns.push(column(
+            initial,
+            Unit::Metre,
+            "footprint, IAU 2000, metres",
+            move |shot: &Shot| shot.0.initial.xyz_m[axis],
+        ));
+        columns.push(column(
+            adjusted,
+            Unit::Metre,
+            "adjusted footprint, IAU 2000, metres",
+            move |shot: &Shot| shot.0.ground.xyz_m[axis],
+        ));
+        columns.push(column(
+            sigma,
+            Unit::Metre,
+            "standard deviation of the adjusted coordinate, metres",
+            move |shot: &Shot| sigma_m(shot.0, axis),
+        ));
+    }
+    columns.extend([
+        range(
+            "range_m",
+            Unit::Metre,
+            "measured range, metres; missing where no image was exposed at the time",
+            |range| Some(range.range_m),
+        ),
+        range(
+            "range_residual_m",
+            Unit::Metre,
+            "measured minus adjusted range, metres",
+            |range| Some(range.residual_m.value),
+        ),
+        range(
+            "range_redundancy",
+            Unit::None,
+            "share of an error of the range that shows in its residual, 0 to 1",
+            |range| Some(range.residual_m.redundancy),
+        ),
+        range(
+            "range_standardised",
+            Unit::None,
+            "residual over its own standard deviation; missing where it is uncontrolled",
+            |range| range.residual_m.standardised,
+        ),
+    ]);
+    columns
+}
+
+fn sigma_m(point: &CorrectedPoint, axis: usize) -> f64 {
+    point.covariance_m2[(axis, axis)].sqrt()
+}

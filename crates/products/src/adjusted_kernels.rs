@@ -1,0 +1,291 @@
+//! Adjusted orientations as SPICE kernels that are loaded after the original ones; their contents are tabulated by
+//! [`areograph_stages::tabulate_kernels`].
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use super::{
+    files::write_text,
+    product::{Content, Context, Declaration, Product, Program, Role, Use, Write, Written},
+    site::AdjustmentProducts,
+};
+use areograph_base::{
+    constants::NAIF_MARS,
+    error::{IoError, Locate, Result},
+};
+use areograph_config::PointingConfig;
+use areograph_geom::light_time::LightTime;
+use areograph_spice::{
+    EncodedCkSegment, Kernel, KernelSet, SpkSegment, write_encoded_ck, write_spk,
+};
+use areograph_stages::{tabulate_kernels::KernelTables, tag_times::ImageTimes};
+
+/// Tolerance within which a bias is the usual one, seconds.
+const BIAS_TOLERANCE_S: f64 = 1e-9;
+
+/// Longest name of a segment.
+const SEGMENT_NAME_MAX: usize = 40;
+
+/// An image with the contents of its adjusted kernels.
+#[derive(Debug, Clone, Copy)]
+pub struct AdjustedImage<'a> {
+    /// Line times.
+    pub times: &'a ImageTimes,
+    /// States and attitudes.
+    pub tables: &'a KernelTables,
+    /// The convention of their adjustment.
+    pub light_time: LightTime,
+}
+
+/// Destination of the kernels, and the kernels that they replace.
+#[derive(Debug, Clone, Copy)]
+pub struct AdjustedKernels<'a> {
+    /// Folder to write to.
+    pub directory: &'a Path,
+    /// Final folder of the site: paths in `adjusted.tm` are relative to it.
+    pub site_folder: &'a Path,
+    /// The original kernels.
+    pub originals: &'a KernelSet,
+    /// The pointing bias that readers of the kernels will apply, if it is not that of the camera.
+    pub pointing: &'a PointingConfig,
+}
+
+pub(super) static ATTITUDE: Declaration = Declaration {
+    path: "adjusted/<image>.bc",
+    what: "adjusted attitude of the bus around the image, J2000 (CK type 3)",
+    readers: "SPICE, ISIS, ALE",
+    rows: "epochs",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::WithAnother,
+    uses: &[Use {
+        program: Program::AdjustedKernels,
+        lines: "spiceinit from=<image>.cub spk=../adjusted/<image>.bsp ck=../adjusted/<image>.bc",
+    }],
+};
+
+pub(super) static POSITION: Declaration = Declaration {
+    path: "adjusted/<image>.bsp",
+    what: "adjusted position of the spacecraft from Mars around the image, geometric, J2000 (SPK type 13)",
+    readers: "SPICE, ISIS, ALE",
+    rows: "epochs",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::WithAnother,
+    uses: &[],
+};
+
+pub(super) static METAKERNEL: Declaration = Declaration {
+    path: "adjusted.tm",
+    what: "the kernels of the site, then the adjusted kernels",
+    readers: "SPICE",
+    rows: "",
+    role: Role::Metadata,
+    content: Content::Foreign,
+    write: Write::Several(of_site),
+    uses: &[],
+};
+
+/// The adjusted kernels of a site.
+fn of_site(of: &Context, adjustment: &AdjustmentProducts) -> Result<Vec<Written>> {
+    let to = AdjustedKernels {
+        directory: of.directory,
+        site_folder: adjustment.folder,
+        originals: adjustment.kernels,
+        pointing: &of.site.config.pointing,
+    };
+    let images = adjustment.images.iter().zip(adjustment.tables);
+    let images = images.filter(|(image, _)| image.times.support.is_none());
+    let images = images.map(|(image, tables)| AdjustedImage {
+        times: image.times,
+        tables,
+        light_time: image.orientation.light_time.convention,
+    });
+    written(&to, &images.collect::<Vec<_>>())
+}
+
+/// Writes an SPK and a CK of every image, and the metakernel.
+///
+/// # Errors
+/// [`Kind::Bug`](areograph_base::error::Kind::Bug) for tables that no kernel can hold, and for a session that is open on this
+/// thread; [`Kind::Io`](areograph_base::error::Kind::Io).
+pub fn write_adjusted_kernels(
+    to: &AdjustedKernels,
+    images: &[AdjustedImage],
+) -> Result<Vec<Product>> {
+    let written = written(to, images)?.into_iter();
+    Ok(written.map(|(product, _)| product).collect())
+}
+
+fn written(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<Vec<Written>> {
+    let mut written = Vec::new();
+    if images.is_empty() {
+        return Ok(written);
+    }
+    let mut add = |path: String, rows: u64, declaration| {
+        let path = PathBuf::from(path);
+        written.push((Product { path, rows }, declaration));
+    };
+    let folder = to.directory.join("adjusted");
+    fs::create_dir_all(&folder)
+        .map_err(IoError::on("make the folder"))
+        .in_file(&folder)?;
+    for image in images {
+        let name = attitude_kernel(&image.times.id);
+        let rows = write_attitude(&to.directory.join(&name), image, &comment(image, to))?;
+        add(name, rows, &ATTITUDE);
+    }
+    for image in images {
+        let name = position_kernel(&image.times.id);
+        let rows = write_position(&to.directory.join(&name), image, &comment(image, to))?;
+        add(name, rows, &POSITION);
+    }
+    let path = to.directory.join(METAKERNEL.path);
+    write_text(&path, &metakernel(to, images)?)?;
+    add(METAKERNEL.path.to_owned(), 0, &METAKERNEL);
+    Ok(written)
+}
+
+/// Path of the SPK of an image below the folder of the products, the longest path that CSPICE writes there.
+#[must_use]
+pub fn position_kernel(image: &str) -> String {
+    POSITION.path_of(image)
+}
+
+/// Path of the CK of an image below the folder of the products.
+#[must_use]
+pub fn attitude_kernel(image: &str) -> String {
+    ATTITUDE.path_of(image)
+}
+
+fn segment_name(image: &AdjustedImage) -> String {
+    let id = image.times.id.chars();
+    id.take(SEGMENT_NAME_MAX).collect()
+}
+
+fn write_attitude(path: &Path, image: &AdjustedImage, comment: &str) -> Result<u64> {
+    let tables = image.tables;
+    let segment = EncodedCkSegment {
+        bus: image.times.instrument.spacecraft.bus,
+        name: &segment_name(image),
+        ticks: &tables.ticks,
+        quaternions: &tables.quaternions,
+        angular_velocities_rad_s: &tables.rates_rad_s,
+        interval_starts: tables.ticks.get(..1).unwrap_or_default(),
+    };
+    write_encoded_ck(path, &[segment], comment)?;
+    Ok(tables.ticks.len() as u64)
+}
+
+fn write_position(path: &Path, image: &AdjustedImage, comment: &str) -> Result<u64> {
+    let tables = image.tables;
+    let segment = SpkSegment {
+        target: image.times.instrument.spacecraft.naif,
+        centre: NAIF_MARS,
+        name: &segment_name(image),
+        degree: KernelTables::STATE_DEGREE,
+        epochs: &tables.epochs,
+        states: &tables.states,
+    };
+    write_spk(path, &[segment], comment)?;
+    Ok(tables.epochs.len() as u64)
+}
+
+/// Text of the comment areas of both kernels.
+fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
+    let times = image.times;
+    let bias_s = to.pointing.bias_of(&times.instrument).seconds();
+    let usual_s = times.instrument.pointing.ck_bias_s;
+    let others = if (bias_s - usual_s).abs() < BIAS_TOLERANCE_S {
+        "ISIS and ALE apply this offset: load the file as it is.".to_owned()
+    } else {
+        format!(
+            "ISIS and ALE always read attitude {usual_s:.3} s from the exposure: do not use this\n\
+             file with them."
+        )
+    };
+    format!(
+        "Orientation of image {id} after an adjustment; written by areograph {version}.\n\
+         Load it after the kernels of the mission. It is valid only for this image, which was exposed over\n\
+         {exposed}\n\
+         (UTC of the first line {utc}). Where the adjustment found that lines were exposed later or earlier\n\
+         than their tags, the orientation of a line is stored at its tag: do not place anything else\n\
+         observed at the time, such as a laser shot, with this file.\n\
+         \n\
+         Positions: {spacecraft} relative to the centre of Mars, geometric, J2000, with the rotation of Mars of the\n\
+         IAU 2000 report (pck00008 to pck00010). {positions}\n\
+         \n\
+         Attitudes: J2000 to {bus_frame}. The attitude of an exposure at t is stored at t {sign} {size:.3} s,\n\
+         as in the kernels that this file replaces. {others}\n",
+        id = times.id,
+        spacecraft = times.instrument.spacecraft.name,
+        bus_frame = times.instrument.spacecraft.bus_frame,
+        version = env!("CARGO_PKG_VERSION"),
+        exposed = times.exposures(),
+        utc = times.utc_start,
+        positions = positions(image.light_time),
+        sign = if bias_s < 0.0 { '-' } else { '+' },
+        size = bias_s.abs(),
+    )
+}
+
+/// Readers for which the positions in an SPK are the adjusted ones.
+const fn positions(light_time: LightTime) -> &'static str {
+    match light_time {
+        LightTime::Surface => {
+            "They were adjusted with light time to the\n\
+             surface and aberration: the position of an exposure is that of the instant at which the light left\n\
+             the ground. Programs that see the spacecraft from the centre of Mars (LT+S: ISIS, ALE) place it\n\
+             elsewhere."
+        }
+        LightTime::None | LightTime::Support => {
+            "They were adjusted without light time:\n\
+             the position of an exposure is that of its instant. Programs that see the spacecraft from the centre\n\
+             of Mars (LT+S: ISIS, ALE) place it elsewhere."
+        }
+        LightTime::Centre => {
+            "They were adjusted as seen from the centre\n\
+             of Mars with light time and aberration: programs that do so (LT+S: ISIS, ALE) find them adjusted."
+        }
+    }
+}
+
+/// The original kernels, followed by those of all images.
+fn metakernel(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<String> {
+    let names = images.iter().flat_map(|image| {
+        [
+            position_kernel(&image.times.id),
+            attitude_kernel(&image.times.id),
+        ]
+    });
+    let names: Vec<PathBuf> = names.map(PathBuf::from).collect();
+    let files: Vec<PathBuf> = names.iter().map(|name| to.directory.join(name)).collect();
+    let own = KernelSet::from_files(&files)?;
+    let own = own.kernels().iter().zip(names);
+    let own: Vec<Kernel> = own
+        .map(|(kernel, path)| Kernel {
+            path,
+            ..kernel.clone()
+        })
+        .collect();
+    let text = to
+        .originals
+        .metakernel_text_before(Some(to.site_folder), &own);
+    let cameras = images.iter().map(|image| &image.times.instrument);
+    let biases = to.pointing.used(cameras).into_iter();
+    let biases: Vec<String> = biases
+        .map(|of| format!("{} s", of.bias.seconds()))
+        .collect();
+    // Text before the first data block is comment.
+    Ok(text.replacen(
+        "\n\n",
+        &format!(
+            "\n\nThe last ones are adjusted: each pair is valid only for its image, not for laser shots or other images, with\n\
+             the pointing bias of {}.\n\n",
+            biases.join(", ")
+        ),
+        1,
+    ))
+}

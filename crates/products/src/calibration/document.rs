@@ -1,0 +1,295 @@
+//! Summary of a calibration, as JSON.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::{CalibrationProducts, WriteCalibration};
+use crate::{
+    coordinates::degrees,
+    files::write_json,
+    product::{Content, Declaration, Role},
+};
+use areograph_base::schema::DocumentSchema;
+use areograph_config::CalibrationMode;
+use areograph_geom::calibration::{AngleCombination, TieSight};
+use areograph_stages::{
+    calibrate::{
+        CalibrationRound, CalibrationStep, CameraResult, HeldBack, PixelsAndMetres, Rounds,
+        Scatter, TieGround, ValidationResult, Value,
+    },
+    judge::Verdict,
+};
+
+pub(super) static DOCUMENT: Declaration<WriteCalibration> = Declaration {
+    path: "calibration.json",
+    what: "parameters with standard deviations, what ties do not determine, figures after every step, of withheld control and of \
+           other orbits, verdict",
+    readers: "scripts",
+    rows: "cameras",
+    role: Role::Metadata,
+    content: Content::Document(schema),
+    write: |path, of| {
+        write_json(path, &Document::of(of))?;
+        Ok(of.result.cameras.len() as u64)
+    },
+    uses: &[],
+};
+
+/// The document.
+#[derive(Serialize, JsonSchema)]
+#[schemars(
+    title = "Calibration of the lines of a camera",
+    description = "calibration.json of areograph: offset angles and look angles after Li et al. 2023."
+)]
+struct Document<'a> {
+    /// Always `areograph calibration 1`.
+    #[schemars(extend("const" = "areograph calibration 1"))]
+    format: &'static str,
+    /// Identifier of the calibration.
+    calibration: &'a str,
+    /// The body that it sees, as in `config/bodies`.
+    body: &'static str,
+    /// Unknowns that ties estimate before control is used.
+    mode: CalibrationMode,
+    /// Whether the result is usable.
+    verdict: &'a Verdict,
+    /// The lines of the camera.
+    #[schemars(length(min = 2))]
+    cameras: Vec<CameraDocument<'a>>,
+    /// Drift of the orbit from line to line, body-fixed, metres: true minus the support data that were given. The
+    /// constant part of the orbit's error is in the offset angles.
+    drift_m_per_line: [Value; 3],
+    /// Offset angles as determined by ties only.
+    tie_sight: TieSightDocument,
+    /// Test of heights of tie points against the ground between laser points; absent where these are too few.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tie_ground: Option<TieGround>,
+    /// Figures before, and after every step.
+    steps: &'a [CalibrationStep],
+    /// The rounds of a calibration from pixels (other members are of the last); absent where points were read from
+    /// tables.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rounds: Option<RoundsDocument>,
+    /// Results of withheld control; absent without control.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    held_back: Option<&'a HeldBack>,
+    /// Residuals of the control that was used, over their expected size.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    control_scatter: Option<Scatter>,
+    /// Other orbits.
+    validation: &'a [ValidationResult],
+}
+
+/// A calibration in rounds.
+#[derive(Serialize, JsonSchema)]
+struct RoundsDocument {
+    /// Whether the rounds converged: half of the units shifted by less than half a cell, residuals of control
+    /// changed by less than 2 %.
+    converged: bool,
+    /// Largest number of rounds allowed.
+    rounds_max: u32,
+    /// Edge of a cell of the terrain models, metres.
+    cell_m: f64,
+    /// The rounds in order.
+    rounds: Vec<RoundDocument>,
+}
+
+/// The numbers of a round: terrain model and units as the cameras of the round before see them, then the cameras.
+#[derive(Serialize, JsonSchema)]
+struct RoundDocument {
+    /// From 1.
+    round: u32,
+    /// Tie points.
+    ties: u64,
+    /// Their residuals in the worst line, root mean square, pixels, with the cameras that the terrain model was made
+    /// with.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    model_tie_rms_px: Option<f64>,
+    /// The same with the cameras of this round.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tie_rms_px: Option<f64>,
+    /// Share of the cells of the terrain model that have a height.
+    model_filled: f64,
+    /// Units of shots that calibrate.
+    units_kept: u64,
+    /// Such units that were refused.
+    units_refused: u64,
+    /// Units of shots withheld for validation.
+    judging_kept: u64,
+    /// Such units that were refused.
+    judging_refused: u64,
+    /// Median length of the shifts of kept units that calibrate, cells; absent where none was kept.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shift_cells: Option<f64>,
+    /// Median of model minus laser, metres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bias_m: Option<f64>,
+    /// Residuals of control, root mean square over all lines.
+    control: PixelsAndMetres,
+    /// The same of withheld control.
+    held_back: PixelsAndMetres,
+    /// Residuals of withheld control, over their expected size.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    held_back_scatter: Option<Scatter>,
+    /// φ, ω and κ of every line, degrees, in the order of `cameras`.
+    angles_deg: Vec<[f64; 3]>,
+    /// Drift of the orbit from line to line, body-fixed, metres.
+    drift_m_per_line: [f64; 3],
+}
+
+/// A line of the camera.
+#[derive(Serialize, JsonSchema)]
+struct CameraDocument<'a> {
+    /// Its name.
+    camera: &'a str,
+    /// φ, about the flight (roll), degrees.
+    phi_deg: Value,
+    /// ω, about the axis across the flight (pitch), degrees.
+    omega_deg: Value,
+    /// κ, about the axis that looks down (yaw), degrees.
+    kappa_deg: Value,
+    /// Tangent across the flight: coefficients of the powers of s′, which is −1 at the first edge of the image and 1 at
+    /// the last.
+    m: &'a [Value],
+    /// Tangent along the flight, likewise.
+    n: &'a [Value],
+    /// The same of the support data that were given, across and along.
+    laboratory: &'a [Vec<f64>; 2],
+    /// Largest residual of these against the look directions of the given support data, pixels.
+    #[schemars(range(min = 0.0))]
+    laboratory_left_px: f64,
+    /// Tangent of a pixel.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pixel_tangent: f64,
+    /// Samples.
+    samples: u32,
+    /// Largest change of a look direction, pixels.
+    #[schemars(range(min = 0.0))]
+    moved_px: f64,
+    /// Largest residual of the calibrated support data against the calibrated look directions, pixels.
+    #[schemars(range(min = 0.0))]
+    isd_left_px: f64,
+}
+
+/// Offset angles as determined by ties only.
+#[derive(Serialize, JsonSchema)]
+struct TieSightDocument {
+    /// Number of directions that ties do not determine: with a standard deviation above one degree.
+    unseen: u32,
+    /// Names of these.
+    unseen_directions: Vec<String>,
+    /// All directions, orthonormal, the least determined first.
+    directions: Vec<DirectionDocument>,
+}
+
+/// A combination of all offset angles.
+#[derive(Serialize, JsonSchema)]
+struct DirectionDocument {
+    /// Standard deviation by ties only, degrees; absent if unbounded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0))]
+    sigma_deg: Option<f64>,
+    /// Its larger components.
+    components: Vec<Component>,
+}
+
+/// A component along a named combination of unit length.
+#[derive(Serialize, JsonSchema)]
+struct Component {
+    /// Its name, for example `common roll`.
+    combination: String,
+    /// The component.
+    share: f64,
+}
+
+impl<'a> Document<'a> {
+    fn of(of: &CalibrationProducts<'a>) -> Self {
+        let result = of.result;
+        Self {
+            format: "areograph calibration 1",
+            calibration: &of.config.calibration,
+            body: of.config.body.word(),
+            mode: of.config.solution.mode,
+            verdict: &result.verdict,
+            cameras: result.cameras.iter().map(camera).collect(),
+            drift_m_per_line: result.drift_m_per_line,
+            tie_sight: tie_sight(&result.tie_sight),
+            tie_ground: result.tie_ground,
+            steps: &result.steps,
+            rounds: result.rounds.as_ref().map(rounds),
+            held_back: result.held_back.as_ref(),
+            control_scatter: result.used,
+            validation: &result.validation,
+        }
+    }
+}
+
+fn camera(of: &CameraResult) -> CameraDocument<'_> {
+    let [phi_deg, omega_deg, kappa_deg] = of.angles_rad.map(|angle| Value {
+        value: degrees(angle.value),
+        sigma: degrees(angle.sigma),
+    });
+    CameraDocument {
+        camera: &of.camera,
+        phi_deg,
+        omega_deg,
+        kappa_deg,
+        m: &of.m,
+        n: &of.n,
+        laboratory: &of.laboratory,
+        laboratory_left_px: of.laboratory_left_px,
+        pixel_tangent: of.pixel,
+        samples: of.samples,
+        moved_px: of.moved_px,
+        isd_left_px: of.isd_left_px,
+    }
+}
+
+fn rounds(of: &Rounds) -> RoundsDocument {
+    let round = |round: &CalibrationRound| RoundDocument {
+        round: round.round,
+        ties: round.ties,
+        model_tie_rms_px: round.model_tie_px,
+        tie_rms_px: round.tie_px,
+        model_filled: round.filled,
+        units_kept: round.units[0],
+        units_refused: round.units[1],
+        judging_kept: round.judging[0],
+        judging_refused: round.judging[1],
+        shift_cells: round.shift_cells.is_finite().then_some(round.shift_cells),
+        bias_m: round.bias_m,
+        control: round.control,
+        held_back: round.held_back,
+        held_back_scatter: round.held_back_scatter,
+        angles_deg: round.angles_rad.iter().map(|of| of.map(degrees)).collect(),
+        drift_m_per_line: round.drift_m_per_line,
+    };
+    RoundsDocument {
+        converged: of.is_converged(),
+        rounds_max: of.rounds_max,
+        cell_m: of.cell_m,
+        rounds: of.rounds.iter().map(round).collect(),
+    }
+}
+
+fn tie_sight(of: &TieSight) -> TieSightDocument {
+    let words = |combination: &AngleCombination| combination.words();
+    let directions = of.directions.iter().map(|direction| DirectionDocument {
+        sigma_deg: direction.sigma_rad.map(degrees),
+        components: (direction.shares.iter())
+            .map(|(combination, share)| Component {
+                combination: words(combination),
+                share: *share,
+            })
+            .collect(),
+    });
+    TieSightDocument {
+        unseen: of.unseen,
+        unseen_directions: of.unseen_names.iter().map(words).collect(),
+        directions: directions.collect(),
+    }
+}
+
+fn schema() -> DocumentSchema {
+    DocumentSchema::of::<Document>("calibration_result")
+}

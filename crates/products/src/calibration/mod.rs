@@ -1,0 +1,109 @@
+//! Products of a calibration: tables as Parquet and CSV, support data of every camera, a document, the report.
+
+mod document;
+mod images;
+mod points;
+
+use std::path::Path;
+
+use super::{
+    files::write_text,
+    parquet,
+    product::{Content, Declaration, Product, Role, write_each},
+    table::Table,
+    text_table,
+};
+use areograph_base::error::{Locate as _, Result};
+use areograph_config::CalibrationConfig;
+use areograph_stages::calibrate::{Calibration, CameraResult};
+
+/// Placeholder of a camera in paths.
+const CAMERA: &str = "<camera>";
+
+/// Inputs of the products of a calibration.
+#[derive(Debug, Clone, Copy)]
+pub struct CalibrationProducts<'a> {
+    /// The configuration.
+    pub config: &'a CalibrationConfig,
+    /// The calibration.
+    pub result: &'a Calibration,
+    /// The report.
+    pub page: &'a str,
+}
+
+/// Writer of a product of a calibration; returns its number of rows.
+pub(super) type WriteCalibration = fn(&Path, &CalibrationProducts) -> Result<u64>;
+
+/// The products of a calibration, in the order in which they are written; those of cameras come first.
+pub(super) static CALIBRATION_PRODUCTS: &[&Declaration<WriteCalibration>] = &[
+    &points::TABLE,
+    &points::CSV,
+    &images::TABLE,
+    &images::CSV,
+    &document::DOCUMENT,
+    &REPORT,
+];
+
+/// Writer of a product of a camera.
+pub(super) type WriteCamera = fn(&Path, &CameraResult) -> Result<u64>;
+
+/// Support data of a camera.
+pub(super) static CAMERA_SUPPORT: Declaration<WriteCamera> = Declaration {
+    path: "cameras/<camera>/isd.json",
+    what: "support data with the calibrated camera and orbit, for `[[images]] isd` and other readers of ISDs",
+    readers: "areograph, usgscsm",
+    rows: "",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: |path, of| write_text(path, &of.isd).map(|()| 0),
+    uses: &[],
+};
+
+static REPORT: Declaration<WriteCalibration> = Declaration {
+    path: "report/index.html",
+    what: "the report of the calibration",
+    readers: "people",
+    rows: "",
+    role: Role::Overview,
+    content: Content::Foreign,
+    write: |path, of| write_text(path, of.page).map(|()| 0),
+    uses: &[],
+};
+
+/// Writes every product of a calibration below `directory`, and reads each of them back.
+///
+/// # Errors
+/// [`Kind::Io`](areograph_base::error::Kind::Io) for errors of the disk; [`Kind::Bug`](areograph_base::error::Kind::Bug) for numbers that
+/// are not finite and files that read back differently.
+pub fn write_calibration_products(
+    directory: &Path,
+    of: &CalibrationProducts,
+) -> Result<Vec<Product>> {
+    let mut products = Vec::new();
+    for camera in &of.result.cameras {
+        let relative = CAMERA_SUPPORT.path.replace(CAMERA, &camera.camera);
+        let path = directory.join(&relative);
+        let rows = (CAMERA_SUPPORT.write)(&path, camera).in_file(&path)?;
+        products.push(Product {
+            path: relative.into(),
+            rows,
+        });
+    }
+    products.extend(write_each(
+        directory,
+        CALIBRATION_PRODUCTS,
+        |write, path| write(path, of),
+    )?);
+    Ok(products)
+}
+
+/// Writes a table as Parquet with its metadata.
+fn write_parquet(path: &Path, of: &CalibrationProducts, table: Table) -> Result<u64> {
+    let about = vec![("calibration", of.config.calibration.clone())];
+    parquet::write(path, table, about)
+}
+
+/// Writes a table as CSV.
+fn write_csv(path: &Path, table: Table) -> Result<u64> {
+    text_table::write(path, table)
+}

@@ -1,0 +1,118 @@
+//! Points on the ground by the calibrated cameras.
+
+use super::{CalibrationProducts, WriteCalibration, write_csv, write_parquet};
+use crate::{
+    coordinates::degrees,
+    product::{Content, Declaration, Role},
+    table::{Column, Table, Unit, column, meanings},
+};
+use areograph_stages::calibrate::PointResult;
+
+pub(super) static TABLE: Declaration<WriteCalibration> = Declaration {
+    path: "points.parquet",
+    what: "every tie and laser point as located by the calibrated cameras, with standard deviations",
+    readers: "scripts",
+    rows: "points",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&columns())),
+    write: |path, of| write_parquet(path, of, table(of)),
+    uses: &[],
+};
+
+pub(super) static CSV: Declaration<WriteCalibration> = Declaration {
+    path: "points.csv",
+    what: "the same as CSV",
+    readers: "spreadsheets, scripts",
+    rows: "points",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&columns())),
+    write: |path, of| write_csv(path, table(of)),
+    uses: &[],
+};
+
+fn table<'a>(of: &CalibrationProducts<'a>) -> Table<'a> {
+    Table::new(columns(), of.result.points.iter().collect())
+}
+
+type Row<'a> = &'a PointResult;
+
+fn columns<'a>() -> Vec<Column<Row<'a>>> {
+    let mut columns = vec![
+        column("point", Unit::None, "name of the point", |row: &Row| {
+            row.point.clone()
+        }),
+        column(
+            "kind",
+            Unit::None,
+            "tie, control (used) or held_back (withheld for validation)",
+            |row: &Row| row.kind.word().to_owned(),
+        ),
+        column(
+            "left_out",
+            Unit::None,
+            "whether it was rejected; position and standard deviations are then empty",
+            |row: &Row| row.left_out,
+        ),
+        column(
+            "longitude_deg",
+            Unit::Degree,
+            "east longitude where its images intersect, -180 to 180 degrees",
+            |row: &Row| row.place.map(|of| degrees(of[0])),
+        ),
+        column(
+            "latitude_deg",
+            Unit::Degree,
+            "areocentric latitude of that, degrees",
+            |row: &Row| row.place.map(|of| degrees(of[1])),
+        ),
+        column(
+            "radius_m",
+            Unit::Metre,
+            "distance of that from the centre of the body, metres",
+            |row: &Row| row.place.map(|of| of[2]),
+        ),
+    ];
+    columns.extend(sigmas());
+    columns.extend(offs());
+    columns
+}
+
+/// Standard deviations.
+fn sigmas<'a>() -> [Column<Row<'a>>; 3] {
+    [
+        column(
+            "sigma_east_m",
+            Unit::Metre,
+            "standard deviation east, of the measurement and of the calibration, metres; empty for a tie point whose height is not \
+             tested for errors such as those found at others",
+            |row: &Row| row.sigma_m.map(|of| of[0]),
+        ),
+        column(
+            "sigma_north_m",
+            Unit::Metre,
+            "likewise north",
+            |row: &Row| row.sigma_m.map(|of| of[1]),
+        ),
+        column("sigma_up_m", Unit::Metre, "likewise up", |row: &Row| {
+            row.sigma_m.map(|of| of[2])
+        }),
+    ]
+}
+
+/// Residuals of laser points.
+fn offs<'a>() -> [Column<Row<'a>>; 3] {
+    [
+        column(
+            "off_east_m",
+            Unit::Metre,
+            "of a laser point: intersected minus the laser's position, east, metres",
+            |row: &Row| row.off_m.map(|of| of[0]),
+        ),
+        column("off_north_m", Unit::Metre, "likewise north", |row: &Row| {
+            row.off_m.map(|of| of[1])
+        }),
+        column("off_up_m", Unit::Metre, "likewise up", |row: &Row| {
+            row.off_m.map(|of| of[2])
+        }),
+    ]
+}

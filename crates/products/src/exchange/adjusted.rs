@@ -1,0 +1,195 @@
+//! Adjusted shots and tie points in the forms of ISIS and Ames Stereo Pipeline.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Matrix3;
+
+use super::{
+    gcp::{ControlMeasure, ControlPoint, write_gcp},
+    lidar_data::{LidarPoint, isis_serial_number, write_lidar_data},
+    points::{GroundEstimate, ImageMeasure},
+};
+use crate::{
+    AdjustmentProducts, ImageProducts, SiteProducts,
+    product::{Content, Declaration, Program, Role, Use, Write},
+};
+use areograph_base::{
+    frames::{BodyFixed, Position},
+    time::Et,
+};
+use areograph_stages::{adjust::CorrectedPoint, read_ties::Ties};
+
+pub(crate) static LIDAR: Declaration = Declaration {
+    path: "exchange/lidar.json",
+    what: "shots with ranges for ISIS: a priori and adjusted points, with their coordinates in the adjusted images",
+    readers: "ISIS",
+    rows: "shots",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::Adjustment(|path, of, _, adjustment| {
+        let images = of.site.images.iter();
+        let names: Vec<String> = images.map(|image| isis_name(of.site, image)).collect();
+        let shots = lidar_points(of.site, adjustment, &names);
+        let some = !shots.is_empty();
+        some.then(|| write_lidar_data(path, &shots)).transpose()
+    }),
+    uses: &[Use {
+        program: Program::Isis,
+        lines: "jigsaw fromlist=cubes.lis cnet=ties.net onet=out.net lidardata=lidar.json olidarfile=out \\\n  \
+                spsolve=position",
+    }],
+};
+
+pub(crate) static CONTROL: Declaration = Declaration {
+    path: "exchange/adjusted.gcp",
+    what: "adjusted tie points as ground control; the images are called <image>.cub",
+    readers: "Ames Stereo Pipeline",
+    rows: "tie points",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::Adjustment(|path, of, geometric, adjustment| {
+        let images = of.site.images.iter();
+        let files: Vec<String> = images
+            .map(|image| format!("{}.cub", image.times.id))
+            .collect();
+        let points = control_points(of.site, geometric.ties, adjustment, &files);
+        let some = !points.is_empty();
+        some.then(|| write_gcp(path, of.site.config.body, &points))
+            .transpose()
+    }),
+    uses: &[Use {
+        program: Program::StereoPipeline,
+        lines: "# Standard deviations along x, y, z, so not with --use-lon-lat-height-gcp-error:\n\
+                bundle_adjust --datum D_MARS IMAGES CAMERAS adjusted.gcp -o run/out",
+    }],
+};
+
+/// The serial number that ISIS has for an image: as configured, else as ISIS composes it.
+pub(super) fn isis_name(site: &SiteProducts, image: &ImageProducts) -> String {
+    let id = &image.times.id;
+    let configured = site.config.images.iter().find(|image| image.id == *id);
+    let configured = configured.and_then(|image| image.serial_number.clone());
+    configured
+        .or_else(|| isis_serial_number(image.times))
+        .unwrap_or_else(|| id.clone())
+}
+
+fn estimate(position: Position<BodyFixed>, covariance_m2: Matrix3<f64>) -> GroundEstimate {
+    GroundEstimate {
+        position,
+        covariance_m2,
+    }
+}
+
+pub(super) fn adjusted(point: &CorrectedPoint) -> GroundEstimate {
+    estimate(point.ground, point.covariance_m2)
+}
+
+/// Shots with a range and their coordinates in the adjusted images: others have no observation equation of
+/// their own in ISIS.
+fn lidar_points<'a>(
+    site: &SiteProducts<'a>,
+    adjustment: &AdjustmentProducts<'a>,
+    names: &'a [String],
+) -> Vec<LidarPoint<'a>> {
+    let config = &site.config.adjustment;
+    let result = adjustment.adjusted;
+    let places: Vec<BTreeMap<usize, [f64; 2]>> = adjustment.images.iter().map(places).collect();
+    let shots = result.ranges.iter().filter_map(|range| {
+        let point = &result.points[range.point];
+        let image = &result.images[range.image];
+        let time_bias_s = image.time_bias_s.map_or(0.0, |(bias_s, _)| bias_s);
+        let measures = names.iter().zip(&places).filter_map(|(image, places)| {
+            let [line, sample] = *places.get(&point.index)?;
+            Some(ImageMeasure {
+                image,
+                line,
+                sample,
+            })
+        });
+        let measures: Vec<ImageMeasure> = measures.collect();
+        if measures.is_empty() {
+            return None;
+        }
+        Some(LidarPoint {
+            id: &point.id,
+            // A time bias of the image is folded into its adjusted kernels.
+            et: Et::from_seconds(site.footprints.et_s[point.index] - time_bias_s),
+            range_m: range.range_m,
+            range_sigma_m: config.range_sigma_m,
+            apriori: estimate(
+                point.initial,
+                Matrix3::from_diagonal_element(config.ground_sigma_m.powi(2)),
+            ),
+            adjusted: Some(adjusted(point)),
+            simultaneous_images: vec![&names[range.image]],
+            measures,
+        })
+    });
+    shots.collect()
+}
+
+/// Line and sample of the footprints in the delivered image, by their rows.
+fn places(image: &ImageProducts) -> BTreeMap<usize, [f64; 2]> {
+    let points = &image.registration.points;
+    (0..points.len())
+        .filter(|index| points.inside[*index])
+        .map(|index| {
+            (
+                points.row[index] as usize,
+                [points.line[index], points.sample[index]],
+            )
+        })
+        .collect()
+}
+
+/// Adjusted tie points with their measurements.
+fn control_points<'a>(
+    site: &SiteProducts<'a>,
+    ties: &'a Ties,
+    adjustment: &'a AdjustmentProducts<'a>,
+    files: &'a [String],
+) -> Vec<ControlPoint<'a>> {
+    let usual_px = tie_sigmas_px(site, adjustment);
+    let points = adjustment.adjusted_ties().filter_map(|point| {
+        let tie = ties.points.get(point.index)?;
+        let measures = tie.measures.iter().filter_map(|measure| {
+            let file = files.get(measure.image)?;
+            let [line_px, sample_px] = measure.sigma_px.unwrap_or(usual_px[measure.image]);
+            Some(ControlMeasure {
+                measure: ImageMeasure {
+                    image: file,
+                    line: measure.line,
+                    sample: measure.sample,
+                },
+                sigma_px: [sample_px, line_px],
+            })
+        });
+        Some(ControlPoint {
+            id: &point.id,
+            ground: adjusted(point),
+            measures: measures.collect(),
+        })
+    });
+    points.collect()
+}
+
+/// Standard deviations of line and sample of measurements whose file does not state them, for each image, lines and
+/// pixels.
+pub(super) fn tie_sigmas_px(site: &SiteProducts, adjustment: &AdjustmentProducts) -> Vec<[f64; 2]> {
+    let [along_px, across_px] = site.config.adjustment.tie_sigma_px;
+    let images = 0..adjustment.images.len();
+    images
+        .map(|image| [along_px / focal_px_per_line(adjustment, image), across_px])
+        .collect()
+}
+
+/// Length of a line in focal-plane pixels, from the pairs of the image.
+fn focal_px_per_line(adjustment: &AdjustmentProducts, image: usize) -> f64 {
+    let id = &adjustment.images[image].times.id;
+    let mut pairs = adjustment.pairs.iter().filter_map(|pair| {
+        let at = pair.images.iter().position(|of| of == id)?;
+        Some(pair.line_spacing_m[at] / pair.pixel_size_m[at])
+    });
+    pairs.next().unwrap_or(1.0)
+}

@@ -1,0 +1,64 @@
+//! Adjusted points for their writers.
+
+use nalgebra::{Matrix3, RowVector3};
+
+use crate::error::ProductError;
+use areograph_base::frames::{BodyFixed, Position};
+use areograph_geom::ellipsoid::Spherical;
+
+/// A point on the ground with its covariance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GroundEstimate {
+    /// Position, IAU 2000.
+    pub position: Position<BodyFixed>,
+    /// Covariance of its components, square metres.
+    pub covariance_m2: Matrix3<f64>,
+}
+
+/// Coordinates of a point in an image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImageMeasure<'a> {
+    /// Name of the image for the reader of the file: a serial number for ISIS, a file for Ames Stereo Pipeline.
+    pub image: &'a str,
+    /// Line in the whole image, 0 at the outer edge of the first line and 0.5 at its middle.
+    pub line: f64,
+    /// Sample, 0 at the outer edge of the first pixel and 0.5 at its middle.
+    pub sample: f64,
+}
+
+impl GroundEstimate {
+    pub(super) fn spherical(&self) -> Spherical {
+        Spherical::from_xyz_m(&self.position.xyz_m)
+    }
+
+    /// Covariance of areocentric latitude, east longitude and radius, radians and metres.
+    ///
+    /// Not finite on the axis of Mars, where there is no longitude.
+    pub(super) fn spherical_covariance(&self) -> Matrix3<f64> {
+        let spherical = self.spherical();
+        let (sin_latitude, cos_latitude) = spherical.latitude.0.sin_cos();
+        let (sin_longitude, cos_longitude) = spherical.longitude_rad.sin_cos();
+        let by_latitude = RowVector3::new(
+            -sin_latitude * cos_longitude,
+            -sin_latitude * sin_longitude,
+            cos_latitude,
+        ) / spherical.radius_m;
+        let equatorial_m = self.position.xyz_m.xy().norm();
+        let by_longitude = RowVector3::new(-sin_longitude, cos_longitude, 0.0) / equatorial_m;
+        let by_radius = self.position.xyz_m.transpose() / spherical.radius_m;
+        let partials = Matrix3::from_rows(&[by_latitude, by_longitude, by_radius]);
+        partials * self.covariance_m2 * partials.transpose()
+    }
+}
+
+/// Rejects a value that is not above 0.
+pub(super) fn above_zero(what: &str, value: f64) -> Result<(), ProductError> {
+    // Written so that NaN is rejected too.
+    if value > 0.0 && value.is_finite() {
+        return Ok(());
+    }
+    Err(ProductError::Refused {
+        action: "write a point",
+        reason: format!("{what} is {value}; expected a number above 0"),
+    })
+}

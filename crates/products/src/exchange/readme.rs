@@ -1,0 +1,177 @@
+//! Descriptions of the files in the folder `exchange`, and the commands that read them.
+
+use std::fmt::Write as _;
+
+use crate::{
+    coordinates::frame,
+    files::write_text,
+    gis::{crs_code, point_z_height},
+    light_time::convention,
+    product::{Content, Context, Declaration, IMAGE, Program, Role, Write},
+    site::SiteProducts,
+};
+use areograph_base::body::Body;
+use areograph_geom::light_time::LightTime;
+
+pub(crate) static README: Declaration = Declaration {
+    path: "exchange/README.txt",
+    what: "descriptions of the files in this folder, and the commands that read them",
+    readers: "people",
+    rows: "",
+    role: Role::Metadata,
+    content: Content::Foreign,
+    write: Write::Site(|path, of| {
+        write_text(path, &of.site.config.wording().of(text(of))).map(|()| Some(0))
+    }),
+    uses: &[],
+};
+
+/// Programs in the order of their sections.
+const PROGRAMS: [Program; 6] = [
+    Program::StereoPipeline,
+    Program::Isis,
+    Program::Gis,
+    Program::CameraModel,
+    Program::AdjustedKernels,
+    Program::Catalogue,
+];
+
+/// Columns of the file names.
+const NAME_WIDTH: usize = 20;
+
+fn text(of: &Context) -> String {
+    let site = of.site;
+    let mut text = format!(
+        "Products of the site {} for other programs. Commands are given for this folder.\n\n\
+         Frame: {}.\n\n",
+        site.config.site,
+        frame(site.config.body)
+    );
+    if !site.images.is_empty() {
+        text += &light_time(site);
+    }
+    if site.footprints.is_empty() {
+        text += "The site has no footprints, so there are no tables of footprints here.\n\n";
+    }
+    let files = files(of);
+    for file in &files {
+        if let Some(name) = file.path.strip_prefix("exchange/") {
+            let _infallible = writeln!(text, "{name:NAME_WIDTH$} {}", file.what);
+        }
+    }
+    for program in PROGRAMS {
+        let uses = files.iter().flat_map(|file| file.uses);
+        let lines: Vec<&str> = uses
+            .filter(|of| of.program == program)
+            .flat_map(|of| of.lines.lines())
+            .collect();
+        if lines.is_empty() {
+            continue;
+        }
+        let _infallible = write!(text, "\n{}\n", about(program, site.config.body));
+        for line in lines {
+            for line in for_images(line, of) {
+                let _infallible = writeln!(text, "  {line}");
+            }
+        }
+    }
+    text
+}
+
+/// The convention of camera positions in all files, and the programs that it suits.
+fn light_time(site: &SiteProducts) -> String {
+    if site
+        .images
+        .iter()
+        .all(|image| image.times.support.is_some())
+    {
+        return format!("{}.\n\n", convention(site));
+    }
+    let others = match site.config.orientation.light_time {
+        LightTime::Surface | LightTime::None | LightTime::Support => {
+            "ISIS and ALE see the spacecraft from the centre of Mars instead (LT+S), about 10 lines away: the files for them, lidar\n\
+             data, ground control and adjusted kernels, fit after a run with light_time = \"centre\"."
+        }
+        LightTime::Centre => {
+            "ISIS and ALE do the same; other programs see the ground about 10 lines away."
+        }
+    };
+    format!(
+        "Camera models, lines and samples, ground control, lidar data and adjusted kernels follow one convention,\n{}.\n\
+         {others}\n../registration.json has the differences of the others for each image.\n\
+         Ranges of lidar data are geometric in every convention: jigsaw, which measures them from ISIS's position of the spacecraft, finds\n\
+         them up to 330 m in error.\n\n",
+        convention(site)
+    )
+}
+
+/// Files written and not empty, each file of images once, and files to be written: those declared after this text.
+fn files(of: &Context) -> Vec<&'static Declaration> {
+    let mut files: Vec<&Declaration> = Vec::new();
+    // An empty table exists, but no program is pointed to it.
+    let used = of
+        .written
+        .iter()
+        .filter(|(product, declaration)| product.rows > 0 || declaration.rows.is_empty());
+    let written = used.map(|(_, declaration)| *declaration);
+    let to_come = of
+        .products
+        .iter()
+        .skip_while(|file| file.path != README.path);
+    for file in written.chain(to_come.skip(1).copied()) {
+        if files.iter().all(|known| known.path != file.path) {
+            files.push(file);
+        }
+    }
+    files
+}
+
+/// The line, once per image for a file of images.
+fn for_images(line: &str, of: &Context) -> Vec<String> {
+    // Commands are declared for Mars.
+    let line = line.replace(
+        &*Body::Mars.map().asp_datum,
+        &of.site.config.body.map().asp_datum,
+    );
+    if !line.contains(IMAGE) {
+        return vec![line];
+    }
+    let images = of.site.images.iter();
+    images
+        .map(|image| line.replace(IMAGE, &image.times.id))
+        .collect()
+}
+
+/// Notes for users of a program, before its commands.
+fn about(program: Program, body: Body) -> String {
+    match program {
+        Program::StereoPipeline => format!(
+            "\
+            Ames Stereo Pipeline ({} is a sphere of {} m). Tables have radii instead of heights, so that the\n\
+            choice of a datum does not matter; the .json beside each names its columns, its --csv-format and its\n\
+            radii. The first line names the columns.",
+            body.map().asp_datum,
+            body.map().radius_m
+        ),
+        Program::Isis => "ISIS (cubes need spiceinit first)".to_owned(),
+        Program::Gis => format!(
+            "GIS: {}, longitudes -180..180, areocentric latitudes; {}.\n\
+             The dates inside the GeoPackage and the shapefile are those of the newest shot.\n\
+             QGIS: Layer > Add Layer > Add Vector Layer, any of these.",
+            crs_code(body),
+            point_z_height(body)
+        ),
+        Program::CameraModel => "\
+            Community Sensor Model (usgscsm): image support data of the cameras. They differ from the\n\
+            files of ALE where those do not describe the camera: the time of a line includes the summing, samples\n\
+            and the detector's centre count from the detector's edge, there is no distortion, and the pointing covers\n\
+            the whole image. The member areograph.interpolation holds the measured interpolation error."
+            .to_owned(),
+        Program::AdjustedKernels => "\
+            The adjusted site (../adjustment.json describes the adjustment and its accuracy).\n\
+            ../images/<image>/adjusted_isd.json is the adjusted camera. Kernels to be loaded after the original ones,\n\
+            each pair only for its image:"
+            .to_owned(),
+        Program::Catalogue => "STAC".to_owned(),
+    }
+}

@@ -1,0 +1,289 @@
+//! Footprints as CSV files that ISIS and Ames Stereo Pipeline read, each with a document of its columns.
+
+use std::borrow::Cow;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::{DEGREE_DECIMALS, KM_DECIMALS, METRE_DECIMALS, SECOND_DECIMALS};
+use crate::{
+    SiteProducts,
+    coordinates::{degrees, frame},
+    files::write_json,
+    footprints::Shot,
+    product::{Content, Declaration, Program, Role, Use, Write},
+    table::{Column, Table, Unit, column, meanings},
+    text_table,
+};
+use areograph_base::{schema::DocumentSchema, units::METRES_PER_KM};
+
+pub(crate) static LOLA_LIKE: Declaration = Declaration {
+    path: "exchange/lola_like.csv",
+    what: "footprints as LOLA's reduced data records: UTC, longitude, latitude, radius km, range km, ...",
+    readers: "ISIS, Ames Stereo Pipeline",
+    rows: "shots",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&lola_like())),
+    write: Write::Footprints(|path, of| text_table::write(path, table(of.site, lola_like()))),
+    uses: &[
+        Use {
+            program: Program::StereoPipeline,
+            lines: "pc_align --max-displacement 1000 --csv-format '2:lon 3:lat 4:radius_km' --datum D_MARS \\\n  \
+                    dem.tif lola_like.csv -o run/out",
+        },
+        Use {
+            program: Program::Isis,
+            lines: "lrolola2isis from=lola_like.csv cubes=cubes.lis pointid=MOLA???? to=lidar.json\n\
+                    # Lidar points of ISIS need the line and sample at which each image sees the shot, which lrolola2isis\n\
+                    # computes (a site with tie points has them ready in lidar.json). It reads column 4, the radius after the\n\
+                    # crossover correction; the measured range of column 5 belongs to the radius before it, column 6. For\n\
+                    # range constraints exchange the two first:\n\
+                    awk -F, -v OFS=, '{ t = $4; $4 = $6; $6 = t; print }' lola_like.csv > lola_raw.csv",
+        },
+    ],
+};
+
+pub(crate) static LOLA_LIKE_SIDECAR: Declaration = Declaration {
+    path: "exchange/lola_like.csv.json",
+    what: "columns, --csv-format and radii of lola_like.csv",
+    readers: "scripts",
+    rows: "",
+    role: Role::Metadata,
+    content: Content::Document(schema),
+    write: Write::Footprints(|path, of| {
+        let sidecar = Sidecar::new(
+            of.site,
+            "lola_like.csv",
+            "2:lon 3:lat 4:radius_km",
+            LOLA_LIKE_RADIUS,
+            &lola_like(),
+        );
+        write_json(path, &sidecar).map(|()| 0)
+    }),
+    uses: &[],
+};
+
+pub(crate) static ODE: Declaration = Declaration {
+    path: "exchange/ode_pts.csv",
+    what: "footprints as the Orbital Data Explorer's points",
+    readers: "Ames Stereo Pipeline",
+    rows: "shots",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&ode_points())),
+    write: Write::Footprints(|path, of| text_table::write(path, table(of.site, ode_points()))),
+    uses: &[Use {
+        program: Program::StereoPipeline,
+        lines: "pc_align --max-displacement 1000 --csv-format '1:lon 2:lat 5:radius_m' --datum D_MARS \\\n  \
+                dem.tif ode_pts.csv -o run/out",
+    }],
+};
+
+pub(crate) static ODE_SIDECAR: Declaration = Declaration {
+    path: "exchange/ode_pts.csv.json",
+    what: "columns, --csv-format and radii of ode_pts.csv",
+    readers: "scripts",
+    rows: "",
+    role: Role::Metadata,
+    content: Content::Document(schema),
+    write: Write::Footprints(|path, of| {
+        let sidecar = Sidecar::new(
+            of.site,
+            "ode_pts.csv",
+            "1:lon 2:lat 5:radius_m",
+            ODE_RADIUS,
+            &ode_points(),
+        );
+        write_json(path, &sidecar).map(|()| 0)
+    }),
+    uses: &[],
+};
+
+const LOLA_LIKE_RADIUS: &str = "column 4 is the distance from the centre of Mars after the crossover correction, kilometres: for heights; \
+     the range of column 5 belongs to the radius before it, column 6: for range constraints; \
+     column 6 the same before it; no column is a height";
+const ODE_RADIUS: &str = "column 5 is the distance from the centre of Mars after the crossover correction, metres; \
+     column 3 is that minus the radius of the areoid, not a height above a sphere";
+
+/// Description of a CSV file for its readers.
+#[derive(Serialize, JsonSchema)]
+#[schemars(title = "Columns of a CSV file")]
+struct Sidecar {
+    /// The file that is described.
+    file: &'static str,
+    /// Options for `pc_align` of Ames Stereo Pipeline.
+    csv_format: &'static str,
+    #[schemars(extend("enum" = ["D_MARS", "D_MOON"]))]
+    datum: &'static str,
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    datum_radius_m: f64,
+    /// Definition of its radii.
+    radius: Cow<'static, str>,
+    /// Frame of its longitudes and latitudes.
+    frame: &'static str,
+    #[schemars(extend("const" = "east, 0..360"))]
+    longitudes: &'static str,
+    #[schemars(extend("const" = 1))]
+    header_lines: u32,
+    #[schemars(length(min = 1))]
+    columns: Vec<SidecarColumn>,
+}
+
+/// A column of a CSV file.
+#[derive(Serialize, JsonSchema)]
+struct SidecarColumn {
+    name: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    unit: Option<&'static str>,
+    meaning: Cow<'static, str>,
+}
+
+impl Sidecar {
+    fn new(
+        site: &SiteProducts,
+        file: &'static str,
+        csv_format: &'static str,
+        radius: &'static str,
+        columns: &[Column<Shot>],
+    ) -> Self {
+        let (body, wording) = (site.config.body, site.config.wording());
+        let columns = meanings(columns).into_iter().map(|column| SidecarColumn {
+            name: column.name,
+            unit: column.unit.symbol(),
+            meaning: wording.of(column.description),
+        });
+        Self {
+            file,
+            csv_format,
+            datum: &body.map().asp_datum,
+            datum_radius_m: body.map().radius_m,
+            radius: wording.of(radius),
+            frame: frame(body),
+            longitudes: "east, 0..360",
+            header_lines: 1,
+            columns: columns.collect(),
+        }
+    }
+}
+
+/// Schema of the documents beside the files.
+pub(crate) fn schema() -> DocumentSchema {
+    DocumentSchema::of::<Sidecar>("csv_columns")
+}
+
+fn table<'a>(site: &'a SiteProducts<'a>, columns: Vec<Column<Shot<'a>>>) -> Table<'a> {
+    Table::new(columns, Shot::all(site)).in_words(&site.config.wording())
+}
+
+/// Columns 1 to 5, in the order that ISIS `lrolola2isis` reads.
+fn lola_like<'a>() -> Vec<Column<Shot<'a>>> {
+    vec![
+        column(
+            "utc",
+            Unit::None,
+            "corrected time of the shot, UTC",
+            Shot::utc,
+        ),
+        column(
+            "longitude_deg",
+            Unit::Degree,
+            "east longitude, degrees",
+            |shot: &Shot| degrees(shot.get(|of| &of.longitude_rad)),
+        )
+        .decimals(DEGREE_DECIMALS),
+        column(
+            "latitude_deg",
+            Unit::Degree,
+            "areocentric latitude, degrees",
+            |shot: &Shot| degrees(shot.get(|of| &of.latitude_rad)),
+        )
+        .decimals(DEGREE_DECIMALS),
+        column(
+            "radius_crossover_km",
+            Unit::Kilometre,
+            "radius after the crossover correction, kilometres",
+            |shot: &Shot| shot.get(|of| &of.radius_crossover_m) / METRES_PER_KM,
+        )
+        .decimals(KM_DECIMALS),
+        column(
+            "range_km",
+            Unit::Kilometre,
+            "one-way range, kilometres",
+            |shot: &Shot| shot.get(|of| &of.range_m) / METRES_PER_KM,
+        )
+        .decimals(KM_DECIMALS),
+        column(
+            "radius_km",
+            Unit::Kilometre,
+            "radius before the crossover correction, kilometres",
+            |shot: &Shot| shot.get(|of| &of.radius_m) / METRES_PER_KM,
+        )
+        .decimals(KM_DECIMALS),
+        column(
+            "et_s",
+            Unit::Second,
+            "corrected time of the shot, TDB seconds past J2000",
+            |shot: &Shot| shot.get(|of| &of.et_s),
+        )
+        .decimals(SECOND_DECIMALS),
+        column(
+            "orbit",
+            Unit::None,
+            "orbit number of the frame",
+            |shot: &Shot| shot.get(|of| &of.orbit),
+        ),
+    ]
+}
+
+/// Columns and units of the PEDR point files of the Orbital Data Explorer.
+fn ode_points<'a>() -> Vec<Column<Shot<'a>>> {
+    vec![
+        column(
+            "LONG_EAST",
+            Unit::Degree,
+            "east longitude, degrees",
+            |shot: &Shot| degrees(shot.get(|of| &of.longitude_rad)),
+        )
+        .decimals(DEGREE_DECIMALS),
+        column(
+            "LAT_NORTH",
+            Unit::Degree,
+            "areocentric latitude, degrees",
+            |shot: &Shot| degrees(shot.get(|of| &of.latitude_rad)),
+        )
+        .decimals(DEGREE_DECIMALS),
+        column(
+            "TOPOGRAPHY",
+            Unit::Metre,
+            "radius after the crossover correction minus areoid radius, metres",
+            Shot::topography_m,
+        )
+        .decimals(METRE_DECIMALS),
+        column(
+            "RANGE",
+            Unit::Metre,
+            "one-way range, metres",
+            |shot: &Shot| shot.get(|of| &of.range_m),
+        )
+        .decimals(METRE_DECIMALS),
+        column(
+            "PLANET_RAD",
+            Unit::Metre,
+            "radius after the crossover correction, metres",
+            |shot: &Shot| shot.get(|of| &of.radius_crossover_m),
+        )
+        .decimals(METRE_DECIMALS),
+        column(
+            "EPHEMERIS_TIME",
+            Unit::Second,
+            "corrected time of the shot, TDB seconds past J2000",
+            |shot: &Shot| shot.get(|of| &of.et_s),
+        )
+        .decimals(SECOND_DECIMALS),
+        column(
+            "ORBIT",
+            Unit::None,
+            "orbit number of the frame",
+            |shot: &Shot| shot.get(|of| &of.orbit),
+        ),
+    ]
+}

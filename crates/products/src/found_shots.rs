@@ -1,0 +1,267 @@
+//! Shots found by a search of the archive, written as they arrive: the same columns as `footprints.parquet`.
+
+use std::{
+    mem,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use arrow_array::{ArrayRef, Float64Array, RecordBatch, StructArray};
+use arrow_schema::{DataType, Field, Fields, Schema, SchemaRef};
+use serde_json::{Value, json};
+
+use super::{
+    coordinates::frame,
+    error::ProductError,
+    files::to_value,
+    footprints::{Shot, ShotNames, columns},
+    geoparquet::geo_metadata,
+    parquet,
+    rows_file::{GEOMETRY, RowsFormat, RowsWriter, SEARCH},
+    table::Table,
+};
+use areograph_base::{
+    body::Body,
+    error::{Locate, Result},
+    footprints::{AsRead, Footprints, SourceFile},
+    frames::BodyFixed,
+};
+use areograph_pds::archive::WindowLists;
+use areograph_stages::convert_datum::convert_at_tags;
+use areograph_store::{
+    atomic,
+    files::{Mark, MarkAt, require_own},
+};
+
+/// The column of the bounding box of each point, and its parts: readers of GeoParquet use it to skip rows.
+const BBOX: &str = "bbox";
+const BBOX_PARTS: [&str; 4] = ["xmin", "ymin", "xmax", "ymax"];
+/// Columns that shots are selected by: a search may keep several values of each, so that GIS has them too; and their
+/// positions.
+const ALSO_IN_GIS: [&str; 4] = ["channel", "class", "attitude_flag", GEOMETRY];
+
+/// Shots that are written together: enough for all threads, few compared with the memory of a search.
+const ROWS_AT_ONCE: usize = 32_768;
+
+/// Some shots of a search, in their order.
+struct FoundShots<'a> {
+    footprints: &'a Footprints<BodyFixed>,
+    windows: &'a WindowLists,
+    window_ids: &'a [String],
+}
+
+impl ShotNames for FoundShots<'_> {
+    fn windows(&self, row: usize) -> String {
+        let windows = self.windows.of(row).iter();
+        let ids = windows.filter_map(|window| self.window_ids.get(*window as usize));
+        ids.map(String::as_str).collect::<Vec<_>>().join(";")
+    }
+
+    fn utc(&self, _row: usize) -> String {
+        String::new()
+    }
+}
+
+impl FoundShots<'_> {
+    fn rows(&self) -> Vec<Shot<'_>> {
+        Shot::all_of(self.footprints, self)
+    }
+
+    fn points_deg(&self) -> Vec<[f64; 2]> {
+        self.rows().iter().map(Shot::point_deg).collect()
+    }
+}
+
+/// Columns of shots in a format: without UTC, which is unknown in a search without kernels.
+fn table(rows: Vec<Shot<'_>>, format: RowsFormat) -> Table<'_> {
+    let table = Table::new(columns(), rows).without("utc");
+    match format {
+        RowsFormat::Parquet => table.for_parquet(),
+        RowsFormat::Csv => table.for_text(),
+        RowsFormat::GeoJson => table.also_in_gis(&ALSO_IN_GIS).for_gis(),
+    }
+}
+
+/// A file of shots that is being written; it is renamed to its final name when finished.
+///
+/// Parquet is GeoParquet 1.1 with bounding boxes; the query is written to a file beside CSV.
+pub struct ShotsFile {
+    path: PathBuf,
+    rows: RowsWriter,
+    format: RowsFormat,
+    schema: SchemaRef,
+    /// The files that shots are counted into.
+    sources: Vec<SourceFile>,
+    window_ids: Vec<String>,
+    /// Shots that are not written yet, with their windows.
+    pending: (Footprints<AsRead>, WindowLists),
+    bounds: Option<[f64; 4]>,
+}
+
+impl ShotsFile {
+    /// Creates the file `path`.
+    ///
+    /// * `sources` – the files that shots are counted into
+    /// * `window_ids` – identifiers of the windows
+    ///
+    /// # Errors
+    /// Errors of the disk; a file that is no earlier answer of a search.
+    pub fn create(
+        path: &Path,
+        format: RowsFormat,
+        sources: Vec<SourceFile>,
+        window_ids: Vec<String>,
+    ) -> Result<Self> {
+        if format == RowsFormat::Csv {
+            require_own(&beside(path), &REQUEST)?;
+        }
+        let bare = parquet::schema(&table(Vec::new(), format));
+        let schema = match format {
+            RowsFormat::Parquet => with_bbox(&bare),
+            RowsFormat::Csv | RowsFormat::GeoJson => bare,
+        };
+        Ok(Self {
+            path: path.to_owned(),
+            rows: RowsWriter::replacing(path, format, SchemaRef::clone(&schema))?,
+            format,
+            schema,
+            sources,
+            window_ids,
+            pending: (Footprints::new(Vec::new()), WindowLists::default()),
+            bounds: None,
+        })
+    }
+
+    /// Appends shots with their windows.
+    ///
+    /// # Errors
+    /// Numbers that are not finite; errors of the disk.
+    pub fn write(&mut self, footprints: Footprints<AsRead>, windows: &WindowLists) -> Result<()> {
+        self.pending.0.append(footprints);
+        self.pending.1.append(windows);
+        while self.pending.0.len() >= ROWS_AT_ONCE {
+            let (footprints, windows) = &mut self.pending;
+            let left = (
+                footprints.split_off(ROWS_AT_ONCE),
+                windows.split_off(ROWS_AT_ONCE),
+            );
+            self.write_pending()?;
+            self.pending = left;
+        }
+        Ok(())
+    }
+
+    /// Writes all pending shots.
+    fn write_pending(&mut self) -> Result<()> {
+        let empty = (Footprints::new(Vec::new()), WindowLists::default());
+        let (footprints, windows) = mem::replace(&mut self.pending, empty);
+        if footprints.is_empty() {
+            return Ok(());
+        }
+        let footprints = convert_at_tags(footprints, &self.sources);
+        let shots = FoundShots {
+            footprints: &footprints,
+            windows: &windows,
+            window_ids: &self.window_ids,
+        };
+        let points_deg = shots.points_deg();
+        for [east, north] in &points_deg {
+            let [west, south, eastern, northern] =
+                self.bounds.unwrap_or([*east, *north, *east, *north]);
+            self.bounds = Some([
+                west.min(*east),
+                south.min(*north),
+                eastern.max(*east),
+                northern.max(*north),
+            ]);
+        }
+        let table = table(shots.rows(), self.format);
+        let path = &self.path;
+        let bare = parquet::schema(&table);
+        let mut batch = parquet::record_batch(&table, &bare, 0..table.rows()).in_file(path)?;
+        if self.format == RowsFormat::Parquet {
+            batch = with_boxes(&batch, &self.schema, &points_deg).in_file(path)?;
+        }
+        self.rows.write(&batch)
+    }
+
+    /// Ends the file with `search`, the query and the completeness of its answer, and gives it its name.
+    ///
+    /// # Errors
+    /// Errors of the disk; a file that is read back with another number of rows.
+    pub fn finish(mut self, search: &Value) -> Result<u64> {
+        self.write_pending()?;
+        let mut notes = vec![(SEARCH, search.to_string())];
+        match self.format {
+            RowsFormat::Parquet => {
+                let geo = geo_metadata(Body::Mars, self.bounds, Some(covering())).to_string();
+                let frame = frame(Body::Mars).to_owned();
+                notes.splice(0..0, [("geo", geo), ("frame", frame)]);
+            }
+            RowsFormat::Csv => {
+                let beside = beside(&self.path);
+                let text = format!("{:#}\n", to_value(search).in_file(&beside)?);
+                atomic::replace(&beside, text.as_bytes(), REQUEST)?;
+            }
+            RowsFormat::GeoJson => {}
+        }
+        self.rows.finish(notes)
+    }
+}
+
+/// The file of the request beside a CSV.
+fn beside(path: &Path) -> PathBuf {
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".json");
+    PathBuf::from(beside)
+}
+
+/// How an earlier such file is recognised.
+const REQUEST: Mark = Mark {
+    what: "the request of an earlier search",
+    at: MarkAt::Content(is_request),
+};
+
+fn is_request(path: &Path) -> bool {
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let request: Value = serde_json::from_str(&text).unwrap_or_default();
+    request["areograph"].is_string() && request["all_records_judged"].is_boolean()
+}
+
+/// These columns and the bounding box.
+fn with_bbox(schema: &SchemaRef) -> SchemaRef {
+    let bbox = Arc::new(Field::new(BBOX, DataType::Struct(bbox_fields()), false));
+    let fields = schema.fields().iter().cloned().chain([bbox]);
+    Arc::new(Schema::new(fields.collect::<Fields>()))
+}
+
+fn bbox_fields() -> Fields {
+    let part = |name: &str| Field::new(name, DataType::Float64, false);
+    BBOX_PARTS.map(part).to_vec().into()
+}
+
+/// These rows with the bounding box of each.
+fn with_boxes(
+    batch: &RecordBatch,
+    schema: &SchemaRef,
+    points_deg: &[[f64; 2]],
+) -> std::result::Result<RecordBatch, ProductError> {
+    let axis = |axis: usize| -> ArrayRef {
+        let values = points_deg.iter().map(|point| point[axis]);
+        Arc::new(Float64Array::from_iter_values(values))
+    };
+    let (x, y) = (axis(0), axis(1));
+    let parts = vec![Arc::clone(&x), Arc::clone(&y), x, y];
+    let boxes = StructArray::try_new(bbox_fields(), parts, None);
+    let boxes: ArrayRef = Arc::new(boxes.map_err(ProductError::refused("assemble columns"))?);
+    let arrays = batch.columns().iter().cloned().chain([boxes]).collect();
+    RecordBatch::try_new(Arc::clone(schema), arrays)
+        .map_err(ProductError::refused("assemble columns"))
+}
+
+/// Columns of the bounding box of each row.
+fn covering() -> Value {
+    let covering = BBOX_PARTS.map(|part| (part.to_owned(), json!([BBOX, part])));
+    let covering: serde_json::Map<String, Value> = covering.into_iter().collect();
+    json!({ "bbox": covering })
+}

@@ -1,0 +1,212 @@
+//! Files generated from the declarations and kept in the repository: `docs/products.md`, `config/schema`.
+
+use std::fmt::Write as _;
+
+use super::{
+    archive::{ARCHIVE_PRODUCTS, SHOTS},
+    calibration::{CALIBRATION_PRODUCTS, CAMERA_SUPPORT},
+    laser_match::{CONTROL, MATCH_PRODUCTS},
+    net::NET_PRODUCTS,
+    product::{Content, Declaration},
+    registry::PRODUCTS,
+    table::{Kind, Meaning},
+};
+use areograph_base::schema::DocumentSchema;
+
+/// JSON Schemas of the documents, each once.
+#[must_use]
+pub fn schemas() -> Vec<DocumentSchema> {
+    let mut schemas: Vec<DocumentSchema> = Vec::new();
+    for content in contents() {
+        if let Content::Document(schema) = content {
+            let schema = schema();
+            if !schemas.contains(&schema) {
+                schemas.push(schema);
+            }
+        }
+    }
+    schemas
+}
+
+/// The content declarations of all files.
+fn contents() -> impl Iterator<Item = &'static Content> {
+    let of_nets = NET_PRODUCTS.iter().map(|product| &product.content);
+    let of_archives = ARCHIVE_PRODUCTS.iter().map(|product| &product.content);
+    let of_calibrations = CALIBRATION_PRODUCTS.iter().map(|product| &product.content);
+    let of_matches = MATCH_PRODUCTS.iter().map(|product| &product.content);
+    let of_sites = PRODUCTS.iter().map(|product| &product.content);
+    let all = of_sites.chain(of_nets).chain(of_archives);
+    all.chain(of_calibrations)
+        .chain(of_matches)
+        .chain([&SHOTS.content])
+}
+
+/// `docs/products.md`: every product, and the columns of every table.
+#[must_use]
+pub fn documentation() -> String {
+    let mut text = "# Products\n\n\
+        Generated from the declarations in `crates/products/src`; `tests/products/generated.rs` reports when it is stale.\n\n\
+        Paths are relative to the site's folder, `<image>` stands for the identifier of an image. `manifest.json`, which \
+        is written last, records what all of them were made from.\n\n\
+        | file | what it is | for | one for | rows | schema |\n|---|---|---|---|---|---|\n"
+        .to_owned();
+    for product in PRODUCTS {
+        let _infallible = writeln!(
+            text,
+            "| `{}` | {} | {} | {} | {} | {} |",
+            product.path,
+            product.what,
+            product.readers,
+            product.when(),
+            product.rows,
+            schema_link(product),
+        );
+    }
+    text +=
+        "\n## Columns\n\nNames end in the unit. `?` marks columns without a value in some rows.\n";
+    for product in PRODUCTS {
+        text += &columns_of(product, "");
+    }
+    text += "\n## Nets of rectified pictures\n\n\
+        Products of `areograph triangulate`, in the folder of the net; `manifest.json` comes last here too. `net:` precedes \
+        their names below.\n\n\
+        | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n";
+    for product in NET_PRODUCTS {
+        text += &line_of(product);
+    }
+    // The CSV files have the columns of the Parquet files.
+    for product in NET_PRODUCTS
+        .iter()
+        .filter(|product| product.path.contains(".parquet"))
+    {
+        text += &columns_of(product, "net: ");
+    }
+    text += "\n## Calibrations of the lines of a camera\n\n\
+        Products of `areograph calibrate`, in the folder of the calibration; `manifest.json` comes last here too. \
+        `calibration:` precedes their names below, `<camera>` stands for a line of the camera.\n\n\
+        | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n";
+    text += &line_of(&CAMERA_SUPPORT);
+    for product in CALIBRATION_PRODUCTS {
+        text += &line_of(product);
+    }
+    for product in CALIBRATION_PRODUCTS
+        .iter()
+        .filter(|product| product.path.contains(".parquet"))
+    {
+        text += &columns_of(product, "calibration: ");
+    }
+    text += "\n## Laser control points from terrain models\n\n\
+        Products of `areograph pedr match`, in the folder `--out`; `manifest.json` comes last here too. `match:` precedes \
+        their names below.\n\n\
+        | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n";
+    text += &line_of(&CONTROL);
+    for product in MATCH_PRODUCTS {
+        text += &line_of(product);
+    }
+    text += &columns_of(&CONTROL, "match: ");
+    for product in MATCH_PRODUCTS
+        .iter()
+        .filter(|product| product.path.contains(".parquet"))
+    {
+        text += &columns_of(product, "match: ");
+    }
+    text += "\n## Archives of PEDR files\n\n\
+        Products of `areograph pedr qa`, in the folder `--out`; `manifest.json` comes last here too. `archive:` precedes \
+        their names below.\n\n\
+        | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n";
+    text += &line_of(&SHOTS);
+    for product in ARCHIVE_PRODUCTS {
+        text += &line_of(product);
+    }
+    text += &columns_of(&SHOTS, "archive: ");
+    for product in ARCHIVE_PRODUCTS
+        .iter()
+        .filter(|product| product.path.contains(".parquet"))
+    {
+        text += &columns_of(product, "archive: ");
+    }
+    text
+}
+
+/// A line for a product of which exactly one is written.
+fn line_of<W>(product: &Declaration<W>) -> String {
+    format!(
+        "| `{}` | {} | {} | {} | {} |\n",
+        product.path,
+        product.what,
+        product.readers,
+        product.rows,
+        schema_link(product),
+    )
+}
+
+/// The columns of a table; empty for other files.
+fn columns_of<W>(product: &Declaration<W>, of: &str) -> String {
+    let Content::Table(columns) = product.content else {
+        return String::new();
+    };
+    let rows: Vec<String> = columns().iter().map(row).collect();
+    format!(
+        "\n### {of}`{}`\n\n| column | type | unit | what it is |\n|---|---|---|---|\n{}",
+        product.path,
+        rows.concat()
+    )
+}
+
+fn schema_link<W>(product: &Declaration<W>) -> String {
+    let name = match product.content {
+        Content::Document(schema) => schema().name,
+        Content::Table(_) | Content::Foreign => return String::new(),
+    };
+    format!("[{name}](../config/schema/{name}.schema.json)")
+}
+
+fn row(column: &Meaning) -> String {
+    let kind = match column.kind {
+        Kind::Real => "real",
+        Kind::Natural => "natural number",
+        Kind::Integer => "integer",
+        Kind::Flag => "true or false",
+        Kind::Text => "text",
+        Kind::Bytes => "bytes",
+    };
+    format!(
+        "| `{}` | {kind}{} | {} | {} |\n",
+        column.name,
+        if column.optional { " ?" } else { "" },
+        column.unit.symbol().unwrap_or_default(),
+        column.description.replace('|', "\\|"),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn names_of_our_columns_end_in_their_unit() {
+        let columns = contents().filter_map(|content| match content {
+            Content::Table(columns) => Some(columns()),
+            _ => None,
+        });
+        for column in columns.flatten() {
+            let foreign = column.name.chars().all(|of| of.is_uppercase() || of == '_');
+            let ending = match column.name.rsplit('_').next() {
+                Some("line" | "lines") => Some("line"),
+                Some("offset") if column.name == "line_offset" => Some("line"),
+                Some("px" | "sample") => Some("pixel"),
+                Some(unit @ ("m" | "km" | "s" | "deg" | "rad")) => Some(unit),
+                _ => None,
+            };
+            assert!(foreign || ending == column.unit.symbol(), "{}", column.name);
+        }
+    }
+
+    #[test]
+    fn a_product_is_declared_once() {
+        let paths: BTreeSet<&str> = PRODUCTS.iter().map(|product| product.path).collect();
+        assert_eq!(paths.len(), PRODUCTS.len());
+    }
+}

@@ -1,0 +1,203 @@
+//! Units of laser shots: results of their search, and why they are kept or not.
+
+use super::{MatchProducts, WriteMatch, natural, write_parquet};
+use crate::{
+    coordinates::{degrees, signed_longitude_deg},
+    product::{Content, Declaration, Role},
+    table::{Column, Table, Unit, column, meanings},
+    text_table,
+};
+use areograph_base::units::wrap_two_pi;
+use areograph_stages::match_laser::UnitResult;
+
+pub(super) static TABLE: Declaration<WriteMatch> = Declaration {
+    path: "units.parquet",
+    what: "every unit of laser shots: its shift, its validation by withheld shots, whether it is kept and why not",
+    readers: "scripts",
+    rows: "units",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&columns())),
+    write: |path, of| write_parquet(path, of, table(of)),
+    uses: &[],
+};
+
+pub(super) static CSV: Declaration<WriteMatch> = Declaration {
+    path: "units.csv",
+    what: "the same as CSV",
+    readers: "spreadsheets, scripts",
+    rows: "units",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&columns())),
+    write: |path, of| text_table::write(path, table(of)),
+    uses: &[],
+};
+
+fn table<'a>(of: &MatchProducts<'a>) -> Table<'a> {
+    Table::new(columns(), of.result.units.iter().collect())
+}
+
+type Row<'a> = &'a UnitResult;
+
+fn columns<'a>() -> Vec<Column<Row<'a>>> {
+    let mut columns = vec![
+        column("unit", Unit::None, "number of the unit", |row: &Row| {
+            natural(row.unit)
+        }),
+        column(
+            "kept",
+            Unit::None,
+            "whether it is kept: it has a control point",
+            |row: &Row| row.is_kept(),
+        ),
+        column(
+            "longitude_deg",
+            Unit::Degree,
+            "east longitude of its middle, -180 to 180 degrees",
+            |row: &Row| signed_longitude_deg(wrap_two_pi(row.place_rad[0])),
+        ),
+        column(
+            "latitude_deg",
+            Unit::Degree,
+            "areocentric latitude of that, degrees",
+            |row: &Row| degrees(row.place_rad[1]),
+        ),
+        column("shots", Unit::None, "number of shots", |row: &Row| {
+            natural(row.shots)
+        }),
+        column(
+            "strips",
+            Unit::None,
+            "number of passes of its shots",
+            |row: &Row| natural(row.strips),
+        ),
+        column(
+            "radius_m",
+            Unit::Metre,
+            "largest distance of a shot from the middle, metres",
+            |row: &Row| row.radius_m,
+        ),
+        column(
+            "relief_m",
+            Unit::Metre,
+            "standard deviation of its laser heights, metres",
+            |row: &Row| row.relief_m,
+        ),
+    ];
+    columns.extend(shifts());
+    columns.extend(deviations());
+    columns.extend(judged());
+    columns
+}
+
+/// Offset of the model from the laser.
+fn shifts<'a>() -> [Column<Row<'a>>; 6] {
+    [
+        column(
+            "shift_east_cells",
+            Unit::None,
+            "eastward offset of the model from the laser, cells",
+            |row: &Row| row.found.map(|of| of.shift_cells[0]),
+        ),
+        column(
+            "shift_north_cells",
+            Unit::None,
+            "likewise to the north",
+            |row: &Row| row.found.map(|of| of.shift_cells[1]),
+        ),
+        column(
+            "shift_east_m",
+            Unit::Metre,
+            "the same, metres in the middle of the model",
+            |row: &Row| row.found.map(|of| of.shift_m[0]),
+        ),
+        column(
+            "shift_north_m",
+            Unit::Metre,
+            "likewise to the north",
+            |row: &Row| row.found.map(|of| of.shift_m[1]),
+        ),
+        column(
+            "shift_longitude_deg",
+            Unit::Degree,
+            "the same in longitude, degrees",
+            |row: &Row| row.found.map(|of| degrees(of.shift_rad[0])),
+        ),
+        column(
+            "shift_latitude_deg",
+            Unit::Degree,
+            "the same in latitude, degrees",
+            |row: &Row| row.found.map(|of| degrees(of.shift_rad[1])),
+        ),
+    ]
+}
+
+/// Precision of the offset.
+fn deviations<'a>() -> [Column<Row<'a>>; 3] {
+    [
+        column(
+            "sigma_east_m",
+            Unit::Metre,
+            "standard deviation of the shift to the east, by leaving out single shots and by the scatter of all units, metres",
+            |row: &Row| row.found.and_then(|of| Some(of.sigma?.shift_m[0])),
+        ),
+        column(
+            "sigma_north_m",
+            Unit::Metre,
+            "likewise to the north",
+            |row: &Row| row.found.and_then(|of| Some(of.sigma?.shift_m[1])),
+        ),
+        column(
+            "sigma_bias_m",
+            Unit::Metre,
+            "likewise of `bias_m`",
+            |row: &Row| row.found.and_then(|of| Some(of.sigma?.bias_m)),
+        ),
+    ]
+}
+
+fn judged<'a>() -> [Column<Row<'a>>; 7] {
+    [
+        column(
+            "score",
+            Unit::None,
+            "similarity at the best whole-cell shift, by the measure stated on the page",
+            |row: &Row| row.found.map(|of| of.score),
+        ),
+        column(
+            "contrast",
+            Unit::None,
+            "ratio of that to the mean of all similarities above 0",
+            |row: &Row| row.found.map(|of| of.contrast),
+        ),
+        column(
+            "bias_m",
+            Unit::Metre,
+            "mean of model minus laser with the shift, over the shots that were used, metres",
+            |row: &Row| row.found.map(|of| of.bias_m),
+        ),
+        column(
+            "held_out_shots",
+            Unit::None,
+            "shots withheld from the search, 0 where the model has too few heights for them",
+            |row: &Row| row.held_out.map_or(0, |of| natural(of.shots)),
+        ),
+        column(
+            "held_out_before_m",
+            Unit::Metre,
+            "root mean square of model minus laser at them without the shift, about the bias of the shots that were used, metres",
+            |row: &Row| row.held_out.map(|of| of.before_m),
+        ),
+        column(
+            "held_out_after_m",
+            Unit::Metre,
+            "the same with the shift",
+            |row: &Row| row.held_out.map(|of| of.after_m),
+        ),
+        column(
+            "refused_because",
+            Unit::None,
+            "why it is not kept; empty if it is",
+            |row: &Row| row.refused_because.clone(),
+        ),
+    ]
+}

@@ -1,0 +1,202 @@
+//! Writes rows to the files of other tools; every file is read back before it is accepted.
+//!
+//! A product is a `Declaration` in its file and a line of the registry; the
+//! files, the manifest's entries, the STAC item, `exchange/README.txt` and `docs/products.md` follow from it.
+//!
+//! The same site gives the same bytes; no clock is read here.
+//!
+//! A `Declaration` has the path, the content, the readers, the sites it applies to, its columns or schema, the function
+//! that writes it, and the commands that read it. A table is a list of `column(name, unit, meaning, value of a row)`
+//! (`table.rs`): Parquet, CSV and their sidecars, `GeoJSON`, `GeoPackage`, dBASE and the PDS4 label take the column
+//! from there, a piece of the rows at a time, and read it back the same way. `.in_gis()` and `.in_dbase(…)` select the
+//! columns of those formats. JSON documents are types: the document and its schema in `config/schema` come from one
+//! `struct` (`schema.rs`). `tests/products/generated.rs` fails when `docs/products.md` is stale.
+//!
+//! The same input gives the same bytes, for any number of threads; `finished_utc` in the manifest is the
+//! exception. Formats that hold a date (`GeoPackage`, dBASE) carry that of the newest shot.
+
+mod adjusted_footprints;
+mod adjusted_kernels;
+mod adjustment;
+mod archive;
+mod calibration;
+mod coordinates;
+mod correlations;
+pub mod error;
+mod exchange;
+mod figures;
+mod files;
+mod footprints;
+mod found_shots;
+mod generated;
+mod geojson;
+mod geoparquet;
+mod geotiff;
+mod gis;
+mod heights;
+mod isd;
+mod kernel_report;
+mod laser_match;
+mod light_time;
+mod listed;
+mod net;
+mod orientation;
+mod overlays;
+mod page;
+mod page_data;
+mod parquet;
+mod parquet_file;
+mod pds4_label;
+mod picture;
+mod product;
+mod ranges;
+pub mod read;
+mod registration;
+mod registry;
+mod rows_file;
+#[cfg(feature = "sql")]
+mod shot_columns;
+mod site;
+mod surface;
+mod table;
+mod text_table;
+mod ties;
+
+use std::path::Path;
+
+pub use adjusted_kernels::{
+    AdjustedImage, AdjustedKernels, attitude_kernel, position_kernel, write_adjusted_kernels,
+};
+pub use adjustment::ADJUSTMENT;
+pub use archive::{
+    ArchiveProducts, WorstProfile, profile_name, write_archive_products, write_profile_shots,
+};
+pub use calibration::{CalibrationProducts, write_calibration_products};
+pub use exchange::{
+    ControlMeasure, ControlNetwork, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint,
+    NetworkMeasure, NetworkPoint, isis_serial_number, write_control_network, write_gcp,
+    write_lidar_data,
+};
+pub use found_shots::ShotsFile;
+pub use generated::{documentation, schemas};
+pub use laser_match::{MatchProducts, write_match_products};
+pub use listed::{Listed, listed};
+pub use net::{NetProducts, write_net_products};
+pub use overlays::{Picture, anaglyph, piece, strip};
+pub use page::REPORT;
+pub use page_data::{PAGE_DATA, PageData};
+pub use picture::{PictureFile, PictureFormat, PictureHead};
+pub use product::{Pages, Product};
+pub use rows_file::{Out, RowsFormat, RowsWriter, SQL};
+#[cfg(feature = "sql")]
+pub use shot_columns::ShotColumns;
+pub use site::{AdjustmentProducts, GeometricProducts, ImageProducts, Program, SiteProducts};
+
+use rayon::prelude::*;
+
+use areograph_base::error::{Locate, Result};
+use product::{Context, Declaration, Scope, Write, Written};
+use registry::PRODUCTS;
+
+/// Writes every product of `site` below `directory`, with `pages` (or one page as its report), and reads each of them
+/// back.
+///
+/// # Errors
+/// [`Kind::Io`](areograph_base::error::Kind::Io) for errors of the disk; [`Kind::Bug`](areograph_base::error::Kind::Bug)
+/// for numbers that are not finite, inputs that do not belong together and files that read back
+/// differently.
+pub fn write_products<'a>(
+    directory: &Path,
+    site: &SiteProducts,
+    pages: impl Into<Pages<'a>>,
+) -> Result<Vec<Product>> {
+    site.check()?;
+    let pages = pages.into();
+    let mut written: Vec<Written> = Vec::new();
+    for group in PRODUCTS.chunk_by(|one, next| one.scope() == next.scope()) {
+        let images: Vec<Option<&ImageProducts>> = match group[0].scope() {
+            Scope::Site => vec![None],
+            Scope::Image => site.images.iter().map(Some).collect(),
+            Scope::AdjustedImage => {
+                let images = site.adjustment().map(|(_, adjustment)| adjustment.images);
+                images.unwrap_or_default().iter().map(Some).collect()
+            }
+        };
+        for image in images {
+            for together in group.chunk_by(|one, next| one.is_apart() && next.is_apart()) {
+                let context = Context {
+                    site,
+                    pages,
+                    directory,
+                    products: PRODUCTS,
+                    written: &written,
+                };
+                let files: Vec<Result<Vec<Written>>> = together
+                    .par_iter()
+                    .map(|declaration| write(declaration, &context, image))
+                    .collect();
+                for files in files {
+                    written.extend(files?);
+                }
+            }
+        }
+    }
+    Ok(written.into_iter().map(|(product, _)| product).collect())
+}
+
+/// Writes one product, for an image if the product is per image.
+fn write(
+    declaration: &'static Declaration,
+    of: &Context,
+    image: Option<&ImageProducts>,
+) -> Result<Vec<Written>> {
+    let relative = image.map_or_else(
+        || declaration.path.to_owned(),
+        |image| declaration.path_of(&image.times.id),
+    );
+    let path = of.directory.join(&relative);
+    let rows = match (&declaration.write, image, &of.site.geometric) {
+        (Write::Site(write), ..) => write(&path, of),
+        (Write::OfPage(write), ..) => return write(of),
+        (Write::Footprints(write), ..) if !of.site.footprints.is_empty() => {
+            write(&path, of).map(Some)
+        }
+        (Write::Image(write) | Write::AdjustedImage(write), Some(image), _) => {
+            write(&path, of, image).map(Some)
+        }
+        (Write::Overlay(write), Some(image), _) => {
+            let mut all = of.site.images.iter();
+            let index = all.position(|of| of.times.id == image.times.id);
+            index.map_or(Ok(None), |index| write(&path, of, index))
+        }
+        (Write::Ties(write), _, Some(geometric)) => write(&path, of, geometric).map(Some),
+        (Write::Matched(write), _, Some(geometric)) if !geometric.ties.matched.is_empty() => {
+            write(&path, of, geometric).map(Some)
+        }
+        (Write::Surface(write), ..) => match of.site.surface {
+            Some(surface) => write(&path, of, surface).map(Some),
+            None => Ok(None),
+        },
+        (Write::Model(write), ..) => match of.site.surface {
+            Some(surface) if !surface.account.is_refused => write(&path, of, surface).map(Some),
+            _ => Ok(None),
+        },
+        (Write::Adjustment(write), _, Some(geometric)) => match &geometric.adjustment {
+            Some(adjustment) => write(&path, of, geometric, adjustment),
+            None => Ok(None),
+        },
+        (Write::Several(write), _, Some(geometric)) => match &geometric.adjustment {
+            Some(adjustment) => return write(of, adjustment),
+            None => Ok(None),
+        },
+        _ => Ok(None),
+    };
+    let product = rows.in_file(&path)?.map(|rows| Product {
+        path: relative.into(),
+        rows,
+    });
+    Ok(product
+        .map(|product| (product, declaration))
+        .into_iter()
+        .collect())
+}

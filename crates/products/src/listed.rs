@@ -1,0 +1,80 @@
+//! Products that a site will have, before they are written: for the report, which links to them.
+
+use super::{
+    exchange::{adjusted::LIDAR, stac::ITEM},
+    figures::FIGURE,
+    page::OVERLAYS,
+    product::{Declaration, Write},
+    registry::PRODUCTS,
+    site::SiteProducts,
+};
+use areograph_stages::adjust::PointKind;
+
+/// A product that a site has.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Listed {
+    /// Path below the site's folder.
+    pub path: String,
+    /// Contents of the file.
+    pub what: &'static str,
+    /// Readers of it.
+    pub readers: &'static str,
+}
+
+/// The products of `site` in the order in which they are written, without the figures of its report.
+#[must_use]
+pub fn listed(site: &SiteProducts) -> Vec<Listed> {
+    let declared = PRODUCTS.iter().filter(|declaration| has(site, declaration));
+    let paths = declared.flat_map(|declaration| {
+        let images = |is_there: &dyn Fn(usize) -> bool| -> Vec<&str> {
+            let images = site.images.iter().enumerate();
+            let images = images.filter(|(index, _)| is_there(*index));
+            images.map(|(_, image)| &*image.times.id).collect()
+        };
+        let images = match declaration.write {
+            Write::Image(_) | Write::AdjustedImage(_) => images(&|_| true),
+            // Images with support data get no kernels.
+            Write::WithAnother => images(&|index| site.images[index].times.support.is_none()),
+            Write::Overlay(_) => images(&|index| {
+                let overlays = site.overlays;
+                overlays.is_some_and(|overlays| overlays.quick_look(index).is_some())
+            }),
+            _ => vec![""],
+        };
+        images.into_iter().map(|image| Listed {
+            path: declaration.path_of(image),
+            what: declaration.what,
+            readers: declaration.readers,
+        })
+    });
+    paths.collect()
+}
+
+fn has(site: &SiteProducts, declaration: &Declaration) -> bool {
+    let adjusted = site.adjustment().map(|(_, adjustment)| adjustment.adjusted);
+    if declaration.path == ITEM.path {
+        let outlines = site.images.iter().map(|image| &image.orientation.outline);
+        return !site.footprints.is_empty() || outlines.flatten().next().is_some();
+    }
+    if declaration.path == LIDAR.path {
+        let mut points = adjusted.iter().flat_map(|adjusted| &adjusted.points);
+        return points.any(|point| point.kind == PointKind::Shot);
+    }
+    if declaration.path == OVERLAYS.path {
+        return site.overlays.is_some();
+    }
+    match declaration.write {
+        Write::Site(_) | Write::Image(_) | Write::Overlay(_) => true,
+        Write::Matched(_) => site
+            .geometric
+            .is_some_and(|geometric| !geometric.ties.matched.is_empty()),
+        Write::Surface(_) => site.surface.is_some(),
+        Write::Model(_) => site.surface.is_some_and(|of| !of.account.is_refused),
+        Write::OfPage(_) => declaration.path != FIGURE.path,
+        Write::Footprints(_) => !site.footprints.is_empty(),
+        Write::Ties(_) => site.geometric.is_some(),
+        Write::Adjustment(_) | Write::AdjustedImage(_) | Write::WithAnother | Write::Several(_) => {
+            adjusted.is_some()
+        }
+    }
+}

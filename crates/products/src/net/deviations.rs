@@ -1,0 +1,102 @@
+//! Deviations of all measurements, the largest first.
+
+use super::{NetProducts, WriteNet, write_csv, write_parquet};
+use crate::{
+    product::{Content, Declaration, Role},
+    table::{Column, Table, Unit, column, meanings},
+};
+use areograph_stages::triangulate::MeasurementResult;
+
+pub(super) static TABLE: Declaration<WriteNet> = Declaration {
+    path: "deviations.parquet",
+    what: "every measurement with its deviation, the largest first; blunders are marked",
+    readers: "scripts",
+    rows: "measurements",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&columns())),
+    write: |path, of| write_parquet(path, of, table(of)),
+    uses: &[],
+};
+
+pub(super) static CSV: Declaration<WriteNet> = Declaration {
+    path: "deviations.csv",
+    what: "the same as CSV",
+    readers: "spreadsheets, scripts",
+    rows: "measurements",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&columns())),
+    write: |path, of| write_csv(path, table(of)),
+    uses: &[],
+};
+
+fn table<'a>(of: &NetProducts<'a>) -> Table<'a> {
+    let mut rows: Vec<&MeasurementResult> = of.result.measurements.iter().collect();
+    rows.sort_by(|one, two| two.length_m().total_cmp(&one.length_m()));
+    Table::new(columns(), rows)
+}
+
+fn columns<'a>() -> Vec<Column<&'a MeasurementResult>> {
+    type Row<'a> = &'a MeasurementResult;
+    vec![
+        column("point", Unit::None, "name of the point", |row: &Row| {
+            row.point.clone()
+        }),
+        column("picture", Unit::None, "name of the picture", |row: &Row| {
+            row.picture.clone()
+        }),
+        column(
+            "brick_dx_m",
+            Unit::Metre,
+            "image minus mean of the point within its brick, east, metres; missing where the brick has one image",
+            |row: &Row| Some(row.in_brick?.x_m),
+        ),
+        column("brick_dy_m", Unit::Metre, "likewise north", |row: &Row| {
+            Some(row.in_brick?.y_m)
+        }),
+        column(
+            "dx_m",
+            Unit::Metre,
+            "image minus mean of the point in the whole net, east, metres",
+            |row: &Row| row.deviation.x_m,
+        ),
+        column("dy_m", Unit::Metre, "likewise north", |row: &Row| {
+            row.deviation.y_m
+        }),
+        column(
+            "redundancy",
+            Unit::None,
+            "share of an error of this measurement that shows in its deviation, 0 to 1",
+            |row: &Row| row.redundancy,
+        ),
+        column(
+            "flagged",
+            Unit::None,
+            "whether it is beyond 3.5 robust standard deviations of its brick",
+            |row: &Row| row.flagged,
+        ),
+        column(
+            "removed",
+            Unit::None,
+            "whether it was rejected as a blunder",
+            |row: &Row| row.removed,
+        ),
+        column(
+            "x_m",
+            Unit::Metre,
+            "the point on the map, east, metres",
+            |row: &Row| row.place_m[0],
+        ),
+        column("y_m", Unit::Metre, "likewise north", |row: &Row| {
+            row.place_m[1]
+        }),
+        column(
+            "picture_x",
+            Unit::None,
+            "measured position, film corrected, units of the picture",
+            |row: &Row| row.at[0],
+        ),
+        column("picture_y", Unit::None, "likewise upwards", |row: &Row| {
+            row.at[1]
+        }),
+    ]
+}

@@ -1,0 +1,125 @@
+//! Pictures on the map.
+
+use super::{NetProducts, WriteNet, write_csv, write_parquet};
+use crate::{
+    coordinates::degrees,
+    product::{Content, Declaration, Role},
+    table::{Column, Table, Unit, column, meanings},
+};
+use areograph_stages::triangulate::PictureResult;
+
+pub(super) static TABLE: Declaration<WriteNet> = Declaration {
+    path: "pictures.parquet",
+    what: "the four coefficients of every picture, its scale, angle and place",
+    readers: "scripts",
+    rows: "pictures",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&columns())),
+    write: |path, of| write_parquet(path, of, table(of)),
+    uses: &[],
+};
+
+pub(super) static CSV: Declaration<WriteNet> = Declaration {
+    path: "pictures.csv",
+    what: "the same as CSV",
+    readers: "spreadsheets, scripts",
+    rows: "pictures",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&columns())),
+    write: |path, of| write_csv(path, table(of)),
+    uses: &[],
+};
+
+fn table<'a>(of: &NetProducts<'a>) -> Table<'a> {
+    Table::new(columns(), of.result.pictures.iter().collect())
+}
+
+fn columns<'a>() -> Vec<Column<&'a PictureResult>> {
+    type Row<'a> = &'a PictureResult;
+    vec![
+        column("picture", Unit::None, "name of the picture", |row: &Row| {
+            row.picture.clone()
+        }),
+        column("brick", Unit::None, "name of its brick", |row: &Row| {
+            row.brick.clone()
+        }),
+        column(
+            "p",
+            Unit::None,
+            "P of X = P x − Q y + A, Y = P y + Q x + B (eq. 3 of Arthur & McMacken 1977), metres per unit of the picture",
+            |row: &Row| row.coefficients[0],
+        ),
+        column("q", Unit::None, "Q, metres per unit", |row: &Row| {
+            row.coefficients[1]
+        }),
+        column("a_m", Unit::Metre, "A, metres", |row: &Row| {
+            row.coefficients[2]
+        }),
+        column("b_m", Unit::Metre, "B, metres", |row: &Row| {
+            row.coefficients[3]
+        }),
+        column(
+            "metres_per_unit",
+            Unit::None,
+            "size of a unit of the picture on the map, metres",
+            |row: &Row| row.coefficients[0].hypot(row.coefficients[1]),
+        ),
+        column(
+            "angle_deg",
+            Unit::Degree,
+            "angle from east to the picture's x axis, anticlockwise, degrees",
+            |row: &Row| degrees(row.angle_rad),
+        ),
+        column(
+            "sigma_scale",
+            Unit::None,
+            "standard deviation of the scale relative to it, and of the angle in radians",
+            |row: &Row| row.sigma_scale,
+        ),
+        column(
+            "x_m",
+            Unit::Metre,
+            "middle of its measured points, east on the map, metres",
+            |row: &Row| row.centre_m[0],
+        ),
+        column("y_m", Unit::Metre, "likewise north, metres", |row: &Row| {
+            row.centre_m[1]
+        }),
+        column(
+            "longitude_deg",
+            Unit::Degree,
+            "east longitude of the middle, -180 to 180 degrees",
+            |row: &Row| degrees(row.centre_rad[0]),
+        ),
+        column(
+            "latitude_deg",
+            Unit::Degree,
+            "areocentric latitude of the middle, degrees",
+            |row: &Row| degrees(row.centre_rad[1]),
+        ),
+        column(
+            "sigma_m",
+            Unit::Metre,
+            "standard deviation of x_m, and of y_m, metres",
+            |row: &Row| row.sigma_m,
+        ),
+        column(
+            "ties",
+            Unit::None,
+            "points that it shares with other pictures",
+            |row: &Row| row.ties,
+        ),
+        column(
+            "deviation_rms_m",
+            Unit::Metre,
+            "root mean square of a coordinate of its images from the means of these points, metres",
+            |row: &Row| row.deviation_rms_m,
+        ),
+        column(
+            "projection_floor_m",
+            Unit::Metre,
+            "departure of an orthographic picture of its size from a similarity on this map, metres: a lower limit for any adjustment",
+            |row: &Row| row.projection_floor_m,
+        ),
+    ]
+}

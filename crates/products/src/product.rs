@@ -1,0 +1,240 @@
+//! Declaration of a product: its file, its readers, its conditions and its writer.
+
+use std::path::{Path, PathBuf};
+
+use super::{
+    site::{AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts},
+    table::Meaning,
+};
+use areograph_base::{
+    error::{Locate as _, Result},
+    schema::DocumentSchema,
+};
+use areograph_stages::map_surface::Surface;
+
+/// A file that was written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Product {
+    /// Path below the site's folder, for example `images/m0402852/isd.json`.
+    pub path: PathBuf,
+    /// Number of items in the file: shots, samples, profiles, table nodes; 0 for plain text.
+    pub rows: u64,
+}
+
+/// Writes every product below `directory` by `write`, which returns its number of rows.
+pub(super) fn write_each<W>(
+    directory: &Path,
+    declarations: &[&Declaration<W>],
+    write: impl Fn(&W, &Path) -> Result<u64>,
+) -> Result<Vec<Product>> {
+    let products = declarations.iter().map(|declaration| {
+        let path = directory.join(declaration.path);
+        let rows = write(&declaration.write, &path).in_file(&path)?;
+        Ok(Product {
+            path: declaration.path.into(),
+            rows,
+        })
+    });
+    products.collect()
+}
+
+/// A product, declared once: the files, the STAC item, `exchange/README.txt` and `docs/products.md` follow. `W` is how
+/// it is written: for a site by [`Write`].
+pub(super) struct Declaration<W = Write> {
+    /// Path below the site's folder; [`IMAGE`] stands for an image's identifier.
+    pub(super) path: &'static str,
+    /// Contents of the file.
+    pub(super) what: &'static str,
+    /// Readers of it.
+    pub(super) readers: &'static str,
+    /// Meaning of its rows; empty for a file without rows.
+    pub(super) rows: &'static str,
+    /// Its role in a catalogue.
+    pub(super) role: Role,
+    /// Columns or schema.
+    pub(super) content: Content,
+    /// Its writer, and the sites that have it.
+    pub(super) write: W,
+    /// Instructions for reading it in other programs.
+    pub(super) uses: &'static [Use],
+}
+
+/// Placeholder of an image in paths and commands.
+pub(super) const IMAGE: &str = "<image>";
+
+/// Roles of STAC assets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Role {
+    Data,
+    Metadata,
+    Overview,
+}
+
+impl Role {
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Self::Data => "data",
+            Self::Metadata => "metadata",
+            Self::Overview => "overview",
+        }
+    }
+}
+
+/// Description of the structure of a file.
+pub(super) enum Content {
+    /// A table with these columns.
+    Table(fn() -> Vec<Meaning>),
+    /// A document of this schema.
+    Document(fn() -> DocumentSchema),
+    /// An external format.
+    Foreign,
+}
+
+/// Writer of a product. The functions return its number of rows, or `None` if there was nothing to write.
+pub(super) enum Write {
+    /// For every site.
+    Site(fn(&Path, &Context) -> Result<Option<u64>>),
+    /// For a site with footprints: GIS readers reject tables without a row, or guess their types.
+    Footprints(fn(&Path, &Context) -> Result<u64>),
+    /// For every image.
+    Image(fn(&Path, &Context, &ImageProducts) -> Result<u64>),
+    /// For every image with pixels, by its index.
+    Overlay(fn(&Path, &Context, usize) -> Result<Option<u64>>),
+    /// For a site with tie points.
+    Ties(fn(&Path, &Context, &GeometricProducts) -> Result<u64>),
+    /// For a site with tie points that were matched.
+    Matched(fn(&Path, &Context, &GeometricProducts) -> Result<u64>),
+    /// For a site with a terrain model.
+    Surface(fn(&Path, &Context, &Surface) -> Result<u64>),
+    /// For a site with a significant terrain model.
+    Model(fn(&Path, &Context, &Surface) -> Result<u64>),
+    /// For a site with an adjustment.
+    Adjustment(fn(&Path, &Context, &GeometricProducts, &AdjustmentProducts) -> Result<Option<u64>>),
+    /// For every image of a site with an adjustment.
+    AdjustedImage(fn(&Path, &Context, &ImageProducts) -> Result<u64>),
+    /// For every image of a site with an adjustment, by the product that writes several.
+    WithAnother,
+    /// For every site, as many as its report has.
+    OfPage(fn(&Context) -> Result<Vec<Written>>),
+    /// For a site with an adjustment, others with it.
+    Several(fn(&Context, &AdjustmentProducts) -> Result<Vec<Written>>),
+}
+
+/// Unit that has a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Scope {
+    Site,
+    Image,
+    AdjustedImage,
+}
+
+/// Pages that are made elsewhere.
+#[derive(Debug, Clone, Copy)]
+pub struct Pages<'a> {
+    /// The report.
+    pub report: &'a str,
+    /// The images with footprints on them, if there are pixels.
+    pub overlays: Option<&'a str>,
+}
+
+impl<'a, T: AsRef<str> + ?Sized> From<&'a T> for Pages<'a> {
+    fn from(report: &'a T) -> Self {
+        Self {
+            report: report.as_ref(),
+            overlays: None,
+        }
+    }
+}
+
+/// A file that was written, and its declaration.
+pub(super) type Written = (Product, &'static Declaration);
+
+/// Inputs of products.
+pub(super) struct Context<'a> {
+    pub(super) site: &'a SiteProducts<'a>,
+    pub(super) pages: Pages<'a>,
+    /// Folder that products are written to.
+    pub(super) directory: &'a Path,
+    /// All declarations, in order.
+    pub(super) products: &'a [&'static Declaration],
+    /// Products written so far, with their declarations.
+    pub(super) written: &'a [Written],
+}
+
+/// A program, or kind of program, with a section in `exchange/README.txt`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Program {
+    StereoPipeline,
+    Isis,
+    Gis,
+    CameraModel,
+    AdjustedKernels,
+    Catalogue,
+}
+
+/// How a program reads a product: lines for `exchange/README.txt`, the same for every image but for [`IMAGE`].
+pub(super) struct Use {
+    pub(super) program: Program,
+    pub(super) lines: &'static str,
+}
+
+impl Declaration {
+    pub(super) const fn scope(&self) -> Scope {
+        match self.write {
+            Write::Image(_) | Write::Overlay(_) => Scope::Image,
+            Write::AdjustedImage(_) => Scope::AdjustedImage,
+            _ => Scope::Site,
+        }
+    }
+
+    /// Whether it is written only from the footprints, independent of other products.
+    pub(super) const fn is_apart(&self) -> bool {
+        matches!(self.write, Write::Footprints(_))
+    }
+
+    /// Condition for the file, in words.
+    pub(super) const fn when(&self) -> &'static str {
+        match self.write {
+            Write::Site(_) => "every site",
+            Write::OfPage(_) => "every figure of the report",
+            Write::Footprints(_) => "a site with footprints",
+            Write::Image(_) => "every image",
+            Write::Overlay(_) => "every image with pixels",
+            Write::Ties(_) => "a site with tie points",
+            Write::Matched(_) => "a site with matched tie points",
+            Write::Surface(_) | Write::Model(_) => "a site with a terrain model",
+            Write::Adjustment(_) | Write::Several(_) => "a site with an adjustment",
+            Write::AdjustedImage(_) | Write::WithAnother => {
+                "every image of a site with an adjustment"
+            }
+        }
+    }
+
+    /// The path of an image's file.
+    pub(super) fn path_of(&self, image: &str) -> String {
+        self.path.replace(IMAGE, image)
+    }
+}
+
+impl<W> Declaration<W> {
+    /// Media type by the extension; `None` for formats without one.
+    pub(super) fn media_type(&self) -> Option<&'static str> {
+        Some(match self.path.rsplit_once('.')?.1 {
+            "parquet" => "application/vnd.apache.parquet",
+            "geojson" => "application/geo+json",
+            "json" => "application/json",
+            "csv" => "text/csv",
+            "gpkg" => "application/geopackage+sqlite3",
+            "shp" => "application/vnd.shp",
+            "shx" => "application/vnd.shx",
+            "dbf" => "application/vnd.dbf",
+            "html" => "text/html",
+            "png" => "image/png",
+            "tif" => "image/tiff; application=geotiff; profile=cloud-optimized",
+            "svg" => "image/svg+xml",
+            "xml" => "application/xml",
+            "txt" | "prj" | "cpg" | "tm" => "text/plain",
+            _ => return None,
+        })
+    }
+}

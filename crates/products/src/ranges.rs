@@ -1,0 +1,405 @@
+//! The range check: residuals per shot as Parquet, statistics and verdicts as JSON.
+
+use std::{borrow::Cow, collections::HashSet};
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::{
+    files::write_json,
+    parquet,
+    product::{Content, Declaration, Role, Write},
+    site::SiteProducts,
+    table::{Column, Table, Unit, column, meanings},
+};
+use areograph_base::{altimetry::MolaClock, footprints::Footprint, schema::DocumentSchema};
+use areograph_config::RangeCheckConfig;
+use areograph_geom::{
+    range_residuals::has_own_spacecraft,
+    statistics::{Summary, Trend},
+};
+use areograph_stages::{
+    check_ranges::{BiasScan, ProfileRanges, ScannedRadius, ShotResiduals},
+    group_profiles::Profile,
+};
+
+/// Definitions of the residuals, for readers of the files.
+const DEFINITIONS: [(&str, &str); 7] = [
+    (
+        "range_minus_distance",
+        "measured range minus |spacecraft in the kernels - footprint with the raw radius|, \
+        both in IAU 2000; the paper's Table 3, with the sign chosen here",
+    ),
+    (
+        "range_minus_distance_crossover",
+        "the same with the crossover-corrected radius",
+    ),
+    (
+        "decoding",
+        "measured range minus |spacecraft in the PEDR file - footprint with the raw radius|: tests \
+        the reading of the file without kernels",
+    ),
+    (
+        "spacecraft_radial, _along, _cross",
+        "spacecraft in the PEDR file minus spacecraft in the kernels: away \
+        from Mars, along the flight, along the orbit's angular momentum",
+    ),
+    (
+        "trend",
+        "slope of range_minus_distance over time, with its standard uncertainty from the scatter about \
+        the line, including the correlation of neighbours",
+    ),
+    (
+        "bias_scan",
+        "spread of range_minus_distance against an assumed correction of the time tags; best_s is limited \
+        by its scatter and the orbit: uncertainty_s takes the mean difference of the two \
+        orbits as the error of either, a metre along the flight being 0.3 ms",
+    ),
+    (
+        "summary",
+        "all shots of the site, each once, also when it lies in several windows; its standard deviation includes \
+        differences between profiles, which those of the profiles do not",
+    ),
+];
+
+/// Positions at which rows of footprints occur first.
+fn each_once(rows: &[u32]) -> Vec<usize> {
+    let mut seen = HashSet::with_capacity(rows.len());
+    let places = rows.iter().enumerate();
+    places
+        .filter(|(_, row)| seen.insert(**row))
+        .map(|(place, _)| place)
+        .collect()
+}
+
+#[derive(Serialize, JsonSchema)]
+#[schemars(
+    title = "Range check of a site",
+    description = "ranges.json of areograph: residuals of measured ranges per profile (the paper's Table 3), their limits and verdicts. Metres and seconds; unknown values are omitted."
+)]
+struct Document<'a> {
+    #[schemars(extend("const" = "areograph ranges 1"))]
+    format: &'static str,
+    site: &'a str,
+    valid: bool,
+    invalid_because: &'a [String],
+    units: &'static str,
+    #[schemars(length(min = 1))]
+    definitions: Vec<Definition>,
+    mola_clock: Clock<'a>,
+    limits: &'a RangeCheckConfig,
+    #[schemars(range(min = 0.0))]
+    trajectory_error_m: f64,
+    summary: SiteSummary,
+    profiles: Vec<ProfileDocument<'a>>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Definition {
+    residual: &'static str,
+    is: Cow<'static, str>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Clock<'a> {
+    #[serde(flatten)]
+    configured: &'a MolaClock,
+    correction_s: f64,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct SiteSummary {
+    profiles: usize,
+    profiles_valid: usize,
+    shots: usize,
+    outliers: u64,
+    range_minus_distance_m: Summary,
+}
+
+/// An image that was exposed during a profile.
+#[derive(Serialize, JsonSchema)]
+struct SimultaneousImage<'a> {
+    /// Image identifier.
+    image: &'a str,
+    /// Shots of the profile fired while the image was exposed.
+    shots: u32,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct ProfileDocument<'a> {
+    id: &'a str,
+    window: &'a str,
+    orbit: u32,
+    et_start_s: f64,
+    et_stop_s: f64,
+    simultaneous: Vec<SimultaneousImage<'a>>,
+    /// Whether it has enough shots to be compared with the limits.
+    judged: bool,
+    valid: bool,
+    invalid_because: &'a [String],
+    /// Shots of tables without a position of the spacecraft: put on the radius through the footprint at the range, it tests
+    /// nothing.
+    shots_nadir_by_range: u32,
+    range_minus_distance_m: Summary,
+    /// Mean without outliers: the one compared with the limit.
+    mean_without_outliers_m: f64,
+    range_minus_distance_crossover_m: Summary,
+    decoding_m: Summary,
+    /// Its mean without the same shots: the one compared with the limit.
+    decoding_without_outliers_m: f64,
+    spacecraft_radial_m: Summary,
+    spacecraft_along_m: Summary,
+    spacecraft_cross_m: Summary,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    trend_m_s: Option<Trend>,
+    outliers: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bias_scan: Option<Scan<'a>>,
+}
+
+/// A scan without unknown members.
+#[derive(Serialize, JsonSchema)]
+struct Scan<'a> {
+    /// Radius of the footprints: the one with the smaller spread of ranges.
+    radius: ScannedRadius,
+    correction_s: &'a [f64],
+    spread_m: &'a [f64],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    best_s: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    uncertainty_s: Option<f64>,
+}
+
+pub(super) static TABLE: Declaration = Declaration {
+    path: "ranges.parquet",
+    what: "residuals of the range check per shot",
+    readers: "scripts",
+    rows: "shots in profiles",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&columns())),
+    write: Write::Site(|path, of| {
+        let site = of.site;
+        let shots = (0..site.ranges.shots.len()).map(|at| RangedShot { site, at });
+        let table = Table::new(columns(), shots.collect()).in_words(&of.site.config.wording());
+        parquet::write(path, table, Vec::new()).map(Some)
+    }),
+    uses: &[],
+};
+
+pub(super) static DOCUMENT: Declaration = Declaration {
+    path: "ranges.json",
+    what: "statistics of the residuals per profile, limits and verdicts",
+    readers: "scripts",
+    rows: "profiles",
+    role: Role::Data,
+    content: Content::Document(schema),
+    write: Write::Site(|path, of| {
+        write_json(path, &document(of.site))?;
+        Ok(Some(of.site.profiles.len() as u64))
+    }),
+    uses: &[],
+};
+
+/// A shot of a profile, by its place among the residuals.
+struct RangedShot<'a> {
+    site: &'a SiteProducts<'a>,
+    at: usize,
+}
+
+impl RangedShot<'_> {
+    fn row(&self) -> u32 {
+        self.site.ranges.shots.row[self.at]
+    }
+
+    fn footprint(&self) -> Footprint {
+        self.site.footprints.row(self.row() as usize)
+    }
+
+    fn profile(&self) -> String {
+        let index = self.site.ranges.shots.profile[self.at];
+        let profile = self.site.profiles.get(index as usize);
+        profile.map_or_else(String::new, |profile| profile.id.clone())
+    }
+}
+
+fn columns<'a>() -> Vec<Column<RangedShot<'a>>> {
+    fn residual<'a>(
+        name: &'static str,
+        description: &'static str,
+        of: fn(&ShotResiduals) -> &Vec<f64>,
+    ) -> Column<RangedShot<'a>> {
+        column(name, Unit::Metre, description, move |shot: &RangedShot| {
+            of(&shot.site.ranges.shots)[shot.at]
+        })
+    }
+    /// The same where the file has a spacecraft.
+    fn own<'a>(
+        name: &'static str,
+        description: &'static str,
+        of: fn(&ShotResiduals) -> &Vec<f64>,
+    ) -> Column<RangedShot<'a>> {
+        column(name, Unit::Metre, description, move |shot: &RangedShot| {
+            Some(of(&shot.site.ranges.shots)[shot.at]).filter(|of| !of.is_nan())
+        })
+    }
+    let definition = |index: usize| DEFINITIONS[index].1;
+    vec![
+        column(
+            "profile",
+            Unit::None,
+            "profile: window, orbit and crossing",
+            RangedShot::profile,
+        ),
+        column(
+            "footprint_row",
+            Unit::None,
+            "row of the footprint in footprints.parquet, counted from 0",
+            RangedShot::row,
+        ),
+        column(
+            "et_s",
+            Unit::Second,
+            "time of the shot after the MOLA clock correction, TDB seconds past J2000",
+            |shot: &RangedShot| shot.footprint().et_s,
+        ),
+        column("orbit", Unit::None, "orbit number", |shot: &RangedShot| {
+            shot.footprint().orbit
+        }),
+        residual("range_minus_distance_m", definition(0), |shots| {
+            &shots.range_minus_distance_m
+        }),
+        residual("range_minus_distance_crossover_m", definition(1), |shots| {
+            &shots.range_minus_distance_crossover_m
+        }),
+        own("decoding_m", definition(2), |shots| &shots.decoding_m),
+        own("spacecraft_radial_m", definition(3), |shots| {
+            &shots.spacecraft_radial_m
+        }),
+        own("spacecraft_along_m", definition(3), |shots| {
+            &shots.spacecraft_along_m
+        }),
+        own("spacecraft_cross_m", definition(3), |shots| {
+            &shots.spacecraft_cross_m
+        }),
+        column(
+            "outlier",
+            Unit::None,
+            "whether range_minus_distance_m is an outlier of its profile",
+            |shot: &RangedShot| shot.site.ranges.shots.outlier[shot.at],
+        ),
+    ]
+}
+
+/// Schema of the document.
+pub(super) fn schema() -> DocumentSchema {
+    DocumentSchema::of::<Document>("ranges")
+}
+
+fn document<'a>(site: &SiteProducts<'a>) -> Document<'a> {
+    let once = each_once(&site.ranges.shots.row);
+    let residuals = once
+        .iter()
+        .map(|shot| site.ranges.shots.range_minus_distance_m[*shot]);
+    let residuals_m: Vec<f64> = residuals.collect();
+    let ranges = site.ranges;
+    let valid = |profile: &&ProfileRanges| profile.invalid_because.is_empty();
+    Document {
+        format: "areograph ranges 1",
+        site: &site.config.site,
+        valid: site.verdict.valid,
+        invalid_because: &site.verdict.reasons,
+        units: "metres, seconds, metres per second; angles in limits in radians",
+        definitions: DEFINITIONS
+            .iter()
+            .map(|(residual, is)| Definition {
+                residual,
+                is: site.config.wording().of(*is),
+            })
+            .collect(),
+        mola_clock: Clock {
+            configured: &site.config.mola_clock,
+            correction_s: site.config.mola_clock.correction_s(),
+        },
+        limits: &site.config.range_check,
+        trajectory_error_m: ranges.trajectory_error_m,
+        summary: SiteSummary {
+            profiles: site.profiles.len(),
+            profiles_valid: ranges.profiles.iter().filter(valid).count(),
+            shots: once.len(),
+            outliers: once
+                .iter()
+                .filter(|shot| ranges.shots.outlier[**shot])
+                .count() as u64,
+            range_minus_distance_m: Summary::of(&residuals_m),
+        },
+        profiles: site
+            .profiles
+            .iter()
+            .zip(&ranges.profiles)
+            .map(|(profile, ranges)| profile_document(site, profile, ranges))
+            .collect(),
+    }
+}
+
+fn profile_document<'a>(
+    site: &SiteProducts<'a>,
+    profile: &'a Profile,
+    ranges: &'a ProfileRanges,
+) -> ProfileDocument<'a> {
+    let [radial, along, cross] = ranges.spacecraft_m;
+    ProfileDocument {
+        id: &profile.id,
+        window: &profile.window,
+        orbit: profile.orbit,
+        et_start_s: profile.interval.start.seconds(),
+        et_stop_s: profile.interval.stop.seconds(),
+        simultaneous: profile
+            .simultaneous
+            .iter()
+            .filter_map(|of| {
+                Some(SimultaneousImage {
+                    image: &site.images.get(of.image)?.times.id,
+                    shots: of.shots,
+                })
+            })
+            .collect(),
+        judged: ranges.is_judged(&site.config.range_check),
+        valid: ranges.invalid_because.is_empty(),
+        invalid_because: &ranges.invalid_because,
+        shots_nadir_by_range: nadir_by_range(site, profile),
+        range_minus_distance_m: ranges.range_minus_distance_m,
+        mean_without_outliers_m: ranges.mean_without_outliers_m,
+        range_minus_distance_crossover_m: ranges.range_minus_distance_crossover_m,
+        decoding_m: ranges.decoding_m,
+        decoding_without_outliers_m: ranges.decoding_without_outliers_m,
+        spacecraft_radial_m: radial,
+        spacecraft_along_m: along,
+        spacecraft_cross_m: cross,
+        trend_m_s: ranges.trend_m_s,
+        outliers: ranges.outliers,
+        bias_scan: ranges.scan.as_ref().map(scan_document),
+    }
+}
+
+/// Shots without a spacecraft of their own, of tables.
+fn nadir_by_range(site: &SiteProducts, profile: &Profile) -> u32 {
+    if site.config.shots.is_empty() {
+        return 0;
+    }
+    let shots = profile
+        .rows
+        .iter()
+        .map(|row| site.footprints.row(*row as usize));
+    let without = shots.filter(|shot| !has_own_spacecraft(shot)).count();
+    u32::try_from(without).unwrap_or(u32::MAX)
+}
+
+fn scan_document(scan: &BiasScan) -> Scan<'_> {
+    Scan {
+        radius: scan.radius,
+        correction_s: &scan.correction_s,
+        spread_m: &scan.spread_m,
+        best_s: scan.best_s,
+        uncertainty_s: scan.uncertainty_s,
+    }
+}

@@ -1,0 +1,331 @@
+//! Registration: line and sample of every footprint in every image as Parquet, statistics as JSON.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::{
+    files::write_json,
+    light_time, parquet,
+    product::{Content, Declaration, Role, Write},
+    site::{ImageProducts, SiteProducts},
+    table::{Column, Table, Unit, column, meanings},
+};
+use areograph_base::schema::DocumentSchema;
+use areograph_config::RegistrationConfig;
+use areograph_geom::{pushbroom::CameraModel, statistics::Summary};
+use areograph_stages::{
+    group_profiles::Profile,
+    register::{MethodRun, ModelDifference, ProfileOnImage, RegisteredPoints},
+    sample_orientation::LightTimeEffect,
+};
+
+/// Definitions of the numbers, for readers of the files.
+const DEFINITIONS: [(&str, &str); 7] = [
+    (
+        "line, sample",
+        "0 at the start of the first line and the outer edge of the first pixel, 0.5 at their centres; \
+        lines of the header image. ISIS counts from 1 at the centre: add 0.5",
+    ),
+    (
+        "points",
+        "footprints with the radius before the crossover correction (x, y, z of footprints.parquet), \
+        every profile in every image",
+    ),
+    (
+        "light_time",
+        "the camera positions to which lines and samples belong; for the other conventions the offset of the ground in the middle \
+        of the image, later in lines and larger in samples",
+    ),
+    (
+        "methods",
+        "the published iterations, on the points within the image's lines: frame_first (Konecny et al. 1987, \
+        Wang 1990; with first_order: Shan, Lee & Yoon 2002) and fixed_point (eq. 4 of Shan et al. 2005)",
+    ),
+    (
+        "evaluations",
+        "evaluations of a method's formula until a step fell below the tolerance; of Newton's method: \
+        evaluations of the orientation",
+    ),
+    (
+        "mean_step_lines",
+        "mean |step| of each iteration over the points with a result, a converged point counts as 0: \
+        figure 4 of Shan et al. 2005",
+    ),
+    (
+        "difference_lines",
+        "line found by the iteration minus the one of Newton's method with the same model",
+    ),
+];
+
+#[derive(Serialize, JsonSchema)]
+#[schemars(
+    title = "Registration of a site",
+    description = "registration.json of areograph: footprints in every image, the cost of the published iterations, and the effect of the camera model. Lines, samples and image pixels; unknown values are omitted."
+)]
+struct Document<'a> {
+    #[schemars(extend("const" = "areograph registration 1"))]
+    format: &'static str,
+    site: &'a str,
+    #[schemars(length(min = 1))]
+    definitions: Vec<Definition>,
+    configured: &'a RegistrationConfig,
+    images: Vec<ImageDocument<'a>>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Definition {
+    of: &'static str,
+    is: &'static str,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct ImageDocument<'a> {
+    image: &'a str,
+    model: CameraModel,
+    light_time: &'a LightTimeEffect,
+    points: usize,
+    inside: usize,
+    extrapolated: usize,
+    rejected: &'a BTreeMap<String, u64>,
+    evaluations_newton: Summary,
+    residual_px: Summary,
+    profiles: Vec<ProfileDocument<'a>>,
+    methods: &'a [MethodRun],
+    models: &'a [ModelDifference],
+}
+
+#[derive(Serialize, JsonSchema)]
+struct ProfileDocument<'a> {
+    id: &'a str,
+    points: u32,
+    inside: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0))]
+    shot_spacing_lines: Option<f64>,
+}
+
+pub(super) static TABLE: Declaration = Declaration {
+    path: "registration.parquet",
+    what: "line and sample of every footprint in every image",
+    readers: "scripts",
+    rows: "footprints in images",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&columns())),
+    write: Write::Site(|path, of| {
+        let metadata = light_time::metadata(of.site);
+        parquet::write(path, table(of.site, of.site.images), metadata).map(Some)
+    }),
+    uses: &[],
+};
+
+pub(super) static DOCUMENT: Declaration = Declaration {
+    path: "registration.json",
+    what: "convergence of the published iterations on them, and the effect of the camera model",
+    readers: "scripts",
+    rows: "images",
+    role: Role::Data,
+    content: Content::Document(schema),
+    write: Write::Site(|path, of| {
+        write_json(path, &document(of.site))?;
+        Ok(Some(of.site.images.len() as u64))
+    }),
+    uses: &[],
+};
+
+pub(super) static ADJUSTED: Declaration = Declaration {
+    path: "registration_adjusted.parquet",
+    what: "line and sample of every footprint with the adjusted orientation",
+    readers: "scripts",
+    rows: "footprints in images",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&columns())),
+    write: Write::Adjustment(|path, of, _, adjustment| {
+        let table = table(of.site, adjustment.images);
+        parquet::write(path, table, light_time::metadata(of.site)).map(Some)
+    }),
+    uses: &[],
+};
+
+/// A footprint in an image.
+struct Registered<'a> {
+    site: &'a SiteProducts<'a>,
+    image: &'a ImageProducts<'a>,
+    at: usize,
+}
+
+impl Registered<'_> {
+    /// The column that `of` picks, in the footprint's row.
+    fn get<T: Copy>(&self, of: fn(&RegisteredPoints) -> &Vec<T>) -> T {
+        of(&self.image.registration.points)[self.at]
+    }
+
+    fn profile(&self) -> String {
+        let index = self.get(|points| &points.profile);
+        let profile = self.site.profiles.get(index as usize);
+        profile.map_or_else(String::new, |profile| profile.id.clone())
+    }
+}
+
+/// The footprints in `images`.
+fn table<'a>(site: &'a SiteProducts<'a>, images: &'a [ImageProducts<'a>]) -> Table<'a> {
+    let of_image = |image: &'a ImageProducts<'a>| {
+        let points = 0..image.registration.points.len();
+        points.map(move |at| Registered { site, image, at })
+    };
+    Table::new(columns(), images.iter().flat_map(of_image).collect())
+        .in_words(&site.config.wording())
+}
+
+fn columns<'a>() -> Vec<Column<Registered<'a>>> {
+    vec![
+        column(
+            "image",
+            Unit::None,
+            "image identifier",
+            |point: &Registered| point.image.times.id.clone(),
+        ),
+        column(
+            "profile",
+            Unit::None,
+            "profile: window, orbit and crossing",
+            Registered::profile,
+        ),
+        column(
+            "footprint_row",
+            Unit::None,
+            "row of the footprint in footprints.parquet, counted from 0",
+            |point: &Registered| point.get(|of| &of.row),
+        ),
+        column(
+            "line",
+            Unit::Line,
+            DEFINITIONS[0].1,
+            |point: &Registered| point.get(|of| &of.line),
+        ),
+        column(
+            "sample",
+            Unit::Pixel,
+            DEFINITIONS[0].1,
+            |point: &Registered| point.get(|of| &of.sample),
+        ),
+        column(
+            "line_offset",
+            Unit::Line,
+            "lines from the middle of the header image, x of the papers",
+            |point: &Registered| point.get(|of| &of.line_offset),
+        ),
+        column(
+            "y_px",
+            Unit::Pixel,
+            "across-track focal-plane coordinate from the boresight, image pixels, y of the papers \
+            (against the samples)",
+            |point: &Registered| point.get(|of| &of.y_px),
+        ),
+        column(
+            "range_m",
+            Unit::Metre,
+            "distance from the camera's position to the footprint, metres",
+            |point: &Registered| point.get(|of| &of.range_m),
+        ),
+        column(
+            "residual_px",
+            Unit::Pixel,
+            "along-track focal-plane coordinate at the solution, image pixels: the residual of the iteration",
+            |point: &Registered| point.get(|of| &of.residual_px),
+        ),
+        column(
+            "step_lines",
+            Unit::Line,
+            "last step of Newton's method, lines",
+            |point: &Registered| point.get(|of| &of.step_lines),
+        ),
+        column(
+            "evaluations",
+            Unit::None,
+            "evaluations of the orientation by Newton's method",
+            |point: &Registered| point.get(|of| &of.evaluations),
+        ),
+        column(
+            "evaluations_frame_first",
+            Unit::None,
+            "evaluations of the frame-first iteration with the second-order model; 0 outside the image's \
+            lines, and where it does not converge",
+            |point: &Registered| point.get(|of| &of.evaluations_frame_first),
+        ),
+        column(
+            "evaluations_fixed_point",
+            Unit::None,
+            "the same of eq. 4 of Shan et al. 2005",
+            |point: &Registered| point.get(|of| &of.evaluations_fixed_point),
+        ),
+        column(
+            "inside",
+            Unit::None,
+            "whether the delivered image shows the footprint",
+            |point: &Registered| point.get(|of| &of.inside),
+        ),
+        column(
+            "extrapolated",
+            Unit::None,
+            "whether it lies beyond the first or last header line, where the orientation is extrapolated",
+            |point: &Registered| point.get(|of| &of.extrapolated),
+        ),
+    ]
+}
+
+/// Schema of the document.
+pub(super) fn schema() -> DocumentSchema {
+    let keys = "/$defs/RegistrationConfig/properties";
+    DocumentSchema::of::<Document>("registration")
+        .with(&format!("{keys}/tolerance_lines"), "exclusiveMinimum", 0)
+        .with(&format!("{keys}/steps_max"), "minimum", 1)
+}
+
+fn document<'a>(site: &SiteProducts<'a>) -> Document<'a> {
+    Document {
+        format: "areograph registration 1",
+        site: &site.config.site,
+        definitions: DEFINITIONS
+            .iter()
+            .map(|(of, is)| Definition { of, is })
+            .collect(),
+        configured: &site.config.registration,
+        images: site
+            .images
+            .iter()
+            .map(|image| image_document(image, site.profiles))
+            .collect(),
+    }
+}
+
+fn image_document<'a>(image: &ImageProducts<'a>, profiles: &'a [Profile]) -> ImageDocument<'a> {
+    let registration = image.registration;
+    let points = &registration.points;
+    let evaluations: Vec<f64> = points.evaluations.iter().map(|n| f64::from(*n)).collect();
+    let profile = |(profile, on_image): (&'a Profile, &ProfileOnImage)| ProfileDocument {
+        id: &profile.id,
+        points: on_image.points,
+        inside: on_image.inside,
+        shot_spacing_lines: on_image.shot_spacing_lines,
+    };
+    ImageDocument {
+        image: &registration.image,
+        model: registration.model,
+        light_time: &image.orientation.light_time,
+        points: points.len(),
+        inside: points.inside_count(),
+        extrapolated: points.extrapolated.iter().filter(|beyond| **beyond).count(),
+        rejected: &registration.rejected,
+        evaluations_newton: Summary::of(&evaluations),
+        residual_px: Summary::of(&points.residual_px),
+        profiles: profiles
+            .iter()
+            .zip(&registration.profiles)
+            .map(profile)
+            .collect(),
+        methods: &registration.methods,
+        models: &registration.models,
+    }
+}

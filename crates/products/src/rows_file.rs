@@ -1,0 +1,345 @@
+//! Streams of rows in the requested format: the one writer for searches, queries and the service.
+
+use std::{
+    fs::File,
+    io::{BufWriter, Read as _, Write},
+    path::Path,
+};
+
+use ::parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use arrow_array::{Array, ArrayRef, RecordBatch, cast::AsArray as _, types};
+use arrow_schema::{DataType, FieldRef, SchemaRef};
+use rayon::prelude::*;
+
+use super::{
+    coordinates::frame,
+    error::ProductError,
+    geojson,
+    geoparquet::point_of,
+    parquet,
+    parquet_file::ParquetFile,
+    table::{ROWS_OF_A_TASK, Values, pieces},
+    text_table,
+};
+use areograph_base::{
+    body::Body,
+    error::{Cause, IoError, Locate, Result},
+};
+use areograph_store::files::{Mark, MarkAt, StagedFile};
+
+/// The column of points in well-known binary.
+pub(super) const GEOMETRY: &str = "geometry";
+
+/// Keys of the metadata of Parquet files by which an answer is recognised: that of a search, and of an SQL query.
+pub(super) const SEARCH: &str = "areograph_search";
+/// See [`SEARCH`].
+pub const SQL: &str = "areograph_sql";
+
+/// Format of rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RowsFormat {
+    /// Parquet; units and descriptions of columns are the metadata of its fields.
+    Parquet,
+    /// Comma-separated values, of all columns except those of bytes.
+    Csv,
+    /// GeoJSON points on Mars: those of the column `geometry` with all columns except those of bytes.
+    GeoJson,
+}
+
+impl RowsFormat {
+    /// How an earlier answer in this format is recognised.
+    const fn mark(self) -> Mark {
+        Mark {
+            what: "an earlier answer of this command",
+            at: match self {
+                Self::Parquet => MarkAt::Content(is_answer),
+                Self::Csv => MarkAt::List,
+                Self::GeoJson => MarkAt::Content(is_collection_of_shots),
+            },
+        }
+    }
+}
+
+/// Whether the metadata of a Parquet file states a search or a query.
+fn is_answer(path: &Path) -> bool {
+    let Ok(Ok(reader)) = File::open(path).map(ParquetRecordBatchReaderBuilder::try_new) else {
+        return false;
+    };
+    let metadata = reader.metadata().file_metadata().key_value_metadata();
+    let mut entries = metadata.into_iter().flatten();
+    entries.any(|entry| [SEARCH, SQL].contains(&&*entry.key))
+}
+
+/// Whether the file begins as a collection of found shots does.
+fn is_collection_of_shots(path: &Path) -> bool {
+    let Ok(head) = shots_head() else {
+        return false;
+    };
+    let mut found = vec![0; head.len()];
+    let read = File::open(path).and_then(|mut file| file.read_exact(&mut found));
+    read.is_ok() && found == head.as_bytes()
+}
+
+fn shots_head() -> std::result::Result<String, ProductError> {
+    geojson::head_of("shots", Body::Mars, frame(Body::Mars), None)
+}
+
+/// Columns that cannot be written.
+#[derive(Debug, thiserror::Error, Cause)]
+enum RowsError {
+    #[error("the column {name} holds {holds}; expected a number, a flag or text in each row")]
+    #[cause(Configuration: "write Parquet, which also holds lists and groups, or select other columns")]
+    Column { name: String, holds: String },
+    #[error("the column {GEOMETRY} is missing or holds no points")]
+    #[cause(Input: "regenerate products of another version of areograph with this version")]
+    NoPoints,
+    #[error("columns of these rows differ from those of earlier rows")]
+    #[cause(like = NoPoints)]
+    Differ,
+}
+
+/// Destination of rows.
+pub type Out = Box<dyn Write + Send>;
+
+/// Rows being written; a file gets its final name when finished.
+pub struct RowsWriter {
+    staged: Option<StagedFile>,
+    form: Form,
+    schema: SchemaRef,
+    rows: u64,
+}
+
+enum Form {
+    Parquet(Box<ParquetFile<Out>>),
+    Csv(BufWriter<Out>),
+    GeoJson(BufWriter<Out>),
+}
+
+impl RowsWriter {
+    /// Begins the file `path`, in a folder of areograph itself, with rows of these columns.
+    ///
+    /// # Errors
+    /// Errors of the disk.
+    pub fn create(path: &Path, format: RowsFormat, schema: SchemaRef) -> Result<Self> {
+        Self::staged(StagedFile::create(path)?, format, schema)
+    }
+
+    /// The same at a path of the user, where only an earlier answer in this format is replaced.
+    ///
+    /// # Errors
+    /// Errors of the disk; a file that is no such answer.
+    pub fn replacing(path: &Path, format: RowsFormat, schema: SchemaRef) -> Result<Self> {
+        Self::staged(StagedFile::replacing(path, format.mark())?, format, schema)
+    }
+
+    fn staged(staged: StagedFile, format: RowsFormat, schema: SchemaRef) -> Result<Self> {
+        let path = staged.path().to_owned();
+        let writer = Self::new(Box::new(staged.writer()?), format, schema).in_file(path)?;
+        Ok(Self {
+            staged: Some(staged),
+            ..writer
+        })
+    }
+
+    /// Begins rows of these columns that go to `out`.
+    ///
+    /// # Errors
+    /// Errors of `out`.
+    pub fn new(out: Out, format: RowsFormat, schema: SchemaRef) -> Result<Self> {
+        let form = match format {
+            RowsFormat::Parquet => {
+                let writer = ParquetFile::new(out, SchemaRef::clone(&schema));
+                Form::Parquet(Box::new(writer.map_err(parquet::refused)?))
+            }
+            RowsFormat::Csv => {
+                let mut out = BufWriter::new(out);
+                text_table::write_names(&mut out, &names(&schema))?;
+                Form::Csv(out)
+            }
+            RowsFormat::GeoJson => {
+                let mut out = BufWriter::new(out);
+                put(&mut out, shots_head()?)?;
+                Form::GeoJson(out)
+            }
+        };
+        Ok(Self {
+            staged: None,
+            form,
+            schema,
+            rows: 0,
+        })
+    }
+
+    /// Appends rows.
+    ///
+    /// # Errors
+    /// Other columns than before; columns that text cannot hold; errors of the disk.
+    pub fn write(&mut self, batch: &RecordBatch) -> Result<()> {
+        let written = self.append(batch);
+        match &self.staged {
+            Some(staged) => written.in_file(staged.path()),
+            None => written,
+        }
+    }
+
+    fn append(&mut self, batch: &RecordBatch) -> Result<()> {
+        let (fields, begun) = (batch.schema(), self.schema.fields().iter());
+        let begun = begun.map(|of| (of.name(), of.data_type()));
+        if !begun.eq(fields.fields().iter().map(|of| (of.name(), of.data_type()))) {
+            return Err(RowsError::Differ.into());
+        }
+        match &mut self.form {
+            Form::Parquet(writer) => writer.write(batch).map_err(parquet::refused)?,
+            Form::Csv(out) => {
+                for text in texts(batch, csv_rows) {
+                    put(out, text?)?;
+                }
+            }
+            Form::GeoJson(out) => {
+                for (index, text) in texts(batch, features).into_iter().enumerate() {
+                    if index > 0 || self.rows > 0 {
+                        put(out, geojson::SEPARATOR)?;
+                    }
+                    put(out, text?)?;
+                }
+            }
+        }
+        self.rows += batch.num_rows() as u64;
+        Ok(())
+    }
+
+    /// Ends the rows, and returns their number.
+    ///
+    /// * `notes` – metadata of Parquet, text by key; members of GeoJSON, whose text is JSON; CSV cannot hold them
+    ///
+    /// # Errors
+    /// Errors of the disk; a Parquet file that is read back with another number of rows.
+    pub fn finish(self, notes: Vec<(&str, String)>) -> Result<u64> {
+        let (is_parquet, rows) = (matches!(self.form, Form::Parquet(_)), self.rows);
+        let ended = self.form.end(notes);
+        let Some(staged) = self.staged else {
+            return ended.map(|()| rows);
+        };
+        ended.in_file(staged.path())?;
+        if is_parquet {
+            require_rows(staged.reader()?, rows).in_file(staged.path())?;
+        }
+        staged.finish()?;
+        Ok(rows)
+    }
+}
+
+impl Form {
+    fn end(self, notes: Vec<(&str, String)>) -> Result<()> {
+        match self {
+            Self::Parquet(writer) => writer.finish(notes).map_err(parquet::refused),
+            Self::Csv(mut out) => Ok(out.flush().map_err(IoError::on("write"))?),
+            Self::GeoJson(mut out) => {
+                let notes = notes
+                    .iter()
+                    .map(|(key, json)| format!(",\n\"{key}\": {json}"));
+                put(&mut out, format!("\n]{}\n}}\n", notes.collect::<String>()))?;
+                Ok(out.flush().map_err(IoError::on("write"))?)
+            }
+        }
+    }
+}
+
+fn put(out: &mut impl Write, text: impl AsRef<[u8]>) -> Result<()> {
+    Ok(out.write_all(text.as_ref()).map_err(IoError::on("write"))?)
+}
+
+/// Calls `text_of` for parts of the batch on all threads.
+fn texts(
+    batch: &RecordBatch,
+    text_of: impl Fn(&RecordBatch) -> Result<Vec<u8>> + Sync,
+) -> Vec<Result<Vec<u8>>> {
+    let parts: Vec<_> = pieces(batch.num_rows(), ROWS_OF_A_TASK).collect();
+    let parts = parts.into_par_iter();
+    parts
+        .map(|rows| text_of(&batch.slice(rows.start, rows.len())))
+        .collect()
+}
+
+/// Whether text can hold the column.
+fn is_text(field: &FieldRef) -> bool {
+    *field.data_type() != DataType::Binary
+}
+
+fn csv_rows(batch: &RecordBatch) -> Result<Vec<u8>> {
+    let values = attributes(batch)?;
+    let columns: Vec<_> = values.iter().map(|values| (None, values)).collect();
+    Ok(text_table::values_as_text(&columns, batch.num_rows()))
+}
+
+fn features(batch: &RecordBatch) -> Result<Vec<u8>> {
+    let points = batch
+        .column_by_name(GEOMETRY)
+        .and_then(|points| points.as_binary_opt::<i32>())
+        .and_then(|points| points.iter().map(|point| point_of(point?)).collect());
+    let points: Vec<[f64; 2]> = points.ok_or(RowsError::NoPoints)?;
+    let text = geojson::points_as_text(&names(&batch.schema()), &attributes(batch)?, &points);
+    Ok(text?)
+}
+
+/// Names of the columns that text can hold.
+fn names(schema: &SchemaRef) -> Vec<&str> {
+    let fields = schema.fields().iter().filter(|field| is_text(field));
+    fields.map(|field| &**field.name()).collect()
+}
+
+/// Types of these columns.
+fn attributes(batch: &RecordBatch) -> Result<Vec<Values>> {
+    let fields = batch.schema();
+    let columns = fields.fields().iter().zip(batch.columns());
+    columns
+        .filter(|(field, _)| is_text(field))
+        .map(|(field, array)| values_of(field.name(), array))
+        .collect()
+}
+
+/// Values of a column, row by row. Only numbers with a fraction, and text, may be missing.
+fn values_of(name: &str, array: &ArrayRef) -> Result<Values> {
+    let is_whole = array.null_count() == 0;
+    Ok(match array.data_type() {
+        DataType::Float64 if is_whole => {
+            Values::Real(array.as_primitive::<types::Float64Type>().values().to_vec())
+        }
+        DataType::Float64 => {
+            Values::OptionalReal(array.as_primitive::<types::Float64Type>().iter().collect())
+        }
+        DataType::UInt32 if is_whole => {
+            Values::Natural(array.as_primitive::<types::UInt32Type>().values().to_vec())
+        }
+        DataType::Int32 if is_whole => {
+            Values::Integer(array.as_primitive::<types::Int32Type>().values().to_vec())
+        }
+        DataType::Boolean if is_whole => {
+            Values::Flag(array.as_boolean().iter().flatten().collect())
+        }
+        DataType::Utf8 => {
+            let texts = array.as_string::<i32>().iter();
+            Values::Text(
+                texts
+                    .map(|text| text.unwrap_or_default().to_owned())
+                    .collect(),
+            )
+        }
+        other => {
+            let (name, holds) = (name.to_owned(), other.to_string());
+            return Err(RowsError::Column { name, holds }.into());
+        }
+    })
+}
+
+/// Reads back the number of rows of the file.
+fn require_rows(file: File, rows: u64) -> Result<()> {
+    let reader =
+        ParquetRecordBatchReaderBuilder::try_new(file).map_err(ProductError::unreadable)?;
+    let found = reader.metadata().file_metadata().num_rows();
+    if u64::try_from(found).is_ok_and(|found| found == rows) {
+        return Ok(());
+    }
+    let what = format!("{found} rows of {rows}");
+    Err(ProductError::ReadBack { what }.into())
+}

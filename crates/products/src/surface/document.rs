@@ -1,0 +1,167 @@
+//! `surface.json`.
+
+use std::{borrow::Cow, collections::BTreeMap};
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::product::Context;
+use areograph_base::units::RADIANS_PER_DEGREE;
+use areograph_geom::statistics::Summary;
+use areograph_stages::map_surface::{ProfileOnSurface, Surface};
+
+/// Definitions of the numbers, for readers of the file.
+const DEFINITIONS: [(&str, &str); 5] = [
+    (
+        "cells",
+        "common: cells that both images show by their orientation; filled: those with a height; unfilled: the others by reason: flat \
+         (no texture), missing (lines or pixels), edge (of an image), unlike (no correlation), ambiguous (two heights correlate), \
+         unsettled, one_way (other heights with the other image as the template), uncertain, alone (contradicted by cells around it)",
+    ),
+    (
+        "sigma_m",
+        "root mean square of the standard deviations in surface_sigma.tif: those of the matching, of one cell against the others",
+    ),
+    (
+        "common_sigma_m",
+        "standard deviation of the offset common to all heights, by the adjustment of the images; missing where not determined",
+    ),
+    (
+        "mola_minus_surface",
+        "radius of a footprint minus that of the model at its place, between the four nearest cells, metres; spread_sigmas is \
+         its robust spread about the median in its standard deviations: of the height, the shot, the profile, and of the slope \
+         times the uncertainty of the position",
+    ),
+    (
+        "mola_takes_part",
+        "whether MOLA controlled heights of the adjustment: then its mean difference is not an independent test, but the \
+         spread about it is",
+    ),
+];
+
+#[derive(Serialize, JsonSchema)]
+#[schemars(
+    title = "Terrain model of a site",
+    description = "surface.json of areograph: how surface.tif was made of a pair of images, statistics of its cells, and the altimeter's shots against it. Metres and degrees; unknown values are omitted."
+)]
+pub(super) struct Document<'a> {
+    #[schemars(extend("const" = "areograph surface 1"))]
+    format: &'static str,
+    site: &'a str,
+    #[schemars(length(min = 1))]
+    definitions: Vec<Definition>,
+    /// Identifiers of both images.
+    images: [&'a str; 2],
+    /// Whether too few cells matched to be significant: then there is no surface.tif.
+    refused: bool,
+    matching: Matching,
+    cells: Cells,
+    heights: Heights,
+    mola_minus_surface: Shots<'a>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Definition {
+    of: &'static str,
+    is: Cow<'static, str>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Matching {
+    /// Edge of the samples of the ground on which images were compared.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    sample_m: f64,
+    /// Edge of the square that was compared for one height.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    compared_m: f64,
+    /// Angle between the rays of both images in the middle.
+    convergence_deg: f64,
+    /// Metres of height for a pixel of parallax, of the coarser image.
+    height_of_pixel_m: f64,
+    /// Median correlation.
+    correlation: f64,
+    /// Median distance of the images across the parallax on the ground: the residual of their orientations.
+    across_parallax_m: f64,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Cells {
+    /// Edge.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    cell_m: f64,
+    rows: usize,
+    columns: usize,
+    common: u32,
+    filled: u32,
+    unfilled: BTreeMap<&'static str, u32>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Heights {
+    /// The sphere that they refer to.
+    sphere_m: f64,
+    #[schemars(range(min = 0.0))]
+    sigma_m: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    common_sigma_m: Option<f64>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Shots<'a> {
+    mola_takes_part: bool,
+    all: Summary,
+    /// Root mean square of the standard deviations of the differences about their common offset.
+    #[schemars(range(min = 0.0))]
+    sigma_m: f64,
+    #[schemars(range(min = 0.0))]
+    spread_sigmas: f64,
+    profiles: &'a [ProfileOnSurface],
+}
+
+impl<'a> Document<'a> {
+    pub(super) fn of(of: &Context<'a>, surface: &'a Surface) -> Self {
+        let account = &surface.account;
+        let [rows, columns] = surface.model.heights.size;
+        let wording = of.site.config.wording();
+        let definitions = DEFINITIONS.iter().map(|(of, is)| Definition {
+            of,
+            is: wording.of(*is),
+        });
+        let unfilled = account.unfilled.iter();
+        Self {
+            format: "areograph surface 1",
+            site: &of.site.config.site,
+            definitions: definitions.collect(),
+            images: account.images.map(|image| &*of.site.images[image].times.id),
+            refused: account.is_refused,
+            matching: Matching {
+                sample_m: account.sample_m,
+                compared_m: account.compared_m,
+                convergence_deg: account.convergence_rad / RADIANS_PER_DEGREE,
+                height_of_pixel_m: account.height_of_pixel_m,
+                correlation: account.correlation,
+                across_parallax_m: account.aside_m,
+            },
+            cells: Cells {
+                cell_m: account.cell_m,
+                rows,
+                columns,
+                common: account.cells,
+                filled: account.filled,
+                unfilled: unfilled.map(|(why, count)| (why.word(), *count)).collect(),
+            },
+            heights: Heights {
+                sphere_m: surface.model.heights.radius_m,
+                sigma_m: account.sigma_m,
+                common_sigma_m: account.common_sigma_m,
+            },
+            mola_minus_surface: Shots {
+                mola_takes_part: account.shots_take_part,
+                all: account.shots.above_m,
+                sigma_m: account.shots.sigma_m,
+                spread_sigmas: account.shots.spread_sigmas,
+                profiles: &account.shots.profiles,
+            },
+        }
+    }
+}

@@ -1,0 +1,431 @@
+//! Tables: a column's name, unit, meaning, type and place in each format are declared once, and every format is
+//! written and checked from that.
+//!
+//! ```text
+//! column("range_m", Unit::Metre, "one-way range", |shot: &Shot| shot.range_m).in_gis().in_dbase("range_m", 12, 3)
+//! ```
+
+use std::{borrow::Cow, ops::Range};
+
+use rayon::prelude::*;
+
+use super::error::ProductError;
+use areograph_base::wording::Wording;
+
+/// Rows whose values are in memory at once.
+const ROWS_AT_ONCE: usize = 65_536;
+/// Rows that a thread turns into text at once, and how often in a wave: the text of a wave, 3 MB per thread, is kept in
+/// memory.
+pub(super) const ROWS_OF_A_TASK: usize = 2_048;
+const TASKS_OF_A_THREAD: usize = 4;
+
+/// Unit of a column; names of areograph's columns end in it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Unit {
+    /// A name, a number without a unit, or a flag.
+    None,
+    Metre,
+    Kilometre,
+    Second,
+    Degree,
+    Radian,
+    /// Lines of the image.
+    Line,
+    /// Pixels of the image.
+    Pixel,
+}
+
+impl Unit {
+    /// The symbol, as in PDS4 and in texts.
+    pub(super) const fn symbol(self) -> Option<&'static str> {
+        Some(match self {
+            Self::None => return None,
+            Self::Metre => "m",
+            Self::Kilometre => "km",
+            Self::Second => "s",
+            Self::Degree => "deg",
+            Self::Radian => "rad",
+            Self::Line => "line",
+            Self::Pixel => "pixel",
+        })
+    }
+}
+
+/// Type of a column's values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Real,
+    Natural,
+    Integer,
+    Flag,
+    Text,
+    /// Only Parquet has such columns.
+    Bytes,
+}
+
+/// Selection of attributes of points for GIS formats.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Gis {
+    No,
+    /// In the order of the columns.
+    Yes,
+    /// After all others.
+    Last,
+    /// Only GIS formats have it.
+    Only,
+}
+
+/// A field of a dBASE table, whose names have ten letters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct DbaseField {
+    pub(super) name: &'static str,
+    /// Digits of a number; texts are as wide as the longest.
+    pub(super) width: u8,
+    pub(super) decimals: u8,
+}
+
+/// Meaning of a column.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Meaning {
+    pub(super) name: &'static str,
+    pub(super) unit: Unit,
+    pub(super) description: Cow<'static, str>,
+    pub(super) kind: Kind,
+    /// Whether rows may lack a value.
+    pub(super) optional: bool,
+    /// Decimals in text formats for external readers; else as many as reproduce the number.
+    pub(super) decimals: Option<usize>,
+    /// Least and greatest value of a count.
+    pub(super) limits: Option<[u32; 2]>,
+    pub(super) dbase: Option<DbaseField>,
+    gis: Gis,
+}
+
+impl Meaning {
+    /// Describes the column in the terms of a site.
+    pub(super) fn say(&mut self, wording: &Wording<'_>) {
+        self.description = wording.of(std::mem::take(&mut self.description));
+    }
+}
+
+/// Returns the values of rows.
+type Gather<R> = dyn Fn(&[R]) -> Values + Send + Sync;
+
+/// A column of a table whose rows are `R`.
+pub(super) struct Column<R> {
+    meaning: Meaning,
+    values: Box<Gather<R>>,
+}
+
+/// The column `name`, whose value in a row is that of `of`.
+pub(super) fn column<R, T: Cell>(
+    name: &'static str,
+    unit: Unit,
+    description: &'static str,
+    of: impl Fn(&R) -> T + Send + Sync + 'static,
+) -> Column<R> {
+    Column {
+        meaning: Meaning {
+            name,
+            unit,
+            description: Cow::Borrowed(description),
+            kind: T::KIND,
+            optional: T::OPTIONAL,
+            decimals: None,
+            limits: None,
+            dbase: None,
+            gis: Gis::No,
+        },
+        values: Box::new(move |rows| T::gather(rows.iter().map(&of).collect())),
+    }
+}
+
+impl<R> Column<R> {
+    /// Printed with a fixed number of decimals.
+    pub(super) const fn decimals(mut self, decimals: usize) -> Self {
+        self.meaning.decimals = Some(decimals);
+        self
+    }
+
+    /// A count within these limits.
+    pub(super) const fn between(mut self, least: u32, greatest: u32) -> Self {
+        self.meaning.limits = Some([least, greatest]);
+        self
+    }
+
+    /// An attribute of points in GeoJSON and GeoPackage too.
+    pub(super) const fn in_gis(mut self) -> Self {
+        self.meaning.gis = Gis::Yes;
+        self
+    }
+
+    /// The same, after the others.
+    pub(super) const fn last_in_gis(mut self) -> Self {
+        self.meaning.gis = Gis::Last;
+        self
+    }
+
+    /// An attribute of points, but not a column of Parquet and CSV.
+    pub(super) const fn only_in_gis(mut self) -> Self {
+        self.meaning.gis = Gis::Only;
+        self
+    }
+
+    /// A field of the shapefile's table too, under this name.
+    pub(super) const fn in_dbase(mut self, name: &'static str, width: u8, decimals: u8) -> Self {
+        self.meaning.dbase = Some(DbaseField {
+            name,
+            width,
+            decimals,
+        });
+        self
+    }
+}
+
+/// Type of a column's values.
+pub(super) trait Cell: Sized {
+    const KIND: Kind;
+    const OPTIONAL: bool = false;
+
+    /// The values of successive rows.
+    fn gather(cells: Vec<Self>) -> Values;
+}
+
+macro_rules! cells {
+    ($($type:ty: $kind:ident, $values:ident;)*) => {
+        $(impl Cell for $type {
+            const KIND: Kind = Kind::$kind;
+
+            fn gather(cells: Vec<Self>) -> Values {
+                Values::$values(cells)
+            }
+        })*
+
+        /// Values of one type.
+        #[derive(Debug, PartialEq)]
+        pub(super) enum Values {
+            OptionalReal(Vec<Option<f64>>),
+            $($values(Vec<$type>),)*
+        }
+    };
+}
+
+cells! {
+    f64: Real, Real;
+    u32: Natural, Natural;
+    i32: Integer, Integer;
+    bool: Flag, Flag;
+    String: Text, Text;
+    Vec<u8>: Bytes, Bytes;
+}
+
+impl Cell for Option<f64> {
+    const KIND: Kind = Kind::Real;
+    const OPTIONAL: bool = true;
+
+    fn gather(cells: Vec<Self>) -> Values {
+        Values::OptionalReal(cells)
+    }
+}
+
+impl Values {
+    /// The first row that is not a finite number.
+    fn not_finite(&self) -> Option<usize> {
+        match self {
+            Self::Real(values) => values.iter().position(|value| !value.is_finite()),
+            Self::OptionalReal(values) => {
+                let infinite = |value: &Option<f64>| value.is_some_and(|value| !value.is_finite());
+                values.iter().position(infinite)
+            }
+            _ => None,
+        }
+    }
+}
+
+/// Rows with the meanings of their columns; their values are computed piece by piece.
+pub(super) struct Table<'a> {
+    columns: Vec<(usize, Meaning)>,
+    rows: usize,
+    values: Box<dyn Fn(usize, Range<usize>) -> Values + Sync + 'a>,
+}
+
+impl<'a> Table<'a> {
+    /// The table of these rows.
+    pub(super) fn new<R: Sync + 'a>(columns: Vec<Column<R>>, rows: Vec<R>) -> Self {
+        Self {
+            columns: meanings(&columns).into_iter().enumerate().collect(),
+            rows: rows.len(),
+            values: Box::new(move |column, range| (columns[column].values)(&rows[range])),
+        }
+    }
+
+    /// With descriptions in the terms of a site.
+    pub(super) fn in_words(mut self, wording: &Wording<'_>) -> Self {
+        for (_, column) in &mut self.columns {
+            column.say(wording);
+        }
+        self
+    }
+
+    /// With only the columns of Parquet.
+    pub(super) fn for_parquet(self) -> Self {
+        self.keep(|column| column.gis != Gis::Only)
+    }
+
+    /// With only the columns of text formats.
+    pub(super) fn for_text(self) -> Self {
+        self.keep(|column| column.gis != Gis::Only && column.kind != Kind::Bytes)
+    }
+
+    /// With only the attributes of GeoJSON and GeoPackage.
+    pub(super) fn for_gis(mut self) -> Self {
+        self.columns
+            .sort_by_key(|(_, column)| column.gis == Gis::Last);
+        self.keep(|column| column.gis != Gis::No)
+    }
+
+    /// With these columns among the attributes of GeoJSON too.
+    pub(super) fn also_in_gis(mut self, names: &[&str]) -> Self {
+        for (_, column) in &mut self.columns {
+            if column.gis == Gis::No && names.contains(&column.name) {
+                column.gis = Gis::Yes;
+            }
+        }
+        self
+    }
+
+    /// With only the fields of dBASE, numbers first.
+    pub(super) fn for_dbase(mut self) -> Self {
+        self.columns
+            .sort_by_key(|(_, column)| column.kind == Kind::Text);
+        self.keep(|column| column.dbase.is_some())
+    }
+
+    /// Without the column of that name.
+    pub(super) fn without(self, name: &str) -> Self {
+        self.keep(|column| column.name != name)
+    }
+
+    /// With only the columns at these indices, in this order; the table must have them.
+    #[cfg(feature = "sql")]
+    pub(super) fn pick(mut self, places: &[usize]) -> Self {
+        self.columns = places
+            .iter()
+            .map(|place| self.columns[*place].clone())
+            .collect();
+        self
+    }
+
+    fn keep(mut self, required: impl Fn(&Meaning) -> bool) -> Self {
+        self.columns.retain(|(_, column)| required(column));
+        self
+    }
+
+    /// Meanings of the columns, in order.
+    pub(super) fn columns(&self) -> impl Iterator<Item = &Meaning> {
+        self.columns.iter().map(|(_, column)| column)
+    }
+
+    pub(super) const fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// The values of some rows, which the table must have, column by column.
+    ///
+    /// # Errors
+    /// A number that is not finite, which no reader could use.
+    pub(super) fn values(
+        &self,
+        rows: Range<usize>,
+    ) -> std::result::Result<Vec<Values>, ProductError> {
+        let of_column = |(index, column): &(usize, Meaning)| {
+            let values = (self.values)(*index, rows.clone());
+            match values.not_finite() {
+                None => Ok(values),
+                Some(row) => Err(ProductError::NotFinite {
+                    what: format!(
+                        "column {}, row {} of {}",
+                        column.name,
+                        rows.start + row + 1,
+                        self.rows
+                    ),
+                }),
+            }
+        };
+        self.columns.par_iter().map(of_column).collect()
+    }
+
+    /// All rows in pieces that fit into memory.
+    pub(super) fn pieces(&self) -> impl Iterator<Item = Range<usize>> + use<> {
+        pieces(self.rows, ROWS_AT_ONCE)
+    }
+
+    /// All rows in waves of small pieces, each of which is for one thread.
+    pub(super) fn waves(&self) -> impl Iterator<Item = Vec<Range<usize>>> + use<> {
+        let tasks = TASKS_OF_A_THREAD * rayon::current_num_threads();
+        let mut small = pieces(self.rows, ROWS_OF_A_TASK).peekable();
+        std::iter::from_fn(move || {
+            small.peek()?;
+            Some(small.by_ref().take(tasks).collect())
+        })
+    }
+}
+
+/// `rows` rows in pieces of at most this size.
+pub(super) fn pieces(rows: usize, size: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..rows)
+        .step_by(size)
+        .map(move |start| start..rows.min(start + size))
+}
+
+/// Meanings of columns, independent of the rows.
+pub(super) fn meanings<R>(columns: &[Column<R>]) -> Vec<Meaning> {
+    columns
+        .iter()
+        .map(|column| column.meaning.clone())
+        .collect()
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// A table of numbers only.
+    pub(crate) fn numbers(name: &'static str, values: Vec<f64>) -> Table<'static> {
+        Table::new(
+            vec![column(name, Unit::Metre, "", |value: &f64| *value)],
+            values,
+        )
+    }
+
+    #[test]
+    fn numbers_that_are_not_finite_are_named_and_refused() {
+        let table = numbers("a_m", vec![1.0, f64::NAN]);
+        assert_eq!(
+            table.values(1..2).unwrap_err().to_string(),
+            "column a_m, row 2 of 2 is not a finite number"
+        );
+        assert_eq!(table.values(0..1).unwrap(), [Values::Real(vec![1.0])]);
+    }
+
+    #[test]
+    fn formats_get_their_columns_in_their_order() {
+        let table = || {
+            let none = |name| column(name, Unit::None, "", |(): &()| String::new());
+            let columns = vec![
+                none("text").in_dbase("text", 0, 0).last_in_gis(),
+                column("bytes", Unit::None, "", |(): &()| vec![1_u8]),
+                column("number_m", Unit::Metre, "", |(): &()| 1.0).in_dbase("number", 5, 1),
+                none("utc").only_in_gis(),
+            ];
+            Table::new(columns, vec![()])
+        };
+        let names = |table: Table| table.columns().map(|of| of.name).collect::<Vec<_>>();
+        assert_eq!(names(table().for_parquet()), ["text", "bytes", "number_m"]);
+        assert_eq!(names(table().for_text()), ["text", "number_m"]);
+        assert_eq!(names(table().for_gis()), ["utc", "text"]);
+        assert_eq!(names(table().for_dbase()), ["number_m", "text"]);
+        let text = [Values::Real(vec![1.0]), Values::Text(vec![String::new()])];
+        assert_eq!(table().for_dbase().values(0..1).unwrap(), text);
+    }
+}

@@ -1,0 +1,233 @@
+//! The combined adjustment: convergence, observations, corrections, reliability.
+
+use super::{
+    corrections, correlation,
+    html::{Cell, Column, Table, counted, folded, heading, paragraph},
+    numbers::whole,
+    plots::{Extent, Panel, Plot, Series, figure, label},
+    reliability, residuals,
+    section::Section,
+    source::sentence,
+};
+use areograph_base::error::Result;
+use areograph_geom::statistics::BAARDA_LIMIT;
+use areograph_products::{AdjustmentProducts, GeometricProducts, SiteProducts};
+use areograph_stages::adjust::{Adjusted, AdjustmentSummary, TypeSummary, WORSE_THAN_CONFIGURED};
+
+/// Iterations that the axis of the convergence has room for at least, so that its labels are whole numbers.
+const STEPS_SHOWN_MIN: f64 = 8.0;
+
+pub(super) const SECTION: Section = Section {
+    title: "Combined adjustment",
+    anchor: "combined-adjustment",
+    appears: |site| site.adjustment().is_some(),
+    write: |site| {
+        let adjustment = site.adjustment();
+        let written = adjustment.map(|(ties, adjustment)| write(site, &ties, &adjustment));
+        Ok(written.transpose()?.unwrap_or_default())
+    },
+};
+
+fn write(
+    site: &SiteProducts,
+    geometric: &GeometricProducts,
+    adjustment: &AdjustmentProducts,
+) -> Result<String> {
+    let adjusted = adjustment.adjusted;
+    let summary = &adjusted.summary;
+    let mut html = overview(adjusted);
+    html += &reliability::absolute(site, geometric, adjustment);
+    html += &format!(
+        "<div class=\"plots\">\n{}</div>\n",
+        residuals::distribution(adjusted)?
+    );
+    html += &residuals::images(adjusted);
+    html += &folded(
+        "Observations by kind, and convergence",
+        &format!(
+            "{}<div class=\"plots\">\n{}</div>\n",
+            observations(summary),
+            figure(&convergence(adjusted))?
+        ),
+    );
+    html += &folded(
+        "Corrections to the orientation, ranges and biases",
+        &corrections::tables(site, adjusted),
+    );
+    html += &heading("Reliability");
+    html += &reliability::redundancy(site, adjusted);
+    html += &reliability::correlations(summary);
+    html += &correlation::figures(adjusted)?;
+    html += &reliability::rejected(adjusted);
+    Ok(html)
+}
+
+fn overview(adjusted: &Adjusted) -> String {
+    let summary = &adjusted.summary;
+    let [along, across] = summary.tie_components;
+    let against_configured = |component: f64| {
+        let words = if summary.degrees_of_freedom == 0 {
+            "no redundancy"
+        } else if component < WORSE_THAN_CONFIGURED.recip() {
+            "better than configured"
+        } else if component <= WORSE_THAN_CONFIGURED {
+            "as configured"
+        } else {
+            "worse than configured"
+        };
+        (words.to_owned(), String::new())
+    };
+    let at = |pointer: &str| format!("adjustment.json#/adjustment/summary{pointer}");
+    let numbers = [
+        (
+            counted(adjusted.images.len(), "image"),
+            "manifest.json#/counts/images".to_owned(),
+        ),
+        (
+            counted(summary.shots.corrections_m[0].n as usize, "footprint"),
+            at("/shots/corrections_m/0/n"),
+        ),
+        (
+            counted(summary.ties.corrections_m[0].n as usize, "tie point"),
+            at("/ties/corrections_m/0/n"),
+        ),
+        (counted(summary.steps, "iteration"), at("/steps")),
+        (
+            summary.degrees_of_freedom.to_string(),
+            at("/degrees_of_freedom"),
+        ),
+        (label(along, 3), at("/tie_components/0")),
+        against_configured(along),
+        (label(across, 3), at("/tie_components/1")),
+        against_configured(across),
+        (label(summary.sigma0, 3), at("/sigma0")),
+    ];
+    sentence(
+        "{}, {} and {} adjusted together in {}; {} degrees of freedom. Unit-weight σ of tie points {} along track ({}), {} \
+         across ({}). σ0 of all observations: {}.",
+        &numbers
+            .each_ref()
+            .map(|(number, place)| (number.clone(), &**place)),
+    )
+}
+
+/// The weighted sum of squares from iteration to iteration.
+fn convergence(adjusted: &Adjusted) -> Plot {
+    let squares = (0_u32..).zip(&adjusted.weighted_squares);
+    let logarithms = squares
+        .filter(|(_, squares)| **squares > 0.0)
+        .map(|(step, squares)| (f64::from(step), squares.log10()));
+    let series = Series::line("weighted sum of squares", 0, logarithms.collect());
+    let ends = (
+        adjusted.weighted_squares.first(),
+        adjusted.weighted_squares.last(),
+    );
+    let words = match ends {
+        (Some(first), Some(last)) => format!(
+            "Weighted sum of squares, from {} to {}.",
+            label(*first, 1),
+            label(*last, 1)
+        ),
+        _ => "No iteration was made.".to_owned(),
+    };
+    let panel = Panel {
+        height: 260,
+        log: true,
+        ..Panel::of("vᵀPv", vec![series])
+    };
+    Plot {
+        x: Extent {
+            low: 0.0,
+            high: (adjusted.weighted_squares.len() as f64).max(STEPS_SHOWN_MIN),
+        },
+        ..Plot::of(
+            "Convergence of the adjustment".to_owned(),
+            words,
+            "iteration",
+            vec![panel],
+        )
+    }
+}
+
+fn observations(summary: &AdjustmentSummary) -> String {
+    let mut table = Table::new(
+        "Observations by kind",
+        &[
+            Column::Text("kind"),
+            Column::Number("number"),
+            Column::Number("redundancy"),
+            Column::Number("per observation"),
+            Column::Number("vᵀPv"),
+            Column::Number("variance component"),
+            Column::Number("by chance"),
+            Column::Number("beyond 3.29"),
+        ],
+    );
+    for (index, of) in summary.types.iter().enumerate() {
+        let each = 100.0 * of.redundancy / of.observations.max(1) as f64;
+        let component = if of.redundancy > 0.0 {
+            label(of.variance_component, 3)
+        } else {
+            "–".to_owned()
+        };
+        let limits = of.variance_component_limits;
+        let by_chance = if limits[1] > 0.0 {
+            format!("{} to {}", label(limits[0], 2), label(limits[1], 2))
+        } else {
+            "–".to_owned()
+        };
+        // Without redundancy, the document has zeros for unknown values.
+        let known = |text: String, is_known: bool, places: &str| {
+            let cell = Cell::from(text);
+            if is_known { cell.told(places) } else { cell }
+        };
+        table.row_of(
+            &format!("adjustment.json#/adjustment/summary/types/{index}"),
+            true,
+            [
+                of.kind.words().into(),
+                Cell::from(whole(of.observations)).told("/observations"),
+                Cell::from(label(of.redundancy, 1)).told("/redundancy"),
+                format!("{} %", label(each, 1)).into(),
+                Cell::from(label(of.weighted_squares, 2)).told("/weighted_squares"),
+                known(component, of.redundancy > 0.0, "/variance_component"),
+                known(
+                    by_chance,
+                    limits[1] > 0.0,
+                    "/variance_component_limits/0 /variance_component_limits/1",
+                ),
+                Cell::from(of.beyond_limit.to_string()).told("/beyond_limit"),
+            ],
+        );
+    }
+    let words = format!(
+        "Variance component: √(vᵀPv / redundancy), 1 where the a priori σ is right; by chance: its 99 % interval, lower for \
+         heights with robust weights. Beyond {BAARDA_LIMIT}: failed Baarda's test, by chance 1 in 1000."
+    );
+    table.finish() + &paragraph(&words) + &outside(summary)
+}
+
+/// The components that are outside their own interval, and what follows.
+fn outside(summary: &AdjustmentSummary) -> String {
+    let listed = |is_outside: fn(&TypeSummary) -> bool| {
+        let found = summary.types.iter().filter(|of| is_outside(of));
+        let found =
+            found.map(|of| format!("{} {}", of.kind.words(), label(of.variance_component, 3)));
+        found.collect::<Vec<String>>().join(", ")
+    };
+    let sentences = [
+        (
+            listed(TypeSummary::is_above_chance),
+            "Above their interval, so that a priori standard deviations are too small",
+        ),
+        (
+            listed(TypeSummary::is_below_chance),
+            "Below their interval, so that a priori standard deviations are larger than the scatter, or robust weights reduce \
+             it; covariances are not reduced",
+        ),
+    ];
+    let found = sentences.into_iter().filter(|(kinds, _)| !kinds.is_empty());
+    found
+        .map(|(kinds, words)| paragraph(&format!("{words}: {kinds}.")))
+        .collect()
+}

@@ -1,0 +1,130 @@
+//! The rounds of a calibration from pixels: a table and a figure.
+
+use super::{
+    html::{Cell, Column, Table, paragraph},
+    numbers::signed,
+    plots::{Panel, Plot, Series, figure, label},
+};
+use areograph_base::error::Result;
+use areograph_stages::calibrate::{CalibrationRound, CameraResult, Rounds, Scatter, Scattered};
+
+/// The rounds of these lines.
+///
+/// # Errors
+/// A plot that cannot be drawn, which is a bug in areograph.
+pub(super) fn rounds(of: &Rounds, cameras: &[CameraResult]) -> Result<String> {
+    let words = format!(
+        "A round measures tie points, makes the lines consistent with them, matches a terrain model with cells of {} m to the laser, \
+         and calibrates with both; the next one begins with its cameras. Rounds end when half of the units are shifted by less than \
+         half a cell and residuals of control change by less than 2 %, after {} at most.",
+        label(of.cell_m, 0),
+        of.rounds_max
+    );
+    Ok(paragraph(&words) + &numbers(of) + &angles(of, cameras) + &plot(of)?)
+}
+
+fn text(value: Option<f64>, decimals: usize) -> Cell {
+    value
+        .map_or_else(|| "–".to_owned(), |value| label(value, decimals))
+        .into()
+}
+
+fn numbers(of: &Rounds) -> String {
+    let mut table = Table::new(
+        "Every round; control and ties as root mean squares, of ties the worst line",
+        &[
+            Column::Number("round"),
+            Column::Number("ties"),
+            Column::Number("ties, px"),
+            Column::Number("units kept"),
+            Column::Number("units rejected"),
+            Column::Number("units shifted by (median), cells"),
+            Column::Number("model − laser (median), m"),
+            Column::Number("control, px"),
+            Column::Number("withheld control, px"),
+            Column::Number("withheld, σ in the plane"),
+            Column::Number("σ in height"),
+        ],
+    );
+    for round in &of.rounds {
+        let [kept, refused] = [0, 1].map(|at| round.units[at] + round.judging[at]);
+        let bias = round
+            .bias_m
+            .map_or_else(|| "–".to_owned(), |of| signed(of, 1));
+        let scatter = |of: fn(Scatter) -> Option<Scattered>| {
+            round.held_back_scatter.and_then(of).map(|of| of.sigmas)
+        };
+        table.row(
+            true,
+            [
+                round.round.to_string().into(),
+                round.ties.to_string().into(),
+                text(round.tie_px, 3),
+                kept.to_string().into(),
+                refused.to_string().into(),
+                text(Some(round.shift_cells).filter(|of| of.is_finite()), 2),
+                bias.into(),
+                text(round.control.plane_px, 3),
+                text(round.held_back.plane_px, 3),
+                text(scatter(|of| of.plane), 2),
+                text(scatter(|of| of.height), 2),
+            ],
+        );
+    }
+    table.finish()
+}
+
+fn angles(of: &Rounds, cameras: &[CameraResult]) -> String {
+    let mut table = Table::new(
+        "Offset angles after every round",
+        &[
+            Column::Number("round"),
+            Column::Text("line"),
+            Column::Number("φ (roll), °"),
+            Column::Number("ω (pitch), °"),
+            Column::Number("κ (yaw), °"),
+        ],
+    );
+    for round in &of.rounds {
+        for (camera, angles_rad) in cameras.iter().zip(&round.angles_rad) {
+            let mut cells: Vec<Cell> =
+                vec![round.round.to_string().into(), (&camera.camera).into()];
+            cells.extend(angles_rad.map(|of| Cell::from(signed(of.to_degrees(), 4))));
+            table.row(true, cells);
+        }
+    }
+    table.finish()
+}
+
+fn plot(of: &Rounds) -> Result<String> {
+    let dots = |value: &dyn Fn(&CalibrationRound) -> Option<f64>| -> Vec<(f64, f64)> {
+        let rounds = of.rounds.iter();
+        let dots = rounds.filter_map(|round| Some((f64::from(round.round), value(round)?)));
+        dots.filter(|(_, value)| value.is_finite()).collect()
+    };
+    let panels = vec![
+        Panel::of(
+            "units shifted, cells",
+            vec![Series::dots(
+                "median of units that calibrate",
+                0,
+                dots(&|round| Some(round.shift_cells)),
+            )],
+        ),
+        Panel::of(
+            "control, px",
+            vec![
+                Series::dots("used", 0, dots(&|round| round.control.plane_px)),
+                Series::dots("withheld", 1, dots(&|round| round.held_back.plane_px)),
+            ],
+        ),
+    ];
+    let plot = Plot::of(
+        "From round to round".to_owned(),
+        "Offset of a round's terrain model from the laser before its calibration, and residuals of control after it."
+            .to_owned(),
+        "round",
+        panels,
+    );
+    Ok(format!("<div class=\"plots\">\n{}</div>\n", figure(&plot)?))
+}

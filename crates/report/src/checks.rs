@@ -1,0 +1,231 @@
+//! The table of the first screen: every limit of the site with the value that uses most of it, the worst first.
+
+use super::{
+    adjustment, heights,
+    html::{Cell, Column, Table, Tone, escape, link},
+    images, misregistration, notes,
+    numbers::{number, signed, whole},
+    ranges, registration, scan,
+    section::Section,
+    selection, surface, timeline,
+};
+use areograph_products::SiteProducts;
+use areograph_stages::judge::{Check, CheckKind, CheckOutcome};
+
+/// The table of the checks of a site.
+pub(super) fn table(site: &SiteProducts) -> String {
+    let mut table = empty();
+    for (index, check) in site.verdict.checks.iter().enumerate() {
+        let more = section(check.kind).filter(|section| (section.appears)(site));
+        let what = more.map_or_else(
+            || escape(check.words()),
+            |section| link(&format!("#{}", section.anchor), check.words()),
+        );
+        row(&mut table, check, what, &place(index));
+    }
+    table.finish()
+}
+
+/// The table of the checks of a net, a calibration or a match.
+pub(super) fn listed(checks: &[Check]) -> String {
+    let mut table = empty();
+    for check in checks {
+        row(&mut table, check, escape(check.words()), "");
+    }
+    table.finish()
+}
+
+fn empty() -> Table {
+    Table::new(
+        "Checks",
+        &[
+            Column::Text("result"),
+            Column::Text("check"),
+            Column::Number("value"),
+            Column::Number("limit"),
+        ],
+    )
+}
+
+/// A check in a table: `what` is checked, as HTML, and its `place` in the products.
+fn row(table: &mut Table, check: &Check, mut what: String, place: &str) {
+    if !check.subject.is_empty() {
+        what += &format!(" <small>{}</small>", escape(&check.subject));
+    }
+    let told = |text: String, at: &str| match place {
+        "" => Cell::from(text),
+        _ => Cell::from(text).told(at),
+    };
+    table.row_of(
+        place,
+        check.outcome != CheckOutcome::Fail,
+        [
+            result(check.outcome),
+            Cell::Html(what),
+            told(value(check), value_place(check)),
+            told(limit(check), "/limit"),
+        ],
+    );
+}
+
+/// Place of a check in the products.
+pub(super) fn place(index: usize) -> String {
+    format!("manifest.json#/verdict/checks/{index}")
+}
+
+/// Place of its value, below that: with the sign that is shown.
+const fn value_place(check: &Check) -> &'static str {
+    if check.kind.is_signed() {
+        "/value"
+    } else {
+        "|/value"
+    }
+}
+
+/// Mark and word of an outcome.
+fn result(outcome: CheckOutcome) -> Cell {
+    let (tone, mark, word) = match outcome {
+        CheckOutcome::Fail => (Tone::Bad, "✗", "fail"),
+        CheckOutcome::Warning => (Tone::Remarks, "!", "warning"),
+        CheckOutcome::Pass => (Tone::Good, "✓", "pass"),
+    };
+    Cell::Html(format!(
+        "<span class=\"outcome {}\"><b aria-hidden=\"true\">{mark}</b> {word}</span>",
+        tone.class()
+    ))
+}
+
+/// The value found, with its unit; a dash if it is not a number.
+pub(super) fn value(check: &Check) -> String {
+    let Some(value) = check.value else {
+        return "–".to_owned();
+    };
+    if check.unit.is_empty() {
+        return whole(value.max(0.0) as u64);
+    }
+    let [decimals, _] = check.decimals();
+    let text = if check.kind.is_signed() {
+        signed(value, decimals)
+    } else {
+        number(value.abs(), decimals)
+    };
+    format!("{text} {}", check.unit)
+}
+
+/// The limit, with its unit; a dash without a number.
+pub(super) fn limit(check: &Check) -> String {
+    let Some(limit) = check.limit else {
+        return "–".to_owned();
+    };
+    let bound = if check.kind.at_least() {
+        "≥"
+    } else if check.kind.is_signed() {
+        "±"
+    } else {
+        "≤"
+    };
+    if check.unit.is_empty() {
+        return format!("{bound} {}", whole(limit as u64));
+    }
+    let [_, decimals] = check.decimals();
+    format!("{bound} {} {}", number(limit, decimals), check.unit)
+}
+
+/// The section with details.
+const fn section(kind: CheckKind) -> Option<&'static Section> {
+    Some(match kind {
+        CheckKind::Footprints => &selection::SECTION,
+        CheckKind::HeightAfter
+        | CheckKind::HeightBefore
+        | CheckKind::HeightOutliers
+        | CheckKind::ProfilesApart
+        | CheckKind::HeightSigma
+        | CheckKind::Boresight => &heights::SECTION,
+        CheckKind::RangeMean
+        | CheckKind::OrbitsApart
+        | CheckKind::Decoding
+        | CheckKind::RangeOutliers
+        | CheckKind::Shots => &ranges::SECTION,
+        CheckKind::ClockCorrection => &scan::SECTION,
+        CheckKind::ParallaxAfter | CheckKind::ParallaxBefore => &misregistration::SECTION,
+        CheckKind::TieResidualsAlong
+        | CheckKind::TieResidualsAcross
+        | CheckKind::VarianceComponents
+        | CheckKind::TiesRejected
+        | CheckKind::TiesUsed
+        | CheckKind::ImagesJoined
+        | CheckKind::PairsJoined
+        | CheckKind::Correction => &adjustment::SECTION,
+        CheckKind::PositionRmse
+        | CheckKind::PointingRmse
+        | CheckKind::TableError
+        | CheckKind::BoresightMeets => &images::SECTION,
+        CheckKind::SurfaceFilled | CheckKind::SurfaceHeight | CheckKind::SurfaceSpread => {
+            &surface::SECTION
+        }
+        CheckKind::Attitude | CheckKind::BeamAlong | CheckKind::BeamAcross => &timeline::SECTION,
+        CheckKind::FootprintsInside | CheckKind::SupportPosition => &registration::SECTION,
+        CheckKind::SkippedRecords => &notes::SECTION,
+        // Of the whole, or of nets, calibrations and matches, whose pages have no such sections.
+        CheckKind::AdjustmentMade
+        | CheckKind::Contradiction
+        | CheckKind::HeldBackPlane
+        | CheckKind::HeldBackHeight
+        | CheckKind::ControlPlane
+        | CheckKind::ControlHeight
+        | CheckKind::OtherOrbits
+        | CheckKind::PlaceKnown
+        | CheckKind::HeightKnown
+        | CheckKind::LinesAgree
+        | CheckKind::CameraMoved
+        | CheckKind::TiesLeftOut
+        | CheckKind::ControlLeftOut
+        | CheckKind::RoundShift
+        | CheckKind::RoundControl
+        | CheckKind::HeldOutShots
+        | CheckKind::UnitsKept
+        | CheckKind::UnitsAgree
+        | CheckKind::ModelBias
+        | CheckKind::Redundancy
+        | CheckKind::MeasurementsRemoved
+        | CheckKind::MeasurementsFlagged
+        | CheckKind::ControlsKept
+        | CheckKind::ControlsRefused
+        | CheckKind::Seams
+        | CheckKind::PictureScale
+        | CheckKind::ControlStretch
+        | CheckKind::OtherOrbitsOffset => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(kind: CheckKind, value: f64, limit: f64) -> Check {
+        Check {
+            kind,
+            what: String::new(),
+            outcome: CheckOutcome::Fail,
+            subject: String::new(),
+            value: Some(value),
+            limit: Some(limit),
+            unit: kind.unit().to_owned(),
+        }
+    }
+
+    #[test]
+    fn a_value_beyond_its_limit_is_never_written_like_it() {
+        let close = check(CheckKind::RangeMean, -10.0004, 10.0);
+        assert_eq!((&*value(&close), &*limit(&close)), ("−10.0004 m", "± 10 m"));
+        let count = check(CheckKind::Shots, 19.0, 20.0);
+        assert_eq!((&*value(&count), &*limit(&count)), ("19", "≥ 20"));
+        let share = check(CheckKind::TiesRejected, 12.34, 10.0);
+        assert_eq!((&*value(&share), &*limit(&share)), ("12.3 %", "≤ 10 %"));
+        // A limit has its own number of digits.
+        let sigma = check(CheckKind::TieResidualsAlong, 0.9, 1.25);
+        assert_eq!((&*value(&sigma), &*limit(&sigma)), ("0.9 σ", "≤ 1.25 σ"));
+        let pointing = check(CheckKind::PointingRmse, 2.0, 0.04);
+        assert_eq!(&*limit(&pointing), "≤ 0.04 ″");
+    }
+}

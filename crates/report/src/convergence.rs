@@ -1,0 +1,120 @@
+//! Appendix: cost of the published iterations from ground to image, figure 4 of Shan et al. 2005 for this site.
+
+use super::{
+    html::{Cell, Column, Table, folded, paragraph},
+    numbers::whole,
+    plots::{Panel, Plot, Series, figure, label},
+    registration::place,
+    section::Section,
+};
+use areograph_base::error::Result;
+use areograph_geom::pushbroom::CameraModel;
+use areograph_products::{ImageProducts, SiteProducts};
+use areograph_stages::register::{Method, MethodRun};
+
+pub(super) const SECTION: Section = Section {
+    title: "Appendix: iterations from ground to image",
+    anchor: "iterations",
+    appears: |site| {
+        let mut images = site.images.iter();
+        images.any(|image| !image.registration.points.is_empty())
+    },
+    write,
+};
+
+fn write(site: &SiteProducts) -> Result<String> {
+    let mut figures = String::new();
+    for image in site.images.iter().filter(|image| converges(image)) {
+        figures += &figure(&convergence_plot(image))?;
+    }
+    let html = format!("{}<div class=\"plots\">\n{figures}</div>\n", methods(site));
+    Ok(folded("Cost of the published iterations", &html))
+}
+
+fn name(run: &MethodRun) -> String {
+    let method = match run.method {
+        Method::FrameFirst => "frame first",
+        Method::FixedPoint => "fixed point, eq. 4",
+    };
+    format!("{method}, order {}", order(run.model))
+}
+
+const fn order(model: CameraModel) -> &'static str {
+    match model {
+        CameraModel::FirstOrder => "1",
+        _ => "2",
+    }
+}
+
+/// Cost of the published iterations on this site's footprints.
+fn methods(site: &SiteProducts) -> String {
+    let mut table = Table::new(
+        "Iterations per footprint within the image's lines",
+        &[
+            Column::Text("image"),
+            Column::Text("method"),
+            Column::Number("footprints"),
+            Column::Number("converged"),
+            Column::Number("iterations, mean"),
+            Column::Number("most"),
+            Column::Number("line − Newton's, mean"),
+            Column::Number("standard deviation"),
+        ],
+    );
+    for image in site.images {
+        for (index, run) in image.registration.methods.iter().enumerate() {
+            let difference = &run.difference_lines;
+            table.row_of(
+                &format!("{}/methods/{index}", place(site, image)),
+                u64::from(run.evaluations.n) == run.points,
+                [
+                    (&image.times.id).into(),
+                    name(run).into(),
+                    Cell::from(whole(run.points)).told("/points"),
+                    Cell::from(whole(run.evaluations.n)).told("/evaluations/n"),
+                    Cell::from(format!("{:.2}", run.evaluations.mean)).told("/evaluations/mean"),
+                    Cell::from(format!("{:.0}", run.evaluations.max)).told("/evaluations/max"),
+                    Cell::from(label(difference.mean, 4)).told("/difference_lines/mean"),
+                    Cell::from(label(difference.standard_deviation, 4))
+                        .told("/difference_lines/standard_deviation"),
+                ],
+            );
+        }
+    }
+    let words = format!(
+        "Tolerance {} lines, at most {} steps. Frame first diverges where pixels are more than twice as long as wide.",
+        site.config.registration.tolerance_lines, site.config.registration.steps_max
+    );
+    table.finish() + &paragraph(&words)
+}
+
+/// Whether an iteration has steps to draw.
+fn converges(image: &ImageProducts) -> bool {
+    let mut runs = image.registration.methods.iter();
+    runs.any(|run| !run.mean_step_lines.is_empty())
+}
+
+/// Figure 4: the mean step of every iteration.
+fn convergence_plot(image: &ImageProducts) -> Plot {
+    // The curves of first order coincide with those of second.
+    let runs = image.registration.methods.iter();
+    let second_order = runs.filter(|run| run.model == CameraModel::SecondOrder);
+    let series = second_order.enumerate().map(|(colour, run)| {
+        let steps = (1_u32..).zip(&run.mean_step_lines);
+        let logarithms = steps
+            .filter(|(_, step)| **step > 0.0)
+            .map(|(iteration, step)| (f64::from(iteration), step.log10()));
+        Series::line(name(run), colour, logarithms.collect())
+    });
+    let words =
+        "Mean step of the footprints within the image's lines, 0 once converged.".to_owned();
+    Plot::of(
+        format!("Convergence on {}", image.times.id),
+        words,
+        "iteration",
+        vec![Panel {
+            log: true,
+            ..Panel::of("mean step, lines", series.collect())
+        }],
+    )
+}

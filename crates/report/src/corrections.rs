@@ -1,0 +1,220 @@
+//! Corrections of the adjustment to each image's orientation, to ranges and to biases.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+
+use super::{
+    html::{Cell, Column, Table, paragraph},
+    plots::label,
+};
+use areograph_base::units::{RADIANS_PER_ARCSECOND, SECONDS_PER_MS};
+use areograph_geom::{orbit_axes::radial_along_cross, statistics::Summary};
+use areograph_products::{ImageProducts, SiteProducts};
+use areograph_stages::adjust::{Adjusted, CorrectedImage};
+
+/// Corrections at the middle of each image, ranges, biases.
+pub(super) fn tables(site: &SiteProducts, adjusted: &Adjusted) -> String {
+    [
+        positions(site, adjusted),
+        rotations(adjusted),
+        ranges(site, adjusted),
+        biases(adjusted),
+        attitude_clock(adjusted),
+    ]
+    .concat()
+}
+
+/// Coefficients of power 0 from quantity `first` on, with their standard deviations.
+fn constants(image: &CorrectedImage, first: usize) -> [(f64, f64); 3] {
+    [0, 1, 2].map(|axis| {
+        let index = 3 * (first + axis);
+        (image.correction[index], image.sigmas[index])
+    })
+}
+
+fn with_sigma((value, sigma): (f64, f64), decimals: usize) -> Cell {
+    format!("{} ± {}", label(value, decimals), label(sigma, decimals)).into()
+}
+
+/// Place in the products of the coefficient of power 0 of a quantity, and its standard deviation, in another unit.
+fn place(quantity: usize, unit: &str) -> String {
+    let index = 3 * quantity;
+    format!("/correction/{index}{unit} /sigmas/{index}{unit}")
+}
+
+/// Place of an image in the products.
+fn of_image(index: usize) -> String {
+    format!("adjustment.json#/adjustment/images/{index}")
+}
+
+fn positions(site: &SiteProducts, adjusted: &Adjusted) -> String {
+    let mut table = Table::new(
+        "Shift of the camera at the middle of the image, metres",
+        &[
+            Column::Text("image"),
+            Column::Number("X"),
+            Column::Number("Y"),
+            Column::Number("Z"),
+            Column::Number("along track, Mars-fixed"),
+            Column::Number("cross track"),
+            Column::Number("radial"),
+        ],
+    );
+    let mut starts_at_pedr = false;
+    for (index, (image, corrected)) in site.images.iter().zip(&adjusted.images).enumerate() {
+        let position_m = constants(corrected, 0);
+        starts_at_pedr |= corrected.pedr_orbit_m().is_some();
+        let in_orbit = orbit_axes(image, Vector3::from(position_m.map(|(value, _)| value)));
+        let mut cells: Vec<Cell> = vec![(&corrected.id).into()];
+        let axes = position_m.into_iter().enumerate();
+        cells.extend(axes.map(|(axis, value)| with_sigma(value, 1).told(place(axis, ""))));
+        cells.extend([1, 2, 0].map(|axis| {
+            let component = in_orbit.map(|shift_m| label(shift_m[axis], 1));
+            Cell::from(component.unwrap_or_else(|| "–".to_owned()))
+        }));
+        table.row_of(&of_image(index), true, cells);
+    }
+    let words = "From the orbit of the kernels; expected with a simultaneous profile: that of the PEDR (adjustment.orbit_of_pedr).";
+    if starts_at_pedr {
+        table.finish() + &paragraph(words)
+    } else {
+        table.finish()
+    }
+}
+
+/// Radial, along the flight over the turning planet, and across it.
+fn orbit_axes(image: &ImageProducts, shift_m: Vector3<f64>) -> Option<Vector3<f64>> {
+    let samples = &image.orientation.samples;
+    let middle = samples.len() / 2;
+    let position_m = |index: usize| Some(samples.get(index)?.position.xyz_m);
+    let (before, after) = (position_m(middle.checked_sub(1)?)?, position_m(middle)?);
+    let advance_m = after - before;
+    let axes = radial_along_cross(&after, &advance_m);
+    (advance_m.norm() > 0.0).then(|| axes.transpose() * shift_m)
+}
+
+fn rotations(adjusted: &Adjusted) -> String {
+    let mut table = Table::new(
+        "Rotation of the camera at the middle of the image, arcseconds",
+        &[
+            Column::Text("image"),
+            Column::Number("about camera x"),
+            Column::Number("about camera y"),
+            Column::Number("about camera z"),
+            Column::Number("time bias, ms"),
+        ],
+    );
+    let per_arcsecond = format!("*{}", RADIANS_PER_ARCSECOND.recip());
+    for (index, image) in adjusted.images.iter().enumerate() {
+        let arcseconds = |(value, sigma): (f64, f64)| {
+            (value / RADIANS_PER_ARCSECOND, sigma / RADIANS_PER_ARCSECOND)
+        };
+        let mut cells: Vec<Cell> = vec![(&image.id).into()];
+        let rotation = constants(image, 3);
+        cells.extend(rotation.into_iter().zip(3..).map(|(axis, quantity)| {
+            with_sigma(arcseconds(axis), 1).told(place(quantity, &per_arcsecond))
+        }));
+        cells.push(image.time_bias_s.map_or_else(
+            || "not estimated".into(),
+            |(bias_s, sigma_s)| {
+                with_sigma((bias_s / SECONDS_PER_MS, sigma_s / SECONDS_PER_MS), 2)
+                    .told("/time_bias_s/0*1000 /time_bias_s/1*1000")
+            },
+        ));
+        table.row_of(&of_image(index), true, cells);
+    }
+    let inseparable = if adjusted.summary.correlated.is_empty() {
+        ""
+    } else {
+        " A narrow field of view hardly separates position from rotation."
+    };
+    table.finish() + &paragraph(&format!("±: a posteriori σ.{inseparable}"))
+}
+
+/// Range residuals of the same shots with the orbit of the kernels and after the adjustment.
+fn ranges(site: &SiteProducts, adjusted: &Adjusted) -> String {
+    if adjusted.ranges.is_empty() {
+        return paragraph("No shot was fired during an exposure: no range takes part.");
+    }
+    let before_m = checked_ranges(site);
+    let mut groups: BTreeMap<(&str, usize), [Vec<f64>; 2]> = BTreeMap::new();
+    for range in &adjusted.ranges {
+        let profile = &*site.profiles[range.profile].id;
+        let [before, after] = groups.entry((profile, range.image)).or_default();
+        let shot = (range.profile, adjusted.points[range.point].index);
+        before.extend(before_m.get(&shot));
+        after.push(range.residual_m.value);
+    }
+    let mut table = Table::new(
+        "Ranges of shots fired during an exposure, residuals in metres",
+        &[
+            Column::Text("profile"),
+            Column::Text("image"),
+            Column::Number("ranges"),
+            Column::Number("before, mean"),
+            Column::Number("std"),
+            Column::Number("after, mean"),
+            Column::Number("std"),
+        ],
+    );
+    for ((profile, image), [before, after]) in groups {
+        let mut cells: Vec<Cell> = vec![
+            profile.into(),
+            (&adjusted.images[image].id).into(),
+            after.len().to_string().into(),
+        ];
+        for values in [before, after] {
+            let found = Summary::of(&values);
+            let numbers = [found.mean, found.standard_deviation].map(|value| label(value, 3));
+            cells.extend(numbers.map(|text| {
+                let text = if found.n == 0 { "–".to_owned() } else { text };
+                Cell::from(text)
+            }));
+        }
+        table.row(true, cells);
+    }
+    table.finish() + &paragraph("Before: as in the range check.")
+}
+
+/// Range − distance of the shots by profile and row.
+fn checked_ranges(site: &SiteProducts) -> BTreeMap<(usize, usize), f64> {
+    let shots = &site.ranges.shots;
+    let of_shot = |index: usize| {
+        let shot = (shots.profile[index] as usize, shots.row[index] as usize);
+        (shot, shots.range_minus_distance_m[index])
+    };
+    (0..shots.len()).map(of_shot).collect()
+}
+
+/// Offset of the attitude's clock, if it is an unknown.
+fn attitude_clock(adjusted: &Adjusted) -> String {
+    adjusted.attitude_clock_s
+        .map_or_else(String::new, |(offset_s, sigma_s)| {
+            paragraph(&format!(
+                "Offset of the attitude's clock, all images: {} ± {} s; the rotations above include it.",
+                label(offset_s, 3),
+                label(sigma_s, 3)
+            ))
+        })
+}
+
+fn biases(adjusted: &Adjusted) -> String {
+    let biases = &adjusted.summary.range_biases_m;
+    if biases.is_empty() {
+        return String::new();
+    }
+    let columns = &[Column::Text("profile"), Column::Number("range bias, m")];
+    let mut table = Table::new("Range biases", columns);
+    for (index, (profile, value_m, sigma_m)) in biases.iter().enumerate() {
+        table.row_of(
+            &format!("adjustment.json#/adjustment/summary/range_biases_m/{index}"),
+            true,
+            [
+                profile.into(),
+                with_sigma((*value_m, *sigma_m), 3).told("/1 /2"),
+            ],
+        );
+    }
+    table.finish()
+}

@@ -1,0 +1,28 @@
+//! Why two outputs cannot be compared.
+
+use areograph_base::error::Cause;
+
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Configuration)]
+pub(super) enum DifferenceError {
+    /// Neither a site's folder nor a folder of sites.
+    #[error("no manifest.json in this folder or below it; expected products of `areograph run`")]
+    #[cause(Input: "name the folder given to --out, or a site's folder in it")]
+    NoProducts,
+    /// Two names of one folder.
+    #[error("A and B are the same folder; expected the products of two runs")]
+    #[cause("copy the first products elsewhere before running again, or run into another --out")]
+    SameFolder,
+    /// A site's folder beside a folder of sites.
+    #[error("it holds the products of one site, the other folder those of several")]
+    #[cause("name two folders of one site, or two output folders with sites")]
+    OneAndSeveral,
+    /// Products of two sites.
+    #[error("these are products of site \"{b}\", the others of site \"{a}\"; expected one site")]
+    #[cause("compare runs of the same site")]
+    DifferentSites { a: String, b: String },
+    /// Two roots without a common site.
+    #[error("A and B have no site in common: A has {a}; B has {b}")]
+    #[cause(like = DifferentSites)]
+    NoneInBoth { a: String, b: String },
+}

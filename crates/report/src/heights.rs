@@ -1,0 +1,387 @@
+//! Heights of tie points against MOLA, and statements of their accuracy.
+
+mod boresight;
+mod profile;
+mod readings;
+mod relief;
+
+use super::{
+    html::{Cell, Column, Table, counted, folded, heading, paragraph},
+    misregistration::BeforeAfter,
+    numbers::whole,
+    plots::{figure, label},
+    section::Section,
+    source::sentence,
+};
+use areograph_base::{error::Result, footprints::AdjustmentModel};
+use areograph_products::{AdjustmentProducts, GeometricProducts, SiteProducts};
+use areograph_stages::{
+    check_heights::{HeightCheck, SurfaceFigures},
+    compare_pairs::PairComparison,
+};
+
+pub(super) const SECTION: Section = Section {
+    title: "Accuracy, and agreement with MOLA",
+    anchor: "accuracy",
+    appears: |site| site.geometric.is_some(),
+    write: |site| {
+        let geometric = site.geometric.iter();
+        geometric.map(|geometric| write(site, geometric)).collect()
+    },
+};
+
+fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
+    let adjustment = geometric.adjustment.as_ref();
+    let mut html = adjustment.map_or_else(String::new, |of| statements(site, geometric, of));
+    if let Ok(surface) = &geometric.heights.surface {
+        html += &heading("Heights against the MOLA surface");
+        html += &compared(geometric);
+        html += &apart(geometric.heights);
+        html += &format!(
+            "<div class=\"plots\">\n{}</div>\n",
+            figure(&profile::plot(geometric))?
+        );
+        html += &folded(
+            "The surface, and heights of footprints by images",
+            &(surface_in_words(surface) + &footprints(geometric)),
+        );
+    }
+    Ok(html)
+}
+
+/// In place of accuracies that rest on a priori values of another spacecraft.
+pub(super) const NOT_STATED: &str =
+    "not stated: the a priori accuracy is that of another spacecraft";
+
+/// The three statements of accuracy, and their basis.
+fn statements(
+    site: &SiteProducts,
+    geometric: &GeometricProducts,
+    adjustment: &AdjustmentProducts,
+) -> String {
+    let mut table = Table::new(
+        "Accuracy of the tie points",
+        &[
+            Column::Text("accuracy"),
+            Column::Text("before the adjustment"),
+            Column::Text("after it"),
+            Column::Text("meaning"),
+        ],
+    );
+    let nothing = || "–".to_owned();
+    let pairs = BeforeAfter::all(geometric);
+    let worst = BeforeAfter::worst(&pairs);
+    let parallax =
+        |pair: &PairComparison| format!("{} m", label(pair.along_track_parallax_m.abs(), 1));
+    let [along, _] = adjustment.adjusted.summary.tie_components;
+    let after = worst.and_then(|pair| pair.after).map(parallax);
+    let [height, place] = match site.accuracy_withheld() {
+        Some(_) => [0, 1].map(|_| NOT_STATED.to_owned()),
+        None => absolute(geometric, adjustment),
+    };
+    let statements = [
+        [
+            "internal agreement".to_owned(),
+            worst.map_or_else(nothing, |pair| parallax(pair.before)),
+            after.map_or_else(nothing, |after| {
+                format!("{after}; residuals {} σ", label(along, 2))
+            }),
+            "how well the images agree along track; not a measure of height or position".to_owned(),
+        ],
+        [
+            "agreement with MOLA, height".to_owned(),
+            agreement(geometric.heights),
+            agreement(adjustment.heights),
+            agreement_says(adjustment).to_owned(),
+        ],
+        [
+            "absolute, height".to_owned(),
+            format!("a priori, from {}", known_beforehand(geometric)),
+            height,
+            "standard deviation of the common offset, and of individual tie points".to_owned(),
+        ],
+        [
+            "absolute, position".to_owned(),
+            "same as after".to_owned(),
+            place,
+            place_says(geometric, adjustment),
+        ],
+    ];
+    for cells in statements {
+        table.row(true, cells.map(Cell::from));
+    }
+    table.finish()
+        + &relief::relief(adjustment.adjusted, known_beforehand(geometric))
+        + &boresight::boresight(adjustment.adjusted)
+        + &readings::two_readings(adjustment.adjusted)
+}
+
+fn place_says(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
+    let (known, by) = (known_beforehand(geometric), place_by(geometric, adjustment));
+    if known == by {
+        format!("a priori, not measured by images: from {known}")
+    } else {
+        format!("by {by}, not measured by images")
+    }
+}
+
+/// All sources of a site's position.
+pub(super) fn place_by(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
+    let adjusted = adjustment.adjusted;
+    let by_relief = adjusted.relief.as_ref().is_some_and(|relief| relief.used);
+    let by_laser = matches!(adjusted.boresight, Some(Ok(_)));
+    let also = [
+        (by_relief, "relief"),
+        (by_laser, "the laser's mounting"),
+        (
+            adjusted.attitude_clock_s.is_some(),
+            "one offset of the attitude's clock",
+        ),
+    ];
+    let also: Vec<&str> = also
+        .into_iter()
+        .filter_map(|(used, what)| used.then_some(what))
+        .collect();
+    match also.as_slice() {
+        [] => known_beforehand(geometric).to_owned(),
+        also => format!("{}; {}", known_beforehand(geometric), also.join(", ")),
+    }
+}
+
+/// A priori sources of a site's position.
+pub(super) fn known_beforehand(geometric: &GeometricProducts) -> &'static str {
+    if geometric.ties.points.iter().any(|tie| tie.known.is_some()) {
+        "orbit, attitude and given ground points"
+    } else {
+        "orbit and attitude"
+    }
+}
+
+fn agreement(check: &HeightCheck) -> String {
+    match &check.surface {
+        Ok(_) => format!(
+            "{} m median, {} m spread (1.48 MAD), {} tie points",
+            label(check.above_m.median, 1),
+            label(check.above_m.nmad, 1),
+            check.above_m.n
+        ),
+        Err(reason) => format!("not known: {reason}"),
+    }
+}
+
+const fn agreement_says(adjustment: &AdjustmentProducts) -> &'static str {
+    if adjustment.adjusted.heights.is_some() {
+        "before: an independent test; after: fit of the adjustment to its control"
+    } else {
+        "a test of heights: the MOLA surface did not control them"
+    }
+}
+
+/// Statements of height and position after the adjustment.
+pub(super) fn absolute(
+    geometric: &GeometricProducts,
+    adjustment: &AdjustmentProducts,
+) -> [String; 2] {
+    let summary = &adjustment.adjusted.summary;
+    let Some(heights) = &adjustment.adjusted.heights else {
+        let statements = if summary.model == AdjustmentModel::Published {
+            [
+                "not determined: the published model does not control heights",
+                "not determined",
+            ]
+        } else {
+            [
+                "a priori: no surface controls heights",
+                "a priori; ties.parquet has the standard deviations of single tie points",
+            ]
+        };
+        return statements.map(str::to_owned);
+    };
+    let single = single_sigmas_m(adjustment);
+    let [east_m, north_m, up_m] = heights.mean_sigma_m;
+    let half = half_apart_m(geometric).map_or_else(String::new, |half_m| {
+        let half = format!(
+            "half of the images' along-track disagreement, {} m",
+            label(half_m, 0)
+        );
+        if is_open(geometric, adjustment) {
+            format!("; open: {half}, because neither image is known to be correct")
+        } else {
+            format!("; {half}, is within that")
+        }
+    });
+    [
+        format!(
+            "mean ±{} m, single tie points ±{} to ±{} m",
+            label(up_m, 1),
+            label(single[0], 0),
+            label(single[1], 0)
+        ),
+        format!(
+            "±{} m east, ±{} m north{half}",
+            label(east_m, 0),
+            label(north_m, 0)
+        ),
+    ]
+}
+
+/// Half of the largest along-track disagreement of a pair before the adjustment, metres.
+fn half_apart_m(geometric: &GeometricProducts) -> Option<f64> {
+    let pairs = BeforeAfter::all(geometric);
+    let worst = BeforeAfter::worst(&pairs)?;
+    Some(0.5 * worst.before.along_track_parallax_m.abs())
+}
+
+/// Whether the stated position is more certain than the images allow: it holds only if errors of both images are as
+/// likely, and half of their difference is no less open.
+pub(super) fn is_open(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> bool {
+    let heights = adjustment.adjusted.heights.as_ref();
+    let stated = heights.map(|of| of.mean_sigma_m[0].max(of.mean_sigma_m[1]));
+    stated
+        .zip(half_apart_m(geometric))
+        .is_some_and(|(stated_m, half_m)| half_m > stated_m)
+}
+
+/// Least and largest standard deviation of the height of a tie point, metres.
+fn single_sigmas_m(adjustment: &AdjustmentProducts) -> [f64; 2] {
+    let ties = adjustment.adjusted_ties();
+    let sigmas_m = ties.map(|point| {
+        let up = point.ground.xyz_m.normalize();
+        up.dot(&(point.covariance_m2 * up)).sqrt()
+    });
+    sigmas_m.fold([f64::INFINITY, 0.0], |[least, most], sigma_m| {
+        [least.min(sigma_m), most.max(sigma_m)]
+    })
+}
+
+fn surface_in_words(surface: &SurfaceFigures) -> String {
+    const OF: [&str; 4] = [
+        "adjustment.json#/before/heights/surface/shots",
+        "adjustment.json#/before/heights/surface/profiles",
+        "adjustment.json#/before/heights/surface/roughness_m",
+        "adjustment.json#/before/heights/surface/slope",
+    ];
+    sentence(
+        "Surface kriged from {} shots of {}; {} m RMS over 300 m, slope {} per axis. Errors at \
+         neighbouring tie points are correlated, so averaging reduces them little.",
+        &[
+            (whole(surface.shots), OF[0]),
+            (counted(surface.profiles, "profile"), OF[1]),
+            (label(surface.roughness_m, 1), OF[2]),
+            (label(surface.slope, 3), OF[3]),
+        ],
+    )
+}
+
+fn compared(geometric: &GeometricProducts) -> String {
+    let mut table = Table::new(
+        "Heights of tie points above the MOLA surface, metres",
+        &[
+            Column::Text("adjustment"),
+            Column::Number("tie points"),
+            Column::Number("within 1 km of a shot"),
+            Column::Number("median"),
+            Column::Number("1.48 MAD"),
+            Column::Number("mean"),
+            Column::Number("standard deviation"),
+            Column::Number("σ of the mean by the surface only"),
+        ],
+    );
+    let after = geometric.adjustment.iter().map(|of| ("after", of.heights));
+    for (state, check) in [("before", geometric.heights)].into_iter().chain(after) {
+        let of = |value: f64, name: &str| {
+            Cell::from(label(value, 1)).told(format!("/above_surface_m/{name}"))
+        };
+        let place = match geometric.adjustment {
+            Some(_) => format!("adjustment.json#/{state}/heights"),
+            None => String::new(),
+        };
+        table.row_of(
+            &place,
+            true,
+            [
+                state.into(),
+                Cell::from(whole(check.above_m.n)).told("/above_surface_m/n"),
+                Cell::from(whole(check.near_shots)).told("/near_shots"),
+                of(check.above_m.median, "median"),
+                of(check.above_m.nmad, "nmad"),
+                of(check.above_m.mean, "mean"),
+                of(check.above_m.standard_deviation, "standard_deviation"),
+                Cell::from(label(check.mean_sigma_m, 1)).told("/mean_sigma_m"),
+            ],
+        );
+    }
+    table.finish()
+}
+
+/// Heights of footprints that both images of a pair show.
+fn footprints(geometric: &GeometricProducts) -> String {
+    let mut table = Table::new(
+        "Heights of footprints by the images that show them, above MOLA, metres",
+        &[
+            Column::Text("adjustment"),
+            Column::Text("pair"),
+            Column::Text("profile"),
+            Column::Number("footprints"),
+            Column::Number("median"),
+            Column::Number("1.48 MAD"),
+        ],
+    );
+    let after = geometric.adjustment.iter().map(|of| ("after", of.pairs));
+    let mut rows = 0;
+    for (state, pairs) in [("before", geometric.pairs)].into_iter().chain(after) {
+        for (index, pair) in pairs.iter().enumerate() {
+            let profiles = pair.footprints.iter().flat_map(|of| &of.profiles);
+            for (at, profile) in profiles.enumerate() {
+                let above_m = &profile.above_m;
+                rows += 1;
+                let place = format!(
+                    "adjustment.json#/{state}/pairs/{index}/footprints/profiles/{at}/above_mola_m"
+                );
+                let place = geometric.adjustment.map_or_else(String::new, |_| place);
+                table.row_of(
+                    &place,
+                    true,
+                    [
+                        state.into(),
+                        pair.images.join(" and ").into(),
+                        profile.profile.clone().into(),
+                        Cell::from(above_m.n.to_string()).told("/n"),
+                        Cell::from(label(above_m.median, 1)).told("/median"),
+                        Cell::from(label(above_m.nmad, 1)).told("/nmad"),
+                    ],
+                );
+            }
+        }
+    }
+    if rows == 0 {
+        return String::new();
+    }
+    let words = "Relief between tie points moves single heights, and the median where it is of one sign along a profile.";
+    table.finish() + &paragraph(words)
+}
+
+fn apart(check: &HeightCheck) -> String {
+    const OF: [&str; 2] = [
+        "|adjustment.json#/before/heights/profiles_apart/mean_m",
+        "adjustment.json#/before/heights/profiles_apart/sigma_m",
+    ];
+    let Some(apart) = &check.apart else {
+        return paragraph("A single profile provides no independent test of the surface.");
+    };
+    let [first, second] = &apart.profiles;
+    let (upper, lower) = if apart.mean_m < 0.0 {
+        (second, first)
+    } else {
+        (first, second)
+    };
+    sentence(
+        "At the tie points the surface interpolated from {} alone lies {} m above that from {} alone (expected σ {} m).",
+        &[
+            (upper.clone(), ""),
+            (label(apart.mean_m.abs(), 1), OF[0]),
+            (lower.clone(), ""),
+            (label(apart.sigma_m, 1), OF[1]),
+        ],
+    )
+}

@@ -1,0 +1,76 @@
+//! Position by a laser on the bus of the cameras.
+
+use super::{
+    super::{
+        html::{Cell, Column, Table, paragraph},
+        plots::label,
+    },
+    relief::profiles,
+};
+use areograph_base::units::SECONDS_PER_MS;
+use areograph_stages::adjust::{Adjusted, BoresightSummary, SpotsOfImage};
+
+const MRAD_PER_RADIAN: f64 = 1e3;
+
+/// Pointing of the laser in simultaneous images, if requested.
+pub(super) fn boresight(adjusted: &Adjusted) -> String {
+    match &adjusted.boresight {
+        None => String::new(),
+        Some(Err(reason)) => paragraph(&format!("adjustment.common_bus did nothing: {reason}.")),
+        Some(Ok(found)) => {
+            let caption = "Recorded profiles against their positions by laser and images, metres";
+            words(found) + &table(&found.images) + &profiles(caption, &found.profile_shifts)
+        }
+    }
+}
+
+fn words(found: &BoresightSummary) -> String {
+    let angle = |axis: usize| {
+        let [value, sigma] = [found.angles_rad[axis], found.sigma_rad[axis]]
+            .map(|radians| label(MRAD_PER_RADIAN * radians, 3));
+        format!("{value} ± {sigma} mrad")
+    };
+    let farthest = found.farthest.as_ref().map(|(unknown, sigmas)| {
+        format!(
+            " Largest contradiction: the {unknown}, {} σ.",
+            label(*sigmas, 1)
+        )
+    });
+    paragraph(&format!(
+        "Camera and laser share a bus: in a simultaneous image the mounting places each shot, independent of the attitude \
+         (adjustment.common_bus). The laser points {} towards X and {} towards Y of the bus from its nominal direction.{}",
+        angle(0),
+        angle(1),
+        farthest.unwrap_or_default()
+    ))
+}
+
+fn table(images: &[SpotsOfImage]) -> String {
+    let mut table = Table::new(
+        "Shots in simultaneous images: footprints by the kernels minus laser by the mounting",
+        &[
+            Column::Text("image"),
+            Column::Number("shots"),
+            Column::Number("lines late, ms"),
+            Column::Number("footprints along, lines"),
+            Column::Number("across, px"),
+        ],
+    );
+    for image in images {
+        let late = image.line_time_s.map_or_else(
+            || "–".to_owned(),
+            |(late_s, sigma_s)| {
+                let [late_ms, sigma_ms] =
+                    [late_s, sigma_s].map(|seconds| label(seconds / SECONDS_PER_MS, 0));
+                format!("{late_ms} ± {sigma_ms}")
+            },
+        );
+        let mut cells: Vec<Cell> = vec![(&image.image).into()];
+        cells.push(image.spots.to_string().into());
+        cells.push(late.into());
+        let off = image.footprints_off.iter();
+        cells.extend(off.map(|axis| Cell::from(label(axis.mean, 1))));
+        table.row(true, cells);
+    }
+    table.finish()
+}

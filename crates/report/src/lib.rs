@@ -1,0 +1,133 @@
+//! The first page for a reader: verdict, residuals, orientation, map and kernels of one site.
+//!
+//! One HTML file without scripts or outside parts, for light and dark screens, phones and paper.
+//! Every plot is described in words and carries its numbers; all text from files is escaped.
+
+#![allow(
+    clippy::format_push_string,
+    clippy::format_collect,
+    reason = "pages are put together once from small pieces"
+)]
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    reason = "pixels, bars and grid lines are small numbers, and casts of floats saturate"
+)]
+
+mod adjustment;
+mod archive;
+mod calibration;
+mod calibration_rounds;
+mod checks;
+mod clocks_and_datum;
+mod compare;
+mod convergence;
+mod corrections;
+mod correlation;
+mod diff;
+pub mod difference;
+mod fidelity;
+mod graticule;
+mod heights;
+mod html;
+mod images;
+mod laser_match;
+mod map;
+mod matching;
+mod misregistration;
+mod moved;
+mod net;
+mod notes;
+mod numbers;
+mod outlines;
+mod overlays;
+mod plots;
+mod provenance;
+mod published;
+mod ranges;
+mod registration;
+mod reliability;
+mod residuals;
+mod scan;
+mod section;
+mod selection;
+mod sites;
+mod sites_map;
+mod sky;
+mod source;
+mod summary;
+mod support_data;
+mod surface;
+mod timeline;
+mod uncertainty;
+
+use areograph_base::error::Result;
+use areograph_products::SiteProducts;
+
+pub use archive::archive_page;
+pub use calibration::calibration_page;
+pub use compare::{KernelComparison, comparison_page};
+pub use diff::difference_page;
+pub use fidelity::{
+    FIDELITY_FILE, Fidelity, FidelityKind, FidelityPaper, FidelityRow, fidelity_page,
+    published_fidelity_page,
+};
+pub use html::STYLE;
+pub use laser_match::match_page;
+pub use net::net_page;
+pub use overlays::overlays_page;
+pub use sites::{Earlier, SiteLine, SiteSummary, sites_page};
+
+use section::Section;
+
+/// Every section of a site's page, in its order.
+const SECTIONS: &[Section] = &[
+    heights::SECTION,
+    misregistration::SECTION,
+    matching::SECTION,
+    surface::SECTION,
+    adjustment::SECTION,
+    ranges::SECTION,
+    scan::SECTION,
+    images::SECTION,
+    support_data::SECTION,
+    registration::SECTION,
+    overlays::SECTION,
+    map::SECTION,
+    timeline::SECTION,
+    selection::SECTION,
+    clocks_and_datum::SECTION,
+    notes::SECTION,
+    provenance::SECTION,
+    convergence::SECTION,
+    published::SECTION,
+    uncertainty::SECTION,
+];
+
+/// The report of `site` as one HTML page.
+///
+/// # Errors
+/// A plot that cannot be drawn, which is a bug in areograph.
+pub fn page(site: &SiteProducts) -> Result<String> {
+    let sections = SECTIONS.iter().map(|section| section.of(site));
+    let sections: Vec<html::Section> = sections
+        .filter_map(Result::transpose)
+        .collect::<Result<_>>()?;
+    let page = html::page(&site.config.site, &summary::lead(site)?, &sections);
+    Ok(plots::with_files(&page))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn anchors_are_unique_and_need_no_escape() {
+        let mut anchors: Vec<&str> = SECTIONS.iter().map(|section| section.anchor).collect();
+        assert!(anchors.iter().all(|anchor| html::slug(anchor) == *anchor));
+        anchors.sort_unstable();
+        anchors.dedup();
+        assert_eq!(anchors.len(), SECTIONS.len());
+    }
+}

@@ -1,0 +1,65 @@
+//! Tie points measured by areograph: the number of places tried, and their outcomes.
+
+use super::{
+    html::{Column, Table, paragraph},
+    numbers::whole,
+    plots::label,
+    section::Section,
+};
+use areograph_products::SiteProducts;
+use areograph_stages::read_ties::Ties;
+
+pub(super) const SECTION: Section = Section {
+    title: "Matching of tie points",
+    anchor: "matching-of-tie-points",
+    appears: |site| matched(site).is_some(),
+    write: |site| {
+        Ok(matched(site)
+            .map(|ties| write(site, ties))
+            .unwrap_or_default())
+    },
+};
+
+fn matched<'a>(site: &SiteProducts<'a>) -> Option<&'a Ties> {
+    let ties = site.geometric?.ties;
+    (!ties.matched.is_empty()).then_some(ties)
+}
+
+fn write(site: &SiteProducts, ties: &Ties) -> String {
+    let mut table = Table::new(
+        "Matched pairs",
+        &[
+            Column::Text("images"),
+            Column::Number("cells of common ground"),
+            Column::Number("tie points"),
+            Column::Number("parts with tie points"),
+            Column::Number("searched within (m)"),
+            Column::Number("σ line (lines)"),
+            Column::Number("σ sample (px)"),
+            Column::Number("correlation"),
+            Column::Text("cells without a tie point"),
+        ],
+    );
+    for pair in &ties.matched {
+        let [first, second] = pair.images.map(|image| &site.images[image].times.id);
+        let [parts, with_ties] = pair.parts;
+        table.row(
+            !pair.is_refused,
+            [
+                format!("{first}, {second}").into(),
+                whole(pair.cells).into(),
+                whole(if pair.is_refused { 0 } else { pair.ties }).into(),
+                format!("{with_ties} of {parts}").into(),
+                label(pair.reach_m, 0).into(),
+                label(pair.sigma_px[0], 3).into(),
+                label(pair.sigma_px[1], 3).into(),
+                label(pair.correlation, 2).into(),
+                pair.reasons().into(),
+            ],
+        );
+    }
+    paragraph(
+        "In each cell of common ground the place with the most texture was matched to the other image and back. σ: medians of \
+         single matches, in the second image. The table is of the second pass, which starts from the adjusted orientation.",
+    ) + &table.finish()
+}

@@ -1,0 +1,342 @@
+//! Tie points, and disagreement of footprints and tie points between images: before and after the adjustment.
+
+mod pair;
+
+use std::collections::BTreeMap;
+
+use super::{
+    html::{Cell, Column, Table, counted, folded, heading, paragraph},
+    moved,
+    numbers::whole,
+    plots::label,
+    section::Section,
+    source::filled,
+};
+use areograph_base::{error::Result, units::RADIANS_PER_DEGREE};
+use areograph_geom::intersection::Unintersected;
+use areograph_products::{GeometricProducts, SiteProducts};
+use areograph_stages::{
+    adjust::{PointKind, RejectionReason},
+    compare_pairs::{FootprintsByTies, ProfileByTies},
+    intersect::TieRejection,
+};
+
+/// Number of pairs with a sentence each; tables have all.
+const PAIRS_TOLD: usize = 6;
+
+pub(super) use pair::{BeforeAfter, by_footprints};
+
+pub(super) const SECTION: Section = Section {
+    title: "Tie points and misregistration",
+    anchor: "tie-points-and-misregistration",
+    appears: |site| site.geometric.is_some(),
+    write: |site| {
+        let geometric = site.geometric.iter();
+        geometric.map(|geometric| write(site, geometric)).collect()
+    },
+};
+
+fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
+    let pairs = BeforeAfter::all(geometric);
+    let told = pairs.iter().take(PAIRS_TOLD);
+    let mut html: String = told.map(|pair| paragraph(&pair.sentence())).collect();
+    if pairs.is_empty() {
+        html += &paragraph("No two images share tie points that could be intersected.");
+    }
+    html += &read(geometric);
+    if !pairs.is_empty() {
+        let tables = geometry(&pairs) + &reprojection(&pairs) + &footprints(&pairs);
+        html += &folded("Tables of the pairs", &tables);
+    }
+    html += &heading(match geometric.adjustment {
+        Some(_) => "Before and after on the image planes",
+        None => "On the image planes",
+    });
+    html += &moved::figures(site, geometric)?;
+    Ok(html)
+}
+
+/// Number of tie points, and of those without information.
+fn read(geometric: &GeometricProducts) -> String {
+    let ties = geometric.ties;
+    let points = &geometric.intersected.points;
+    let elsewhere: u64 = ties.elsewhere.values().sum();
+    let outliers = points.iter().filter(|point| point.outlier).count();
+    let adjusted = geometric.adjustment.map_or_else(
+        || "; the adjustment failed".to_owned(),
+        |of| {
+            let number = of.intersected.points.len().to_string();
+            filled(
+                ", {} with the adjusted one",
+                &[(number, "adjustment.json#/after/intersected")],
+            )
+        },
+    );
+    let mut words = filled(
+        "{} read, {} in two or more images; {} intersect with the kernels' orientation",
+        &[
+            (
+                counted(ties.points.len(), "tie point"),
+                "adjustment.json#/ties/points",
+            ),
+            (
+                ties.multi_image().to_string(),
+                "adjustment.json#/ties/multi_image",
+            ),
+            (
+                points.len().to_string(),
+                "adjustment.json#/before/intersected",
+            ),
+        ],
+    ) + &adjusted
+        + ".";
+    for (count, what) in [
+        (elsewhere, "measurements are in other images."),
+        (ties.ignored, "are marked to be ignored."),
+        (ties.complaint_count, "records could not be read."),
+    ] {
+        if count > 0 {
+            words += &format!(" {count} {what}");
+        }
+    }
+    if outliers > 0 {
+        words += &filled(
+            " {}, excluded from the pair statistics.",
+            &[(
+                counted(outliers, "reprojection outlier"),
+                "adjustment.json#/before/outliers",
+            )],
+        );
+    }
+    format!("<p>{words}</p>\n") + &rejected(geometric)
+}
+
+/// Tie points by the reason for their rejection.
+fn rejected(geometric: &GeometricProducts) -> String {
+    let mut reasons: BTreeMap<(&str, &str), u64> = BTreeMap::new();
+    for tie in &geometric.intersected.rejected {
+        *reasons
+            .entry(("intersection", rejection(tie.reason)))
+            .or_insert(0) += 1;
+    }
+    let ties = geometric.adjustment.iter();
+    let ties = ties.flat_map(|of| &of.adjusted.rejected);
+    for tie in ties.filter(|left| left.kind == PointKind::Tie) {
+        let reason = match tie.reason {
+            // The intersection has given the reason.
+            RejectionReason::NotIntersected => continue,
+            RejectionReason::Undetermined => "not determined",
+            RejectionReason::Blunder { .. } => "blunder: its standardised residual is too large",
+            RejectionReason::Height { .. } => {
+                "blunder: no ground explains its height above the MOLA surface"
+            }
+        };
+        *reasons.entry(("adjustment", reason)).or_insert(0) += 1;
+    }
+    if reasons.is_empty() {
+        return paragraph("No tie point was rejected.");
+    }
+    let columns = &[
+        Column::Text("rejected by"),
+        Column::Number("tie points"),
+        Column::Text("reason"),
+    ];
+    let mut table = Table::new("Rejected tie points", columns);
+    for ((of, reason), count) in reasons {
+        table.row(true, [of.into(), whole(count).into(), reason.into()]);
+    }
+    table.finish()
+}
+
+/// A reason without the values of a single tie point.
+const fn rejection(reason: TieRejection) -> &'static str {
+    match reason {
+        TieRejection::Rays(rays) => match rays {
+            Unintersected::FewRays { .. } => "measured in one image only",
+            Unintersected::NearParallel { .. } => "rays too close to parallel",
+            Unintersected::IllConditioned => "rays do not determine the point",
+            Unintersected::BehindCamera { .. } => "rays meet behind a camera",
+            Unintersected::Height { .. } => "rays meet far from the ellipsoid",
+            Unintersected::NotConverged => "the iteration did not converge",
+        },
+        TieRejection::Unseen => "an image does not see the intersected point",
+        TieRejection::Duplicate => "duplicate identifier",
+        TieRejection::TwiceInImage => "measured twice in one image",
+        TieRejection::OutsideImage => "measured outside its image",
+        TieRejection::NotFinite => "measurement not a finite number",
+    }
+}
+
+fn geometry(pairs: &[BeforeAfter]) -> String {
+    let mut table = Table::new(
+        "Pairs of images",
+        &[
+            Column::Text("pair"),
+            Column::Text("adjustment"),
+            Column::Number("tie points"),
+            Column::Number("convergence, degrees"),
+            Column::Number("H/B"),
+            Column::Number("line spacing 1, m"),
+            Column::Number("line spacing 2, m"),
+            Column::Number("along-track parallax of tie points, m"),
+        ],
+    );
+    for pair in pairs {
+        for (state, found) in pair.states() {
+            let degrees = format!("/convergence_rad*{}", RADIANS_PER_DEGREE.recip());
+            let numbers = [
+                (found.convergence_rad / RADIANS_PER_DEGREE, 2, &*degrees),
+                (found.height_over_base, 2, "/height_over_base"),
+                (found.line_spacing_m[0], 3, "/line_spacing_m/0"),
+                (found.line_spacing_m[1], 3, "/line_spacing_m/1"),
+                (found.along_track_parallax_m, 2, "/along_track_parallax_m"),
+            ];
+            let mut cells = pair.head(state, found);
+            cells
+                .extend(numbers.map(|(value, decimals, place)| {
+                    Cell::from(label(value, decimals)).told(place)
+                }));
+            table.row_of(&pair.place(state), true, cells);
+        }
+    }
+    table.finish()
+}
+
+fn reprojection(pairs: &[BeforeAfter]) -> String {
+    let mut table = Table::new(
+        "Reprojection residuals of tie points (Table 5 of Shan et al. 2005), x in lines, y in pixels",
+        &[
+            Column::Text("pair"),
+            Column::Text("adjustment"),
+            Column::Number("tie points"),
+            Column::Number("M x1"),
+            Column::Number("σ x1"),
+            Column::Number("M y1"),
+            Column::Number("σ y1"),
+            Column::Number("M x2"),
+            Column::Number("σ x2"),
+            Column::Number("M y2"),
+            Column::Number("σ y2"),
+        ],
+    );
+    for pair in pairs {
+        for (state, found) in pair.states() {
+            let mut cells = pair.head(state, found);
+            for (image, of) in found.residuals.iter().enumerate() {
+                let moments = [
+                    (of.mean_x, "mean_x"),
+                    (of.deviation_x, "deviation_x"),
+                    (of.mean_y, "mean_y"),
+                    (of.deviation_y, "deviation_y"),
+                ];
+                cells.extend(moments.map(|(value, name)| {
+                    Cell::from(label(value, 2)).told(format!("/residuals/{image}/{name}"))
+                }));
+            }
+            table.row_of(&pair.place(state), true, cells);
+        }
+    }
+    let words = "Measured minus projected: M mean, σ standard deviation; x along track, y across (against the samples).";
+    table.finish() + &paragraph(words)
+}
+
+fn footprints(pairs: &[BeforeAfter]) -> String {
+    let mut table = Table::new(
+        "Footprints between the images, by tie points; positive along track; samples include relief parallax",
+        &[
+            Column::Text("profile"),
+            Column::Text("pair"),
+            Column::Number("footprints"),
+            Column::Number("lines, before"),
+            Column::Number("after"),
+            Column::Number("metres, before"),
+            Column::Number("after"),
+            Column::Number("σ, m, before"),
+            Column::Number("after"),
+            Column::Number("MOLA spacings, before"),
+            Column::Number("after"),
+            Column::Number("samples, before"),
+            Column::Number("after"),
+        ],
+    );
+    let mut notes = String::new();
+    for pair in pairs {
+        let Some(found) = &pair.before.footprints else {
+            notes += &paragraph(&format!(
+                "{}: tie points do not determine a transformation between the images.",
+                pair.name()
+            ));
+            continue;
+        };
+        let after = pair.after.and_then(|after| after.footprints.as_ref());
+        for (index, profile) in found.profiles.iter().enumerate() {
+            let after = after.and_then(|after| {
+                let same = |other: &ProfileByTies| other.profile == profile.profile;
+                let index = after.profiles.iter().position(same)?;
+                Some((index, &after.profiles[index]))
+            });
+            let cells = profile_cells(pair, (index, profile), after);
+            table.row(true, cells);
+        }
+        let spacing = pair.before.mola_spacing_m;
+        let spacing = spacing.map(|metres| format!(" One MOLA spacing: {} m.", label(metres, 1)));
+        notes += &paragraph(&format!(
+            "{}: by a polynomial of order {} through {} tie points ({} rejected), σ {} lines and {} samples. {}{}",
+            pair.name(),
+            found.order,
+            found.ties,
+            found.ties_rejected,
+            label(found.tie_lines.standard_deviation, 2),
+            label(found.tie_samples.standard_deviation, 2),
+            not_counted(found),
+            spacing.unwrap_or_default()
+        ));
+    }
+    table.finish() + &notes
+}
+
+/// Footprints omitted from the table.
+fn not_counted(found: &FootprintsByTies) -> String {
+    let none = if found.profiles.is_empty() {
+        "No footprint is in both images. "
+    } else {
+        ""
+    };
+    format!(
+        "{none}{} omitted: outside an image or the tie-point area.",
+        counted(found.outside as usize, "footprint")
+    )
+}
+
+/// Place of a number of a profile in the products, and its format on a page.
+type Quantity = (&'static str, fn(&ProfileByTies) -> Option<String>);
+
+/// A profile by its place among those of the pair, before and after.
+fn profile_cells(
+    pair: &BeforeAfter,
+    before: (usize, &ProfileByTies),
+    after: Option<(usize, &ProfileByTies)>,
+) -> Vec<Cell> {
+    let mut cells = vec![
+        (&before.1.profile).into(),
+        pair.name().into(),
+        pair.told("before", before.0, "lines/n", whole(before.1.lines.n)),
+    ];
+    let quantities: [Quantity; 5] = [
+        ("lines/mean", |of| Some(label(of.lines.mean, 2))),
+        ("along_m", |of| Some(label(of.along_m, 1))),
+        ("along_sigma_m", |of| Some(label(of.along_sigma_m, 1))),
+        ("along_spacings", |of| Some(label(of.along_spacings?, 3))),
+        ("samples/mean", |of| Some(label(of.samples.mean, 2))),
+    ];
+    for (name, quantity) in quantities {
+        for (state, of) in [("before", Some(before)), ("after", after)] {
+            let cell = of.map(|(index, of)| {
+                let text = quantity(of).unwrap_or_else(|| "–".to_owned());
+                pair.told(state, index, name, text)
+            });
+            cells.push(cell.unwrap_or_else(|| "–".into()));
+        }
+    }
+    cells
+}

@@ -1,0 +1,429 @@
+//! The page of a triangulated net: verdict, bricks, blunders, controls, and vectors of all of them on a map.
+
+use super::{
+    checks,
+    html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, verdict},
+    plots::{
+        Arrow, Arrows, Extent, GREY, Panel, Plot, Series, figure, label, magnification, thinned,
+    },
+};
+use areograph_base::{error::Result, units::METRES_PER_KM};
+use areograph_config::{Method, NetConfig};
+use areograph_stages::triangulate::{
+    ControlResult, MeasurementResult, ShrinkageResult, Triangulation,
+};
+
+/// Number of deviations listed.
+const LISTED: usize = 25;
+/// Number of vectors and points drawn.
+const DRAWN: usize = 3_000;
+/// Number of pictures listed.
+const PICTURES: usize = 100;
+/// Share of the map for the longest vector.
+const VECTOR_ROOM: f64 = 0.12;
+/// Width of the axes in a plot's own units, about: both axes are drawn to one scale.
+const AXIS_WIDTH: f64 = 880.0;
+
+/// The page of a net.
+///
+/// # Errors
+/// A plot that cannot be drawn, which is a bug in areograph.
+pub fn net_page(config: &NetConfig, net: &Triangulation) -> Result<String> {
+    let sections = [
+        Section::new("Deviations of the ties", deviations(net)?),
+        Section::new("Bricks", bricks(net)),
+        Section::new("Blunders and largest deviations", blunders(net)),
+        Section::new("Controls", controls(net)?),
+        Section::new("Precision and redundancy", precision(config, net)),
+        Section::new("Pictures", pictures(net)),
+    ];
+    Ok(page(&config.net, &lead(config, net), &sections))
+}
+
+fn lead(config: &NetConfig, net: &Triangulation) -> String {
+    let (tone, word) = Tone::of(net.verdict.valid, !net.verdict.remarks.is_empty());
+    let totals = &net.totals;
+    let headline = format!(
+        "{word}: {}, {}, {} kept.",
+        counted(net.pictures.len(), "picture"),
+        counted(net.points.len(), "point"),
+        counted(net.controls.iter().filter(|of| of.kept).count(), "control"),
+    );
+    let [x, y] = totals.deviation_rms_m;
+    let [east, north] = totals.control_rms_m;
+    let mut words = format!(
+        "{} Images of the ties lie {x:.1} m (east) and {y:.1} m (north) from their means, root mean square; controls \
+         {east:.1} m and {north:.1} m from where they are given.",
+        way(config)
+    );
+    if !config.description.is_empty() {
+        words = format!("{}. {words}", config.description);
+    }
+    let body = paragraph(&words) + &list(&net.verdict.reasons) + &list(&net.verdict.remarks);
+    verdict(tone, &headline, &body) + &checks::listed(&net.verdict.checks)
+}
+
+/// Steps of the method, by the paper's names.
+fn way(config: &NetConfig) -> String {
+    let way = &config.triangulation;
+    let local = if way.local { ", LOCAL" } else { "" };
+    match way.method {
+        Method::Scale => format!("BRICK, EXTEND, SCALE{local}: the figure keeps its shape."),
+        Method::Mortar => format!(
+            "BRICK, EXTEND, MORTAR, SCALE{local}: bricks give way to the controls by their weights."
+        ),
+        Method::OneShot => {
+            "All pictures and controls at once, then SCALE; bricks identify blunders.".to_owned()
+        }
+    }
+}
+
+fn km(of_m: [f64; 2]) -> (f64, f64) {
+    (of_m[0] / METRES_PER_KM, of_m[1] / METRES_PER_KM)
+}
+
+/// A map of `arrows` over `series`, both axes to one scale.
+fn map(title: &str, caption: &str, mut arrows: Vec<Arrows>, series: Vec<Series>) -> Result<String> {
+    let mut panel = Panel::of("north, km", series);
+    let mut plot = Plot::of(title.to_owned(), caption.to_owned(), "east, km", Vec::new());
+    let points = || panel.series.iter().flat_map(|series| &series.points);
+    plot.x = Extent::of(points().map(|point| point.0));
+    panel.y = Extent::of(points().map(|point| point.1));
+    let width = plot.x.high - plot.x.low;
+    for of in &mut arrows {
+        of.magnification = magnification(&of.each, (VECTOR_ROOM * width, VECTOR_ROOM * width));
+        let tips = || of.each.iter().map(|arrow| of.tip(arrow));
+        plot.x = plot.x.with(tips().map(|tip| tip.0));
+        panel.y = panel.y.with(tips().map(|tip| tip.1));
+    }
+    let (width, height) = (plot.x.high - plot.x.low, panel.y.high - panel.y.low);
+    panel.height = (AXIS_WIDTH * height / width).clamp(300.0, 1_400.0) as u32;
+    panel.arrows = arrows
+        .into_iter()
+        .filter(|of| !of.each.is_empty())
+        .collect();
+    plot.panels.push(panel);
+    Ok(format!("<div class=\"plots\">\n{}</div>\n", figure(&plot)?))
+}
+
+fn deviations(net: &Triangulation) -> Result<String> {
+    let tied: Vec<&MeasurementResult> = net.measurements.iter().filter(|of| shown(of)).collect();
+    if tied.is_empty() {
+        return Ok(paragraph("No point is on several pictures."));
+    }
+    let arrow = |of: &&&MeasurementResult| {
+        let deviation = of.in_brick.unwrap_or(of.deviation);
+        Arrow {
+            from: km(of.place_m),
+            by: km([deviation.x_m, deviation.y_m]),
+        }
+    };
+    let used: Vec<Arrow> = tied
+        .iter()
+        .filter(|of| !of.removed)
+        .map(|of| arrow(&of))
+        .collect();
+    let removed: Vec<Arrow> = tied
+        .iter()
+        .filter(|of| of.removed)
+        .map(|of| arrow(&of))
+        .collect();
+    let used = thinned(&used, DRAWN);
+    let centres = net
+        .pictures
+        .iter()
+        .map(|picture| km(picture.centre_m))
+        .collect();
+    let places: Vec<(f64, f64)> = net.points.iter().map(|point| km(point.place_m)).collect();
+    let caption = "Images of ties from the mean of their point within the brick, where the point lies on the map. \
+        Thinned for display.";
+    map(
+        "Vectors of deviations",
+        caption,
+        vec![
+            arrows("deviation in use", 0, used),
+            arrows("rejected as a blunder", 1, removed),
+        ],
+        vec![
+            Series::dots("points", GREY, thinned(&places, DRAWN)),
+            Series::dots("middles of pictures", 2, centres),
+        ],
+    )
+}
+
+/// Whether a measurement has a deviation within its brick, or was rejected.
+fn shown(of: &MeasurementResult) -> bool {
+    of.in_brick.is_some() || of.removed
+}
+
+fn arrows(label: &str, colour: usize, each: Vec<Arrow>) -> Arrows {
+    Arrows {
+        label: label.to_owned(),
+        colour,
+        magnification: 1.0,
+        each,
+    }
+}
+
+fn metres(value: f64) -> Cell {
+    label(value, 1).into()
+}
+
+fn bricks(net: &Triangulation) -> String {
+    let mut table = Table::new(
+        "Deviations within each brick and between them, as in table 1 of Arthur & McMacken 1977",
+        &[
+            Column::Text("brick"),
+            Column::Number("pictures"),
+            Column::Number("ties"),
+            Column::Number("redundancy"),
+            Column::Number("max δX, m"),
+            Column::Number("max δY, m"),
+            Column::Number("rms δX, m"),
+            Column::Number("rms δY, m"),
+            Column::Number("rejected"),
+            Column::Number("flagged"),
+        ],
+    );
+    for brick in &net.bricks {
+        let mut cells: Vec<Cell> = vec![(&brick.brick).into()];
+        cells
+            .extend([brick.pictures, brick.ties, brick.redundancy].map(|of| of.to_string().into()));
+        cells.extend(
+            [brick.largest_m, brick.rms_m]
+                .concat()
+                .into_iter()
+                .map(metres),
+        );
+        cells.extend([brick.removed, brick.flagged].map(|of| of.to_string().into()));
+        table.row(true, cells);
+    }
+    let mut words = String::new();
+    if let Some(seams) = &net.seams {
+        let mut row = |name: &str, largest_m: Option<[f64; 2]>, rms_m: [f64; 2]| {
+            let mut cells: Vec<Cell> = vec![
+                name.into(),
+                "".into(),
+                seams.points.to_string().into(),
+                "".into(),
+            ];
+            let largest: Vec<Cell> =
+                largest_m.map_or_else(|| vec!["".into(), "".into()], |of| of.map(metres).to_vec());
+            cells.extend(largest);
+            cells.extend(rms_m.map(metres));
+            cells.extend(["".into(), "".into()]);
+            table.row(true, cells);
+        };
+        row("brick to brick", Some(seams.largest_m), seams.rms_m);
+        if let Some(rms_m) = seams.local_rms_m {
+            row("brick to brick, after LOCAL", None, rms_m);
+        }
+    }
+    let of_bricks = net
+        .bricks
+        .iter()
+        .filter_map(|brick| Some((format!("brick {}", brick.brick), brick.shrinkage?)));
+    let of_seams = net
+        .seams
+        .iter()
+        .filter_map(|seams| Some(("the bricks tied together".to_owned(), seams.shrinkage?)));
+    let strongest = of_bricks
+        .chain(of_seams)
+        .min_by(|(_, a), (_, b)| a.factor.total_cmp(&b.factor));
+    if let Some((what, ShrinkageResult { factor, law })) = strongest {
+        words = paragraph(&format!(
+            "Two controls without redundancy shrink the figure between them, since residuals of ties shrink with it. The \
+             strongest here is {what}: by {:.1} parts in a million, by the law L′/L = 1 / (1 + 2T / (w L²)) {:.1}. It is put \
+             back everywhere before SCALE.",
+            1e6 * (1.0 - factor),
+            1e6 * (1.0 - law)
+        ));
+    }
+    table.finish() + &words
+}
+
+fn blunders(net: &Triangulation) -> String {
+    let mut worst: Vec<&MeasurementResult> =
+        net.measurements.iter().filter(|of| shown(of)).collect();
+    // One reference for all: rejected measurements have no deviation within their brick.
+    let length_m = |of: &MeasurementResult| of.deviation.x_m.hypot(of.deviation.y_m);
+    worst.sort_by(|a, b| {
+        b.removed
+            .cmp(&a.removed)
+            .then(length_m(b).total_cmp(&length_m(a)))
+    });
+    let mut table = Table::new(
+        "Rejected measurements, then the largest deviations, from the mean of the point over all pictures; full list in deviations.csv",
+        &[
+            Column::Text("point"),
+            Column::Text("picture"),
+            Column::Number("δX, m"),
+            Column::Number("δY, m"),
+            Column::Number("length, m"),
+            Column::Text("verdict"),
+        ],
+    );
+    for of in worst.iter().take(LISTED) {
+        let verdict = match (of.removed, of.flagged) {
+            (true, _) => "rejected",
+            (false, true) => "flagged, in use",
+            (false, false) => "in use",
+        };
+        let cells: [Cell; 6] = [
+            (&of.point).into(),
+            (&of.picture).into(),
+            metres(of.deviation.x_m),
+            metres(of.deviation.y_m),
+            metres(length_m(of)),
+            verdict.into(),
+        ];
+        table.row(!of.removed, cells);
+    }
+    let on_two = |of: &&MeasurementResult| {
+        let same = net
+            .measurements
+            .iter()
+            .filter(|other| other.point == of.point);
+        of.removed && same.count() == 2
+    };
+    let both_go = if worst.iter().copied().any(|of| on_two(&of)) {
+        " Of a point on two pictures, the wrong one cannot be identified, and both are rejected."
+    } else {
+        ""
+    };
+    let words = "Flagged measurements are beyond 3.5 robust standard deviations (by the median) of their brick. One is rejected \
+        when the root mean square of the brick falls by 30 % without it, alone or with others of the same size.";
+    table.finish() + &paragraph(&format!("{words}{both_go}"))
+}
+
+fn controls(net: &Triangulation) -> Result<String> {
+    let mut table = Table::new(
+        "Controls: given minus computed",
+        &[
+            Column::Text("point"),
+            Column::Number("X, km"),
+            Column::Number("Y, km"),
+            Column::Number("δX, m"),
+            Column::Number("δY, m"),
+            Column::Number("by SCALE δX, m"),
+            Column::Number("by SCALE δY, m"),
+            Column::Text("verdict"),
+        ],
+    );
+    let mut sorted: Vec<&ControlResult> = net.controls.iter().collect();
+    let length = |of: &ControlResult| of.scale_residual_m[0].hypot(of.scale_residual_m[1]);
+    sorted.sort_by(|a, b| length(b).total_cmp(&length(a)));
+    for of in sorted.iter().take(PICTURES) {
+        let (x, y) = km(of.given_m);
+        let mut cells: Vec<Cell> = vec![(&of.point).into(), label(x, 3).into(), label(y, 3).into()];
+        cells.extend(
+            [of.residual_m, of.scale_residual_m]
+                .concat()
+                .into_iter()
+                .map(metres),
+        );
+        cells.push(if of.kept { "kept" } else { "rejected" }.into());
+        table.row(of.kept, cells);
+    }
+    let vectors = |kept: bool| -> Vec<Arrow> {
+        let of = net.controls.iter().filter(|of| of.kept == kept);
+        of.map(|of| Arrow {
+            from: km(of.given_m),
+            by: km(of.scale_residual_m),
+        })
+        .collect()
+    };
+    let places = net.controls.iter().map(|of| km(of.given_m)).collect();
+    let figure = map(
+        "Vectors of residuals at the controls",
+        "Given minus computed by SCALE of the free figure. Blunders are identified by least median of squares over the \
+         similarities through each pair of controls.",
+        vec![
+            arrows("kept", 0, vectors(true)),
+            arrows("rejected", 1, vectors(false)),
+        ],
+        vec![Series::dots("controls", GREY, places)],
+    )?;
+    Ok(table.finish() + &figure)
+}
+
+fn precision(config: &NetConfig, net: &Triangulation) -> String {
+    let totals = &net.totals;
+    let sigma = match totals.tie_sigma_m {
+        None => "The standard deviation of an image is not determined: there is no redundancy."
+            .to_owned(),
+        Some(sigma_m) => {
+            let source = if totals.tie_sigma_given {
+                "as given"
+            } else {
+                "by the bricks' deviations"
+            };
+            let largest = totals.largest_sigma_m.map_or_else(String::new, |of| {
+                format!(" The largest of a point is ±{of:.1} m.")
+            });
+            format!(
+                "A coordinate of an image has a standard deviation of {sigma_m:.2} m, {source}.{largest}"
+            )
+        }
+    };
+    let scale = totals.scale_sigma_m.map_or_else(String::new, |of| {
+        format!(" Controls differ from the free figure by {of:.1} m (standard deviation of a coordinate).")
+    });
+    let redundancy = format!(
+        "Equations: {} of ties (2(r − 1) for a point on r pictures), {} of controls; unknowns: {}; redundancy {}.",
+        totals.tie_equations, totals.control_equations, totals.unknowns, totals.redundancy
+    );
+    let floor = format!(
+        "Pictures are taken as pieces of a conformal map. An orthographic one departs from a similarity on this map by up to \
+         {:.2} m here: a systematic lower limit of the deviations for any adjustment.",
+        totals.projection_floor_m
+    );
+    let sigmas = if config.triangulation.method == Method::OneShot {
+        ""
+    } else {
+        " Standard deviations of points are those of the adjustment of all pictures and kept controls at once, by their weights."
+    };
+    [
+        paragraph(&(sigma + &scale + sigmas)),
+        paragraph(&redundancy),
+        paragraph(&floor),
+    ]
+    .concat()
+}
+
+fn pictures(net: &Triangulation) -> String {
+    let mut table = Table::new(
+        "Pictures; full list in pictures.csv",
+        &[
+            Column::Text("picture"),
+            Column::Text("brick"),
+            Column::Number("metres per unit"),
+            Column::Number("angle, °"),
+            Column::Number("X, km"),
+            Column::Number("Y, km"),
+            Column::Number("±, m"),
+            Column::Number("ties"),
+            Column::Number("rms, m"),
+            Column::Number("floor, m"),
+        ],
+    );
+    for of in net.pictures.iter().take(PICTURES) {
+        let (x, y) = km(of.centre_m);
+        let cells: [Cell; 10] = [
+            (&of.picture).into(),
+            (&of.brick).into(),
+            label(of.coefficients[0].hypot(of.coefficients[1]), 4).into(),
+            label(of.angle_rad.to_degrees(), 3).into(),
+            label(x, 3).into(),
+            label(y, 3).into(),
+            of.sigma_m
+                .map_or_else(String::new, |of| label(of, 1))
+                .into(),
+            of.ties.to_string().into(),
+            metres(of.deviation_rms_m),
+            label(of.projection_floor_m, 2).into(),
+        ];
+        table.row(true, cells);
+    }
+    table.finish()
+}

@@ -1,0 +1,240 @@
+//! Images with footprints and tie points on them: a separate page, and a section that links to it.
+
+use std::fmt::Write as _;
+
+use base64::{Engine as _, engine::general_purpose::STANDARD};
+
+use super::{
+    html::{self, escape, link, list, paragraph},
+    numbers::whole,
+    plots::label,
+    section::Section,
+};
+use areograph_base::error::Result;
+use areograph_products::{Picture, SiteProducts, anaglyph, piece, strip};
+use areograph_stages::lay_overlays::{
+    CHIP_EDGE, Mark, Overlays, Place, PlaceView, ShownImage, Subject,
+};
+
+/// Pixels of all whole images on the page: with the pieces it stays below 5 MB for any contents.
+const STRIP_PIXELS: u64 = 2_300_000;
+
+pub(super) const SECTION: Section = Section {
+    title: "Images and footprints",
+    anchor: "overlays",
+    appears: |site| site.overlays.is_some(),
+    write,
+};
+
+/// Contents of the other page, and the position of each image on it.
+fn write(site: &SiteProducts) -> Result<String> {
+    let Some(overlays) = site.overlays else {
+        return Ok(String::new());
+    };
+    let words = format!(
+        "{} with footprints and tie points on their pixels, before and after the adjustment, and {} of the ground in pairs of \
+         images: ",
+        html::counted(overlays.images.len(), "image"),
+        html::counted(overlays.places.len(), "place"),
+    );
+    let page = link("overlays.html", "overlays.html");
+    let images = overlays.images.iter().map(|shown| {
+        let id = &site.images[shown.image].times.id;
+        let picture = link(&format!("../images/{id}/overlay.png"), "picture");
+        let layer = link(
+            &format!("../images/{id}/overlay.geojson"),
+            "marks as a layer",
+        );
+        format!("<li>{}: {picture}, {layer}</li>\n", escape(id))
+    });
+    let images: String = images.collect();
+    let first = overlays
+        .places
+        .first()
+        .map(|place| figure(site, place))
+        .transpose()?;
+    Ok(format!(
+        "<p>{}{page}.</p>\n<ul>\n{images}</ul>\n{}",
+        escape(&words),
+        first.unwrap_or_default()
+    ))
+}
+
+/// The page of a site whose images have pixels; `None` without any.
+///
+/// # Errors
+/// A picture that cannot be drawn, which is a bug in areograph.
+pub fn overlays_page(site: &SiteProducts) -> Result<Option<String>> {
+    let Some(overlays) = site.overlays else {
+        return Ok(None);
+    };
+    let is_tie = |place: &&Place| matches!(place.subject, Subject::Tie { .. });
+    let figures = |places: Vec<&Place>| {
+        let figures = places.into_iter().map(|place| figure(site, place));
+        figures.collect::<Result<String>>()
+    };
+    let (ties, footprints): (Vec<&Place>, Vec<&Place>) = overlays.places.iter().partition(is_tie);
+    let sections = [
+        html::Section::new("Images", images(site, overlays)?),
+        html::Section::new("Footprints", figures(footprints)?),
+        html::Section::new("Tie points", figures(ties)?),
+    ];
+    let title = format!("{}: images and footprints", site.config.site);
+    Ok(Some(html::page(&title, &lead(site), &sections)))
+}
+
+fn lead(site: &SiteProducts) -> String {
+    let report = format!(
+        "<p class=\"about\">{}</p>\n",
+        link("index.html", "Report of the site")
+    );
+    let mut keys = vec!["blue circle: the point by the orientation of the kernels"];
+    if site.adjustment().is_some() {
+        keys.push("orange upright cross: the point by the adjusted orientation");
+        keys.push("yellow diagonal cross: a measured tie point");
+    } else if site.geometric.is_some() {
+        keys.push("yellow diagonal cross: a measured tie point");
+    }
+    report
+        + &list(&keys)
+        + &paragraph(
+            "Numbers count the shots of a profile, from 1. Marks leave their middle free. Pieces of images have the same \
+             ground in the same place, north up; dark violet is beyond the image or missing. In pictures of two images the \
+             first is red and the second cyan: ground that both have in the same place is grey.",
+        )
+}
+
+fn images(site: &SiteProducts, overlays: &Overlays) -> Result<String> {
+    let each = STRIP_PIXELS / overlays.images.len().max(1) as u64;
+    let mut html = "<div class=\"strips\">\n".to_owned();
+    for shown in &overlays.images {
+        if let Some(picture) = strip(site, shown.image, each)? {
+            html += &strip_figure(site, shown, &picture);
+        }
+    }
+    Ok(html + "</div>\n")
+}
+
+fn strip_figure(site: &SiteProducts, shown: &ShownImage, picture: &Picture) -> String {
+    let image = &site.images[shown.image];
+    let id = &image.times.id;
+    let inside = image.registration.points.inside_count();
+    let mut words = format!(
+        "{id}, {} lines of {} samples, {} × {} of them one pixel; line 0 is at the top. {} in it by the kernels",
+        whole(image.times.line_times.lines()),
+        whole(image.times.samples),
+        picture.reduction,
+        picture.reduction,
+        html::counted(inside, "footprint"),
+    );
+    if picture.step > 1 {
+        let _infallible = write!(words, "; 1 in {} is marked", picture.step);
+    }
+    words.push('.');
+    let look = &shown.quick_look;
+    for (lines, what) in [
+        (look.lines_missing, "missing"),
+        (look.lines_suspect, "damaged or of uncertain position"),
+    ] {
+        if lines > 0 {
+            let _infallible = write!(words, " {} {what}.", html::counted(lines as usize, "line"));
+        }
+    }
+    let alt = format!("{id} with its footprints");
+    let name = escape(&alt);
+    format!(
+        "<figure>\n<div class=\"strip\" tabindex=\"0\" role=\"region\" aria-label=\"{name}\">{}</div>\n\
+         <figcaption>{}</figcaption>\n</figure>\n",
+        img(picture, &alt),
+        escape(&words)
+    )
+}
+
+/// A place in its images, side by side and superposed.
+fn figure(site: &SiteProducts, place: &Place) -> Result<String> {
+    let id = |view: &PlaceView| &*site.images[view.image].times.id;
+    let title = title(site, &place.subject);
+    let mut cells = Vec::new();
+    for view in &place.views {
+        if let Some(chip) = view.chips.last() {
+            let alt = format!("{title} in {}", id(view));
+            cells.push((img(&piece(chip)?, &alt), id(view).to_owned()));
+        }
+    }
+    if let [one, other] = &place.views[..] {
+        for ((centre, first), second) in place.centres.iter().zip(&one.chips).zip(&other.chips) {
+            let state = match centre {
+                Mark::Before => "both, before the adjustment",
+                Mark::After => "both, after the adjustment",
+                Mark::Measured => "both, as measured",
+            };
+            let alt = format!(
+                "{title} in {} (red) and {} (cyan), {state}",
+                id(one),
+                id(other)
+            );
+            cells.push((img(&anaglyph(first, second)?, &alt), state.to_owned()));
+        }
+    }
+    let cells: String = cells
+        .into_iter()
+        .map(|(img, words)| format!("<div>{img}<p>{}</p></div>\n", escape(&words)))
+        .collect();
+    let anchor = html::slug(&title);
+    Ok(format!(
+        "<figure class=\"place\" id=\"{anchor}\">\n<h3>{}</h3>\n<div class=\"pieces\">\n{cells}</div>\n\
+         <figcaption>{}</figcaption>\n</figure>\n",
+        escape(&title),
+        escape(&caption(site, place))
+    ))
+}
+
+fn title(site: &SiteProducts, subject: &Subject) -> String {
+    match subject {
+        Subject::Footprint {
+            profile, number, ..
+        } => format!(
+            "Footprint {number} of profile {}",
+            site.profiles[*profile].id
+        ),
+        Subject::Tie {
+            id, is_rejected, ..
+        } => {
+            let rejected = if *is_rejected { ", rejected" } else { "" };
+            format!("Tie point {id}{rejected}")
+        }
+    }
+}
+
+fn caption(site: &SiteProducts, place: &Place) -> String {
+    let edge_m = place.pixel_m * CHIP_EDGE as f64;
+    let mut words = match &place.subject {
+        Subject::Footprint { row, .. } => format!("Row {row} of footprints.parquet. "),
+        Subject::Tie { why, .. } => format!("Reason: {why}. "),
+    };
+    let _infallible = write!(
+        words,
+        "{} m a pixel, {} m from edge to edge.",
+        label(place.pixel_m, 1),
+        label(edge_m, 0)
+    );
+    let moved = place.views.iter().filter_map(|view| {
+        let id = &site.images[view.image].times.id;
+        Some(format!("by {} m in {id}", label(view.moved_m?, 1)))
+    });
+    let moved: Vec<String> = moved.collect();
+    if !moved.is_empty() {
+        let _infallible = write!(words, " The adjustment moves it {}.", moved.join(", "));
+    }
+    words
+}
+
+fn img(picture: &Picture, alt: &str) -> String {
+    format!(
+        "<img src=\"data:image/png;base64,{}\" width=\"{}\" height=\"{}\" alt=\"{}\">",
+        STANDARD.encode(&picture.png),
+        picture.width,
+        picture.height,
+        escape(alt)
+    )
+}

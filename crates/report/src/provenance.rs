@@ -1,0 +1,178 @@
+//! Program, configuration, and the files that were read.
+
+use super::{
+    html::{Cell, Column, Table, escape, folded, link, paragraph},
+    numbers::whole,
+    section::Section,
+};
+use areograph_config::{self as config};
+use areograph_products::{SiteProducts, listed};
+
+pub(super) const SECTION: Section = Section {
+    title: "Provenance",
+    anchor: "provenance",
+    appears: |_| true,
+    write: |site| Ok(write(site)),
+};
+
+fn write(site: &SiteProducts) -> String {
+    let config = site.config;
+    let file = areograph_store::files::file_name(&config.file);
+    let words = format!(
+        "Cite as: areograph {}, site {}, configuration {file} (BLAKE3 of its keys {}). Computed with {}.",
+        env!("CARGO_PKG_VERSION"),
+        config.site,
+        config.blake3,
+        site.program.cspice.replace('_', " ")
+    );
+    let mut files = Table::new(
+        "Files that were read",
+        &[
+            Column::Text("file, kernels in load order"),
+            Column::Text("role"),
+            Column::Number("bytes"),
+            Column::Text("BLAKE3"),
+        ],
+    );
+    for (index, kernel) in site.kernels.iter().enumerate() {
+        files.row_of(
+            &format!("manifest.json#/kernels/{index}"),
+            true,
+            [
+                (&kernel.name).into(),
+                (&kernel.role).into(),
+                Cell::from(whole(kernel.bytes)).told("/bytes"),
+                hash(&kernel.blake3),
+            ],
+        );
+    }
+    for support in site
+        .images
+        .iter()
+        .filter_map(|image| image.times.support.as_ref())
+    {
+        files.row(
+            true,
+            [
+                (&support.name).into(),
+                "ISD".into(),
+                whole(support.bytes).into(),
+                hash(&support.blake3),
+            ],
+        );
+    }
+    for file in &site.footprints.files {
+        files.row(
+            true,
+            [
+                (&file.name).into(),
+                "PEDR".into(),
+                "–".into(),
+                hash(&file.blake3),
+            ],
+        );
+    }
+    let made = format!(
+        "<p>Made by <code>areograph run {0}</code>; <code>areograph report {1}</code> makes this page again.</p>\n",
+        escape(&file),
+        escape(&config.site)
+    );
+    paragraph(&words)
+        + &made
+        + LINKS
+        + &folded("Files that were read", &files.finish())
+        + &settings(site)
+        + &methods(site)
+        + &products(site)
+}
+
+/// The number of each stage's method.
+fn methods(site: &SiteProducts) -> String {
+    let columns = &[Column::Text("stage"), Column::Number("method")];
+    let mut table = Table::new(
+        "Stages; the number rises when a stage computes something else",
+        columns,
+    );
+    for (stage, method) in &site.program.methods {
+        table.row(true, [stage.into(), method.to_string().into()]);
+    }
+    folded("Methods", &table.finish())
+}
+
+/// Links to the other files, from the folder of the page.
+const LINKS: &str = "<p><a href=\"../manifest.json\">manifest.json</a>: verdict, checks, figures and hashes for programs. \
+    <a href=\"../kernels.tm\">kernels.tm</a> loads the same kernels. \
+    <a href=\"../../index.html\">All sites</a>.</p>\n";
+
+/// Every file beside the page.
+fn products(site: &SiteProducts) -> String {
+    let columns = &[
+        Column::Text("file"),
+        Column::Text("content"),
+        Column::Text("readers"),
+    ];
+    let mut table = Table::new("Products", columns);
+    for product in listed(site) {
+        let place = format!("../{}", product.path);
+        table.row(
+            true,
+            [
+                Cell::Html(link(&place, &product.path)),
+                product.what.into(),
+                product.readers.into(),
+            ],
+        );
+    }
+    folded("Products", &table.finish())
+}
+
+/// The written keys of the configuration beside their defaults; all other keys have the defaults.
+fn settings(site: &SiteProducts) -> String {
+    if site.config.keys.is_empty() {
+        return String::new();
+    }
+    let columns = &[
+        Column::Text("key"),
+        Column::Text("value"),
+        Column::Text("default"),
+    ];
+    let mut table = Table::new("Settings as written; all others are the defaults", columns);
+    let declared = config::keys();
+    for (key, value) in &site.config.keys {
+        let default = declared.iter().find(|declared| is_of(key, &declared.path));
+        let default = default.and_then(|declared| declared.default.as_ref());
+        let default = default.map_or_else(|| "–".to_owned(), ToString::to_string);
+        table.row(true, [key.into(), value.into(), default.into()]);
+    }
+    folded("Settings", &table.finish())
+}
+
+/// Whether a key as written is the declared one: the name of a list of tables is followed by the entry.
+fn is_of(key: &str, declared: &str) -> bool {
+    let Some((table, name)) = declared.rsplit_once('.') else {
+        return key == declared;
+    };
+    let rest = key
+        .strip_prefix(table)
+        .and_then(|rest| rest.strip_suffix(name));
+    rest.is_some_and(|entry| entry.starts_with('.') && entry.ends_with('.'))
+}
+
+/// A hash in a monospaced font.
+fn hash(blake3: &str) -> Cell {
+    Cell::Html(format!("<span class=\"hash\">{}</span>", escape(blake3)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn written_keys_find_their_declaration() {
+        assert!(is_of("site", "site") && !is_of("sites", "site"));
+        assert!(is_of("adjustment.model", "adjustment.model"));
+        assert!(is_of("images.E02-02855.label", "images.label"));
+        assert!(!is_of("adjustment.images.a.id", "images.id"));
+        assert!(!is_of("pedr.files", "ties.files"));
+    }
+}

@@ -1,0 +1,342 @@
+//! The range check: Table 3 and figure 2 of Shan et al. 2005, and the residuals beside them.
+
+mod plots;
+
+use super::{
+    html::{Cell, Column, Table, escape, folded, folded_unless, heading, paragraph},
+    numbers::{number, whole},
+    plots::label,
+    section::Section,
+    source::{filled, sentence},
+};
+use areograph_base::error::Result;
+use areograph_geom::statistics::Summary;
+use areograph_products::SiteProducts;
+use areograph_stages::check_ranges::ProfileRanges;
+
+pub(super) use plots::{many, plotted};
+
+pub(super) const SECTION: Section = Section {
+    title: "Range check",
+    anchor: "range-check",
+    appears: |site| site.config.has_shots(),
+    write,
+};
+
+fn write(site: &SiteProducts) -> Result<String> {
+    if site.profiles.is_empty() {
+        return Ok(paragraph("No profile."));
+    }
+    if site.ranges.profiles.iter().all(|of| !of.is_tested()) {
+        return Ok(untested(site));
+    }
+    let figures = format!("<div class=\"plots\">\n{}</div>\n", plots::figures(site)?);
+    if many(site) {
+        let title = format!("Tables of all {} profiles", whole(site.profiles.len()));
+        let tables = statistics(site) + &limits(site) + &three_ways(site);
+        return Ok(all_profiles(site) + &figures + &folded(&title, &tables));
+    }
+    let profiles = &site.ranges.profiles;
+    let invalid = profiles.iter().any(|of| !of.invalid_because.is_empty());
+    let ways = folded_unless(
+        invalid,
+        "Limits, and three ways to check a range",
+        &(limits(site) + &three_ways(site)),
+    );
+    Ok(statistics(site) + &ways + &heading("Along the profiles") + &figures)
+}
+
+/// What is stated where no range is compared with anything.
+fn untested(site: &SiteProducts) -> String {
+    let mut table = Table::new(
+        "Profiles whose ranges are not tested",
+        &[
+            Column::Number("profiles"),
+            Column::Number("shots in profiles"),
+        ],
+    );
+    let shots: usize = site.profiles.iter().map(|of| of.rows.len()).sum();
+    table.row(
+        true,
+        [whole(site.profiles.len()).into(), whole(shots).into()],
+    );
+    paragraph(
+        "The range check tests nothing: the tables have no position of the spacecraft, and no kernels cover the shots. The \
+         spacecraft is put on the radius through the footprint at the range (nadir by range); its distance from the \
+         footprint is the range.",
+    ) + &table.finish()
+}
+
+/// Millimetres suffice for ranges recorded in centimetres.
+pub(super) fn metres(value: f64) -> String {
+    label(value, 3)
+}
+
+/// All profiles in one row.
+fn all_profiles(site: &SiteProducts) -> String {
+    let mut table = Table::new(
+        "Range − distance of all profiles, metres",
+        &[
+            Column::Number("profiles"),
+            Column::Number("invalid"),
+            Column::Number("shots"),
+            Column::Number("outliers"),
+            Column::Number("mean of the means"),
+            Column::Number("std of the means"),
+            Column::Number("least mean"),
+            Column::Number("largest mean"),
+            Column::Number("std within profiles"),
+        ],
+    );
+    let profiles = &site.ranges.profiles;
+    let measured = profiles.iter().filter(|of| of.measured() > 0);
+    let means: Vec<f64> = measured.map(|of| of.mean_without_outliers_m).collect();
+    let means = Summary::of(&means);
+    let invalid = profiles
+        .iter()
+        .filter(|of| !of.invalid_because.is_empty())
+        .count();
+    let shots: u64 = profiles
+        .iter()
+        .map(|of| u64::from(of.range_minus_distance_m.n))
+        .sum();
+    let outliers: u64 = profiles.iter().map(|of| u64::from(of.outliers)).sum();
+    let (squares, freedom) = profiles.iter().fold((0.0, 0.0), |(squares, freedom), of| {
+        let own = f64::from(of.range_minus_distance_m.n.saturating_sub(1));
+        let variance_m2 = of.range_minus_distance_m.standard_deviation.powi(2);
+        (squares + own * variance_m2, freedom + own)
+    });
+    table.row(
+        invalid == 0,
+        [
+            whole(profiles.len()).into(),
+            whole(invalid).into(),
+            whole(shots).into(),
+            whole(outliers).into(),
+            metres(means.mean).into(),
+            metres(means.standard_deviation).into(),
+            metres(means.min).into(),
+            metres(means.max).into(),
+            metres((squares / f64::max(freedom, 1.0)).sqrt()).into(),
+        ],
+    );
+    table.finish()
+}
+
+fn statistics(site: &SiteProducts) -> String {
+    let limits = &site.config.range_check;
+    let mut table = Table::new(
+        "Range − distance per profile (Table 3 of Shan et al. 2005), metres",
+        &[
+            Column::Text("profile"),
+            Column::Number("n"),
+            Column::Number("mean"),
+            Column::Number("std"),
+            Column::Number("median"),
+            Column::Number("NMAD"),
+            Column::Number("min"),
+            Column::Number("max"),
+            Column::Number("outliers"),
+            Column::Number("trend, mm/s"),
+            Column::Text("simultaneous images"),
+            Column::Text("verdict"),
+        ],
+    );
+    for (index, (profile, ranges)) in site.profiles.iter().zip(&site.ranges.profiles).enumerate() {
+        let main = &ranges.range_minus_distance_m;
+        let outlier_share = f64::from(ranges.outliers) / f64::from(main.n.max(1));
+        let images: Vec<String> = profile
+            .simultaneous
+            .iter()
+            .filter_map(|of| {
+                let image = site.images.get(of.image)?;
+                Some(format!("{} ({} shots)", image.times.id, of.shots))
+            })
+            .collect();
+        let valid = ranges.invalid_because.is_empty();
+        let of_main = |value: f64, name: &str| match main.n {
+            0 => Cell::from("–"),
+            _ => Cell::from(metres(value)).told(format!("/range_minus_distance_m/{name}")),
+        };
+        table.row_of(
+            &place(index),
+            valid,
+            [
+                (&profile.id).into(),
+                Cell::from(whole(main.n)).told("/range_minus_distance_m/n"),
+                of_main(main.mean, "mean"),
+                of_main(main.standard_deviation, "standard_deviation"),
+                of_main(main.median, "median"),
+                of_main(main.nmad, "nmad"),
+                of_main(main.min, "min"),
+                of_main(main.max, "max"),
+                Cell::Limited(
+                    whole(ranges.outliers),
+                    used_share(outlier_share, limits.outlier_share_max),
+                )
+                .told("/outliers"),
+                trend(ranges),
+                dash_for_none(images.join(", ")).into(),
+                match (valid, ranges.is_judged(limits)) {
+                    (false, _) => "invalid",
+                    (true, false) => "not judged",
+                    (true, true) => "valid",
+                }
+                .into(),
+            ],
+        );
+    }
+    table.finish()
+}
+
+/// Limits of the table of the profiles.
+fn limits(site: &SiteProducts) -> String {
+    let limits = &site.config.range_check;
+    sentence(
+        "Judged: profiles of at least {} shots. Limits: at most {} % outliers (beyond {} robust σ of the median). Bars: share of a limit that is used.",
+        &[
+            (
+                limits.shots_min.to_string(),
+                "ranges.json#/limits/shots_min",
+            ),
+            (
+                number(100.0 * limits.outlier_share_max, 1),
+                "ranges.json#/limits/outlier_share_max*100",
+            ),
+            (
+                limits.outlier_sigma.to_string(),
+                "ranges.json#/limits/outlier_sigma",
+            ),
+        ],
+    )
+}
+
+/// Used share of a limit that may be 0: then 0 uses nothing of it, and all other values are beyond it.
+fn used_share(value: f64, limit: f64) -> f64 {
+    if value <= 0.0 { 0.0 } else { value / limit }
+}
+
+fn dash_for_none(text: String) -> String {
+    if text.is_empty() {
+        "–".to_owned()
+    } else {
+        text
+    }
+}
+
+fn trend(ranges: &ProfileRanges) -> Cell {
+    let text = ranges.trend_m_s.map_or_else(
+        || "–".to_owned(),
+        |trend| {
+            format!(
+                "{} ± {}",
+                label(1e3 * trend.slope, 2),
+                label(1e3 * trend.uncertainty, 2)
+            )
+        },
+    );
+    Cell::from(text).told("/trend_m_s/slope*1000 /trend_m_s/uncertainty*1000")
+}
+
+/// Place of a profile in the products.
+pub(super) fn place(profile: usize) -> String {
+    format!("ranges.json#/profiles/{profile}")
+}
+
+/// A mean in the table of three ways; a dash without values.
+fn known(of: &Summary, name: &str) -> Cell {
+    match of.n {
+        0 => Cell::from("–"),
+        _ => Cell::from(metres(of.mean)).told(format!("/{name}/mean")),
+    }
+}
+
+fn three_ways(site: &SiteProducts) -> String {
+    let limits = &site.config.range_check;
+    let mut table = Table::new(
+        "The three ways to check a range, means in metres",
+        &[
+            Column::Text("profile"),
+            Column::Number("range − distance, kernels"),
+            Column::Number("without outliers"),
+            Column::Number("with crossover radius"),
+            Column::Number("range − distance, PEDR's own orbit"),
+            Column::Number("without outliers"),
+            Column::Number("PEDR − kernels, radial"),
+            Column::Number("along-track"),
+            Column::Number("cross-track"),
+        ],
+    );
+    for (index, ranges) in site.ranges.profiles.iter().enumerate() {
+        let mean_m = ranges.mean_without_outliers_m;
+        let decoding_m = ranges.decoding_without_outliers_m;
+        let [radial, along, cross] = [(0, "radial"), (1, "along"), (2, "cross")]
+            .map(|(at, axis)| known(&ranges.spacecraft_m[at], &format!("spacecraft_{axis}_m")));
+        let limited = |of: &Summary, mean_m: f64, limit_m: f64, name: &str| match of.n {
+            0 => Cell::from("–"),
+            _ => Cell::Limited(metres(mean_m), mean_m.abs() / limit_m).told(format!("/{name}")),
+        };
+        let (by_kernels, by_own) = (&ranges.range_minus_distance_m, &ranges.decoding_m);
+        table.row_of(
+            &place(index),
+            true,
+            [
+                (&ranges.profile).into(),
+                known(by_kernels, "range_minus_distance_m"),
+                limited(
+                    by_kernels,
+                    mean_m,
+                    ranges.mean_max_m(limits),
+                    "mean_without_outliers_m",
+                ),
+                known(
+                    &ranges.range_minus_distance_crossover_m,
+                    "range_minus_distance_crossover_m",
+                ),
+                known(by_own, "decoding_m"),
+                limited(
+                    by_own,
+                    decoding_m,
+                    limits.decoding_max_m,
+                    "decoding_without_outliers_m",
+                ),
+                radial,
+                along,
+                cross,
+            ],
+        );
+    }
+    let mut words = vec!["Limits apply to means without outliers.".to_owned()];
+    if site.config.shots.is_empty() {
+        words.push(escape(
+            "Crossover radius: the MOLA team's adjustment, which moves footprints, not ranges.",
+        ));
+    }
+    words.push(filled(
+        "PEDR's own orbit: without kernels; a mean beyond ±{} m indicates a reading error.",
+        &[(
+            limits.decoding_max_m.to_string(),
+            "ranges.json#/limits/decoding_max_m",
+        )],
+    ));
+    let mut orbits = filled(
+        "PEDR − kernels: spacecraft positions, inertial axes; beyond {} m orbit, clock or datum differ.",
+        &[(
+            limits.orbit_max_m.to_string(),
+            "ranges.json#/limits/orbit_max_m",
+        )],
+    );
+    // A table's own spacecraft and that of support data are not tabulated.
+    if site.ranges.trajectory_error_m > 0.0 {
+        orbits += &filled(
+            " Trajectory tabulated to {} mm.",
+            &[(
+                number(1e3 * site.ranges.trajectory_error_m, 3),
+                "ranges.json#/trajectory_error_m*1000",
+            )],
+        );
+    }
+    words.push(orbits);
+    let words: Vec<String> = words.iter().map(|of| format!("<li>{of}</li>\n")).collect();
+    table.finish() + &format!("<ul>\n{}</ul>\n", words.concat())
+}

@@ -1,0 +1,241 @@
+//! Registration: profiles on the image plane.
+
+use super::{
+    html::{Cell, Column, Table, counted, folded, paragraph},
+    numbers::whole,
+    plots::{COLOURS, Extent, GREY, INK, Mark, Panel, Plot, Series, Style, figure, label, thinned},
+    section::Section,
+};
+use areograph_base::error::Result;
+use areograph_geom::pushbroom::CameraModel;
+use areograph_products::{ImageProducts, SiteProducts};
+use areograph_stages::group_profiles::Profile;
+
+/// Number of profiles with separate colours; the others share the last, grey one.
+const COLOURED: usize = COLOURS.len() - 1;
+/// Largest number of dots of one series.
+const DOTS_MAX: usize = 600;
+/// Widths of the image shown on either side of it.
+const WIDTHS_BESIDE: f64 = 0.15;
+
+pub(super) const SECTION: Section = Section {
+    title: "Registration",
+    anchor: "registration",
+    appears: |site| site.images.iter().any(registered),
+    write,
+};
+
+fn registered(image: &ImageProducts) -> bool {
+    !image.registration.points.is_empty()
+}
+
+fn write(site: &SiteProducts) -> Result<String> {
+    let images = site.images.iter().filter(|image| registered(image));
+    let images: Vec<&ImageProducts> = images.collect();
+    let mut planes = String::new();
+    for image in &images {
+        planes += &figure(&plane(site.profiles, image))?;
+    }
+    let planes = format!("<div class=\"plots\">\n{planes}</div>\n");
+    let evidence = planes + &models(site, &images);
+    Ok(profiles(site, &images)
+        + &folded(
+            "Footprints over the lines, and the effect of other camera models",
+            &evidence,
+        ))
+}
+
+/// Place of an image in the products.
+pub(super) fn place(site: &SiteProducts, image: &ImageProducts) -> String {
+    let mut images = site.images.iter();
+    let index = images.position(|other| other.times.id == image.times.id);
+    format!("registration.json#/images/{}", index.unwrap_or_default())
+}
+
+/// Profiles in the images, and their positions.
+fn profiles(site: &SiteProducts, images: &[&ImageProducts]) -> String {
+    let mut table = Table::new(
+        "Profiles in the images",
+        &[
+            Column::Text("image"),
+            Column::Text("profile"),
+            Column::Text("simultaneous"),
+            Column::Number("footprints in the image"),
+            Column::Number("lines"),
+            Column::Number("samples"),
+            Column::Number("shot spacing, lines"),
+        ],
+    );
+    let mut elsewhere = 0;
+    for image in images {
+        let points = &image.registration.points;
+        let of_image = place(site, image);
+        let each = site.profiles.iter().zip(&image.registration.profiles);
+        for (index, (profile, on_image)) in (0_u32..).zip(each) {
+            if on_image.inside == 0 {
+                elsewhere += 1;
+                continue;
+            }
+            let inside = |values: &[f64]| {
+                let of = points.profile.iter().zip(&points.inside).zip(values);
+                let own = of.filter(|((profile, inside), _)| **profile == index && **inside);
+                let (low, high) = own.fold((f64::INFINITY, f64::NEG_INFINITY), |ends, (_, at)| {
+                    (ends.0.min(*at), ends.1.max(*at))
+                });
+                format!("{low:.0} to {high:.0}")
+            };
+            let with = |at: usize| site.images[at].times.id == image.times.id;
+            let together = profile.simultaneous.iter().any(|of| with(of.image));
+            let spacing = on_image.shot_spacing_lines;
+            table.row_of(
+                &format!("{of_image}/profiles/{index}"),
+                true,
+                [
+                    (&image.times.id).into(),
+                    (&profile.id).into(),
+                    if together { "yes" } else { "no" }.into(),
+                    Cell::from(whole(on_image.inside)).told("/inside"),
+                    inside(&points.line).into(),
+                    inside(&points.sample).into(),
+                    Cell::from(
+                        spacing.map_or_else(|| "–".to_owned(), |lines| format!("{lines:.1}")),
+                    )
+                    .told("/shot_spacing_lines"),
+                ],
+            );
+        }
+    }
+    let rejected: u64 = images
+        .iter()
+        .flat_map(|image| image.registration.rejected.values())
+        .sum();
+    let mut words = Vec::new();
+    if elsewhere > 0 {
+        words.push(format!(
+            "Not listed: {elsewhere} profiles without a footprint in an image."
+        ));
+    }
+    if rejected > 0 {
+        words.push(format!(
+            "{rejected} footprints cannot be projected (behind the camera or beyond the horizon)."
+        ));
+    }
+    table.finish() + &paragraph(&words.join(" "))
+}
+
+/// Footprints near the image, over its lines.
+fn plane(profiles: &[Profile], image: &ImageProducts) -> Plot {
+    let points = &image.registration.points;
+    let (lines, samples) = (
+        f64::from(image.times.line_times.lines()),
+        f64::from(image.times.samples),
+    );
+    let beside = WIDTHS_BESIDE * samples;
+    let near = Extent {
+        low: -beside,
+        high: samples + beside,
+    };
+    let mut dots: Vec<Vec<(f64, f64)>> = vec![Vec::new(); profiles.len()];
+    for index in 0..points.len() {
+        let (line, sample) = (points.line[index], points.sample[index]);
+        if !points.extrapolated[index] && near.contains(sample) {
+            dots[points.profile[index] as usize].push((line, sample));
+        }
+    }
+    let mut series: Vec<Series> = Vec::new();
+    let mut others = Vec::new();
+    for (profile, dots) in profiles.iter().zip(dots) {
+        if dots.is_empty() {
+            continue;
+        }
+        if series.len() < COLOURED {
+            series.push(Series {
+                label: profile.id.clone(),
+                style: Style::Dots,
+                colour: series.len(),
+                points: thinned(&dots, DOTS_MAX),
+            });
+        } else {
+            others.extend(dots);
+        }
+    }
+    if !others.is_empty() {
+        series.push(Series {
+            label: "other profiles".to_owned(),
+            style: Style::Dots,
+            colour: GREY,
+            points: thinned(&others, DOTS_MAX),
+        });
+    }
+    let shown = series.len();
+    let ends = [0.0, f64::from(image.times.lines_delivered)].map(|x| Mark {
+        x,
+        half_width: 0.0,
+        colour: INK,
+    });
+    let panel = Panel {
+        y: near,
+        limits: vec![0.0, samples],
+        marks: ends.to_vec(),
+        ..Panel::of("sample", series)
+    };
+    let words = format!(
+        "{} of {} footprints inside, of {}. Flight to the right; dashed: sides of the image, solid: its ends.",
+        whole(points.inside_count()),
+        whole(points.len()),
+        counted(shown, "profile")
+    );
+    Plot {
+        x: Extent::of([0.0, lines].into_iter()),
+        ..Plot::of(
+            format!("Profiles on {}", image.times.id),
+            words,
+            "line",
+            vec![panel],
+        )
+    }
+}
+
+/// Effect of the choice of the model.
+fn models(site: &SiteProducts, images: &[&ImageProducts]) -> String {
+    let mut table = Table::new(
+        "Other models against the one used, footprints within the image's lines",
+        &[
+            Column::Text("image"),
+            Column::Text("used"),
+            Column::Text("other"),
+            Column::Number("lines, mean"),
+            Column::Number("standard deviation"),
+            Column::Number("samples, mean"),
+            Column::Number("standard deviation"),
+        ],
+    );
+    let word = |required: CameraModel| {
+        let words = CameraModel::WORDS.into_iter();
+        words
+            .filter(|(_, model)| *model == required)
+            .map(|(word, _)| word.replace('_', " "))
+            .collect::<String>()
+    };
+    for image in images {
+        for (index, other) in image.registration.models.iter().enumerate() {
+            let mut cells: Vec<Cell> = vec![
+                (&image.times.id).into(),
+                word(image.registration.model).into(),
+                word(other.model).into(),
+            ];
+            for (summary, name) in [(&other.lines, "lines"), (&other.samples, "samples")] {
+                let mean = Cell::from(label(summary.mean, 4));
+                let deviation = Cell::from(label(summary.standard_deviation, 4));
+                cells.push(mean.told(format!("/{name}/mean")));
+                cells.push(deviation.told(format!("/{name}/standard_deviation")));
+            }
+            table.row_of(
+                &format!("{}/models/{index}", place(site, image)),
+                true,
+                cells,
+            );
+        }
+    }
+    table.finish()
+}

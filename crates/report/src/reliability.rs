@@ -1,0 +1,302 @@
+//! Reliability of the adjustment: absolute position, gross errors that no
+//! residual shows, unknowns that cannot be separated, and rejected points.
+
+use super::{
+    heights::{known_beforehand, place_by},
+    html::{Cell, Column, Table, counted, folded, paragraph},
+    numbers::whole,
+    plots::label,
+    source::sentence,
+};
+use areograph_base::footprints::AdjustmentModel;
+use areograph_geom::statistics::Summary;
+use areograph_products::{AdjustmentProducts, GeometricProducts, SiteProducts};
+use areograph_stages::adjust::{
+    Adjusted, AdjustmentSummary, PointKind, RejectionReason, ScalarResidual,
+};
+
+/// Error in standard deviations over the root of the redundancy number that Baarda's test at 3.29 detects in
+/// eight cases of ten.
+///
+/// # Source
+/// Baarda 1968, A testing procedure for use in geodetic networks.
+const NON_CENTRALITY: f64 = 4.13;
+/// Below this redundancy number a residual hides its error.
+const HIDDEN: f64 = 0.1;
+/// Above this one it shows the error clearly.
+const SHOWN: f64 = 0.3;
+/// Number of pairs of unknowns, and of blunders, listed; the rest are counted.
+const CORRELATED_SHOWN: usize = 12;
+const BLUNDERS_SHOWN: usize = 20;
+
+/// Determined and undetermined quantities of the adjustment, with numbers.
+pub(super) fn absolute(
+    site: &SiteProducts,
+    geometric: &GeometricProducts,
+    adjustment: &AdjustmentProducts,
+) -> String {
+    const MOVED: [&str; 3] = [
+        "adjustment.json#/adjustment/summary/ties/corrections_m/0/mean",
+        "adjustment.json#/adjustment/summary/ties/corrections_m/1/mean",
+        "adjustment.json#/adjustment/summary/ties/corrections_m/2/mean",
+    ];
+    const SIGMA: [&str; 3] = [
+        "adjustment.json#/adjustment/heights/mean_sigma_m/0",
+        "adjustment.json#/adjustment/heights/mean_sigma_m/1",
+        "adjustment.json#/adjustment/heights/mean_sigma_m/2",
+    ];
+    let summary = &adjustment.adjusted.summary;
+    let ties = &summary.ties;
+    if ties.corrections_m[0].n == 0 {
+        return paragraph("No tie point was used.");
+    }
+    let registration = if adjustment.images_agree {
+        "Relative registration is corrected"
+    } else {
+        "Relative registration is not corrected"
+    };
+    let axes = ties.corrections_m.iter().zip(MOVED);
+    let mut numbers: Vec<(String, &str)> = axes
+        .map(|(axis, place)| (label(axis.mean, 1), place))
+        .collect();
+    numbers.push((registration.to_owned(), ""));
+    let determined = match &adjustment.adjusted.heights {
+        Some(_) if site.accuracy_withheld().is_some() => {
+            "heights follow MOLA; absolute accuracies are not stated, because the a priori accuracy of orbit and attitude is \
+             that of another spacecraft"
+        }
+        Some(heights) => {
+            let [east_m, north_m, up_m] = heights.mean_sigma_m;
+            numbers.push((label(up_m, 1), SIGMA[2]));
+            numbers.push((label(east_m, 0), SIGMA[0]));
+            numbers.push((label(north_m, 0), SIGMA[1]));
+            numbers.push((place_by(geometric, adjustment), ""));
+            "heights follow MOLA to {} m on average; position is known to {} m east and {} m north, by {}"
+        }
+        None if summary.model == AdjustmentModel::Published => {
+            "heights and position are not determined: image coordinates of footprints come from the orientation that is \
+             adjusted"
+        }
+        None => {
+            numbers.push((known_beforehand(geometric).to_owned(), ""));
+            "heights and position are a priori, from {}"
+        }
+    };
+    sentence(
+        &format!(
+            "Tie points moved by {{}}, {{}}, {{}} m in X, Y, Z on average. {{}}; {determined}."
+        ),
+        &numbers,
+    )
+}
+
+/// Observations of one kind along one axis.
+struct Controlled {
+    name: &'static str,
+    unit: &'static str,
+    sigma: f64,
+    redundancies: Vec<f64>,
+}
+
+impl Controlled {
+    fn all(site: &SiteProducts, adjusted: &Adjusted) -> Vec<Self> {
+        let options = &site.config.adjustment;
+        let views = |kind: PointKind, of: fn(&[ScalarResidual; 2]) -> f64| -> Vec<f64> {
+            let views = adjusted.views.iter().filter(|view| view.kind == kind);
+            views
+                .map(|view| of(&[view.along_px, view.across_px]))
+                .collect()
+        };
+        let along = |of: &[ScalarResidual; 2]| of[0].redundancy;
+        let across = |of: &[ScalarResidual; 2]| of[1].redundancy;
+        let ranges = adjusted.ranges.iter();
+        let all = [
+            (
+                "tie point along the track",
+                "px",
+                options.tie_sigma_px[0],
+                views(PointKind::Tie, along),
+            ),
+            (
+                "tie point across the track",
+                "px",
+                options.tie_sigma_px[1],
+                views(PointKind::Tie, across),
+            ),
+            (
+                "MOLA image point along the track",
+                "px",
+                options.footprint_sigma_px[0],
+                views(PointKind::Shot, along),
+            ),
+            (
+                "MOLA image point across the track",
+                "px",
+                options.footprint_sigma_px[1],
+                views(PointKind::Shot, across),
+            ),
+            (
+                "MOLA range",
+                "m",
+                options.range_sigma_m,
+                ranges.map(|range| range.residual_m.redundancy).collect(),
+            ),
+        ];
+        let named = all.map(|(name, unit, sigma, redundancies)| Self {
+            name,
+            unit,
+            sigma,
+            redundancies,
+        });
+        let held = named.into_iter();
+        held.filter(|of| !of.redundancies.is_empty()).collect()
+    }
+
+    fn mean(&self) -> f64 {
+        Summary::of(&self.redundancies).mean
+    }
+
+    /// The smallest error that the test detects, with its unit.
+    fn smallest(&self) -> String {
+        let error = NON_CENTRALITY * self.sigma / self.mean().sqrt();
+        if error.is_finite() {
+            format!("{} {}", label(error, 1), self.unit)
+        } else {
+            "–".to_owned()
+        }
+    }
+}
+
+/// Share of a gross error visible in its own residual.
+pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
+    let all = Controlled::all(site, adjusted);
+    let mut table = Table::new(
+        "Redundancy: fraction of a gross error visible in its own residual",
+        &[
+            Column::Text("observation"),
+            Column::Number("number"),
+            Column::Number("shown, mean"),
+            Column::Number("least"),
+            Column::Number("most"),
+            Column::Number("smallest detectable error"),
+        ],
+    );
+    let mut sentences = String::new();
+    for of in &all {
+        let found = Summary::of(&of.redundancies);
+        let [mean, least, most] = [found.mean, found.min, found.max].map(per_cent);
+        let hidden = found.mean < HIDDEN;
+        let consequence = if hidden {
+            "such errors cannot be detected"
+        } else {
+            "only large ones are detected"
+        };
+        if found.mean < SHOWN {
+            sentences += &paragraph(&format!(
+                "A gross error in a {} shows only {mean} in its residual: {consequence}.",
+                of.name
+            ));
+        }
+        table.row(
+            !hidden,
+            [
+                of.name.into(),
+                whole(found.n).into(),
+                mean.into(),
+                least.into(),
+                most.into(),
+                of.smallest().into(),
+            ],
+        );
+    }
+    let words = "Shown: the redundancy number r; detectable by Baarda's test (3.29, power 80 %): 4.13 σ/√r.";
+    let table = table.finish() + &paragraph(words);
+    sentences + &folded("Redundancy by kind of observation", &table)
+}
+
+/// A share; one that rounds to zero is still shown.
+fn per_cent(share: f64) -> String {
+    if 0.0 < share && share < 5e-4 {
+        "< 0.1 %".to_owned()
+    } else {
+        format!("{} %", label(100.0 * share, 1))
+    }
+}
+
+/// Unknowns that cannot be separated.
+pub(super) fn correlations(summary: &AdjustmentSummary) -> String {
+    let mut all: Vec<_> = summary.correlated.iter().enumerate().collect();
+    all.sort_by(|(_, a), (_, b)| b.2.abs().total_cmp(&a.2.abs()));
+    let Some((_, (first, second, largest))) = all.first() else {
+        return paragraph("No two unknowns of the orientation correlate by more than 0.95.");
+    };
+    let sum = if *largest < 0.0 { "sum" } else { "difference" };
+    let mut html = paragraph(&format!(
+        "{} correlate by more than 0.95, most of all {first} and {second} ({}): only their {sum}, each over its σ, is determined. \
+         Do not interpret them singly.",
+        counted(all.len(), "pair") + " of unknowns",
+        label(*largest, 4)
+    ));
+    let columns = &[
+        Column::Number("correlation"),
+        Column::Text("unknown"),
+        Column::Text("and"),
+    ];
+    let mut table = Table::new("Largest correlations", columns);
+    for (index, (first, second, coefficient)) in all.iter().take(CORRELATED_SHOWN) {
+        let coefficient = Cell::from(label(*coefficient, 4)).told("/2");
+        table.row_of(
+            &format!("adjustment.json#/adjustment/summary/correlated/{index}"),
+            true,
+            [coefficient, first.into(), second.into()],
+        );
+    }
+    html += &table.finish();
+    html + &rest(all.len(), CORRELATED_SHOWN)
+}
+
+fn rest(all: usize, shown: usize) -> String {
+    if all <= shown {
+        return String::new();
+    }
+    paragraph(&format!("And {} more.", all - shown))
+}
+
+/// Points that the adjustment rejected.
+pub(super) fn rejected(adjusted: &Adjusted) -> String {
+    let mut blunders = Vec::new();
+    let mut undetermined = [0_usize; 2];
+    for point in &adjusted.rejected {
+        match point.reason {
+            RejectionReason::Blunder { standardised }
+            | RejectionReason::Height { standardised, .. } => {
+                blunders.push((&point.id, standardised));
+            }
+            RejectionReason::Undetermined => {
+                undetermined[usize::from(point.kind == PointKind::Tie)] += 1;
+            }
+            RejectionReason::NotIntersected => {}
+        }
+    }
+    let mut html = String::new();
+    for (count, what) in undetermined.into_iter().zip(["footprint", "tie point"]) {
+        if count > 0 {
+            html += &paragraph(&format!(
+                "{} rejected as not determined.",
+                counted(count, what)
+            ));
+        }
+    }
+    if blunders.is_empty() {
+        return html + &paragraph("No tie point was rejected as a blunder.");
+    }
+    let columns = &[
+        Column::Text("tie point"),
+        Column::Number("largest standardised residual"),
+    ];
+    let mut table = Table::new("Blunders, in order of detection", columns);
+    for (id, standardised) in blunders.iter().take(BLUNDERS_SHOWN) {
+        table.row(true, [(*id).into(), label(*standardised, 1).into()]);
+    }
+    html + &table.finish() + &rest(blunders.len(), BLUNDERS_SHOWN)
+}

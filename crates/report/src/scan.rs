@@ -1,0 +1,124 @@
+//! MOLA clock by the ranges: spread of the residuals against the assumed correction.
+
+use super::{
+    html::{Cell, Column, Table, folded, paragraph},
+    numbers::{number, signed},
+    plots::{COLOURS, MARK, Mark, Panel, Plot, Series, figure},
+    ranges::{many, place, plotted},
+    section::Section,
+};
+use areograph_base::error::Result;
+use areograph_products::SiteProducts;
+use areograph_stages::check_ranges::BiasScan;
+
+pub(super) const SECTION: Section = Section {
+    title: "Clock bias scan",
+    anchor: "clock-bias-scan",
+    appears: |site| {
+        let mut profiles = site.ranges.profiles.iter();
+        profiles.any(|ranges| ranges.scan.is_some())
+    },
+    write,
+};
+
+fn write(site: &SiteProducts) -> Result<String> {
+    let mut figures = String::new();
+    for index in plotted(site) {
+        if let Some(plot) = scan_plot(site, index) {
+            figures += &figure(&plot)?;
+        }
+    }
+    let words = paragraph(
+        "The time-tag correction that minimises the spread of the residuals, with raw or crossover-corrected radii, whichever gives the smaller scatter. Nadir profiles constrain it poorly.",
+    );
+    let figures = format!("<div class=\"plots\">\n{figures}</div>\n");
+    if many(site) {
+        return Ok(words + &figures + &folded("Table of all profiles", &table(site)));
+    }
+    Ok(words + &table(site) + &folded("Spread against correction", &figures))
+}
+
+fn table(site: &SiteProducts) -> String {
+    let configured_s = site.config.mola_clock.correction_s();
+    let mut table = Table::new(
+        "Correction of least spread, seconds",
+        &[
+            Column::Text("profile"),
+            Column::Text("radius"),
+            Column::Number("best"),
+            Column::Number("uncertainty"),
+            Column::Number("configured"),
+            Column::Number("best − configured"),
+            Column::Number("spread at the nearest scanned, m"),
+        ],
+    );
+    for (index, ranges) in site.ranges.profiles.iter().enumerate() {
+        let Some(scan) = &ranges.scan else { continue };
+        let plain =
+            |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |seconds| number(seconds, 4));
+        let with_sign =
+            |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |seconds| signed(seconds, 4));
+        let least_m = scan.spread_m.iter().copied().fold(f64::INFINITY, f64::min);
+        table.row_of(
+            &place(index),
+            true,
+            [
+                (&ranges.profile).into(),
+                scan.radius.word().into(),
+                Cell::from(with_sign(scan.best_s)).told("/bias_scan/best_s"),
+                Cell::from(plain(scan.uncertainty_s)).told("/bias_scan/uncertainty_s"),
+                Cell::from(with_sign(Some(configured_s)))
+                    .told("ranges.json#/mola_clock/correction_s"),
+                with_sign(scan.best_s.map(|best_s| best_s - configured_s)).into(),
+                format!("{least_m:.4}").into(),
+            ],
+        );
+    }
+    table.finish()
+}
+
+fn scan_plot(site: &SiteProducts, index: usize) -> Option<Plot> {
+    let configured_s = site.config.mola_clock.correction_s();
+    let ranges = &site.ranges.profiles[index];
+    let scan = ranges.scan.as_ref()?;
+    let points = scan.correction_s.iter().zip(&scan.spread_m);
+    let points = points.map(|(correction, spread)| (*correction, *spread));
+    let mut panel = Panel::of(
+        "standard deviation, m",
+        vec![Series::line("spread of the residuals", 0, points.collect())],
+    );
+    if let (Some(best_s), Some(uncertainty_s)) = (scan.best_s, scan.uncertainty_s) {
+        panel.marks.push(Mark {
+            x: best_s,
+            half_width: uncertainty_s,
+            colour: COLOURS[0],
+        });
+    }
+    panel.marks.push(Mark {
+        x: configured_s,
+        half_width: 0.0,
+        colour: MARK,
+    });
+    let caption = format!(
+        "{} (blue); configured: {} s (red).",
+        best(scan),
+        signed(configured_s, 3)
+    );
+    let title = format!("Clock bias scan of {}", ranges.profile);
+    let x = "assumed correction of the tags, s";
+    Some(Plot::of(title, caption, x, vec![panel]))
+}
+
+fn best(scan: &BiasScan) -> String {
+    match (scan.best_s, scan.uncertainty_s) {
+        (Some(best_s), Some(uncertainty_s)) => {
+            format!(
+                "Best {} ± {} s",
+                signed(best_s, 4),
+                number(uncertainty_s, 4)
+            )
+        }
+        (Some(best_s), None) => format!("Best {} s", signed(best_s, 4)),
+        _ => "No minimum inside the scan".to_owned(),
+    }
+}

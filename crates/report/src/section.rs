@@ -1,0 +1,34 @@
+//! Declaration of a section of a site's page.
+
+use super::html;
+use areograph_base::error::Result;
+use areograph_products::SiteProducts;
+
+/// A section of the page of one site. Its file declares it as `SECTION`; [`super::SECTIONS`] lists it once, and order
+/// and contents of the page follow.
+pub(super) struct Section {
+    /// Its heading, and its name in the list of contents.
+    pub(super) title: &'static str,
+    /// Its name in links, unique on the page.
+    pub(super) anchor: &'static str,
+    /// Whether the page of this site has it.
+    pub(super) appears: fn(&SiteProducts) -> bool,
+    /// Its body as HTML; fails if a plot cannot be drawn.
+    pub(super) write: fn(&SiteProducts) -> Result<String>,
+}
+
+impl Section {
+    /// The section of this site, if it has one.
+    ///
+    /// # Errors
+    /// A plot that cannot be drawn, which is a bug in areograph.
+    pub(super) fn of(&self, site: &SiteProducts) -> Result<Option<html::Section>> {
+        if !(self.appears)(site) {
+            return Ok(None);
+        }
+        let wording = site.config.wording();
+        let body = wording.of((self.write)(site)?).into_owned();
+        let title = wording.of(self.title);
+        Ok(Some(html::Section::named(self.anchor, title, body)))
+    }
+}

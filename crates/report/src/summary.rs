@@ -1,0 +1,310 @@
+//! The first screen of a site's page: verdict, key numbers, every check, the map.
+
+use super::{
+    checks,
+    heights::{is_open, place_by},
+    html::{Tone, counted, escape, list, paragraph, verdict},
+    map,
+    misregistration::{BeforeAfter, by_footprints},
+    numbers::{number, signed, whole},
+    source::told,
+};
+use areograph_base::{error::Result, footprints::AdjustmentModel};
+use areograph_products::SiteProducts;
+use areograph_stages::{
+    compare_pairs::PairComparison,
+    judge::{Check, CheckKind},
+};
+
+/// Number of reasons, and of remarks, listed; the rest are counted.
+const REASONS_SHOWN: usize = 4;
+
+/// Verdict with reasons, accuracy with its basis, and location: the first lines of the page.
+///
+/// # Errors
+/// A map that cannot be drawn.
+pub(super) fn lead(site: &SiteProducts) -> Result<String> {
+    let (reasons, remarks) = (&site.verdict.reasons, &site.verdict.remarks);
+    let tone = match (reasons.len(), remarks.len()) {
+        (0, 0) => Tone::Good,
+        (0, _) => Tone::Remarks,
+        _ => Tone::Bad,
+    };
+    let remarks = if remarks.is_empty() {
+        String::new()
+    } else {
+        format!(
+            "<details class=\"more\"{}><summary>{}</summary>\n{}</details>\n",
+            if reasons.is_empty() { " open" } else { "" },
+            counted(remarks.len(), "remark"),
+            first_of(remarks)
+        )
+    };
+    let found = format!(
+        "{}{}{}<div class=\"first\">\n<div>{}</div>\n<div>{}</div>\n</div>\n{remarks}",
+        verdict(tone, &headline(site), &first_of(reasons)),
+        numbers(site),
+        untested(&site.verdict.untested),
+        checks::table(site),
+        map::first(site)?,
+    );
+    // The user's text is not changed.
+    Ok(about(site) + &site.config.wording().of(found))
+}
+
+/// Errors that no datum of the site can show.
+fn untested(phrases: &[String]) -> String {
+    if phrases.is_empty() {
+        return String::new();
+    }
+    let phrases: Vec<String> = phrases.iter().map(|phrase| escape(phrase)).collect();
+    format!(
+        "<p class=\"about\"><b>Not tested by anything here:</b> {}.</p>\n",
+        phrases.join("; ")
+    )
+}
+
+fn headline(site: &SiteProducts) -> String {
+    match (site.verdict.reasons.len(), site.verdict.remarks.len()) {
+        (0, 0) => "Valid: every check is within its limit.".to_owned(),
+        (0, 1) => "Valid, with one remark.".to_owned(),
+        (0, count) => format!("Valid, with {count} remarks."),
+        (1, _) => "Invalid, for one reason:".to_owned(),
+        (count, _) => format!("Invalid, for {count} reasons:"),
+    }
+}
+
+/// Subject of the page: description, dates of the data, counts.
+fn about(site: &SiteProducts) -> String {
+    let mut parts = Vec::new();
+    let days = |dates: &mut dyn Iterator<Item = &str>| {
+        let mut days: Vec<String> = dates
+            .filter_map(|utc| Some(utc.get(..10)?.to_owned()))
+            .collect();
+        days.sort_unstable();
+        match (days.first(), days.last()) {
+            (Some(first), Some(last)) if first == last => format!(" of {first}"),
+            (Some(first), Some(last)) => format!(" of {first} to {last}"),
+            _ => String::new(),
+        }
+    };
+    if !site.images.is_empty() {
+        let taken = days(&mut site.images.iter().map(|image| &*image.times.utc_start));
+        let images = counted(site.images.len(), "image");
+        parts.push(told(&images, "manifest.json#/counts/images") + &escape(&taken));
+    }
+    let shot = days(&mut site.utc.iter().map(String::as_str));
+    let footprints = counted(site.footprints.len(), "footprint");
+    let profiles = counted(site.profiles.len(), "profile");
+    parts.push(format!(
+        "{} in {}{}",
+        told(&footprints, "manifest.json#/counts/footprints"),
+        told(&profiles, "manifest.json#/counts/profiles"),
+        escape(&shot)
+    ));
+    let mut words = escape(site.config.description.trim_end_matches('.'));
+    if !words.is_empty() {
+        words += ". ";
+    }
+    words += &(parts.join("; ") + ".");
+    format!("<p class=\"about\">{words}</p>\n")
+}
+
+/// A key number: its name, its value, and a note.
+struct KeyNumber {
+    what: &'static str,
+    /// As HTML, like the note.
+    value: String,
+    note: String,
+}
+
+/// The accuracy of the products: by MOLA, between the images, absolutely; without tie points by
+/// the ranges.
+fn numbers(site: &SiteProducts) -> String {
+    let numbers: Vec<KeyNumber> = [
+        by_mola(site),
+        between_images(site),
+        in_place(site),
+        by_ranges(site),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    if numbers.is_empty() {
+        return String::new();
+    }
+    let items: String = numbers
+        .iter()
+        .map(|number| {
+            format!(
+                "<div><dt>{}</dt><dd><b>{}</b> {}</dd></div>\n",
+                escape(number.what),
+                number.value,
+                number.note
+            )
+        })
+        .collect();
+    format!("<dl class=\"numbers\">\n{items}</dl>\n")
+}
+
+/// A check with its number, if it has one, and the place of that in the products.
+fn checked<'a>(site: &SiteProducts<'a>, kind: CheckKind) -> Option<(&'a Check, f64, String)> {
+    let mut checks = site.verdict.checks.iter().enumerate();
+    let (index, check) = checks.find(|(_, check)| check.kind == kind)?;
+    Some((
+        check,
+        check.value?,
+        format!("{}/value", checks::place(index)),
+    ))
+}
+
+fn by_mola(site: &SiteProducts) -> Option<KeyNumber> {
+    let (_, after_m, after_place) = checked(site, CheckKind::HeightAfter)?;
+    let (_, before_m, before_place) = checked(site, CheckKind::HeightBefore)?;
+    let (geometric, adjustment) = site.adjustment()?;
+    let of = |state| format!("adjustment.json#/{state}/heights/above_surface_m/n");
+    let ties = counted(adjustment.heights.above_m.n as usize, "tie point");
+    let ties = told(&ties, &of("after"));
+    let all = told(&whole(geometric.heights.above_m.n), &of("before"));
+    let before_m = told(&signed(before_m, 1), &before_place);
+    Some(KeyNumber {
+        what: "Heights against MOLA",
+        value: told(&format!("{} m", signed(after_m, 1)), &after_place),
+        // Data that control a result cannot test it: then only the number before does.
+        note: match site.config.adjustment.model {
+            AdjustmentModel::MolaSurface => format!(
+                "median of {ties}, controlled by MOLA; {before_m} m of {all} before, independent of it"
+            ),
+            AdjustmentModel::Published => {
+                format!("median of {ties}; {before_m} m of {all} before the adjustment")
+            }
+        },
+    })
+}
+
+fn between_images(site: &SiteProducts) -> Option<KeyNumber> {
+    let (after, after_m, place) = checked(site, CheckKind::ParallaxAfter)?;
+    let (geometric, _) = site.adjustment()?;
+    let pairs = BeforeAfter::all(&geometric);
+    let pair = pairs.iter().find(|pair| pair.name() == after.subject)?;
+    let before_m = pair.before.along_track_parallax_m.abs();
+    let before_place = format!("|{}/along_track_parallax_m", pair.place("before"));
+    Some(KeyNumber {
+        what: "Between images, along track",
+        value: told(
+            &format!(
+                "{} m",
+                number(after_m.abs(), if after_m.abs() < 1.0 { 2 } else { 1 })
+            ),
+            &format!("|{place}"),
+        ),
+        note: format!(
+            "at the tie points of {}, which the adjustment fits; {} m before{}",
+            escape(&after.subject),
+            told(&number(before_m, 0), &before_place),
+            at_footprints(pair)
+        ),
+    })
+}
+
+/// Disagreement of the same images on footprints, which are not fitted, and its precision by the tie points.
+fn at_footprints(pair: &BeforeAfter) -> String {
+    let of = |state: &str, pair_of: &PairComparison| {
+        let [apart_m, sigma_m] = by_footprints(pair_of)?;
+        let place = format!("{}/footprints", pair.place(state));
+        let told = |value: f64, name: &str| told(&number(value, 0), &format!("{place}/{name}"));
+        Some([told(apart_m, "apart_m"), told(sigma_m, "apart_sigma_m")])
+    };
+    let [before, after] = [("before", Some(pair.before)), ("after", pair.after)]
+        .map(|(state, found)| of(state, found?));
+    let (Some([before_m, before_sigma_m]), Some([after_m, sigma_m])) = (before, after) else {
+        return String::new();
+    };
+    format!(
+        ". Footprints, not fitted: {after_m} m (σ {sigma_m} m), before {before_m} m (σ {before_sigma_m} m)"
+    )
+}
+
+/// Place of heights in the products.
+const HEIGHTS: &str = "adjustment.json#/adjustment/heights";
+
+/// Absolute accuracy of position and height.
+fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
+    let (geometric, adjustment) = site.adjustment()?;
+    let heights = adjustment.adjusted.heights.as_ref()?;
+    if site.accuracy_withheld().is_some() {
+        return Some(KeyNumber {
+            what: "Absolute accuracy, 1 σ",
+            value: "not stated".to_owned(),
+            note: "the a priori accuracy of orbit and attitude is that of another spacecraft; see the remarks"
+                .to_owned(),
+        });
+    }
+    let [east_m, north_m, up_m] = heights.mean_sigma_m;
+    Some(KeyNumber {
+        what: "Absolute accuracy, 1 σ",
+        value: told(
+            &format!(
+                "±{} m east, ±{} m north, ±{} m height",
+                number(east_m, 0),
+                number(north_m, 0),
+                number(up_m, 1)
+            ),
+            &format!("{HEIGHTS}/mean_sigma_m/0 {HEIGHTS}/mean_sigma_m/1 {HEIGHTS}/mean_sigma_m/2"),
+        ),
+        note: escape(
+            &(if is_open(&geometric, &adjustment) {
+                format!(
+                    "by {}; see accuracy for open points",
+                    place_by(&geometric, &adjustment)
+                )
+            } else {
+                format!(
+                    "position by {}, height by MOLA",
+                    place_by(&geometric, &adjustment)
+                )
+            } + untested_attitude(site)),
+        ),
+    })
+}
+
+/// A clause where nothing tests an attitude error that all images share.
+fn untested_attitude(site: &SiteProducts) -> &'static str {
+    let mut checks = site.verdict.checks.iter();
+    if checks.any(|check| check.kind == CheckKind::BeamAcross) {
+        ""
+    } else {
+        "; no simultaneous shot tests the attitude"
+    }
+}
+
+/// Ranges, if there are profiles.
+fn by_ranges(site: &SiteProducts) -> Option<KeyNumber> {
+    let (check, mean_m, place) = checked(site, CheckKind::RangeMean)?;
+    let profile = escape(&check.subject);
+    Some(KeyNumber {
+        what: "Range − distance",
+        value: told(&format!("{} m", signed(mean_m, 2)), &place),
+        note: match site.profiles.len() {
+            1 => format!("mean of profile {profile}"),
+            count => {
+                let profiles = counted(count, "profile");
+                let profiles = told(&profiles, "manifest.json#/counts/profiles");
+                format!("largest mean of {profiles}, {profile}")
+            }
+        },
+    })
+}
+
+/// As many sentences as keep the verdict on one screen; the manifest has all.
+fn first_of(sentences: &[String]) -> String {
+    let shown = &sentences[..sentences.len().min(REASONS_SHOWN)];
+    let mut html = list(shown);
+    if shown.len() < sentences.len() {
+        let more = sentences.len() - shown.len();
+        html += &paragraph(&format!(
+            "And {more} more, all of them in ../manifest.json."
+        ));
+    }
+    html
+}

@@ -1,0 +1,168 @@
+//! The terrain model of a pair of images: statistics, comparison with MOLA, and pictures.
+
+mod pictures;
+
+use super::{
+    html::{Cell, Column, Table, folded_unless, link, paragraph},
+    numbers::{signed, whole},
+    plots::label,
+    section::Section,
+};
+use areograph_base::{error::Result, ties::reasons, units::RADIANS_PER_DEGREE};
+use areograph_geom::statistics::Summary;
+use areograph_products::SiteProducts;
+use areograph_stages::map_surface::{ShotComparison, SurfaceAccount};
+
+/// More profiles than this are folded.
+const PROFILES_SHOWN: usize = 6;
+
+pub(super) const SECTION: Section = Section {
+    title: "Terrain model",
+    anchor: "terrain-model",
+    appears: |site| site.surface.is_some(),
+    write: |site| {
+        let surface = site.surface.iter();
+        surface
+            .map(|surface| write(site, &surface.account))
+            .collect()
+    },
+};
+
+fn write(site: &SiteProducts, account: &SurfaceAccount) -> Result<String> {
+    let table = made(site, account);
+    if account.is_refused {
+        let words = "Too few cells matched to be significant: there is no model.";
+        return Ok(paragraph(words) + &table);
+    }
+    let model = link("../surface.tif", "surface.tif");
+    let sigmas = link("../surface_sigma.tif", "surface_sigma.tif");
+    let files = format!(
+        "<p>Heights above the sphere of the body's maps: {model}; their standard deviations: {sigmas}.</p>\n"
+    );
+    let pictures = pictures::figures(account, site.config.body)?;
+    Ok(files + &table + &compared(account) + &format!("<div class=\"plots\">\n{pictures}</div>\n"))
+}
+
+/// Making of the model, and outcomes of its cells.
+fn made(site: &SiteProducts, account: &SurfaceAccount) -> String {
+    let mut table = Table::new(
+        "Terrain model of a pair of images",
+        &[
+            Column::Text("images"),
+            Column::Number("cell (m)"),
+            Column::Number("compared (m)"),
+            Column::Number("cells of common ground"),
+            Column::Number("with a height"),
+            Column::Number("σ, matching (m)"),
+            Column::Number("σ, common (m)"),
+            Column::Number("convergence (°)"),
+            Column::Number("correlation"),
+            Column::Text("cells without a height"),
+        ],
+    );
+    let [first, second] = account.images.map(|image| &site.images[image].times.id);
+    let common = account.common_sigma_m.map_or_else(
+        || Cell::from("not known"),
+        |sigma_m| Cell::from(label(sigma_m, 1)).told("/heights/common_sigma_m"),
+    );
+    let of =
+        |value: f64, decimals: usize, place: &str| Cell::from(label(value, decimals)).told(place);
+    table.row_of(
+        "surface.json#",
+        !account.is_refused,
+        [
+            format!("{first}, {second}").into(),
+            of(account.cell_m, 1, "/cells/cell_m"),
+            of(account.compared_m, 0, "/matching/compared_m"),
+            Cell::from(whole(account.cells)).told("/cells/common"),
+            Cell::from(whole(account.filled)).told("/cells/filled"),
+            of(account.sigma_m, 2, "/heights/sigma_m"),
+            common,
+            of(
+                account.convergence_rad / RADIANS_PER_DEGREE,
+                1,
+                "/matching/convergence_deg",
+            ),
+            of(account.correlation, 2, "/matching/correlation"),
+            reasons(&account.unfilled).into(),
+        ],
+    );
+    table.finish()
+        + &paragraph(
+            "σ, matching: of one cell against the others, by the residuals of its match. Errors that all heights share are stated separately \
+             (σ, common, by the adjustment). Neighbouring heights within the compared square are correlated.",
+        )
+}
+
+/// Shots against the model.
+fn compared(account: &SurfaceAccount) -> String {
+    let ShotComparison {
+        above_m,
+        sigma_m,
+        spread_sigmas,
+        profiles,
+        ..
+    } = &account.shots;
+    if above_m.n == 0 {
+        return paragraph(
+            "No footprint of MOLA is on it: there is no independent test of its heights.",
+        );
+    }
+    let mut all = shots_table("MOLA minus the terrain model, metres");
+    all.row_of(
+        "surface.json#/mola_minus_surface/all",
+        true,
+        summary_row("all", above_m),
+    );
+    let mut single = shots_table("MOLA minus the terrain model by profile, metres");
+    for (index, profile) in profiles.iter().enumerate() {
+        single.row_of(
+            &format!("surface.json#/mola_minus_surface/profiles/{index}/above_m"),
+            true,
+            summary_row(&profile.profile, &profile.above_m),
+        );
+    }
+    let words = if account.shots_take_part {
+        "MOLA controlled heights of the adjustment: the mean shows how well that control was met; the scatter about it is \
+         an independent test."
+    } else {
+        "MOLA did not control the heights: an independent test."
+    };
+    let spread = format!(
+        "Expected about the median: {} m (σ of height, shot, profile, and of their places on its slopes); found: {} of it.",
+        label(*sigma_m, 1),
+        label(*spread_sigmas, 2)
+    );
+    all.finish()
+        + &paragraph(&format!("{words} {spread}"))
+        + &folded_unless(
+            profiles.len() <= PROFILES_SHOWN,
+            "Single profiles",
+            &single.finish(),
+        )
+}
+
+fn shots_table(caption: &str) -> Table {
+    Table::new(
+        caption,
+        &[
+            Column::Text("profile"),
+            Column::Number("shots"),
+            Column::Number("mean"),
+            Column::Number("standard deviation"),
+            Column::Number("median"),
+            Column::Number("1.48 MAD"),
+        ],
+    )
+}
+
+fn summary_row(name: &str, of: &Summary) -> [Cell; 6] {
+    [
+        name.into(),
+        Cell::from(whole(of.n)).told("/n"),
+        Cell::from(signed(of.mean, 1)).told("/mean"),
+        Cell::from(label(of.standard_deviation, 1)).told("/standard_deviation"),
+        Cell::from(signed(of.median, 1)).told("/median"),
+        Cell::from(label(of.nmad, 1)).told("/nmad"),
+    ]
+}

@@ -1,0 +1,233 @@
+//! The budget of eq. 5 to 9 of Shan et al. 2005: how far apart the two footprints of one point lie.
+
+use super::{
+    html::{Cell, Column, Table, counted, folded, paragraph},
+    misregistration::BeforeAfter,
+    plots::label,
+    section::Section,
+    source::untold,
+};
+use areograph_geom::uncertainty::{GroundPart, UncertaintyBudget};
+use areograph_products::GeometricProducts;
+
+pub(super) const SECTION: Section = Section {
+    title: "Appendix: uncertainty budget of Shan et al. 2005",
+    anchor: "gap-of-footprints",
+    appears: |site| {
+        let pairs = site.geometric.as_ref().map(|geometric| geometric.pairs);
+        pairs.is_some_and(|pairs| !pairs.is_empty())
+    },
+    write: |site| Ok(site.geometric.iter().map(write).collect()),
+};
+
+fn write(geometric: &GeometricProducts) -> String {
+    let pairs = BeforeAfter::all(geometric);
+    let without: String = pairs.iter().map(without_budget).collect();
+    let html = [
+        rows(TITLE, COLUMNS, &pairs, as_published),
+        paragraph(WORDS),
+        rows(SIGNED_TITLE, SIGNED_COLUMNS, &pairs, by_equation_5),
+        paragraph(SIGNED_WORDS),
+        without,
+    ];
+    folded("The budget by eq. 5 to 9", &html.concat())
+}
+
+/// The equations as the paper computes with them.
+const TITLE: &str =
+    "How far apart the two footprints of a point lie (eq. 5 to 9 of Shan et al. 2005)";
+const COLUMNS: &[Column] = &[
+    Column::Text("pair"),
+    Column::Text("adjustment"),
+    Column::Number("observed misregistration, px"),
+    Column::Number("by orientation, px"),
+    Column::Number("by footprints, px"),
+    Column::Number("in plan, m"),
+    Column::Number("in height, m"),
+    Column::Number("in height by eq. 7, m"),
+];
+const WORDS: &str = "As the paper computes: D = √(M² + σ²) of the reprojection residuals; across track it averages where its eq. 7 \
+                     adds squares, so both are given. Known flaw: eq. 7 adds the means of both images in quadrature, although \
+                     means of opposite sign add up by eq. 5, and eq. 6 assigns the rest to the footprints. Exact shots get such \
+                     a rest as well: it is no accuracy of the altimeter.";
+
+/// The same by eq. 5.
+const SIGNED_TITLE: &str = "The same with Δ = Δ1 − Δ2 of every tie point (eq. 5)";
+const SIGNED_COLUMNS: &[Column] = &[
+    Column::Text("pair"),
+    Column::Text("adjustment"),
+    Column::Number("observed misregistration, px"),
+    Column::Number("by orientation, px"),
+    Column::Number("not by orientation, mean, px"),
+    Column::Number("in plan, m"),
+    Column::Number("in height, m"),
+];
+const SIGNED_WORDS: &str = "Means keep their signs. Not by orientation: mean misregistration of the footprints that the mean of the \
+                            tie points does not explain; of several pairs the root mean square. An error of a footprint in plan \
+                            moves both of its projections alike and does not show here. Agreement of two images, not accuracy.";
+
+/// A row for each state of each pair with a budget, and one of all pairs before the adjustment.
+fn rows<const N: usize>(
+    title: &str,
+    columns: &'static [Column],
+    pairs: &[BeforeAfter],
+    cells: fn(&UncertaintyBudget, bool) -> [Cell; N],
+) -> String {
+    let mut table = Table::new(title, columns);
+    for pair in pairs {
+        for (index, (state, found)) in pair.states().enumerate() {
+            if let Ok(budget) = &found.budget {
+                let head = [Cell::from(pair.name()), state.into()];
+                let cells = head.into_iter().chain(cells(budget, index == 0));
+                table.row_of(&pair.place(state), true, cells);
+            }
+        }
+    }
+    let before: Vec<UncertaintyBudget> = (pairs.iter())
+        .filter_map(|pair| pair.before.budget.clone().ok())
+        .collect();
+    if before.len() > 1 {
+        pooled(&mut table, &before, cells);
+    }
+    table.finish()
+}
+
+/// A row of all `budgets` before the adjustment; no product has its numbers.
+fn pooled<const N: usize>(
+    table: &mut Table,
+    budgets: &[UncertaintyBudget],
+    cells: fn(&UncertaintyBudget, bool) -> [Cell; N],
+) {
+    if let Some(budget) = UncertaintyBudget::pooled(budgets) {
+        let pairs = counted(budgets.len(), "pair");
+        let head = [Cell::from(format!("all: {pairs}")), "before".into()];
+        table.row(
+            true,
+            head.into_iter().chain(cells(&budget, true).map(untold)),
+        );
+    }
+}
+
+/// The budget of the pairs of all sites before their adjustments, as the paper pools its three.
+pub(super) fn of_all_sites(budgets: &[UncertaintyBudget]) -> String {
+    if budgets.len() < 2 {
+        return String::new();
+    }
+    let mut published = Table::new(TITLE, COLUMNS);
+    pooled(&mut published, budgets, as_published);
+    let mut signed = Table::new(SIGNED_TITLE, SIGNED_COLUMNS);
+    pooled(&mut signed, budgets, by_equation_5);
+    let html = [
+        published.finish(),
+        paragraph(WORDS),
+        signed.finish(),
+        paragraph(SIGNED_WORDS),
+    ];
+    folded(
+        "Uncertainty budget of Shan et al. 2005, all sites",
+        &html.concat(),
+    )
+}
+
+/// Shares of orientation and footprints in the observed misregistration apply only before the adjustment.
+fn as_published(budget: &UncertaintyBudget, before: bool) -> [Cell; 6] {
+    let footprints = match budget.ground {
+        GroundPart::Resolved { along_px } if before => {
+            Cell::from(label(along_px, 2)).told("/budget/ground/resolved/along_px")
+        }
+        GroundPart::NotResolvable if before => {
+            "not resolvable: orientation explains more than is observed".into()
+        }
+        _ => "–".into(),
+    };
+    [
+        observed(budget, before),
+        of(budget.along_px, "along_px"),
+        footprints,
+        of(
+            budget.paper_average.planimetric_m,
+            "paper_average/planimetric_m",
+        ),
+        of(budget.paper_average.height_m, "paper_average/height_m"),
+        of(budget.equation_7.height_m, "equation_7/height_m"),
+    ]
+}
+
+fn by_equation_5(budget: &UncertaintyBudget, before: bool) -> [Cell; 5] {
+    let found = &budget.equation_5;
+    let left = found.unexplained_px.filter(|_| before);
+    [
+        observed(budget, before),
+        of(found.along_px, "equation_5/along_px"),
+        left.map_or_else(|| "–".into(), |px| of(px, "equation_5/unexplained_px")),
+        of(found.point.planimetric_m, "equation_5/point/planimetric_m"),
+        of(found.point.height_m, "equation_5/point/height_m"),
+    ]
+}
+
+fn observed(budget: &UncertaintyBudget, before: bool) -> Cell {
+    let px = budget.total_along_px.filter(|_| before);
+    px.map_or_else(|| "–".into(), |px| of(px, "total_along_px"))
+}
+
+/// A number of the budget at `name` below it.
+fn of(value: f64, name: &str) -> Cell {
+    Cell::from(label(value, 2)).told(format!("/budget/{name}"))
+}
+
+/// Reason why a pair has no budget.
+fn without_budget(pair: &BeforeAfter) -> String {
+    let mut html = String::new();
+    for (state, found) in pair.states() {
+        if let Err(reason) = &found.budget {
+            let name = pair.name();
+            html += &paragraph(&format!(
+                "{name}, {state} the adjustment: there is no budget: {reason}."
+            ));
+        }
+    }
+    html
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use areograph_geom::uncertainty::{
+        BudgetInput, Misregistration, PairResiduals, ResidualMoments, uncertainty_budget,
+    };
+
+    /// Images that disagree by so many lines, half in each.
+    fn budget(apart_lines: f64) -> UncertaintyBudget {
+        let image = |mean_x: f64| ResidualMoments {
+            mean_x,
+            deviation_x: 0.0,
+            mean_y: 0.0,
+            deviation_y: 0.0,
+        };
+        let images = [image(0.5 * apart_lines), image(-0.5 * apart_lines)];
+        uncertainty_budget(&BudgetInput {
+            sites: vec![PairResiduals::of_images(images)],
+            misregistration: Some(Misregistration {
+                mean_m: -5.0 * apart_lines,
+                rms_m: 5.0 * apart_lines,
+            }),
+            pixel_size_m: 5.0,
+            height_over_base: 2.5,
+        })
+        .unwrap()
+    }
+
+    #[test]
+    fn sites_are_pooled_by_their_squares() {
+        // √((30² + 40²) / 2) = 35.36, and by eq. 7 that over √2.
+        let html = of_all_sites(&[budget(30.0), budget(40.0)]);
+        assert!(html.contains("all: 2 pairs"), "{html}");
+        assert!(
+            html.contains(">35.36<") && html.contains(">25.00<"),
+            "{html}"
+        );
+        // No product has these numbers.
+        assert!(!html.contains("data-from"), "{html}");
+        assert_eq!(of_all_sites(&[budget(30.0)]), "");
+    }
+}

@@ -1,0 +1,194 @@
+//! Damaged products: reported once for each run; a current run is made again.
+
+use std::{collections::BTreeMap, fs::File, io, path::Path};
+
+use rusqlite::{Connection, Transaction};
+
+use super::alerts::{Alert, tell_edge};
+use crate::{
+    contents::{Content, Contents, open_below},
+    database::{
+        Ask, CauseKind, CauseRow, Priority, Stored, active_job, ask,
+        runs::{damaged_products, is_kept, put_checked, put_damaged},
+        sites::site,
+    },
+};
+use areograph_config::{AlertKind, ServiceConfig};
+use areograph_store::{files::Identity, manifest::Manifest, publish::MANIFEST};
+
+/// Products of a run that do not match its manifest.
+#[derive(Debug, Clone, Copy)]
+pub struct Damage<'a> {
+    /// The site.
+    pub site: &'a str,
+    /// The run.
+    pub run: &'a str,
+    /// Their number, as far as known.
+    pub products: i64,
+    /// The first of them, as in "`footprints.csv` does not match its manifest".
+    pub what: &'a str,
+}
+
+/// Whether damage of a run has been reported.
+///
+/// # Errors
+/// SQLite errors.
+pub fn is_known_damage(connection: &Connection, run: &str) -> Stored<bool> {
+    Ok(damaged_products(connection, run)? > 0)
+}
+
+/// Reports damage, if it is new. A current run is made again, unless a job of its site is active.
+///
+/// # Errors
+/// SQLite errors.
+pub fn note_damage(
+    transaction: &Transaction<'_>,
+    config: &ServiceConfig,
+    now_ms: i64,
+    damage: &Damage<'_>,
+) -> Stored<()> {
+    let Damage {
+        site: name,
+        run,
+        products,
+        what,
+    } = *damage;
+    if !is_kept(transaction, run)? {
+        return Ok(());
+    }
+    put_damaged(transaction, run, products)?;
+    let text = format!("run {run}: {what}; it is withheld");
+    edge(transaction, config, now_ms, damage, Some(&text))?;
+    let is_current = site(transaction, name)?
+        .is_some_and(|site| site.enabled && site.current_run.as_deref() == Some(run));
+    if !is_current || active_job(transaction, name)?.is_some() {
+        return Ok(());
+    }
+    let cause = CauseRow::plain(CauseKind::ProductDamaged, what, now_ms);
+    let asked = Ask {
+        site: name,
+        priority: Priority::Changed,
+        force: true,
+        night: None,
+        asked_by: None,
+        ready: true,
+        causes: &[cause],
+    };
+    ask(transaction, now_ms, &asked).map(|_| ())
+}
+
+/// Records the result of a complete check of a run.
+///
+/// # Errors
+/// SQLite errors.
+pub fn note_check(
+    transaction: &Transaction<'_>,
+    config: &ServiceConfig,
+    now_ms: i64,
+    damage: &Damage<'_>,
+) -> Stored<()> {
+    put_checked(transaction, damage.run, now_ms)?;
+    if damage.products > 0 {
+        return note_damage(transaction, config, now_ms, damage);
+    }
+    if damaged_products(transaction, damage.run)? > 0 {
+        put_damaged(transaction, damage.run, 0)?;
+        edge(transaction, config, now_ms, damage, None)?;
+    }
+    Ok(())
+}
+
+fn edge(
+    transaction: &Transaction<'_>,
+    config: &ServiceConfig,
+    now_ms: i64,
+    damage: &Damage<'_>,
+    text: Option<&str>,
+) -> Stored<()> {
+    let alert = Alert {
+        kind: AlertKind::ProductDamaged,
+        site: Some(damage.site),
+        run: Some(damage.run),
+        text: text.unwrap_or_default(),
+    };
+    let subject = format!("products {}", damage.run);
+    let state = (&*subject, text.is_some());
+    tell_edge(transaction, config, now_ms, state, (&alert, None))
+}
+
+/// Result of reading all products of a run.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct RunCheck {
+    /// Products that do not match the manifest.
+    pub damaged: i64,
+    /// The first of them, as text.
+    pub what: String,
+}
+
+impl RunCheck {
+    fn add(&mut self, what: String) {
+        if self.damaged == 0 {
+            self.what = what;
+        }
+        self.damaged += 1;
+    }
+}
+
+/// Files that were read in one check, by device and inode: runs share unchanged products by links.
+pub type Seen = BTreeMap<(u64, u64), (Identity, Content)>;
+
+/// Reads all products of a run that were not `seen`, even if the file system reports no change; `None` if `step` stopped it. A product that
+/// cannot be read counts as damaged.
+pub fn check_run(
+    contents: &Contents,
+    folder: &Path,
+    manifest_blake3: &str,
+    seen: &mut Seen,
+    mut step: impl FnMut(usize) -> bool,
+) -> Option<RunCheck> {
+    let mut check = RunCheck::default();
+    let Some(manifest) = published_manifest(folder, manifest_blake3) else {
+        check.add("the manifest of this run is not the one that was published".to_owned());
+        return Some(check);
+    };
+    for entry in &manifest.products {
+        let opened = open_below(folder, Path::new(&entry.path));
+        let read = opened.and_then(|file| {
+            let read = file.map(|file| read_once(contents, &file, seen, &mut step));
+            read.transpose()
+        });
+        match read {
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => return None,
+            Err(error) => check.add(format!("`{}` cannot be read: {error}", entry.path)),
+            Ok(Some(content)) if content.is(entry.bytes, &entry.blake3) => {}
+            Ok(_) => check.add(format!("`{}` does not match its manifest", entry.path)),
+        }
+    }
+    Some(check)
+}
+
+fn read_once(
+    contents: &Contents,
+    file: &File,
+    seen: &mut Seen,
+    step: &mut impl FnMut(usize) -> bool,
+) -> io::Result<Content> {
+    let identity = Identity::of(&file.metadata()?);
+    let key = (identity.device, identity.inode);
+    match seen.get(&key) {
+        Some((before, content)) if *before == identity => Ok(*content),
+        _ => {
+            let content = contents.read(file, step)?;
+            seen.insert(key, (identity, content));
+            Ok(content)
+        }
+    }
+}
+
+fn published_manifest(folder: &Path, blake3: &str) -> Option<Manifest> {
+    let bytes = std::fs::read(folder.join(MANIFEST)).ok()?;
+    let is_published = blake3::hash(&bytes).to_hex().as_str() == blake3;
+    is_published
+        .then(|| serde_json::from_slice(&bytes).ok())
+        .flatten()
+}

@@ -1,0 +1,261 @@
+//! Pointing of a laser on the bus of the cameras in simultaneous images.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Vector2, Vector3};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    error::AdjustError,
+    input::{AdjustImage, LaserShots, ShotRange},
+    network::{Assembled, projector},
+    relief::ProfileOffset,
+    words::unknown_in_words,
+};
+use areograph_config::AdjustmentConfig;
+use areograph_geom::{
+    bundle::{
+        AdjustedBus, Adjustment, CommonBus, Estimate, RecordedProfile, Residual, Spot, Unknown,
+        View,
+    },
+    ellipsoid::local_axes,
+    pushbroom::{ExteriorOrientation, Projector},
+    statistics::Summary,
+};
+
+/// Standard deviation of a single spot in its image beyond the errors that all spots share, focal-plane pixels: jitter
+/// and interpolation of attitudes. The recorded footprint has a separate error.
+const SPOT_SIGMA_PX: f64 = 0.5;
+/// Plausible delay of lines against the shots, seconds: 45 ms, half the disagreement of the images of a pair (Shan et
+/// al. 2005, Table 5).
+const LINE_TIME_S: f64 = 0.045;
+
+/// Boresight of a laser on the bus of the cameras.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BoresightSummary {
+    /// Two angles by which the boresight differs from the laser's file and the frame kernels, radians: towards X of the
+    /// bus, and towards the axis that completes the right-handed set.
+    pub angles_rad: [f64; 2],
+    /// Standard deviations of these, radians.
+    pub sigma_rad: [f64; 2],
+    /// Images with spots.
+    pub images: Vec<SpotsOfImage>,
+    /// Offset of each of their profiles as recorded.
+    pub profile_shifts: Vec<ProfileOffset>,
+    /// Images without a simultaneous profile.
+    pub without: Vec<String>,
+    /// The unknown of laser, profiles and line times that is farthest from its a priori value, and its distance in
+    /// standard deviations of the contradiction; `None` where nothing tests them.
+    pub farthest: Option<(String, f64)>,
+}
+
+/// Spots in one image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SpotsOfImage {
+    /// Identifier.
+    pub image: String,
+    /// Spots.
+    pub spots: usize,
+    /// Delay of its lines against the shots with its standard deviation, seconds, where it is an unknown.
+    pub line_time_s: Option<(f64, f64)>,
+    /// Footprints in the initial orientation minus the laser's position from the mounting: along the track in lines,
+    /// across it in focal-plane pixels.
+    pub footprints_off: [Summary; 2],
+}
+
+/// Adds the spots of all shots with a range to the network, or returns the reason if none exist.
+pub(super) fn add_spots<M: ExteriorOrientation>(
+    assembled: &mut Assembled<&M>,
+    images: &[AdjustImage<M>],
+    shots: &LaserShots,
+    config: &AdjustmentConfig,
+) -> Result<Result<(), String>, AdjustError> {
+    if images.iter().any(|image| image.laser_axes.is_none()) {
+        return Ok(Err(
+            "the altimeter file does not state where the beam points (beam.bus)".to_owned(),
+        ));
+    }
+    let profile_of: BTreeMap<usize, usize> = assembled
+        .profiles
+        .iter()
+        .enumerate()
+        .map(|(place, profile)| (profile.index, place))
+        .collect();
+    let projectors = images
+        .iter()
+        .map(|image| projector(image, &image.oriented_camera.orientation));
+    let projectors = projectors.collect::<Result<Vec<_>, _>>()?;
+    let (mut spots, mut recorded) = (Vec::new(), Vec::new());
+    let mut middles_m = vec![Vector3::zeros(); assembled.profiles.len()];
+    for (point, shot) in shots.shots.iter().enumerate() {
+        let Some(profile) = profile_of.get(&shot.profile) else {
+            continue;
+        };
+        recorded.push((point, *profile));
+        middles_m[*profile] += shot.ground.xyz_m;
+        let ranges = shot.range.iter().chain(&shot.also);
+        spots.extend(ranges.filter_map(|range| {
+            let projector = &projectors[range.image];
+            spot_of(&images[range.image], projector, point, range)
+        }));
+    }
+    if spots.is_empty() {
+        return Ok(Err(
+            "no image was exposed during a profile, so the laser mounting gives no observations"
+                .to_owned(),
+        ));
+    }
+    let profiles = assembled.profiles.iter().zip(&middles_m);
+    let profiles = profiles.map(|(profile, middle_m)| RecordedProfile {
+        surface_profile: profile.index,
+        axes: local_axes(middle_m),
+        sigma_m: shots.profile_sigma_m,
+    });
+    assembled.network.common_bus = Some(CommonBus {
+        boresight_sigma_rad: config.boresight_sigma_rad,
+        line_time_sigma_s: config.boresight_line_time_sigma_s.unwrap_or(f64::INFINITY),
+        profiles: profiles.collect(),
+        recorded,
+        spots,
+    });
+    Ok(Ok(()))
+}
+
+/// The spot of a shot in an image; `None` where it falls outside the image, as it may near an end.
+fn spot_of<M: ExteriorOrientation>(
+    image: &AdjustImage<M>,
+    projector: &Projector<'_, M>,
+    point: usize,
+    range: &ShotRange,
+) -> Option<Spot> {
+    let (ground_m, by_boresight_m) = met(image, range)?;
+    let seen = projector.project(&ground_m).ok()?;
+    let focal_px = image
+        .oriented_camera
+        .detector
+        .focal_px(&seen.camera_m)
+        .ok()?;
+    (seen.x.abs() <= 0.5 * image.oriented_camera.lines()).then(|| Spot {
+        view: View {
+            point,
+            image: range.image,
+            x_lines: seen.x,
+            y_px: focal_px.y,
+            sigma_px: Vector2::repeat(SPOT_SIGMA_PX),
+        },
+        by_boresight_m,
+    })
+}
+
+/// Ground position of the laser beam by the initial orientation of `image`, and its change with the boresight angles.
+fn met<M: ExteriorOrientation>(
+    image: &AdjustImage<M>,
+    range: &ShotRange,
+) -> Option<(Vector3<f64>, [Vector3<f64>; 2])> {
+    let axes = image.laser_axes?;
+    let pose = image.oriented_camera.orientation.pose(range.x_lines);
+    let on_mars_m = pose.mars_to_camera.tr_mul(&axes) * range.range_m;
+    let laser_m = pose.position_m + range.to_laser_m;
+    let [first_m, second_m, beam_m] = [0, 1, 2].map(|axis| on_mars_m.column(axis).into_owned());
+    Some((laser_m + beam_m, [first_m, second_m]))
+}
+
+/// Adjusted unknowns of laser and profiles.
+pub(super) fn summarise<M: ExteriorOrientation>(
+    images: &[AdjustImage<M>],
+    assembled: &Assembled<&M>,
+    adjustment: &Adjustment,
+    variance_factor: f64,
+) -> Option<BoresightSummary> {
+    let bus = adjustment.common_bus.as_ref()?;
+    let root = variance_factor.sqrt();
+    let of_image = |(index, image): (usize, &AdjustImage<M>)| {
+        let off = footprints_off(image, index, assembled);
+        let of_axis = |axis: usize| -> Vec<f64> { off.iter().map(|pair| pair[axis]).collect() };
+        SpotsOfImage {
+            image: image.oriented_camera.id.clone(),
+            spots: off.len(),
+            line_time_s: bus.line_times_s[index]
+                .map(|found| (found.value, found.root_cofactor * root)),
+            footprints_off: [0, 1].map(|axis| Summary::of(&of_axis(axis))),
+        }
+    };
+    let all = images.iter().enumerate().map(of_image);
+    let (with, without): (Vec<_>, Vec<_>) = all.partition(|of| of.spots > 0);
+    let profiles = assembled.profiles.iter().zip(&bus.profile_shifts_m);
+    Some(BoresightSummary {
+        angles_rad: bus.boresight_rad.map(|found| found.value),
+        sigma_rad: bus.boresight_rad.map(|found| found.root_cofactor * root),
+        images: with,
+        profile_shifts: profiles
+            .map(|(profile, shift)| ProfileOffset {
+                profile: profile.name.clone(),
+                shift_m: shift.map(|found| found.value),
+                sigma_m: shift.map(|found| found.root_cofactor * root),
+            })
+            .collect(),
+        without: without.into_iter().map(|image| image.image).collect(),
+        farthest: farthest(images, assembled, bus),
+    })
+}
+
+/// Footprints of an image's spots in its initial orientation, minus the spots.
+fn footprints_off<M: ExteriorOrientation>(
+    image: &AdjustImage<M>,
+    index: usize,
+    assembled: &Assembled<&M>,
+) -> Vec<[f64; 2]> {
+    let Ok(projector) = projector(image, &image.oriented_camera.orientation) else {
+        return Vec::new();
+    };
+    let spots = assembled.network.common_bus.iter();
+    let spots = spots.flat_map(|bus| &bus.spots).map(|spot| &spot.view);
+    let off = spots.filter(|view| view.image == index).filter_map(|view| {
+        let recorded_m = &assembled.network.points[view.point].ground_m;
+        let seen = projector.project(recorded_m).ok()?;
+        let focal_px = image
+            .oriented_camera
+            .detector
+            .focal_px(&seen.camera_m)
+            .ok()?;
+        Some([seen.x - view.x_lines, focal_px.y - view.y_px])
+    });
+    off.collect()
+}
+
+/// The unknown that is farthest from its a priori value.
+///
+/// The standardised residual of an a priori value measures the contradiction: all unknowns that contradict each other
+/// in one direction show the same value.
+fn farthest<M>(
+    images: &[AdjustImage<M>],
+    assembled: &Assembled<&M>,
+    bus: &AdjustedBus,
+) -> Option<(String, f64)> {
+    let standardised = |found: &Estimate| found.prior.as_ref().and_then(Residual::standardised);
+    let angles = bus.boresight_rad.iter().enumerate();
+    let angles = angles.map(|(axis, found)| (Unknown::Boresight { axis }, standardised(found)));
+    let shifts = bus.profile_shifts_m.iter().enumerate();
+    let shifts = shifts.flat_map(|(profile, shift)| {
+        let axes = shift.iter().enumerate();
+        axes.map(move |(axis, found)| {
+            (Unknown::ProfileShift { profile, axis }, standardised(found))
+        })
+    });
+    // A free unknown contradicts nothing, but the delay of lines is bounded.
+    let late = |found: &Estimate| match found.prior {
+        None => Some(found.value / found.root_cofactor.hypot(LINE_TIME_S)),
+        Some(_) => standardised(found),
+    };
+    let times = bus.line_times_s.iter().enumerate();
+    let times = times
+        .filter_map(|(image, found)| Some((Unknown::LineTime { image }, late(found.as_ref()?))));
+    let all = angles.chain(shifts).chain(times);
+    let tested = all.filter_map(|(unknown, standardised)| Some((unknown, standardised?.abs())));
+    let farthest = tested.max_by(|one, other| one.1.total_cmp(&other.1));
+    farthest.map(|(unknown, sigmas)| {
+        let words = unknown_in_words(unknown, images, &assembled.profiles);
+        let words = words.trim_start_matches("the ").to_owned();
+        (words, sigmas)
+    })
+}

@@ -1,0 +1,87 @@
+//! Why a site cannot be adjusted.
+
+use areograph_base::error::Cause;
+use areograph_geom::{bundle::BundleError, pushbroom::Unseen};
+
+/// Distance between initial and adjusted value that is a contradiction, in standard deviations of the initial value.
+pub(super) const CONTRADICTION: f64 = 10.0;
+
+/// Why a site cannot be adjusted.
+#[derive(Debug, Clone, PartialEq, thiserror::Error, Cause)]
+#[cause(Input)]
+pub enum AdjustError {
+    /// No tie point could be intersected.
+    #[error("none of {ties} tie points has a ground point; {first}")]
+    #[cause("check that the images overlap and that the tie points belong to them")]
+    NoTies {
+        /// Tie points.
+        ties: usize,
+        /// The first of them, and why it has no ground point.
+        first: String,
+    },
+    /// The network as a whole.
+    #[error("{0}")]
+    #[cause(
+        "check the input of the adjustment, and give orientations and footprints finite standard deviations"
+    )]
+    Network(BundleError),
+    /// The steps do not converge.
+    #[error(
+        "the adjustment did not converge after {steps} steps (weighted sum of squares {weighted_squares:.3e}) with {held_by}"
+    )]
+    #[cause(
+        "lower these standard deviations where they exceed the uncertainty of the kernels; otherwise check the tie \
+         points and the images' times and kernels: the observations have no common solution"
+    )]
+    NotConverged {
+        /// Steps taken.
+        steps: usize,
+        /// The sum when the iteration stopped.
+        weighted_squares: f64,
+        /// The keys that hold the orientations, with their values.
+        held_by: String,
+    },
+    /// An invalid standard deviation, coordinate or number.
+    #[error("{what} is {value}, expected {expected}")]
+    #[cause("correct this value, or leave out the item that it belongs to")]
+    Value {
+        /// The quantity, with its image, point or profile.
+        what: String,
+        /// The value.
+        value: f64,
+        /// The expected value.
+        expected: &'static str,
+    },
+    /// The observations do not separate unknowns.
+    #[error("the network is singular: the observations do not separate {0}")]
+    #[cause(
+        "give these unknowns finite standard deviations in [adjustment], or smaller ones, or hold them fixed with 0"
+    )]
+    Singular(String),
+    /// A shot occurs twice.
+    #[error("two shots have the identifier {0}")]
+    #[cause("leave out the second file, or renumber the shots")]
+    DuplicateShot(String),
+    /// An orientation that sees no ground.
+    #[error("image {image}: its orientation sees no ground: {unseen}")]
+    #[cause("check the orientation samples of the image")]
+    Blind {
+        /// Identifier of the image.
+        image: String,
+        /// Why.
+        unseen: Unseen,
+    },
+    /// Initial values that the observations contradict.
+    #[error(
+        "{what} contradicts the rest of the network: standardised residual {standardised:.1}, expected at most {CONTRADICTION}"
+    )]
+    #[cause(
+        "check the datum, the clock and the units of this value, or raise its standard deviation"
+    )]
+    Contradiction {
+        /// The initial value.
+        what: String,
+        /// Its standardised residual, without sign.
+        standardised: f64,
+    },
+}

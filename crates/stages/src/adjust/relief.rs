@@ -1,0 +1,55 @@
+//! Horizontal position from the relief of a site.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::network::Assembled;
+use areograph_base::schema::none_negative;
+use areograph_geom::bundle::Adjustment;
+
+/// Horizontal position from relief, whether or not the adjustment uses it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ReliefSummary {
+    /// Whether heights on slopes were used for the horizontal position.
+    pub used: bool,
+    /// Standard deviations towards east and north of the images' position against the MOLA surface from relief only,
+    /// metres.
+    #[schemars(transform = none_negative)]
+    pub sigma_m: [f64; 2],
+    /// Where it is used: offset of each profile of the surface as recorded.
+    pub profile_shifts: Vec<ProfileOffset>,
+}
+
+/// Offset of a profile as recorded.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ProfileOffset {
+    /// Identifier of the profile.
+    pub profile: String,
+    /// Towards east, north and up, metres.
+    pub shift_m: [f64; 3],
+    /// Standard deviations of these, metres.
+    #[schemars(transform = none_negative)]
+    pub sigma_m: [f64; 3],
+}
+
+/// The relief under the tie points, where it has slopes.
+pub(super) fn relief<M>(
+    assembled: &Assembled<M>,
+    adjustment: &Adjustment,
+    variance_factor: f64,
+    profiles: &[String],
+) -> Option<ReliefSummary> {
+    let control = assembled.network.heights.as_ref()?;
+    let relief = adjustment.relief.as_ref()?;
+    let root = variance_factor.sqrt();
+    let shifts = relief.profiles.iter().map(|shift| ProfileOffset {
+        profile: profiles[shift.profile].clone(),
+        shift_m: shift.shift_m,
+        sigma_m: shift.root_cofactors_m.map(|root_m| root_m * root),
+    });
+    Some(ReliefSummary {
+        used: control.surface.uses_relief(),
+        sigma_m: relief.sigma_m,
+        profile_shifts: shifts.collect(),
+    })
+}

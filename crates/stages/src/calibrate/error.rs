@@ -1,0 +1,203 @@
+//! Why a calibration fails, with the names of cameras and points.
+
+use areograph_base::error::Cause;
+
+/// A failed calibration.
+#[derive(Debug, Clone, PartialEq, thiserror::Error, Cause)]
+#[cause(Input)]
+pub enum CalibrateError {
+    /// Two images are mounted on different frames.
+    #[error(
+        "camera {camera} is mounted on frame {found} (instrument_pointing.time_dependent_frames), camera {first} on \
+         {expected}; expected one frame, that of the spacecraft"
+    )]
+    #[cause(
+        "write the support data so that instrument_pointing ends in the spacecraft's frame and constant_rotation leads \
+         from there to the camera"
+    )]
+    OtherFrame {
+        /// The camera.
+        camera: String,
+        /// Its frame.
+        found: i32,
+        /// The first camera.
+        first: String,
+        /// And its frame.
+        expected: i32,
+    },
+    /// Two cameras have one sensor.
+    #[error(
+        "cameras {first} and {second} have the same sensor, {sensor}; expected support data of different lines"
+    )]
+    #[cause(
+        "name_sensor distinguishes the lines of the camera: check the files of cameras.isd and validation.isd"
+    )]
+    SameSensor {
+        /// A camera.
+        first: String,
+        /// Another.
+        second: String,
+        /// The sensor of both.
+        sensor: String,
+    },
+    /// No axis of the spacecraft is near nadir, or near the direction of flight.
+    #[error("no axis of the spacecraft lies within {limit_deg} degrees of {what}")]
+    #[cause(like = OtherFrame)]
+    NoAxis {
+        /// The direction.
+        what: &'static str,
+        /// Largest allowed angle, degrees.
+        limit_deg: f64,
+    },
+    /// A camera does not look down.
+    #[error(
+        "camera {camera} looks up or across: its look directions are not tangents about the axis that looks down"
+    )]
+    #[cause(like = OtherFrame)]
+    LooksUp {
+        /// The camera.
+        camera: String,
+    },
+    /// A table names an unknown camera.
+    #[error("point {point} is in camera {camera:?}; expected one of {expected}")]
+    #[cause("use the camera identifiers of the configuration in the table")]
+    UnknownCamera {
+        /// The point.
+        point: String,
+        /// The name in the table.
+        camera: String,
+        /// The cameras.
+        expected: String,
+    },
+    /// Too few tie points.
+    #[error(
+        "{found} usable tie points link camera {camera} to another; expected at least {expected} for every camera"
+    )]
+    #[cause("measure more points that are visible in several lines")]
+    TooFewTies {
+        /// The camera that has fewest.
+        camera: String,
+        /// How many there are.
+        found: usize,
+        /// How many are needed.
+        expected: usize,
+    },
+    /// Too few control points.
+    #[error(
+        "{found} control points are usable, {held_back} are withheld; expected at least {expected} of each"
+    )]
+    #[cause(
+        "give more laser points, or leave out the table control: without control only differential parameters are \
+         estimated"
+    )]
+    TooFewControls {
+        /// How many there are.
+        found: usize,
+        /// How many are held back.
+        held_back: usize,
+        /// How many are needed.
+        expected: usize,
+    },
+    /// Most points do not fit.
+    #[error("{misfits} of {all} {what} do not fit the support data, for example {point}: {why}")]
+    #[cause(
+        "check that every camera has the support data of its own image and is not exchanged with another, that samples \
+         count from the edge from which the support data count them, and that places are of the same epoch and body"
+    )]
+    Misfit {
+        /// `tie points` or `control points`.
+        what: &'static str,
+        /// How many do not fit.
+        misfits: usize,
+        /// How many there are.
+        all: usize,
+        /// One of them.
+        point: String,
+        /// Why it does not.
+        why: String,
+    },
+    /// A control point has two places.
+    #[error(
+        "control point {point} has two places; expected one longitude, latitude and radius in all its rows"
+    )]
+    #[cause("give every laser point a unique name")]
+    TwoPlaces {
+        /// The point.
+        point: String,
+    },
+    /// An orbit of the validation has another number of files, or another sensor.
+    #[error("validation {orbit}: no support data of {sensor}, the sensor of camera {camera}")]
+    #[cause(like = SameSensor)]
+    NoSupport {
+        /// The orbit.
+        orbit: String,
+        /// The sensor.
+        sensor: String,
+        /// Its camera.
+        camera: String,
+    },
+    /// The calibrated cameras cannot see a control point.
+    #[error("control point {point} cannot validate the calibration: {problem}")]
+    #[cause("check the position of this point and its lines and samples")]
+    Unseen {
+        /// The point.
+        point: String,
+        /// Why.
+        problem: String,
+    },
+    /// Another orbit has too little laser control.
+    #[error("validation {orbit}: {found} control points are usable; expected at least {expected}")]
+    #[cause("give this orbit more laser points, or leave it out of [[validation]]")]
+    ThinValidation {
+        /// The orbit.
+        orbit: String,
+        /// How many there are.
+        found: usize,
+        /// How many are needed.
+        expected: usize,
+    },
+    /// Another orbit has a file of the calibration.
+    #[error(
+        "validation {orbit}: {file} has the same bytes as a file of the calibration itself; expected files of another orbit"
+    )]
+    #[cause(
+        "data used in a calibration cannot validate it: give files of another orbit, or leave this one out"
+    )]
+    SameFile {
+        /// The orbit.
+        orbit: String,
+        /// The file.
+        file: String,
+    },
+    /// The camera of another orbit is mounted differently.
+    #[error(
+        "validation {orbit}: camera {camera} looks {off_px:.2} px away from its direction in the orbit of the \
+         calibration; expected one mounting and one focal plane within {limit_px} px"
+    )]
+    #[cause(
+        "give support data that have the same mounting, focal length and focal plane: the calibration is an offset \
+         from them"
+    )]
+    OtherMounting {
+        /// The orbit.
+        orbit: String,
+        /// The camera.
+        camera: String,
+        /// The difference, pixels.
+        off_px: f64,
+        /// Largest allowed difference, pixels.
+        limit_px: f64,
+    },
+    /// The adjustment fails.
+    #[error("step {step}: {problem}")]
+    #[cause(
+        "check that ties and laser points were measured in these images and cover them, and check their standard \
+         deviations"
+    )]
+    Adjustment {
+        /// Which step.
+        step: &'static str,
+        /// The problem.
+        problem: String,
+    },
+}

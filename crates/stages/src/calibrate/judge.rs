@@ -1,0 +1,309 @@
+//! The verdict on a calibration.
+
+use super::{
+    elsewhere::{Noise, elsewhere},
+    result::{
+        CalibrationStep, CameraResult, HeldBack, PointKind, Scatter, Scattered, ValidationResult,
+    },
+};
+use crate::judge::{Check, CheckKind, CheckOutcome::Fail, Verdict};
+use areograph_config::CalibrationMode;
+use areograph_geom::{calibration::TieSight, statistics::unit_weight_limits};
+
+/// Largest acceptable scatter of control; beyond it, standard deviations are too small.
+const SCATTER_MAX: f64 = 1.5;
+/// Below this scatter, standard deviations are too large.
+const SCATTER_MIN: f64 = 0.6;
+/// Largest acceptable residual of ties, pixels; beyond it, the lines do not agree.
+const TIES_MAX_PX: f64 = 1.0;
+/// Share of points that may be left out.
+const LEFT_OUT_MAX: f64 = 0.1;
+/// A calibration moves the image by at most this many a priori standard deviations.
+const MOVED_MAX: f64 = 3.0;
+/// Residual of the support data against the look directions, pixels, above which a remark states it.
+const ISD_LEFT_PX: f64 = 0.5;
+
+/// The evidence on which a calibration is judged.
+pub(super) struct Evidence<'a> {
+    pub(super) mode: CalibrationMode,
+    pub(super) steps: &'a [CalibrationStep],
+    pub(super) used: Option<Scatter>,
+    pub(super) held_back: Option<&'a HeldBack>,
+    pub(super) cameras: &'a [CameraResult],
+    pub(super) sight: &'a TieSight,
+    pub(super) validation: &'a [ValidationResult],
+    /// Noise of measurement and laser in each.
+    pub(super) validation_noise: &'a [Noise],
+    /// Points, and those that were left out: ties, then control.
+    pub(super) left_out: [[usize; 2]; 2],
+    /// What no point tests.
+    pub(super) untested: Vec<String>,
+    /// A priori knowledge.
+    pub(super) known: Known,
+    /// Remarks on the body's frame in the support data.
+    pub(super) of_frames: Vec<String>,
+    pub(super) complaints: u64,
+}
+
+/// Movements that the a priori orbit and attitude allow, one standard deviation.
+#[derive(Clone, Copy)]
+pub(super) struct Known {
+    /// The image, pixels.
+    pub(super) image_px: f64,
+    /// The ground, metres along an axis.
+    pub(super) ground_m: f64,
+}
+
+pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
+    let mut reasons = Vec::new();
+    match of.held_back {
+        None => reasons.push(format!(
+            "no laser control: absolute pointing is not determined, and results from ties are not validated; not determined by ties: {}",
+            of.sight.unseen_words()
+        )),
+        Some(held_back) => {
+            let scatters = scatters(of);
+            let scattered = scatters.iter().filter_map(Judged::reason);
+            reasons.extend(scattered);
+            if reasons.is_empty() {
+                reasons.extend(coarse(held_back, of.known));
+            }
+        }
+    }
+    if let Some(last) = of.steps.last() {
+        match last.figures.ties.worst_px() {
+            Some(worst_px) if worst_px <= TIES_MAX_PX => {}
+            Some(worst_px) => reasons.push(format!(
+                "tie points have residuals of {worst_px:.2} px (root mean square); expected at most {TIES_MAX_PX} px"
+            )),
+            None => reasons.push("a camera has no usable tie point left".to_owned()),
+        }
+    }
+    for (what, [all, left_out]) in ["tie", "control"].iter().zip(of.left_out) {
+        if left_out as f64 > LEFT_OUT_MAX * all as f64 {
+            reasons.push(format!(
+                "{left_out} of {all} {what} points were left out; expected at most a tenth"
+            ));
+        }
+    }
+    for camera in of.cameras {
+        if !(camera.moved_px <= MOVED_MAX * of.known.image_px) {
+            reasons.push(format!(
+                "the calibration moves camera {} by {:.0} px; expected at most {:.0} px, {MOVED_MAX} standard deviations of the a priori orbit and \
+                 attitude",
+                camera.camera,
+                camera.moved_px,
+                MOVED_MAX * of.known.image_px
+            ));
+        }
+    }
+    let elsewhere = elsewhere(of.validation, of.validation_noise, of.cameras);
+    reasons.extend(elsewhere.reasons);
+    let mut remarks = remarks(of);
+    remarks.extend(elsewhere.remarks);
+    let mut checks = checks(of);
+    checks.extend(Check::worst(elsewhere.checks.into_iter()));
+    checks.extend(Check::worst(elsewhere.offsets.into_iter()));
+    Verdict::of(reasons, remarks, checks)
+}
+
+/// Scatter of used or withheld control in the plane or in height, and its limit.
+struct Judged {
+    kind: CheckKind,
+    /// In words.
+    what: &'static str,
+    found: Scattered,
+    limit: f64,
+}
+
+impl Judged {
+    /// Why the scatter is too large, if it is.
+    fn reason(&self) -> Option<String> {
+        let Self {
+            what, found, limit, ..
+        } = self;
+        // Written so that NaN is a reason.
+        (!(found.sigmas <= *limit)).then(|| {
+            format!(
+                "{what} are {:.2} times as large as expected (root mean square); expected at most {limit:.2} times: standard deviations are too \
+                 small, or an error has another source than the camera",
+                found.sigmas
+            )
+        })
+    }
+}
+
+fn scatters(of: &Evidence<'_>) -> Vec<Judged> {
+    let judged = |kind, what, found: Option<Scattered>| {
+        let found = found?;
+        // Few coordinates scatter more by chance. The limit is rounded up to the printed hundredths.
+        let [_, by_chance] = unit_weight_limits(found.coordinates)?;
+        Some(Judged {
+            kind,
+            what,
+            found,
+            limit: SCATTER_MAX.max((100.0 * by_chance).ceil() / 100.0),
+        })
+    };
+    let held_back = of.held_back.map(|of| of.scatter);
+    let both = |of: Option<Scatter>| of.map_or((None, None), |of| (of.plane, of.height));
+    let [(plane, height), (held_plane, held_height)] = [of.used, held_back].map(both);
+    [
+        judged(
+            CheckKind::HeldBackPlane,
+            "residuals of withheld control in the plane",
+            held_plane,
+        ),
+        judged(
+            CheckKind::HeldBackHeight,
+            "residuals of withheld control in height",
+            held_height,
+        ),
+        judged(
+            CheckKind::ControlPlane,
+            "residuals of used control in the plane",
+            plane,
+        ),
+        judged(
+            CheckKind::ControlHeight,
+            "residuals of used control in height",
+            height,
+        ),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
+fn checks(of: &Evidence<'_>) -> Vec<Check> {
+    let check = |kind, found: f64, limit: f64| Check::new(kind, "", found, limit, Fail);
+    let mut checks = Vec::new();
+    match of.held_back {
+        None => checks.push(Check::told(
+            CheckKind::HeldBackPlane,
+            "no laser control",
+            Fail,
+        )),
+        Some(held_back) => {
+            let scatters = scatters(of).into_iter();
+            checks.extend(
+                scatters.map(|judged| check(judged.kind, judged.found.sigmas, judged.limit)),
+            );
+            let known_m = of.known.ground_m;
+            let plane = held_back.accuracy_plane_m.map(|found_m| {
+                let known_m = std::f64::consts::SQRT_2 * known_m;
+                check(CheckKind::PlaceKnown, found_m, known_m)
+            });
+            let height = held_back.accuracy_height_m;
+            let height = height.map(|found_m| check(CheckKind::HeightKnown, found_m, known_m));
+            checks.extend(plane.into_iter().chain(height));
+        }
+    }
+    let ties = of
+        .steps
+        .last()
+        .and_then(|last| last.figures.ties.worst_px());
+    checks.extend(ties.map(|worst_px| check(CheckKind::LinesAgree, worst_px, TIES_MAX_PX)));
+    let kinds = [CheckKind::TiesLeftOut, CheckKind::ControlLeftOut];
+    for (kind, [all, left_out]) in kinds.into_iter().zip(of.left_out) {
+        let share = left_out as f64 / all.max(1) as f64;
+        checks.push(Check::of_share(kind, "", share, LEFT_OUT_MAX, Fail));
+    }
+    let limit_px = MOVED_MAX * of.known.image_px;
+    checks.extend(Check::worst(of.cameras.iter().map(|camera| {
+        Check::new(
+            CheckKind::CameraMoved,
+            &*camera.camera,
+            camera.moved_px,
+            limit_px,
+            Fail,
+        )
+    })));
+    checks
+}
+
+/// Why the accuracy on the ground does not exceed the a priori one, if it does not.
+fn coarse(held_back: &HeldBack, known: Known) -> Option<String> {
+    let Some((plane_m, height_m)) = held_back.accuracy_plane_m.zip(held_back.accuracy_height_m)
+    else {
+        return Some("no tie point has a position with a standard deviation".to_owned());
+    };
+    if held_back.intersected == 0 {
+        return Some(
+            "no withheld laser point is in two cameras: positions and heights are not validated; expected laser points in \
+             two cameras or more"
+                .to_owned(),
+        );
+    }
+    let better = plane_m < std::f64::consts::SQRT_2 * known.ground_m && height_m < known.ground_m;
+    (!better).then(|| {
+        format!(
+            "the accuracy of a tie point is {plane_m:.0} m in the plane and {height_m:.0} m in height, against \
+             {:.0} m per axis from the a priori orbit and attitude: the laser control is too coarse, too sparse or too far away \
+             to determine the pointing",
+            known.ground_m
+        )
+    })
+}
+
+fn remarks(of: &Evidence<'_>) -> Vec<String> {
+    let mut remarks = [&*of.of_frames, &*of.untested].concat();
+    let mut say = |when: bool, text: String| {
+        if when {
+            remarks.push(text);
+        }
+    };
+    say(
+        of.mode == CalibrationMode::AsPublished,
+        format!(
+            "all angles are free in the step of ties, as published: {} combinations of them are not determined ({}), and a difference \
+             of scale is taken for a common pitch; the figures after this step may be far off",
+            of.sight.unseen,
+            of.sight.unseen_words()
+        ),
+    );
+    for [all, left_out] in of.left_out {
+        say(
+            left_out > 0,
+            format!("points left out: {left_out} of {all}"),
+        );
+    }
+    say(
+        of.held_back.is_some_and(|held_back| {
+            let Scatter { plane, height } = held_back.scatter;
+            let both = [plane, height].into_iter().flatten();
+            both.clone().next().is_some() && both.into_iter().all(|of| of.sigmas < SCATTER_MIN)
+        }),
+        "withheld control fits better than its standard deviations predict: they may be larger than needed".to_owned(),
+    );
+    for camera in of.cameras {
+        say(
+            camera.isd_left_px > ISD_LEFT_PX,
+            format!(
+                "the calibrated support data of camera {} deviate by up to {:.2} px from its look directions, which bend: they hold only a straight line \
+                 of equal samples",
+                camera.camera, camera.isd_left_px
+            ),
+        );
+    }
+    if let Some(judged) = of
+        .steps
+        .last()
+        .and_then(|last| last.figures.of(PointKind::HeldBack))
+    {
+        for (camera, figures) in of.cameras.iter().zip(&judged.cameras) {
+            say(
+                figures.plane_px.is_none(),
+                format!(
+                    "no withheld laser point is in camera {}: only tie points validate its pointing",
+                    camera.camera
+                ),
+            );
+        }
+    }
+    say(
+        of.complaints > 0,
+        format!("rows and points left out, with reasons: {}", of.complaints),
+    );
+    remarks
+}

@@ -1,0 +1,368 @@
+//! The result of a calibration, with names, in metres, radians and pixels.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::judge::Verdict;
+use areograph_geom::calibration::TieSight;
+
+/// A calibration.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Calibration {
+    /// The lines of the camera.
+    pub cameras: Vec<CameraResult>,
+    /// Drift of the orbit from line to line, body-fixed, metres; the calibrated support data contain it.
+    pub drift_m_per_line: [Value; 3],
+    /// Sensitivity of ties to the offset angles.
+    pub tie_sight: TieSight,
+    /// The test of ties against the ground between laser points; `None` where these are too few.
+    pub tie_ground: Option<TieGround>,
+    /// The figures before the first and after every step.
+    pub steps: Vec<CalibrationStep>,
+    /// Scatter of the control that was used; `None` without control.
+    pub used: Option<Scatter>,
+    /// Statistics of withheld control; `None` without control.
+    pub held_back: Option<HeldBack>,
+    /// The rounds of a calibration from pixels, of which this is the last.
+    pub rounds: Option<Rounds>,
+    /// Other orbits.
+    pub validation: Vec<ValidationResult>,
+    /// Every point.
+    pub points: Vec<PointResult>,
+    /// Every image of a point.
+    pub images: Vec<ImageResult>,
+    /// Whether the result is to be used.
+    pub verdict: Verdict,
+    /// Rows and points that were left out, one sentence each.
+    pub complaints: Vec<String>,
+    /// Number of all complaints.
+    pub complaint_count: u64,
+}
+
+/// The test of heights of tie points against the ground between laser points.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TieGround {
+    /// Tie points that were tested last.
+    pub tested: u64,
+    /// Height above or below the ground, in standard deviations, beyond which a tie point is left out.
+    #[schemars(range(min = 0.0))]
+    pub limit_sigmas: f64,
+    /// The same in metres, for the median of the tie points: smaller errors along the flight are not identified.
+    #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
+    pub limit_m: Option<f64>,
+}
+
+/// A number and its standard deviation.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Value {
+    /// The number.
+    pub value: f64,
+    /// Its standard deviation; 0 for one that was not free.
+    #[schemars(range(min = 0.0))]
+    pub sigma: f64,
+}
+
+/// A line of the camera.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CameraResult {
+    /// Its name.
+    pub camera: String,
+    /// φ, ω and κ, radians.
+    pub angles_rad: [Value; 3],
+    /// Coefficients of the tangent across the flight, powers of s′.
+    pub m: Vec<Value>,
+    /// Coefficients of the tangent along the flight.
+    pub n: Vec<Value>,
+    /// The same of the laboratory.
+    pub laboratory: [Vec<f64>; 2],
+    /// Their largest residual against the laboratory's look directions, pixels.
+    pub laboratory_left_px: f64,
+    /// Tangent of a pixel.
+    pub pixel: f64,
+    /// Samples.
+    pub samples: u32,
+    /// Largest change of a look direction by the calibration, pixels.
+    pub moved_px: f64,
+    /// The calibrated support data.
+    pub isd: String,
+    /// Their largest residual against the calibrated look directions, pixels: support data hold a straight line of
+    /// equal samples.
+    pub isd_left_px: f64,
+}
+
+/// Figures of points after a step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CalibrationStep {
+    /// `before`, `ties`, `external`, `internal` or `joint`.
+    pub step: String,
+    /// The free parameters, in words.
+    pub free: String,
+    /// Steps of the adjustment; 0 before any.
+    pub steps: u32,
+    /// The figures.
+    pub figures: Figures,
+}
+
+/// Root mean squares, as in tables 5 to 7 of Li et al. 2023.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Figures {
+    /// Tie points after intersection.
+    pub ties: TieFigures,
+    /// Control points that the calibration uses, and withheld ones; empty without control. Other orbits have no
+    /// withheld points.
+    pub control: Vec<ControlFigures>,
+}
+
+impl Figures {
+    /// Figures of control points of this kind.
+    #[must_use]
+    pub fn of(&self, kind: PointKind) -> Option<&ControlFigures> {
+        self.control.iter().find(|of| of.kind == kind)
+    }
+}
+
+/// Tie points.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TieFigures {
+    /// Points.
+    pub points: u64,
+    /// Root mean square of every camera across and along the flight, pixels; missing for a camera without tie points.
+    pub cameras_px: Vec<[Option<f64>; 2]>,
+}
+
+impl TieFigures {
+    /// The largest of the cameras, across or along, pixels; `None` where a camera has no value.
+    #[must_use]
+    pub fn worst_px(&self) -> Option<f64> {
+        let all = self.cameras_px.iter().flatten();
+        all.copied()
+            .try_fold(0.0, |worst: f64, of| of.map(|of| worst.max(of)))
+    }
+}
+
+/// Control points.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ControlFigures {
+    /// Their use.
+    pub kind: PointKind,
+    /// Points.
+    pub points: u64,
+    /// Of every camera: distance between projected and measured image position of the laser points.
+    pub cameras: Vec<PixelsAndMetres>,
+    /// Points in two cameras or more.
+    pub heights: u64,
+    /// Root mean square of their intersected height minus the laser's, metres; missing without such a point.
+    #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
+    pub height_m: Option<f64>,
+}
+
+/// In the focal plane, and on the ground; missing for a camera without points.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PixelsAndMetres {
+    /// Root mean square distance, pixels.
+    #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
+    pub plane_px: Option<f64>,
+    /// Root mean square distance of the ray at the laser's radius from the laser's place, metres.
+    #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
+    pub plane_m: Option<f64>,
+}
+
+/// Statistics of withheld control.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct HeldBack {
+    /// Points.
+    pub points: u64,
+    /// Ratio of their residuals to the expected ones.
+    pub scatter: Scatter,
+    /// Number of them in two cameras or more, whose positions are intersected.
+    pub intersected: u64,
+    /// Root mean square of intersected minus laser position, horizontally, metres, including errors of laser and
+    /// measurement. Missing where no point is intersected, as are the next two.
+    #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
+    pub plane_m: Option<f64>,
+    /// Likewise of the height, metres.
+    #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
+    pub height_m: Option<f64>,
+    /// Mean of the same east, north and up, metres.
+    #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
+    pub mean_m: Option<[f64; 3]>,
+    /// Stated accuracy of a tie point in the plane, metres: root mean square of the standard deviations, scaled by the
+    /// scatter in the plane of used or withheld control where that exceeds 1.
+    #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
+    pub accuracy_plane_m: Option<f64>,
+    /// Likewise of its height, metres.
+    #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
+    pub accuracy_height_m: Option<f64>,
+}
+
+/// Root mean square of the residuals of control over those expected from measurement, laser and calibration: near 1
+/// when standard deviations are correct. Plane and height are separate, as too large standard deviations of the one
+/// hide errors of the other.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Scatter {
+    /// East and north; missing where the points have no redundancy.
+    #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
+    pub plane: Option<Scattered>,
+    /// Up, of points in two cameras or more; missing without such a point.
+    #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
+    pub height: Option<Scattered>,
+}
+
+/// A root mean square over its expectation.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Scattered {
+    /// Root mean square of the residuals over the expected ones.
+    #[schemars(range(min = 0.0))]
+    pub sigmas: f64,
+    /// Number of coordinates that are free to differ; smaller for used points, as the calibration follows them.
+    #[schemars(range(min = 0.0))]
+    pub coordinates: f64,
+}
+
+/// A calibration in rounds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Rounds {
+    /// The rounds in order.
+    pub rounds: Vec<CalibrationRound>,
+    /// Maximum number of rounds.
+    pub rounds_max: u32,
+    /// Edge of a cell of the terrain models, metres.
+    pub cell_m: f64,
+}
+
+/// The numbers of a round: terrain model and units with the cameras of the previous round, then the cameras.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CalibrationRound {
+    /// From 1.
+    pub round: u32,
+    /// Tie points.
+    pub ties: u64,
+    /// Their residuals in the worst line, root mean square, pixels, with the cameras that the terrain model was made with.
+    pub model_tie_px: Option<f64>,
+    /// The same with the cameras of this round.
+    pub tie_px: Option<f64>,
+    /// Share of the cells of the terrain model with a height.
+    pub filled: f64,
+    /// Units that calibrate: kept, and rejected.
+    pub units: [u64; 2],
+    /// Withheld units: kept, and rejected.
+    pub judging: [u64; 2],
+    /// Median length of the shifts of kept units that calibrate, cells.
+    pub shift_cells: f64,
+    /// Median of model minus laser, metres.
+    pub bias_m: Option<f64>,
+    /// Residuals of control, root mean square over all lines, pixels and metres on the ground.
+    pub control: PixelsAndMetres,
+    /// The same of withheld control.
+    pub held_back: PixelsAndMetres,
+    /// Residuals of control in the lines that see it, root mean square, pixels, by the number of its unit.
+    pub unit_px: BTreeMap<usize, f64>,
+    /// Scatter of withheld control.
+    pub held_back_scatter: Option<Scatter>,
+    /// φ, ω and κ of every line, radians.
+    pub angles_rad: Vec<[f64; 3]>,
+    /// Drift of the orbit, metres a line.
+    pub drift_m_per_line: [f64; 3],
+}
+
+/// Another orbit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ValidationResult {
+    /// Its name.
+    pub orbit: String,
+    /// With the laboratory's geometry.
+    pub before: Figures,
+    /// With the calibration, unchanged.
+    pub after: Figures,
+    /// Mean offsets of its control with the calibration: in the plane of every camera, and in height.
+    pub offsets: Vec<ControlOffset>,
+}
+
+/// Mean offset of the control of another orbit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ControlOffset {
+    /// The camera in whose plane it is; absent for height.
+    #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
+    pub camera: Option<String>,
+    /// Length of the mean offset in the plane, or of the mean height above the laser, metres.
+    #[schemars(range(min = 0.0))]
+    pub offset_m: f64,
+    /// Standard deviation of one control point by measurement and laser, metres.
+    #[schemars(range(min = 0.0))]
+    pub point_sigma_m: f64,
+    /// Standard deviation of the mean by measurement and laser, metres: errors of the orbit and of the calibration are
+    /// additional.
+    #[schemars(range(min = 0.0))]
+    pub mean_sigma_m: f64,
+    /// Standard deviation by the calibration, metres.
+    #[schemars(range(min = 0.0))]
+    pub calibration_sigma_m: f64,
+    /// The largest permitted offset, metres.
+    #[schemars(range(min = 0.0))]
+    pub limit_m: f64,
+}
+
+/// Use of a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PointKind {
+    /// Its position is unknown.
+    Tie,
+    /// The laser gives its position.
+    Control,
+    /// Likewise, but withheld.
+    HeldBack,
+}
+
+impl PointKind {
+    /// Its name in tables.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Tie => "tie",
+            Self::Control => "control",
+            Self::HeldBack => "held_back",
+        }
+    }
+}
+
+/// A point on the ground, by the calibrated cameras.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PointResult {
+    /// Its name.
+    pub point: String,
+    /// Its use.
+    pub kind: PointKind,
+    /// Whether it was left out.
+    pub left_out: bool,
+    /// East longitude, latitude, radians, and radius, metres, intersected from its images; `None` where they are too
+    /// few, and for a point that was left out.
+    pub place: Option<[f64; 3]>,
+    /// Standard deviations east, north and up, metres; `None` without a place, and for a tie point whose height is not
+    /// tested for errors such as those that were found at others.
+    pub sigma_m: Option<[f64; 3]>,
+    /// Of a laser point: intersected minus the laser's, east, north and up, metres.
+    pub off_m: Option<[f64; 3]>,
+}
+
+/// An image of a point.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ImageResult {
+    /// The point.
+    pub point: String,
+    /// Its use.
+    pub kind: PointKind,
+    /// The camera.
+    pub camera: String,
+    /// Line and sample.
+    pub place: [f64; 2],
+    /// Whether it was left out.
+    pub left_out: bool,
+    /// Residual across and along the flight with the laboratory's geometry, pixels: at the intersected position, or at
+    /// the laser's for a laser point.
+    pub before_px: Option<[f64; 2]>,
+    /// The same with the calibration.
+    pub after_px: Option<[f64; 2]>,
+}

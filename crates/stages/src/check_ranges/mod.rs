@@ -1,0 +1,337 @@
+//! Three-way range check: measured range, the file's own orbit and the kernels' orbit against each other.
+//!
+//! | residual | tests |
+//! |---|---|
+//! | range − \|PEDR spacecraft − footprint\| | our decoding of the file |
+//! | PEDR spacecraft − SPK spacecraft | the kernels |
+//! | range − \|SPK spacecraft − footprint\| | Table 3 of Shan et al. 2005 |
+//!
+//! Geometric states only: the range is to the spacecraft's centre of mass, so there is no lever arm,
+//! and ISIS's apparent positions would be 0.14 km off.
+
+mod figures;
+mod orbit;
+mod residuals;
+mod scan;
+mod tables;
+
+use std::sync::atomic::AtomicBool;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::{convert_datum::Converted, group_profiles::Profile};
+use areograph_base::{
+    altimetry::MolaClock,
+    error::{Cause, Result},
+    footprints::{Footprint, Footprints},
+    frames::BodyFixed,
+    time::{Et, Intervals},
+    watch::Watch,
+};
+use areograph_config::RangeCheckConfig;
+use areograph_geom::{
+    range_residuals::{RangeResiduals, SpacecraftState},
+    statistics::{Summary, Trend, outliers},
+};
+use areograph_spice::{KernelView, Session, Trajectory};
+use areograph_store::{
+    stage::{Output, Stage},
+    stage_inputs,
+};
+
+pub use figures::RangeFigures;
+pub use residuals::ShotResiduals;
+pub use scan::{BiasScan, ScannedRadius};
+pub use tables::{CheckTableRanges, Spacecraft, check_table_ranges};
+
+/// Residuals of every shot, and statistics of every profile.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RangeCheck {
+    /// Residuals, ordered by profile, then by time.
+    pub shots: ShotResiduals,
+    /// One entry per profile, in the order of the profiles.
+    pub profiles: Vec<ProfileRanges>,
+    /// Largest error of the tabulated trajectory against the kernels, metres.
+    pub trajectory_error_m: f64,
+}
+
+stage_inputs! {
+    /// Footprints, profiles, limits, the clock of MOLA, and the kernels of the trajectory.
+    pub struct CheckRanges<'a> {
+        /// Footprints in the frame of the products.
+        pub converted: &'a Output<Converted>,
+        /// Profiles.
+        pub profiles: &'a Output<Vec<Profile>>,
+        /// Kernels that positions may depend on.
+        pub kernels: &'a KernelView,
+        /// The clock of MOLA.
+        pub mola_clock: &'a MolaClock,
+        /// Limits and the scan of clock biases.
+        pub range_check: &'a RangeCheckConfig,
+    }
+}
+
+impl Stage for CheckRanges<'_> {
+    const NAME: &'static str = "check_ranges";
+    const METHOD: u32 = 9;
+    type Output = RangeCheck;
+    stage_inputs!(fingerprint);
+
+    fn run(&self, stop: &AtomicBool) -> Result<RangeCheck> {
+        self.run_watched(stop.into())
+    }
+
+    fn run_watched(&self, watch: Watch<'_>) -> Result<RangeCheck> {
+        let profiles = self.profiles.value()?;
+        let reach_s = trajectory_reach_s(self.range_check, self.mola_clock);
+        check_ranges(
+            &self.converted.value()?.footprints,
+            profiles,
+            &trajectory(self.kernels.session()?, profiles, reach_s)?,
+            self.mola_clock,
+            self.range_check,
+            watch,
+        )
+    }
+
+    /// Checks the coverage of positions for every profile; one finding for all covered profiles.
+    fn examine(&self) -> Vec<Result<String>> {
+        let profiles = self.profiles.get().map_or(&[][..], Vec::as_slice);
+        let (mut covered, mut shots, mut found) = (0, 0, Vec::new());
+        for profile in profiles {
+            let session = self.kernels.session();
+            match session.and_then(|session| session.require_position(profile.interval)) {
+                Ok(()) => {
+                    covered += 1;
+                    shots += profile.rows.len();
+                }
+                Err(failure) => found.push(Err(failure)),
+            }
+        }
+        let of = profiles.len();
+        let finding = format!("{covered} of {of} profiles ({shots} shots): position covered");
+        found.extend((of > 0).then_some(Ok(finding)));
+        found
+    }
+}
+
+/// Seconds of trajectory beyond the reach of the scan of the clock bias.
+const TRAJECTORY_MARGIN_S: f64 = 0.5;
+/// The tabulated trajectory stays this close to the kernels, metres: a tenth of a PEDR centimetre.
+const TRAJECTORY_TOLERANCE_M: f64 = 0.001;
+
+/// Seconds beyond a profile for which the spacecraft's trajectory is tabulated.
+#[must_use]
+pub fn trajectory_reach_s(range_check: &RangeCheckConfig, mola_clock: &MolaClock) -> f64 {
+    range_check.scan_half_width_s + mola_clock.bias_s + TRAJECTORY_MARGIN_S
+}
+
+/// Tabulates the spacecraft's trajectory over all profiles, `reach_s` beyond them as far as the kernels go.
+fn trajectory(session: &Session, profiles: &[Profile], reach_s: f64) -> Result<Trajectory> {
+    for profile in profiles {
+        session.require_position(profile.interval)?;
+    }
+    let reach = profiles
+        .iter()
+        .map(|profile| profile.interval.padded(reach_s));
+    let covered = Intervals::union_of(reach).intersection(&session.coverage()?.spk);
+    session.trajectory(&covered, TRAJECTORY_TOLERANCE_M)
+}
+
+/// Statistics of one profile.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ProfileRanges {
+    /// Profile identifier.
+    pub profile: String,
+    /// Its shots; for some shots of tables only the table's own spacecraft is known.
+    pub shots: u32,
+    /// Range − distance (SPK spacecraft, footprint with raw radius), metres.
+    pub range_minus_distance_m: Summary,
+    /// The same with the crossover-corrected radius, metres: crossover moves the footprint, not the range.
+    pub range_minus_distance_crossover_m: Summary,
+    /// Range − distance (PEDR spacecraft, raw footprint), metres.
+    pub decoding_m: Summary,
+    /// PEDR spacecraft − SPK spacecraft along radial, along-track and cross-track axes, metres.
+    pub spacecraft_m: [Summary; 3],
+    /// Mean of range − distance without outliers, metres: this one is judged.
+    pub mean_without_outliers_m: f64,
+    /// Mean of range − distance to the file's own spacecraft without the same shots, metres: this one is judged.
+    pub decoding_without_outliers_m: f64,
+    /// Linear trend of range − distance over time, metres per second.
+    pub trend_m_s: Option<Trend>,
+    /// Shots farther from the median than the configured number of robust standard deviations.
+    pub outliers: u32,
+    /// Scan over assumed clock biases; `None` when there are too few shots for one.
+    pub scan: Option<BiasScan>,
+    /// Why the profile breaks the limits of the configuration; empty when it is valid, or too short to be judged.
+    pub invalid_because: Vec<String>,
+}
+
+impl ProfileRanges {
+    /// Whether it has enough shots to be judged: a window may clip a profile to a few shots.
+    #[must_use]
+    pub const fn is_judged(&self, limits: &RangeCheckConfig) -> bool {
+        self.shots >= limits.shots_min
+    }
+
+    /// Largest |mean| of range − distance, metres.
+    ///
+    /// Tables without a spacecraft have radii corrected by crossovers: these move footprints by metres, of some orbits by
+    /// tens of metres, and not the ranges, so that the limit is that of two orbits.
+    #[must_use]
+    pub fn mean_max_m(&self, limits: &RangeCheckConfig) -> f64 {
+        if self.decoding_m.n == 0 {
+            limits.mean_max_m.max(limits.orbit_max_m)
+        } else {
+            limits.mean_max_m
+        }
+    }
+
+    /// Whether its ranges are compared with any position of the spacecraft.
+    #[must_use]
+    pub const fn is_tested(&self) -> bool {
+        self.range_minus_distance_m.n > 0 || self.decoding_m.n > 0
+    }
+
+    /// Shots whose residuals are known.
+    #[must_use]
+    pub const fn measured(&self) -> usize {
+        self.range_minus_distance_m.n as usize
+    }
+
+    /// Mean distance of the file's own spacecraft from that of the kernels, metres.
+    #[must_use]
+    pub fn orbits_apart_m(&self) -> f64 {
+        self.figures().orbits_apart_m()
+    }
+
+    /// The figures that are judged.
+    #[must_use]
+    pub fn figures(&self) -> RangeFigures {
+        RangeFigures {
+            n: self.shots,
+            outliers: self.outliers,
+            mean_m: [
+                self.range_minus_distance_m.mean,
+                self.mean_without_outliers_m,
+            ],
+            decoding_m: [self.decoding_m.mean, self.decoding_without_outliers_m],
+            spacecraft_m: self.spacecraft_m.each_ref().map(|axis| axis.mean),
+        }
+    }
+}
+
+/// A shot outside the tabulated trajectory.
+#[derive(Debug, thiserror::Error, Cause)]
+#[error("profile {profile}: no spacecraft position at {at}, the time of a shot")]
+#[cause(Coverage: "add a spacecraft ephemeris (SPK) that covers the PEDR files")]
+struct OutsideTrajectory {
+    profile: String,
+    at: Et,
+}
+
+/// Checks the ranges of every profile against `trajectory`.
+///
+/// `watch` is checked before every profile, and counts shots.
+///
+/// # Errors
+/// A shot whose time the trajectory does not cover; [`Stopped`](areograph_base::error::Stopped).
+/// # Source
+/// Shan et al. 2005, Table 3; the limits are ours, as the paper states none.
+pub fn check_ranges<'a>(
+    footprints: &Footprints<BodyFixed>,
+    profiles: &[Profile],
+    trajectory: &Trajectory,
+    clock: &MolaClock,
+    limits: &RangeCheckConfig,
+    watch: impl Into<Watch<'a>>,
+) -> Result<RangeCheck> {
+    let watch = watch.into();
+    watch.announce(profiles.iter().map(|profile| profile.rows.len()).sum());
+    let mut shots = ShotResiduals::default();
+    let mut checked = Vec::with_capacity(profiles.len());
+    for (index, profile) in (0_u32..).zip(profiles) {
+        watch.check()?;
+        let first = shots.len();
+        let residuals = |row: &u32| {
+            let shot = footprints.row(*row as usize);
+            let at = clock.spacecraft_time(shot.et_tag_s);
+            let (position, velocity_m_s) = trajectory.state(at).ok_or(at)?;
+            let spacecraft = SpacecraftState::of(at, &position, &velocity_m_s);
+            Ok(RangeResiduals::of(&shot, &spacecraft))
+        };
+        let of_shots: Vec<std::result::Result<RangeResiduals, Et>> =
+            profile.rows.par_iter().map(residuals).collect();
+        for (row, residuals) in profile.rows.iter().zip(of_shots) {
+            let residuals = residuals.map_err(|at| OutsideTrajectory {
+                profile: profile.id.clone(),
+                at,
+            })?;
+            shots.push(index, *row, &residuals);
+        }
+        let flags = outliers(&shots.range_minus_distance_m[first..], limits.outlier_sigma);
+        shots.outlier.extend(flags);
+        let kept: Vec<Footprint> = (first..shots.len())
+            .filter(|shot| !shots.outlier[*shot])
+            .map(|shot| footprints.row(shots.row[shot] as usize))
+            .collect();
+        let scan = BiasScan::of(&kept, trajectory, limits);
+        let mut ranges = statistics(profile, &shots, first, scan, footprints);
+        let explain = || orbit::cause(footprints, profile, trajectory, clock, limits.orbit_max_m);
+        ranges.invalid_because = ranges.figures().broken_limits(limits, explain);
+        checked.push(ranges);
+        watch.step(profile.rows.len() as u64, "shots");
+    }
+    Ok(RangeCheck {
+        shots,
+        profiles: checked,
+        trajectory_error_m: trajectory.max_error_m(),
+    })
+}
+
+/// Statistics of the profile whose shots begin at `first`, not judged yet.
+fn statistics(
+    profile: &Profile,
+    shots: &ShotResiduals,
+    first: usize,
+    scan: Option<BiasScan>,
+    footprints: &Footprints<BodyFixed>,
+) -> ProfileRanges {
+    let summary = |column: &[f64]| Summary::of(&column[first..]);
+    // Shots of tables may have no spacecraft of their own; where the kernels are not finite, range − distance is not either.
+    let of_own = |column: &[f64]| {
+        let known = column[first..].iter().copied().filter(|of| !of.is_nan());
+        Summary::of(&known.collect::<Vec<_>>())
+    };
+    let seconds: Vec<f64> = shots.row[first..]
+        .iter()
+        .map(|row| Et::from_seconds(footprints.et_s[*row as usize]).since(profile.interval.start))
+        .collect();
+    let outlier = &shots.outlier[first..];
+    let outliers = outlier.iter().filter(|flag| **flag).count();
+    // A single wrong record must not decide the verdict on all others; their number has a separate limit.
+    let mean_without = |column: &[f64]| {
+        let kept = column[first..].iter().zip(outlier);
+        let kept: Vec<f64> = kept.filter(|(_, is)| !**is).map(|(m, _)| *m).collect();
+        Summary::of(&kept).mean
+    };
+    ProfileRanges {
+        profile: profile.id.clone(),
+        shots: u32::try_from(profile.rows.len()).unwrap_or(u32::MAX),
+        range_minus_distance_m: summary(&shots.range_minus_distance_m),
+        range_minus_distance_crossover_m: summary(&shots.range_minus_distance_crossover_m),
+        decoding_m: summary(&shots.decoding_m),
+        spacecraft_m: [
+            of_own(&shots.spacecraft_radial_m),
+            of_own(&shots.spacecraft_along_m),
+            of_own(&shots.spacecraft_cross_m),
+        ],
+        mean_without_outliers_m: mean_without(&shots.range_minus_distance_m),
+        decoding_without_outliers_m: mean_without(&shots.decoding_m),
+        trend_m_s: Trend::of(&seconds, &shots.range_minus_distance_m[first..]),
+        outliers: u32::try_from(outliers).unwrap_or(u32::MAX),
+        scan,
+        invalid_because: Vec::new(),
+    }
+}

@@ -1,0 +1,295 @@
+//! The clock correction that minimises the spread of the range residuals of a profile.
+//!
+//! Shifting the spacecraft by a time `c` changes the residual of shot `k` by about `c` times the rate of its line of
+//! sight. A common change does not alter the spread, so a profile determines the bias only when that rate varies along
+//! it: well when the spacecraft holds an inertial attitude off nadir (about 3 m/s²), hardly at nadir (below 0.03 m/s²).
+//! The uncertainty reflects this.
+//!
+//! Over a revolution the error of the file's orbit is a wave in the residuals that masks a bias. Crossovers remove most
+//! of it: radii corrected by them are scanned as well, and used where they reduce the spread.
+
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use areograph_base::{
+    body::Body,
+    footprints::Footprint,
+    frames::{BodyFixed, Position},
+    time::Et,
+};
+use areograph_config::{RangeCheckConfig, SCAN_STEPS_MAX};
+use areograph_geom::{
+    body_rotation::{body_rotation, frame_rotation_3, spin_rad_s},
+    range_residuals::{footprint, own_spacecraft, range_residual_m},
+    statistics::{Trend, mean_and_deviation},
+};
+use areograph_spice::Trajectory;
+
+/// Fewest shots for a meaningful scan.
+const SHOTS_MIN: usize = 10;
+
+/// Half the time over which the rate of a line of sight is measured, seconds.
+const RATE_STEP_S: f64 = 0.01;
+
+/// Corrected radii are used when their least spread is below this share of that of raw ones: reductions by chance, or
+/// where crossovers carry no information, are smaller.
+const CALMER: f64 = 0.98;
+
+/// Radius of footprints.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum ScannedRadius {
+    /// As ranges give it.
+    #[default]
+    Raw,
+    /// Corrected by crossovers.
+    Crossover,
+}
+
+impl ScannedRadius {
+    /// Its name.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Raw => "raw",
+            Self::Crossover => "crossover",
+        }
+    }
+}
+
+/// Spread of range − distance against the assumed clock correction.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BiasScan {
+    /// Radius of the footprints.
+    pub radius: ScannedRadius,
+    /// Assumed corrections, seconds added to the tags.
+    pub correction_s: Vec<f64>,
+    /// Standard deviation of range − distance at each, metres.
+    pub spread_m: Vec<f64>,
+    /// Correction of least spread, refined by a parabola through the variance, seconds.
+    ///
+    /// `None` when the least spread lies at an end of the scan.
+    pub best_s: Option<f64>,
+    /// Standard uncertainty of `best_s`, seconds: from the remaining residuals with the correlation of
+    /// neighbours, and from the uncertainty of the orbit.
+    pub uncertainty_s: Option<f64>,
+}
+
+impl BiasScan {
+    /// Scans a profile by its shots in IAU 2000, without outliers, in time order; `None` for fewer than ten.
+    #[must_use]
+    pub fn of(
+        shots: &[Footprint],
+        trajectory: &Trajectory,
+        limits: &RangeCheckConfig,
+    ) -> Option<Self> {
+        if shots.len() < SHOTS_MIN {
+            return None;
+        }
+        let sighted: Vec<Sighted> = shots.iter().map(Sighted::of).collect();
+        let [mut raw, mut crossover] =
+            [ScannedRadius::Raw, ScannedRadius::Crossover].map(Self::empty);
+        let spin_rad_s = spin_rad_s(Body::Mars.model()).z;
+        let spreads_m = |correction_s: &f64| {
+            let turn = frame_rotation_3(spin_rad_s * correction_s);
+            let residual = |shot: &Sighted| shot.residuals_m(trajectory, *correction_s, &turn);
+            let residuals: Option<Vec<[f64; 2]>> = sighted.iter().map(residual).collect();
+            residuals.map(|residuals| {
+                [0, 1].map(|which| {
+                    let residuals: Vec<f64> = residuals.iter().map(|of| of[which]).collect();
+                    mean_and_deviation(&residuals)[1]
+                })
+            })
+        };
+        let corrections: Vec<f64> = corrections(limits).collect();
+        let spreads_m: Vec<Option<[f64; 2]>> = corrections.par_iter().map(spreads_m).collect();
+        for (correction_s, spreads_m) in corrections.into_iter().zip(spreads_m) {
+            // Corrections beyond the coverage of the kernels are omitted.
+            for (scan, spread_m) in [&mut raw, &mut crossover]
+                .into_iter()
+                .zip(spreads_m.into_iter().flatten())
+            {
+                scan.correction_s.push(correction_s);
+                scan.spread_m.push(spread_m);
+            }
+        }
+        let is_calmer = crossover.least_spread_m() < CALMER * raw.least_spread_m();
+        let mut scan = if is_calmer { crossover } else { raw };
+        scan.best_s = best_s(&scan);
+        scan.uncertainty_s = scan
+            .best_s
+            .and_then(|best_s| uncertainty_s(shots, scan.radius, trajectory, best_s));
+        Some(scan)
+    }
+
+    const fn empty(radius: ScannedRadius) -> Self {
+        Self {
+            radius,
+            correction_s: Vec::new(),
+            spread_m: Vec::new(),
+            best_s: None,
+            uncertainty_s: None,
+        }
+    }
+
+    /// The least of its spreads, metres.
+    fn least_spread_m(&self) -> f64 {
+        self.spread_m.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// The quantities of a shot that do not depend on the correction.
+struct Sighted {
+    tag: Et,
+    range_m: f64,
+    /// With the raw and the corrected radius.
+    footprints: [Position<BodyFixed>; 2],
+    /// From J2000 to Mars at the tag.
+    to_mars: Matrix3<f64>,
+}
+
+impl Sighted {
+    fn of(shot: &Footprint) -> Self {
+        let tag = Et::from_seconds(shot.et_tag_s);
+        Self {
+            tag,
+            range_m: shot.range_m,
+            footprints: [shot.radius_m, shot.radius_crossover_m]
+                .map(|radius_m| footprint(shot, radius_m)),
+            to_mars: *body_rotation(Body::Mars, tag).matrix(),
+        }
+    }
+
+    /// Range − distance to both footprints.
+    ///
+    /// * `turn` – rotation of Mars during the correction: within seconds its axis moves by less than 1e-6 m on the
+    ///   ground
+    fn residuals_m(
+        &self,
+        trajectory: &Trajectory,
+        correction_s: f64,
+        turn: &Matrix3<f64>,
+    ) -> Option<[f64; 2]> {
+        let position = trajectory.position(self.tag.plus(correction_s))?;
+        let spacecraft = Position::new(turn * (self.to_mars * position.xyz_m));
+        let footprints = self.footprints.each_ref();
+        Some(footprints.map(|of| range_residual_m(self.range_m, &spacecraft, of)))
+    }
+}
+
+/// Range − distance of a shot whose tag is corrected by `correction_s`.
+fn residual_m(
+    shot: &Footprint,
+    radius: ScannedRadius,
+    trajectory: &Trajectory,
+    correction_s: f64,
+) -> Option<f64> {
+    let at = Et::from_seconds(shot.et_tag_s + correction_s);
+    let spacecraft = body_rotation(Body::Mars, at).apply(&trajectory.position(at)?);
+    Some(range_residual_m(
+        shot.range_m,
+        &spacecraft,
+        &footprint(shot, radius_m(shot, radius)),
+    ))
+}
+
+fn radius_m(shot: &Footprint, radius: ScannedRadius) -> f64 {
+    match radius {
+        ScannedRadius::Raw => shot.radius_m,
+        ScannedRadius::Crossover => shot.radius_crossover_m,
+    }
+}
+
+/// Corrections from `-half_width` to `+half_width`, symmetric about zero.
+fn corrections(limits: &RangeCheckConfig) -> impl Iterator<Item = f64> {
+    let (half_width_s, step_s) = (limits.scan_half_width_s, limits.scan_step_s);
+    let side: Vec<f64> = (1..=SCAN_STEPS_MAX)
+        .map(|k| f64::from(k) * step_s)
+        .take_while(|correction| *correction <= half_width_s * (1.0 + 1e-12))
+        .collect();
+    let negative: Vec<f64> = side.iter().rev().map(|correction| -correction).collect();
+    negative.into_iter().chain([0.0]).chain(side)
+}
+
+/// Minimum of the parabola through the three least variances.
+fn best_s(scan: &BiasScan) -> Option<f64> {
+    let least =
+        (0..scan.spread_m.len()).min_by(|a, b| scan.spread_m[*a].total_cmp(&scan.spread_m[*b]))?;
+    if least == 0 || least + 1 >= scan.spread_m.len() {
+        return None;
+    }
+    let variance = |index: usize| scan.spread_m[index].powi(2);
+    let step_s = scan.correction_s[least + 1] - scan.correction_s[least];
+    let (before, at, after) = (variance(least - 1), variance(least), variance(least + 1));
+    let curvature = (before - 2.0 * at + after) / (2.0 * step_s * step_s);
+    let slope = (after - before) / (2.0 * step_s);
+    (curvature > 0.0).then(|| scan.correction_s[least] - slope / (2.0 * curvature))
+}
+
+/// Unit vectors as columns: along the velocity, across the orbit, and at right angles to both.
+///
+/// The first is the direction of flight itself and not, as elsewhere, perpendicular to the radius: an orbit with a
+/// constant time error is shifted along it, and must appear as such.
+fn track_axes(position: &Vector3<f64>, velocity: &Vector3<f64>) -> Matrix3<f64> {
+    let along = velocity.normalize();
+    let cross = position.cross(velocity).normalize();
+    Matrix3::from_columns(&[along, cross, along.cross(&cross)])
+}
+
+/// Standard uncertainty of the best correction.
+///
+/// The best correction is the slope of the residuals over the rates of their lines of sight. It is uncertain by the
+/// scatter about that line, and by the orbit: moved by a constant vector it changes the residuals by the vector's
+/// component along each line of sight, and a metre along the track cannot be separated from 0.3 ms. The orbit
+/// uncertainty is taken from the across-track difference from the orbit of the PEDR file, assumed equal in all
+/// directions: along the track the two also differ by the error of the correction itself. An orbit error that changes
+/// along the profile leaves a slope too, estimated by the slope of that difference.
+fn uncertainty_s(
+    shots: &[Footprint],
+    radius: ScannedRadius,
+    trajectory: &Trajectory,
+    best_s: f64,
+) -> Option<f64> {
+    let mut residuals_m = Vec::with_capacity(shots.len());
+    let mut rates_m_s = Vec::with_capacity(shots.len());
+    let mut directions: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::with_capacity(shots.len()));
+    let mut orbit_difference_m = Vector3::zeros();
+    let mut sighted_differences_m = Vec::with_capacity(shots.len());
+    for shot in shots {
+        let residual = |correction_s| residual_m(shot, radius, trajectory, correction_s);
+        let change_m = residual(best_s + RATE_STEP_S)? - residual(best_s - RATE_STEP_S)?;
+        residuals_m.push(residual(best_s)?);
+        rates_m_s.push(change_m / (2.0 * RATE_STEP_S));
+        let at = Et::from_seconds(shot.et_tag_s + best_s);
+        let position = trajectory.position(at)?;
+        let to_mars = body_rotation(Body::Mars, at);
+        let to_track = track_axes(&position.xyz_m, &trajectory.velocity_m_s(at)?).transpose()
+            * to_mars.matrix().transpose();
+        let spacecraft = to_mars.apply(&position);
+        let sight_m = spacecraft.xyz_m - footprint(shot, radius_m(shot, radius)).xyz_m;
+        let sight = sight_m.normalize();
+        let direction = to_track * sight;
+        for (axis, component) in directions.iter_mut().zip(&direction) {
+            axis.push(*component);
+        }
+        let difference_m = to_track * (own_spacecraft(shot).xyz_m - spacecraft.xyz_m);
+        orbit_difference_m += difference_m;
+        sighted_differences_m.push(difference_m.yz().dot(&direction.yz()));
+    }
+    let noise_s = Trend::of(&rates_m_s, &residuals_m)?.uncertainty;
+    let mut seconds_per_metre = Vector3::zeros();
+    for (sensitivity, axis) in seconds_per_metre.iter_mut().zip(&directions) {
+        *sensitivity = Trend::of(&rates_m_s, axis)?.slope;
+    }
+    let difference_m = orbit_difference_m / shots.len() as f64;
+    let across_m = difference_m.y.hypot(difference_m.z) / f64::sqrt(2.0);
+    let orbit_s = seconds_per_metre.norm() * across_m;
+    let change_s = match radius {
+        ScannedRadius::Raw => Trend::of(&rates_m_s, &sighted_differences_m)?.slope,
+        // Crossovers have removed it.
+        ScannedRadius::Crossover => 0.0,
+    };
+    Some(noise_s.hypot(orbit_s).hypot(change_s))
+}

@@ -1,0 +1,157 @@
+//! Footprints of one orbit inside one window become a profile, marked where an image was exposed at the same time.
+//!
+//! This is a separate stage, because profiles need footprints and image times, and two stages need profiles.
+
+use std::sync::atomic::AtomicBool;
+
+use serde::{Deserialize, Serialize};
+
+use super::{convert_datum::Converted, tag_times::ImageTimes};
+use areograph_base::{
+    error::Result,
+    footprints::Footprints,
+    frames::BodyFixed,
+    time::{Et, Interval},
+};
+use areograph_config::WindowConfig;
+use areograph_store::{
+    stage::{InOrder, Output, Stage},
+    stage_inputs,
+};
+
+/// Shots of one orbit inside one window, in order of time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Profile {
+    /// `<window>/<orbit>`, with `.2`, `.3` … when the orbit crosses the window again.
+    pub id: String,
+    /// Window identifier.
+    pub window: String,
+    /// Orbit number in the PEDR.
+    pub orbit: u32,
+    /// Rows of the footprints, counted from 0.
+    pub rows: Vec<u32>,
+    /// First and last corrected shot time.
+    pub interval: Interval,
+    /// Images exposed while the profile was measured.
+    pub simultaneous: Vec<SimultaneousImage>,
+}
+
+/// An image that was exposed during a profile.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SimultaneousImage {
+    /// Index of the image.
+    pub image: usize,
+    /// Shots of the profile fired while the image was exposed.
+    pub shots: u32,
+}
+
+impl Profile {
+    /// A pause longer than this starts another profile of the same orbit, seconds.
+    ///
+    /// An orbit crosses a wide window twice, on its day and its night side, tens of minutes apart; clouds and lost
+    /// packets cause gaps of seconds.
+    pub const PAUSE_S: f64 = 300.0;
+}
+
+stage_inputs! {
+    /// Footprints, windows, and the images that may be simultaneous.
+    pub struct GroupProfiles<'a> {
+        /// Footprints in IAU 2000.
+        pub converted: &'a Output<Converted>,
+        /// Windows in the order of the footprints' bits.
+        pub windows: &'a [WindowConfig],
+        /// Line times of the images.
+        pub images: InOrder<'a, Output<ImageTimes>>,
+    }
+}
+
+impl Stage for GroupProfiles<'_> {
+    const NAME: &'static str = "group_profiles";
+    const METHOD: u32 = 2;
+    const CHECKED: bool = true;
+    type Output = Vec<Profile>;
+    stage_inputs!(fingerprint);
+
+    fn run(&self, _stop: &AtomicBool) -> Result<Vec<Profile>> {
+        let images = self.images.0.iter().map(|image| Ok(image.value()?.clone()));
+        let images = images.collect::<Result<Vec<_>>>()?;
+        let footprints = &self.converted.value()?.footprints;
+        Ok(group_profiles(footprints, self.windows, &images))
+    }
+}
+
+/// Groups footprints by window, orbit and pause.
+///
+/// Profiles are in the order of the windows and, within one, of time.
+#[must_use]
+pub fn group_profiles(
+    footprints: &Footprints<BodyFixed>,
+    windows: &[WindowConfig],
+    images: &[ImageTimes],
+) -> Vec<Profile> {
+    let mut profiles = Vec::new();
+    for (bit, window) in windows.iter().enumerate() {
+        let mut rows: Vec<u32> = (0_u32..)
+            .zip(&footprints.windows)
+            .filter(|(_, mask)| *mask >> bit & 1 == 1)
+            .map(|(row, _)| row)
+            .collect();
+        // The sort is stable: shots with equal times stay in file order.
+        rows.sort_by(|a, b| footprints.et_s[*a as usize].total_cmp(&footprints.et_s[*b as usize]));
+        let crossings = rows.chunk_by(|a, b| {
+            let (a, b) = (*a as usize, *b as usize);
+            footprints.orbit[a] == footprints.orbit[b]
+                && footprints.et_s[b] - footprints.et_s[a] <= Profile::PAUSE_S
+        });
+        let first_of_window = profiles.len();
+        for rows in crossings {
+            let orbit = footprints.orbit[rows[0] as usize];
+            let earlier = profiles[first_of_window..]
+                .iter()
+                .filter(|profile: &&Profile| profile.orbit == orbit)
+                .count();
+            profiles.push(profile(footprints, &window.id, earlier, rows, images));
+        }
+    }
+    profiles
+}
+
+fn profile(
+    footprints: &Footprints<BodyFixed>,
+    window: &str,
+    earlier: usize,
+    rows: &[u32],
+    images: &[ImageTimes],
+) -> Profile {
+    let time = |row: &u32| Et::from_seconds(footprints.et_s[*row as usize]);
+    let orbit = footprints.orbit[rows[0] as usize];
+    let suffix = if earlier == 0 {
+        String::new()
+    } else {
+        format!(".{}", earlier + 1)
+    };
+    let simultaneous = images
+        .iter()
+        .enumerate()
+        // Images by the kernels of another spacecraft have no laser.
+        .filter(|(_, image)| image.support.is_some() || image.has_laser())
+        .filter_map(|(index, image)| {
+            let exposures = image.exposures();
+            let before = rows.partition_point(|row| time(row) < exposures.start);
+            let until = rows.partition_point(|row| time(row) <= exposures.stop);
+            let shots = u32::try_from(until - before).unwrap_or(u32::MAX);
+            (shots > 0).then_some(SimultaneousImage {
+                image: index,
+                shots,
+            })
+        })
+        .collect();
+    Profile {
+        id: format!("{window}/{orbit}{suffix}"),
+        window: window.to_owned(),
+        orbit,
+        rows: rows.to_vec(),
+        interval: Interval::new(time(&rows[0]), time(&rows[rows.len() - 1])),
+        simultaneous,
+    }
+}

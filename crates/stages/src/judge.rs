@@ -1,0 +1,220 @@
+//! The verdict on a site: the one place where it is made.
+//!
+//! Reasons, remarks and `checks` come from the same evidence and limits; for every limit the largest use is listed. The
+//! manifest stores them; pages, messages and run comparisons show them and judge nothing.
+
+mod adjustment;
+mod beam;
+mod checks;
+mod ranges;
+mod surface;
+mod untested;
+
+pub use areograph_base::verdict::{Check, CheckKind, CheckOutcome, Verdict};
+pub use beam::BeamEvidence;
+
+use super::{
+    adjust::Adjusted,
+    check_heights::HeightCheck,
+    check_ranges::{BiasScan, RangeCheck},
+    compare_pairs::PairComparison,
+    fit_sensor_model::SensorModel,
+    map_surface::SurfaceAccount,
+    orientation::Orientation,
+    read_ties::Ties,
+    tag_times::{Disagreement, ImageTimes},
+};
+use areograph_base::wording::{Wording, signed, with_minus};
+use areograph_config::{LimitsConfig, OrientationConfig, RangeCheckConfig};
+
+/// The evidence on which a site is judged.
+#[derive(Debug, Clone, Copy)]
+pub struct Evidence<'a> {
+    /// The words of sentences and checks.
+    pub wording: Wording<'a>,
+    /// Footprints in the windows; `None` for a site without PEDR files.
+    pub footprints: Option<usize>,
+    /// The limits of the configuration.
+    pub limits: &'a LimitsConfig,
+    /// Limits on ranges.
+    pub range_limits: &'a RangeCheckConfig,
+    /// Limits on sensor models.
+    pub orientation_limits: &'a OrientationConfig,
+    /// Ranges of every profile.
+    pub ranges: &'a RangeCheck,
+    /// The configured correction of the clock of MOLA, seconds.
+    pub clock_correction_s: f64,
+    /// The images with the orientation of the kernels.
+    pub images: &'a [JudgedImage<'a>],
+    /// The beam of the laser by the attitude of the images.
+    pub beam: BeamEvidence<'a>,
+    /// Faults of the kernels, one sentence each.
+    pub warnings: &'a [String],
+    /// Faults of skipped records, one sentence each.
+    pub complaints: &'a [String],
+    /// The adjustment; `None` for a site without tie points.
+    pub adjustment: Option<AdjustmentEvidence<'a>>,
+    /// The terrain model of a pair; `None` where it is not requested.
+    pub surface: Option<&'a SurfaceAccount>,
+    /// Why there is no adjustment although there are tie points.
+    pub adjustment_failure: Option<&'a str>,
+}
+
+/// An image that is judged.
+#[derive(Debug, Clone, Copy)]
+pub struct JudgedImage<'a> {
+    /// Its line times, with the disagreements of its label, clock and mounting.
+    pub times: &'a ImageTimes,
+    /// Its orientation.
+    pub orientation: &'a Orientation,
+    /// Its sensor models.
+    pub model: &'a SensorModel,
+}
+
+impl<'a> JudgedImage<'a> {
+    /// Identifier.
+    pub(super) fn id(&self) -> &'a str {
+        &self.times.id
+    }
+
+    /// The disagreements that make the site invalid.
+    fn contradictions(&self) -> impl Iterator<Item = &'a Disagreement> {
+        let all = self.times.remarks.iter();
+        all.filter(|of| of.is_beyond_accuracy())
+    }
+}
+
+/// The evidence on an adjustment.
+#[derive(Debug, Clone, Copy)]
+pub struct AdjustmentEvidence<'a> {
+    /// The tie points.
+    pub ties: &'a Ties,
+    /// The adjustment.
+    pub adjusted: &'a Adjusted,
+    /// The images with their adjusted orientation.
+    pub images: &'a [JudgedImage<'a>],
+    /// Every pair with the orientation of the kernels.
+    pub pairs: &'a [PairComparison],
+    /// Every pair with the adjusted orientation.
+    pub adjusted_pairs: &'a [PairComparison],
+    /// Heights of tie points with the orientation of the kernels.
+    pub heights: &'a HeightCheck,
+    /// Heights of the adjusted tie points.
+    pub adjusted_heights: &'a HeightCheck,
+}
+
+/// Judges a site by its limits and by contradictions in its data.
+#[must_use]
+pub fn judge(evidence: &Evidence<'_>) -> Verdict {
+    let mut checks = checks::checks(evidence);
+    for check in &mut checks {
+        check.say(&evidence.wording);
+    }
+    let verdict = Verdict::of(evidence.invalid_because(), evidence.remarks(), checks);
+    let said = |sentence: String| with_minus(&evidence.wording.of(sentence));
+    Verdict {
+        reasons: verdict.reasons.into_iter().map(said).collect(),
+        remarks: verdict.remarks.into_iter().map(said).collect(),
+        untested: untested::untested(evidence).into_iter().map(said).collect(),
+        ..verdict
+    }
+}
+
+impl Evidence<'_> {
+    /// Why the site is invalid, one sentence per reason; empty when it is valid.
+    fn invalid_because(&self) -> Vec<String> {
+        let mut reasons = Vec::new();
+        if self.footprints == Some(0) {
+            reasons.push(
+                "no footprint in any window: check windows and pedr.filter, and that pedr.files are those of the \
+                 site's orbits"
+                    .to_owned(),
+            );
+        }
+        for profile in &self.ranges.profiles {
+            for reason in &profile.invalid_because {
+                reasons.push(format!("profile {}: {reason}", profile.profile));
+            }
+        }
+        reasons.extend(ranges::invalid_because(self));
+        for image in self.images {
+            let of_orientation = image.orientation.invalid_because.iter();
+            let all = image
+                .contradictions()
+                .map(|of| &of.text)
+                .chain(of_orientation);
+            for reason in all.chain(&image.model.invalid_because) {
+                reasons.push(format!("image {}: {reason}", image.id()));
+            }
+        }
+        reasons.extend(beam::invalid_because(self));
+        reasons.extend(
+            self.adjustment
+                .iter()
+                .flat_map(|of| of.invalid_because(self.limits)),
+        );
+        reasons.extend(surface::invalid_because(self));
+        let failed = self.adjustment_failure;
+        reasons.extend(failed.map(|failure| format!("no adjustment: {failure}")));
+        reasons
+    }
+
+    /// Points that the reader must weigh although no limit is broken, one sentence each.
+    fn remarks(&self) -> Vec<String> {
+        let mut remarks = self.warnings.to_vec();
+        match self.complaints {
+            [] => {}
+            [only] => remarks.push(format!("skipped records: {only}")),
+            [first, rest @ ..] => remarks.push(format!(
+                "skipped records: {first} (and {} more)",
+                rest.len()
+            )),
+        }
+        for image in self.images {
+            let notes = image.orientation.notes.iter();
+            remarks.extend(notes.map(|note| format!("image {}: {note}", image.id())));
+        }
+        remarks.extend(ranges::remarks(self));
+        remarks.extend(beam::remarks(self));
+        let configured_s = self.clock_correction_s;
+        for ranges in &self.ranges.profiles {
+            let doubt = ranges
+                .scan
+                .as_ref()
+                .and_then(|scan| doubt(scan, configured_s));
+            remarks.extend(doubt.map(|doubt| format!("profile {}: {doubt}", ranges.profile)));
+        }
+        remarks.extend(
+            self.adjustment
+                .iter()
+                .flat_map(|of| of.remarks(self.limits)),
+        );
+        remarks.extend(surface::remarks(self));
+        remarks
+    }
+}
+
+/// Differences from the configured clock correction below this get no remark, seconds: independent orbits differ by
+/// tens of metres along the track, which the spacecraft covers in this time.
+const CLOCK_DOUBT_S: f64 = 0.02;
+/// The same limit in standard uncertainties; the larger of the two applies.
+const CLOCK_DOUBT_SIGMA: f64 = 5.0;
+
+/// How far a scan with this uncertainty may be from the configured correction, seconds.
+const fn clock_limit_s(uncertainty_s: f64) -> f64 {
+    CLOCK_DOUBT_S.max(CLOCK_DOUBT_SIGMA * uncertainty_s)
+}
+
+/// The contradiction between a scan and the configured correction, if any.
+fn doubt(scan: &BiasScan, configured_s: f64) -> Option<String> {
+    let (best_s, uncertainty_s) = (scan.best_s?, scan.uncertainty_s?);
+    let apart_s = (best_s - configured_s).abs();
+    // Written so that NaN counts.
+    (!(apart_s <= clock_limit_s(uncertainty_s))).then(|| {
+        format!(
+            "its ranges fit a clock correction of {} ± {uncertainty_s:.4} s, not the configured {} s",
+            signed(best_s, 4),
+            signed(configured_s, 3)
+        )
+    })
+}

@@ -1,0 +1,402 @@
+//! How an adjustment is judged: by MOLA first, then by agreement between the images, then by a priori values.
+
+use std::collections::BTreeSet;
+
+use super::{AdjustmentEvidence, JudgedImage};
+use crate::{
+    adjust::{CorrectedImage, HEIGHTS_MIN, HeightSummary, ObservationType, PointKind, TypeSummary},
+    compare_pairs::PairComparison,
+};
+use areograph_base::{footprints::AdjustmentModel, wording::signed};
+use areograph_config::LimitsConfig;
+use areograph_geom::bundle::Unknown;
+
+/// Mean heights with a larger standard deviation than this, metres, are hardly controlled.
+pub(super) const HEIGHT_LOOSE_M: f64 = 20.0;
+/// Craters between the profiles make outliers of a smaller share of the tie points than this.
+pub(super) const HEIGHT_OUTLIERS_FEW: f64 = 0.03;
+/// A larger share of laser spots beyond their limit is not due to chance, which leaves one in a thousand there.
+const SPOTS_BEYOND_FEW: f64 = 0.05;
+/// A mean height within this many of its standard deviations is no contradiction.
+const HEIGHT_SIGMAS: f64 = 3.0;
+
+impl AdjustmentEvidence<'_> {
+    /// Why the adjusted orientation is invalid, one sentence per reason: MOLA first, then agreement between the images,
+    /// then a priori values.
+    pub(super) fn invalid_because(&self, limits: &LimitsConfig) -> Vec<String> {
+        let mut invalid = self.heights_off(limits);
+        let reasons = |image: &JudgedImage| -> Vec<String> {
+            let id = image.id();
+            // Faults of the orientation of the kernels are reported with it.
+            let of_model = image.model.invalid_because.iter();
+            of_model
+                .map(|reason| format!("adjusted image {id}: {reason}"))
+                .collect()
+        };
+        invalid.extend(self.images.iter().flat_map(reasons));
+        let (left_out, ties) = (self.left_out(), self.ties.multi_image());
+        if 2 * left_out > ties {
+            invalid.push(format!(
+                "adjustment: {left_out} of {ties} tie points were rejected; ties.parquet states why"
+            ));
+        }
+        let rounds = [
+            ("before", self.pairs, limits.parallax_before_max_m),
+            ("after", self.adjusted_pairs, limits.parallax_after_max_m),
+        ];
+        let parted = self.parted();
+        if !parted.is_empty() {
+            invalid.push(format!(
+                "no tie point of {} took part in the adjustment: check their labels, and the tie points in ties.parquet",
+                parted.join("; ")
+            ));
+        }
+        let heights = self.adjusted.heights.iter();
+        let spread = heights.filter(|of| !(of.beyond_share() <= limits.height_outliers_max));
+        invalid.extend(spread.map(heights_beyond));
+        for (round, pairs, limit_m) in rounds {
+            for pair in pairs.iter().filter(|pair| !is_together(pair, limit_m)) {
+                invalid.push(format!(
+                    "tie points of {} and {} lie {:.1} m apart along the flight {round} the adjustment, expected at most \
+                     {limit_m} m",
+                    pair.images[0], pair.images[1], pair.along_track_parallax_m
+                ));
+            }
+        }
+        invalid.extend(self.corrected_too_far(limits));
+        invalid.extend(self.laser_elsewhere(limits));
+        invalid
+    }
+
+    /// A laser that contradicts its mounting or its profile.
+    fn laser_elsewhere(&self, limits: &LimitsConfig) -> Option<String> {
+        let boresight = self.adjusted.boresight.as_ref()?.as_ref().ok()?;
+        let (unknown, sigmas) = boresight.farthest.as_ref()?;
+        let limit = limits.correction_max_sigma;
+        // Written so that NaN counts.
+        (!(*sigmas <= limit)).then(|| {
+            format!(
+                "laser and images contradict each other: the {unknown} is off by {sigmas:.1} standard deviations, expected at \
+                 most {limit}; check beam.bus of the altimeter, mola_clock and the times of the images, or leave out \
+                 adjustment.common_bus"
+            )
+        })
+    }
+
+    /// Images without laser control, where `adjustment.common_bus` is set.
+    fn laser_missing(&self) -> Option<String> {
+        match self.adjusted.boresight.as_ref()? {
+            Err(reason) => Some(format!("adjustment.common_bus did nothing: {reason}")),
+            Ok(boresight) if !boresight.without.is_empty() => Some(format!(
+                "adjustment.common_bus does not control {}: no shot of a profile falls within their exposure",
+                boresight.without.join(", ")
+            )),
+            Ok(_) => None,
+        }
+    }
+
+    /// The laser spots in the images, if so many do not fit that some shots must be wrong.
+    pub(super) fn spots_beyond(&self) -> Option<&TypeSummary> {
+        let mut types = self.adjusted.summary.types.iter();
+        let spots = types.find(|of| of.kind == ObservationType::LaserSpot)?;
+        let few = SPOTS_BEYOND_FEW * spots.observations as f64;
+        (spots.beyond_limit as f64 > few).then_some(spots)
+    }
+
+    /// Spots that do not fit.
+    fn spots_spoiled(&self) -> Option<String> {
+        self.spots_beyond().map(|spots| {
+            format!(
+                "{} of {} image coordinates of laser spots exceed 3.29 of their standard deviations: some shots are \
+                 recorded at a wrong place, or profiles and line times are worse than configured",
+                spots.beyond_limit, spots.observations
+            )
+        })
+    }
+
+    /// The limit on heights after the adjustment, at least `HEIGHT_SIGMAS` standard deviations of their mean.
+    pub(super) fn height_after_max_m(&self, limits: &LimitsConfig) -> f64 {
+        let by_chance_m = HEIGHT_SIGMAS * self.adjusted_heights.mean_sigma_m;
+        limits.height_after_max_m.max(by_chance_m)
+    }
+
+    /// Contradictions between MOLA and the heights of tie points.
+    fn heights_off(&self, limits: &LimitsConfig) -> Vec<String> {
+        let after_max_m = self.height_after_max_m(limits);
+        let rounds = [
+            ("before", self.heights, limits.height_before_max_m),
+            ("after", self.adjusted_heights, after_max_m),
+        ];
+        let mut reasons = Vec::new();
+        for (round, check, limit_m) in rounds {
+            // Written so that NaN counts.
+            if check.surface.is_ok() && !(check.above_m.median.abs() <= limit_m) {
+                reasons.push(format!(
+                    "tie points lie {} m from the MOLA surface {round} the adjustment (median of {}), expected at most \
+                     {limit_m:.1} m",
+                    signed(check.above_m.median, 1),
+                    check.above_m.n
+                ));
+            }
+        }
+        if let Some(apart) = &self.heights.apart {
+            let (sigmas, limit) = (apart.sigmas(), apart.limit(limits.profiles_apart_max_sigma));
+            if !(sigmas <= limit) {
+                reasons.push(format!(
+                    "profiles {} and {} contradict each other: at the tie points their surfaces lie {:.1} m apart on \
+                     average, {sigmas:.1} standard deviations, expected at most {limit:.1}",
+                    apart.profiles[0],
+                    apart.profiles[1],
+                    apart.mean_m.abs(),
+                ));
+            }
+        }
+        reasons
+    }
+
+    /// Remarks on heights that MOLA controls, but not well.
+    fn heights_loose(&self, limits: &LimitsConfig) -> Vec<String> {
+        let Some(heights) = &self.adjusted.heights else {
+            return Vec::new();
+        };
+        let mut remarks = Vec::new();
+        if !heights.settled {
+            remarks.push(
+                "heights of tie points, and the MOLA surface under them, had not converged when the adjustment ended: \
+                 they are less certain than stated"
+                    .to_owned(),
+            );
+        }
+        let [_, _, up_m] = heights.mean_sigma_m;
+        if !(up_m <= HEIGHT_LOOSE_M) {
+            remarks.push(format!(
+                "MOLA controls heights to ±{up_m:.0} m only: the tie points lie far from its shots, or the a priori σ in \
+                 mola_surface is large"
+            ));
+        }
+        let share = heights.beyond_share();
+        if share > HEIGHT_OUTLIERS_FEW && share <= limits.height_outliers_max {
+            remarks.push(heights_beyond(heights));
+        }
+        if heights.compared < HEIGHTS_MIN {
+            remarks.push(format!(
+                "{} tie points are too few to search for blunders by their heights",
+                heights.compared
+            ));
+        }
+        remarks
+    }
+
+    /// The largest correction of each image in its standard deviations: image, unknown, correction.
+    pub(super) fn largest_corrections(&self) -> impl Iterator<Item = (&str, Unknown, f64)> {
+        let largest = |image: &CorrectedImage| -> Option<(f64, usize)> {
+            let off = image.correction.iter().zip(&image.expected);
+            let off = off.map(|(value, expected)| value - expected);
+            let corrections = off.zip(&image.prior_sigmas).enumerate();
+            let known = corrections.filter(|(_, (_, sigma))| **sigma > 0.0 && sigma.is_finite());
+            let sigmas = known.map(|(index, (value, sigma))| ((value / sigma).abs(), index));
+            sigmas.max_by(|one, other| one.0.total_cmp(&other.0))
+        };
+        self.adjusted.images.iter().filter_map(move |image| {
+            let (sigmas, coefficient) = largest(image)?;
+            let unknown = Unknown::Orientation {
+                image: 0,
+                coefficient,
+            };
+            Some((&*image.id, unknown, sigmas))
+        })
+    }
+
+    /// Corrections of orientations beyond what their a priori standard deviations allow.
+    fn corrected_too_far(&self, limits: &LimitsConfig) -> Vec<String> {
+        let far = self
+            .largest_corrections()
+            .filter(|(_, _, sigmas)| !(*sigmas <= limits.correction_max_sigma));
+        let far = far.map(|(image, unknown, sigmas)| {
+            format!(
+                "image {image}: the adjustment corrects its {} by {sigmas:.1} standard deviations, expected at most {}; check \
+                 its time, its kernels and pointing.ck_bias_s",
+                unknown.quantity(),
+                limits.correction_max_sigma
+            )
+        });
+        far.collect()
+    }
+
+    /// Tie points that took part in the adjustment.
+    pub(super) fn taken(&self) -> usize {
+        let points = self.adjusted.points.iter();
+        points.filter(|point| point.kind == PointKind::Tie).count()
+    }
+
+    /// Tie points that join images, but took no part.
+    pub(super) fn left_out(&self) -> usize {
+        self.ties.multi_image().saturating_sub(self.taken())
+    }
+
+    /// Standard deviation of unit weight of tie points along and across the track; `None` where they fit, but without
+    /// redundancy.
+    pub(super) fn axes(&self) -> impl Iterator<Item = Option<f64>> {
+        let summary = &self.adjusted.summary;
+        let kinds = [ObservationType::TieAlong, ObservationType::TieAcross];
+        kinds
+            .into_iter()
+            .zip(summary.tie_components)
+            .map(|(kind, found)| {
+                let of_kind = summary.types.iter().find(|of| of.kind == kind);
+                let is_untested = found <= 1.0 && of_kind.is_none_or(|of| of.redundancy < 1.0);
+                (!is_untested).then_some(found)
+            })
+    }
+
+    /// Kinds of observation other than tie points with enough redundancy for a test.
+    pub(super) fn other_components(&self) -> impl Iterator<Item = &TypeSummary> {
+        let types = self.adjusted.summary.types.iter();
+        let others = types.filter(|of| {
+            !matches!(
+                of.kind,
+                ObservationType::TieAlong | ObservationType::TieAcross
+            )
+        });
+        others.filter(|of| of.variance_component_limits[1] > 0.0)
+    }
+
+    /// Those whose residuals are larger than chance explains.
+    fn components_above(&self) -> impl Iterator<Item = String> {
+        let above = self.other_components().filter(|of| of.is_above_chance());
+        above.map(|of| {
+            let [_, most] = of.variance_component_limits;
+            format!(
+                "residuals of {} are {:.2} times their a priori standard deviations, by chance at most {most:.2}: these are too \
+                 small, or a model does not hold",
+                of.kind.words(),
+                of.variance_component
+            )
+        })
+    }
+
+    /// Images without a tie point in the adjustment.
+    pub(super) fn untied(&self) -> Vec<String> {
+        let views = self.adjusted.views.iter();
+        let ties = views.filter(|view| view.kind == PointKind::Tie);
+        let tied: BTreeSet<usize> = ties.map(|view| view.image).collect();
+        let images = self.adjusted.images.iter().enumerate();
+        images
+            .filter(|(index, _)| !tied.contains(index))
+            .map(|(_, image)| image.id.clone())
+            .collect()
+    }
+
+    /// Pairs of images with tie points of which none took part.
+    pub(super) fn parted(&self) -> Vec<String> {
+        let is_adjusted = |pair: &PairComparison| {
+            self.adjusted_pairs
+                .iter()
+                .any(|of| of.images == pair.images)
+        };
+        let pairs = self.pairs.iter().filter(|pair| !is_adjusted(pair));
+        pairs.map(|pair| pair.images.join(" and ")).collect()
+    }
+
+    /// Whether the images of every pair place tie points together after the adjustment, and most of these took
+    /// part in it.
+    #[must_use]
+    pub fn images_agree(&self, limits: &LimitsConfig) -> bool {
+        let limit_m = limits.parallax_after_max_m;
+        2 * self.left_out() <= self.ties.multi_image()
+            && !self.adjusted_pairs.is_empty()
+            && self
+                .adjusted_pairs
+                .iter()
+                .all(|pair| is_together(pair, limit_m))
+    }
+
+    /// Points that the reader must weigh, one sentence each.
+    pub(super) fn remarks(&self, limits: &LimitsConfig) -> Vec<String> {
+        let mut remarks = Vec::new();
+        let both = self.heights.surface.as_ref();
+        match both.and(self.adjusted_heights.surface.as_ref()) {
+            Err(reason) => remarks.push(format!(
+                "heights of tie points are not controlled by MOLA ({reason}): they are only as accurate as the a \
+                 priori orbit and attitude"
+            )),
+            Ok(_) => remarks.extend(self.heights_loose(limits)),
+        }
+        if self.adjusted.summary.model == AdjustmentModel::Published {
+            remarks.push(
+                "the adjustment follows the published model (adjustment.model): its heights are not controlled, and \
+                 its standard deviations state only the agreement between the images; across the track it departs from the \
+                 paper (decision 0010)"
+                    .to_owned(),
+            );
+        }
+        if self.adjusted.attitude_clock_s.is_some() {
+            remarks.push(
+                "positions depend on adjustment.attitude_clock, an interpretation of the disagreement between the \
+                 images that no measurement tests; the report gives the other interpretation beside it"
+                    .to_owned(),
+            );
+        }
+        if matches!(self.adjusted.boresight, Some(Ok(_))) {
+            remarks.push(
+                "across-track positions depend on adjustment.common_bus, which assumes that footprints do not carry \
+                 the attitude error of these kernels: PEDR files made with the same attitude would agree with them \
+                 whatever its error"
+                    .to_owned(),
+            );
+        }
+        remarks.extend(self.laser_missing());
+        remarks.extend(self.spots_spoiled());
+        let (left_out, ties) = (self.left_out(), self.ties.multi_image());
+        let share = limits.rejected_share_max;
+        if left_out as f64 > share * ties as f64 && 2 * left_out <= ties {
+            remarks.push(format!(
+                "{left_out} of {ties} tie points were rejected by the adjustment; ties.parquet states why"
+            ));
+        }
+        let taken = self.taken();
+        if taken < limits.ties_min as usize {
+            remarks.push(format!(
+                "only {taken} tie points took part in the adjustment, expected at least {}",
+                limits.ties_min
+            ));
+        }
+        for (found, axis) in self.axes().zip(["along", "across"]) {
+            match found {
+                // Written so that NaN counts.
+                Some(found) if !(found <= limits.sigma0_max) => remarks.push(format!(
+                    "residuals of the tie points {axis} the track are {found:.2} times what adjustment.tie_sigma_px expects: \
+                     measurements are worse than configured, or a model does not hold"
+                )),
+                Some(_) => {}
+                None => remarks.push(format!(
+                    "tie points have no redundancy {axis} the track: blunders there go undetected"
+                )),
+            }
+        }
+        remarks.extend(self.components_above());
+        for image in self.untied() {
+            remarks.push(format!(
+                "image {image} has no tie point in the adjustment: no measurement in it tests or corrects its orientation"
+            ));
+        }
+        remarks
+    }
+}
+
+fn is_together(pair: &PairComparison, limit_m: f64) -> bool {
+    // Written so that NaN counts as apart.
+    pair.along_track_parallax_m.abs() <= limit_m
+}
+
+fn heights_beyond(heights: &HeightSummary) -> String {
+    let rejected = match heights.rejected {
+        0 => String::new(),
+        count => format!(", {count} more were rejected for this reason"),
+    };
+    format!(
+        "{} of {} tie points lie farther from the MOLA surface than their standard deviations allow{rejected}: \
+         across-track measurement errors shift heights by more than stated; height_check.parquet lists them",
+        heights.beyond_limit, heights.compared
+    )
+}

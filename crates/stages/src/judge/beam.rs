@@ -1,0 +1,335 @@
+//! How the attitude of images is judged: by the beam of a laser on the same bus, and by the place of its footprints.
+
+use super::{
+    Check, CheckKind,
+    CheckOutcome::{self, Fail, Pass, Warning},
+    Evidence,
+};
+use crate::check_beam::{Beam, ImageBeam};
+use areograph_base::{units::METRES_PER_KM, wording::signed};
+use areograph_config::{AdjustmentConfig, MolaSurfaceConfig};
+use areograph_geom::statistics::BAARDA_LIMIT;
+
+/// Milliradians in a radian.
+const PER_MILLI: f64 = 1e3;
+/// At least this share of the footprints that the mountings place in an image must lie in it.
+const INSIDE_SHARE_MIN: f64 = 0.5;
+/// Support data may contain apparent positions, up to this far from geometric ones, metres.
+const APPARENT_M: f64 = 330.0;
+/// Images whose middles are closer in time are of one pass, seconds: they share the error of the attitude and the profile.
+const PASS_S: f64 = 600.0;
+/// Fewer expected footprints do not test an orientation.
+const EXPECTED_MIN: u32 = 5;
+
+/// The evidence of the laser's beam.
+#[derive(Debug, Clone, Copy)]
+pub struct BeamEvidence<'a> {
+    /// The images with the orientation of the kernels.
+    pub images: &'a [ImageBeam],
+    /// A priori standard deviations of attitude and boresight.
+    pub adjustment: &'a AdjustmentConfig,
+    /// That of the position of a profile in plan.
+    pub surface: &'a MolaSurfaceConfig,
+}
+
+/// The two axes of the bus.
+const AXES: [(CheckKind, &str); 2] = [
+    (CheckKind::BeamAlong, "along the track"),
+    (CheckKind::BeamAcross, "across the track"),
+];
+
+/// A beam along one axis, of an image or on average over all, with its standard deviation.
+struct Deviation {
+    axis: usize,
+    /// Images.
+    subjects: Vec<String>,
+    shots: u32,
+    angle_rad: f64,
+    sigma_rad: f64,
+    range_m: f64,
+}
+
+impl Deviation {
+    fn outcome(&self, limit_sigma: f64) -> CheckOutcome {
+        let sigmas = self.angle_rad.abs() / self.sigma_rad;
+        // Written so that NaN counts.
+        if !(sigmas <= limit_sigma) {
+            Fail
+        } else if !(sigmas <= BAARDA_LIMIT) {
+            Warning
+        } else {
+            Pass
+        }
+    }
+
+    fn subject(&self) -> String {
+        match &*self.subjects {
+            [one] => one.clone(),
+            all => format!("mean of {} images", all.len()),
+        }
+    }
+
+    fn check(&self, limit_sigma: f64) -> Check {
+        let [angle, limit] =
+            [self.angle_rad, limit_sigma * self.sigma_rad].map(|rad| PER_MILLI * rad);
+        let kind = AXES[self.axis].0;
+        let mut check = Check::new(kind, self.subject(), angle, limit, Fail);
+        check.outcome = self.outcome(limit_sigma);
+        check
+    }
+
+    /// One sentence; `limit` states the limit.
+    fn text(&self, limit: &str) -> String {
+        let images = match &*self.subjects {
+            [one] => format!("image {one}"),
+            all => format!("images {}, on average", all.join(" and ")),
+        };
+        let ground_m = self.angle_rad.abs() * self.range_m;
+        let ground = if ground_m < METRES_PER_KM {
+            format!("{ground_m:.0} m")
+        } else {
+            format!("{:.1} km", ground_m / METRES_PER_KM)
+        };
+        format!(
+            "{images}: the beam of MOLA in the PEDR lies {} mrad {} from its mounting by the attitude of the kernels, {ground} \
+             on the ground ({} shots), {limit}",
+            signed(PER_MILLI * self.angle_rad, 2),
+            AXES[self.axis].1,
+            self.shots
+        )
+    }
+}
+
+impl BeamEvidence<'_> {
+    fn beams(&self) -> impl Iterator<Item = (&ImageBeam, &Beam)> {
+        let images = self.images.iter();
+        images.filter_map(|image| Some((image, image.beam.as_ref().ok()?)))
+    }
+
+    /// Whether the beam tests the attitude of the image with this identifier.
+    pub(super) fn tests(&self, image: &str) -> bool {
+        let tested = |(of, beam): (&ImageBeam, &Beam)| {
+            of.image == image && self.own_sigmas_rad(of, beam).iter().all(|s| s.is_finite())
+        };
+        self.beams().any(tested)
+    }
+
+    /// Standard deviations along and across the track of what is of one image: its attitude and its profile in plan.
+    fn own_sigmas_rad(&self, image: &ImageBeam, beam: &Beam) -> [f64; 2] {
+        let own = self
+            .adjustment
+            .images
+            .iter()
+            .find(|of| of.id == image.image);
+        let of_camera = own.and_then(|of| of.rotation_rad);
+        // About Y of the camera the beam moves along the track, about X across it.
+        let attitude_rad = of_camera.map_or([self.adjustment.rotation_sigma_rad[0]; 2], |sigmas| {
+            [sigmas[3], sigmas[0]]
+        });
+        let plan_rad = self.surface.profile_plan_sigma_m / beam.range_m;
+        attitude_rad.map(|rad| rad.hypot(plan_rad))
+    }
+
+    /// Those of what all images share: the boresight, and along the track the clocks of attitude and altimeter.
+    fn common_sigmas_rad(&self, turn_rad_s: f64, clock_s: f64) -> [f64; 2] {
+        let boresight_rad = self.adjustment.boresight_sigma_rad;
+        let attitude_s = if self.adjustment.attitude_clock {
+            self.adjustment.attitude_clock_sigma_s
+        } else {
+            0.0
+        };
+        let clocks_rad = turn_rad_s * clock_s.hypot(attitude_s);
+        [boresight_rad.hypot(clocks_rad), boresight_rad]
+    }
+
+    /// The images that the beam tests, by pass.
+    fn passes(&self) -> Vec<Vec<(&ImageBeam, &Beam)>> {
+        let mut passes: Vec<Vec<(&ImageBeam, &Beam)>> = Vec::new();
+        for (image, beam) in self.beams().filter(|(of, _)| self.tests(&of.image)) {
+            let at_s = beam.middle_et_s;
+            let mut known = passes.iter_mut();
+            match known.find(|pass| (pass[0].1.middle_et_s - at_s).abs() <= PASS_S) {
+                Some(pass) => pass.push((image, beam)),
+                None => passes.push(vec![(image, beam)]),
+            }
+        }
+        passes
+    }
+
+    /// Every image along both axes, then the mean of all passes.
+    fn deviations(&self) -> Vec<Deviation> {
+        let passes = self.passes();
+        let count = passes.len() as f64;
+        let mut deviations = Vec::new();
+        for axis in 0..AXES.len() {
+            let (mut variance, mut common_rad) = (0.0_f64, 0.0_f64);
+            let mut mean = Deviation {
+                axis,
+                subjects: Vec::new(),
+                shots: 0,
+                angle_rad: 0.0,
+                sigma_rad: 0.0,
+                range_m: 0.0,
+            };
+            for pass in &passes {
+                let share = 1.0 / (count * pass.len() as f64);
+                let mut largest_rad = 0.0_f64;
+                for (image, beam) in pass {
+                    let own_rad = self.own_sigmas_rad(image, beam)[axis];
+                    let shared_rad = self.common_sigmas_rad(beam.turn_rad_s, beam.clock_s)[axis];
+                    largest_rad = largest_rad.max(own_rad);
+                    common_rad = common_rad.max(shared_rad);
+                    mean.subjects.push(image.image.clone());
+                    mean.shots += beam.shots;
+                    mean.angle_rad += share * beam.angles_rad[axis];
+                    mean.range_m += share * beam.range_m;
+                    deviations.push(Deviation {
+                        axis,
+                        subjects: vec![image.image.clone()],
+                        shots: beam.shots,
+                        angle_rad: beam.angles_rad[axis],
+                        sigma_rad: own_rad.hypot(shared_rad),
+                        range_m: beam.range_m,
+                    });
+                }
+                variance += largest_rad * largest_rad;
+            }
+            if passes.len() > 1 {
+                mean.sigma_rad = (variance.sqrt() / count).hypot(common_rad);
+                deviations.push(mean);
+            }
+        }
+        deviations
+    }
+
+    /// Images whose footprints test the orientation: image, footprints inside, the least number expected.
+    fn places(&self) -> impl Iterator<Item = (&ImageBeam, &Beam, f64)> {
+        let tested = self
+            .beams()
+            .filter(|(_, of)| of.expected_inside >= EXPECTED_MIN);
+        tested.map(|(image, of)| {
+            let least = (INSIDE_SHARE_MIN * f64::from(of.expected_inside)).ceil();
+            (image, of, least)
+        })
+    }
+}
+
+/// Images of support data with the distance of their position from the spacecraft of the altimeter's file, metres, and
+/// the limit.
+fn support_positions<'a>(evidence: &'a Evidence<'_>) -> impl Iterator<Item = (&'a str, f64, f64)> {
+    let limit_m = APPARENT_M + evidence.range_limits.orbit_max_m;
+    let images = evidence.images.iter();
+    let of_support = images.filter(|image| image.times.support.is_some());
+    of_support.filter_map(move |image| {
+        let mut beams = evidence.beam.beams();
+        let (_, beam) = beams.find(|(of, _)| of.image == image.id())?;
+        Some((image.id(), beam.apart_m, limit_m))
+    })
+}
+
+pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
+    let (beam, limit_sigma) = (&evidence.beam, evidence.limits.correction_max_sigma);
+    let deviations = beam.deviations();
+    let of_axis = |axis: usize| {
+        let such = deviations.iter().filter(|of| of.axis == axis);
+        Check::worst(such.map(|of| of.check(limit_sigma)))
+    };
+    let inside = beam.places().map(|(image, of, least)| {
+        let kind = CheckKind::FootprintsInside;
+        Check::new(kind, &*image.image, f64::from(of.inside), least, Fail)
+    });
+    let meets = evidence.images.iter().map(|image| {
+        let samples = &image.orientation.samples;
+        let met = samples.iter().filter(|of| of.boresight.is_some()).count();
+        let broken = if met == 0 { Fail } else { Warning };
+        let kind = CheckKind::BoresightMeets;
+        Check::new(kind, image.id(), met as f64, samples.len() as f64, broken)
+    });
+    let positions = support_positions(evidence).map(|(image, apart_m, limit_m)| {
+        Check::new(CheckKind::SupportPosition, image, apart_m, limit_m, Fail)
+    });
+    let all = [
+        Check::worst(positions),
+        of_axis(0),
+        of_axis(1),
+        Check::worst(inside),
+        Check::worst(meets),
+    ];
+    all.into_iter().flatten().collect()
+}
+
+/// Attitudes that contradict the laser or miss the body, one sentence each.
+pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
+    let limit_sigma = evidence.limits.correction_max_sigma;
+    let deviations = evidence.beam.deviations();
+    let far = deviations
+        .iter()
+        .filter(|of| of.outcome(limit_sigma) == Fail);
+    let mut reasons: Vec<String> = far
+        .map(|of| {
+            let limit = PER_MILLI * limit_sigma * of.sigma_rad;
+            of.text(&format!(
+                "expected at most {limit:.2} mrad; check the C-kernels, pointing.ck_bias_s, mola_clock, and that the shots are \
+                 of this orbit"
+            ))
+        })
+        .collect();
+    for (image, of, least) in evidence.beam.places() {
+        if f64::from(of.inside) < least {
+            reasons.push(format!(
+                "image {}: {} of {} simultaneous footprints lie in it by the kernels, where the mountings of camera and laser \
+                 place all of them, expected at least {least:.0}; check attitude, frames and times",
+                image.image, of.inside, of.expected_inside
+            ));
+        }
+    }
+    for (image, apart_m, limit_m) in support_positions(evidence) {
+        // Written so that NaN counts.
+        if !(apart_m <= limit_m) {
+            reasons.push(format!(
+                "image {image}: its support data place the spacecraft {apart_m:.0} m from its position in the PEDR, expected \
+                 at most {limit_m:.0} m; check that they are those of this image, and their frame"
+            ));
+        }
+    }
+    let blind = evidence.images.iter().filter(|image| {
+        let samples = &image.orientation.samples;
+        samples.iter().all(|of| of.boresight.is_none())
+    });
+    reasons.extend(blind.map(|image| {
+        format!(
+            "image {}: its boresight misses the ellipsoid; check attitude and frames",
+            image.id()
+        )
+    }));
+    reasons
+}
+
+/// What the reader must weigh of the attitude, one sentence each.
+pub(super) fn remarks(evidence: &Evidence<'_>) -> Vec<String> {
+    let limit_sigma = evidence.limits.correction_max_sigma;
+    let deviations = evidence.beam.deviations();
+    let doubtful = deviations
+        .iter()
+        .filter(|of| of.outcome(limit_sigma) == Warning);
+    let mut remarks: Vec<String> = doubtful
+        .map(|of| {
+            let sigmas = of.angle_rad.abs() / of.sigma_rad;
+            of.text(&format!(
+                "{sigmas:.1} standard deviations: the position is less certain than stated"
+            ))
+        })
+        .collect();
+    for image in evidence.images {
+        let samples = &image.orientation.samples;
+        let missed = samples.iter().filter(|of| of.boresight.is_none()).count();
+        if missed > 0 && missed < samples.len() {
+            remarks.push(format!(
+                "image {}: its boresight misses the ellipsoid at {missed} of {} epochs",
+                image.id(),
+                samples.len()
+            ));
+        }
+    }
+    remarks
+}

@@ -1,0 +1,85 @@
+//! How the ranges of a site are judged as a whole: by its profiles that are long enough, where the spacecraft is known.
+
+use super::Evidence;
+use crate::check_ranges::ProfileRanges;
+use areograph_base::wording::signed;
+use areograph_config::RangeCheckConfig;
+
+/// Short profiles named in a remark; all are counted.
+const NAMED_MAX: usize = 3;
+
+impl Evidence<'_> {
+    /// Whether any range is compared with a position of the spacecraft.
+    pub(super) fn is_tested(&self) -> bool {
+        self.ranges.profiles.iter().any(ProfileRanges::is_tested)
+    }
+}
+
+/// A site none of whose profiles is long enough to be judged.
+pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Option<String> {
+    let (profiles, limits) = (&evidence.ranges.profiles, evidence.range_limits);
+    let longest = profiles.iter().max_by_key(|of| of.shots)?;
+    (evidence.is_tested() && !longest.is_judged(limits)).then(|| {
+        format!(
+            "no profile is long enough to be judged: the longest, {}, has {} shots; limit at least {}",
+            longest.profile, longest.shots, limits.shots_min
+        )
+    })
+}
+
+/// Profiles that are not judged or not tested.
+pub(super) fn remarks(evidence: &Evidence<'_>) -> Vec<String> {
+    let (profiles, limits) = (&evidence.ranges.profiles, evidence.range_limits);
+    let mut remarks = Vec::new();
+    let untested = profiles.iter().filter(|of| !of.is_tested()).count();
+    if untested > 0 {
+        let whose = if untested == profiles.len() {
+            "The range check tests nothing".to_owned()
+        } else {
+            format!(
+                "The range check does not test {untested} of {} profiles",
+                profiles.len()
+            )
+        };
+        remarks.push(format!(
+            "{whose}: the tables have no position of the spacecraft, and no kernels cover the shots"
+        ));
+    }
+    let short: Vec<&ProfileRanges> = profiles.iter().filter(|of| !of.is_judged(limits)).collect();
+    if !short.is_empty() && short.len() < profiles.len() {
+        let shots: u32 = short.iter().map(|of| of.shots).sum();
+        let named = short.iter().take(NAMED_MAX).map(|of| &*of.profile);
+        let more = if short.len() > NAMED_MAX { ", …" } else { "" };
+        remarks.push(format!(
+            "profiles of fewer than {} shots, which are not judged: {} with {shots} shots ({}{more})",
+            limits.shots_min,
+            short.len(),
+            named.collect::<Vec<_>>().join(", ")
+        ));
+    }
+    remarks.extend(profiles.iter().filter_map(|of| far_off(of, limits)));
+    remarks
+}
+
+/// A profile whose mean is beyond the limit, but does not make the site invalid: it is too short, or its radii are corrected
+/// by crossovers.
+fn far_off(of: &ProfileRanges, limits: &RangeCheckConfig) -> Option<String> {
+    let mean_m = of.mean_without_outliers_m;
+    let why = if of.is_judged(limits) {
+        "radii corrected by crossovers"
+    } else {
+        "not judged"
+    };
+    let is_open = of.invalid_because.is_empty()
+        && (!of.is_judged(limits) || of.mean_max_m(limits) > limits.mean_max_m);
+    // Written so that NaN counts.
+    (is_open && of.measured() > 0 && !(mean_m.abs() <= limits.mean_max_m)).then(|| {
+        format!(
+            "profile {}, {why}: mean of range − distance {} m by {} shots; limit ±{} m",
+            of.profile,
+            signed(mean_m, 3),
+            of.measured(),
+            limits.mean_max_m
+        )
+    })
+}

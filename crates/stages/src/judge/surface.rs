@@ -1,0 +1,134 @@
+//! How a terrain model is judged: by the share of the ground that it covers, and by the altimeter.
+
+use super::{
+    Check, CheckKind,
+    CheckOutcome::{Fail, Warning},
+    Evidence,
+};
+use crate::map_surface::SurfaceAccount;
+use areograph_base::wording::signed;
+
+/// A mean height within this many of its standard deviations is no contradiction.
+const HEIGHT_SIGMAS: f64 = 3.0;
+/// Fewer shots do not validate a model.
+const SHOTS_MIN: u32 = 10;
+
+/// How far the median of the shots may lie from a model, metres.
+fn height_max_m(evidence: &Evidence<'_>, surface: &SurfaceAccount) -> f64 {
+    let limits = evidence.limits;
+    match (surface.common_sigma_m, &evidence.adjustment) {
+        (Some(common_m), _) => limits.height_after_max_m.max(HEIGHT_SIGMAS * common_m),
+        // No adjustment has brought the images closer to the shots.
+        _ => limits.height_before_max_m,
+    }
+}
+
+const fn has_shots(surface: &SurfaceAccount) -> bool {
+    surface.shots.above_m.n >= SHOTS_MIN
+}
+
+pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
+    let Some(surface) = evidence.surface else {
+        return Vec::new();
+    };
+    let limits = evidence.limits;
+    let share = if surface.is_refused {
+        0.0
+    } else {
+        surface.filled_share()
+    };
+    let least = limits.surface_filled_min;
+    let mut filled = Check::of_share(CheckKind::SurfaceFilled, "", share, least, Fail);
+    if surface.is_refused {
+        filled.outcome = Fail;
+        return vec![filled];
+    }
+    let of_shots = if has_shots(surface) {
+        let subject = if surface.shots_take_part {
+            "MOLA takes part"
+        } else {
+            ""
+        };
+        let shots = &surface.shots;
+        let height_max_m = height_max_m(evidence, surface);
+        let spread_max = limits.surface_spread_max_sigma;
+        [
+            (
+                CheckKind::SurfaceHeight,
+                subject,
+                shots.above_m.median,
+                height_max_m,
+            ),
+            (
+                CheckKind::SurfaceSpread,
+                "",
+                shots.spread_sigmas,
+                spread_max,
+            ),
+        ]
+        .map(|(kind, subject, value, limit)| Check::new(kind, subject, value, limit, Fail))
+        .into()
+    } else {
+        vec![Check::told(
+            CheckKind::SurfaceHeight,
+            "too few shots on it",
+            Warning,
+        )]
+    };
+    std::iter::once(filled).chain(of_shots).collect()
+}
+
+/// Why a terrain model makes its site invalid, one sentence each.
+pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
+    let Some(surface) = evidence.surface else {
+        return Vec::new();
+    };
+    let (filled, searched) = (surface.filled, surface.searched());
+    if surface.is_refused {
+        return vec![format!(
+            "terrain model: {filled} of {searched} searched cells matched, too few to be significant, so that the \
+             model is withheld; check that the pixels are those of these images, and check their orientation"
+        )];
+    }
+    let limits = evidence.limits;
+    let mut reasons = Vec::new();
+    // Written so that NaN counts, here and below.
+    if !(surface.filled_share() >= limits.surface_filled_min) {
+        reasons.push(format!(
+            "terrain model: {filled} of {} cells that both images show have a height, expected at least {:.0} %",
+            surface.cells,
+            100.0 * limits.surface_filled_min
+        ));
+    }
+    if !has_shots(surface) {
+        return reasons;
+    }
+    let shots = &surface.shots;
+    let height_max_m = height_max_m(evidence, surface);
+    if !(shots.above_m.median.abs() <= height_max_m) {
+        reasons.push(format!(
+            "terrain model: MOLA lies {} m above it (median of {} shots), expected at most {height_max_m:.1} m",
+            signed(shots.above_m.median, 1),
+            shots.above_m.n
+        ));
+    }
+    let spread_max = limits.surface_spread_max_sigma;
+    if !(shots.spread_sigmas <= spread_max) {
+        reasons.push(format!(
+            "terrain model: MOLA scatters about it by {:.1} standard deviations, expected at most {spread_max:.1}",
+            shots.spread_sigmas
+        ));
+    }
+    reasons
+}
+
+/// Remarks on a terrain model.
+pub(super) fn remarks(evidence: &Evidence<'_>) -> Option<String> {
+    let surface = evidence.surface?;
+    (!surface.is_refused && !has_shots(surface)).then(|| {
+        format!(
+            "terrain model: {} of MOLA's shots lie on it, too few to validate its heights",
+            surface.shots.above_m.n
+        )
+    })
+}

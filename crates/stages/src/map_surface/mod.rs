@@ -1,0 +1,275 @@
+//! A terrain model of a pair of images, cell by cell.
+//!
+//! Both images are laid on the ground as it is known so far, from coarse to fine: where they differ, the ground is
+//! higher or lower. Since each cell is compared along its vertical, the comparison follows the epipolar curves of any
+//! camera. Heights are searched by correlation, then refined by least squares with either image as the template; a
+//! height that does not correlate, differs in the two directions or is contradicted by its neighbours is a hole. The
+//! altimeter validates the result.
+//!
+//! Both images are resampled at every halving of the cells, so that the epipolar curves of the camera need not be
+//! known; their difference is height along the parallax, and orientation across it. A thread holds tiles of at most 240
+//! samples and the margin of the comparison; cells are held whole, at most 2²⁴. Every tile sees the whole result of the
+//! step before, so that there are no seams and the number of threads changes no byte. Standard deviations are those of
+//! the matching; the common part of all heights is stated separately, by the adjustment.
+
+mod common;
+mod compare;
+mod field;
+mod ground;
+mod level;
+mod levels;
+mod lines;
+mod pair;
+mod result;
+mod search;
+mod settle;
+mod sight;
+mod tidy;
+
+#[cfg(test)]
+mod tests;
+
+use std::{collections::BTreeMap, sync::atomic::AtomicBool};
+
+use self::{common::Common, compare::compare, levels::all_levels};
+use super::{
+    adjust::Adjusted, convert_datum::Converted, group_profiles::Profile, image_pixels::PixelFiles,
+    image_view::View, shot_heights::Heights, site_image::SiteImages, tag_times::ImageTimes,
+};
+use areograph_base::{
+    body::Body,
+    error::{Cause, Result},
+    ties::Unmatched,
+    watch::Watch,
+};
+use areograph_config::{MolaSurfaceConfig, SurfaceConfig};
+use areograph_geom::pushbroom::{CameraModel, Unseen};
+use areograph_store::{
+    stage::{Input, Inputs, Output, Stage},
+    stage_inputs,
+};
+
+pub use lines::{LinesToMap, map_lines};
+pub use result::{
+    ProfileOnSurface, ShotComparison, ShotOnSurface, Surface, SurfaceAccount, SurfaceLook,
+    SurfaceModel,
+};
+
+/// Smallest share of searched cells that must be found for the result to be significant: chance finds one in some
+/// hundred.
+const FOUND_SHARE_MIN: f64 = 0.1;
+/// Cells along the longer side of the model on a page.
+const LOOK: usize = 480;
+
+stage_inputs! {
+    /// Images with their best orientation and their pixels, known heights, and the configuration.
+    pub struct MapSurface<'a> {
+        /// The images.
+        pub images: SiteImages<'a>,
+        /// The form of the orientation.
+        pub model: &'a CameraModel,
+        /// Their pixels.
+        pub pixels: PixelFiles<'a>,
+        /// Footprints in IAU 2000.
+        pub converted: &'a Output<Converted>,
+        /// Profiles.
+        pub profiles: &'a Output<Vec<Profile>>,
+        /// Configuration of the terrain model.
+        pub surface: &'a SurfaceConfig,
+        /// Uncertainties of shots.
+        pub mola_surface: &'a MolaSurfaceConfig,
+        /// The adjustment that gave the images their orientation.
+        pub adjusted: AdjustmentOfImages<'a>,
+        /// Largest common error of heights by the images, metres.
+        pub off_m: &'a f64,
+    }
+}
+
+/// The adjustment, where there is one.
+#[derive(Debug)]
+pub struct AdjustmentOfImages<'a>(pub Option<&'a Output<Adjusted>>);
+
+impl Input for AdjustmentOfImages<'_> {
+    fn add_to(&self, field: &str, inputs: &mut Inputs) {
+        if let Some(adjusted) = self.0 {
+            adjusted.add_to(field, inputs);
+        }
+    }
+}
+
+/// No surface can be made.
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Input)]
+enum SurfaceError {
+    #[error("image {image}: its orientation sees no ground: {unseen}")]
+    #[cause("check the kernels and times of the image")]
+    Unseen { image: String, unseen: Unseen },
+    #[error("{found} images have pixels; expected two, or their identifiers in surface.images")]
+    #[cause("name two images with images.pixels in surface.images")]
+    NotTwo { found: usize },
+}
+
+/// Result of a cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Found {
+    /// Above the sphere, metres.
+    height_m: f64,
+    /// Standard deviation of that, metres.
+    sigma_m: f64,
+    /// Offset of the second image across the parallax, samples of the ground.
+    aside: f64,
+    correlation: f64,
+}
+
+/// A cell; `None` where not both images show it.
+type Cell = Option<std::result::Result<Found, Unmatched>>;
+
+impl Stage for MapSurface<'_> {
+    const NAME: &'static str = "map_surface";
+    type Output = Surface;
+    stage_inputs!(fingerprint);
+
+    fn run(&self, stop: &AtomicBool) -> Result<Surface> {
+        self.run_watched(stop.into())
+    }
+
+    fn run_watched(&self, watch: Watch<'_>) -> Result<Surface> {
+        let oriented = self.images.oriented()?;
+        let times = self.images.0.iter().map(|image| image.times.value());
+        let times: Vec<&ImageTimes> = times.collect::<Result<_>>()?;
+        let pixels = self.pixels.decoded(&times)?;
+        let mut views = Vec::new();
+        for index in self.pair(&times)? {
+            if let Some(pixels) = &pixels[index] {
+                let view = View::of(&oriented[index], *self.model, pixels).map_err(|unseen| {
+                    let image = times[index].id.clone();
+                    SurfaceError::Unseen { image, unseen }
+                })?;
+                views.push((index, view));
+            }
+        }
+        let [(first, one), (second, other)] = &views[..] else {
+            return Err(SurfaceError::NotTwo { found: views.len() }.into());
+        };
+        let footprints = &self.converted.value()?.footprints;
+        let profiles = self.profiles.value()?;
+        let heights = Heights::of(footprints, profiles);
+        let options = Options {
+            body: footprints.body,
+            cell_m: self.surface.cell_m.unwrap_or_default(),
+            off_m: *self.off_m,
+        };
+        let mut surface = map_surface([one, other], &heights, &options, watch)?;
+        let account = &mut surface.account;
+        account.images = [*first, *second];
+        let adjusted = self.adjusted.0.map(Output::value).transpose()?;
+        let of_heights = adjusted.and_then(|adjusted| adjusted.heights.as_ref());
+        account.common_sigma_m = of_heights.map(|of| of.mean_sigma_m[2]);
+        account.shots_take_part = of_heights.is_some();
+        let shots = self.mola_surface.options(footprints.body);
+        account.shots = compare(&surface.model, footprints, profiles, &shots);
+        Ok(surface)
+    }
+}
+
+impl MapSurface<'_> {
+    /// Indices of the two images: those that are named, or those that have pixels.
+    fn pair(&self, times: &[&ImageTimes]) -> Result<Vec<usize>> {
+        let images = times.iter().enumerate();
+        let pair: Vec<usize> = match &self.surface.images {
+            Some(named) => {
+                let place = |id: &String| times.iter().position(|of| of.id == *id);
+                named.iter().filter_map(place).collect()
+            }
+            None => images
+                .filter(|(index, _)| self.pixels.0[*index].is_some())
+                .map(|(index, _)| index)
+                .collect(),
+        };
+        if pair.len() == 2 {
+            return Ok(pair);
+        }
+        Err(SurfaceError::NotTwo { found: pair.len() }.into())
+    }
+}
+
+/// Options of a terrain model.
+struct Options {
+    body: Body,
+    /// Edge of a cell, metres.
+    cell_m: f64,
+    /// Largest common error of heights by the images, metres.
+    off_m: f64,
+}
+
+/// The surface of a pair, without statistics of shots or adjustment.
+fn map_surface(
+    views: [&View<'_>; 2],
+    heights: &Heights,
+    options: &Options,
+    watch: Watch<'_>,
+) -> Result<Surface> {
+    let common = Common::of(views, options.body, heights, options.cell_m)?;
+    let cells = all_levels(&common, views, heights, options.off_m, watch)?;
+    Ok(told(&common, &cells))
+}
+
+/// The model of all cells, and its statistics.
+fn told(common: &Common, cells: &[Cell]) -> Surface {
+    let mut unfilled = BTreeMap::new();
+    let (mut found, mut count) = (Vec::new(), 0);
+    for cell in cells.iter().flatten() {
+        count += 1;
+        match cell {
+            Ok(cell) => found.push(cell),
+            Err(why) => *unfilled.entry(*why).or_insert(0) += 1,
+        }
+    }
+    let median = |of: fn(&Found) -> f64| {
+        let mut values: Vec<f64> = found.iter().map(|cell| of(cell)).collect();
+        values.sort_by(f64::total_cmp);
+        values.get(values.len() / 2).copied().unwrap_or_default()
+    };
+    let square: f64 = found.iter().map(|cell| cell.sigma_m * cell.sigma_m).sum();
+    let sample_m = common.sample_m();
+    let pixel_m = common.pixels_m[0].max(common.pixels_m[1]);
+    let mut account = SurfaceAccount {
+        images: [0, 1],
+        cell_m: common.ground.cell_m,
+        sample_m,
+        compared_m: (2 * search::HALF + 1) as f64 * sample_m,
+        cells: count,
+        filled: u32::try_from(found.len()).unwrap_or(u32::MAX),
+        unfilled,
+        is_refused: false,
+        convergence_rad: common.convergence_rad,
+        height_of_pixel_m: common.height_of_sample_m() * pixel_m / sample_m,
+        sigma_m: (square / found.len().max(1) as f64).sqrt(),
+        correlation: median(|cell| cell.correlation),
+        aside_m: median(|cell| cell.aside) * sample_m,
+        common_sigma_m: None,
+        shots_take_part: false,
+        shots: ShotComparison::default(),
+        look: SurfaceModel::nothing().look(1),
+    };
+    let found_share = f64::from(account.filled) / f64::from(account.searched().max(1));
+    account.is_refused = !(account.filled > 0 && found_share >= FOUND_SHARE_MIN);
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "heights of a planet keep a millimetre"
+    )]
+    let numbers = |of: fn(&Found) -> f64| -> Vec<f32> {
+        let number = |cell: &Cell| match cell {
+            Some(Ok(cell)) if !account.is_refused => of(cell) as f32,
+            _ => f32::NAN,
+        };
+        cells.iter().map(number).collect()
+    };
+    let model = SurfaceModel {
+        sigmas_m: numbers(|cell| cell.sigma_m),
+        heights: common.ground.height_grid(numbers(|cell| cell.height_m)),
+        parallel_rad: common.ground.parallel_rad,
+    };
+    account.look = model.look(LOOK);
+    Surface { account, model }
+}

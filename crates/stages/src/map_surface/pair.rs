@@ -1,0 +1,111 @@
+//! Both images of a tile, laid on a surface.
+
+use nalgebra::{Matrix2, Vector2};
+
+use super::{
+    level::{Known, Level},
+    sight::{Sight, Tile},
+};
+use areograph_base::error::Result;
+use areograph_geom::imaging::Patch;
+
+/// Margin around the pixels that are read of an image: interpolation, smoothing, and the shift across the flight,
+/// pixels.
+const ROOM_PX: f64 = 6.0;
+
+/// Both images over a tile of the ground.
+pub(super) struct Pair {
+    sights: [Sight; 2],
+    patches: [Patch; 2],
+    heights_m: Vec<f32>,
+    aside: Vec<f32>,
+    pub(super) tile: Tile,
+    /// Shift of the second image against the first for a metre of height, samples of the ground along both axes.
+    parallax: Vector2<f64>,
+}
+
+impl Pair {
+    /// Both images of a tile, up to `reach` samples of parallax above and below the known heights; `None` where one of
+    /// them does not show it.
+    ///
+    /// # Errors
+    /// The system's refusal to read the images' temporary files.
+    pub(super) fn of(
+        level: &Level<'_>,
+        tile: Tile,
+        known: &Known,
+        reach: f64,
+    ) -> Result<Option<Self>> {
+        let heights_m = tile.sampled(&known.heights_m, level.per_cell);
+        let aside = tile.sampled(&known.aside, level.per_cell);
+        let sight = |at: usize| {
+            let scale = (1_u64 << level.halvings[at]) as f64;
+            Sight::of(level.views[at], scale, level, &tile, &heights_m)
+        };
+        let (Some(one), Some(other)) = (sight(0), sight(1)) else {
+            return Ok(None);
+        };
+        let parallax = other.shift_per_m - one.shift_per_m;
+        if !(parallax.norm() > 0.0) {
+            return Ok(None);
+        }
+        let reach_m = reach / parallax.norm();
+        let read = |at: usize, sight: &Sight| -> Result<Patch> {
+            let spans = sight.spans_px(&heights_m, reach_m, ROOM_PX);
+            let pixels = level.views[at].pixels;
+            let window = pixels.window_with_gaps(level.halvings[at], [&spans[0], &spans[1]])?;
+            Ok(window.smoothed())
+        };
+        Ok(Some(Self {
+            patches: [read(0, &one)?, read(1, &other)?],
+            sights: [one, other],
+            heights_m,
+            aside,
+            tile,
+            parallax,
+        }))
+    }
+
+    /// Samples of the ground by which a metre of height moves the images against each other.
+    pub(super) fn samples_per_m(&self) -> f64 {
+        self.parallax.norm()
+    }
+
+    /// Unit vectors along the parallax and across it, samples of the ground (southwards, eastwards).
+    pub(super) fn axes(&self) -> Matrix2<f64> {
+        let along = self.parallax.normalize();
+        Matrix2::from_columns(&[along, Vector2::new(-along.y, along.x)])
+    }
+
+    /// Each image at the samples of the tile, `above_m` above the known heights; NaN where it shows nothing.
+    pub(super) fn laid(&self, above_m: f64) -> [Vec<f32>; 2] {
+        let across = self.axes().column(1).into_owned();
+        [(0, -0.5), (1, 0.5)].map(|(image, share)| {
+            let sight = &self.sights[image];
+            let step_px = sight.px_per_sample * across * share;
+            let samples = self.heights_m.iter().zip(&self.aside).enumerate();
+            let number = |(at, (height_m, aside)): (usize, (&f32, &f32))| {
+                let place = sight.place_px(at, f64::from(*height_m) + above_m);
+                self.patches[image].number(&(place + step_px * f64::from(*aside)))
+            };
+            samples.map(number).collect()
+        })
+    }
+
+    /// The known height at a sample, metres.
+    pub(super) fn height_m(&self, at: usize) -> f64 {
+        f64::from(self.heights_m[at])
+    }
+
+    /// Offset of the second image across the parallax at a sample.
+    pub(super) fn aside(&self, at: usize) -> f64 {
+        f64::from(self.aside[at])
+    }
+
+    /// Least distance of a sample from the edges of an image, pixels of its level; below 0 beyond them.
+    pub(super) fn edge_px(&self, at: usize) -> f64 {
+        let height_m = f64::from(self.heights_m[at]);
+        let [one, other] = [0, 1].map(|image| self.sights[image].edge_px(at, height_m));
+        one.min(other)
+    }
+}

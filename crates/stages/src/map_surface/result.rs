@@ -1,0 +1,196 @@
+//! A terrain model of a pair of images, and its statistics.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use areograph_base::ties::Unmatched;
+use areograph_geom::{height_grid::HeightGrid, statistics::Summary};
+
+/// A terrain model with its statistics.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Surface {
+    /// Statistics.
+    pub account: SurfaceAccount,
+    /// The model itself.
+    pub model: SurfaceModel,
+}
+
+/// Heights and their standard deviations, cell by cell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SurfaceModel {
+    /// Heights above the sphere of the body's maps, NaN where there is none.
+    pub heights: HeightGrid,
+    /// Latitude at which cells are as wide as high, radians.
+    pub parallel_rad: f64,
+    /// Standard deviation of every height by the matching, metres, NaN where there is no height.
+    pub sigmas_m: Vec<f32>,
+}
+
+/// Statistics of a terrain model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SurfaceAccount {
+    /// Indices of the images.
+    pub images: [usize; 2],
+    /// Edge of a cell, and of the samples of the ground on which images were compared, metres.
+    pub cell_m: f64,
+    /// See `cell_m`.
+    pub sample_m: f64,
+    /// Edge of the square that was compared for one height, metres.
+    pub compared_m: f64,
+    /// Cells that both images show.
+    pub cells: u32,
+    /// Of these, those with a height.
+    pub filled: u32,
+    /// The others by reason.
+    pub unfilled: BTreeMap<Unmatched, u32>,
+    /// Whether too few cells were found to be significant; no height is then used.
+    pub is_refused: bool,
+    /// Angle between the rays of both images in the middle, radians.
+    pub convergence_rad: f64,
+    /// Metres of height for a pixel of parallax, of the coarser image.
+    pub height_of_pixel_m: f64,
+    /// Root mean square of the standard deviations of all heights by the matching, metres.
+    pub sigma_m: f64,
+    /// Median correlation.
+    pub correlation: f64,
+    /// Median distance of the images across the parallax, metres on the ground: residual orientation errors.
+    pub aside_m: f64,
+    /// Standard deviation of the common error of all heights, by the adjustment, metres; `None` where it is not known.
+    pub common_sigma_m: Option<f64>,
+    /// Whether the shots controlled heights of the adjustment and are therefore not independent.
+    pub shots_take_part: bool,
+    /// The altimeter's shots on it.
+    pub shots: ShotComparison,
+    /// The model in larger cells, for display.
+    pub look: SurfaceLook,
+}
+
+/// The altimeter's shots against a terrain model.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct ShotComparison {
+    /// Every shot on it, profile by profile.
+    pub shots: Vec<ShotOnSurface>,
+    /// Heights of shots minus those of the model, metres.
+    pub above_m: Summary,
+    /// Root mean square of the standard deviations of these differences about their common part, metres.
+    pub sigma_m: f64,
+    /// Robust spread of the differences about their median in these standard deviations.
+    pub spread_sigmas: f64,
+    /// The same by profile, of profiles with shots on it.
+    pub profiles: Vec<ProfileOnSurface>,
+}
+
+/// A shot on a terrain model.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ShotOnSurface {
+    /// Index of its profile.
+    pub profile: usize,
+    /// Row of the footprints.
+    pub row: u32,
+    /// East longitude and latitude, radians.
+    pub place_rad: [f64; 2],
+    /// Its height minus that of the model, metres.
+    pub above_m: f64,
+    /// Standard deviation of that about the common part of all differences, metres.
+    pub sigma_m: f64,
+}
+
+/// A profile on a terrain model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ProfileOnSurface {
+    /// Its identifier.
+    pub profile: String,
+    /// Heights of its shots minus those of the model, metres.
+    pub above_m: Summary,
+}
+
+/// A terrain model in larger cells.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SurfaceLook {
+    /// Mean heights, NaN where there is none.
+    pub heights: HeightGrid,
+    /// Root mean squares of standard deviations, metres, likewise.
+    pub sigmas_m: Vec<f32>,
+}
+
+impl SurfaceModel {
+    /// A model without cells, for statistics without a model.
+    #[must_use]
+    pub const fn nothing() -> Self {
+        Self {
+            heights: HeightGrid {
+                size: [0, 0],
+                first_rad: [0.0; 2],
+                cell_rad: [0.0; 2],
+                radius_m: 0.0,
+                heights_m: Vec::new(),
+            },
+            parallel_rad: 0.0,
+            sigmas_m: Vec::new(),
+        }
+    }
+
+    /// The model in cells so large that no side has more than `side` of them.
+    #[must_use]
+    pub fn look(&self, side: usize) -> SurfaceLook {
+        let [rows, columns] = self.heights.size;
+        let step = rows.max(columns).div_ceil(side.max(1)).max(1);
+        let size = [rows.div_ceil(step), columns.div_ceil(step)];
+        let mut sums = vec![[0.0_f64; 3]; size[0] * size[1]];
+        let known = self.heights.heights_m.iter().zip(&self.sigmas_m);
+        for (at, (height_m, sigma_m)) in known.enumerate() {
+            if !height_m.is_nan() {
+                let cell = at / columns / step * size[1] + at % columns / step;
+                let [height_m, sigma_m] = [height_m, sigma_m].map(|of| f64::from(*of));
+                for (sum, term) in sums[cell]
+                    .iter_mut()
+                    .zip([height_m, sigma_m * sigma_m, 1.0])
+                {
+                    *sum += term;
+                }
+            }
+        }
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "heights of a planet keep a millimetre"
+        )]
+        let mean = |of: usize, root: fn(f64) -> f64| -> Vec<f32> {
+            // A cell without a number has 0/0.
+            let means = sums.iter().map(|sums| root(sums[of] / sums[2]) as f32);
+            means.collect()
+        };
+        let [of_step, half] = [step as f64, 0.5 * (step as f64 - 1.0)];
+        let heights = &self.heights;
+        SurfaceLook {
+            heights: HeightGrid {
+                size,
+                first_rad: [
+                    heights.first_rad[0] + half * heights.cell_rad[0],
+                    heights.first_rad[1] - half * heights.cell_rad[1],
+                ],
+                cell_rad: heights.cell_rad.map(|cell_rad| cell_rad * of_step),
+                radius_m: heights.radius_m,
+                heights_m: mean(0, std::convert::identity),
+            },
+            sigmas_m: mean(1, f64::sqrt),
+        }
+    }
+}
+
+impl SurfaceAccount {
+    /// Cells with texture that were searched in both images.
+    #[must_use]
+    pub fn searched(&self) -> u32 {
+        let not_searched = [Unmatched::Flat, Unmatched::Missing, Unmatched::Edge];
+        let not_searched = not_searched.iter().filter_map(|why| self.unfilled.get(why));
+        self.cells - not_searched.sum::<u32>()
+    }
+
+    /// Of the cells that both images show, the share with a height.
+    #[must_use]
+    pub fn filled_share(&self) -> f64 {
+        f64::from(self.filled) / f64::from(self.cells.max(1))
+    }
+}

@@ -1,0 +1,37 @@
+//! Why matching fails.
+
+use areograph_base::error::Cause;
+
+/// A failed match.
+#[derive(Debug, Clone, PartialEq, thiserror::Error, Cause)]
+#[cause(Input)]
+pub enum MatchError {
+    /// Two files hold the same shots.
+    #[error(
+        "holds shots that {other} also holds; every shot counts once, otherwise held-out shots would take part in the match"
+    )]
+    #[cause("name only one of the two files")]
+    SharedShots {
+        /// The other file.
+        other: String,
+    },
+    /// No shot lies on the model.
+    #[error(
+        "no shot lies on {ground}, which reaches from {west:.3} to {east:.3} degrees east and from {south:.3} to {north:.3} degrees of latitude"
+    )]
+    #[cause(
+        "name PEDR files of passes over it, and check its position: longitudes are east, latitudes areocentric"
+    )]
+    NoShots {
+        /// The ground.
+        ground: &'static str,
+        /// Its edges, degrees.
+        west: f64,
+        /// East.
+        east: f64,
+        /// South.
+        south: f64,
+        /// North.
+        north: f64,
+    },
+}

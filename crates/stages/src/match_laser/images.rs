@@ -1,0 +1,32 @@
+//! Image coordinates of ground points in the images of the model, by the same support data.
+
+use super::result::MatchedPoint;
+use crate::line_camera::{LineCamera, NoSight};
+use areograph_geom::{ellipsoid::spherical_to_xyz_m, pushbroom::Projector};
+
+/// Enters lines and samples into `points`, where an image shows the model's position of a point.
+pub(super) fn enter(
+    cameras: &[LineCamera],
+    points: &mut [MatchedPoint],
+) -> std::result::Result<(), NoSight> {
+    for LineCamera { camera, .. } in cameras {
+        let projector = Projector::new(&camera.orientation, camera.lines())
+            .map_err(|problem| NoSight {
+                image: camera.id.clone(),
+                problem: problem.to_string(),
+            })?
+            .through(camera.detector.distortion);
+        for point in &mut *points {
+            let [longitude_rad, latitude_rad, radius_m] = point.model;
+            let place_m = spherical_to_xyz_m(longitude_rad, latitude_rad, radius_m);
+            let seen = projector.project(&place_m).ok().and_then(|seen| {
+                let focal_px = camera.detector.focal_px(&seen.camera_m).ok()?;
+                let line = camera.line_times.line_of_offset(seen.x);
+                let sample = camera.detector.sample(focal_px.y);
+                camera.shows(line, sample).then_some([line, sample])
+            });
+            point.in_images.push(seen);
+        }
+    }
+    Ok(())
+}

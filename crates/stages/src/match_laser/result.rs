@@ -1,0 +1,254 @@
+//! Request and result of a match.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use super::{similarity::Similarity, surface::SimilaritySurface};
+use crate::{judge::Verdict, line_camera::LineCamera};
+use areograph_base::{altimetry::ShotFilter, body::Body};
+use areograph_geom::height_grid::HeightGrid;
+
+/// How laser profiles are matched with a terrain model. Li et al. 2023 and its published program have 15 points, 1000 m², 70 cells,
+/// similarities above 0.9 and contrasts above 1.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MatchOptions {
+    /// Maximum number of points of a segment.
+    pub segment_points: usize,
+    /// Population variance of laser heights that a segment must exceed, m².
+    pub least_variance_m2: f64,
+    /// The measure; `None` selects `pearson` where the median bias exceeds a tenth of the relief, or 100 m, otherwise
+    /// `ccc`.
+    pub similarity: Option<Similarity>,
+    /// Shifts are searched within this many cells.
+    pub search_cells: u32,
+    /// Similarity that a unit must exceed.
+    pub least_score: f64,
+    /// Ratio of the best similarity to the mean of those above 0 that a unit must exceed.
+    pub least_contrast: f64,
+    /// Largest root mean square of model minus laser, bias removed, over all held-out shots, metres.
+    pub limit_m: f64,
+    /// Seed of the clusters.
+    pub seed: u64,
+    /// Shots that are taken.
+    pub filter: ShotFilter,
+}
+
+/// Withheld ground: every *n*-th rectangle of a lattice, shifted by a seed. The rectangles do not depend on the model,
+/// so that a shot stays on its side with every model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct HeldBackGround {
+    /// Every *n*-th rectangle is withheld.
+    pub every: u32,
+    /// Seed of the shift.
+    pub seed: u64,
+}
+
+/// A terrain model in memory, to be matched.
+#[derive(Debug, Clone, Copy)]
+pub struct ModelRequest<'a> {
+    /// Its heights.
+    pub model: &'a HeightGrid,
+    /// PEDR files.
+    pub pedr: &'a [PathBuf],
+    /// Images that it was made from.
+    pub images: &'a [LineCamera],
+    /// Options.
+    pub options: &'a MatchOptions,
+    /// Withheld ground.
+    pub held_back: HeldBackGround,
+}
+
+/// What to match.
+#[derive(Debug, Clone, Serialize)]
+pub struct MatchRequest {
+    /// Options.
+    pub options: MatchOptions,
+    /// The body.
+    pub body: Body,
+    /// Radius of the reference sphere of the model's heights, metres, where it is stated.
+    pub radius_m: Option<f64>,
+    /// Whether that sphere is meant to differ from that of the model's map.
+    pub heights_apart: bool,
+    /// The terrain model.
+    #[serde(skip)]
+    pub model: PathBuf,
+    /// PEDR files.
+    #[serde(skip)]
+    pub pedr: Vec<PathBuf>,
+    /// Images that the model was made from.
+    pub images: Vec<MatchImage>,
+}
+
+/// An image by its support data.
+#[derive(Debug, Clone, Serialize)]
+pub struct MatchImage {
+    /// Name in the table of control: that of a camera of `areograph calibrate`.
+    pub name: String,
+    /// The support data.
+    #[serde(skip)]
+    pub isd: PathBuf,
+}
+
+/// The result of a match.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LaserMatch {
+    /// Radius of the reference sphere of the model's heights, metres.
+    pub radius_m: f64,
+    /// Size of a cell towards the east and the north, metres.
+    pub cell_m: [f64; 2],
+    /// Shots on the model.
+    pub shots: usize,
+    /// Passes.
+    pub tracks: usize,
+    /// Segments.
+    pub segments: usize,
+    /// Segments with relief.
+    pub segments_kept: usize,
+    /// The measure that ran.
+    pub similarity: Similarity,
+    /// Median of model minus laser over the units that correlation keeps, metres, which decides on the measure.
+    pub located_bias_m: Option<f64>,
+    /// Median of model minus laser over the units that are kept, metres.
+    pub bias_m: Option<f64>,
+    /// All held-out shots of the kept units.
+    pub held_out: Option<HeldOut>,
+    /// Widening of their standard deviations; `None` with too few units.
+    pub widened: Option<Widened>,
+    /// Every unit, kept or not.
+    pub units: Vec<UnitResult>,
+    /// A control point of every kept unit.
+    pub points: Vec<MatchedPoint>,
+    /// Names of the images.
+    pub images: Vec<String>,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Records and points that were left out.
+    pub complaints: Vec<String>,
+    /// Their number.
+    pub complaint_count: u64,
+}
+
+/// Model minus laser at held-out shots: root mean squares about the bias of the used shots, metres.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct HeldOut {
+    /// Shots.
+    pub shots: usize,
+    /// Without the shift.
+    pub before_m: f64,
+    /// With it.
+    pub after_m: f64,
+}
+
+/// A unit of segments that lie together.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct UnitResult {
+    /// Its number, from 1.
+    pub unit: usize,
+    /// East longitude and latitude of its middle, radians.
+    pub place_rad: [f64; 2],
+    /// Whether its ground is withheld: it validates, and no other unit shares a shot with it.
+    pub judges: bool,
+    /// Shots.
+    pub shots: usize,
+    /// Passes of these shots.
+    pub strips: usize,
+    /// Largest distance of a shot from the middle, metres.
+    pub radius_m: f64,
+    /// Standard deviation of its laser heights, metres.
+    pub relief_m: f64,
+    /// Result of the search; absent where it found no shift.
+    pub found: Option<UnitMatch>,
+    /// Held-out shots, where the model has heights with and without the shift.
+    pub held_out: Option<HeldOut>,
+    /// Similarity over the shifts of that search; absent in matches of models that are made round by round.
+    pub similarity: Option<SimilaritySurface>,
+    /// Why it is rejected; empty if it is kept.
+    pub refused_because: String,
+}
+
+impl UnitResult {
+    /// Whether it is kept.
+    #[must_use]
+    pub const fn is_kept(&self) -> bool {
+        self.refused_because.is_empty()
+    }
+}
+
+/// Result of the search of a unit: position of the ground in the model relative to that by the laser.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct UnitMatch {
+    /// Shift to the east and the north, cells.
+    pub shift_cells: [f64; 2],
+    /// The same, metres.
+    pub shift_m: [f64; 2],
+    /// The same in longitude and latitude, radians.
+    pub shift_rad: [f64; 2],
+    /// Similarity.
+    pub score: f64,
+    /// That over the mean of similarities above 0.
+    pub contrast: f64,
+    /// Mean of model minus laser over the shots that were used, metres.
+    pub bias_m: f64,
+    /// Standard deviations; `None` where least squares give no position.
+    pub sigma: Option<MatchSigma>,
+}
+
+/// Standard deviations of a unit: from leaving out single shots, widened by the scatter of all units ([`Widened`]).
+/// Errors of the laser that its shots share are not included.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MatchSigma {
+    /// Of the shift to the east and the north, metres.
+    pub shift_m: [f64; 2],
+    /// Of model minus laser, metres.
+    pub bias_m: f64,
+}
+
+impl MatchSigma {
+    /// The same, widened by these factors.
+    pub(super) fn wider(self, by: Widened) -> Self {
+        Self {
+            shift_m: self.shift_m.map(|sigma_m| by.shift * sigma_m),
+            bias_m: by.bias * self.bias_m,
+        }
+    }
+}
+
+/// Factors by which standard deviations of units were widened, at least 1: scatter of units about a plane over the
+/// ground relative to that predicted by leaving out their shots. The shots of a unit share an error of the model, which
+/// they cannot show.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Widened {
+    /// Of shifts.
+    pub shift: f64,
+    /// Of biases.
+    pub bias: f64,
+}
+
+/// A laser control point: the shot of a unit that lies nearest to its bias.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MatchedPoint {
+    /// Number of its unit.
+    pub unit: usize,
+    /// Whether that unit is withheld.
+    pub judges: bool,
+    /// File, record and shot.
+    pub name: String,
+    /// East longitude, latitude, radians, and radius, metres, by the laser.
+    pub laser: [f64; 3],
+    /// The same by the model.
+    pub model: [f64; 3],
+    /// Standard deviations of their difference towards the east, the north and up, metres, from the matching only.
+    pub sigma_m: [f64; 3],
+    /// Line and sample in each image, where the image shows it.
+    pub in_images: Vec<Option<[f64; 2]>>,
+}
+
+impl MatchedPoint {
+    /// Standard deviation of a horizontal coordinate, metres: root mean square of east and north.
+    #[must_use]
+    pub fn sigma_horizontal_m(&self) -> f64 {
+        let [east_m, north_m, _] = self.sigma_m;
+        std::f64::consts::FRAC_1_SQRT_2 * east_m.hypot(north_m)
+    }
+}

@@ -1,0 +1,285 @@
+//! Shots inside the box of the model: found, in one frame and in the order of time, each once; then tracks and segments.
+
+use std::sync::atomic::AtomicBool;
+
+use super::{
+    error::MatchError,
+    result::{HeldBackGround, MatchOptions},
+};
+use crate::convert_datum::DatumTurn;
+use areograph_base::{
+    altimetry::ShotFilter,
+    error::{Error, Locate as _, Result},
+    footprints::{AsRead, Footprints},
+    units::wrap_two_pi,
+};
+use areograph_geom::{
+    height_grid::{HeightGrid, Probe},
+    window::{Region, WindowShape},
+};
+use areograph_pds::archive::{Found, Judged, Opened, Query, Seen, Sink, search};
+use areograph_store::files::file_name;
+
+/// A track ends where latitude jumps by this angle between shots, radians (0.1°, as in the program of Li et al. 2023),
+/// or after this time without a shot, seconds: 100 km of flight.
+const JUMP_RAD: f64 = 0.1 * std::f64::consts::PI / 180.0;
+const PAUSE_S: f64 = 30.0;
+/// A segment ends at a gap of three spacings of shots, which come every 0.1 s.
+const GAP_S: f64 = 0.3;
+/// Share of a segment's points that must have a height in the model.
+const COVERED: f64 = 13.0 / 15.0;
+/// Edges to the east and the north of a rectangle of ground that is withheld or not, metres: a few units of shots, and
+/// two segments of a profile, which runs north or south; and the radius at which they have this length, metres.
+const HELD_BACK_M: [f64; 2] = [5_000.0, 10_000.0];
+const RADIUS_M: f64 = 3_396_190.0;
+/// Maximum number of complaints that are kept with their text; all are counted.
+const COMPLAINTS_MAX: usize = 1_000;
+
+/// A shot over the model.
+#[derive(Debug, Clone)]
+pub(super) struct Shot {
+    /// File, record and shot: its name.
+    pub(super) name: String,
+    pub(super) tag_s: f64,
+    pub(super) longitude_rad: f64,
+    pub(super) latitude_rad: f64,
+    pub(super) radius_m: f64,
+    /// Above the sphere of the model.
+    pub(super) height_m: f64,
+    /// Row and column of the model.
+    pub(super) cell: [f64; 2],
+    pub(super) probe: Probe,
+    /// Towards the east and the north from the middle of the model, metres.
+    pub(super) plan_m: [f64; 2],
+    /// Number of the pass over the box.
+    pub(super) track: usize,
+}
+
+impl Shot {
+    /// Whether it lies on withheld ground.
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "rectangles of a planet are some thousands"
+    )]
+    pub(super) fn is_held_back(&self, held_back: Option<HeldBackGround>) -> bool {
+        let Some(HeldBackGround { every, seed }) = held_back else {
+            return false;
+        };
+        let [width_rad, height_rad] = HELD_BACK_M.map(|edge_m| edge_m / RADIUS_M);
+        let row = (self.latitude_rad / height_rad).floor();
+        // Width at the southern edge of the row, independent of other rows.
+        let east_rad = width_rad / (row * height_rad).cos().max(0.01);
+        let column = (self.longitude_rad / east_rad).floor();
+        // Rows are shifted by half the distance, so that withheld rectangles are evenly spaced.
+        let half = i64::from((every / 2).max(1));
+        let place = column as i64 + half * row as i64;
+        let shift = (seed % u64::from(every)).cast_signed();
+        (place + shift).rem_euclid(i64::from(every)) == 0
+    }
+}
+
+/// Result of a search.
+#[derive(Default)]
+pub(super) struct Shots {
+    pub(super) shots: Vec<Shot>,
+    pub(super) tracks: usize,
+    pub(super) complaints: Vec<String>,
+    pub(super) complaint_count: u64,
+}
+
+/// Finds the shots inside the box of a model.
+pub(super) fn shots_over(
+    grid: &HeightGrid,
+    paths: &[std::path::PathBuf],
+    filter: &ShotFilter,
+    stop: &AtomicBool,
+) -> Result<Shots> {
+    let Opened {
+        mut sources,
+        failures,
+    } = Opened::all(paths)?;
+    if let Some(failure) = failures.into_iter().next() {
+        return Err(failure);
+    }
+    // Order and numbers of files do not depend on how they were named.
+    sources.sort_by_cached_key(|source| file_name(source.path()));
+    let [west, south, east, north] = grid.edges_rad();
+    let is_whole = east - west >= std::f64::consts::TAU;
+    let region = Region::new(&WindowShape::Box {
+        west_rad: if is_whole { 0.0 } else { wrap_two_pi(west) },
+        east_rad: if is_whole {
+            std::f64::consts::TAU
+        } else {
+            wrap_two_pi(east)
+        },
+        south_rad: south,
+        north_rad: north,
+    });
+    let query = Query::new(vec![region], filter, Judged::Near);
+    let mut gathered = Gathered {
+        grid,
+        names: sources.iter().map(|of| file_name(of.path())).collect(),
+        turns: (sources.iter())
+            .map(|source| DatumTurn::at_tags(source.datum()))
+            .collect(),
+        seen: Seen::default(),
+        found: Vec::new(),
+        shots: Shots::default(),
+    };
+    search(&sources, &query, stop, &mut gathered)?;
+    let Gathered {
+        mut found,
+        mut shots,
+        ..
+    } = gathered;
+    found.sort_by(|a, b| a.tag_s.total_cmp(&b.tag_s));
+    shots.shots = found;
+    shots.number_tracks();
+    Ok(shots)
+}
+
+/// Takes shots as they are found.
+struct Gathered<'a> {
+    grid: &'a HeightGrid,
+    names: Vec<String>,
+    turns: Vec<DatumTurn>,
+    seen: Seen,
+    found: Vec<Shot>,
+    shots: Shots,
+}
+
+impl Gathered<'_> {
+    /// Checks that no earlier file holds one of these shots.
+    fn require_distinct(&mut self, file: usize, footprints: &Footprints<AsRead>) -> Result<()> {
+        let Some((_, other)) = self.seen.take_all(file, &footprints.et_tag_s) else {
+            return Ok(());
+        };
+        let other = self.names[other].clone();
+        Err(MatchError::SharedShots { other }).in_file(&self.names[file])
+    }
+
+    fn take(&mut self, file: usize, footprints: &Footprints<AsRead>) {
+        let [longitude_rad, latitude_rad] = self.grid.middle_rad();
+        let middle = self.grid.cell_of(longitude_rad, latitude_rad);
+        let [east_m, north_m] = self.grid.cell_m();
+        for row in 0..footprints.len() {
+            let shot = self.turns[file].applied(footprints.row(row));
+            let cell = self.grid.cell_of(shot.longitude_rad, shot.latitude_rad);
+            let found = Shot {
+                name: format!("{}_{}_{}", self.names[file], shot.record, shot.shot),
+                tag_s: shot.et_tag_s,
+                longitude_rad: shot.longitude_rad,
+                latitude_rad: shot.latitude_rad,
+                radius_m: shot.radius_m,
+                height_m: shot.radius_m - self.grid.radius_m,
+                cell,
+                probe: Probe::at(cell),
+                plan_m: [
+                    (cell[1] - middle[1]) * east_m,
+                    (middle[0] - cell[0]) * north_m,
+                ],
+                track: 0,
+            };
+            self.found.push(found);
+        }
+    }
+}
+
+impl Sink for Gathered<'_> {
+    fn found(&mut self, file: usize, found: Found) -> Result<()> {
+        self.shots.complaint_count += found.complaints.len() as u64;
+        for complaint in &found.complaints {
+            if self.shots.complaints.len() < COMPLAINTS_MAX {
+                self.shots.complaints.push(complaint.to_string());
+            }
+        }
+        self.require_distinct(file, &found.footprints)?;
+        self.take(file, &found.footprints);
+        Ok(())
+    }
+
+    fn failed(&mut self, _file: usize, failure: Error) -> Result<()> {
+        Err(failure)
+    }
+}
+
+impl Shots {
+    fn number_tracks(&mut self) {
+        let mut track = 0;
+        for index in 1..self.shots.len() {
+            let [before, this] = [index - 1, index].map(|of| &self.shots[of]);
+            let jump_rad = (this.latitude_rad - before.latitude_rad).abs();
+            if jump_rad >= JUMP_RAD || this.tag_s - before.tag_s > PAUSE_S {
+                track += 1;
+            }
+            self.shots[index].track = track;
+        }
+        self.tracks = self.shots.last().map_or(0, |last| last.track + 1);
+    }
+
+    /// Segments: at most `points` shots of one track without a gap, either all or none of them on withheld ground.
+    pub(super) fn segments(
+        &self,
+        points: usize,
+        held_back: Option<HeldBackGround>,
+    ) -> Vec<&[Shot]> {
+        let runs = self.shots.chunk_by(|a, b| {
+            let is_near = a.track == b.track && b.tag_s - a.tag_s < GAP_S;
+            is_near && a.is_held_back(held_back) == b.is_held_back(held_back)
+        });
+        runs.flat_map(|run| run.chunks(points)).collect()
+    }
+}
+
+/// Whether a segment has relief, and enough of it lies on the model.
+pub(super) fn is_kept(grid: &HeightGrid, segment: &[Shot], options: &MatchOptions) -> bool {
+    let needed = (COVERED * options.segment_points as f64).ceil();
+    let covered = segment
+        .iter()
+        .filter(|shot| grid.probed_m(&shot.probe, [0, 0]).is_some());
+    let count = segment.len() as f64;
+    let mean_m = segment.iter().map(|shot| shot.height_m).sum::<f64>() / count;
+    let squares = segment.iter().map(|shot| (shot.height_m - mean_m).powi(2));
+    covered.count() as f64 >= needed && squares.sum::<f64>() / count > options.least_variance_m2
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use areograph_testing::shot_cases::{CASES, path, source};
+
+    #[test]
+    fn files_with_the_same_shots_are_refused() {
+        let grid = HeightGrid {
+            size: [1, 1],
+            first_rad: [0.0, 0.0],
+            cell_rad: [0.1, 0.1],
+            radius_m: RADIUS_M,
+            heights_m: vec![0.0],
+        };
+        for case in CASES {
+            let files = 0..case.files.len();
+            let names: Vec<String> = files.clone().map(|file| source(file).name).collect();
+            let mut gathered = Gathered {
+                grid: &grid,
+                names: names.clone(),
+                turns: Vec::new(),
+                seen: Seen::default(),
+                found: Vec::new(),
+                shots: Shots::default(),
+            };
+            let mut checked =
+                files.map(|file| gathered.require_distinct(file, &case.footprints(file)));
+            let refused = checked.find_map(Result::err);
+            let named = refused.map(|error| (error.file.clone(), error.cause.to_string()));
+            match (named, case.shared) {
+                (None, None) => {}
+                (Some((refused, why)), Some([other, file])) => {
+                    assert_eq!(refused, Some(path(file)), "{}", case.name);
+                    assert!(why.contains(&names[other]), "{}: {why}", case.name);
+                }
+                (found, _) => panic!("{}: {found:?}", case.name),
+            }
+        }
+    }
+}

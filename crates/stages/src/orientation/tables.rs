@@ -1,0 +1,162 @@
+//! Tables of an orientation for camera models, and their interpolation error.
+
+use nalgebra::{Matrix3, Vector3, Vector4};
+use serde::{Deserialize, Serialize};
+
+use crate::tag_times::ImageTimes;
+use areograph_base::{
+    error::Result,
+    frames::{BodyFixed, CameraFrame, J2000, Position, Rotation, SpacecraftBus},
+    time::Et,
+};
+use areograph_geom::{
+    attitude::{continuous_quaternions, matrix_of_spice_quaternion},
+    lagrange::lagrange,
+    statistics::largest,
+};
+
+/// Points between two nodes at which the interpolation is compared with the kernels, shares of their distance.
+const CHECKED_AT: [f64; 3] = [0.25, 0.5, 0.75];
+
+/// Uniform tables from a little before to a little after the image, as camera models require.
+///
+/// Positions follow the same convention as the samples, see [`super::LightTimeEffect`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CameraTables {
+    /// Epochs, ET seconds.
+    pub et_s: Vec<f64>,
+    /// Mars to the spacecraft, from where straight rays start, J2000, metres.
+    pub position_m: Vec<Vector3<f64>>,
+    /// Velocity, metres per second.
+    pub velocity_m_s: Vec<Vector3<f64>>,
+    /// Mars to Sun, J2000, LT+S, metres, at the first and the last epoch.
+    pub sun_position_m: [Vector3<f64>; 2],
+    /// Velocity of the Sun from Mars, metres per second, at the same epochs.
+    pub sun_velocity_m_s: [Vector3<f64>; 2],
+    /// J2000 → bus, read with the pointing bias.
+    pub inertial_to_bus: Vec<Rotation<J2000, SpacecraftBus>>,
+    /// Angular velocity of the bus in J2000, radians per second.
+    pub bus_angular_velocity_rad_s: Vec<Vector3<f64>>,
+    /// J2000 → body-fixed, for the ground that is seen.
+    pub inertial_to_mars: Vec<Rotation<J2000, BodyFixed>>,
+    /// Angular velocity of Mars in J2000, radians per second.
+    pub mars_angular_velocity_rad_s: Vec<Vector3<f64>>,
+    /// Bus → camera, at the first epoch.
+    pub bus_to_camera: Rotation<SpacecraftBus, CameraFrame>,
+    /// Interpolation error of the tables over the image.
+    pub interpolation: InterpolationCheck,
+}
+
+/// Interpolation between the nodes of [`CameraTables`], as camera models do it, against the kernels.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct InterpolationCheck {
+    /// Largest distance between the image coordinates of the same ground by both, image pixels.
+    pub error_max_px: f64,
+    /// Epochs that were compared; 0 for tables of support data, which have no reference.
+    pub epochs: usize,
+}
+
+impl InterpolationCheck {
+    /// Largest acceptable error of tables, image pixels: tables with a larger one get more nodes.
+    pub const LIMIT_PX: f64 = 0.01;
+
+    /// Whether the error is below the limit.
+    #[must_use]
+    pub fn keeps_limit(&self) -> bool {
+        self.error_max_px < Self::LIMIT_PX
+    }
+
+    /// Compares the interpolated camera with `camera` between all nodes over the image.
+    pub(crate) fn of(
+        image: &ImageTimes,
+        tables: &CameraTables,
+        camera: impl Fn(Et) -> Result<Camera>,
+    ) -> Result<Self> {
+        let nodes = Nodes::new(tables);
+        let mut check = Self::default();
+        for pair in tables.et_s.windows(2) {
+            for share in CHECKED_AT {
+                let et = Et::from_seconds(pair[0] + share * (pair[1] - pair[0]));
+                if !image.exposures().contains(et) {
+                    continue;
+                }
+                let error_px = error_px(image, &camera(et)?, &nodes.camera(et));
+                check.error_max_px = largest([check.error_max_px, error_px]).unwrap_or_default();
+                check.epochs += 1;
+            }
+        }
+        Ok(check)
+    }
+}
+
+/// Position and rotation of the camera at one instant.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Camera {
+    /// Perspective centre.
+    pub(crate) position: Position<BodyFixed>,
+    /// Rotation to the axes of Mars.
+    pub(crate) to_mars: Rotation<CameraFrame, BodyFixed>,
+}
+
+/// The nodes as a camera model uses them: rotated to Mars first, then interpolated.
+pub(crate) struct Nodes {
+    start_s: f64,
+    step_s: f64,
+    position_m: Vec<Vector3<f64>>,
+    /// Quaternions (w, x, y, z), continuous.
+    camera_to_mars: Vec<Vector4<f64>>,
+}
+
+impl Nodes {
+    /// Nodes of `tables`, which hold two or more.
+    pub(crate) fn new(tables: &CameraTables) -> Self {
+        let bus_to_camera = tables.bus_to_camera.matrix();
+        let rotations = || tables.inertial_to_mars.iter().map(Rotation::matrix);
+        let camera_to_mars: Vec<Matrix3<f64>> = rotations()
+            .zip(&tables.inertial_to_bus)
+            .map(|(to_mars, to_bus)| to_mars * (bus_to_camera * to_bus.matrix()).transpose())
+            .collect();
+        let quaternions = continuous_quaternions(&camera_to_mars).into_iter();
+        let last = tables.et_s.len() - 1;
+        Self {
+            start_s: tables.et_s[0],
+            step_s: (tables.et_s[last] - tables.et_s[0]) / last as f64,
+            position_m: rotations()
+                .zip(&tables.position_m)
+                .map(|(to_mars, position_m)| to_mars * position_m)
+                .collect(),
+            camera_to_mars: quaternions.map(Vector4::from).collect(),
+        }
+    }
+
+    /// The camera between the nodes.
+    pub(crate) fn camera(&self, et: Et) -> Camera {
+        let at = (et.seconds() - self.start_s) / self.step_s;
+        let camera_to_mars = matrix_of_spice_quaternion(lagrange(&self.camera_to_mars, at).into());
+        Camera {
+            position: Position::new(lagrange(&self.position_m, at)),
+            to_mars: Rotation::new(camera_to_mars, et),
+        }
+    }
+}
+
+/// Largest distance between the image coordinates of the same ground in two cameras, in image pixels, over the middle
+/// and both ends of a line; the ground is assumed at its shortest range, at nadir.
+fn error_px(image: &ImageTimes, kernels: &Camera, interpolated: &Camera) -> f64 {
+    let position_m = kernels.position.xyz_m;
+    let distance_m = position_m.norm() - image.body.model().equatorial_radius_m;
+    let detector = image.detector();
+    let pixel_rad =
+        image.instrument.optics.pixel_pitch_mm / image.instrument.optics.focal_length_mm;
+    let errors_px = [0.0, 0.5, 1.0].map(|share| {
+        let look = detector.look(share * detector.samples);
+        let ground_m = position_m + kernels.to_mars.matrix() * look * distance_m;
+        let seen =
+            interpolated.to_mars.matrix().transpose() * (ground_m - interpolated.position.xyz_m);
+        let missed = seen.xy() / seen.z - look.xy();
+        let lines = missed.x / f64::from(image.downtrack_summing);
+        let samples = missed.y / f64::from(image.crosstrack_summing);
+        lines.hypot(samples) / pixel_rad
+    });
+    largest(errors_px).unwrap_or_default()
+}

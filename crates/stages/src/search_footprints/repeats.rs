@@ -1,0 +1,84 @@
+//! Shots that two of the site's files hold: versions of one orbit are refused.
+
+use std::path::PathBuf;
+
+use areograph_base::{
+    error::{Cause, Error, Result},
+    footprints::{AsRead, Footprints},
+    time::Et,
+};
+use areograph_pds::archive::Seen;
+
+/// Two files with the same shots, of which neither is a copy of the other.
+#[derive(Debug, thiserror::Error, Cause)]
+#[error(
+    "holds {shots} shot(s) in the windows that {other} holds as well, the first in record {record} \
+     (there in record {other_record}, orbit {orbit}) at {at}"
+)]
+#[cause(Input: "name only one of the two in pedr.files: every shot counts once, and areograph cannot decide which \
+    version of an orbit is meant")]
+struct SharedShots {
+    shots: usize,
+    other: String,
+    record: u32,
+    other_record: u32,
+    orbit: u32,
+    at: Et,
+}
+
+/// Makes sure that no two files hold the same shot; `file` is an index into `paths`.
+///
+/// # Errors
+/// The two files whose common shot is the earliest.
+pub(super) fn require_distinct(footprints: &Footprints<AsRead>, paths: &[PathBuf]) -> Result<()> {
+    let (tags_s, files) = (&footprints.et_tag_s, &footprints.file);
+    let mut seen = Seen::default();
+    let shared: Vec<(usize, usize)> = (0..footprints.len())
+        .filter_map(|row| Some((row, seen.take(usize::from(files[row]), tags_s[row])?)))
+        .collect();
+    let earliest = (shared.iter()).min_by(|(a, _), (b, _)| tags_s[*a].total_cmp(&tags_s[*b]));
+    let Some((row, other)) = earliest.copied() else {
+        return Ok(());
+    };
+    let is_of_both = |(of, with): &&(usize, usize)| files[*of] == files[row] && *with == other;
+    let apart_s = |of: &usize| (tags_s[*of] - tags_s[row]).abs();
+    let others = (0..footprints.len()).filter(|of| usize::from(files[*of]) == other);
+    let other_row = others.min_by(|a, b| apart_s(a).total_cmp(&apart_s(b)));
+    let error = SharedShots {
+        shots: shared.iter().filter(is_of_both).count(),
+        other: paths[other].display().to_string(),
+        record: footprints.record[row],
+        other_record: footprints.record[other_row.unwrap_or(row)],
+        orbit: footprints.orbit[row],
+        at: Et::from_seconds(tags_s[row]),
+    };
+    Err(Error::from(error).in_file(&paths[usize::from(files[row])]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use areograph_testing::shot_cases::{CASES, path};
+
+    #[test]
+    fn files_with_the_same_shots_are_refused() {
+        for case in CASES {
+            let paths: Vec<PathBuf> = (0..case.files.len()).map(path).collect();
+            let mut footprints = Footprints::new(Vec::new());
+            for file in 0..case.files.len() {
+                footprints.append(case.footprints(file));
+            }
+            let refused = require_distinct(&footprints, &paths).err();
+            let named = refused.map(|error| (error.file.clone(), error.cause.to_string()));
+            match (named, case.shared) {
+                (None, None) => {}
+                (Some((path, why)), Some([other, file])) => {
+                    assert_eq!(path.as_ref(), Some(&paths[file]), "{}", case.name);
+                    let other = paths[other].display().to_string();
+                    assert!(why.contains(&other), "{}: {why}", case.name);
+                }
+                (found, _) => panic!("{}: {found:?}", case.name),
+            }
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! An image of the site with the outputs of its stages: the input of the stages after the registration.
+
+use super::{
+    fit_sensor_model::SensorModel, orientation::Orientation, oriented::OrientedImage,
+    register::ImageRegistration, tag_times::ImageTimes,
+};
+use areograph_base::error::Result;
+use areograph_store::stage::{Input, Inputs, Output};
+
+/// Stage outputs of one image, with the orientation of the kernels or the adjusted one.
+#[derive(Debug, Clone)]
+pub struct SiteImage {
+    /// Line times.
+    pub times: Output<ImageTimes>,
+    /// Orientation samples.
+    pub orientation: Output<Orientation>,
+    /// Sensor models.
+    pub model: Output<SensorModel>,
+    /// Image coordinates of the footprints.
+    pub registration: Output<ImageRegistration>,
+}
+
+/// The images of a site in its order.
+#[derive(Debug, Clone, Copy)]
+pub struct SiteImages<'a>(pub &'a [SiteImage]);
+
+impl Input for SiteImages<'_> {
+    fn add_to(&self, field: &str, inputs: &mut Inputs) {
+        let labels: Vec<&str> = self.0.iter().map(|image| image.times.label()).collect();
+        inputs.setting(&format!("{field} (order)"), &labels);
+        for image in self.0 {
+            (&image.times).add_to(field, inputs);
+            (&image.orientation).add_to(field, inputs);
+            (&image.model).add_to(field, inputs);
+            (&image.registration).add_to(field, inputs);
+        }
+    }
+}
+
+impl<'a> SiteImages<'a> {
+    /// The images with their orientation in every form.
+    ///
+    /// # Errors
+    /// Samples that do not form an orientation.
+    pub fn oriented(self) -> Result<Vec<OrientedImage<'a>>> {
+        let oriented = self.0.iter().map(|image| {
+            let (times, orientation) = (image.times.value()?, image.orientation.value()?);
+            OrientedImage::of(times, orientation, image.model.value()?)
+        });
+        oriented.collect()
+    }
+}

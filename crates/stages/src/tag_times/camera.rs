@@ -1,0 +1,97 @@
+//! A camera of the site's own against the built-in one of the same frame.
+
+use super::agreement::{Disagreement, HEIGHT_M, ground};
+use areograph_base::instruments::Instrument;
+
+/// Pixel angles of one camera that differ by less are within what its files state: the kernel and ISIS differ by 1 %
+/// for the narrow-angle camera, whose focal length is known to 2 %.
+const SCALE_TOLERANCE: f64 = 0.02;
+
+/// Pixels by which two files of one camera may place its boresight apart: one counts edges, another centres.
+const BORESIGHT_PX: f64 = 1.0;
+
+/// A remark on a camera with the frame of a known one, but another geometry: kernels cannot show a mirrored detector.
+pub(super) fn camera_agrees(camera: &Instrument, known: &[Instrument]) -> Option<Disagreement> {
+    let is_same = |other: &&Instrument| {
+        other.naif.frame == camera.naif.frame && other.naif.instrument == camera.naif.instrument
+    };
+    let other = known.iter().find(is_same)?;
+    let pixel_rad = |of: &Instrument| of.optics.pixel_pitch_mm / of.optics.focal_length_mm;
+    let scale = pixel_rad(camera) / pixel_rad(other);
+    let apart_px = |of: fn(&Instrument) -> f64| (of(camera) - of(other)).abs();
+    let across_px = apart_px(|of| of.detector.boresight_px);
+    let along_px = apart_px(|of| of.detector.along_track_px);
+    let is_mirrored = camera.detector.samples_along != other.detector.samples_along;
+    // A mirrored line has its boresight at the other end. Written so that NaN counts, here and below.
+    let is_apart = !(across_px <= BORESIGHT_PX) && !is_mirrored;
+    let differences = [
+        ("detector.samples_along", is_mirrored),
+        ("detector.boresight_px", is_apart),
+        ("detector.along_track_px", !(along_px <= BORESIGHT_PX)),
+        ("optics", !((scale - 1.0).abs() <= SCALE_TOLERANCE)),
+    ];
+    let differs: Vec<&str> = differences
+        .into_iter()
+        .filter_map(|(key, differs)| differs.then_some(key))
+        .collect();
+    if differs.is_empty() {
+        return None;
+    }
+    let moved_px = if is_apart { across_px } else { 0.0 }.hypot(along_px);
+    let ground_m = if moved_px <= BORESIGHT_PX {
+        0.0
+    } else {
+        moved_px * pixel_rad(other) * HEIGHT_M
+    };
+    let displaced = if ground_m > 0.0 {
+        format!(", {} on the ground", ground(ground_m))
+    } else {
+        String::new()
+    };
+    Some(Disagreement {
+        text: format!(
+            "its camera differs in {} from the built-in file of {}, whose frame it names{displaced}: no kernel tests the \
+             geometry of a camera",
+            differs.join(", "),
+            other.name
+        ),
+        ground_m,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use areograph_base::instruments::Sense;
+    use areograph_config::{all_instruments, usual_instrument};
+
+    #[test]
+    fn a_mirrored_detector_is_reported_and_rounding_is_not() {
+        for camera in all_instruments() {
+            assert_eq!(
+                camera_agrees(camera, all_instruments()),
+                None,
+                "{}",
+                camera.id
+            );
+        }
+        let remark = |change: fn(&mut Instrument)| {
+            let mut camera = usual_instrument().clone();
+            change(&mut camera);
+            camera_agrees(&camera, all_instruments())
+        };
+        let mirrored = remark(|camera| camera.detector.samples_along = Sense::MinusY).unwrap();
+        let expected = "differs in detector.samples_along from";
+        assert!(mirrored.text.contains(expected), "{mirrored:?}");
+        // 500 pixels of 3.75 µrad from 380 km.
+        let moved = remark(|camera| camera.detector.boresight_px += 500.0).unwrap();
+        assert!((moved.ground_m - 712.0).abs() < 1.0 && moved.is_beyond_accuracy());
+        assert!(moved.text.contains("712 m on the ground"), "{moved:?}");
+        assert_eq!(remark(|camera| camera.detector.boresight_px += 0.5), None);
+        assert_eq!(remark(|camera| camera.optics.pixel_pitch_mm *= 0.99), None);
+        assert!(remark(|camera| camera.optics.focal_length_mm *= 1.1).is_some());
+        assert!(remark(|camera| camera.optics.focal_length_mm = f64::NAN).is_some());
+        // A camera that no file describes.
+        assert_eq!(remark(|camera| camera.naif.frame = "OWN".to_owned()), None);
+    }
+}

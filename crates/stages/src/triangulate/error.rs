@@ -1,0 +1,165 @@
+//! Why a net has no solution, with the names of its pictures and points.
+
+use areograph_base::error::Cause;
+use areograph_geom::plane::{FilmError, PlaneError};
+
+/// A net without a solution.
+#[derive(Debug, Clone, PartialEq, thiserror::Error, Cause)]
+#[cause(Input)]
+pub enum NetError {
+    /// The tables hold no measurement.
+    #[error("no table holds a measurement")]
+    #[cause("give tables with measurements in measurements.files")]
+    NoMeasurement,
+    /// Fewer than two controls that a picture shows.
+    #[error("controls measured in a picture: {found}; expected two or more")]
+    #[cause("give at least two controls, named as the points of the measurements")]
+    TooFewControls {
+        /// How many there are.
+        found: usize,
+    },
+    /// A picture or brick, with the parts tied to it, can turn, shrink or move.
+    #[error(
+        "UnderconnectedPicture: {what} {name} has ties and controls: {ties}; expected two or more at different places, \
+         in a part of the net with two controls"
+    )]
+    #[cause(
+        "measure more points that it shares with its neighbours, or leave its measurements out"
+    )]
+    Underconnected {
+        /// `picture` or `brick`.
+        what: &'static str,
+        /// Its name.
+        name: String,
+        /// Its points that are ties or controls.
+        ties: usize,
+    },
+    /// Two points of a picture have one place.
+    #[error("points {first} and {second} have the same place in picture {picture}")]
+    #[cause(
+        "points at the same place are one point: give both the same name, or correct one of them"
+    )]
+    EqualPoints {
+        /// The picture.
+        picture: String,
+        /// One point.
+        first: String,
+        /// The other.
+        second: String,
+    },
+    /// Two controls have one place.
+    #[error("controls {first} and {second} have the same place on the map")]
+    #[cause(like = EqualPoints)]
+    EqualControls {
+        /// One point.
+        first: String,
+        /// The other.
+        second: String,
+    },
+    /// A picture is a mirror image.
+    #[error("picture {picture} is a mirror image compared with its neighbours")]
+    #[cause(
+        "change the sign of one coordinate of this picture, which may have been measured from the back of the film"
+    )]
+    MirroredPicture {
+        /// The picture.
+        picture: String,
+    },
+    /// All pictures are mirror images.
+    #[error("the pictures are a mirror image of the controls")]
+    #[cause("set measurements.y_axis to the direction of y in the pictures")]
+    MirroredFigure,
+    /// A picture differs in size from its table.
+    #[error(
+        "WrongUnits: a unit of picture {picture} is {found_m:.4e} m on the ground; expected {expected_m:.4e} m within a factor of 2"
+    )]
+    #[cause(
+        "check metres_per_unit of the picture, and the units in which controls and measurements are given"
+    )]
+    WrongUnits {
+        /// The picture.
+        picture: String,
+        /// Adjusted size of a unit on the ground, metres.
+        found_m: f64,
+        /// Size by its table, metres.
+        expected_m: f64,
+    },
+    /// A control beyond the map.
+    #[error(
+        "WrongUnits: control {point} is {x_m:.4e} m east and {y_m:.4e} m north; the map reaches {limit_m:.4e} m"
+    )]
+    #[cause("check the unit in the column name, x_m or x_km, and the map of the configuration")]
+    BeyondTheMap {
+        /// The point.
+        point: String,
+        /// East, metres.
+        x_m: f64,
+        /// North, metres.
+        y_m: f64,
+        /// How far the map reaches, metres.
+        limit_m: f64,
+    },
+    /// A control outside the area of the projection.
+    #[error("control {point} lies outside the area of the projection")]
+    #[cause("choose another projection in the table map")]
+    NotOnTheMap {
+        /// The point.
+        point: String,
+    },
+    /// Ticks that give no correction.
+    #[error("the film of picture {picture}: {problem}")]
+    #[cause("give the four corner ticks of the picture, and either no or all four mid-edge ticks")]
+    Film {
+        /// The picture.
+        picture: String,
+        /// The problem.
+        problem: String,
+    },
+}
+
+/// Gives failures of the solver their names.
+pub(super) struct Names<'a> {
+    pub(super) pictures: &'a [String],
+    pub(super) points: &'a [String],
+}
+
+impl Names<'_> {
+    /// The failure with the names of the net; pictures are called `what`.
+    pub(super) fn of(&self, error: PlaneError, what: &'static str) -> NetError {
+        let picture = |index: usize| self.pictures[index].clone();
+        let point = |index: usize| self.points[index].clone();
+        match error {
+            PlaneError::TooFewControls { found } => NetError::TooFewControls { found },
+            PlaneError::UnderconnectedPicture { picture: at, ties } => NetError::Underconnected {
+                what,
+                name: picture(at),
+                ties,
+            },
+            PlaneError::EqualPoints {
+                picture: at,
+                first,
+                second,
+            } => NetError::EqualPoints {
+                picture: picture(at),
+                first: point(first),
+                second: point(second),
+            },
+            PlaneError::EqualControls { first, second } => NetError::EqualControls {
+                first: point(first),
+                second: point(second),
+            },
+            PlaneError::MirroredPicture { picture: at } => NetError::MirroredPicture {
+                picture: picture(at),
+            },
+            PlaneError::MirroredFigure => NetError::MirroredFigure,
+        }
+    }
+}
+
+/// A film that gives no correction.
+pub(super) fn film(picture: &str, problem: FilmError) -> NetError {
+    NetError::Film {
+        picture: picture.to_owned(),
+        problem: problem.to_string(),
+    }
+}
