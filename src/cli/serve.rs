@@ -129,7 +129,7 @@ fn serve(file: &Path, listen: Option<SocketAddr>) -> Result<(), Error> {
     };
     // Pages answer from the beginning: a lost database may take minutes to be made again.
     let served = pages.spawn(http::serve(listener, Arc::clone(&shared)));
-    let worked = work.block_on(async {
+    let worked: Result<(), Error> = work.block_on(async {
         tokio::spawn(obey(Arc::clone(&shared), listen));
         output::line(format_args!("listening at http://{address}"));
         let _ = sd_notify::notify(&[NotifyState::Ready]);

@@ -148,8 +148,8 @@ declare_table! {
         count: u16 = key(whole_from_to(1, 256)).or(2),
         /// Threads of each.
         threads: u16 = key(whole_from_to(1, 1024)).or(2),
-        /// Memory that each may take, mebibytes.
-        memory_mib: u32 = key(whole_from_to(64, 1 << 24)).or(8192),
+        /// Memory that each may take, mebibytes. A worker takes about 106 before it reads a site.
+        memory_mib: u32 = key(whole_from_to(512, 1 << 24)).or(8192),
         /// Longest time for a site.
         deadline_s: f64 = key(from_to(1.0, 2_592_000.0)).or(21_600.0),
         /// A worker without a heartbeat for this time is ended.

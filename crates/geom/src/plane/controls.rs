@@ -3,13 +3,13 @@
 use super::{Place, similarity::Similarity};
 
 /// Median of the squared length of a vector whose coordinates are normal with variance 1: `2 ln 2`.
-const MEDIAN_OF_SQUARES: f64 = 2.0 * std::f64::consts::LN_2;
+pub(super) const MEDIAN_OF_SQUARES: f64 = 2.0 * std::f64::consts::LN_2;
 /// Minimum number of controls for the detection of a gross error.
 const JUDGED_MIN: usize = 5;
 /// Robust standard deviations within which controls are selected first.
-const FIRST_CHOICE: f64 = 5.0;
+pub(super) const FIRST_CHOICE: f64 = 5.0;
 /// Maximum number of rounds of selection and fit.
-const ROUNDS: usize = 20;
+pub(super) const ROUNDS: usize = 20;
 
 /// A figure on its controls.
 #[derive(Debug, Clone, PartialEq)]

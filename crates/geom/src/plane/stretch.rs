@@ -1,14 +1,24 @@
 //! Stretch of a figure against its controls: controls whose axes have different scales, or are not at right angles.
+//!
+//! A similarity between stretched controls has large residuals, under which gross errors hide. Gross errors are
+//! therefore identified about an affinity, again by least median of squares.
 
-use nalgebra::Matrix2;
-
-use super::{Place, controls::fit_similarity};
+use super::{
+    Place,
+    controls::{FIRST_CHOICE, MEDIAN_OF_SQUARES, ROUNDS},
+};
+use crate::random::Random;
 
 /// Minimum number of controls: an affinity has six unknowns in two equations a control.
 const CONTROLS_MIN: usize = 5;
-/// Smallest square of the sine between the directions of the axes of the figure, as a share: controls nearly on a line
-/// determine no stretch across it.
+/// Minimum number of controls among which gross errors are identified about an affinity.
+const JUDGED_MIN: usize = 7;
+/// Affinities through three controls that are compared, at most: all of them up to thirty controls.
+const TRIPLES_MAX: usize = 4_096;
+/// Smallest spread of controls that determine a stretch, see [`Affinity::fit`]: a tenth in width, and for three of them
+/// what rounding leaves.
 const SPREAD_MIN: f64 = 0.05;
+const SPREAD_OF_THREE: f64 = 1e-6;
 
 /// What an affinity of the controls has beyond a similarity: `Z = a z + b z̄ + c`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,72 +43,215 @@ impl Stretch {
     }
 }
 
+/// `Z = a z + b z̄ + c`.
+#[derive(Debug, Clone, Copy)]
+struct Affinity {
+    a: Place,
+    b: Place,
+    c: Place,
+    /// Variance of a coordinate of `b` where that of a control is 1.
+    of_b: f64,
+}
+
+impl Affinity {
+    /// The affinity that fits `from` to `to` best; `None` where their spread, the square of the sine between the
+    /// regressions on both axes, is below a limit: points nearly on a line.
+    fn fit(from: &[Place], to: &[Place], spread_min: f64) -> Option<Self> {
+        let count = from.len().min(to.len()) as f64;
+        let (middle, target) = (
+            from.iter().sum::<Place>() / count,
+            to.iter().sum::<Place>() / count,
+        );
+        let pairs = || {
+            let pairs = from.iter().zip(to);
+            pairs.map(|(from, to)| (from - middle, to - target))
+        };
+        let squares: f64 = pairs().map(|(from, _)| from.norm_sqr()).sum();
+        let turned: Place = pairs().map(|(from, _)| from * from).sum();
+        let spread = 1.0 - turned.norm_sqr() / (squares * squares);
+        // Written so that NaN counts.
+        if !(spread > spread_min) {
+            return None;
+        }
+        let of_plain: Place = pairs().map(|(from, to)| from.conj() * to).sum();
+        let of_mirrored: Place = pairs().map(|(from, to)| from * to).sum();
+        let determinant = squares * squares * spread;
+        let a = (of_plain * squares - turned.conj() * of_mirrored) / determinant;
+        let b = (of_mirrored * squares - turned * of_plain) / determinant;
+        Some(Self {
+            a,
+            b,
+            c: target - a * middle - b * middle.conj(),
+            of_b: 1.0 / (squares * spread),
+        })
+    }
+
+    fn residual(&self, from: Place, to: Place) -> f64 {
+        (to - self.a * from - self.b * from.conj() - self.c).norm()
+    }
+}
+
 /// The stretch of `given` against `figure`; `None` for fewer than five controls, or controls nearly on a line.
+///
+/// * `kept` – controls without gross errors about a similarity: those used where they are too few to identify gross
+///   errors about an affinity
+/// * `limit` – standard deviations beyond which a control has a gross error
 #[must_use]
-pub fn stretch(figure: &[Place], given: &[Place]) -> Option<Stretch> {
+pub fn stretch(figure: &[Place], given: &[Place], kept: &[bool], limit: f64) -> Option<Stretch> {
     let count = figure.len().min(given.len());
-    if count < CONTROLS_MIN {
-        return None;
-    }
-    let (figure, given) = (&figure[..count], &given[..count]);
-    // In a frame of the size and direction of the controls.
-    let similarity = fit_similarity(figure, given)?;
-    let middle = given.iter().sum::<Place>() / count as f64;
-    let pairs = || {
-        let pairs = figure.iter().zip(given);
-        pairs.map(|(figure, given)| (similarity.map(*figure) - middle, given - middle))
+    let own = if count >= JUDGED_MIN {
+        Some(selected(&figure[..count], &given[..count], limit)?)
+    } else {
+        None
     };
-    let squares: f64 = pairs().map(|(from, _)| from.norm_sqr()).sum();
-    let turned: Place = pairs().map(|(from, _)| from * from).sum();
-    let spread = 1.0 - turned.norm_sqr() / (squares * squares);
-    // Written so that NaN counts.
-    if !(spread > SPREAD_MIN) {
+    let (figure, given) = of_kept(figure, given, own.as_deref().unwrap_or(kept));
+    if figure.len() < CONTROLS_MIN {
         return None;
     }
-    let real = Place::from(squares);
-    let normal = Matrix2::new(real, turned.conj(), turned, real);
-    let right = nalgebra::Vector2::new(
-        pairs().map(|(from, to)| from.conj() * to).sum::<Place>(),
-        pairs().map(|(from, to)| from * to).sum::<Place>(),
-    );
-    let [a, b]: [Place; 2] = (normal.try_inverse()? * right).into();
-    let left: f64 = pairs()
-        .map(|(from, to)| (to - a * from - b * from.conj()).norm_sqr())
-        .sum();
-    let free = (2 * count - 6) as f64;
-    let variance = left / free;
-    let of_b = variance / (squares * spread);
+    let fitted = Affinity::fit(&figure, &given, SPREAD_MIN)?;
+    let free = (2 * figure.len() - 6) as f64;
+    let sigma = sigma_of(&fitted, &figure, &given) * fitted.of_b.sqrt();
+    let (a, b) = (fitted.a, fitted.b);
     Some(Stretch {
         ratio: 2.0 * b.norm() / a.norm(),
-        sigma: 2.0 * of_b.sqrt() / a.norm(),
+        sigma: 2.0 * sigma / a.norm(),
         free,
         direction_rad: 0.5 * (a * b).arg(),
     })
+}
+
+/// Controls without gross errors about an affinity.
+fn selected(figure: &[Place], given: &[Place], limit: f64) -> Option<Vec<bool>> {
+    let count = figure.len();
+    let residuals = |of: &Affinity| -> Vec<f64> {
+        let pairs = figure.iter().zip(given);
+        pairs.map(|(from, to)| of.residual(*from, *to)).collect()
+    };
+    // The rank of least median for three complex unknowns.
+    let rank = (count / 2 + 2).min(count) - 1;
+    let mut best: Option<(f64, Affinity)> = None;
+    for three in triples(count) {
+        let [from, to] = [figure, given].map(|of| three.map(|index| of[index]));
+        let Some(affinity) = Affinity::fit(&from, &to, SPREAD_OF_THREE) else {
+            continue;
+        };
+        let mut sizes = residuals(&affinity);
+        let median = *sizes.select_nth_unstable_by(rank, f64::total_cmp).1;
+        if best.is_none_or(|(least, _)| median < least) {
+            best = Some((median, affinity));
+        }
+    }
+    let (median, affinity) = best?;
+    // The correction for small samples of Rousseeuw and Leroy.
+    let small_sample = 1.0 + 5.0 / (count as f64 - 3.0);
+    // Exact data leave rounding, which is not a gross error.
+    let size = given.iter().map(|given| given.norm()).fold(0.0, f64::max);
+    let within = |of: &Affinity, distance: f64| -> Vec<bool> {
+        let reach = distance.max(1e-9 * size);
+        residuals(of).into_iter().map(|of| of <= reach).collect()
+    };
+    let sigma = small_sample * median / MEDIAN_OF_SQUARES.sqrt();
+    let mut kept = within(&affinity, FIRST_CHOICE * sigma);
+    for _ in 0..ROUNDS {
+        let (from, to) = of_kept(figure, given, &kept);
+        let fitted = Affinity::fit(&from, &to, SPREAD_OF_THREE)?;
+        let next = within(&fitted, limit * sigma_of(&fitted, &from, &to));
+        let enough = next.iter().filter(|kept| **kept).count() > count / 2;
+        if next == kept || !enough {
+            break;
+        }
+        kept = next;
+    }
+    Some(kept)
+}
+
+/// Standard deviation of a coordinate of a control about an affinity.
+fn sigma_of(of: &Affinity, from: &[Place], to: &[Place]) -> f64 {
+    let pairs = from.iter().zip(to);
+    let squares: f64 = pairs
+        .map(|(from, to)| of.residual(*from, *to).powi(2))
+        .sum();
+    (squares / (2 * from.len()).saturating_sub(6).max(1) as f64).sqrt()
+}
+
+fn of_kept(figure: &[Place], given: &[Place], kept: &[bool]) -> (Vec<Place>, Vec<Place>) {
+    let pairs = figure.iter().zip(given).zip(kept);
+    let pairs = pairs.filter(|(_, kept)| **kept);
+    pairs.map(|((figure, given), _)| (*figure, *given)).unzip()
+}
+
+/// Every three of some controls; of many controls, a fixed choice.
+fn triples(count: usize) -> Vec<[usize; 3]> {
+    if count * (count - 1) * (count - 2) / 6 <= TRIPLES_MAX {
+        let last_two = |one: usize| {
+            (one + 1..count)
+                .flat_map(move |two| (two + 1..count).map(move |three| [one, two, three]))
+        };
+        return (0..count).flat_map(last_two).collect();
+    }
+    let mut random = Random::new(0, "three controls");
+    let mut triples = Vec::with_capacity(TRIPLES_MAX);
+    while triples.len() < TRIPLES_MAX {
+        let three = [0; 3].map(|_: usize| {
+            let index = random.bits() % count as u64;
+            usize::try_from(index).unwrap_or(0)
+        });
+        if three[0] != three[1] && three[1] != three[2] && three[0] != three[2] {
+            triples.push(three);
+        }
+    }
+    triples
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn figure(count: usize) -> Vec<Place> {
+        (0..count)
+            .map(|index| Place::from_polar(1.0 + 0.1 * index as f64, 2.4 * index as f64))
+            .collect()
+    }
+
+    /// The figure on a map whose east axis is a tenth too long.
+    fn stretched(figure: &[Place]) -> Vec<Place> {
+        let turn = Place::from_polar(30.0, 0.7);
+        let turned = figure.iter().map(|of| of * turn);
+        turned
+            .map(|of| Place::new(1.1 * of.re, of.im) + 500.0)
+            .collect()
+    }
+
     #[test]
     fn a_stretch_of_the_east_axis_is_found() {
-        let figure: Vec<Place> = (0..8)
-            .map(|index| Place::from_polar(1.0 + 0.1 * f64::from(index), 2.4 * f64::from(index)))
-            .collect();
-        let turn = Place::from_polar(30.0, 0.7);
-        let given: Vec<Place> = figure
-            .iter()
-            .map(|of| of * turn)
-            .map(|of| Place::new(1.1 * of.re, of.im) + 500.0)
-            .collect();
-        let found = stretch(&figure, &given).unwrap();
-        // 1.1 against 1, over their mean; exact data leave rounding.
-        assert!((found.ratio - 0.1 / 1.05).abs() < 1e-9, "{found:?}");
-        assert!(found.direction_rad.abs() < 1e-9, "{found:?}");
-        assert!(found.by_chance(1e-4) < 1e-9, "{found:?}");
-        let line: Vec<Place> = (0..8)
-            .map(|index| Place::new(f64::from(index), 0.0))
-            .collect();
-        assert!(stretch(&line, &line).is_none());
+        for count in [5, 8, 40] {
+            let figure = figure(count);
+            let given = stretched(&figure);
+            let found = stretch(&figure, &given, &vec![true; count], 4.0).unwrap();
+            // 1.1 against 1, over their mean; exact data leave rounding.
+            assert!((found.ratio - 0.1 / 1.05).abs() < 1e-9, "{found:?}");
+            assert!(found.direction_rad.abs() < 1e-9, "{found:?}");
+            assert!(found.by_chance(1e-3) < 1e-9, "{found:?}");
+        }
+        let line: Vec<Place> = (0..8_u32).map(|at| Place::new(at.into(), 0.0)).collect();
+        assert!(stretch(&line, &line, &[true; 8], 4.0).is_none());
+    }
+
+    #[test]
+    fn gross_errors_do_not_hide_a_stretch() {
+        let figure = figure(12);
+        let mut given = stretched(&figure);
+        for (index, of) in given.iter_mut().enumerate() {
+            // Errors of a hundredth of the figure, and two of half of it.
+            *of += Place::from_polar(0.5, 1.7 * (index * index) as f64);
+        }
+        given[4] += Place::new(0.0, 17.0);
+        given[5] += Place::new(0.0, 19.0);
+        let found = stretch(&figure, &given, &[true; 12], 4.0).unwrap();
+        // Ten controls, six unknowns.
+        assert!((found.free - 14.0).abs() < 0.5, "{found:?}");
+        // Errors of 0.35 in a coordinate over a figure of 45: within four standard deviations of half a per cent.
+        assert!((found.ratio - 0.1 / 1.05).abs() < 0.02, "{found:?}");
+        assert!(found.ratio > found.by_chance(1e-3), "{found:?}");
     }
 }

@@ -83,7 +83,8 @@ fn sigmas<'a>() -> [Column<Row<'a>>; 3] {
         column(
             "sigma_east_m",
             Unit::Metre,
-            "standard deviation east, of the measurement and of the calibration, metres",
+            "standard deviation east, of the measurement and of the calibration, metres; empty for a tie point whose height is not \
+             tested for errors such as those found at others",
             |row: &Row| row.sigma_m.map(|of| of[0]),
         ),
         column(

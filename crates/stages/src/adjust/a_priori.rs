@@ -17,7 +17,11 @@ pub fn accuracy_withheld<'a>(
         return None;
     }
     let is_of_it = |times: &ImageTimes| match &times.support {
-        Some(support) => support.has_laser && site.altimeter.id == usual_altimeter().id,
+        Some(support) => {
+            let platform = support.platform.replace('_', " ");
+            platform.eq_ignore_ascii_case(&SPACECRAFT.label_name)
+                || (support.has_laser && site.altimeter.id == usual_altimeter().id)
+        }
         None => times.instrument.spacecraft.has_laser(),
     };
     let has_own = |times: &ImageTimes| {

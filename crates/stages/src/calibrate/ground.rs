@@ -74,13 +74,21 @@ impl Tie {
     }
 }
 
-/// Tie points in use that are off the ground, and what the test can find. `None` where laser points in use are too few or
-/// nearly on a line.
+/// Result of the test.
+pub(super) struct Tested {
+    /// Tie points off the ground.
+    pub(super) off: Vec<Off>,
+    /// Of each other tie point in use, its index and the smallest error of height that shows, metres.
+    pub(super) shown_m: Vec<(usize, f64)>,
+    pub(super) summary: TieGround,
+}
+
+/// Tests tie points in use against the ground. `None` where laser points in use are too few or nearly on a line.
 pub(super) fn off_ground(
     points: &[OrbitPoint],
     state: &CalibrationState,
     covariance: &DMatrix<f64>,
-) -> Option<(Vec<Off>, TieGround)> {
+) -> Option<Tested> {
     let lasers = points.iter().filter(|of| of.is(PointKind::Control));
     let lasers_m: Vec<Vector3<f64>> = lasers
         .filter_map(|of| Some(of.point.known?.place_m))
@@ -103,30 +111,38 @@ pub(super) fn off_ground(
         off.extend((!is_kept).then_some(above));
         is_kept
     });
-    let mut sigmas_m = Vec::new();
+    let mut sigmas_m: Vec<Option<f64>> = vec![None; kept.len()];
     for _ in 0..ROUNDS {
         let places_m: Vec<Vector3<f64>> = kept.iter().map(|tie| tie.place_m).collect();
         let Some(ground) = laser_ground.with(&places_m) else {
             break;
         };
         let found = on_ground(&kept, &ground, lasers_m.len());
-        sigmas_m = found.iter().flatten().map(|of| of.sigma_m).collect();
+        sigmas_m = found.iter().map(|of| Some(of.as_ref()?.sigma_m)).collect();
         let worst = worst_of_neighbours(&found, is_off);
         if worst.is_empty() {
             break;
         }
         for at in worst.into_iter().rev() {
             kept.remove(at);
+            sigmas_m.remove(at);
             off.extend(found[at].as_ref().map(|of| of.off));
         }
     }
     off.sort_by_key(|of| of.index);
-    let tested = TieGround {
-        tested: (sigmas_m.len() + off.len()) as u64,
-        limit_sigmas: limit,
-        limit_m: (!sigmas_m.is_empty()).then(|| limit * Summary::of(&sigmas_m).median),
-    };
-    Some((off, tested))
+    let known_m: Vec<f64> = sigmas_m.iter().flatten().copied().collect();
+    let shown_m = kept.iter().zip(&sigmas_m);
+    Some(Tested {
+        summary: TieGround {
+            tested: (known_m.len() + off.len()) as u64,
+            limit_sigmas: limit,
+            limit_m: (!known_m.is_empty()).then(|| limit * Summary::of(&known_m).median),
+        },
+        shown_m: shown_m
+            .map(|(tie, sigma_m)| (tie.index, limit * sigma_m.unwrap_or(f64::INFINITY)))
+            .collect(),
+        off,
+    })
 }
 
 /// A tie point on a ground that contains it.

@@ -210,7 +210,9 @@ impl Outcome<'_> {
                 kind: of.kind,
                 left_out: of.left_out,
                 place,
-                sigma_m: placed.and_then(|(_, sigma_m)| sigma_m),
+                sigma_m: placed
+                    .filter(|_| !of.may_be_off)
+                    .and_then(|(_, sigma_m)| sigma_m),
                 off_m: self.off_m(of).map(Into::into),
             }
         };

@@ -27,6 +27,8 @@ pub(super) struct OrbitPoint {
     pub(super) measured: Vec<Measured>,
     pub(super) point: GroundPoint,
     pub(super) left_out: bool,
+    /// Whether it is a tie point where ties are wrong along the flight, and the ground would not show that of this one.
+    pub(super) may_be_off: bool,
 }
 
 impl OrbitPoint {
@@ -100,6 +102,7 @@ pub(super) fn points_of(
                 kind,
                 measured: of.measured,
                 left_out: false,
+                may_be_off: false,
             }
         };
         of.into_iter().map(point).collect()

@@ -340,7 +340,8 @@ pub struct PointResult {
     /// East longitude, latitude, radians, and radius, metres, intersected from its images; `None` where they are too
     /// few, and for a point that was left out.
     pub place: Option<[f64; 3]>,
-    /// Standard deviations east, north and up, metres.
+    /// Standard deviations east, north and up, metres; `None` without a place, and for a tie point whose height is not
+    /// tested for errors such as those that were found at others.
     pub sigma_m: Option<[f64; 3]>,
     /// Of a laser point: intersected minus the laser's, east, north and up, metres.
     pub off_m: Option<[f64; 3]>,

@@ -24,7 +24,7 @@ use areograph_geom::{
         CalibrationError, CalibrationState, Freedom, GroundPoint, Layout, Parameter, Start, solve,
         tie_sight,
     },
-    statistics::outliers,
+    statistics::{Summary, outliers},
 };
 
 /// A point is left out when its residual exceeds the median of its kind by this many robust standard deviations: of a
@@ -48,6 +48,8 @@ struct Work<'a> {
     covariance: DMatrix<f64>,
     /// The test of ties against the ground; `None` where it is not possible.
     tie_ground: Option<TieGround>,
+    /// Heights of ties that were left out above or below the ground, metres.
+    off_m: Vec<f64>,
 }
 
 /// Calibrates the lines of a camera by the tables of its configuration.
@@ -97,6 +99,7 @@ fn calibrate_by(
         state,
         covariance: DMatrix::zeros(parameters, parameters),
         tie_ground: None,
+        off_m: Vec::new(),
     };
     work.tell("before", "nothing", 0);
     let sight =
@@ -360,13 +363,12 @@ impl Work<'_> {
 
     /// Leaves out ties whose heights contradict the ground between laser points.
     fn leave_out_off_ground(&mut self, complaints: &mut Complaints) -> bool {
-        let found = off_ground(&self.points, &self.state, &self.covariance);
-        let Some((off, tested)) = found else {
+        let Some(tested) = off_ground(&self.points, &self.state, &self.covariance) else {
             self.tie_ground = None;
             return false;
         };
-        self.tie_ground = (tested.tested > 0).then_some(tested);
-        for of in &off {
+        self.tie_ground = (tested.summary.tested > 0).then_some(tested.summary);
+        for of in &tested.off {
             let point = &mut self.points[of.index];
             point.left_out = true;
             complaints.tell(format!(
@@ -376,8 +378,15 @@ impl Work<'_> {
                 of.above_m,
                 of.sigmas.abs()
             ));
+            self.off_m.push(of.above_m.abs());
         }
-        !off.is_empty()
+        if !self.off_m.is_empty() {
+            let usual_m = Summary::of(&self.off_m).median;
+            for (index, shown_m) in tested.shown_m {
+                self.points[index].may_be_off = shown_m > usual_m;
+            }
+        }
+        !tested.off.is_empty()
     }
 }
 

@@ -21,7 +21,7 @@ const SCALE_SIGMAS: f64 = 3.0;
 /// Stretch that two maps of one net may have.
 const STRETCH_MAX: f64 = 0.01;
 /// Probability that errors of the controls feign a stretch.
-const CHANCE_MAX: f64 = 1e-4;
+const CHANCE_MAX: f64 = 1e-3;
 /// Number of pictures that a reason names.
 const NAMED_MAX: usize = 3;
 
@@ -97,7 +97,13 @@ pub(super) struct Scales {
 }
 
 impl Scales {
-    pub(super) fn of(sizes: &[SizeCheck], pictures: &[PictureResult], laid: &Laid) -> Self {
+    /// * `limit` – standard deviations beyond which a control has a gross error
+    pub(super) fn of(
+        sizes: &[SizeCheck],
+        pictures: &[PictureResult],
+        laid: &Laid,
+        limit: f64,
+    ) -> Self {
         let scales = sizes.iter().map(|size| {
             let picture = &pictures[size.picture];
             let sigma = picture.sigma_scale.unwrap_or(0.0);
@@ -108,15 +114,14 @@ impl Scales {
             }
         });
         let shown = shown_controls(&laid.net, &laid.block.places);
-        let kept = shown.iter().zip(&laid.scaled.kept);
-        let kept = kept.filter(|(_, kept)| **kept);
-        let (figure, given): (Vec<Place>, Vec<Place>) = kept
-            .map(|((_, figure, given), _)| (*figure, *given))
+        let (figure, given): (Vec<Place>, Vec<Place>) = shown
+            .iter()
+            .map(|(_, figure, given)| (*figure, *given))
             .unzip();
         Self {
             pictures: scales.collect(),
             unstated: pictures.len() - sizes.len(),
-            stretch: stretch(&figure, &given),
+            stretch: stretch(&figure, &given, &laid.scaled.kept, limit),
         }
     }
 

@@ -50,7 +50,7 @@ impl Report<'_> {
             bricks: &bricks,
             seams: seams.as_ref(),
             controls: &controls,
-            scales: &Scales::of(self.sizes, &pictures, self.laid),
+            scales: &Scales::of(self.sizes, &pictures, self.laid, self.config.controls.limit),
             measurements: measurements.len(),
             complaints: self.data.complaint_count,
             remarks: &remarks,
