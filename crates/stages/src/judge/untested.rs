@@ -39,7 +39,7 @@ pub(super) fn untested(evidence: &Evidence<'_>) -> Vec<String> {
             if has_ties {
                 "focal length: tie points absorb an error of 1 %"
             } else {
-                "camera: focal length, distortion, direction of the samples"
+                "rotation about the line of sight; camera: focal length, distortion, direction of the samples"
             }
             .to_owned(),
         );
