@@ -224,26 +224,29 @@ pub(super) fn orient<D: Driver>(
         images,
         required,
     } = prepared;
-    let view = KernelView::positions(kernels.as_ref());
-    let view = flow.attempt(CheckRanges::NAME, view)?;
-    let view = &view.unwrap_or_else(|| KernelView::all(None));
-    let ranges = if config.shots.is_empty() {
-        flow.stage(&CheckRanges {
-            converted: &converted,
-            profiles: &profiles,
-            kernels: view,
-            mola_clock: &config.mola_clock,
-            range_check: &config.range_check,
-        })?
-    } else {
-        flow.stage(&CheckTableRanges {
-            converted: &converted,
-            profiles: &profiles,
-            images: InOrder(&images),
-            kernels: view,
-            mola_clock: &config.mola_clock,
-            range_check: &config.range_check,
-        })?
+    // One session at a time: that of the positions ends here.
+    let ranges = {
+        let view = KernelView::positions(kernels.as_ref());
+        let view = flow.attempt(CheckRanges::NAME, view)?;
+        let view = &view.unwrap_or_else(|| KernelView::all(None));
+        if config.shots.is_empty() {
+            flow.stage(&CheckRanges {
+                converted: &converted,
+                profiles: &profiles,
+                kernels: view,
+                mola_clock: &config.mola_clock,
+                range_check: &config.range_check,
+            })?
+        } else {
+            flow.stage(&CheckTableRanges {
+                converted: &converted,
+                profiles: &profiles,
+                images: InOrder(&images),
+                kernels: view,
+                mola_clock: &config.mola_clock,
+                range_check: &config.range_check,
+            })?
+        }
     };
     let (orientations, described) = {
         let view = &KernelView::all(kernels.as_ref());

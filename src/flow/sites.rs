@@ -171,6 +171,7 @@ fn summary(manifest: &Manifest) -> SiteSummary {
 }
 
 #[cfg(test)]
+#[allow(clippy::disallowed_methods, reason = "files of a test")]
 mod tests {
     use super::*;
 

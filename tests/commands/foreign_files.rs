@@ -75,8 +75,8 @@ fn inputs(folder: &Path) -> Vec<&'static str> {
         fs::write(folder.join(name), text).unwrap();
     }
     let mut names = texts.map(|(name, _)| name).to_vec();
-    track::write(&folder.join("ap19020k.b"), Datum::Iau2000, 0, |_, _| ());
-    names.push("ap19020k.b");
+    track::write(&folder.join("ap19020l.b"), Datum::Iau2000, 0, |_, _| ());
+    names.push("ap19020l.b");
     succeed(
         areograph()
             .current_dir(folder)
@@ -102,14 +102,14 @@ fn a_search_replaces_only_its_own_answers() {
             let search = [
                 "pedr",
                 "search",
-                "ap19020k.b",
+                "ap19020l.b",
                 BOX,
                 "--format",
                 format,
                 "--out",
             ];
             let output = program(folder, &[&search[..], &[file]].concat());
-            if file == "ap19020k.b" {
+            if file == "ap19020l.b" {
                 // The input of this search; refused by name.
                 assert_eq!(output.status.code(), Some(2));
                 continue;
@@ -118,13 +118,13 @@ fn a_search_replaces_only_its_own_answers() {
         }
     }
     for out in ["a.parquet", "a.geojson", "a.csv"] {
-        assert_repeats(folder, &["pedr", "search", "ap19020k.b", BOX, "--out", out]);
+        assert_repeats(folder, &["pedr", "search", "ap19020l.b", BOX, "--out", out]);
     }
     // A search for other shots as well.
     let other = [
         "pedr",
         "search",
-        "ap19020k.b",
+        "ap19020l.b",
         "--box=0,170,-60,60",
         "--out",
         "a.csv",
@@ -132,7 +132,7 @@ fn a_search_replaces_only_its_own_answers() {
     assert_repeats(folder, &other);
     // The request beside a table is a file of its own, and an answer that was edited is not one of areograph.
     fs::write(folder.join("b.csv.json"), "{\"areograph\": 1}").unwrap();
-    let search = ["pedr", "search", "ap19020k.b", BOX, "--out"];
+    let search = ["pedr", "search", "ap19020l.b", BOX, "--out"];
     assert_refused(folder, "b.csv.json", &[&search[..], &["b.csv"]].concat());
     let edited = fs::read_to_string(folder.join("a.csv")).unwrap() + "mine\n";
     fs::write(folder.join("a.csv"), edited).unwrap();
@@ -144,7 +144,7 @@ fn tables_indexes_and_manual_pages_replace_only_their_own() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     inputs(folder);
-    let tab = ["pedr", "tab", "ap19020k.b", "--per-shot", "--out", "tables"];
+    let tab = ["pedr", "tab", "ap19020l.b", "--per-shot", "--out", "tables"];
     assert_repeats(folder, &tab);
     let table = fs::read_dir(folder.join("tables")).unwrap();
     let table = table.map(|entry| entry.unwrap().file_name().into_string().unwrap());
@@ -177,7 +177,7 @@ fn pictures_replace_only_their_own() {
         predictor: Predictor::X,
         table: 3,
     };
-    let image = new_image(640, 1, &[90; 640 * 320], coding);
+    let image = new_image(640, 1, &vec![90; 640 * 320], coding);
     fs::write(folder.join("image.imq"), encode(&image).unwrap()).unwrap();
     for out in ["a.png", "a.tif"] {
         let extract = [
@@ -272,7 +272,7 @@ fn products_heal_without_their_manifest() {
             fs::remove_dir_all(case.path("out/case/.cache")).unwrap();
         }),
         ("damaged product", &|| {
-            case.write("out/case/ranges.json", "{}")
+            case.write("out/case/ranges.json", "{}");
         }),
     ];
     for (what, spoil) in spoil {

@@ -146,7 +146,9 @@ fn a_pedr_file_of_another_site_is_a_remark() {
     let case = Case::new();
     // The orbits over the window are those of the pair.
     let own = ["ap19019k.b", "ap19117l.b"];
-    let other = |name: &str| name.ends_with(".b") && !own.contains(&name);
+    let other = |name: &str| {
+        Path::new(name).extension().is_some_and(|of| of == "b") && !own.contains(&name)
+    };
     let folder = fs::read_dir(mission().join("pedr")).unwrap();
     let names = folder.map(|entry| entry.unwrap().file_name().into_string().unwrap());
     let mut names: Vec<String> = names.filter(|name| other(name)).collect();

@@ -56,7 +56,7 @@ fn kill_before_a_rename(command: &Command, folder: &Path) {
 fn a_killed_search_leaves_nothing_to_the_next() {
     let folder = tempfile::tempdir().unwrap();
     let root: PathBuf = folder.path().canonicalize().unwrap();
-    track::write(&root.join("ap19020k.b"), Datum::Iau2000, 0, |_, _| ());
+    track::write(&root.join("ap19020l.b"), Datum::Iau2000, 0, |_, _| ());
     for name in FOREIGN {
         fs::write(root.join(name), "mine").unwrap();
     }
@@ -67,7 +67,7 @@ fn a_killed_search_leaves_nothing_to_the_next() {
             "--quiet",
             "pedr",
             "search",
-            "ap19020k.b",
+            "ap19020l.b",
             "--box=-170,170,-60,60",
         ]);
         command.arg("--out").arg(root.join(out));

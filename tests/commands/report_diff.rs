@@ -56,6 +56,7 @@ fn a_turned_ck_is_found_and_nothing_else() {
         "describe_kernels",
         "fit_sensor_model/image",
         "register/image",
+        "check_beam",
         "publish",
     ];
     assert_eq!(case.stages_run(), ran);
@@ -203,6 +204,7 @@ fn another_orbit_moves_the_camera_by_the_injected_difference() {
         "describe_kernels",
         "fit_sensor_model/image",
         "register/image",
+        "check_beam",
         "publish",
     ];
     assert_eq!(case.stages_run(), ran);

@@ -35,7 +35,7 @@ fn run(case: &Case) -> Vec<String> {
 
 fn fresh() -> Case {
     let case = Case::new();
-    assert_eq!(run(&case).len(), 11);
+    assert_eq!(run(&case).len(), 12);
     assert_eq!(plan(&case), BTreeMap::new());
     assert_eq!(run(&case), [""; 0]);
     case
@@ -154,6 +154,7 @@ fn another_orbit_touches_ranges_and_orientation() {
             "describe_kernels",
             "fit_sensor_model/image",
             "register/image",
+            "check_beam",
             "publish"
         ]
     );
@@ -170,7 +171,7 @@ fn another_camera_model_touches_registration_alone() {
     let planned = plan(&case);
     assert_eq!(planned["register/image"], "key registration.model changed");
     assert!(!planned.contains_key("fit_sensor_model/image"));
-    assert_eq!(run(&case), ["register/image", "publish"]);
+    assert_eq!(run(&case), ["register/image", "check_beam", "publish"]);
 }
 
 #[test]

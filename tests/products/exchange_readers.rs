@@ -454,6 +454,7 @@ fn the_pds4_label_describes_every_field_of_the_table() {
             let fits = match kind {
                 "ASCII_Real" => row[column].parse::<f64>().is_ok_and(f64::is_finite),
                 "ASCII_Integer" => row[column].parse::<i64>().is_ok(),
+                "ASCII_Boolean" => ["true", "false"].contains(&row[column]),
                 "UTF8_String" => !row[column].contains('"'),
                 _ => false,
             };

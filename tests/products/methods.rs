@@ -180,11 +180,11 @@ fn every_method_of_the_sources_has_a_row() {
         let (what, file, method) = (&of.declared, &of.file, of.method);
         if numbers.is_empty() {
             wrong.push(format!(
-                "{what} (src/{file}) has no row: let a scene of tests/methods/scenes.rs run it"
+                "{what} ({file}) has no row: let a scene of tests/methods/scenes.rs run it"
             ));
         } else if numbers.iter().any(|number| *number != method) {
             wrong.push(format!(
-                "{what} (src/{file}): METHOD is {method}, {LEDGER} has {numbers:?}: write it anew (`{WRITE}`, scenes that take \
+                "{what} ({file}): METHOD is {method}, {LEDGER} has {numbers:?}: write it anew (`{WRITE}`, scenes that take \
                  long with AREOGRAPH_LONG=1)"
             ));
         }

@@ -637,6 +637,11 @@ fn tells(world: &World, answer: &Answer) -> Option<String> {
 
 type Kind = fn(&World) -> Vec<Hostile>;
 
+/// Jobs and audited actions. A product that is a link is damage, for which its site runs again: that is no change by the
+/// request.
+const CHANGES: &str = "SELECT 1000 * (SELECT count(*) FROM job WHERE id NOT IN
+    (SELECT job FROM cause WHERE kind = 'product_damaged')) + (SELECT count(*) FROM audit)";
+
 #[test]
 fn hostile_requests_are_refused_and_told_nothing() {
     let kinds: [Kind; 6] = [
@@ -651,8 +656,7 @@ fn hostile_requests_are_refused_and_told_nothing() {
     for kind in kinds {
         // A new service each, or the limits of rates would refuse first.
         let world = World::new();
-        let before =
-            world.number("SELECT (SELECT count(*) FROM job) * 1000 + (SELECT count(*) FROM audit)");
+        let before = world.number(CHANGES);
         for hostile in kind(&world) {
             let port = world.address.port().to_string();
             let request = hostile
@@ -689,8 +693,7 @@ fn hostile_requests_are_refused_and_told_nothing() {
             }
             count += 1;
         }
-        let after =
-            world.number("SELECT (SELECT count(*) FROM job) * 1000 + (SELECT count(*) FROM audit)");
+        let after = world.number(CHANGES);
         assert_eq!(before, after, "a hostile request changed something");
         assert_eq!(world.get("/healthz").status, 200);
     }

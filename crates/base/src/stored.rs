@@ -16,6 +16,12 @@ pub fn is_left_out<T>(value: &Option<T>) -> bool {
     value.is_none() && !WHOLE.get()
 }
 
+/// The same for a list, which has no value if it is empty.
+#[must_use]
+pub fn is_list_left_out<T>(list: &[T]) -> bool {
+    list.is_empty() && !WHOLE.get()
+}
+
 /// Result of `write` with all fields serialized, on this thread.
 pub fn whole<T>(write: impl FnOnce() -> T) -> T {
     struct Reset(bool);
@@ -36,6 +42,8 @@ mod tests {
     fn a_field_without_a_value_is_left_out_of_documents_alone() {
         assert!(is_left_out::<f64>(&None) && !is_left_out(&Some(1.0)));
         assert!(whole(|| !is_left_out::<f64>(&None)));
+        assert!(is_list_left_out::<f64>(&[]) && !is_list_left_out(&[1.0]));
+        assert!(whole(|| !is_list_left_out::<f64>(&[])));
         assert!(is_left_out::<f64>(&None));
     }
 }

@@ -21,7 +21,7 @@ pub struct Verdict {
     /// Remarks for the reader although no limit is exceeded.
     pub remarks: Vec<String>,
     /// Errors that no datum of the run can show, one phrase each.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "crate::stored::is_list_left_out")]
     pub untested: Vec<String>,
     /// Every limit with the item that uses most of it, the worst first.
     #[serde(default)]

@@ -1,5 +1,7 @@
 //! The configuration of the service: `areograph serve` and `areograph nightly`.
 
+mod folders;
+
 use std::{
     collections::BTreeMap,
     net::{IpAddr, SocketAddr},
@@ -9,7 +11,6 @@ use std::{
 use serde::Serialize;
 
 use areograph_base::error::Error;
-use areograph_store::files::{overlap, real_path};
 
 use super::{
     declare::{
@@ -373,40 +374,7 @@ fn across_tables(service: &ServiceConfig, keys: &mut Keys<'_, '_>) {
             "another folder than that of the products",
         );
     }
-    outputs_apart(service, keys);
-}
-
-/// Whether a folder of inputs and one of outputs meet.
-type Meet = fn(&Path, &Path) -> bool;
-
-/// What the service writes must not come back as an input: a run would cause the next one.
-fn outputs_apart(service: &ServiceConfig, keys: &mut Keys<'_, '_>) {
-    let (inputs, outputs) = (&service.inputs, &service.outputs);
-    // Folders of site files are read without their subfolders.
-    let is_below = |input: &Path, output: &Path| real_path(input).starts_with(real_path(output));
-    let folders: [(&str, &Vec<PathBuf>, Meet); 3] = [
-        ("sites", &inputs.sites, is_below),
-        ("kernels", &inputs.kernels, overlap),
-        ("data", &inputs.data, overlap),
-    ];
-    for (name, output) in [("products", &outputs.products), ("state", &outputs.state)] {
-        for (input_name, inputs, meet) in &folders {
-            let Some(input) = inputs.iter().find(|input| meet(input, output)) else {
-                continue;
-            };
-            let (output, input) = (output.display(), input.display());
-            let expected = format!(
-                "folders of inputs and outputs apart from each other: {input} (inputs.{input_name}) and {output} \
-                 (outputs.{name}) overlap"
-            );
-            // A default is not in the file.
-            if keys.writes("outputs", name) {
-                keys.refuse_below("outputs", name, expected);
-            } else {
-                keys.refuse_below("inputs", input_name, expected);
-            }
-        }
-    }
+    folders::outputs_apart(service, keys);
 }
 
 /// A configuration of the service that passed every check, with its warnings.

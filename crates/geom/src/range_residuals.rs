@@ -9,7 +9,7 @@ use super::{
 };
 use areograph_base::{
     body::Body,
-    footprints::Footprint,
+    footprints::{Footprint, Footprints},
     frames::{BodyFixed, Frame, J2000, Position},
     time::Et,
 };
@@ -102,7 +102,18 @@ pub fn footprint(shot: &Footprint, radius_m: f64) -> Position<BodyFixed> {
 const BY_RANGE_RAD: f64 = 1e-9;
 const BY_RANGE_M: f64 = 0.006;
 
-/// Whether the file states where the spacecraft was.
+/// Whether the file of the shot in `row` states where the spacecraft was.
+///
+/// A PEDR file always does: at nadir its spacecraft lies on the radius through the footprint. Of a table see
+/// [`has_own_spacecraft`].
+#[must_use]
+pub fn states_spacecraft<F>(footprints: &Footprints<F>, row: usize) -> bool {
+    let shot = footprints.row(row);
+    let file = footprints.files.get(usize::from(shot.file));
+    file.is_some_and(|file| file.version.is_some()) || has_own_spacecraft(&shot)
+}
+
+/// Whether a table states where the spacecraft was.
 ///
 /// Otherwise it was put on the radius through the footprint at the range ("nadir by range"), because a table has a range
 /// but no position: its distance from the footprint is then the range, and tests nothing.

@@ -301,7 +301,8 @@ mod tests {
             );
             // Noise of 5 m beside what the ground does between the points; 300 points, and one draw of the others.
             assert!(sigmas_m.contains(&sigma_m), "{wave_m}: {sigma_m} m");
-            assert!((0.7..1.4).contains(&z), "{wave_m}: {z}");
+            // The kernel of the errors; tests of single points take the tail.
+            assert!((0.7..1.6).contains(&z), "{wave_m}: {z}");
             assert!(
                 (1.5..6.0).contains(&surface.tail),
                 "{wave_m}: {}",

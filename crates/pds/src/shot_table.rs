@@ -37,6 +37,7 @@ pub type Utc<'a> = &'a dyn Fn(&str) -> Result<Et>;
 
 /// The columns of a table.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[expect(clippy::large_enum_variant, reason = "one for each table")]
 pub enum TableColumns {
     /// As assigned.
     Assigned(ShotColumns),
@@ -270,6 +271,7 @@ impl Rows {
 }
 
 /// The columns of a table, from its first row on.
+#[expect(clippy::large_enum_variant, reason = "one for each table")]
 enum Known<'a> {
     Unread(&'a TableColumns),
     Assigned(Fields),

@@ -14,7 +14,7 @@ use super::{
 use areograph_base::{footprints::Footprints, frames::BodyFixed, schema::DocumentSchema};
 use areograph_geom::{
     ellipsoid::{AreocentricLatitude, spherical_to_xyz_m},
-    range_residuals::has_own_spacecraft,
+    range_residuals::states_spacecraft,
 };
 
 pub(super) static CSV: Declaration = Declaration {
@@ -435,7 +435,7 @@ fn spacecraft<'a>() -> Vec<Column<Shot<'a>>> {
             "nadir_by_range",
             Unit::None,
             "whether the file has no position of the spacecraft: it is then on the radius through the footprint, at range_m",
-            |shot: &Shot| !has_own_spacecraft(&shot.footprints.row(shot.row)),
+            |shot: &Shot| !states_spacecraft(shot.footprints, shot.row),
         ),
     ]
 }

@@ -32,7 +32,7 @@ pub(super) const GEOMETRY: &str = "geometry";
 
 /// Keys of the metadata of Parquet files by which an answer is recognised: that of a search, and of an SQL query.
 pub(super) const SEARCH: &str = "areograph_search";
-/// See [`SEARCH`].
+/// Likewise for an answer of SQL.
 pub const SQL: &str = "areograph_sql";
 
 /// Format of rows.

@@ -162,6 +162,7 @@ impl<'a> SiteProducts<'a> {
     }
 
     /// The tie points and their adjustment; `None` without an adjustment.
+    #[must_use]
     pub fn adjustment(&self) -> Option<(GeometricProducts<'a>, AdjustmentProducts<'a>)> {
         let geometric = self.geometric?;
         Some((geometric, geometric.adjustment?))

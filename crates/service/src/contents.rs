@@ -273,6 +273,6 @@ mod tests {
         assert!(begun.elapsed() >= Duration::from_millis(190));
         assert!(!pace.step(1 << 30, || begun.elapsed() > Duration::from_millis(300)));
         // A loaded machine may sleep longer, but not for the 1,024 s of the rate.
-        assert!(begun.elapsed() < Duration::from_secs(60));
+        assert!(begun.elapsed() < Duration::from_secs(100));
     }
 }

@@ -167,7 +167,7 @@ mod tests {
     #[test]
     fn whoever_follows_hears_of_an_event_and_of_nothing_else() {
         let folder = tempfile::tempdir().unwrap();
-        let text = "[inputs]\nsites = [\".\"]\nkernels = [\".\"]\ndata = [\".\"]\n";
+        let text = "[inputs]\nsites = [\".\"]\nkernels = [\"kernels\"]\ndata = [\"data\"]\n";
         let config = parse_service(text, &folder.path().join("areograph.toml")).unwrap();
         let database = Database::open(folder.path()).unwrap();
         let clock = Clock::set_to(7);

@@ -36,7 +36,7 @@ use areograph_config::all_instruments;
 use areograph_geom::{
     attitude::bus_to_camera,
     pushbroom::{CameraModel, Pose},
-    range_residuals::{footprint, has_own_spacecraft, own_spacecraft},
+    range_residuals::{footprint, own_spacecraft, states_spacecraft},
     statistics::Summary,
 };
 use areograph_store::{
@@ -200,12 +200,7 @@ impl Placed<'_> {
         if shots.is_empty() {
             return Err(BeamGap::NoShot);
         }
-        // A PEDR file always states the spacecraft: at nadir it lies on the radius of the footprint.
-        let is_directed = |row: &u32| {
-            let shot = footprints.row(*row as usize);
-            let file = footprints.files.get(usize::from(shot.file));
-            file.is_some_and(|file| file.version.is_some()) || has_own_spacecraft(&shot)
-        };
+        let is_directed = |row: &u32| states_spacecraft(footprints, *row as usize);
         let shots: Vec<u32> = shots.iter().copied().filter(is_directed).collect();
         if shots.is_empty() {
             return Err(BeamGap::NoPosition);

@@ -126,7 +126,7 @@ impl Stage for Reorient<'_> {
 /// positions, which a correction of 100 m would change by 1 mm for `surface` and 1 cm for `centre`.
 ///
 /// # Errors
-/// [`Kind::Input`] for a shift beyond the camera tables; [`Kind::Bug`] for a correction that is not finite.
+/// [`Kind::Input`](areograph_base::error::Kind::Input) for a shift beyond the camera tables; [`Kind::Bug`](areograph_base::error::Kind::Bug) for a correction that is not finite.
 /// # Accuracy
 /// Without a shift the samples are those of the kernels to rounding. With one they are read from the
 /// tables; [`CameraTables::interpolation`] then bounds the error of both steps together.

@@ -8,7 +8,7 @@
 
 use std::{
     collections::BTreeSet,
-    fs,
+    fs, io,
     ops::Deref,
     path::{Component, Path, PathBuf},
 };
@@ -88,7 +88,7 @@ impl Deref for Staging {
 impl Drop for Staging {
     fn drop(&mut self) {
         // After a publication it no longer exists; the next run removes files that cannot be removed now.
-        let _ = fs::remove_dir_all(&self.folder);
+        let _ = remove_marked(&self.folder);
     }
 }
 
@@ -114,10 +114,28 @@ pub(super) fn remove_staging(site_folder: &Path) {
     let folder = site_folder.join(STAGING);
     // Files that cannot be removed are reported when publishing.
     let _ = if folder.join(STAGING_MARK).is_file() {
-        fs::remove_dir_all(folder)
+        remove_marked(&folder)
     } else {
         fs::remove_dir(folder)
     };
+}
+
+/// Removes a folder with the mark. The mark goes last: whoever is killed meanwhile leaves a folder that the next run
+/// recognises.
+fn remove_marked(folder: &Path) -> io::Result<()> {
+    let mark = folder.join(STAGING_MARK);
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        if entry.file_type()?.is_dir() {
+            fs::remove_dir_all(entry.path())?;
+        } else if entry.path() != mark {
+            fs::remove_file(entry.path())?;
+        }
+    }
+    match fs::remove_file(mark) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => fs::remove_dir(folder),
+    }
 }
 
 /// Whether a run ever worked in the folder: it contains stored stages or a publication in progress.
@@ -279,7 +297,7 @@ pub fn publish(site_folder: &Path, staging: &Path, manifest: &Manifest) -> Resul
     }
     atomic::write(&site_folder.join(MANIFEST), &manifest_bytes(manifest)?)?;
     remove_if_there(&journal)?;
-    fs::remove_dir_all(staging)
+    remove_marked(staging)
         .map_err(IoError::on("remove the folder"))
         .in_file(staging)
 }

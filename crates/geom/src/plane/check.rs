@@ -10,7 +10,7 @@ use super::{
 const EQUAL: f64 = 1e-9;
 
 /// Checks that every picture is tied to the net, every part of the net to two controls, and that no two points
-/// coincide. Parts that hang on one point are those of [`loose_picture`].
+/// coincide. Parts that hang on one point are those of `loose_picture`.
 ///
 /// # Errors
 /// [`PlaneError`]; for a part without controls its first picture.

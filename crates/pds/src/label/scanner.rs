@@ -45,7 +45,7 @@ impl<'a> Scanner<'a> {
         let ends = |byte: &u8| matches!(byte, b'\n' | b'\r');
         let length = rest.iter().position(ends).unwrap_or(rest.len());
         let text = String::from_utf8_lossy(&rest[..length]);
-        let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
+        let line = before.split(|byte| *byte == b'\n').count();
         (line, text.chars().take(UNREAD_CHARACTERS).collect())
     }
 

@@ -67,7 +67,7 @@ pub(super) fn check_heading(record: &StringRecord) -> std::result::Result<(), Sh
         let found = record.get(at).unwrap_or_default();
         let written = bare(found);
         let is_known = names.iter().any(|name| bare(name) == written);
-        if !is_known && !(at == TIME && written == TIME_SPELLED) {
+        if !is_known && (at != TIME || written != TIME_SPELLED) {
             return Err(ShotTableError::Heading {
                 column: at + 1,
                 found: found.to_owned(),

@@ -45,6 +45,11 @@ pub fn accuracy_withheld<'a>(
 /// Whether the site has standard deviations of its own.
 fn is_configured(config: &AdjustmentConfig) -> bool {
     let defaults = AdjustmentConfig::default();
-    config.position_sigma_m != defaults.position_sigma_m
-        && config.rotation_sigma_rad != defaults.rotation_sigma_rad
+    let differ = |own: &[f64], default: &[f64]| {
+        own.iter()
+            .zip(default)
+            .any(|(own, default)| own.to_bits() != default.to_bits())
+    };
+    differ(&config.position_sigma_m, &defaults.position_sigma_m)
+        && differ(&config.rotation_sigma_rad, &defaults.rotation_sigma_rad)
 }

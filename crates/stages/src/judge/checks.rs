@@ -355,7 +355,8 @@ fn components(of: &AdjustmentEvidence<'_>) -> Option<Check> {
     });
     let mut check = Check::worst(tested)?;
     if !below.is_empty() {
-        check.subject += &format!("; below their interval: {}", below.join("; "));
+        check.subject.push_str("; below their interval: ");
+        check.subject.push_str(&below.join("; "));
     }
     Some(check)
 }

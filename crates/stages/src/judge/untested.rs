@@ -37,7 +37,7 @@ pub(super) fn untested(evidence: &Evidence<'_>) -> Vec<String> {
     if !evidence.images.is_empty() {
         phrases.push(
             if has_ties {
-                "focal length: tie points absorb an error of 1 %"
+                "focal length, whose error tie points absorb"
             } else {
                 "rotation about the line of sight; camera: focal length, distortion, direction of the samples"
             }

@@ -125,7 +125,7 @@ enum TabulateError {
 /// rad.
 ///
 /// # Errors
-/// [`Kind::Coverage`] where the original kernels do not reach around an image; [`Kind::Bug`] for too few samples.
+/// [`Kind::Coverage`](areograph_base::error::Kind::Coverage) where the original kernels do not reach around an image; [`Kind::Bug`](areograph_base::error::Kind::Bug) for too few samples.
 pub fn tabulate_kernels(
     session: &Session,
     images: &[&ImageTimes],

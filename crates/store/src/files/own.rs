@@ -172,7 +172,13 @@ fn line_of(mut file: &File, path: &Path) -> io::Result<String> {
     let mut hasher = blake3::Hasher::new();
     io::copy(&mut file, &mut hasher)?;
     let name = path.file_name().unwrap_or(OsStr::new(""));
-    Ok(format!("{}  {name:?}", hasher.finalize().to_hex()))
+    // Escaped: a name may hold a line break.
+    let name = name.to_string_lossy();
+    Ok(format!(
+        "{}  {}",
+        hasher.finalize().to_hex(),
+        name.escape_debug()
+    ))
 }
 
 /// Lists the content `file`, which is about to receive the name `path`.
