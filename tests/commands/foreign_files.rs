@@ -177,7 +177,8 @@ fn pictures_replace_only_their_own() {
         predictor: Predictor::X,
         table: 3,
     };
-    let image = new_image(640, 1, &vec![90; 640 * 320], coding);
+    let pixels = vec![90; 640 * 320];
+    let image = new_image(640, 1, &pixels, coding);
     fs::write(folder.join("image.imq"), encode(&image).unwrap()).unwrap();
     for out in ["a.png", "a.tif"] {
         let extract = [

@@ -135,6 +135,7 @@ pub fn read_ties(ties: &TiesConfig, images: &[ImageConfig], times: &[&ImageTimes
     let mut first = BTreeMap::new();
     let mut contents: BTreeMap<String, &PathBuf> = BTreeMap::new();
     for path in &ties.files {
+        pds::SizedFile::Ties.require(path)?;
         let (blake3, _) = hash_file(path)?;
         if let Some(original) = contents.get(&blake3) {
             let (copy, original) = (file_name(path), file_name(original));

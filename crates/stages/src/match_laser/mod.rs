@@ -80,7 +80,7 @@ stage_inputs! {
 
 impl Stage for MatchLaser<'_> {
     const NAME: &'static str = "match_laser";
-    const METHOD: u32 = 5;
+    const METHOD: u32 = 6;
     const CALLS: &'static [Called] = &[called::<ConvertDatum<'_>>()];
     type Output = LaserMatch;
     stage_inputs!(fingerprint);
