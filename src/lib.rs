@@ -11,10 +11,11 @@ pub mod flow;
 pub mod worker;
 
 pub use areograph_base::{
-    altimetry, body, constants, error, footprints, frames, image, instruments, kernel_source,
-    line_times, schema, stored, ties, time, units, verdict, watch, wording,
+    altimetry, body, constants, error, footprints, frames, image, instruments, kernel_names,
+    kernel_source, line_times, schema, stored, ties, time, units, verdict, watch, wording,
 };
 pub use areograph_config as config;
+pub use areograph_fetch as fetch;
 pub use areograph_geom::{self as geom, imaging};
 pub use areograph_pds as pds;
 pub use areograph_products as products;

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::{
     report,
-    single::{Asked, answer},
+    single::{Request, answer},
 };
 use crate::{
     config::{LoadedCalibration, load_calibration},
@@ -51,13 +51,13 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     for warning in warnings {
         tracing::warn!("{warning}");
     }
-    let asked = Asked {
+    let request = Request {
         what: "calibration",
         name: &calibration.calibration,
         json: arguments.json,
     };
     let ran = run_calibration(&calibration, &arguments.out, arguments.force);
-    answer(&asked, ran, |count| {
+    answer(&request, ran, |count| {
         format!(
             "{} lines, {} ties, {} laser points, {} more withheld, {} left out",
             count("cameras"),

@@ -4,6 +4,8 @@ mod extract;
 mod info;
 mod search;
 
+pub(super) use search::propose;
+
 use clap::{Args, Subcommand};
 
 use crate::error::Error;

@@ -1,5 +1,7 @@
 //! `areograph init`.
 
+mod place;
+
 use std::{
     fs,
     io::{self, IsTerminal as _, Write as _},
@@ -26,6 +28,7 @@ use crate::{
 ///   areograph init gale
 ///   areograph init gale --box 137.0,138.0,-5.5,-4.0 --kernels kernels/nav.tm --pedr 'pedr/*.b'
 ///   areograph init gale --label labels/e0202855.lbl --label labels/m0402852.lbl --kernels kernels --ties gale.csv
+///   areograph init gale --place gale --pairs 2    # then: areograph fetch gale/gale.toml
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
@@ -53,6 +56,8 @@ pub(super) struct Arguments {
     /// Tie point files, or globs of them.
     #[arg(long, value_name = "GLOB")]
     ties: Vec<PathBuf>,
+    #[command(flatten)]
+    place: place::PlaceArguments,
 }
 
 /// Why no site file is written.
@@ -69,13 +74,16 @@ enum Refused {
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let folder = absolute(&arguments.folder)?;
-    let asked = Asked::of(arguments, &file_name(&folder))?;
-    asked.complete()?;
-    let file = arguments.folder.join(format!("{}.toml", asked.site));
+    if arguments.place.is_given() {
+        return place::run(arguments, &folder);
+    }
+    let answers = Answers::of(arguments, &file_name(&folder))?;
+    answers.complete()?;
+    let file = arguments.folder.join(format!("{}.toml", answers.site));
     if file.exists() {
         return Err(Refused::Exists).in_file(file);
     }
-    let text = asked.new_site(&folder)?.text();
+    let text = answers.new_site(&folder)?.text();
     // Checked as the future file, so that paths are relative to its folder.
     fs::create_dir_all(&folder)
         .map_err(IoError::on("create the folder"))
@@ -94,7 +102,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
 }
 
 /// Options and answers, with paths relative to the current folder.
-struct Asked {
+struct Answers {
     site: String,
     description: String,
     edges_deg: Option<[f64; 4]>,
@@ -104,10 +112,10 @@ struct Asked {
     ties: Vec<PathBuf>,
 }
 
-impl Asked {
+impl Answers {
     /// Options, completed by answers on a terminal.
     fn of(arguments: &Arguments, name: &str) -> Result<Self, Error> {
-        let mut asked = Self {
+        let mut answers = Self {
             site: arguments.site.clone().unwrap_or_else(|| identifier(name)),
             description: arguments.description.clone().unwrap_or_default(),
             edges_deg: arguments.edges_deg,
@@ -117,22 +125,22 @@ impl Asked {
             ties: arguments.ties.clone(),
         };
         if !(io::stdin().is_terminal() && io::stderr().is_terminal()) {
-            return Ok(asked);
+            return Ok(answers);
         }
         if arguments.site.is_none() {
-            let answer = answer(&format!("Identifier of the site [{}]", asked.site))?;
+            let answer = answer(&format!("Identifier of the site [{}]", answers.site))?;
             if !answer.is_empty() {
-                asked.site = answer;
+                answers.site = answer;
             }
         }
         let questions = [
             (
                 "Kernels: a metakernel, a folder, or files in load order",
-                &mut asked.kernels,
+                &mut answers.kernels,
             ),
-            ("PEDR files or globs [none: images only]", &mut asked.pedr),
-            ("Labels of images [none]", &mut asked.labels),
-            ("Tie point files [none]", &mut asked.ties),
+            ("PEDR files or globs [none: images only]", &mut answers.pedr),
+            ("Labels of images [none]", &mut answers.labels),
+            ("Tie point files [none]", &mut answers.ties),
         ];
         for (question, paths) in questions {
             if paths.is_empty() {
@@ -140,18 +148,18 @@ impl Asked {
                 paths.extend(answer.split_whitespace().map(PathBuf::from));
             }
         }
-        while asked.edges_deg.is_none() && !asked.pedr.is_empty() {
+        while answers.edges_deg.is_none() && !answers.pedr.is_empty() {
             let answer =
                 answer("Window west,east,south,north in degrees [the area that the images cover]")?;
             if answer.is_empty() {
                 break;
             }
             match edges(&answer) {
-                Ok(edges_deg) => asked.edges_deg = Some(edges_deg),
+                Ok(edges_deg) => answers.edges_deg = Some(edges_deg),
                 Err(problem) => tell(&format!("{problem}\n"))?,
             }
         }
-        Ok(asked)
+        Ok(answers)
     }
 
     /// Checks that the input suffices for a site.
@@ -193,6 +201,7 @@ impl Asked {
             edges_deg: self.edges_deg,
             images,
             ties: seen(&self.ties)?,
+            ..NewSite::default()
         })
     }
 }

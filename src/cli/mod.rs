@@ -3,6 +3,7 @@
 mod calibrate;
 mod check;
 mod completions;
+mod fetch;
 mod image;
 mod init;
 mod kernels;
@@ -11,6 +12,7 @@ mod nightly;
 mod numbers;
 mod open;
 mod output;
+mod panicked;
 mod pedr;
 mod plan;
 mod progress;
@@ -72,6 +74,7 @@ enum LogForm {
 #[derive(Debug, Subcommand)]
 enum Command {
     Init(init::Arguments),
+    Fetch(fetch::Arguments),
     Run(run::Arguments),
     Check(check::Arguments),
     Plan(plan::Arguments),
@@ -148,6 +151,7 @@ fn log(cli: &Cli) {
 fn run(command: Command) -> ExitCode {
     match command {
         Command::Init(arguments) => finish(init::run(&arguments)),
+        Command::Fetch(arguments) => finish(fetch::run(&arguments)),
         Command::Run(arguments) => run::run(&arguments),
         Command::Check(arguments) => finish(check::run(&arguments)),
         Command::Plan(arguments) => finish(plan::run(&arguments)),

@@ -20,13 +20,13 @@ use crate::{
 };
 
 /// Time between two turns.
-const TICK: Duration = Duration::from_millis(200);
+const POLL_INTERVAL: Duration = Duration::from_millis(200);
 /// Maximum number of jobs of one night whose outcomes are read.
 const JOBS_MAX: u32 = 100_000;
 
-/// Performs one nightly run without a service, for a timer: compares all sites, runs those affected by a change, and exits.
+/// Performs one nightly run without a service, for a timer: compares all sites, runs the affected ones, and exits.
 ///
-/// Refused while a service uses the same state folder. Exit codes are those of `run`.
+/// The command fails while a service uses the same state folder. Exit codes are those of `run`.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: areograph nightly areograph.toml")]
 pub(super) struct Arguments {
@@ -89,7 +89,7 @@ async fn through_the_night(
             engine.stop().await;
             return engine.night(id);
         }
-        let _ = timeout(TICK, shared.wake.notified()).await;
+        let _ = timeout(POLL_INTERVAL, shared.wake.notified()).await;
     }
 }
 

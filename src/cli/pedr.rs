@@ -1,5 +1,6 @@
 //! `areograph pedr`.
 
+mod crossovers;
 mod filter;
 mod index;
 mod info;
@@ -30,6 +31,7 @@ enum Command {
     Tab(tab::Arguments),
     Index(index::Arguments),
     Search(search::Arguments),
+    Crossovers(crossovers::Arguments),
     Qa(qa::Arguments),
     Match(matching::Arguments),
     #[cfg(feature = "sql")]
@@ -42,6 +44,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
         Command::Tab(arguments) => tab::run(arguments),
         Command::Index(arguments) => index::run(arguments),
         Command::Search(arguments) => search::run(arguments),
+        Command::Crossovers(arguments) => crossovers::run(arguments),
         Command::Qa(arguments) => qa::run(arguments),
         Command::Match(arguments) => return matching::run(arguments),
         #[cfg(feature = "sql")]

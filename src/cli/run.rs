@@ -10,21 +10,24 @@ use clap::{Args, builder::PossibleValuesParser};
 use serde_json::json;
 use tokio::{sync::Semaphore, task::JoinHandle};
 
-use super::{load_sites, open, output, plan, progress::Progress, report, stop::on_signals};
+use super::{
+    load_sites, open, output, panicked::flatten, plan, progress::Progress, report, stop::on_signals,
+};
 use crate::{
     config::SiteConfig,
-    error::{Cause, Error, Kind},
+    error::{Error, Kind},
     flow::{
         Ending, Observer, PUBLISH, RunOptions, SiteOutcome, check_out, publish_sites, run_site,
         stages,
     },
     products::REPORT,
     store::{hashes::HashCache, manifest::Manifest, publish::read_manifest},
+    verdict::NOT_TESTED,
 };
 
 /// Runs sites from kernels to validated products in `<out>/<site>`.
 ///
-/// A stage runs only if one of its inputs has changed; the log (-v) states which.
+/// A stage runs only if one of its inputs has changed; the log (-v) names this input.
 ///
 /// Examples:
 ///   areograph run sites/*.toml --out products
@@ -183,16 +186,6 @@ async fn run_all(
     outcomes
 }
 
-/// A task that panicked is a bug in areograph, reported like any other failure.
-fn flatten(joined: Result<Outcome, tokio::task::JoinError>) -> Outcome {
-    joined.unwrap_or_else(|error| Err(Panicked(error.to_string()).into()))
-}
-
-#[derive(Debug, thiserror::Error, Cause)]
-#[error("internal error of areograph: {0}")]
-#[cause(Bug: "please report it with the configuration; the next run detects and repairs incomplete products")]
-struct Panicked(String);
-
 fn exit_code(outcome: &Outcome) -> u8 {
     match outcome {
         Err(failure) => failure.kind().exit_code(),
@@ -246,6 +239,13 @@ fn print_outcome(outcome: &SiteOutcome) {
     }
     for check in verdict.key_checks() {
         output::line(format_args!("  {check}"));
+    }
+    // Of an invalid site the reasons matter.
+    if verdict.valid && !verdict.untested.is_empty() {
+        output::line(format_args!("  {NOT_TESTED}"));
+        for phrase in &verdict.untested {
+            output::line(format_args!("    {phrase}"));
+        }
     }
 }
 

@@ -88,6 +88,7 @@ enum Ground {
     Plains,
     Medium,
     Rough,
+    Varied,
 }
 
 /// Coding of the images, as typed.
@@ -123,6 +124,7 @@ impl Arguments {
             Ground::Plains => Roughness::Plains,
             Ground::Medium => Roughness::Medium,
             Ground::Rough => Roughness::Rough,
+            Ground::Varied => Roughness::Varied,
         });
         let drawn = if self.attitude_clock {
             realistic.with_attitude_clock()

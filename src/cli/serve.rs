@@ -17,7 +17,7 @@ use tokio::{
     time::{interval, sleep},
 };
 
-use super::{output, report};
+use super::{output, panicked::flatten, report};
 use crate::{
     config::service_example,
     error::{Cause, Error, IoError, Locate as _},
@@ -148,10 +148,7 @@ fn serve(file: &Path, listen: Option<SocketAddr>) -> Result<(), Error> {
     let served = pages.block_on(served);
     work.shutdown_background();
     pages.shutdown_background();
-    served.unwrap_or_else(|panicked| {
-        tracing::error!("serving the pages failed: {panicked}");
-        Ok(())
-    })
+    flatten(served)
 }
 
 /// Begins the engine, which first takes over the state of an earlier service.
@@ -162,9 +159,7 @@ async fn begin(shared: &Arc<Shared>, workers: Processes) -> Result<Arc<Engine<Pr
         tokio::task::spawn_blocking(move || Engine::new(taking, workers, Random::default()));
     let engine = engine.await;
     life.abort();
-    let engine =
-        engine.map_err(|panicked| IoError::on("begin")(std::io::Error::other(panicked)))?;
-    engine.map(Arc::new)
+    flatten(engine).map(Arc::new)
 }
 
 /// Shuts the service down at SIGTERM or SIGINT, by force at the second signal or after a delay; reloads the
@@ -190,7 +185,7 @@ async fn obey(shared: Arc<Shared>, listen: Option<SocketAddr>) {
             }
         }
     }
-    tracing::info!("ending");
+    tracing::info!("the service is stopping");
     let _ = sd_notify::notify(&[NotifyState::Stopping]);
     shared.ending.cancel();
     tokio::select! {

@@ -14,6 +14,7 @@ use crate::{
         lock::{Owner, ServiceLock},
         rebuild::rebuild,
         tokens::{Role, add_token, revoke_token, tokens},
+        words::counted,
     },
 };
 
@@ -127,7 +128,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
             let (state, products) = (&config.outputs.state, &config.outputs.products);
             let _lock = ServiceLock::take(state, &owner)?;
             let found = rebuild(state, products, now_ms)?;
-            output::line(format_args!("{} sites, {} runs", found.sites, found.runs));
+            let (sites, runs) = (counted(found.sites, "site"), counted(found.runs, "run"));
+            output::line(format_args!("{sites}, {runs}"));
             Ok(())
         }
         Command::Token(command) => token(command),

@@ -12,7 +12,7 @@ use crate::{
 };
 
 /// Name of such a flow in its answer.
-pub(super) struct Asked<'a> {
+pub(super) struct Request<'a> {
     /// The key of its name in JSON.
     pub(super) what: &'static str,
     /// Its name.
@@ -23,7 +23,7 @@ pub(super) struct Asked<'a> {
 
 /// Prints the outcome of a run, with its counts in words.
 pub(super) fn answer(
-    asked: &Asked<'_>,
+    request: &Request<'_>,
     ran: Result<SingleOutcome>,
     words: impl Fn(&dyn Fn(&str) -> u64) -> String,
 ) -> ExitCode {
@@ -32,9 +32,9 @@ pub(super) fn answer(
         Err(failure) => return report(&failure),
     };
     let manifest = &outcome.manifest;
-    if asked.json {
+    if request.json {
         output::json(&json!({
-            asked.what: asked.name,
+            request.what: request.name,
             "folder": outcome.folder,
             "unchanged": outcome.unchanged,
             "verdict": manifest.verdict,
@@ -50,7 +50,7 @@ pub(super) fn answer(
         };
         output::line(format_args!(
             "{}: {}{unchanged}; {}; {}",
-            asked.name,
+            request.name,
             manifest.verdict.word(),
             words(&count),
             outcome.folder.join("report/index.html").display(),

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::{
     report,
-    single::{Asked, answer},
+    single::{Request, answer},
 };
 use crate::{
     config::{LoadedNet, load_net},
@@ -45,13 +45,13 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     for warning in warnings {
         tracing::warn!("{warning}");
     }
-    let asked = Asked {
+    let request = Request {
         what: "net",
         name: &net.net,
         json: arguments.json,
     };
     let ran = run_net(&net, &arguments.out, arguments.force);
-    answer(&asked, ran, |count| {
+    answer(&request, ran, |count| {
         format!(
             "{} pictures, {} points, {} blunders, {} controls left out of {}",
             count("pictures"),

@@ -66,7 +66,7 @@ use crate::{
 };
 
 /// Raised when the layout of the products changes.
-const LAYOUT: u32 = 2;
+const LAYOUT: u32 = 3;
 /// Profiles whose shots are written.
 const WORST: usize = 12;
 /// Step of the scan of clock biases, seconds: the parabola through the variances interpolates between steps.

@@ -3,7 +3,7 @@
 use std::sync::atomic::AtomicBool;
 
 use super::{
-    driver::{Flow, Leave},
+    driver::{Exit, Flow},
     outline::stages,
 };
 use crate::{
@@ -23,7 +23,7 @@ impl Bounds<'_> {
     pub(super) fn enter(&self, stage: &'static str) -> Flow<()> {
         let place = |name: &str| stages().iter().position(|stage| *stage == name);
         if place(self.until) < place(stage) {
-            return Err(Leave::StageReached);
+            return Err(Exit::StageReached);
         }
         Ok(Stopped::check(self.stop).in_stage(stage)?)
     }

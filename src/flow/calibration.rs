@@ -8,7 +8,7 @@ use std::path::Path;
 use super::{
     calibration_loop::CalibrationLoop,
     out::check_out_path,
-    single::{Single, SingleOutcome, Told, made},
+    single::{ManifestEntry, Single, SingleOutcome, made},
 };
 use crate::{
     config::CalibrationConfig,
@@ -22,7 +22,7 @@ use crate::{
 };
 
 /// Raised when the layout of the products of a calibration changes.
-const METHOD: u32 = 3;
+const METHOD: u32 = 4;
 
 /// Calibrates the lines of a camera and publishes the products in `<out>/<calibration>`, if an input has changed
 /// since the last run.
@@ -63,12 +63,12 @@ pub fn run_calibration(
             };
             write_calibration_products(staging, &products)
         },
-        told,
+        manifest_entry,
     )
 }
 
 /// Content of the manifest of a calibration.
-fn told(result: &Calibration) -> Told<'_> {
+fn manifest_entry(result: &Calibration) -> ManifestEntry<'_> {
     let count = |kind: PointKind| {
         let of = result.points.iter().filter(|of| of.kind == kind);
         of.count() as u64
@@ -81,7 +81,7 @@ fn told(result: &Calibration) -> Told<'_> {
     }
     let height_m = result.held_back.as_ref().and_then(|of| of.height_m);
     stated.extend(height_m.map(|of| (figures::HELD_BACK_HEIGHT_RMS_M, of)));
-    Told {
+    ManifestEntry {
         verdict: &result.verdict,
         counts: vec![
             ("cameras", result.cameras.len() as u64),

@@ -5,7 +5,7 @@ use std::{collections::BTreeSet, path::PathBuf, sync::atomic::AtomicBool};
 
 use super::{
     RivalSet,
-    driver::{Driver, Flow, Leave},
+    driver::{Driver, Exit, Flow},
     evidence::{complaints, judged, warnings},
     kernels::{load_rivals, required_coverage},
     outputs::{Prepared, Site},
@@ -45,7 +45,7 @@ pub struct Checked {
 #[must_use]
 pub fn check_site(config: &SiteConfig, hashes: &HashCache) -> Checked {
     let mut check = Check::of(config, hashes.files());
-    if let Err(Leave::Failed(failure)) = check.all(config) {
+    if let Err(Exit::Failed(failure) | Exit::NotAdjusted(failure)) = check.all(config) {
         check.checked.failures.push(failure.in_site(&config.site));
     }
     check.checked
@@ -63,8 +63,10 @@ pub fn required_by_site(config: &SiteConfig) -> Result<RequiredCoverage> {
     }
     match prepared {
         Ok(prepared) => Ok(prepared.required.unwrap_or_default()),
-        Err(Leave::StageReached) => Ok(RequiredCoverage::default()),
-        Err(Leave::Failed(failure)) => Err(failure.in_site(&config.site)),
+        Err(Exit::StageReached) => Ok(RequiredCoverage::default()),
+        Err(Exit::Failed(failure) | Exit::NotAdjusted(failure)) => {
+            Err(failure.in_site(&config.site))
+        }
     }
 }
 
@@ -141,12 +143,12 @@ impl<'a> Check<'a> {
         for line in kernels.explanation() {
             self.tell(line);
         }
-        let site = orient(self, config, prepared, Some(kernels))?;
+        let mut site = orient(self, config, prepared, Some(kernels))?;
         if config.ties.matched {
             let shots = (&site.converted, &site.profiles);
             match_ties(self, config, Round::Initial, &site.images, shots, None)?;
         }
-        overlays(self, config, &site).map(|_| ())
+        overlays(self, config, &mut site)
     }
 
     fn tell(&mut self, finding: &str) {

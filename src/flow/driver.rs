@@ -5,7 +5,7 @@ use std::{path::PathBuf, sync::atomic::AtomicBool};
 use super::outputs::Site;
 use crate::{
     config::SiteConfig,
-    error::{Error, Locate, Result},
+    error::{Error, Kind, Locate, Result},
     files::{HashedFile, InputFiles},
     pds::SizedFile,
     spice::RequiredCoverage,
@@ -15,21 +15,33 @@ use crate::{
 
 /// Why the flow ends before its end.
 #[derive(Debug)]
-pub(super) enum Leave {
+pub(super) enum Exit {
     /// The last requested stage is done.
     StageReached,
     /// Something failed.
     Failed(Error),
+    /// The geometry of tie points or orientation failed: there is no adjustment.
+    NotAdjusted(Error),
 }
 
-impl From<Error> for Leave {
+/// A step of the adjustment: a failure of its geometry, and not an unreadable file, ends only the adjustment.
+pub(super) fn of_adjustment<T>(step: Flow<T>) -> Flow<T> {
+    step.map_err(|leave| match leave {
+        Exit::Failed(failure) if failure.kind() == Kind::Input && failure.file.is_none() => {
+            Exit::NotAdjusted(failure)
+        }
+        leave => leave,
+    })
+}
+
+impl From<Error> for Exit {
     fn from(failure: Error) -> Self {
         Self::Failed(failure)
     }
 }
 
 /// Result of a step of the flow, unless the flow ends there.
-pub(super) type Flow<T> = std::result::Result<T, Leave>;
+pub(super) type Flow<T> = std::result::Result<T, Exit>;
 
 /// A stage with the reason why it runs, or [`Reason::Unchanged`].
 #[derive(Debug, Clone, PartialEq, Eq)]

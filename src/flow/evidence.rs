@@ -6,19 +6,26 @@ use std::{
     path::Path,
 };
 
-use super::outputs::Site;
+use super::{choice::KernelChoice, outputs::Site};
 use crate::{
     config::SiteConfig,
-    error::Result,
+    error::{Error, Result},
     footprints::SourceFile,
     geom::pushbroom::CameraModel,
     instruments::Instrument,
-    stage::Output,
+    stage::Round,
     stages::{
         adjust::accuracy_withheld,
+        check_profiles::ProfileCheck,
+        convert_datum::Converted,
+        describe_kernels::KernelDescription,
         judge::{AdjustmentEvidence, BeamEvidence, Evidence, JudgedImage, Verdict, judge},
-        lay_overlays::ShownImage,
+        lay_overlays::{Overlays, ShownImage},
+        map_surface::Surface,
+        read_ties::Ties,
+        search_footprints::SearchResult,
         site_image::SiteImage,
+        tag_times::ImageTimes,
     },
     wording::with_minus,
 };
@@ -31,43 +38,44 @@ pub(super) fn judged(
     complaints: &[String],
 ) -> Result<(Verdict, bool)> {
     let images = judged_images(&site.images)?;
-    let adjusted = site.adjustment.as_ref();
-    let adjusted_images = adjusted.map_or(&[][..], |of| &of.images);
+    let adjusted_images = site.adjusted_images.as_deref().unwrap_or_default();
     let adjusted_images = judged_images(adjusted_images)?;
-    let adjustment = match (&site.ties, &site.intersection, adjusted) {
-        (Some(ties), Some(initial), Some(adjustment)) => Some(AdjustmentEvidence {
-            ties: ties.value()?,
-            adjusted: adjustment.adjusted.value()?,
+    let book = &site.book;
+    let adjustment = book.find(Round::Initial)?.map(|adjusted| {
+        Ok::<_, Error>(AdjustmentEvidence {
+            ties: book.of()?,
+            adjusted,
             images: &adjusted_images,
-            pairs: initial.pairs.value()?,
-            adjusted_pairs: adjustment.intersection.pairs.value()?,
-            heights: initial.heights.value()?,
-            adjusted_heights: adjustment.intersection.heights.value()?,
-        }),
-        _ => None,
-    };
+            pairs: book.of::<Vec<_>>()?,
+            adjusted_pairs: book.require::<Vec<_>>(Round::Adjusted)?.value()?,
+            heights: book.of()?,
+            adjusted_heights: book.require(Round::Adjusted)?.value()?,
+        })
+    });
+    let adjustment = adjustment.transpose()?;
     let failure = site
         .adjustment_failure
         .as_ref()
         .map(|failure| format!("{}; {}", failure.cause, failure.cause.advice()));
-    let surface = site.surface.as_ref().map(Output::value).transpose()?;
+    let surface = book.find::<Surface>(Round::Initial)?;
     let searched = config.has_shots();
     let verdict = judge(&Evidence {
         wording: config.wording(),
-        footprints: searched.then_some(site.converted.value()?.footprints.len()),
+        footprints: searched.then_some(site.book.of::<Converted>()?.footprints.len()),
         limits: &config.limits,
         range_limits: &config.range_check,
         orientation_limits: &config.orientation,
-        ranges: site.ranges.value()?,
-        clock_correction_s: config.mola_clock.correction_s(),
+        ranges: book.of()?,
+        clock_correction_s: config.altimeter_clock.correction_s(),
         images: &images,
         beam: BeamEvidence {
-            images: site.beam.value()?,
+            images: book.of::<Vec<_>>()?,
             adjustment: &config.adjustment,
-            surface: &config.mola_surface,
+            surface: &config.laser_surface,
         },
         warnings,
         complaints,
+        profiles: book.of()?,
         adjustment,
         surface: surface.map(|of| &of.account),
         adjustment_failure: failure.as_deref(),
@@ -80,7 +88,7 @@ pub(super) fn judged(
 
 /// Remarks on kernels, clocks, labels and tie points, one sentence each.
 pub(super) fn warnings(config: &SiteConfig, site: &Site) -> Result<Vec<String>> {
-    let described = site.described.value()?;
+    let described = site.book.of::<KernelDescription>()?;
     let mut warnings: Vec<String> = described.pck_note.iter().cloned().collect();
     warnings.extend(described.rates_note.iter().cloned());
     for camera in cameras(&site.images)? {
@@ -91,17 +99,19 @@ pub(super) fn warnings(config: &SiteConfig, site: &Site) -> Result<Vec<String>> 
         let remarks = times.remarks.iter();
         let remarks = remarks.filter(|remark| !remark.is_beyond_accuracy());
         warnings.extend(remarks.map(|remark| format!("image {}: {}", times.id, remark.text)));
+        let remark = image.model.value()?.remark.as_ref();
+        warnings.extend(remark.map(|remark| format!("image {}: {remark}", times.id)));
     }
     warnings.extend(same_exposures(&site.images)?);
+    let checked = site.book.of::<ProfileCheck>()?;
+    warnings.extend(checked.remark());
     warnings.extend(empty_pedr_files(config, site)?);
-    if has_angles(config) {
-        warnings.extend(gimbal_locks(&site.images)?);
-    }
-    if let Some(ties) = &site.ties {
-        let remarks = ties.value()?.remarks.iter();
+    warnings.extend(gimbal_locks(&site.images, true)?);
+    if let Some(ties) = site.book.find::<Ties>(Round::Initial)? {
+        let remarks = ties.remarks.iter();
         warnings.extend(remarks.map(|remark| format!("tie points: {remark}")));
     }
-    if site.adjustment.is_some() {
+    if site.adjusted_images.is_some() {
         let times = site.images.iter().map(|image| image.times.value());
         let times = times.collect::<Result<Vec<_>>>()?;
         warnings.extend(accuracy_withheld(config, times));
@@ -115,10 +125,10 @@ pub(super) fn warnings(config: &SiteConfig, site: &Site) -> Result<Vec<String>> 
 
 /// Images whose pixels were read, and their identifiers.
 fn shown(site: &Site) -> Result<Vec<(&str, &ShownImage)>> {
-    let Some(overlays) = &site.overlays else {
+    let Some(overlays) = site.book.find::<Overlays>(Round::Initial)? else {
         return Ok(Vec::new());
     };
-    let shown = overlays.value()?.images.iter();
+    let shown = overlays.images.iter();
     let named = shown.map(|shown| Ok((&*site.images[shown.image].times.value()?.id, shown)));
     named.collect()
 }
@@ -136,20 +146,20 @@ fn cameras(images: &[SiteImage]) -> Result<Vec<&Instrument>> {
     Ok(cameras)
 }
 
-/// Whether the orientation that is used has polynomials of ω, φ and κ.
-const fn has_angles(config: &SiteConfig) -> bool {
-    match config.registration.model {
+/// Whether a form of orientation has polynomials of ω, φ and κ.
+const fn has_angles(model: CameraModel) -> bool {
+    match model {
         CameraModel::FirstOrder | CameraModel::SecondOrder => true,
         CameraModel::RotationVector | CameraModel::Samples => false,
     }
 }
 
-/// Images whose angles ω and κ turn about nearly the same axis.
-fn gimbal_locks(images: &[SiteImage]) -> Result<Vec<String>> {
+/// Images whose angles ω and κ turn about nearly the same axis; `use_angles` – of those that use these, or of the others.
+fn gimbal_locks(images: &[SiteImage], use_angles: bool) -> Result<Vec<String>> {
     let mut locks = Vec::new();
     for image in images {
         let (times, model) = (image.times.value()?, image.model.value()?);
-        if model.near_gimbal_lock {
+        if model.near_gimbal_lock && has_angles(model.model) == use_angles {
             locks.push(format!(
                 "image {}: |cos φ| falls to {:.3}, where ω and κ are poorly determined; the rotation-vector form is unaffected",
                 times.id, model.cos_phi_min
@@ -159,33 +169,50 @@ fn gimbal_locks(images: &[SiteImage]) -> Result<Vec<String>> {
     Ok(locks)
 }
 
-/// Images that one camera took at one time with the same pixels: their labels may have been exchanged.
+/// Images that one camera took at one time with the same pixels: their labels may have been exchanged. A remark for each
+/// group of such images.
 fn same_exposures(images: &[SiteImage]) -> Result<Vec<String>> {
-    let mut same = Vec::new();
-    for (index, image) in images.iter().enumerate() {
+    /// Images that a remark names; of more it states the number.
+    const NAMED: usize = 5;
+    let mut groups: Vec<Vec<&ImageTimes>> = Vec::new();
+    for image in images {
         let times = image.times.value()?;
-        for earlier in &images[..index] {
-            let other = earlier.times.value()?;
-            let apart_s = times
-                .line_times
-                .start()
-                .since(other.line_times.start())
-                .abs();
-            if apart_s < times.line_times.mean_period_s() && times.detector() == other.detector() {
-                same.push(format!(
-                    "images {} and {} were exposed at the same time by the same pixels: one of the labels may belong to another image",
-                    other.id, times.id
-                ));
-            }
+        let is_same = |group: &&mut Vec<&ImageTimes>| {
+            let other = group[0];
+            let starts = [times, other].map(|of| of.line_times.start());
+            let apart_s = starts[0].since(starts[1]).abs();
+            apart_s < times.line_times.mean_period_s() && times.detector() == other.detector()
+        };
+        match groups.iter_mut().find(is_same) {
+            Some(group) => group.push(times),
+            None => groups.push(vec![times]),
         }
     }
-    Ok(same)
+    let remark = |group: &Vec<&ImageTimes>| {
+        let ids: Vec<&str> = group.iter().map(|times| &*times.id).collect();
+        let named = match &ids[..] {
+            [] | [_] => return None,
+            [others @ .., last] if ids.len() <= NAMED => {
+                format!("{} and {last}", others.join(", "))
+            }
+            _ => format!(
+                "{} and {} others",
+                ids[..NAMED].join(", "),
+                ids.len() - NAMED
+            ),
+        };
+        let which = if ids.len() == 2 { "one" } else { "some" };
+        Some(format!(
+            "images {named} were exposed at the same time by the same pixels: {which} of the labels may belong to another image"
+        ))
+    };
+    Ok(groups.iter().filter_map(remark).collect())
 }
 
 /// PEDR files without a shot in the windows: each that the site file names, and those of patterns of which most files
 /// have shots. A pattern of which most have none searches an archive.
 fn empty_pedr_files(config: &SiteConfig, site: &Site) -> Result<Option<String>> {
-    let footprints = &site.converted.value()?.footprints;
+    let footprints = &site.book.of::<Converted>()?.footprints;
     let with_shots: BTreeSet<u16> = footprints.file.iter().copied().collect();
     let files = footprints.files.iter().zip(0_u16..);
     let files: Vec<(&SourceFile, bool)> = files
@@ -241,24 +268,23 @@ fn judged_images(images: &[SiteImage]) -> Result<Vec<JudgedImage<'_>>> {
 /// Notes for a reader of the products, one sentence each.
 pub(super) fn notes(config: &SiteConfig, site: &Site) -> Result<Vec<String>> {
     let mut notes = Vec::new();
-    if let Some(choice) = &site.choice {
-        notes.extend(choice.value()?.notes.iter().cloned());
+    let book = &site.book;
+    if let Some(choice) = book.find::<KernelChoice>(Round::Initial)? {
+        notes.extend(choice.notes.iter().cloned());
     }
     if let Some(kernels) = &site.kernels {
         notes.extend(kernels.notes().cloned());
     }
-    notes.extend(site.found.value()?.notes.iter().cloned());
-    notes.extend(site.converted.value()?.notes.iter().cloned());
+    notes.extend(book.of::<SearchResult>()?.notes.iter().cloned());
+    notes.extend(site.book.of::<Converted>()?.notes.iter().cloned());
     for image in &site.images {
         let times = image.times.value()?;
         let of_image = times.notes.iter();
         notes.extend(of_image.map(|note| format!("image {}: {note}", times.id)));
     }
-    if !has_angles(config) {
-        notes.extend(gimbal_locks(&site.images)?);
-    }
-    if let Some(ties) = &site.ties {
-        notes.extend(ties.value()?.notes());
+    notes.extend(gimbal_locks(&site.images, false)?);
+    if let Some(ties) = book.find::<Ties>(Round::Initial)? {
+        notes.extend(ties.notes());
     }
     let said = notes
         .iter()
@@ -279,17 +305,17 @@ pub(super) fn complaints_of_pixels(site: &Site) -> Result<(Vec<String>, u64)> {
 
 /// Complaints about input records, one sentence each.
 pub(super) fn complaints(site: &Site) -> Result<Vec<String>> {
-    let complaints = site.found.value()?.complaints.iter();
+    let complaints = site.book.of::<SearchResult>()?.complaints.iter();
     let mut complaints: Vec<String> = complaints.map(ToString::to_string).collect();
-    if let Some(ties) = &site.ties {
-        complaints.extend(ties.value()?.complaints.iter().cloned());
+    if let Some(ties) = site.book.find::<Ties>(Round::Initial)? {
+        complaints.extend(ties.complaints.iter().cloned());
     }
     Ok(complaints.iter().map(|of| with_minus(of)).collect())
 }
 
 /// Rejected shots inside a window, by reason.
 pub(super) fn rejected(site: &Site) -> Result<BTreeMap<String, u64>> {
-    let rejected = site.found.value()?.rejected.iter();
+    let rejected = site.book.of::<SearchResult>()?.rejected.iter();
     Ok(rejected
         .map(|(reason, count)| (reason.to_string(), *count))
         .collect())

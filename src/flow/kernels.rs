@@ -64,7 +64,7 @@ pub(super) fn required_coverage(
 ) -> RequiredCoverage {
     let (kernels, reach_s) = (
         &config.kernels,
-        trajectory_reach_s(&config.range_check, &config.mola_clock),
+        trajectory_reach_s(&config.range_check, &config.altimeter_clock),
     );
     let mut by_spacecraft: BTreeMap<&str, Vec<&ImageTimes>> = BTreeMap::new();
     // Images with support data read no kernels.

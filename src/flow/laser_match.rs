@@ -7,7 +7,7 @@ use std::{collections::BTreeMap, path::Path};
 
 use super::{
     out::check_out_path,
-    single::{Single, SingleOutcome, Told, made},
+    single::{ManifestEntry, Single, SingleOutcome, made},
 };
 use crate::{
     error::{Cause, Locate as _, Result},
@@ -20,7 +20,7 @@ use crate::{
 };
 
 /// Raised when the layout of the products of a match changes.
-const METHOD: u32 = 3;
+const METHOD: u32 = 4;
 /// Stands for the name of a site in messages and in the manifest.
 const NAME: &str = "pedr_match";
 
@@ -76,7 +76,7 @@ pub fn run_match(request: &MatchRequest, out: &Path, force: bool) -> Result<Sing
             };
             write_match_products(staging, &products)
         },
-        told,
+        manifest_entry,
     )
 }
 
@@ -108,10 +108,10 @@ fn keys(request: &MatchRequest) -> BTreeMap<String, String> {
 }
 
 /// Content of the manifest of a match.
-fn told(result: &LaserMatch) -> Told<'_> {
+fn manifest_entry(result: &LaserMatch) -> ManifestEntry<'_> {
     let kept = result.units.iter().filter(|unit| unit.is_kept());
     let held_out = result.held_out.as_ref();
-    Told {
+    ManifestEntry {
         verdict: &result.verdict,
         counts: vec![
             ("shots", result.shots as u64),

@@ -3,10 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{
-    PUBLISH,
-    driver::Ledger,
-    evidence::complaints_of_pixels,
-    outputs::{Intersection, Site},
+    PUBLISH, choice::KernelChoice, driver::Ledger, evidence::complaints_of_pixels, outputs::Site,
 };
 use crate::{
     altimetry::BiasScope,
@@ -14,13 +11,27 @@ use crate::{
     config::SiteConfig,
     error::Result,
     files::file_name,
-    stage::Inputs,
+    stage::{Inputs, Round},
     stages::{
-        describe_kernels::KernelLine, judge::Verdict, read_ties::Ties, tag_times::used_biases,
+        adjust::Adjusted,
+        check_heights::HeightCheck,
+        check_ranges::RangeCheck,
+        compare_pairs::PairComparison,
+        convert_datum::Converted,
+        describe_kernels::{KernelDescription, KernelLine},
+        group_profiles::Profile,
+        judge::Verdict,
+        map_surface::Surface,
+        read_ties::Ties,
+        search_footprints::SearchResult,
+        tag_times::used_biases,
     },
-    store::manifest::{
-        BiasEntry, Complaints, ConfigurationEntry, KernelEntry, Manifest, ProductEntry, StageEntry,
-        figures,
+    store::{
+        book::Book,
+        manifest::{
+            BiasEntry, Complaints, ConfigurationEntry, KernelEntry, Manifest, ProductEntry,
+            StageEntry, figures,
+        },
     },
 };
 
@@ -37,22 +48,21 @@ pub(super) struct Account {
 }
 
 /// Largest along-track parallax of a pair of images at their tie points, metres.
-fn largest_along_track_parallax_m(intersection: Option<&Intersection>) -> Result<Option<f64>> {
-    let Some(intersection) = intersection else {
-        return Ok(None);
-    };
-    let pairs = intersection.pairs.value()?.iter();
+fn largest_along_track_parallax_m(book: &Book, round: Round) -> Result<Option<f64>> {
+    let pairs = book
+        .find::<Vec<PairComparison>>(round)?
+        .into_iter()
+        .flatten();
     let parallaxes_m = pairs.map(|pair| pair.along_track_parallax_m);
     Ok(parallaxes_m.max_by(f64::total_cmp))
 }
 
 /// Median height of the tie points above the MOLA surface, metres.
-fn height_off_surface_m(intersection: Option<&Intersection>) -> Result<Option<f64>> {
-    let Some(intersection) = intersection else {
-        return Ok(None);
-    };
-    let above_m = &intersection.heights.value()?.above_m;
-    Ok((above_m.n > 0).then(|| above_m.median.abs()))
+fn height_off_surface_m(book: &Book, round: Round) -> Result<Option<f64>> {
+    let heights = book.find::<HeightCheck>(round)?;
+    let above_m = heights.map(|heights| &heights.above_m);
+    let above_m = above_m.filter(|above_m| above_m.n > 0);
+    Ok(above_m.map(|above_m| above_m.median.abs()))
 }
 
 /// The manifest of a site whose products are made from `inputs`.
@@ -63,13 +73,12 @@ pub(super) fn manifest(
     ledger: &Ledger,
     inputs: &Inputs,
 ) -> Result<Manifest> {
-    let (found, complaints) = (site.found.value()?, account.complaints);
-    let of_ties = match &site.ties {
-        Some(ties) => ties.value()?.complaint_count,
-        None => 0,
-    };
+    let (book, complaints) = (&site.book, account.complaints);
+    let found = book.of::<SearchResult>()?;
+    let ties = book.find::<Ties>(Round::Initial)?;
+    let of_ties = ties.map_or(0, |ties| ties.complaint_count);
     let (_, of_pixels) = complaints_of_pixels(site)?;
-    let choice = site.choice.as_ref().map(|choice| choice.value());
+    let choice = book.find::<KernelChoice>(Round::Initial)?;
     Ok(Manifest {
         tool: "areograph".to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -81,16 +90,13 @@ pub(super) fn manifest(
             keys: config.keys.clone(),
         },
         biases: biases(config, site)?,
-        kernels: site
-            .described
-            .value()?
+        kernels: book
+            .of::<KernelDescription>()?
             .kernels
             .iter()
             .map(kernel_entry)
             .collect(),
-        kernel_choice: choice
-            .transpose()?
-            .map_or_else(Vec::new, |choice| choice.entries.clone()),
+        kernel_choice: choice.map_or_else(Vec::new, |choice| choice.entries.clone()),
         stages: stages(ledger, inputs),
         products: account.products,
         counts: counts(site)?,
@@ -131,7 +137,8 @@ fn kernel_entry(line: &KernelLine) -> KernelEntry {
 
 /// Rows and things counted.
 fn counts(site: &Site) -> Result<BTreeMap<String, u64>> {
-    let found = site.found.value()?;
+    let book = &site.book;
+    let found = book.of::<SearchResult>()?;
     let (mut registered, mut inside, mut rejected) = (0, 0, 0);
     for image in &site.images {
         let registration = image.registration.value()?;
@@ -144,9 +151,9 @@ fn counts(site: &Site) -> Result<BTreeMap<String, u64>> {
         ("shots_read", found.shots_read),
         (
             "footprints",
-            site.converted.value()?.footprints.len() as u64,
+            book.of::<Converted>()?.footprints.len() as u64,
         ),
-        ("profiles", site.profiles.value()?.len() as u64),
+        ("profiles", book.of::<Vec<Profile>>()?.len() as u64),
         ("images", site.images.len() as u64),
         ("registered", registered),
         ("registered_inside", inside),
@@ -154,11 +161,11 @@ fn counts(site: &Site) -> Result<BTreeMap<String, u64>> {
     ];
     let mut counts: BTreeMap<String, u64> =
         counts.map(|(name, count)| (name.to_owned(), count)).into();
-    if let Some(ties) = &site.ties {
-        counts.extend(matched(ties.value()?));
+    if let Some(ties) = book.find(Round::Initial)? {
+        counts.extend(matched(ties));
     }
-    if let Some(surface) = &site.surface {
-        let account = &surface.value()?.account;
+    if let Some(surface) = book.find::<Surface>(Round::Initial)? {
+        let account = &surface.account;
         counts.insert("surface_cells".to_owned(), u64::from(account.cells));
         counts.insert("surface_filled".to_owned(), u64::from(account.filled));
     }
@@ -183,7 +190,8 @@ fn matched(ties: &Ties) -> BTreeMap<String, u64> {
 
 /// The largest figures of the site.
 fn figures_of(site: &Site) -> Result<BTreeMap<String, f64>> {
-    let profiles = site.ranges.value()?.profiles.iter();
+    let book = &site.book;
+    let profiles = book.of::<RangeCheck>()?.profiles.iter();
     // Ranges of tables may have nothing to be compared with.
     let measured = profiles.filter(|ranges| ranges.measured() > 0);
     let means = measured.map(|ranges| ranges.mean_without_outliers_m.abs());
@@ -193,12 +201,11 @@ fn figures_of(site: &Site) -> Result<BTreeMap<String, f64>> {
         .iter()
         .map(|model| model.second_order.position_rmse_m());
     let pointings = models.iter().map(|model| model.rotation_vector.rmse_rad());
-    let adjustment = site.adjustment.as_ref();
-    let before = largest_along_track_parallax_m(site.intersection.as_ref())?;
-    let after = largest_along_track_parallax_m(adjustment.map(|of| &of.intersection))?;
-    let height = height_off_surface_m(site.intersection.as_ref())?;
-    let adjusted_height = height_off_surface_m(adjustment.map(|of| &of.intersection))?;
-    let adjusted = adjustment.map(|of| of.adjusted.value()).transpose()?;
+    let before = largest_along_track_parallax_m(book, Round::Initial)?;
+    let after = largest_along_track_parallax_m(book, Round::Adjusted)?;
+    let height = height_off_surface_m(book, Round::Initial)?;
+    let adjusted_height = height_off_surface_m(book, Round::Adjusted)?;
+    let adjusted = book.find::<Adjusted>(Round::Initial)?;
     let figures = [
         (figures::RANGE_MEAN_M, means.max_by(f64::total_cmp)),
         (figures::POSITION_RMSE_M, positions.max_by(f64::total_cmp)),
@@ -219,7 +226,7 @@ fn figures_of(site: &Site) -> Result<BTreeMap<String, f64>> {
 }
 
 fn biases(config: &SiteConfig, site: &Site) -> Result<Vec<BiasEntry>> {
-    let scope = match config.mola_clock.scope {
+    let scope = match config.altimeter_clock.scope {
         BiasScope::SpkLookup => "spacecraft position in the range check",
         BiasScope::Rotation => "rotation of Mars into IAU 2000",
         BiasScope::Both => {
@@ -229,9 +236,9 @@ fn biases(config: &SiteConfig, site: &Site) -> Result<Vec<BiasEntry>> {
     };
     let clock = BiasEntry {
         name: "mola_clock".to_owned(),
-        correction_s: config.mola_clock.correction_s(),
+        correction_s: config.altimeter_clock.correction_s(),
         scope: scope.to_owned(),
-        source: config.mola_clock.source.clone(),
+        source: config.altimeter_clock.source.clone(),
     };
     let images = site.images.iter().map(|image| image.times.value());
     let images = images.collect::<Result<Vec<_>>>()?;

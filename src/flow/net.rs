@@ -8,7 +8,7 @@ use std::path::Path;
 
 use super::{
     out::check_out_path,
-    single::{Single, SingleOutcome, Told, made},
+    single::{ManifestEntry, Single, SingleOutcome, made},
 };
 use crate::{
     config::NetConfig,
@@ -20,7 +20,7 @@ use crate::{
 };
 
 /// Raised when the layout of the products of a net changes.
-const METHOD: u32 = 2;
+const METHOD: u32 = 3;
 
 /// Triangulates a net and publishes its products in `<out>/<net>`, if an input has changed since the last run.
 ///
@@ -55,15 +55,15 @@ pub fn run_net(config: &NetConfig, out: &Path, force: bool) -> Result<SingleOutc
             };
             write_net_products(staging, &net)
         },
-        told,
+        manifest_entry,
     )
 }
 
 /// Content of the manifest of a net.
-fn told(result: &Triangulation) -> Told<'_> {
+fn manifest_entry(result: &Triangulation) -> ManifestEntry<'_> {
     let totals = &result.totals;
     let largest = |of: [f64; 2]| of[0].max(of[1]);
-    Told {
+    ManifestEntry {
         verdict: &result.verdict,
         counts: vec![
             ("pictures", result.pictures.len() as u64),

@@ -1,18 +1,15 @@
 //! The outputs of the stages of a site.
 
-use super::choice::KernelChoice;
 use crate::{
     error::Error,
     spice::{KernelSet, RequiredCoverage},
     stage::Output,
     stages::{
-        adjust::Adjusted, check_beam::ImageBeam, check_heights::HeightCheck,
-        check_ranges::RangeCheck, compare_pairs::PairComparison, convert_datum::Converted,
-        describe_kernels::KernelDescription, group_profiles::Profile, intersect::IntersectedTies,
-        lay_overlays::Overlays, map_surface::Surface, read_ties::Ties,
-        search_footprints::SearchResult, site_image::SiteImage, tabulate_kernels::KernelTables,
-        tag_times::ImageTimes,
+        check_heights::HeightCheck, compare_pairs::PairComparison, convert_datum::Converted,
+        group_profiles::Profile, intersect::IntersectedTies, search_footprints::SearchResult,
+        site_image::SiteImage, tag_times::ImageTimes,
     },
+    store::book::Book,
 };
 
 /// Outputs of the stages before the choice of kernels.
@@ -30,48 +27,26 @@ pub(super) struct Prepared {
 
 /// A site with the outputs of all its stages.
 pub(super) struct Site {
-    pub(super) found: Output<SearchResult>,
+    /// The outputs, but those of images.
+    pub(super) book: Book,
+    /// Footprints and profiles again, inputs of most stages.
     pub(super) converted: Output<Converted>,
-    pub(super) utc: Output<Vec<String>>,
     pub(super) profiles: Output<Vec<Profile>>,
     pub(super) required: Option<RequiredCoverage>,
-    pub(super) choice: Option<Output<KernelChoice>>,
     pub(super) kernels: Option<KernelSet>,
-    pub(super) described: Output<KernelDescription>,
-    pub(super) ranges: Output<RangeCheck>,
     /// In the order of the configuration.
     pub(super) images: Vec<SiteImage>,
-    /// Of the same images.
-    pub(super) beam: Output<Vec<ImageBeam>>,
-    /// `None` for a site without tie point files.
-    pub(super) ties: Option<Output<Ties>>,
-    /// With the orientation of the kernels; `None` if it failed.
-    pub(super) intersection: Option<Intersection>,
-    /// `None` if it failed.
-    pub(super) adjustment: Option<Adjustment>,
-    /// Overlays on the images; `None` for a site without pixels.
-    pub(super) overlays: Option<Output<Overlays>>,
-    /// A terrain model; `None` for a site that requests none.
-    pub(super) surface: Option<Output<Surface>>,
+    /// The same images with their adjusted orientation; `None` without an adjustment.
+    pub(super) adjusted_images: Option<Vec<SiteImage>>,
     /// Why a site with tie points has no adjustment.
     pub(super) adjustment_failure: Option<Error>,
 }
 
 /// Ground points of the tie points, and the internal agreement of every pair of images.
+#[derive(Clone)]
 pub(super) struct Intersection {
     pub(super) intersected: Output<IntersectedTies>,
     pub(super) pairs: Output<Vec<PairComparison>>,
     /// Heights of the intersected points, or of those of the adjustment.
     pub(super) heights: Output<HeightCheck>,
-}
-
-/// Outputs of the adjustment of a site.
-pub(super) struct Adjustment {
-    pub(super) adjusted: Output<Adjusted>,
-    /// The images with their adjusted orientation.
-    pub(super) images: Vec<SiteImage>,
-    /// Contents of the adjusted kernels of every image.
-    pub(super) tables: Vec<Output<KernelTables>>,
-    /// With the adjusted orientation.
-    pub(super) intersection: Intersection,
 }

@@ -8,10 +8,10 @@ use crate::stages::site_image::SiteImages;
 use crate::{
     config::{ImageConfig, SiteConfig},
     files::HashedFile,
-    stage::{Output, Stage as _},
+    stage::{Round, Stage as _},
     stages::{
         image_pixels::PixelFiles,
-        lay_overlays::{LayOverlays, MeasuredTies, Overlays},
+        lay_overlays::{LayOverlays, MeasuredTies},
     },
 };
 
@@ -25,30 +25,28 @@ pub(super) fn pixel_files<D: Driver>(
     config.images.iter().map(hash).collect()
 }
 
-/// Overlays of footprints and tie points on images with pixels; `None` for a site without pixels.
-pub(super) fn overlays<D: Driver>(
-    flow: &mut D,
-    config: &SiteConfig,
-    site: &Site,
-) -> Flow<Option<Output<Overlays>>> {
+/// Overlays of footprints and tie points on images with pixels; not for a site without pixels.
+pub(super) fn overlays<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut Site) -> Flow<()> {
     if config.images.iter().all(|image| image.pixels.is_none()) {
-        return Ok(None);
+        return Ok(());
     }
     let pixels = pixel_files(flow, LayOverlays::NAME, config)?;
-    let adjustment = site.adjustment.as_ref();
-    let measured = site.ties.as_ref().zip(site.intersection.as_ref());
+    let book = &site.book;
+    let measured = book.output(Round::Initial);
+    let measured = measured.zip(book.output(Round::Initial));
+    let adjusted = book.output(Round::Initial);
+    let adjusted = adjusted.zip(book.output(Round::Adjusted));
     let overlays = flow.stage(&LayOverlays {
         images: SiteImages(&site.images),
-        adjusted_images: SiteImages(adjustment.map_or(&[], |of| &of.images)),
-        model: &config.registration.model,
+        adjusted_images: SiteImages(site.adjusted_images.as_deref().unwrap_or_default()),
         pixels: PixelFiles(&pixels),
         converted: &site.converted,
         profiles: &site.profiles,
-        ties: measured.map(|(ties, initial)| MeasuredTies {
+        ties: measured.map(|(ties, intersected)| MeasuredTies {
             ties,
-            intersected: &initial.intersected,
-            adjusted: adjustment.map(|of| (&of.adjusted, &of.intersection.intersected)),
+            intersected,
+            adjusted,
         }),
     })?;
-    Ok(Some(overlays))
+    Ok(site.book.enter(Round::Initial, overlays)?)
 }

@@ -5,7 +5,7 @@ use std::{path::PathBuf, sync::atomic::AtomicBool};
 use super::{
     PUBLISH,
     bounds::Bounds,
-    driver::{Driver, Flow, Leave, Ledger, StageReason},
+    driver::{Driver, Exit, Flow, Ledger, StageReason},
     outputs::Site,
     publish::{inputs, standing},
     run::RunOptions,
@@ -51,11 +51,13 @@ pub fn plan_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SitePl
     let driven = site(&mut plan, config);
     options.hashes.keep(plan.files());
     match driven {
-        Ok(()) | Err(Leave::StageReached) => Ok(SitePlan {
+        Ok(()) | Err(Exit::StageReached) => Ok(SitePlan {
             files: plan.files().all(),
             stages: plan.planned,
         }),
-        Err(Leave::Failed(failure)) => Err(failure.in_site(&config.site)),
+        Err(Exit::Failed(failure) | Exit::NotAdjusted(failure)) => {
+            Err(failure.in_site(&config.site))
+        }
     }
 }
 

@@ -20,8 +20,10 @@ use crate::{
     },
     report,
     spice::{KernelSet, KernelView, Session},
-    stage::{Input, Inputs, Output, Reason},
-    stages::site_image::SiteImage,
+    stage::{Input, Inputs, Output, Reason, Round},
+    stages::{
+        convert_datum::Converted, describe_kernels::KernelDescription, site_image::SiteImage,
+    },
     store::{
         cache::StageCache,
         manifest::Manifest,
@@ -32,7 +34,7 @@ use crate::{
 };
 
 /// Raised when the layout of products changes.
-const METHOD: u32 = 18;
+const METHOD: u32 = 21;
 
 /// The configuration as written, the outlines that it names, all kernels and their paths relative to `folder`, and
 /// the inputs of every stage.
@@ -104,7 +106,8 @@ pub(super) fn publish(
 ) -> Result<Manifest> {
     let none = KernelSet::default();
     let kernels = site.kernels.as_ref().unwrap_or(&none);
-    let described = site.described.value()?;
+    let book = &site.book;
+    let described = book.of::<KernelDescription>()?;
     let (notes, mut complaints, rejected) =
         (notes(config, site)?, complaints(site)?, rejected(site)?);
     let warnings = warnings(config, site)?;
@@ -115,27 +118,33 @@ pub(super) fn publish(
     // Complaints about pixels are no skipped records; the verdict receives them through the warnings.
     complaints.extend(complaints_of_pixels(site)?.0);
     let images = image_products(&site.images)?;
-    let adjusted_images = site
-        .adjustment
-        .as_ref()
-        .map(|of| image_products(&of.images));
-    let adjusted_images = adjusted_images.transpose()?.unwrap_or_default();
-    let tables = site.adjustment.iter().flat_map(|of| &of.tables);
-    let tables = tables.map(Output::value).collect::<Result<Vec<_>>>()?;
-    let adjustment = site.adjustment.as_ref().map(|adjustment| {
+    let adjusted_images = site.adjusted_images.as_deref().unwrap_or_default();
+    let adjusted_images = image_products(adjusted_images)?;
+    let tables = book.parts(Round::Adjusted)?;
+    let adjustment = book.find(Round::Initial)?.map(|adjusted| {
         Ok::<_, Error>(AdjustmentProducts {
             kernels,
             folder,
-            adjusted: adjustment.adjusted.value()?,
-            heights: adjustment.intersection.heights.value()?,
+            adjusted,
+            heights: book.require(Round::Adjusted)?.value()?,
             images: &adjusted_images,
             tables: &tables,
-            intersected: adjustment.intersection.intersected.value()?,
-            pairs: adjustment.intersection.pairs.value()?,
+            intersected: book.require(Round::Adjusted)?.value()?,
+            pairs: book.require::<Vec<_>>(Round::Adjusted)?.value()?,
             images_agree,
         })
     });
-    let converted = site.converted.value()?;
+    let adjustment = adjustment.transpose()?;
+    let geometric = book.find(Round::Initial)?.map(|intersected| {
+        Ok::<_, Error>(GeometricProducts {
+            ties: book.of()?,
+            intersected,
+            pairs: book.of::<Vec<_>>()?,
+            heights: book.of()?,
+            adjustment,
+        })
+    });
+    let converted = book.of::<Converted>()?;
     let products = SiteProducts {
         config,
         kernels: &described.kernels,
@@ -144,16 +153,17 @@ pub(super) fn publish(
         images: &images,
         conversions: &converted.files,
         footprints: &converted.footprints,
-        utc: site.utc.value()?,
-        profiles: site.profiles.value()?,
-        ranges: site.ranges.value()?,
+        utc: book.of::<Vec<_>>()?,
+        profiles: book.of::<Vec<_>>()?,
+        profile_check: book.of()?,
+        ranges: book.of()?,
         rejected: &rejected,
         complaints: &complaints,
         notes: &notes,
         verdict: &verdict,
-        geometric: geometric_products(site, adjustment.transpose()?)?,
-        overlays: site.overlays.as_ref().map(Output::value).transpose()?,
-        surface: site.surface.as_ref().map(Output::value).transpose()?,
+        geometric: geometric.transpose()?,
+        overlays: book.find(Round::Initial)?,
+        surface: book.find(Round::Initial)?,
         program: &Program {
             cspice: Session::version_of_cspice()?,
             methods: methods.to_vec(),
@@ -198,21 +208,4 @@ fn image_products(images: &[SiteImage]) -> Result<Vec<ImageProducts<'_>>> {
         })
     });
     images.collect()
-}
-
-/// Results of the tie points of the site; `None` if they could not be intersected.
-fn geometric_products<'a>(
-    site: &'a Site,
-    adjustment: Option<AdjustmentProducts<'a>>,
-) -> Result<Option<GeometricProducts<'a>>> {
-    let (Some(ties), Some(initial)) = (&site.ties, &site.intersection) else {
-        return Ok(None);
-    };
-    Ok(Some(GeometricProducts {
-        ties: ties.value()?,
-        intersected: initial.intersected.value()?,
-        pairs: initial.pairs.value()?,
-        heights: initial.heights.value()?,
-        adjustment,
-    }))
 }

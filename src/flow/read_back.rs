@@ -21,7 +21,7 @@ pub(super) fn read_back(
     kernels: &KernelSet,
     staging: &Path,
 ) -> Result<()> {
-    let images = site.adjustment.iter().flat_map(|of| &of.images);
+    let images = site.adjusted_images.iter().flatten();
     for image in images {
         let (times, orientation) = (image.times.value()?, image.orientation.value()?);
         if times.support.is_some() {

@@ -30,6 +30,7 @@ pub(super) fn registered<D: Driver>(
             round,
             samples: &orientation,
             orientation: &config.orientation,
+            registration_model: &config.registration.model,
         })?;
         let registration = flow.stage(&Register {
             image,

@@ -5,7 +5,7 @@ use std::{path::PathBuf, sync::atomic::AtomicBool, time::Instant};
 use super::{
     PUBLISH,
     bounds::Bounds,
-    driver::{Driver, Flow, Leave, Ledger, StageReason},
+    driver::{Driver, Exit, Flow, Ledger, StageReason},
     observer::{Observer, StageEvent},
     outputs::Site,
     publish::{inputs, keep, publish, standing},
@@ -103,8 +103,8 @@ pub fn run_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOut
         ending: Ending::StoppedAfter(options.until.to_owned()),
     };
     let driven = match site(&mut run, config) {
-        Ok(()) | Err(Leave::StageReached) => run.verify_inputs(),
-        Err(Leave::Failed(failure)) => {
+        Ok(()) | Err(Exit::StageReached) => run.verify_inputs(),
+        Err(Exit::Failed(failure) | Exit::NotAdjusted(failure)) => {
             // Outputs made from changed files are discarded; the failure itself takes precedence over the change.
             let _ = run.verify_inputs();
             Err(failure)

@@ -55,7 +55,7 @@ pub(super) struct Single<'a> {
 }
 
 /// The part of a manifest that depends on an output.
-pub(super) struct Told<'a> {
+pub(super) struct ManifestEntry<'a> {
     pub(super) verdict: &'a Verdict,
     pub(super) counts: Vec<(&'static str, u64)>,
     pub(super) figures: Vec<(&'static str, f64)>,
@@ -74,7 +74,7 @@ impl Single<'_> {
         files: &[PathBuf],
         made: impl FnOnce(&[HashedFile], &StageCache, &AtomicBool) -> Result<Made<T>>,
         write: impl FnOnce(&Path, &T) -> Result<Vec<Product>>,
-        tell: impl Fn(&T) -> Told<'_>,
+        tell: impl Fn(&T) -> ManifestEntry<'_>,
     ) -> Result<SingleOutcome> {
         let ran = self.ran(files, made, write, tell).in_site(self.name);
         if self.folder.is_dir() {
@@ -94,7 +94,7 @@ impl Single<'_> {
         files: &[PathBuf],
         made: impl FnOnce(&[HashedFile], &StageCache, &AtomicBool) -> Result<Made<T>>,
         write: impl FnOnce(&Path, &T) -> Result<Vec<Product>>,
-        tell: impl Fn(&T) -> Told<'_>,
+        tell: impl Fn(&T) -> ManifestEntry<'_>,
     ) -> Result<(Manifest, bool)> {
         let stop = AtomicBool::new(false);
         let known = InputFiles::default();
@@ -133,7 +133,7 @@ impl Single<'_> {
         made: &Made<T>,
         inputs: &Inputs,
         write: impl FnOnce(&Path, &T) -> Result<Vec<Product>>,
-        tell: impl Fn(&T) -> Told<'_>,
+        tell: impl Fn(&T) -> ManifestEntry<'_>,
     ) -> Result<Manifest> {
         let staging = staging(&self.folder)?;
         let value = made.output.value()?;
@@ -156,14 +156,14 @@ impl Single<'_> {
     }
 
     /// The manifest without products and stages.
-    fn manifest(&self, told: Told<'_>) -> Manifest {
+    fn manifest(&self, entry: ManifestEntry<'_>) -> Manifest {
         let named = |(name, count): (&str, u64)| (name.to_owned(), count);
-        let (texts, count) = told.complaints;
+        let (texts, count) = entry.complaints;
         Manifest {
             tool: "areograph".to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             site: self.name.to_owned(),
-            verdict: told.verdict.clone(),
+            verdict: entry.verdict.clone(),
             configuration: ConfigurationEntry {
                 file_name: file_name(self.file),
                 blake3: self.blake3.to_owned(),
@@ -174,8 +174,8 @@ impl Single<'_> {
             kernel_choice: Vec::new(),
             stages: Vec::new(),
             products: Vec::new(),
-            counts: told.counts.into_iter().map(named).collect(),
-            figures: told
+            counts: entry.counts.into_iter().map(named).collect(),
+            figures: entry
                 .figures
                 .into_iter()
                 .map(|(name, figure)| (name.to_owned(), figure))

@@ -3,13 +3,13 @@
 use super::{
     LOAD_KERNELS,
     choice::{ChooseKernels, KernelChoice, RivalKernelSets, rival_positions},
-    driver::{Driver, Flow, Leave},
+    driver::{Driver, Exit, Flow},
     kernels::{load_kernels, required_coverage},
     outputs::{Prepared, Site},
     overlays::overlays,
     registered::registered,
     surface::surface,
-    triangulate::{is_of_adjustment, triangulate},
+    triangulate::triangulate,
 };
 use crate::{
     config::{ImageConfig, SiteConfig, WindowConfig},
@@ -24,6 +24,7 @@ use crate::{
     stage::{InOrder, Output, Round, Stage},
     stages::{
         check_beam::CheckBeam,
+        check_profiles::CheckProfiles,
         check_ranges::{CheckRanges, CheckTableRanges},
         convert_datum::ConvertDatum,
         describe_kernels::{DescribeKernels, Required},
@@ -37,6 +38,7 @@ use crate::{
         tag_times::{ImageTimes, TagTimes},
         tag_utc::TagUtc,
     },
+    store::book::Book,
 };
 
 /// The flow of one site, from its configuration to its products.
@@ -53,18 +55,20 @@ pub(super) fn finish<D: Driver>(flow: &mut D, config: &SiteConfig, prepared: Pre
         None => None,
     };
     let mut site = orient(flow, config, prepared, kernels)?;
-    site.choice = choice;
+    if let Some(choice) = choice {
+        site.book.enter(Round::Initial, choice)?;
+    }
     match triangulate(flow, config, &mut site) {
         Ok(()) => {}
         // A failed adjustment does not prevent the other products.
-        Err(Leave::Failed(failure)) if is_of_adjustment(&failure) => {
+        Err(Exit::NotAdjusted(failure)) => {
             tracing::warn!("{failure}");
             site.adjustment_failure = Some(failure);
         }
         Err(leave) => return Err(leave),
     }
-    site.surface = surface(flow, config, &site)?;
-    site.overlays = overlays(flow, config, &site)?;
+    surface(flow, config, &mut site)?;
+    overlays(flow, config, &mut site)?;
     flow.publish(config, &site)
 }
 
@@ -75,20 +79,23 @@ pub(super) fn prepare<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Prep
         let kernels = &KernelView::text(clocks.as_ref());
         let tag = |image: &ImageConfig| {
             let source = image.source().map_or(&[][..], std::slice::from_ref);
+            // A cube has its pixels beside its label.
             let kind = match &image.isd {
                 Some(_) => SizedFile::SupportData,
                 None => SizedFile::Label,
             };
             let source = flow.hash_sized(TagTimes::NAME, kind, source)?.pop();
-            let (label, support) = match &image.isd {
-                Some(_) => (None, source),
-                None => (source, None),
+            let (label, support, cube) = match (&image.isd, &image.cube) {
+                (Some(_), _) => (None, source, None),
+                (None, Some(_)) => (None, None, source),
+                (None, None) => (source, None, None),
             };
             flow.stage(&TagTimes {
                 body: &config.body,
                 image,
                 label,
                 support,
+                cube,
                 kernels,
             })
         };
@@ -97,7 +104,8 @@ pub(super) fn prepare<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Prep
     let found = found(flow, config, &images, clocks.as_ref())?;
     let converted = flow.stage(&ConvertDatum {
         found: &found,
-        mola_clock: &config.mola_clock,
+        altimeter_clock: &config.altimeter_clock,
+        ground: &config.pedr.crossover,
     })?;
     let utc = flow.stage(&TagUtc {
         converted: &converted,
@@ -111,7 +119,7 @@ pub(super) fn prepare<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Prep
     Ok(Prepared {
         required: flow.required(config, &images, &profiles),
         // Shots as in their files are not needed any more: a million of them occupy a fifth of a gigabyte.
-        found: found.lightened(|found| found.footprints = Footprints::new(Vec::new())),
+        found: found.without_rows(|found| found.footprints = Footprints::new(Vec::new())),
         converted,
         utc,
         profiles,
@@ -136,7 +144,7 @@ fn found<D: Driver>(
         written: &config.windows,
         outlined: outlined.as_ref(),
     };
-    let clock_correction_s = &config.mola_clock.correction_s();
+    let clock_correction_s = &config.altimeter_clock.correction_s();
     if !tables.is_empty() {
         return flow.stage(&ReadShots {
             body: &config.body,
@@ -224,6 +232,11 @@ pub(super) fn orient<D: Driver>(
         images,
         required,
     } = prepared;
+    let checked = flow.stage(&CheckProfiles {
+        converted: &converted,
+        profiles: &profiles,
+        laser_surface: &config.laser_surface,
+    })?;
     // One session at a time: that of the positions ends here.
     let ranges = {
         let view = KernelView::positions(kernels.as_ref());
@@ -234,7 +247,7 @@ pub(super) fn orient<D: Driver>(
                 converted: &converted,
                 profiles: &profiles,
                 kernels: view,
-                mola_clock: &config.mola_clock,
+                altimeter_clock: &config.altimeter_clock,
                 range_check: &config.range_check,
             })?
         } else {
@@ -243,7 +256,7 @@ pub(super) fn orient<D: Driver>(
                 profiles: &profiles,
                 images: InOrder(&images),
                 kernels: view,
-                mola_clock: &config.mola_clock,
+                altimeter_clock: &config.altimeter_clock,
                 range_check: &config.range_check,
             })?
         }
@@ -266,25 +279,25 @@ pub(super) fn orient<D: Driver>(
         converted: &converted,
         profiles: &profiles,
         altimeter: &config.altimeter,
-        mola_clock: &config.mola_clock,
+        altimeter_clock: &config.altimeter_clock,
     })?;
+    let (mut book, round) = (Book::default(), Round::Initial);
+    book.enter(round, found)?;
+    book.enter(round, converted.clone())?;
+    book.enter(round, utc)?;
+    book.enter(round, profiles.clone())?;
+    book.enter(round, checked)?;
+    book.enter(round, described)?;
+    book.enter(round, ranges)?;
+    book.enter(round, beam)?;
     Ok(Site {
-        found,
+        book,
         converted,
-        utc,
         profiles,
         required,
-        choice: None,
         kernels,
-        described,
-        ranges,
         images,
-        beam,
-        ties: None,
-        intersection: None,
-        adjustment: None,
-        overlays: None,
-        surface: None,
+        adjusted_images: None,
         adjustment_failure: None,
     })
 }

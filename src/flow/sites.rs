@@ -183,7 +183,8 @@ mod tests {
         let budget = serde_json::json!({
             "along_px": 41.0, "total_along_px": 74.0, "ground": {"resolved": {"along_px": 61.6}},
             "paper_average": point, "equation_7": point,
-            "equation_5": {"along_px": 54.6, "unexplained_px": 0.3, "point": point}
+            "equation_5": {"along_px": 54.6, "unexplained_px": 0.3, "point": point},
+            "pixel_size_m": 5.0, "height_over_base": 2.5
         });
         let document = serde_json::json!({
             "before": {"pairs": [{"budget": budget}, {"no_budget_because": "no pair"}]},

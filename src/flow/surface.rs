@@ -8,36 +8,32 @@ use super::{
 use crate::stages::site_image::SiteImages;
 use crate::{
     config::SiteConfig,
-    stage::{Output, Stage as _},
+    stage::{Round, Stage as _},
     stages::{
+        adjust::Adjusted,
         image_pixels::PixelFiles,
-        map_surface::{AdjustmentOfImages, MapSurface, Surface},
+        map_surface::{AdjustmentOfImages, MapSurface},
     },
 };
 
-/// The terrain model of a pair of images with their best orientation; `None` for a site that requests none, or whose
+/// The terrain model of a pair of images with their best orientation; not for a site that requests none, or whose
 /// adjustment failed.
-pub(super) fn surface<D: Driver>(
-    flow: &mut D,
-    config: &SiteConfig,
-    site: &Site,
-) -> Flow<Option<Output<Surface>>> {
+pub(super) fn surface<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut Site) -> Flow<()> {
     if !config.surface.is_asked_for() || site.adjustment_failure.is_some() {
-        return Ok(None);
+        return Ok(());
     }
-    let adjustment = site.adjustment.as_ref();
+    let adjusted = site.book.output::<Adjusted>(Round::Initial);
     let limits = &config.limits;
     let pixels = pixel_files(flow, MapSurface::NAME, config)?;
     let surface = flow.stage(&MapSurface {
-        images: SiteImages(adjustment.map_or(&site.images, |of| &of.images)),
-        model: &config.registration.model,
+        images: SiteImages(site.adjusted_images.as_ref().unwrap_or(&site.images)),
         pixels: PixelFiles(&pixels),
         converted: &site.converted,
         profiles: &site.profiles,
         surface: &config.surface,
-        mola_surface: &config.mola_surface,
-        adjusted: AdjustmentOfImages(adjustment.map(|of| &of.adjusted)),
-        off_m: adjustment.map_or(&limits.height_before_max_m, |_| &limits.height_after_max_m),
+        laser_surface: &config.laser_surface,
+        adjusted: AdjustmentOfImages(adjusted),
+        off_m: adjusted.map_or(&limits.height_before_max_m, |_| &limits.height_after_max_m),
     })?;
-    Ok(Some(surface))
+    Ok(site.book.enter(Round::Initial, surface)?)
 }

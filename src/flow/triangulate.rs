@@ -3,14 +3,14 @@
 //! A site whose adjustment fails publishes all earlier products, marked invalid.
 
 use super::{
-    driver::{Driver, Flow},
-    outputs::{Adjustment, Intersection, Site},
+    driver::{Driver, Flow, of_adjustment},
+    outputs::{Intersection, Site},
     overlays::pixel_files,
     registered::{Shots, registered},
 };
 use crate::{
     config::SiteConfig,
-    error::{Error, Kind},
+    error::Result,
     pds::SizedFile,
     spice::{KernelSet, KernelView},
     stage::{InOrder, Output, Round, Stage},
@@ -25,13 +25,25 @@ use crate::{
         read_ties::{ImageNames, ReadTies, TieFiles, Ties},
         reorient::Reorient,
         site_image::{SiteImage, SiteImages},
-        tabulate_kernels::TabulateKernels,
+        tabulate_kernels::{KernelTables, TabulateKernels},
         tag_times::ImageTimes,
     },
+    store::book::Book,
 };
 
 /// Images and tie points, and the difference between the orbits of shots and kernels.
 type Measured<'a> = (&'a [SiteImage], &'a Output<Ties>, &'a Output<RangeCheck>);
+/// Outputs of the adjustment of a site.
+struct Adjustment {
+    adjusted: Output<Adjusted>,
+    /// The images with their adjusted orientation.
+    images: Vec<SiteImage>,
+    /// Contents of the adjusted kernels of every image.
+    tables: Vec<Output<KernelTables>>,
+    /// With the adjusted orientation.
+    intersection: Intersection,
+}
+
 /// Ground points of tie points, and comparisons of pairs of images.
 type Ground<'a> = (&'a Output<IntersectedTies>, &'a Output<Vec<PairComparison>>);
 
@@ -44,15 +56,15 @@ pub(super) fn triangulate<D: Driver>(
     let Some(ties) = ties(flow, config, site)? else {
         return Ok(());
     };
-    let ties = &*site.ties.insert(ties);
-    let shots = (&site.converted, &site.profiles);
-    let initial = intersect(flow, config, None, &site.images, ties, shots)?;
-    let initial = &*site.intersection.insert(initial);
+    site.book.enter(Round::Initial, ties.clone())?;
+    let (images, shots) = (&site.images[..], (&site.converted, &site.profiles));
+    let initial = intersect(flow, config, None, images, &ties, shots)?;
+    initial.clone().enter(&mut site.book, Round::Initial)?;
     let kernels = &KernelView::all(site.kernels.as_ref());
-    let measured = (&site.images[..], ties, &site.ranges);
-    let adjustment = adjust(flow, config, measured, initial, shots, kernels)?;
-    site.adjustment = Some(adjustment);
-    Ok(())
+    let ranges = &site.book.require(Round::Initial)?.clone();
+    let measured = (images, &ties, ranges);
+    let adjustment = adjust(flow, config, measured, &initial, shots, kernels)?;
+    Ok(adjustment.enter(site)?)
 }
 
 /// The tie points of the site's files, followed by the matched ones; `None` for a site without either.
@@ -101,7 +113,7 @@ fn matched<D: Driver>(
     let shots = (&site.converted, &site.profiles);
     let ties = &match_ties(flow, config, Round::Initial, images, shots, read)?;
     let (intersected, pairs) = &ground(flow, config, round, images, ties, shots)?;
-    let measured = (images, ties, &site.ranges);
+    let measured = (images, ties, site.book.require(Round::Initial)?);
     let ground = (intersected, pairs);
     let (_, images) = corrected(flow, config, round, measured, ground, shots)?;
     match_ties(flow, config, Round::Adjusted, &images, shots, read)
@@ -117,16 +129,15 @@ pub(super) fn match_ties<D: Driver>(
     read: Option<&Output<Ties>>,
 ) -> Flow<Output<Ties>> {
     let pixels = pixel_files(flow, MatchTies::NAME, config)?;
-    flow.stage(&MatchTies {
+    of_adjustment(flow.stage(&MatchTies {
         round,
         images: SiteImages(images),
-        model: &config.registration.model,
         pixels: PixelFiles(&pixels),
         converted,
         profiles,
         margin: &Margin::of(config, round),
         read: TiesOfFiles(read),
-    })
+    }))
 }
 
 /// The combined adjustment, and the images and tie points once more with the adjusted orientation.
@@ -151,7 +162,7 @@ fn adjust<D: Driver>(
             index: &index,
             times: InOrder(&times),
             orientation: &image.orientation,
-            kernels: if config.images[index].isd.is_some() {
+            kernels: if config.images[index].support().is_some() {
                 none
             } else {
                 kernels
@@ -180,10 +191,9 @@ fn corrected<D: Driver>(
     shots: Shots,
 ) -> Flow<(Output<Adjusted>, Vec<SiteImage>)> {
     let (converted, profiles) = shots;
-    let adjusted = flow.stage(&Adjust {
+    let adjusted = of_adjustment(flow.stage(&Adjust {
         round,
         images: SiteImages(images),
-        model: &config.registration.model,
         converted,
         profiles,
         ties,
@@ -191,39 +201,24 @@ fn corrected<D: Driver>(
         ranges,
         pairs,
         altimeter: &config.altimeter,
-        mola_surface: &config.mola_surface,
+        laser_surface: &config.laser_surface,
         adjustment: &config.adjustment,
-    })?;
+    }))?;
     let reorient = |(index, image): (usize, &SiteImage)| {
-        flow.stage(&Reorient {
+        of_adjustment(flow.stage(&Reorient {
             round,
             image: &config.images[index].id,
             index: &index,
             times: &image.times,
             orientation: &image.orientation,
             adjusted: &adjusted,
-        })
+        }))
     };
     let orientations = images.iter().enumerate().map(reorient);
     let orientations = orientations.collect::<Flow<Vec<_>>>()?;
     let times: Vec<_> = images.iter().map(|image| image.times.clone()).collect();
-    let images = registered(flow, config, round, &times, orientations, shots)?;
+    let images = of_adjustment(registered(flow, config, round, &times, orientations, shots))?;
     Ok((adjusted, images))
-}
-
-/// Whether a failure is one of geometry, of tie points and orientation, and not an unreadable file.
-pub(super) fn is_of_adjustment(failure: &Error) -> bool {
-    let stage = failure.stage.as_deref().unwrap_or_default();
-    let name = stage.split('/').next().unwrap_or_default();
-    let names = [
-        MatchTies::NAME,
-        Intersect::NAME,
-        Adjust::NAME,
-        Reorient::NAME,
-    ];
-    let of_adjustment =
-        names.contains(&name) || stage.ends_with("/adjusted") || stage.ends_with("/matching");
-    failure.kind() == Kind::Input && failure.file.is_none() && of_adjustment
 }
 
 /// Ground points of the tie points, the internal agreement of every pair of images, and heights against MOLA: with
@@ -248,8 +243,9 @@ fn intersect<D: Driver>(
         points,
         converted,
         profiles,
-        mola_surface: &config.mola_surface,
-    })?;
+        laser_surface: &config.laser_surface,
+    });
+    let heights = of_round(round, heights)?;
     Ok(Intersection {
         intersected,
         pairs,
@@ -266,22 +262,49 @@ fn ground<D: Driver>(
     ties: &Output<Ties>,
     (converted, profiles): Shots,
 ) -> Flow<(Output<IntersectedTies>, Output<Vec<PairComparison>>)> {
-    let (images, model) = (SiteImages(images), &config.registration.model);
-    let intersected = flow.stage(&Intersect {
+    let images = SiteImages(images);
+    let intersected = of_adjustment(flow.stage(&Intersect {
         round,
         images,
-        model,
         ties,
         intersection: &config.intersection,
-    })?;
+    }))?;
     let pairs = flow.stage(&ComparePairs {
         round,
         images,
-        model,
         ties,
         intersected: &intersected,
         converted,
         profiles,
-    })?;
-    Ok((intersected, pairs))
+    });
+    Ok((intersected, of_round(round, pairs)?))
+}
+
+/// A step that belongs to the adjustment unless it uses the orientation of the kernels.
+fn of_round<T>(round: Round, step: Flow<T>) -> Flow<T> {
+    match round {
+        Round::Initial => step,
+        Round::Matching | Round::Adjusted => of_adjustment(step),
+    }
+}
+
+impl Intersection {
+    /// Enters the outputs in the book.
+    fn enter(self, book: &mut Book, round: Round) -> Result<()> {
+        book.enter(round, self.intersected)?;
+        book.enter(round, self.pairs)?;
+        book.enter(round, self.heights)
+    }
+}
+
+impl Adjustment {
+    /// Enters the outputs in the book of the site.
+    fn enter(self, site: &mut Site) -> Result<()> {
+        // There is one adjustment, of the orientation of the kernels.
+        site.book.enter(Round::Initial, self.adjusted)?;
+        site.book.enter_parts(Round::Adjusted, self.tables)?;
+        self.intersection.enter(&mut site.book, Round::Adjusted)?;
+        site.adjusted_images = Some(self.images);
+        Ok(())
+    }
 }

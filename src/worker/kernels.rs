@@ -24,7 +24,7 @@ impl Worker {
         let mut probed = Vec::with_capacity(files.len());
         for path in files {
             Stopped::check(&self.stop)?;
-            self.voice.stage(
+            self.reporter.stage(
                 &path.to_string_lossy(),
                 "running",
                 "opened with CSPICE",

@@ -6,9 +6,9 @@ mod hash;
 mod kernels;
 mod limits;
 mod list;
+mod reporter;
 mod shots;
 mod site;
-mod voice;
 
 use std::{
     any::Any,
@@ -33,8 +33,8 @@ use crate::{
     report::difference_page,
     store::{hashes::HashCache, lock::Busy, page::PagePath},
 };
+use reporter::Reporter;
 use shots::{Search, search};
-use voice::Voice;
 
 /// Interval of heartbeats.
 const BEAT: Duration = Duration::from_secs(2);
@@ -44,7 +44,7 @@ const ORPHANED: Duration = Duration::from_secs(10);
 /// State that the parts of a worker share.
 struct Worker {
     task: Task,
-    voice: Arc<Voice>,
+    reporter: Arc<Reporter>,
     stop: Arc<AtomicBool>,
     hashes: HashCache,
     /// Folders below which input files must lie, links resolved.
@@ -60,31 +60,31 @@ pub fn main(parent: Option<u32>) -> ExitCode {
     if !limits::end_with(parent) {
         return interrupted;
     }
-    let voice = match Voice::take() {
-        Ok(voice) => Arc::new(voice),
+    let reporter = match Reporter::take() {
+        Ok(reporter) => Arc::new(reporter),
         Err(error) => {
             tracing::error!("standard output cannot be reserved for the service: {error}");
             return ExitCode::from(Kind::Io.exit_code());
         }
     };
-    voice.say(&Line::Hello {
+    reporter.send(&Line::Hello {
         v: PROTOCOL,
         version: env!("CARGO_PKG_VERSION").to_owned(),
         pid: process::id(),
     });
     let task = match read_task() {
         None => return interrupted,
-        Some(Err(text)) => return fail(&voice, bug(text)),
+        Some(Err(text)) => return fail(&reporter, bug(text)),
         Some(Ok(task)) => task,
     };
     let stop = Arc::new(AtomicBool::new(false));
     // Without these two threads the worker could not be stopped, nor distinguished from one that hangs.
-    let threads = listen(&stop).and_then(|()| beat(&voice));
+    let threads = listen(&stop).and_then(|()| beat(&reporter));
     if let Err(error) = threads {
-        return fail(&voice, bug(format!("no thread can be started: {error}")));
+        return fail(&reporter, bug(format!("no thread can be started: {error}")));
     }
     if let Err(text) = limits::keep_to(&task) {
-        return fail(&voice, unfit(text));
+        return fail(&reporter, unfit(text));
     }
     let worker = Worker {
         hashes: HashCache::new(&task.hashes_file, false),
@@ -94,18 +94,18 @@ pub fn main(parent: Option<u32>) -> ExitCode {
             .map(|root| root.canonicalize().unwrap_or_else(|_| root.clone()))
             .collect(),
         task,
-        voice,
+        reporter,
         stop,
     };
     match catch_unwind(AssertUnwindSafe(|| worker.work())) {
         Ok(Ok(answer)) => {
             // Short tasks end before the first heartbeat.
-            worker.voice.beat();
-            worker.voice.say(&Line::Answer(answer));
+            worker.reporter.beat();
+            worker.reporter.send(&Line::Answer(answer));
             ExitCode::SUCCESS
         }
-        Ok(Err(failure)) => fail(&worker.voice, described(&failure)),
-        Err(panic) => fail(&worker.voice, panicked(&*panic)),
+        Ok(Err(failure)) => fail(&worker.reporter, described(&failure)),
+        Err(panic) => fail(&worker.reporter, panicked(&*panic)),
     }
 }
 
@@ -154,11 +154,11 @@ fn listen(stop: &Arc<AtomicBool>) -> std::io::Result<()> {
 }
 
 /// Starts the heartbeats.
-fn beat(voice: &Arc<Voice>) -> std::io::Result<()> {
-    let voice = Arc::clone(voice);
+fn beat(reporter: &Arc<Reporter>) -> std::io::Result<()> {
+    let reporter = Arc::clone(reporter);
     let beats = move || {
         loop {
-            voice.beat();
+            reporter.beat();
             thread::sleep(BEAT);
         }
     };
@@ -221,10 +221,10 @@ impl Worker {
 }
 
 /// Reports a failure; returns its exit code.
-fn fail(voice: &Voice, failure: Failure) -> ExitCode {
+fn fail(reporter: &Reporter, failure: Failure) -> ExitCode {
     let code = failure.code;
     tracing::error!("{}", failure.text);
-    voice.say(&Line::Failure(failure));
+    reporter.send(&Line::Failure(failure));
     ExitCode::from(code)
 }
 
@@ -244,7 +244,7 @@ fn panicked(panic: &(dyn Any + Send)) -> Failure {
     let text = text.or(panic.downcast_ref::<&str>().copied());
     bug(format!(
         "internal error of areograph: {}",
-        text.unwrap_or("for no stated reason")
+        text.unwrap_or("without a message")
     ))
 }
 

@@ -1,7 +1,8 @@
 //! Shots of many sites inside a region, from their published footprints.
 
 use std::{
-    fs::File,
+    fs::{self, File},
+    io::ErrorKind,
     path::{Path, PathBuf},
     sync::{Arc, atomic::AtomicBool},
 };
@@ -16,7 +17,7 @@ use crate::{
     error::{Cause, Error, IoError, Locate, Result, Stopped},
     geom::window::Region,
     products::{RowsFormat, RowsWriter},
-    store::publish::read_manifest,
+    store::{manifest::Manifest, publish::MANIFEST},
     units::RADIANS_PER_DEGREE,
 };
 
@@ -44,6 +45,10 @@ enum ShotsError {
     #[error("contains no products")]
     #[cause(Input: "run the site")]
     NoRun,
+    /// A manifest that is not one of areograph.
+    #[error("the manifest cannot be read: {0}")]
+    #[cause(Input: "restore the run from a copy, or run the site again")]
+    Manifest(serde_json::Error),
     /// A product that this program did not write, or that a library rejects.
     #[error("cannot be {0}")]
     #[cause(Input: "products of another version of areograph must be made again by this version")]
@@ -123,7 +128,7 @@ fn region(corners: &[[f64; 2]]) -> Result<Region> {
 
 /// The site of a run and its footprints; `None` for a site without footprints.
 fn open(run: &Path, path: &Path) -> Result<Option<(String, ParquetRecordBatchReader)>> {
-    let manifest = read_manifest(run).ok_or(ShotsError::NoRun).in_file(run)?;
+    let manifest = manifest_of(run)?;
     if !manifest
         .products
         .iter()
@@ -138,6 +143,19 @@ fn open(run: &Path, path: &Path) -> Result<Option<(String, ParquetRecordBatchRea
         .and_then(ParquetRecordBatchReaderBuilder::build);
     let batches = batches.map_err(refused("read as Parquet")).in_file(path)?;
     Ok(Some((manifest.site, batches)))
+}
+
+fn manifest_of(run: &Path) -> Result<Manifest> {
+    let path = run.join(MANIFEST);
+    let bytes = match fs::read(&path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            return Err(ShotsError::NoRun).in_file(run);
+        }
+        read => read.map_err(IoError::on("read")).in_file(&path)?,
+    };
+    serde_json::from_slice(&bytes)
+        .map_err(ShotsError::Manifest)
+        .in_file(path)
 }
 
 /// The rows whose shots lie inside.

@@ -18,7 +18,9 @@ use crate::{
 
 /// A site file whose keys differ from those that the service recorded.
 #[derive(Debug, thiserror::Error, Cause)]
-#[error("its keys have the hash {is}; expected {seen}, the hash that the service recorded")]
+#[error(
+    "the keys of the site file have the hash {is}; expected {seen}, which the service recorded"
+)]
 #[cause(Input: "run again after the service has detected the change")]
 struct OtherKeys {
     is: String,
@@ -91,7 +93,7 @@ impl Worker {
         let regions: Vec<Region> = site
             .windows
             .iter()
-            .map(|of| Region::new(&of.shape))
+            .map(|window| Region::new(&window.shape))
             .collect();
         let bounds = bounds_rad(&regions);
         Ok(PlanAnswer {
@@ -124,7 +126,7 @@ impl Worker {
             stop: &self.stop,
             hashes: &self.hashes,
             roots: &self.roots,
-            observer: &*self.voice,
+            observer: &*self.reporter,
         }
     }
 

@@ -275,7 +275,7 @@ const MISTAKES: &[Mistake] = &[
             });
         },
         End::Remark,
-        "repeat the measurements of another point",
+        "duplicate the measurements of another point",
     ),
     (
         "ties_saved_again_under_other_names",
@@ -285,7 +285,7 @@ const MISTAKES: &[Mistake] = &[
             all_tables(case);
         },
         End::Remark,
-        "tie points: 154 repeat the measurements of another point and are omitted",
+        "tie points: 154 duplicate the measurements of another point and are omitted",
     ),
     (
         "all_ties_on_one_pixel",
@@ -362,25 +362,25 @@ const MISTAKES: &[Mistake] = &[
         "clock_bias_with_the_wrong_sign",
         |case| site(case, "sign = \"late\"", "sign = \"early\""),
         End::Invalid,
-        "they agree when time tags are corrected by −0.11",
+        "they agree if time tags are corrected by −0.11",
     ),
     (
         "orbit_300_m_ahead",
         |case| move_orbit(case, [300.0, 0.0, 0.0]),
         End::Invalid,
-        "or the kernels hold a different orbit",
+        "otherwise the kernels contain a different orbit",
     ),
     (
         "orbit_300_m_up",
         |case| move_orbit(case, [0.0, 300.0, 0.0]),
         End::Invalid,
-        "the kernels hold a different orbit from that of the file",
+        "the kernels contain an orbit other than that of the file",
     ),
     (
         "orbit_300_m_aside",
         |case| move_orbit(case, [0.0, 0.0, 300.0]),
         End::Invalid,
-        "the kernels hold a different orbit from that of the file",
+        "the kernels contain an orbit other than that of the file",
     ),
     (
         "datum_against_the_label",
@@ -406,7 +406,7 @@ const MISTAKES: &[Mistake] = &[
             case.write("pedr/shots.b", bytes);
         },
         End::Invalid,
-        "they agree when its coordinates are of iau1991, not of iau1994 (pedr.datum)",
+        "they agree if its coordinates refer to iau1991 instead of iau1994 (pedr.datum)",
     ),
 ];
 

@@ -70,10 +70,10 @@ struct Found {
 
 fn found(config: &SiteConfig) -> Found {
     let images = tag_times(&config.images, &session("nav")).unwrap();
-    let correction_s = config.mola_clock.correction_s();
+    let correction_s = config.altimeter_clock.correction_s();
     let searched = search_footprints(&config.pedr, &config.windows, correction_s, &RUN_ON).unwrap();
     assert!(searched.complaints.is_empty(), "{:?}", searched.complaints);
-    let footprints = convert_datum(searched.footprints, &config.mola_clock).footprints;
+    let footprints = convert_datum(searched.footprints, &config.altimeter_clock).footprints;
     let profiles = group_profiles(&footprints, &config.windows, &images);
     Found {
         images,
@@ -97,7 +97,7 @@ fn checked(version: &str, config: &SiteConfig, found: &Found) -> RangeCheck {
         &found.footprints,
         &found.profiles,
         &trajectory(version, found),
-        &config.mola_clock,
+        &config.altimeter_clock,
         &config.range_check,
         &RUN_ON,
     )
@@ -144,8 +144,11 @@ fn footprints_and_shot_times_come_back() {
                 assert_eq!(u64::from(shot.shot), truth["shot"][index].as_u64().unwrap());
                 // The file writes microseconds of the frame's mid-point.
                 assert!((shot.et_s - number(&truth["et_s"][index])).abs() < 2e-6);
-                let ground =
-                    spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, shot.radius_m);
+                let ground = spherical_to_xyz_m(
+                    shot.longitude_rad,
+                    shot.latitude_rad,
+                    shot.radius_crossover_m,
+                );
                 let apart_m = (ground - vector(&truth["ground_iau2000_m"][index])).norm();
                 // Microdegrees are 0.06 m on the ground; the rest is the frame's linear model.
                 assert!(apart_m < 0.2, "{} row {row}: {apart_m} m", profile.id);
@@ -171,7 +174,7 @@ fn profile_means_are_the_injected_orbit_differences() {
                 let expected_m = number(
                     &truth["orbit_differences"][version]["expected_range_minus_distance_mean_m"],
                 );
-                let mean_m = ranges.profiles[index].range_minus_distance_m.mean;
+                let mean_m = ranges.profiles[index].range_minus_distance_crossover_m.mean;
                 let apart_m = (mean_m - expected_m).abs();
                 assert!(
                     apart_m < 0.05,
@@ -374,7 +377,7 @@ fn without_the_pointing_bias_a_nadir_image_moves_380_m() {
 fn without_the_clock_bias_shots_are_late_by_it() {
     let mut config = site("isidis");
     let with = found(&config);
-    config.mola_clock.scope = BiasScope::None;
+    config.altimeter_clock.scope = BiasScope::None;
     let without = found(&config);
     assert_eq!(with.footprints.len(), without.footprints.len());
     for (with, without) in with.footprints.et_s.iter().zip(&without.footprints.et_s) {
@@ -386,10 +389,10 @@ fn without_the_clock_bias_shots_are_late_by_it() {
 fn the_three_readings_of_the_clock_bias_differ_as_told() {
     let mut config = site("isidis");
     let mut read = |scope: BiasScope| {
-        config.mola_clock.scope = scope;
+        config.altimeter_clock.scope = scope;
         (
             found(&config).footprints,
-            config.mola_clock.moves_spacecraft(),
+            config.altimeter_clock.moves_spacecraft(),
         )
     };
     let (stay, looks_up) = read(BiasScope::SpkLookup);

@@ -7,6 +7,7 @@
 )]
 
 use std::{
+    collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
     sync::LazyLock,
@@ -155,8 +156,8 @@ impl Harm {
 }
 
 /// The returned shots of a file that nothing is said against, by row and shot.
-fn kept(file: &File) -> Vec<(usize, Footprint)> {
-    let mut kept = Vec::new();
+fn kept(file: &File) -> BTreeMap<(usize, u8), Footprint> {
+    let mut kept = BTreeMap::new();
     for (row, frame) in file.frames(0..file.records().len(), guard()) {
         let Ok(frame) = frame else { continue };
         let spoiled = frame.spoiled_shots();
@@ -164,7 +165,7 @@ fn kept(file: &File) -> Vec<(usize, Footprint)> {
         let shots = shots
             .filter_map(|shot| frame.shot(shot))
             .filter(|shot| shot.range_m > 0.0);
-        kept.extend(shots.map(|shot| (row, shot)));
+        kept.extend(shots.map(|shot| ((row, shot.shot), shot)));
     }
     kept
 }
@@ -238,14 +239,11 @@ fn every_bit_of_a_record_is_harmless_or_complained_of() {
                 .iter()
                 .rposition(|(first, _)| *first <= bit / 8)
                 .unwrap();
-            for (row, shot) in &good {
-                let same = now
-                    .iter()
-                    .find(|(other, now)| other == row && now.shot == shot.shot);
-                match same {
-                    Some((_, now)) => harms[field].grow(&Harm::between(shot, now)),
+            for (place, shot) in &good {
+                match now.get(place) {
+                    Some(now) => harms[field].grow(&Harm::between(shot, now)),
                     None => assert_eq!(
-                        *row,
+                        place.0,
                         ROW,
                         "bit {bit} ({}): lost a good shot",
                         field_of(bit / 8)
@@ -253,11 +251,7 @@ fn every_bit_of_a_record_is_harmless_or_complained_of() {
                 }
             }
             // A shot that came back from nothing has no good values to be held against.
-            let invented = now.iter().any(|(row, now)| {
-                !good
-                    .iter()
-                    .any(|(other, shot)| other == row && now.shot == shot.shot)
-            });
+            let invented = now.keys().any(|place| !good.contains_key(place));
             assert!(
                 !invented,
                 "bit {bit} ({}): a shot without a return",

@@ -738,6 +738,11 @@ fn a_file_that_does_not_open_does_not_hide_the_others() {
     assert!(told.contains("missing.b"), "{told}");
     let answers: Value = serde_json::from_str(&answer).unwrap();
     assert_eq!(answers.as_array().unwrap().len(), 2);
+    // A PEDR file has positions of its own.
+    for file in answers.as_array().unwrap() {
+        assert!(file.get("nadir_by_range").is_none(), "{file}");
+        assert!(file["range_minus_distance_m"].is_object(), "{file}");
+    }
 }
 
 /// An archive whose kernels cover none of it is not valid.

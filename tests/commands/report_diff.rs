@@ -66,7 +66,7 @@ fn a_turned_ck_is_found_and_nothing_else() {
     assert_eq!(names(&found["kernels"]["changed"]), ["mgs_sc_scene.bc"]);
     assert_eq!(found["kernels"]["changed"][0]["role"], "CK");
     assert_eq!(names(&found["stages"]["changed"]), ran);
-    assert_eq!(found["stages"]["unchanged"], 6);
+    assert_eq!(found["stages"]["unchanged"], 7);
     assert_eq!(found["configuration_changed"], false);
     assert_eq!(found["footprints"]["only_in_a"], 0);
     assert_eq!(found["footprints"]["only_in_b"], 0);
@@ -269,11 +269,11 @@ fn a_clock_correction_that_turns_mars_moves_footprints_and_names_its_key() {
     case.replace(
         "site.toml",
         "[pedr]",
-        "[mola_clock]\nscope = \"both\"\n[pedr]",
+        "[altimeter_clock]\nscope = \"both\"\n[pedr]",
     );
     case.stages_run();
     let found = difference(&case);
-    let keys = serde_json::json!([{"what": "mola_clock.scope", "b": "\"both\""}]);
+    let keys = serde_json::json!([{"what": "altimeter_clock.scope", "b": "\"both\""}]);
     assert_eq!(found["configuration"], keys);
     assert_eq!(found["biases"][0]["what"], "mola_clock.scope");
     let movement = &found["footprints"]["movement"];

@@ -35,7 +35,7 @@ fn run(case: &Case) -> Vec<String> {
 
 fn fresh() -> Case {
     let case = Case::new();
-    assert_eq!(run(&case).len(), 12);
+    assert_eq!(run(&case).len(), 13);
     assert_eq!(plan(&case), BTreeMap::new());
     assert_eq!(run(&case), [""; 0]);
     case
@@ -161,7 +161,7 @@ fn another_orbit_touches_ranges_and_orientation() {
 }
 
 #[test]
-fn another_camera_model_touches_registration_alone() {
+fn another_camera_model_touches_models_and_registration_alone() {
     let case = fresh();
     case.replace(
         "site.toml",
@@ -169,9 +169,21 @@ fn another_camera_model_touches_registration_alone() {
         "[registration]\nmodel = \"samples\"\n[pedr]",
     );
     let planned = plan(&case);
-    assert_eq!(planned["register/image"], "key registration.model changed");
-    assert!(!planned.contains_key("fit_sensor_model/image"));
-    assert_eq!(run(&case), ["register/image", "check_beam", "publish"]);
+    // The form in use is chosen where the models are fitted.
+    assert_eq!(
+        planned["fit_sensor_model/image"],
+        "key registration_model changed"
+    );
+    assert!(!planned.contains_key("sample_orientation/image"));
+    assert_eq!(
+        run(&case),
+        [
+            "fit_sensor_model/image",
+            "register/image",
+            "check_beam",
+            "publish"
+        ]
+    );
 }
 
 #[test]
@@ -195,11 +207,14 @@ fn the_clock_scope_touches_what_it_reaches() {
     case.replace(
         "site.toml",
         "[pedr]",
-        "[mola_clock]\nscope = \"both\"\n[pedr]",
+        "[altimeter_clock]\nscope = \"both\"\n[pedr]",
     );
     let planned = plan(&case);
-    assert_eq!(planned["convert_datum"], "key mola_clock.scope changed");
-    assert!(planned["check_ranges"].starts_with("key mola_clock.scope changed"));
+    assert_eq!(
+        planned["convert_datum"],
+        "key altimeter_clock.scope changed"
+    );
+    assert!(planned["check_ranges"].starts_with("key altimeter_clock.scope changed"));
     assert!(!planned.contains_key("search_footprints"));
     assert!(!planned.contains_key("sample_orientation/image"));
 }
@@ -259,7 +274,7 @@ fn kernels_that_move_give_another_metakernel_and_nothing_else() {
 }
 
 #[test]
-fn pedr_files_of_one_name_are_told_apart() {
+fn pedr_files_of_one_name_are_of_distinct_images() {
     let case = Case::new();
     std::fs::create_dir(case.path("second")).unwrap();
     let mut bytes = case.read("pedr/ap19117l.b");

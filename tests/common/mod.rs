@@ -14,6 +14,7 @@
 )]
 
 pub(crate) mod adjusted;
+pub(crate) mod archive_server;
 pub(crate) mod camera_files;
 pub(crate) mod case;
 pub(crate) mod daf;

@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 
 use areograph::{
-    altimetry::{BiasScope, DatumChoice, MolaClock, ShotFilter, TagSign},
+    altimetry::{BiasScope, DatumChoice, GroundRadius, MolaClock, ShotFilter, TagSign},
     body::Body,
     body::Datum,
     config::{
@@ -25,6 +25,7 @@ use areograph::{
     products::{ImageProducts, Program, SiteProducts},
     spice::RequiredCoverage,
     stages::{
+        check_profiles::{ProfileCheck, check_profiles},
         check_ranges::{BiasScan, ProfileRanges, RangeCheck, ScannedRadius, ShotResiduals},
         convert_datum::FileConversion,
         describe_kernels::KernelLine,
@@ -74,7 +75,7 @@ impl Site {
         let orientation = orientation(&times);
         let footprints = footprints();
         let profiles = group_profiles(&footprints, &config.windows, std::slice::from_ref(&times));
-        let model = fit_sensor_model(&orientation, &config.orientation).unwrap();
+        let model = fit_sensor_model(&orientation, &config.orientation, None).unwrap();
         // Shots and camera of this site have nothing to do with each other: without a move none would be seen.
         let mut seen = footprints.clone();
         move_under_the_camera(&mut seen, &model);
@@ -161,6 +162,16 @@ impl Site {
         site
     }
 
+    fn profile_check(&self) -> ProfileCheck {
+        let surface = &self.config.laser_surface;
+        check_profiles(
+            &self.footprints,
+            &self.profiles,
+            &surface.options(self.footprints.body),
+            surface.profile_plan_sigma_m,
+        )
+    }
+
     /// Calls `with` on the site as products want it, with or without its image.
     pub(crate) fn with<T>(&self, image: bool, with: impl FnOnce(&SiteProducts) -> T) -> T {
         let images = [ImageProducts {
@@ -175,6 +186,7 @@ impl Site {
             model: &self.model,
         }];
         let searched = !self.config.pedr.files.is_empty();
+        let profile_check = self.profile_check();
         let verdict = judge(&Evidence {
             wording: self.config.wording(),
             footprints: searched.then_some(self.footprints.len()),
@@ -182,15 +194,16 @@ impl Site {
             limits: &self.config.limits,
             range_limits: &self.config.range_check,
             orientation_limits: &self.config.orientation,
-            clock_correction_s: self.config.mola_clock.correction_s(),
+            clock_correction_s: self.config.altimeter_clock.correction_s(),
             images: if image { &judged } else { &[] },
             beam: BeamEvidence {
                 images: &[],
                 adjustment: &self.config.adjustment,
-                surface: &self.config.mola_surface,
+                surface: &self.config.laser_surface,
             },
             warnings: &self.warnings,
             complaints: &self.complaints,
+            profiles: &profile_check,
             adjustment: None,
             surface: None,
             adjustment_failure: None,
@@ -204,6 +217,7 @@ impl Site {
             footprints: &self.footprints,
             utc: &self.utc,
             profiles: &self.profiles,
+            profile_check: &profile_check,
             ranges: &self.ranges,
             rejected: &self.rejected,
             complaints: &self.complaints,
@@ -254,7 +268,7 @@ fn config() -> SiteConfig {
             ck_bias: Some(usual_instrument().pointing_bias()),
             source: Some("mocAddendum004.ti".to_owned()),
         },
-        mola_clock: MolaClock {
+        altimeter_clock: MolaClock {
             bias_s: 0.117,
             sign: TagSign::Late,
             scope: BiasScope::SpkLookup,
@@ -263,6 +277,7 @@ fn config() -> SiteConfig {
         pedr: PedrConfig {
             files: vec!["data/ap19019l.b".into()],
             datum: DatumChoice::Auto,
+            crossover: GroundRadius::Corrected,
             filter: ShotFilter {
                 classes: vec![1],
                 channels: vec![1, 2, 3, 4],
@@ -302,6 +317,7 @@ pub(crate) fn move_under_the_camera(footprints: &mut Footprints<BodyFixed>, mode
         let boresight = pose.mars_to_camera.row(2).transpose();
         let ground = Spherical::from_xyz_m(&(pose.position_m + boresight * 380_000.0));
         footprints.radius_m[row] = ground.radius_m;
+        footprints.radius_crossover_m[row] = ground.radius_m;
         footprints.latitude_rad[row] = ground.latitude.0;
         footprints.longitude_rad[row] = ground.longitude_rad;
     }
@@ -430,6 +446,7 @@ fn footprints() -> Footprints<BodyFixed> {
         version: Some('L'),
         datum: Datum::Iau2000,
         blake3: "cd".repeat(32),
+        is_table: false,
     }]);
     for k in 0..SHOTS {
         let along = f64::from(k) / f64::from(SHOTS);

@@ -245,7 +245,7 @@ fn files_stay_short() {
 const INSTRUMENT_WORDS: [&str; 4] = ["mgs", "moc", "mex", "hrsc"];
 
 /// Where they may stand in code, and why; comments may say where a rule comes from.
-const NAME_INSTRUMENTS: [(&str, &str); 9] = [
+const NAME_INSTRUMENTS: [(&str, &str); 10] = [
     ("crates/pds", "reads the labels and files of the mission"),
     ("crates/scene", "imitates the mission, whose files it names"),
     (
@@ -257,6 +257,10 @@ const NAME_INSTRUMENTS: [(&str, &str); 9] = [
         "the list of instrument files that are built in",
     ),
     ("crates/config/src/calibration.rs", "examples of keys"),
+    (
+        "crates/fetch/src/archives.rs",
+        "the table of archives that is built in",
+    ),
     ("crates/config/src/images.rs", "examples of keys"),
     ("crates/config/src/kernels.rs", "examples of keys"),
     ("crates/config/src/pointing.rs", "examples of keys"),

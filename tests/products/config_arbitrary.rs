@@ -76,7 +76,7 @@ proptest! {
     #[test]
     fn any_number_in_any_numeric_key_is_answered(number in any::<f64>(), key in 0_usize..8) {
         let key = [
-            "kernels.padding_s", "pointing.ck_bias_s", "mola_clock.bias_s", "range_check.scan_step_s",
+            "kernels.padding_s", "pointing.ck_bias_s", "altimeter_clock.bias_s", "range_check.scan_step_s",
             "range_check.scan_half_width_s", "pedr.filter.off_nadir_max_deg",
             "orientation.position_rmse_max_m", "range_check.mean_max_m",
         ][key];
@@ -101,7 +101,7 @@ fn texts_made_to_be_slow_or_deep_are_answered_soon() {
         format!("kernels.files = [{}]", "'a',".repeat(megabyte / 4)),
         format!("{} = 1", "k".repeat(megabyte)),
         format!("site = '{}'", "k".repeat(megabyte)),
-        format!("mola_clock.sign = '{}'", "k".repeat(megabyte)),
+        format!("altimeter_clock.sign = '{}'", "k".repeat(megabyte)),
         format!("pedr.files = ['{}']", "[".repeat(megabyte)),
         format!("pedr.files = ['{}']", "*/".repeat(megabyte / 2)),
     ] {

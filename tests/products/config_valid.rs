@@ -134,7 +134,7 @@ fn the_example_says_the_defaults_and_means_si_units() {
     // A picosecond.
     assert!((image.exposure_s.unwrap() - 0.000_482_1).abs() < 1e-12);
     assert!((example.orientation.pointing_rmse_max_rad - 4.848_136_8e-5).abs() < 1e-12);
-    assert!((example.mola_clock.correction_s() + 0.117).abs() < 1e-12);
+    assert!((example.altimeter_clock.correction_s() + 0.117).abs() < 1e-12);
 }
 
 #[test]
@@ -171,7 +171,7 @@ fn a_site_takes_the_clock_bias_of_its_own_altimeter() {
         .replace("bias_s = 0.117", "bias_s = 0.25")
         .replace("source = \"", "source = \"own: ");
     fs::write(folder.path().join("sites/laser.toml"), own).unwrap();
-    let of_file = parse_with(&folder, "altimeter = 'laser.toml'", "").mola_clock;
+    let of_file = parse_with(&folder, "altimeter = 'laser.toml'", "").altimeter_clock;
     assert!((of_file.bias_s - 0.25).abs() < f64::EPSILON);
     assert!(
         of_file.source.starts_with("own: Shan et al. 2005"),
@@ -180,11 +180,11 @@ fn a_site_takes_the_clock_bias_of_its_own_altimeter() {
     );
     let written = parse_with(
         &folder,
-        "altimeter = 'laser.toml'\nmola_clock.bias_s = 0.1",
+        "altimeter = 'laser.toml'\naltimeter_clock.bias_s = 0.1",
         "",
     );
-    assert!((written.mola_clock.bias_s - 0.1).abs() < f64::EPSILON);
-    let usual = parse_with(&folder, "", "").mola_clock;
+    assert!((written.altimeter_clock.bias_s - 0.1).abs() < f64::EPSILON);
+    let usual = parse_with(&folder, "", "").altimeter_clock;
     assert!((usual.bias_s - config::usual_altimeter().clock_bias_s).abs() < f64::EPSILON);
 }
 
@@ -219,7 +219,7 @@ fn entries_that_are_never_used_are_told() {
     let folder = folder();
     let text = "site = 's'\n\
         kernels = { metakernel = '../kernels/scene.tm', pinned = ['pck00010.tpc'] }\n\
-        mola_clock = { scope = 'none', bias_s = 0.117 }\n\
+        altimeter_clock = { scope = 'none', bias_s = 0.117 }\n\
         windows = [{ id = 'w', longitude_deg = [0, 1], latitude_deg = [0, 1] }]\n\
         images = [{ id = 'i', label = '../labels/e0202855.lbl', sclk_start = '1:2', utc_start = '1999-236T14:12:13' }]\n";
     let prefix = format!("{}/sites/", folder.path().display());
@@ -230,7 +230,7 @@ fn entries_that_are_never_used_are_told() {
     assert_eq!(
         warnings,
         "site.toml:2:58: kernels.pinned is never used: it belongs to kernels.root\n\
-         site.toml:3:41: mola_clock.bias_s is never used: mola_clock.scope is \"none\"\n\
+         site.toml:3:46: altimeter_clock.bias_s is never used: altimeter_clock.scope is \"none\"\n\
          site.toml:4:11: windows are never used: there is no table pedr\n\
          site.toml:5:10: images without a table pedr: orientation only, no footprints and no range check\n\
          site.toml:5:89: images.utc_start is never used: sclk_start comes first"
@@ -461,4 +461,37 @@ fn former_names_are_understood() {
          site.toml:11:1: adjustment.nadir_sigma_m is now called adjustment.position_sigma_nadir_m\n\
          site.toml:12:1: adjustment.off_nadir_sigma_m is now called adjustment.position_sigma_off_nadir_m"
     );
+}
+
+#[test]
+fn former_names_of_tables_are_understood() {
+    let folder = folder();
+    let text = |clock: &str, surface: &str| {
+        format!(
+            "site = 's'\nkernels.metakernel = '../kernels/scene.tm'\n\
+             images = [{{ id = 'i', label = '../labels/e0202855.lbl' }}]\n\
+             pedr.files = ['../pedr/*.b']\n\
+             windows = [{{ id = 'w', longitude_deg = [0, 1], latitude_deg = [0, 1] }}]\n\
+             [{clock}]\nbias_s = 0.25\nsource = 'own'\n\
+             [{surface}]\nshot_sigma_m = 2\n"
+        )
+    };
+    let now = parse_in(&folder, &text("altimeter_clock", "laser_surface"));
+    assert_eq!(now.warnings, Vec::<String>::new());
+    let before = parse_in(&folder, &text("mola_clock", "mola_surface"));
+    // The written bias, not that of the altimeter file; and what the manifest keeps.
+    assert!((before.site.altimeter_clock.bias_s - 0.25).abs() < f64::EPSILON);
+    assert_eq!(before.site.altimeter_clock.source, "own");
+    assert!((before.site.laser_surface.shot_sigma_m - 2.0).abs() < f64::EPSILON);
+    assert_eq!(before.site, now.site);
+    let prefix = format!("{}/sites/", folder.path().display());
+    assert_eq!(
+        before.warnings.join("\n").replace(&prefix, ""),
+        "site.toml:6:2: mola_clock is now called altimeter_clock\n\
+         site.toml:9:2: mola_surface is now called laser_surface"
+    );
+    let example = config::example();
+    let has_table = |table: &str| example.lines().any(|line| line == format!("[{table}]"));
+    assert!(has_table("altimeter_clock") && has_table("laser_surface"));
+    assert!(!has_table("mola_clock") && !has_table("mola_surface"));
 }

@@ -16,7 +16,10 @@ use areograph::{
     geom::uncertainty::GroundPart,
     report,
     stages::{
-        adjust::{ObservationType, PointKind, RejectedPoint, RejectionReason, accuracy_withheld},
+        adjust::{
+            ObservationType, OtherReading, PointKind, RejectedPoint, RejectionReason,
+            accuracy_withheld,
+        },
         compare_pairs::PairComparison,
         judge::{CheckKind, CheckOutcome},
     },
@@ -390,7 +393,7 @@ fn what_cannot_be_trusted_is_said() {
     let correlated = &site.adjusted.summary.correlated;
     let most = correlated.iter().map(|of| of.2.abs()).fold(0.0, f64::max);
     if correlated.is_empty() {
-        assert!(words.contains("No two unknowns of the orientation correlate by more than 0.95."));
+        assert!(words.contains("No two unknowns of the adjustment correlate by more than 0.95."));
     } else {
         let rows = table(&page, "Largest correlations");
         assert_eq!(rows.len(), correlated.len().min(12));
@@ -478,7 +481,7 @@ fn exact_shots_contribute_nothing_with_signs_and_much_as_published() {
         unreachable!("orientation explains less than is observed");
     };
     assert!(along_px * pixel_m > 100.0, "{along_px}");
-    assert!(section(&page, SECTIONS[2]).contains("it is no accuracy of the altimeter"));
+    assert!(section(&page, SECTIONS[2]).contains("it is not the accuracy of the altimeter"));
 }
 
 #[test]
@@ -504,6 +507,12 @@ fn several_pairs_are_pooled_as_the_sites_of_the_paper() {
 #[test]
 fn accuracy_by_the_values_of_another_spacecraft_is_withheld() {
     let mut site = Site::gusev();
+    let heights = site.adjusted.heights.as_ref().unwrap();
+    site.adjusted.other_reading = Some(Ok(OtherReading {
+        attitude_clock_s: Some((0.41, 0.12)),
+        mean_sigma_m: Some(heights.mean_sigma_m),
+        moved_m: [10.0, 120.0, 1.0],
+    }));
     assert!(text(lead(&site.page())).contains("m height"));
     let other = all_instruments()
         .iter()
@@ -521,14 +530,34 @@ fn accuracy_by_the_values_of_another_spacecraft_is_withheld() {
     let withheld = withheld.unwrap();
     assert!(withheld.contains("position_sigma_m"), "{withheld}");
     let page = site.page();
-    assert!(text(lead(&page)).contains("not stated"));
+    assert!(text(lead(&page)).contains("withheld"));
     assert!(!text(lead(&page)).contains("m height"));
     assert!(!page.contains("Ellipses: 1 σ"));
-    assert!(page.contains("absolute accuracies are not stated"));
+    assert!(page.contains("absolute accuracies are withheld"));
+    assert!(page.contains("The accuracy of position by relief is withheld"));
+    let rows = table(&page, "Two readings");
+    for row in &rows {
+        assert!(!row[0].contains('±'), "{row:?}");
+        assert_eq!(row[5..], ["withheld"; 3]);
+    }
+    assert_eq!(rows.len(), 2);
     // With values of its own the site states what follows from them.
     site.config.adjustment.position_sigma_m = [1_000.0, 1.0, 0.0];
     site.config.adjustment.rotation_sigma_rad = [4e-4, 1e-5, 0.0];
-    assert!(!site.page().contains("not stated"));
+    let page = site.page();
+    // Profiles are withheld from the surface as well, and predicted from it.
+    for words in [
+        "accuracies are withheld",
+        "by relief is withheld",
+        ">withheld<",
+    ] {
+        assert!(!page.contains(words), "{words}");
+    }
+    assert!(
+        table(&page, "Two readings")
+            .iter()
+            .all(|row| row[5].starts_with('±'))
+    );
 }
 
 #[test]
@@ -569,9 +598,7 @@ fn budgets_that_cannot_be_are_told_in_words() {
     site.adjusted_pairs[0].budget = Err(fault.to_owned());
     let page = site.page();
     let text = section(&page, SECTIONS[2]);
-    assert!(text.contains(&format!(
-        "after the adjustment: there is no budget: {fault}."
-    )));
+    assert!(text.contains(&format!("has no budget after the adjustment: {fault}.")));
     let rows = table(&page, "How far apart the two footprints");
     assert_eq!(rows.len(), 1);
     assert!(rows[0][4].contains("orientation explains more than is observed"));
@@ -597,7 +624,7 @@ fn many_blunders_are_counted_and_their_names_stay_text() {
     assert!(text.contains("And 13 more.") && text.contains("&lt;i&gt;19") && !text.contains("<i>"));
     assert!(text.contains("−7.250 ± 0.125") && text.contains("gusev &amp; co"));
     assert!(text.contains("−42.50 ± 1.00"));
-    assert!(text.contains("No two unknowns of the orientation correlate"));
+    assert!(text.contains("No two unknowns of the adjustment correlate"));
 }
 
 #[test]

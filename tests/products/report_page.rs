@@ -10,7 +10,7 @@ use crate::common::products_site as fixture;
 
 use std::{collections::BTreeSet, fs, path::Path};
 
-use areograph::report;
+use areograph::{geom::statistics::Summary, report, stages::judge::CheckKind};
 use fixture::{SHOTS, Site};
 
 /// The page, also left below `target`, where a person may look at it.
@@ -51,6 +51,54 @@ fn a_failed_range_check_is_said_in_the_first_lines() {
         .map(|of| order.iter().position(|word| word == of).unwrap());
     assert!(ranks.is_sorted(), "{outcomes:?}");
     assert!(checks.contains("<a href=\"#range-check\">Range − distance (mean)</a>"));
+}
+
+#[test]
+fn the_longest_profile_is_one_whose_ranges_are_tested() {
+    let mut site = Site::small();
+    let mut blind = site.ranges.profiles[0].clone();
+    blind.profile = "blind/1".to_owned();
+    blind.shots *= 10;
+    (blind.range_minus_distance_m, blind.decoding_m) = (Summary::of(&[]), Summary::of(&[]));
+    let longest = |site: &Site| {
+        let checks = site.with(true, |products| products.verdict.checks.clone());
+        let check = checks
+            .into_iter()
+            .find(|check| check.kind == CheckKind::Shots);
+        check.unwrap().subject
+    };
+    site.ranges.profiles.push(blind.clone());
+    assert_eq!(longest(&site), site.ranges.profiles[0].profile);
+    // Where no range is tested, it is the longest of all.
+    site.ranges.profiles = vec![blind.clone()];
+    assert_eq!(longest(&site), blind.profile);
+}
+
+#[test]
+fn errors_that_nothing_shows_are_listed_by_their_reason() {
+    let site = Site::small();
+    let untested = site.with(true, |products| products.verdict.untested.clone());
+    let reasons: BTreeSet<&str> = untested
+        .iter()
+        .map(|phrase| phrase.rsplit_once(" (").unwrap().1)
+        .collect();
+    assert_eq!(reasons.len(), untested.len(), "{untested:?}");
+    let camera = "rotation about the line of sight; focal length, distortion and direction of the samples of the camera (no \
+                  tie points were adjusted)";
+    assert!(
+        untested.iter().any(|phrase| phrase == camera),
+        "{untested:?}"
+    );
+    assert!(
+        untested[0].contains("no beam tests the attitude"),
+        "{untested:?}"
+    );
+    let page = page("untested", &site, true);
+    let (_, list) = page
+        .split_once("Not tested by the data of this site:")
+        .unwrap();
+    let (list, _) = list.split_once("</ul>").unwrap();
+    assert_eq!(list.matches("<li>").count(), untested.len(), "{list}");
 }
 
 #[test]

@@ -76,7 +76,7 @@ fn real_with(test: &str, summing: u32, light_time: LightTime) -> Option<Real> {
         &sampling(light_time),
     )
     .unwrap();
-    site.model = fit_sensor_model(&site.orientation, &sampling(light_time)).unwrap();
+    site.model = fit_sensor_model(&site.orientation, &sampling(light_time), None).unwrap();
     assert!(site.model.invalid_because.is_empty());
     let folder = tempfile::tempdir().unwrap();
     site.with(true, |site| write_products(folder.path(), site, ""))
@@ -371,7 +371,7 @@ fn tables_get_the_nodes_that_the_limit_needs() {
 fn tables_that_cannot_keep_the_limit_make_the_image_invalid() {
     let mut site = fixture::Site::small();
     site.orientation.tables.interpolation.error_max_px = 0.25;
-    let model = fit_sensor_model(&site.orientation, &site.config.orientation).unwrap();
+    let model = fit_sensor_model(&site.orientation, &site.config.orientation, None).unwrap();
     let told = "camera tables interpolate with errors up to 0.2500 pixels even with a node per line; \
                 limit 0.01 pixels";
     assert!(

@@ -328,30 +328,52 @@ fn line_times_of_rows_are_the_published_ones() {
 }
 
 #[test]
-fn a_site_of_one_file_runs_and_a_long_image_says_what_it_needs() {
+fn a_site_of_one_file_runs_and_a_long_image_follows_its_samples() {
     let Some(folder) = real_data(FOLDER, "HRSC's site by files of the archive") else {
         return;
     };
     let case = case(&folder, LINES[0]);
-    let told = case.outcome(case.run());
-    let advice = "over 197 s an orbit departs from any polynomial of second order: set registration.model = \"samples\"";
-    assert!(
-        !told.starts_with("exit 0") && told.contains(advice),
-        "{told}"
-    );
-    assert!(
-        told.contains("orientation.position_rmse_max_m above this"),
-        "{told}"
-    );
-    // Which is true.
     let site = String::from_utf8(case.read("site.toml")).unwrap();
+    let with_model = |model: &str| site.replace("[[images]]", &format!("{model}\n[[images]]"));
     case.write(
         "site.toml",
-        site.replace(
-            "[[images]]",
-            "[orientation]\nposition_rmse_max_m = 200\npointing_rmse_max_arcsec = 3600\n[registration]\nmodel = 'samples'\n[[images]]",
-        ),
+        with_model("[registration]\nmodel = 'rotation_vector'"),
     );
+    let refused = case.outcome(case.run());
+    let advice = "over 197 s an orbit departs from any polynomial of second order: remove registration.model";
+    assert!(
+        !refused.starts_with("exit 0") && refused.contains(advice),
+        "{refused}"
+    );
+    // Which helps: the image follows its samples.
+    case.write("site.toml", &site);
+    let accepted = case.outcome(case.run());
+    assert!(
+        accepted.starts_with("exit 0")
+            && accepted.contains("this image is interpolated between its samples"),
+        "{accepted}"
+    );
+    let registration = json(&case.path("out/hrsc/registration.json"));
+    assert_eq!(registration["images"][0]["model"], "samples");
+    let manifest = json(&case.path("out/hrsc/manifest.json"));
+    let checks = manifest["verdict"]["checks"].as_array().unwrap();
+    let position = checks
+        .iter()
+        .find(|check| check["kind"] == "position_rmse")
+        .unwrap();
+    // Metres: an interpolation over 6.6 s of an orbit whose acceleration changes by 3 mm/s² a second.
+    assert!(position["value"].as_f64().unwrap() < 0.1, "{position}");
+    // Too few samples are noticed.
+    case.write(
+        "site.toml",
+        with_model("[orientation]\nintervals = 3\nposition_rmse_max_m = 0.01"),
+    );
+    let coarse = case.outcome(case.run());
+    assert!(
+        !coarse.starts_with("exit 0") && coarse.contains("raise orientation.intervals"),
+        "{coarse}"
+    );
+    case.write("site.toml", &site);
     succeed(&mut case.run());
     let orientation = json(&case.path("out/hrsc/images/h5270_0000_ir2/orientation.json"));
     assert_eq!(orientation["times"]["start_from"], "lines");

@@ -118,7 +118,7 @@ fn position_rmse_equals_cspice() {
     let Some((_, orientation, truth)) = m0402852("real polynomial fits") else {
         return;
     };
-    let model = fit_sensor_model(&orientation, &SAMPLING).unwrap();
+    let model = fit_sensor_model(&orientation, &SAMPLING, None).unwrap();
     assert!(model.invalid_because.is_empty());
     for (degree, model, tolerance) in [
         ("degree_1", &model.first_order, 1e-6), // relative, as the issue demands

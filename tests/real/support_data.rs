@@ -42,7 +42,7 @@ fn table(path: &Path) -> RecordBatch {
 }
 
 /// Footprint, line and sample of every row of a registration.
-fn places(path: &Path) -> Vec<(u32, [f64; 2])> {
+pub(crate) fn places(path: &Path) -> Vec<(u32, [f64; 2])> {
     let table = table(path);
     let rows = table.column_by_name("footprint_row").unwrap();
     let rows = rows.as_primitive::<UInt32Type>();
@@ -57,7 +57,7 @@ fn places(path: &Path) -> Vec<(u32, [f64; 2])> {
 }
 
 /// The pair over Isidis, run by labels and kernels, and its site file with its own support data instead.
-fn pair_with_support_data() -> Case {
+pub(crate) fn pair_with_support_data() -> Case {
     let case = Case::pair();
     succeed(&mut case.run());
     fs::rename(case.path("out"), case.path("by_kernels")).unwrap();
@@ -189,6 +189,50 @@ fn support_data_are_compared_with_the_kernels_shots_and_cameras_beside_them() {
         );
         assert!(found.contains(part), "{mistake}: {found}");
     }
+}
+
+/// Kernels of the spacecraft that do not reach the image contradict nothing: a remark states why they are not compared.
+#[test]
+fn kernels_that_do_not_cover_an_image_of_support_data_are_a_remark() {
+    let case = pair_with_support_data();
+    let site = "site = 'alone'\n[kernels]\nmetakernel = 'kernels/nav.tm'\n\
+                [[images]]\nid = 'E02-01301'\nisd = 'isd/E02-01301.json'\n";
+    case.write("site.toml", site);
+    let remark = "its support data are not compared with the kernels";
+    let covered = case.outcome(case.run());
+    assert!(covered.starts_with("exit 0"), "{covered}");
+    assert!(!covered.contains(remark), "{covered}");
+    // A year later than the kernels of the mission end.
+    let mut isd = json(&case.path("isd/E02-01301.json"));
+    let late_s = 365.0 * 86_400.0;
+    for key in ["starting_ephemeris_time", "center_ephemeris_time"] {
+        isd[key] = json!(number(&isd[key]) + late_s);
+    }
+    for table in [
+        "instrument_position",
+        "instrument_pointing",
+        "body_rotation",
+        "sun_position",
+    ] {
+        for key in [
+            "ck_table_start_time",
+            "ck_table_end_time",
+            "spk_table_start_time",
+            "spk_table_end_time",
+        ] {
+            if isd[table][key].is_number() {
+                isd[table][key] = json!(number(&isd[table][key]) + late_s);
+            }
+        }
+        let times = isd[table]["ephemeris_times"].as_array_mut();
+        for time in times.into_iter().flatten() {
+            *time = json!(number(time) + late_s);
+        }
+    }
+    case.write("isd/E02-01301.json", isd.to_string());
+    let late = case.outcome(case.run());
+    assert!(late.starts_with("exit 0"), "{late}");
+    assert!(late.contains(remark), "{late}");
 }
 
 #[test]

@@ -232,13 +232,13 @@ fn real_image_apart(image: &Image, orientation: &Orientation, test: &str) -> Opt
         light_time: image.light_time,
         ..OrientationConfig::default()
     };
-    site.model = fit_sensor_model(orientation, &limits).unwrap();
+    site.model = fit_sensor_model(orientation, &limits, None).unwrap();
     let folder = tempfile::tempdir().unwrap();
     site.with(true, |site| write_products(folder.path(), site, ""))
         .unwrap();
     let isd = folder.path().join("images/m04-02852/isd.json");
     let camera = OrientedImage::of(&image.times, orientation, &site.model).unwrap();
-    let projector = camera.projector(CameraModel::Samples).unwrap();
+    let projector = camera.projector_of(CameraModel::Samples).unwrap();
     let ground = orientation.samples.iter().skip(1).step_by(2);
     let ground_m: Vec<Vector3<f64>> = ground
         .flat_map(|at| {

@@ -4,6 +4,7 @@
 mod common;
 mod service_commands;
 mod service_data;
+mod service_fetch;
 mod service_http;
 mod service_http_data;
 mod service_http_hostile;

@@ -242,7 +242,10 @@ fn a_database_that_cannot_be_used_is_refused_in_words() {
     let holder = sql("PRAGMA locking_mode = EXCLUSIVE; BEGIN EXCLUSIVE");
     refused(
         6,
-        &["another program has locked the database", "end the program"],
+        &[
+            "another program has locked the database",
+            "close the program",
+        ],
     );
     drop(holder);
     drop(sql("PRAGMA user_version = 0"));
@@ -258,7 +261,7 @@ fn a_database_that_cannot_be_used_is_refused_in_words() {
     );
     demo.lose_database();
     fs::create_dir(demo.database()).unwrap();
-    refused(3, &["this is not a file", "areograph service rebuild"]);
+    refused(3, &["not a regular file", "areograph service rebuild"]);
     // What is advised works.
     fs::create_dir_all(demo.file("products")).unwrap();
     let rebuilt = demo.service(&["rebuild"], &[]);

@@ -10,7 +10,7 @@ use crate::world;
 
 use std::{fs, path::Path, thread::sleep, time::Duration};
 
-use serde_json::json;
+use serde_json::{Value, json};
 use world::{BEFORE, RUN, World};
 
 const CSV: &str = "tables/footprints.csv";
@@ -117,6 +117,39 @@ fn shots_of_damaged_footprints_are_withheld() {
         "{detail}"
     );
     assert_eq!(alerts(&world), 1);
+}
+
+#[test]
+fn a_failed_search_for_shots_states_its_reason() {
+    let world = World::new();
+    let folder = world.path(&format!("products/alpha/runs/{RUN}"));
+    let path = folder.join("manifest.json");
+    let mut manifest: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    let products = manifest["products"].as_array_mut().unwrap();
+    let mut products = products.iter_mut();
+    let product = products.find(|product| product["path"] == "tables/footprints.csv");
+    let product = product.unwrap();
+    // As published, but not Parquet.
+    let content = "not Parquet";
+    product["path"] = json!("footprints.parquet");
+    product["bytes"] = json!(content.len());
+    product["blake3"] = json!(blake3::hash(content.as_bytes()).to_hex().as_str());
+    fs::write(folder.join("footprints.parquet"), content).unwrap();
+    let text = manifest.to_string();
+    fs::write(&path, &text).unwrap();
+    let hash = blake3::hash(text.as_bytes()).to_hex();
+    world.sql(&format!(
+        "UPDATE run SET manifest_blake3 = '{hash}' WHERE id = '{RUN}'"
+    ));
+    let found = world.get("/api/v1/shots?bbox=350,-5,10,5");
+    assert_eq!(found.status, 409, "{}", found.text());
+    let problem = found.json();
+    let detail = problem["detail"].as_str().unwrap();
+    let secret = world.folder.path().display().to_string();
+    assert!(
+        detail.contains("cannot be read as Parquet") && !detail.contains(&secret),
+        "{detail}"
+    );
 }
 
 #[test]

@@ -147,15 +147,15 @@ impl Mission {
         self.ask("SELECT state FROM job ORDER BY id")
     }
 
-    /// Lets several sweeps go by, longer than the quiet period.
-    fn several_sweeps(&self) {
+    /// Lets several polls go by, longer than the quiet period.
+    fn several_polls(&self) {
         let round = || -> u64 {
             self.ask("SELECT value FROM fact WHERE name = 'round'")[0]
                 .parse()
                 .unwrap()
         };
         let begun = (round(), Instant::now());
-        self.wait_for("sweeps", || {
+        self.wait_for("polls", || {
             round() >= begun.0 + 5 && begun.1.elapsed() > Duration::from_secs(3)
         });
     }
@@ -243,7 +243,7 @@ fn a_second_service_is_sent_to_the_first_and_a_touched_file_runs_nothing() {
     // Touched: nothing runs.
     let kernel = fs::read(mission.file(OWN)).unwrap();
     fs::write(mission.file(OWN), &kernel).unwrap();
-    mission.several_sweeps();
+    mission.several_polls();
     assert_eq!(mission.states().len(), 2, "{}", mission.log());
     assert_eq!(service.end().code(), Some(0), "{}", mission.log());
 }
@@ -264,10 +264,10 @@ fn a_kernel_that_is_copied_slowly_runs_its_site_once() {
     }
     drop(copy);
     mission.wait_for_jobs(3);
-    mission.several_sweeps();
+    mission.several_polls();
     assert_eq!(mission.ask("SELECT site FROM job WHERE id > 2"), ["isidis"]);
     let why = mission.ask("SELECT detail FROM cause WHERE job = 3");
-    let expected = "`mgs_sc_isidis.bc` changed; its coverage overlaps images E02-01301, E02-02016; stages sample_orientation, ";
+    let expected = "`mgs_sc_isidis.bc` changed; its coverage overlaps images E02-01301 and E02-02016; stages sample_orientation, ";
     assert!(why.len() == 1 && why[0].starts_with(expected), "{why:?}");
     let ran = mission.ask(
         "SELECT DISTINCT json_extract(value, '$.stage') FROM run, json_each(stages) WHERE job = 3",
@@ -309,13 +309,13 @@ fn a_folder_that_is_away_for_a_while_runs_nothing() {
             .len()
             == 1
     });
-    mission.several_sweeps();
+    mission.several_polls();
     // A service that begins meanwhile waits for the folder as well.
     assert_eq!(service.end().code(), Some(0), "{}", mission.log());
     let (service, _) = mission.start();
-    mission.several_sweeps();
+    mission.several_polls();
     fs::rename(mission.path("away"), mission.file("kernels")).unwrap();
-    mission.several_sweeps();
+    mission.several_polls();
     assert_eq!(mission.states().len(), 2, "{}", mission.log());
     let alerts =
         mission.ask("SELECT json_extract(data, '$.alert') FROM event WHERE kind = 'alert'");

@@ -381,12 +381,12 @@ fn a_site_may_name_files_below_the_roots_only() {
 }
 
 #[test]
-fn other_keys_and_a_busy_site_are_told_apart() {
+fn other_keys_and_a_busy_site_are_of_distinct_images() {
     let case = Case::new();
     let changed = failed(&run_task(&case, "0001", &"0".repeat(64)));
     assert_eq!((changed.code, changed.busy), (3, false));
     assert!(
-        changed.text.contains("the hash that the service recorded"),
+        changed.text.contains("which the service recorded"),
         "{}",
         changed.text
     );
@@ -644,6 +644,27 @@ fn shots_within_a_polygon_are_found_in_all_formats() {
         };
         assert_eq!(failed(&task(&case, what)).code, 2);
     }
+    // A damaged manifest is not a missing one.
+    for (damaged, expected) in [
+        (true, "the manifest cannot be read"),
+        (false, "contains no products"),
+    ] {
+        let run = case.path(if damaged { "damaged" } else { "missing" });
+        fs::create_dir(&run).unwrap();
+        if damaged {
+            fs::write(run.join("manifest.json"), "{").unwrap();
+        }
+        let what = What::Shots {
+            runs: vec![run],
+            polygon: polygon.to_vec(),
+            rows_max: 10,
+            format: "csv".to_owned(),
+            into: case.path("refused"),
+        };
+        let failure = failed(&task(&case, what));
+        assert_eq!(failure.code, 3);
+        assert!(failure.text.contains(expected), "{}", failure.text);
+    }
     assert!(!case.path("refused").exists());
 }
 
@@ -802,7 +823,10 @@ fn what_is_no_worker_is_ended() {
     for (said, why) in [
         ("echo Toolkit version N0067", "not a line of a worker"),
         ("head -c 100000 /dev/zero", "a line of more than"),
-        ("echo '{\"line\":\"beat\",\"rss_kib\":1}'", "not a hello"),
+        (
+            "echo '{\"line\":\"beat\",\"rss_kib\":1}'",
+            "does not identify the worker",
+        ),
     ] {
         let (garbled, ..) = ended(&format!("{said}\nsleep 60"), LIMITS, None);
         let How::Garbled(text) = garbled.how else {

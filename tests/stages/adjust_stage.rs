@@ -88,6 +88,7 @@ impl Site {
                 time_bias_sigma_s: 0.0,
                 turn_rad_s: Vector3::zeros(),
                 expected_m: Vector3::zeros(),
+                line_delay: None,
                 laser_axes: None,
             })
             .collect();

@@ -18,8 +18,8 @@ use areograph::{
     pds::ties::read_ties,
     products::{
         ControlMeasure, ControlNetwork, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint,
-        NetworkMeasure, NetworkPoint, isis_serial_number, write_control_network, write_gcp,
-        write_lidar_data,
+        NetworkMeasure, NetworkPoint, ProfileShift, isis_serial_number, write_control_network,
+        write_gcp, write_lidar_data,
     },
     spice::{KernelSet, Session},
     stages::tag_times::tag_times,
@@ -74,7 +74,7 @@ fn lidar_json(points: &[LidarPoint]) -> Value {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("exchange/lidar.json");
     assert_eq!(
-        write_lidar_data(&path, points).unwrap(),
+        write_lidar_data(&path, &[], points).unwrap(),
         points.len() as u64
     );
     serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
@@ -228,6 +228,35 @@ fn covariances_of_latitude_longitude_and_radius_are_those_of_the_coordinates() {
 }
 
 #[test]
+fn lidar_data_state_the_shift_that_points_of_a_profile_share() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("lidar.json");
+    let shift = ProfileShift {
+        profile: "gusev_crater/9043",
+        apriori_sigma_m: [70.0, 70.0, 1.0],
+        adjusted_sigma_m: [39.0, 67.0, 0.75],
+    };
+    write_lidar_data(&path, &[shift], &[shot()]).unwrap();
+    let json: Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
+    let shared = &json["sharedErrors"][0];
+    assert_eq!(shared["profile"], "gusev_crater/9043");
+    assert_eq!(
+        shared["aprioriSigmaEastNorthUp"],
+        serde_json::json!([70.0, 70.0, 1.0])
+    );
+    assert_eq!(
+        shared["adjustedSigmaEastNorthUp"],
+        serde_json::json!([39.0, 67.0, 0.75])
+    );
+    assert!(
+        shared["meaning"]
+            .as_str()
+            .unwrap()
+            .contains("does not average out")
+    );
+}
+
+#[test]
 fn serial_numbers_are_those_of_a_real_network() {
     let name = "MOC serial numbers";
     let files: Option<Vec<PathBuf>> = ["mgs_text/naif0012.tls", "mgs_text/MGS_SCLKSCET.00061.tsc"]
@@ -259,7 +288,7 @@ fn serial_numbers_are_those_of_a_real_network() {
 fn lidar_points_that_isis_would_refuse_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |points: &[LidarPoint]| {
-        let failure = write_lidar_data(&folder.path().join("lidar.json"), points).unwrap_err();
+        let failure = write_lidar_data(&folder.path().join("lidar.json"), &[], points).unwrap_err();
         assert_eq!(failure.kind(), Kind::Bug);
         failure.cause.to_string()
     };
@@ -375,6 +404,7 @@ fn control(id: &str, ground: GroundEstimate) -> ControlPoint<'_> {
     ControlPoint {
         id,
         ground,
+        relative_sigma_m: None,
         measures: vec![
             measure("E02-00665.cub", 1_204.5, 0.5, [0.5, 0.75]),
             measure("E02-01453.cub", 88.062_5, 671.375, [1e-5, 2.0]),
@@ -395,11 +425,15 @@ fn ground_control_is_read_as_ames_stereo_pipeline_reads_it() {
         ..control("seen by none", gusev())
     };
     let points = [
-        control("tie-0001\n9", gusev()),
+        ControlPoint {
+            relative_sigma_m: Some([3.25, 3.5, 11.0]),
+            ..control("tie-0001\n9", gusev())
+        },
         unmeasured,
         control("ap19215-41-7", west),
     ];
-    assert_eq!(write_gcp(&path, Body::Mars, &points).unwrap(), 2);
+    let shared_m = Some([103.04, 108.0, 1.75]);
+    assert_eq!(write_gcp(&path, Body::Mars, shared_m, &points).unwrap(), 2);
     let text = fs::read_to_string(path).unwrap();
     // Commas are blanks, lines that begin with # are comments, everything else is a point.
     let lines: Vec<Vec<String>> = text
@@ -439,7 +473,16 @@ fn ground_control_is_read_as_ames_stereo_pipeline_reads_it() {
             ["E02-01453.cub", "670.8750", "87.5625", "0.00001", "2"]
         );
     }
-    assert!(text.contains("\n# 1 is tie-0001 9\n") && text.contains("\n# 2 is ap19215-41-7\n"));
+    assert!(
+        text.contains("\n# 1 is tie-0001 9: 3.250 3.500 11.000\n")
+            && text.contains("\n# 2 is ap19215-41-7\n")
+    );
+    assert!(
+        text.contains("# all points share an error of 103.0 m east, 108.0 m north and 1.8 m up")
+    );
+    write_gcp(&folder.path().join("alone.gcp"), Body::Mars, None, &points).unwrap();
+    let text = fs::read_to_string(folder.path().join("alone.gcp")).unwrap();
+    assert!(text.contains("# all points share the error of the a priori orientations"));
 }
 
 #[test]
@@ -448,7 +491,8 @@ fn ground_control_that_would_be_misread_is_refused() {
     let refused = |change: fn(&mut ControlPoint)| {
         let mut point = control("tie", gusev());
         change(&mut point);
-        let failure = write_gcp(&folder.path().join("a.gcp"), Body::Mars, &[point]).unwrap_err();
+        let path = folder.path().join("a.gcp");
+        let failure = write_gcp(&path, Body::Mars, None, &[point]).unwrap_err();
         assert_eq!(failure.kind(), Kind::Bug);
         failure.cause.to_string()
     };

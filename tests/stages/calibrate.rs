@@ -194,7 +194,7 @@ fn another_rotation_of_the_body_is_told() {
     assert!(remarks.contains("rotate Mars by 592.7 m"), "{remarks}");
 }
 
-/// What the steps must reach, at control that was held back and against the truth.
+/// What the steps must reach, at withheld control and against the truth.
 #[test]
 fn every_step_has_the_size_of_the_paper() {
     let folder = scene(&[]);
@@ -286,8 +286,8 @@ fn stated_standard_deviations_hold_against_the_truth() {
     println!("drift {drift:.2?}");
     assert!(drift.iter().all(|z| z.abs() < 3.0), "{drift:?}");
     assert!(rms(drift.iter().copied()) > 0.1, "{drift:?}");
-    // 119 points a seed that were held back, 357 that were used: in height less than a hundredth, of the former two.
-    for (what, of) in [("held back", &held_back), ("used", &used)] {
+    // 119 withheld points a seed, 357 that were used: in height less than a hundredth, of the former two.
+    for (what, of) in [("withheld", &held_back), ("used", &used)] {
         println!("{what}: in the plane and in height {of:.2?}");
         for axis in 0..2 {
             let z = rms(of.iter().map(|of| of[axis]));

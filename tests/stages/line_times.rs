@@ -233,7 +233,8 @@ fn places(times: &ImageTimes) -> Vec<(f64, f64)> {
 fn image_to_ground_to_image_closes_where_the_exposure_changes() {
     let image = changed();
     let sampling = areograph::config::OrientationConfig::default();
-    let model = fit_sensor_model(&image.orientation, &sampling).unwrap();
+    let required = Some(CameraModel::Samples);
+    let model = fit_sensor_model(&image.orientation, &sampling, required).unwrap();
     // Time is what orientation is smooth over: the polynomials fit as they do without a change.
     assert!(
         model.invalid_because.is_empty(),
@@ -241,8 +242,8 @@ fn image_to_ground_to_image_closes_where_the_exposure_changes() {
         model.invalid_because
     );
     let oriented = OrientedImage::of(&image.times, &image.orientation, &model).unwrap();
-    let camera = oriented.oriented_camera(CameraModel::Samples);
-    let projector = oriented.projector(CameraModel::Samples).unwrap();
+    let camera = oriented.oriented_camera();
+    let projector = oriented.projector().unwrap();
     let session = Session::open(&image.set).unwrap();
     let (mut site, mut expected) = (fixture::Site::small(), Vec::new());
     let (mut worst_px, mut worst_of_kernels_px) = (0.0_f64, 0.0_f64);
@@ -277,7 +278,7 @@ fn image_to_ground_to_image_closes_where_the_exposure_changes() {
             let place = Spherical::from_xyz_m(&ground_m);
             site.footprints.longitude_rad[row] = place.longitude_rad;
             site.footprints.latitude_rad[row] = place.latitude.0;
-            site.footprints.radius_m[row] = place.radius_m;
+            site.footprints.radius_crossover_m[row] = place.radius_m;
             expected.push((line, sample));
         }
     }
@@ -287,15 +288,13 @@ fn image_to_ground_to_image_closes_where_the_exposure_changes() {
     assert!(worst_of_kernels_px < 0.01, "{worst_of_kernels_px} px");
     let mut profile = site.profiles[0].clone();
     profile.rows = (0_u32..).take(expected.len()).collect();
-    let mut config = site.config.registration.clone();
-    config.model = CameraModel::Samples;
     let registered = register(
         &image.times,
         &image.orientation,
         &model,
         &site.footprints,
         &[profile],
-        &config,
+        &site.config.registration,
         &AtomicBool::new(false),
     )
     .unwrap();
@@ -316,7 +315,7 @@ fn camera_models_see_every_line_when_it_is_exposed() {
     let image = changed();
     let sampling = areograph::config::OrientationConfig::default();
     let mut site = fixture::Site::small();
-    site.model = fit_sensor_model(&image.orientation, &sampling).unwrap();
+    site.model = fit_sensor_model(&image.orientation, &sampling, None).unwrap();
     site.orientation = image.orientation.clone();
     site.times = image.times.clone();
     let folder = tempfile::tempdir().unwrap();

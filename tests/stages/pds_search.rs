@@ -12,7 +12,7 @@ use std::{
 };
 
 use areograph::{
-    altimetry::{DatumChoice, ShotFilter},
+    altimetry::{DatumChoice, GroundRadius, ShotFilter},
     body::Datum,
     config::{PedrConfig, WindowConfig},
     files::HashedFile,
@@ -46,6 +46,7 @@ fn config(files: Vec<PathBuf>) -> PedrConfig {
     PedrConfig {
         files,
         datum: DatumChoice::Auto,
+        crossover: GroundRadius::Corrected,
         filter: ShotFilter {
             classes: vec![1],
             channels: vec![1, 2, 3],

@@ -52,7 +52,7 @@ fn footprints_under_the_boresight_come_back_to_their_lines() {
     let site = under_the_camera();
     for (_, model) in CameraModel::WORDS {
         let mut site_of_model = under_the_camera();
-        site_of_model.config.registration.model = model;
+        site_of_model.model.model = model;
         let found = registered(&site_of_model);
         assert_eq!(found.points.len(), SHOTS as usize);
         assert!(found.rejected.is_empty());
@@ -122,8 +122,8 @@ fn what_has_no_place_is_counted_by_reason() {
     // The other side of Mars, the sky, and no place at all.
     site.footprints.longitude_rad[3] += std::f64::consts::PI;
     site.footprints.latitude_rad[3] *= -1.0;
-    site.footprints.radius_m[4] = 4.5e6;
-    site.footprints.radius_m[5] = f64::NAN;
+    site.footprints.radius_crossover_m[4] = 4.5e6;
+    site.footprints.radius_crossover_m[5] = f64::NAN;
     let found = registered(&site);
     assert_eq!(found.points.len(), SHOTS as usize - 3);
     let rejected: Vec<(&str, u64)> = found.rejected.iter().map(|(k, v)| (&**k, *v)).collect();
@@ -172,6 +172,7 @@ fn every_profile_is_tried_in_an_image_that_sees_nothing() {
     site.model = areograph::stages::fit_sensor_model::fit_sensor_model(
         &site.orientation,
         &site.config.orientation,
+        None,
     )
     .unwrap();
     for fit in &mut site.model.second_order.position_m {

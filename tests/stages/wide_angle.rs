@@ -176,7 +176,7 @@ fn shots_lie_where_the_instrument_kernel_sees_them() {
     let (site, truth) = (site(), truth());
     chooses_among_rivals(&run);
     for (image, orientation) in images(&site) {
-        let model = fit_sensor_model(&orientation, &site.orientation).unwrap();
+        let model = fit_sensor_model(&orientation, &site.orientation, None).unwrap();
         let oriented = OrientedImage::of(&image, &orientation, &model).unwrap();
         let told = truth["wide_angle"].as_array().unwrap();
         let told = told
@@ -199,7 +199,7 @@ fn shots_lie_where_the_instrument_kernel_sees_them() {
             let Some(point_m) = ground_m.get(&key) else {
                 continue;
             };
-            let projector = oriented.projector(site.registration.model).unwrap();
+            let projector = oriented.projector().unwrap();
             let seen = projector.project(point_m).unwrap();
             let y_px = oriented.detector.focal_px(&seen.camera_m).unwrap().y;
             let line = seen.x + 0.5 * oriented.lines();

@@ -83,10 +83,10 @@ impl Mission {
         let config = load(&self.path(&format!("sites/{site}.toml")))
             .unwrap()
             .site;
-        let correction_s = config.mola_clock.correction_s();
+        let correction_s = config.altimeter_clock.correction_s();
         let searched =
             search_footprints(&config.pedr, &config.windows, correction_s, &RUN_ON).unwrap();
-        let all = convert_datum(searched.footprints, &config.mola_clock).footprints;
+        let all = convert_datum(searched.footprints, &config.altimeter_clock).footprints;
         let name = profile["file"].as_str().unwrap();
         let is_own = |file: usize| all.files[file].name == name;
         (0..all.et_s.len())
@@ -232,7 +232,11 @@ fn shifts_m(mission: &Mission, profile: &Value) -> Vec<Vector3<f64>> {
     let shift = |(index, truth): (usize, &Value)| {
         // A shot whose shifted place is outside the window is not read.
         let shot = shots.iter().find(|shot| is_shot(index, shot))?;
-        let told_m = spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, shot.radius_m);
+        let told_m = spherical_to_xyz_m(
+            shot.longitude_rad,
+            shot.latitude_rad,
+            shot.radius_crossover_m,
+        );
         let true_m = vector(truth);
         let up = true_m.normalize();
         let east = Vector3::z().cross(&up).normalize();

@@ -20,6 +20,7 @@ mod misregistration;
 mod orbit;
 mod overlays;
 mod relief;
+mod shared_errors;
 
 use std::{
     collections::BTreeMap,
@@ -51,6 +52,8 @@ struct Judged {
     errors_m: Vec<Vector3<f64>>,
     /// Stated standard deviations of the same.
     sigmas_m: Vec<Vector3<f64>>,
+    /// The same without the error that all share.
+    relative_m: Vec<Vector3<f64>>,
     /// Stated standard deviations of their mean.
     mean_sigmas_m: Vector3<f64>,
     /// Median height above the MOLA surface before the adjustment, and the true error of heights then, metres.
@@ -126,6 +129,7 @@ impl Judged {
             name: format!("{} {site}", mission.file_name().unwrap().to_string_lossy()),
             errors_m: Vec::new(),
             sigmas_m: Vec::new(),
+            relative_m: Vec::new(),
             mean_sigmas_m: vector(&document["adjustment"]["heights"]["mean_sigma_m"]),
             against_mola_m: document["before"]["heights"]["above_surface_m"]["median"]
                 .as_f64()
@@ -165,6 +169,9 @@ impl Judged {
                     judged.errors_m.push(axes * (adjusted_m - true_m));
                     let sigmas = ["sigma_east_m", "sigma_north_m", "sigma_up_m"];
                     judged.sigmas_m.push(three(sigmas, row).unwrap());
+                    let relative = sigmas.map(|name| format!("relative_{name}"));
+                    let relative = relative.each_ref().map(String::as_str);
+                    judged.relative_m.push(three(relative, row).unwrap());
                 }
             }
         }
@@ -378,18 +385,31 @@ fn stated_heights_hold_against_truth() {
     assert!(500 * lost <= good, "{lost} of {good}");
 }
 
-/// Twelve missions, of which one for each kind of ground is in every run, that may be wrong in all that the real one may have been wrong in, over ground of three kinds: what
-/// is stated holds on every axis, the place included, although nothing but prior knowledge says it.
+/// Twelve missions, of which one for each kind of ground is in every run, that may be wrong in all that the real one may have
+/// been wrong in, over ground of three kinds: what is stated holds on every axis, the place included, although nothing but
+/// prior knowledge determines it.
 #[test]
 fn stated_heights_and_places_hold_where_everything_errs() {
+    hold_where_everything_errs(seeds(101..=112, 3), &["plains", "medium", "rough"]);
+}
+
+/// The same over ground whose exponent is not that of the surface, drawn for each site, and whose roughness changes within
+/// a window: twelve missions in the long run, one in every run.
+#[test]
+fn stated_heights_and_places_hold_on_varied_ground() {
+    hold_where_everything_errs(seeds(20_101..=20_112, 1), &["varied"]);
+}
+
+#[allow(clippy::print_stdout, reason = "what was measured is worth reading")]
+fn hold_where_everything_errs(seeds: Vec<u32>, grounds: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
-    let missions: Vec<PathBuf> = seeds(101..=112, 3)
+    let missions: Vec<PathBuf> = seeds
         .into_iter()
-        .zip(["plains", "medium", "rough"].into_iter().cycle())
+        .zip(grounds.iter().cycle())
         .map(|(seed, ground)| scene(folder.path(), seed, &["--realistic", "--roughness", ground]))
         .collect();
     let all = judged(folder.path(), &missions);
-    assert_eq!(all.len(), if common::long() { 36 } else { 9 });
+    assert_eq!(all.len(), SITES.len() * missions.len());
     for (axis, name) in ["east", "north", "up"].into_iter().enumerate() {
         let normalised: Vec<f64> = all
             .iter()
@@ -412,7 +432,8 @@ fn stated_heights_and_places_hold_where_everything_errs() {
     let lost: usize = all.iter().map(|site| site.lost.len()).sum();
     let good: usize = all.iter().map(|site| site.errors_m.len()).sum();
     println!("{lost} of {good} good tie points lost");
-    assert!(500 * lost <= good, "{lost} of {good}");
+    // 0.2 %; of one mission chance loses one or two.
+    assert!(500 * lost <= good.max(1_000), "{lost} of {good}");
     for site in &all {
         assert_eq!(site.kept_blunders, [""; 0], "{}", site.name);
     }

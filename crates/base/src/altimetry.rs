@@ -93,6 +93,29 @@ pub enum DatumChoice {
     Stated(Datum),
 }
 
+/// The radius of a shot that every stage takes for the ground.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum GroundRadius {
+    /// Corrected by the crossover residual of its file where the file has one.
+    #[default]
+    Corrected,
+    /// Before that correction: the measured range laid off from the orbit of the file.
+    Raw,
+}
+
+impl GroundRadius {
+    /// Description, following "the radii".
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Corrected => "after the crossover correction",
+            Self::Raw => "before the crossover correction",
+        }
+    }
+}
+
 /// Shots to keep; a shot must pass every test.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ShotFilter {

@@ -12,17 +12,29 @@ pub const CONTROL_SIGMA_MAX_M: f64 = 3_000.0;
 
 use serde::Deserialize;
 
+/// Folder that `areograph fetch` keeps beside the files that it fetches: parts of files, copies of indexes.
+pub const FETCH_FOLDER: &str = ".fetch";
 /// NAIF id of the centre of Mars.
 pub const NAIF_MARS: i32 = 499;
 /// Name of Mars in labels.
 pub const MARS_NAME: &str = "MARS";
 /// NAIF id of the Sun.
 pub const NAIF_SUN: i32 = 10;
+/// Least and largest distance of Mars from the Sun, metres, for choosing kernels: perihelion 206.65 and aphelion 249.26
+/// million km (NASA's Mars fact sheet), rounded outwards.
+pub const SUN_DISTANCE_M: [f64; 2] = [206.0e9, 250.0e9];
 
 /// NAIF id of the barycentre of the solar system.
 pub const NAIF_SOLAR_SYSTEM_BARYCENTRE: i32 = 0;
 /// Speed of light, metres per second.
 pub const SPEED_OF_LIGHT_M_S: f64 = 299_792_458.0;
+
+/// Speed of the mapping orbit over the ground, metres per second: converts times into distances along the track.
+///
+/// # Source
+/// The circumference of Mars, 21,300 km, over the period of 7,064 s (Shan et al. 2005, table 1: 1.9 h) is 3,015 m/s; one
+/// significant digit serves limits and margins.
+pub const GROUND_SPEED_M_S: f64 = 3_000.0;
 
 /// All built-in spacecraft; the first carries the laser.
 static ALL: LazyLock<[Spacecraft; 2]> = LazyLock::new(|| {

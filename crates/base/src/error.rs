@@ -10,6 +10,47 @@ use std::{
     sync::atomic::{AtomicBool, Ordering},
 };
 
+/// Kind and advice of a failure, beside its message.
+///
+/// ```
+/// use areograph_base::error::{Cause, Kind};
+///
+/// #[derive(Debug, thiserror::Error, Cause)]
+/// #[cause(Input)]
+/// enum TableError {
+///     #[error("no row")]
+///     #[cause("give a table with at least one row")]
+///     Empty,
+///     #[error("line {line} is truncated")]
+///     #[cause(like = Empty)]
+///     Truncated { line: usize },
+///     #[error("no column {0}")]
+///     #[cause(Configuration: "name a column of the table instead of {0}")]
+///     Column(String),
+///     #[error("the table is of {body}")]
+///     #[cause("set body to {word}", word = body.to_lowercase())]
+///     Body { body: String },
+/// }
+///
+/// assert_eq!(TableError::Empty.kind(), Kind::Input);
+/// let truncated = TableError::Truncated { line: 3 };
+/// assert_eq!(truncated.advice(), "give a table with at least one row");
+/// let column = TableError::Column("height".to_owned());
+/// assert_eq!(column.kind(), Kind::Configuration);
+/// assert_eq!(column.advice(), "name a column of the table instead of height");
+/// let body = TableError::Body { body: "Mars".to_owned() };
+/// assert_eq!(body.advice(), "set body to mars");
+/// ```
+///
+/// A variant without kind or advice does not compile:
+///
+/// ```compile_fail
+/// # use areograph_base::error::Cause;
+/// #[derive(Debug, thiserror::Error, Cause)]
+/// #[error("no row")]
+/// #[cause(Input)] // no advice
+/// struct Empty;
+/// ```
 pub use areograph_derive::Cause;
 
 /// Kinds of failure; each is an exit code of the program.

@@ -30,13 +30,16 @@ use std::marker::PhantomData;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::body::{Body, Datum};
+use crate::{
+    altimetry::GroundRadius,
+    body::{Body, Datum},
+};
 
 /// State of footprint coordinates as in their files; each file states its datum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AsRead;
 
-/// A PEDR file that footprints came from.
+/// A PEDR file or table of shots that footprints came from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SourceFile {
     /// File name without folders: the location of a file does not affect the results.
@@ -47,6 +50,8 @@ pub struct SourceFile {
     pub datum: Datum,
     /// BLAKE3 of the file's bytes, hexadecimal.
     pub blake3: String,
+    /// Whether it is a table of shots, which need not state the spacecraft. PEDR files do.
+    pub is_table: bool,
 }
 
 /// Control of an adjustment.
@@ -118,6 +123,8 @@ macro_rules! columns {
             pub files: Vec<SourceFile>,
             /// The body of the footprints.
             pub body: Body,
+            /// Which radius is that of the ground.
+            pub ground: GroundRadius,
             $($(#[$doc])* pub $column: Vec<$kind>,)*
             datum: PhantomData<D>,
         }
@@ -132,7 +139,7 @@ macro_rules! columns {
             /// No footprints on `body` yet, from these files.
             #[must_use]
             pub const fn on(body: Body, files: Vec<SourceFile>) -> Self {
-                Self { files, body, $($column: Vec::new(),)* datum: PhantomData }
+                Self { files, body, ground: GroundRadius::Corrected, $($column: Vec::new(),)* datum: PhantomData }
             }
 
             /// Appends one shot.
@@ -154,6 +161,7 @@ macro_rules! columns {
                 Self {
                     files: self.files.clone(),
                     body: self.body,
+                    ground: self.ground,
                     $($column: self.$column.split_off(row),)*
                     datum: PhantomData,
                 }
@@ -173,7 +181,7 @@ macro_rules! columns {
             /// For the stage that converts the coordinates, and for the reader of its product.
             #[must_use]
             pub fn declare<E>(self) -> Footprints<E> {
-                Footprints { files: self.files, body: self.body, $($column: self.$column,)* datum: PhantomData }
+                Footprints { files: self.files, body: self.body, ground: self.ground, $($column: self.$column,)* datum: PhantomData }
             }
         }
     };
@@ -239,6 +247,25 @@ impl<D> Footprints<D> {
         (0..self.len())
             .map(|row| self.row(row).topography_m())
             .collect()
+    }
+
+    /// Radius of the ground by the shot in row `row`, metres: the one that all stages use.
+    ///
+    /// # Panics
+    /// If the row does not exist.
+    #[must_use]
+    pub fn ground_radius_m(&self, row: usize) -> f64 {
+        match self.ground {
+            GroundRadius::Corrected => self.radius_crossover_m[row],
+            GroundRadius::Raw => self.radius_m[row],
+        }
+    }
+
+    /// Which of two radii is that of the ground; `None` without a PEDR file, since tables of shots have one radius.
+    #[must_use]
+    pub fn ground_choice(&self) -> Option<GroundRadius> {
+        let has_both = self.files.iter().any(|file| !file.is_table);
+        has_both.then_some(self.ground)
     }
 
     /// Number of shots.

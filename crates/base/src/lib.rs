@@ -24,6 +24,7 @@ pub mod footprints;
 pub mod frames;
 pub mod image;
 pub mod instruments;
+pub mod kernel_names;
 pub mod kernel_source;
 pub mod line_times;
 #[cfg(feature = "schema")]

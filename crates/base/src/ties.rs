@@ -121,7 +121,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_become_indices_and_an_index_without_an_image_is_told() {
+    fn names_become_indices_and_an_index_without_an_image_is_reported() {
         let measure = |image: &str| TieMeasure {
             image: image.to_owned(),
             line: 1.0,

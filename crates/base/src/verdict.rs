@@ -10,6 +10,9 @@ pub use kind::CheckKind;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Heading of [`Verdict::untested`] on pages and in messages.
+pub const NOT_TESTED: &str = "Not tested by the data of this site:";
+
 /// Whether the products are within the limits of the configuration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
@@ -20,7 +23,7 @@ pub struct Verdict {
     pub reasons: Vec<String>,
     /// Remarks for the reader although no limit is exceeded.
     pub remarks: Vec<String>,
-    /// Errors that no datum of the run can show, one phrase each.
+    /// Errors that no datum of the run can show, one phrase for each reason.
     #[serde(default, skip_serializing_if = "crate::stored::is_list_left_out")]
     pub untested: Vec<String>,
     /// Every limit with the item that uses most of it, the worst first.
@@ -36,8 +39,9 @@ impl Verdict {
         if reasons.is_empty() {
             reasons = failed;
         } else if failed.is_empty() {
-            let told = Check::told(CheckKind::Contradiction, "", CheckOutcome::Fail);
-            checks.push(told);
+            let failed_check =
+                Check::without_number(CheckKind::Contradiction, "", CheckOutcome::Fail);
+            checks.push(failed_check);
         }
         if remarks.is_empty() {
             remarks = in_words(&checks, CheckOutcome::Warning);

@@ -22,7 +22,7 @@ pub struct Count {
 pub struct Counter<'a> {
     done: AtomicU64,
     all: AtomicU64,
-    tell: &'a (dyn Fn(Count) + Sync),
+    watcher: &'a (dyn Fn(Count) + Sync),
 }
 
 impl fmt::Debug for Counter<'_> {
@@ -37,11 +37,11 @@ impl fmt::Debug for Counter<'_> {
 impl<'a> Counter<'a> {
     /// A new counter.
     #[must_use]
-    pub const fn new(tell: &'a (dyn Fn(Count) + Sync)) -> Self {
+    pub const fn new(watcher: &'a (dyn Fn(Count) + Sync)) -> Self {
         Self {
             done: AtomicU64::new(0),
             all: AtomicU64::new(0),
-            tell,
+            watcher,
         }
     }
 }
@@ -98,7 +98,7 @@ impl<'a> Watch<'a> {
     /// Reports items that are done; `of` is their name, in the plural.
     pub fn step(&self, by: u64, of: &'static str) {
         if let Some(counter) = self.counter {
-            (counter.tell)(Count {
+            (counter.watcher)(Count {
                 done: counter.done.fetch_add(by, Ordering::Relaxed) + by,
                 all: counter.all.load(Ordering::Relaxed),
                 of,
@@ -114,21 +114,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn steps_are_told_with_what_is_to_come() {
-        let told = Mutex::new(Vec::new());
-        let tell = |count: Count| told.lock().unwrap().push((count.done, count.all));
-        let (stop, counter) = (AtomicBool::new(false), Counter::new(&tell));
+    fn steps_are_reported_with_the_number_of_all() {
+        let counts = Mutex::new(Vec::new());
+        let watcher = |count: Count| counts.lock().unwrap().push((count.done, count.all));
+        let (stop, counter) = (AtomicBool::new(false), Counter::new(&watcher));
         let watch = Watch::counted(&stop, &counter);
         watch.announce(3);
         watch.step(1, "shots");
         watch.announce(2);
         watch.step(4, "shots");
-        assert_eq!(*told.lock().unwrap(), [(1, 3), (5, 5)]);
+        assert_eq!(*counts.lock().unwrap(), [(1, 3), (5, 5)]);
         assert!(watch.check().is_ok());
         stop.store(true, Ordering::Relaxed);
         assert!(watch.check().is_err());
         // Without a listener nothing is counted.
         Watch::from(&stop).step(1, "shots");
-        assert_eq!(told.lock().unwrap().len(), 2);
+        assert_eq!(counts.lock().unwrap().len(), 2);
     }
 }

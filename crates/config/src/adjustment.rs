@@ -71,6 +71,14 @@ declare_table! {
             RotationUnknowns::WORDS,
             ["", "constants", "and linear terms in t", "and quadratic terms"],
         )).or(RotationUnknowns::Acceleration),
+        /// Standard deviation of a delay of all lines of an image, which `rotation_sigma_arcsec` allows for together with
+        /// pitch: tie points separate neither from the other, so it is no unknown. What is stated of the position of a
+        /// camera along its track contains it. 45 ms are half the disagreement of the images of a pair (Shan et al. 2005,
+        /// Table 5); 0 assumes exact line times. With `time_bias_sigma_ms`, `attitude_clock` or
+        /// `boresight_line_time_sigma_ms` these apply instead.
+        line_time_sigma_s as "line_time_sigma_ms": f64 = key(SIGMA_OR_NONE)
+            .or(45.0)
+            .map(|milliseconds| milliseconds * SECONDS_PER_MS),
         /// Whether the along-track disagreement of the images of a pair is attributed to one time offset of the
         /// attitudes, the same for all images: it rotates nadir-following images, but not inertially held ones.
         /// Otherwise all images are equally likely to be in error. Tie points cannot distinguish the two, so this is
@@ -103,7 +111,7 @@ declare_table! {
         )).or(false),
         /// Whether the position of the laser in a simultaneous image is an observation: camera and laser share one
         /// bus, so that the mounting determines it, regardless of the attitude. It requires profiles simultaneous
-        /// with the images, whose position is known to `mola_surface.profile_plan_sigma_m`; each profile may then be
+        /// with the images, whose position is known to `laser_surface.profile_plan_sigma_m`; each profile may then be
         /// offset in plan, and the boresight of the laser may differ from its file and the frame kernels.
         common_bus: bool = key(yes_or_no(
             "footprints do not constrain the attitude",
@@ -179,6 +187,7 @@ fn keys_of_the_model(checked: &AdjustmentConfig, keys: &mut Keys<'_, '_>) {
         AdjustmentModel::Published => &[
             "position_sigma_m",
             "rotation_sigma_arcsec",
+            "line_time_sigma_ms",
             "orbit_of_pedr",
             "relief_for_plan",
             "attitude_clock",

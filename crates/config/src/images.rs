@@ -64,6 +64,14 @@ declare_table! {
         /// image.
         #[serde(skip)]
         isd: Option<PathBuf> = key(FILE).unused(r#""../isd/m0402852.json""#),
+        /// Or an ISIS cube of a MOC image after `spiceinit`: its label and tables give line times, camera and orientation,
+        /// without kernels of orbit and attitude, and without the keys below. Or a cube of a line scanner after `csminit`, by
+        /// the state of its camera model. The orientation is used unchanged, as that of
+        /// support data; it contains the pointing bias of ISIS. A cropped or reduced cube is the image of its own lines and
+        /// samples (group `AlphaCube`); of a map-projected cube the image before the projection is described, and its pixels
+        /// are no samples of it. Pixels of an unprojected cube need its name in `pixels` as well.
+        #[serde(skip)]
+        cube: Option<PathBuf> = key(FILE).unused(r#""../cubes/E0201461.cub""#),
         /// Whether the laser is on the spacecraft of these support data, and their positions are geometric: then they
         /// are used for the ranges of shots that were fired while the image was exposed. Only with support data.
         has_laser: bool = key(Switch).or(false).unused("true"),
@@ -91,10 +99,16 @@ declare_table! {
 }
 
 impl ImageConfig {
-    /// The file with line times and exposure: support data, or a label.
+    /// The file with line times, exposure and orientation: support data, or an oriented cube.
+    #[must_use]
+    pub fn support(&self) -> Option<&PathBuf> {
+        self.isd.as_ref().or(self.cube.as_ref())
+    }
+
+    /// The file with line times and exposure: that with the orientation too, or a label.
     #[must_use]
     pub fn source(&self) -> Option<&PathBuf> {
-        self.isd.as_ref().or(self.label.as_ref())
+        self.support().or(self.label.as_ref())
     }
 
     /// The name of the image in tie point files.
@@ -180,12 +194,24 @@ fn is_complete(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
             let ways: Vec<_> = ways.iter().map(|way| json!({"required": [way]})).collect();
             json!({"anyOf": ways})
         });
-        json!({"anyOf": [{"required": ["label"]}, {"required": ["isd"]}, {"allOf": needs}]})
+        json!({"anyOf": [{"required": ["label"]}, {"required": ["isd"]}, {"required": ["cube"]}, {"allOf": needs}]})
     });
-    if keys.span_of("isd").is_some() {
+    let support = ["isd", "cube"].map(|key| keys.span_of(key).is_some());
+    if support.contains(&true) {
+        if support == [true; 2] {
+            keys.refuse(
+                "cube",
+                "no cube beside support data (isd), or no isd beside it",
+            );
+        }
+        let why = if support[0] {
+            "the support data of images.isd give all of these"
+        } else {
+            "label and tables of images.cube give all of these"
+        };
         let of_label = ["label", "instrument"].into_iter();
         for key in of_label.chain(OF_FIELDS) {
-            keys.unused(key, "the support data of images.isd give all of these");
+            keys.unused(key, why);
         }
         return;
     }
@@ -202,7 +228,7 @@ fn is_complete(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
         .collect();
     if keys.span_of("label").is_none() && !lacking.is_empty() {
         let expected = format!(
-            "a label, support data (isd), or also {}",
+            "a label, support data (isd), an oriented cube, or also {}",
             lacking.join(", ")
         );
         keys.missing("label", &expected);

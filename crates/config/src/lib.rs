@@ -25,8 +25,8 @@ mod geojson;
 mod images;
 mod instruments;
 mod kernels;
+mod laser_surface;
 mod limits;
-mod mola_surface;
 mod net;
 mod new_site;
 mod orientation;
@@ -69,8 +69,8 @@ pub use instruments::{
     usual_altimeter, usual_instrument,
 };
 pub use kernels::KernelsConfig;
+pub use laser_surface::MolaSurfaceConfig;
 pub use limits::LimitsConfig;
-pub use mola_surface::MolaSurfaceConfig;
 pub use net::{
     Blunders, LoadedNet, Method, NetConfig, TriangulationConfig, YAxis, load_net, net_example,
     net_schema, parse_net,
@@ -82,9 +82,9 @@ pub use pointing::{PointingConfig, UsedBias};
 pub use problems::Problems;
 pub use range_check::{RangeCheckConfig, SCAN_STEPS_MAX};
 pub use service::{
-    AlertKind, ChangesConfig, FreshnessConfig, HookConfig, HttpConfig, LoadedService, MovedConfig,
-    RetentionConfig, ScheduleConfig, ServiceConfig, ServiceInputs, ServiceOutputs, WorkersConfig,
-    load_service, parse_service, service_example, service_schema,
+    AlertKind, ChangesConfig, FetchConfig, FreshnessConfig, HookConfig, HttpConfig, LoadedService,
+    MovedConfig, RetentionConfig, ScheduleConfig, ServiceConfig, ServiceInputs, ServiceOutputs,
+    WorkersConfig, load_service, parse_service, service_example, service_schema,
 };
 pub use shots::{ShotColumns, ShotLayout, ShotTableConfig};
 pub use site::SiteConfig;
@@ -139,6 +139,72 @@ pub fn load(path: &Path) -> Result<Loaded, Error> {
 pub fn load_within(path: &Path, roots: &[PathBuf]) -> Result<Loaded, Error> {
     let text = read(path)?;
     Ok(parse_within(&text, path, roots)?)
+}
+
+/// A configuration whose inputs may be missing, checked in all else.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unfilled {
+    /// The valid form, with the paths and globs of what is missing.
+    pub site: SiteConfig,
+    /// Files, folders and globs that lead nowhere yet.
+    pub absent: Vec<PathBuf>,
+    /// Paths and globs of each table `[[shots]]`, as written.
+    pub shot_globs: Vec<Vec<ShotGlob>>,
+}
+
+/// A path or glob of tables of shots.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ShotGlob {
+    /// The path, from the current folder on; its last part may have wildcards.
+    pub path: PathBuf,
+    /// Whether it leads to no file yet.
+    pub is_absent: bool,
+}
+
+/// As [`load`], for a configuration whose files, folders and globs need not exist yet.
+///
+/// # Errors
+/// Those of [`load`], missing files excepted.
+pub fn load_unfilled(path: &Path) -> Result<Unfilled, Error> {
+    let text = read(path)?;
+    Ok(parse_unfilled(&text, path)?)
+}
+
+/// As [`parse`], for a configuration whose files, folders and globs need not exist yet.
+///
+/// # Errors
+/// [`Problems`] with everything that is wrong, missing files excepted.
+pub fn parse_unfilled(text: &str, path: &Path) -> Result<Unfilled, Problems> {
+    let mut review = Review::new(path, text).unfilled();
+    let read = read_table::<SiteConfig>(text, &mut review);
+    let absent = review.take_absent();
+    let ((site, _), _) = review.finish(read)?;
+    let file = path.to_owned();
+    let site = SiteConfig { file, ..site };
+    let shot_globs = shot_globs(text, path, &absent);
+    Ok(Unfilled {
+        site,
+        absent,
+        shot_globs,
+    })
+}
+
+/// Paths and globs of the tables of shots of a valid text.
+fn shot_globs(text: &str, path: &Path, absent: &[PathBuf]) -> Vec<Vec<ShotGlob>> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let table: toml::Table = text.parse().unwrap_or_default();
+    let tables = table.get("shots").and_then(toml::Value::as_array);
+    let globs = |table: &toml::Value| {
+        let globs = table.get("files").and_then(toml::Value::as_array);
+        let globs = globs.into_iter().flatten().filter_map(toml::Value::as_str);
+        globs
+            .map(|glob| ShotGlob {
+                path: folder.join(glob),
+                is_absent: absent.contains(&PathBuf::from(paths::below(folder, glob))),
+            })
+            .collect()
+    };
+    tables.into_iter().flatten().map(globs).collect()
 }
 
 /// The text of the file, of bounded length.

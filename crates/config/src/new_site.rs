@@ -36,6 +36,8 @@ pub struct NewSite {
     pub edges_deg: Option<[f64; 4]>,
     /// Identifier and label of every image.
     pub images: Vec<(String, PathBuf)>,
+    /// Whether the files of the labels contain the pixels.
+    pub pixels_in_labels: bool,
     /// Paths or globs of tie point files.
     pub ties: Vec<PathBuf>,
 }
@@ -66,6 +68,9 @@ impl NewSite {
             file.table("[[images]]");
             file.key("images.id", id.as_str());
             file.key("images.label", text(label));
+            if self.pixels_in_labels {
+                file.key("images.pixels", text(label));
+            }
         }
         if !self.ties.is_empty() {
             file.table("[ties]");

@@ -1,6 +1,5 @@
 //! `[orientation]` and `[registration]`: the sensor model and its use.
 
-use schemars::JsonSchema;
 use serde::Deserialize;
 
 use areograph_base::units::RADIANS_PER_ARCSECOND;
@@ -24,10 +23,11 @@ declare_table! {
             "where it was at the exposure, as for papers that do not state a convention",
             "where it seems to be from the centre of Mars (LT+S): to match ISIS and ALE",
         ])).or(LightTime::Surface),
-        /// Largest second-order position RMSE, norm of x, y, z. The default is about twice the largest in Table 4
+        /// Largest position RMSE of the model in use, norm of x, y, z: of polynomials of second order at the samples, of
+        /// an interpolation between the samples halfway between them. The default is about twice the largest in Table 4
         /// of Shan et al. 2005 (2.3 m).
         position_rmse_max_m: f64 = key(above_to(0.0, 1e6)).or(5.0),
-        /// Largest second-order pointing RMSE of each angle. The default is twice the largest there (5.0″).
+        /// Largest pointing RMSE of each angle, likewise. The default is twice the largest there (5.0″).
         pointing_rmse_max_rad as "pointing_rmse_max_arcsec": f64 =
             key(above_to(0.0, 3600.0)).or(10.0).map(|arcsec| arcsec * RADIANS_PER_ARCSECOND),
     }
@@ -35,15 +35,16 @@ declare_table! {
 
 declare_table! {
     /// Projection of the footprints into the images.
-    pub struct RegistrationConfig: Deserialize, JsonSchema {
-        /// The orientation that points are projected with. The distances of the other models from the chosen one are
-        /// reported in `registration.json` and in the report.
-        model: CameraModel = key(words_of(CameraModel::WORDS, [
+    pub struct RegistrationConfig: Deserialize {
+        /// The orientation that points are projected with. Without it, each image uses `rotation_vector` if that keeps the
+        /// limits of `[orientation]`, and `samples` otherwise, with a remark. The distances of the other models from the
+        /// one in use are reported in `registration.json` and in the report.
+        model: Option<CameraModel> = key(words_of(CameraModel::WORDS, [
             "positions and angles as polynomials of first order (Shan, Lee & Yoon 2002)",
             "of second order (Shan et al. 2005); angles are poorly determined near the equator",
             "second order with a rotation vector, which is well determined at every latitude",
             "interpolation between the samples, no polynomial over the whole image",
-        ])).or(CameraModel::RotationVector),
+        ])).unused(r#""samples""#),
         /// Convergence limit of the two published iterations. The default is that of the papers. They run beside
         /// Newton's method, which computes the product.
         // Below, steps drown in the rounding of coordinates: 1e-9 m of 4e6 m, lines of metres.

@@ -2,7 +2,7 @@
 
 use std::{
     collections::BTreeMap,
-    io,
+    fmt, io,
     path::{Path, PathBuf},
 };
 
@@ -60,6 +60,9 @@ impl Form for Place {
                 format!("{}; an empty string is not a path", self.kind),
             );
         } else if !(self.suits)(&path) {
+            if review.may_lack(&path) {
+                return Some(path);
+            }
             let (kind, shown) = (&self.kind, path.display());
             found.refuse(review, format!("{kind}; {shown} is {}", what_is_at(&path)));
         } else if !review.admit(&path, found.value.span(), &found.key) {
@@ -111,9 +114,12 @@ impl Form for Globs {
         for written in globs {
             let matched = match written.get_ref().as_str() {
                 Some(glob) => matches(&review.resolve(""), glob),
-                None => Err(ValueKind::Glob.to_string()),
+                None => Err(Unmatched::Other(ValueKind::Glob.to_string())),
             };
             match matched {
+                Err(Unmatched::Absent(pattern)) if review.may_lack(&pattern) => {
+                    by_identity.insert(pattern.clone(), pattern);
+                }
                 Err(expected) => review.refuse(written.span(), &found.key, expected),
                 Ok(paths) => {
                     let span = written.span();
@@ -156,28 +162,61 @@ impl Form for Globs {
     }
 }
 
+/// Why a glob gives no files.
+enum Unmatched {
+    /// No file matches this pattern.
+    Absent(PathBuf),
+    /// What was expected of it.
+    Other(String),
+}
+
+impl From<String> for Unmatched {
+    fn from(expected: String) -> Self {
+        Self::Other(expected)
+    }
+}
+
+impl fmt::Display for Unmatched {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Absent(pattern) => {
+                let pattern = pattern.display();
+                write!(
+                    formatter,
+                    "a glob that matches a file; {pattern} matches none"
+                )
+            }
+            Self::Other(expected) => formatter.write_str(expected),
+        }
+    }
+}
+
+/// A glob that counts from `folder`, whose own name has no wildcards.
+pub(super) fn below(folder: &Path, glob: &str) -> String {
+    if Path::new(glob).is_absolute() {
+        return glob.to_owned();
+    }
+    let folder = glob::Pattern::escape(&folder.to_string_lossy());
+    Path::new(&folder).join(glob).to_string_lossy().into_owned()
+}
+
 /// Files that one glob matches below `folder`, or what was expected of it.
-fn matches(folder: &Path, glob: &str) -> Result<Vec<PathBuf>, String> {
+fn matches(folder: &Path, glob: &str) -> Result<Vec<PathBuf>, Unmatched> {
     // `**` and long rows of wildcards could walk a whole disk.
     let wild_parts = glob
         .split('/')
         .filter(|part| part.contains(['*', '?', '[']))
         .count();
     if glob.contains("**") || wild_parts > WILD_PARTS_MAX {
-        return Err(format!(
+        return Err(Unmatched::Other(format!(
             "a glob without `**` and with wildcards in at most {WILD_PARTS_MAX} of its parts"
-        ));
+        )));
     }
     let invalid =
         |error: glob::PatternError| format!("a glob: {} at character {}", error.msg, error.pos + 1);
     // Checked separately first, so that the position refers to the written text.
     glob::Pattern::new(glob).map_err(invalid)?;
-    let pattern = if Path::new(glob).is_absolute() {
-        glob.to_owned()
-    } else {
-        let folder = glob::Pattern::escape(&folder.to_string_lossy());
-        Path::new(&folder).join(glob).to_string_lossy().into_owned()
-    };
+    let pattern = below(folder, glob);
     let found = glob::glob(&pattern).map_err(invalid)?;
     let mut files = Vec::new();
     for entry in found.take(FILES_MAX + 1) {
@@ -193,17 +232,15 @@ fn matches(folder: &Path, glob: &str) -> Result<Vec<PathBuf>, String> {
             Ok(_) => {}
             // A skipped file would go unnoticed.
             Err(error) => {
-                return Err(format!(
+                return Err(Unmatched::Other(format!(
                     "existing files: {} cannot be accessed: {error}",
                     path.display()
-                ));
+                )));
             }
         }
     }
     if files.is_empty() {
-        return Err(format!(
-            "a glob that matches a file; {pattern} matches none"
-        ));
+        return Err(Unmatched::Absent(pattern.into()));
     }
     Ok(files)
 }

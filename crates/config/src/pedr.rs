@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use serde::Deserialize;
 
 use areograph_base::{
-    altimetry::{DatumChoice, ShotFilter},
+    altimetry::{DatumChoice, GroundRadius, ShotFilter},
     body::Datum,
     units::RADIANS_PER_DEGREE,
 };
@@ -35,6 +35,12 @@ declare_table! {
             ("iau1994", DatumChoice::Stated(Datum::Iau1994), ""),
             ("iau2000", DatumChoice::Stated(Datum::Iau2000), ""),
         ])).or(DatumChoice::Auto),
+        /// Radius that every stage takes for the ground: corrected by the crossover residuals of the files (as in Shan,
+        /// Lee & Yoon 2002), or raw. The range check reports both; tables of shots have one radius.
+        crossover: GroundRadius = key(words([
+            ("corrected", GroundRadius::Corrected, "where the file has a residual"),
+            ("raw", GroundRadius::Raw, ""),
+        ])).or(GroundRadius::Corrected),
         /// Shots to keep.
         filter: ShotFilter = table(),
     }

@@ -1,4 +1,4 @@
-//! `[pointing]` and `[mola_clock]`: the two time biases.
+//! `[pointing]` and `[altimeter_clock]`: the two time biases.
 
 use serde::Deserialize;
 
@@ -160,8 +160,9 @@ declare_table! {
 
 fn bias_is_used(clock: &MolaClock, keys: &mut Keys<'_, '_>) {
     if clock.scope == BiasScope::None {
+        let why = format!("{} is \"none\"", keys.path_of("scope"));
         for key in ["bias_s", "sign"] {
-            keys.unused(key, "mola_clock.scope is \"none\"");
+            keys.unused(key, &why);
         }
     }
 }

@@ -79,6 +79,8 @@ pub(super) struct Review<'a> {
     roots: &'a [PathBuf],
     /// Files that the text leads to.
     files: Vec<PathBuf>,
+    /// Whether files may be missing, and which ones are.
+    absent: Option<Vec<PathBuf>>,
 }
 
 impl<'a> Review<'a> {
@@ -93,7 +95,30 @@ impl<'a> Review<'a> {
             documentation: SITE_EXAMPLE,
             roots: &[],
             files: Vec::new(),
+            absent: None,
         }
+    }
+
+    /// The same of a file whose inputs may be missing.
+    pub(super) fn unfilled(self) -> Self {
+        Self {
+            absent: Some(Vec::new()),
+            ..self
+        }
+    }
+
+    /// Whether nothing is at a path, or matches a glob, and that is permitted; it is then recorded.
+    pub(super) fn may_lack(&mut self, path: &Path) -> bool {
+        let Some(absent) = self.absent.as_mut().filter(|_| !path.exists()) else {
+            return false;
+        };
+        absent.push(path.to_owned());
+        true
+    }
+
+    /// Files, folders and globs that lead nowhere.
+    pub(super) fn take_absent(&mut self) -> Vec<PathBuf> {
+        self.absent.take().unwrap_or_default()
     }
 
     /// The same of a file that may lead only below these folders.

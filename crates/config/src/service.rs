@@ -1,5 +1,6 @@
 //! The configuration of the service: `areograph serve` and `areograph nightly`.
 
+mod fetch;
 mod folders;
 
 use std::{
@@ -23,6 +24,8 @@ use super::{
     problems::Problems,
     read,
 };
+
+pub use fetch::FetchConfig;
 
 /// Where every key is documented.
 pub(super) const SERVICE_EXAMPLE: &str = "config/areograph.toml";
@@ -59,6 +62,8 @@ declare_table! {
         outputs: ServiceOutputs = table(),
         /// When every site is checked.
         schedule: ScheduleConfig = table(),
+        /// Files of archives.
+        fetch: FetchConfig = table(),
         /// How changes are found.
         changes: ChangesConfig = table(),
         /// The processes that run sites.
@@ -81,7 +86,7 @@ declare_table! {
     /// Folders that are read. Site files may name files below these folders only. A folder must exist when the
     /// service first reads it; later it may be temporarily absent, and its sites are held.
     pub struct ServiceInputs {
-        /// Folders of site files (`*.toml`, without subfolders). A file that appears or changes is seen by the next sweep.
+        /// Folders of site files (`*.toml`, without subfolders). The next poll detects files that appear or change.
         sites: Vec<PathBuf> = key(list(MIRROR).each_once("each folder once")).required().example(r#"["sites"]"#),
         /// Folders of kernels, with their subfolders.
         kernels: Vec<PathBuf> = key(list(MIRROR).each_once("each folder once")).required().example(r#"["kernels"]"#),
@@ -127,7 +132,7 @@ declare_table! {
 declare_table! {
     /// How changes are found: files are listed, not watched, since network file systems do not report changes.
     pub struct ChangesConfig {
-        /// Time between two sweeps of all folders.
+        /// Time between two polls of all folders.
         scan_interval_s: f64 = key(from_to(0.05, 86_400.0)).or(60.0),
         /// A folder is used when nothing below it has changed for this time: mirrors copy slowly.
         quiet_period_s: f64 = key(from_to(0.0, 86_400.0)).or(600.0),
@@ -296,6 +301,8 @@ pub enum AlertKind {
     RootUnavailable,
     /// A folder of inputs is back.
     RootBack,
+    /// Files of archives could not be fetched.
+    FetchFailed,
     /// The disk is nearly full.
     DiskLow,
     /// A published product does not match its manifest.
@@ -307,7 +314,7 @@ pub enum AlertKind {
 }
 
 impl AlertKind {
-    const WORDS: [(&'static str, Self, &'static str); 11] = [
+    const WORDS: [(&'static str, Self, &'static str); 12] = [
         (
             "failed",
             Self::Failed,
@@ -331,6 +338,11 @@ impl AlertKind {
             "a folder of inputs is not available",
         ),
         ("root_back", Self::RootBack, "a folder of inputs is back"),
+        (
+            "fetch_failed",
+            Self::FetchFailed,
+            "files of archives could not be fetched",
+        ),
         ("disk_low", Self::DiskLow, "the disk is nearly full"),
         (
             "product_damaged",

@@ -24,8 +24,8 @@ use super::{
     images::{IMAGES, ImageConfig},
     instruments::{ALTIMETER, built_in_altimeters, usual_altimeter, usual_instrument},
     kernels::KernelsConfig,
+    laser_surface::MolaSurfaceConfig,
     limits::LimitsConfig,
-    mola_surface::MolaSurfaceConfig,
     orientation::{OrientationConfig, RegistrationConfig},
     pedr::PedrConfig,
     pointing::{PointingConfig, has_turned_sign},
@@ -67,8 +67,8 @@ declare_table! {
         kernels: KernelsConfig = table(),
         /// Pointing (CK) bias.
         pointing: PointingConfig = table(),
-        /// MOLA clock bias.
-        mola_clock: MolaClock = table(),
+        /// Clock bias of the altimeter.
+        altimeter_clock: MolaClock = table().was("mola_clock"),
         /// PEDR files and filters; no files when only images are oriented.
         pedr: PedrConfig = table(),
         /// Tables of laser shots, in place of PEDR files.
@@ -88,8 +88,8 @@ declare_table! {
         ties: TiesConfig = table(),
         /// Intersection of tie points.
         intersection: IntersectionConfig = table(),
-        /// The MOLA surface.
-        mola_surface: MolaSurfaceConfig = table(),
+        /// The ground between laser shots.
+        laser_surface: MolaSurfaceConfig = table().was("mola_surface"),
         /// Combined adjustment.
         adjustment: AdjustmentConfig = table(),
         /// Terrain model of a pair of images.
@@ -128,11 +128,11 @@ impl SiteConfig {
 
 /// The clock bias is that of the altimeter where the site gives no other.
 fn clock_of_altimeter(mut site: SiteConfig, keys: &Keys<'_, '_>) -> SiteConfig {
-    let (clock, altimeter) = (&mut site.mola_clock, &site.altimeter);
-    if !keys.writes("mola_clock", "bias_s") {
+    let (clock, altimeter) = (&mut site.altimeter_clock, &site.altimeter);
+    if !keys.writes("altimeter_clock", "bias_s") {
         clock.bias_s = altimeter.clock_bias_s;
     }
-    if !keys.writes("mola_clock", "source") {
+    if !keys.writes("altimeter_clock", "source") {
         clock.source.clone_from(&altimeter.clock_source);
     }
     site
@@ -264,8 +264,8 @@ fn other_bodies(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         let Some(datum) = table.get("datum") else {
             continue;
         };
-        let of_body = site.shots.iter().filter_map(|of| of.datum);
-        if of_body.clone().any(|of| of.body() != body) {
+        let of_body = site.shots.iter().filter_map(|table| table.datum);
+        if of_body.clone().any(|datum| datum.body() != body) {
             let expected = format!("a datum of {body}, the body of the site");
             keys.review().refuse(datum.span(), "shots.datum", expected);
         }
@@ -275,7 +275,7 @@ fn other_bodies(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     }
     for table in keys.entries(&["shots"]) {
         let layout = table.get("layout");
-        if let Some(layout) = layout.filter(|of| of.get_ref().as_str() == Some("ode_pedr")) {
+        if let Some(layout) = layout.filter(|word| word.get_ref().as_str() == Some("ode_pedr")) {
             let expected =
                 format!("the layout of a table of {body}: this one holds shots of MOLA at Mars");
             keys.review()
@@ -283,7 +283,7 @@ fn other_bodies(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         }
     }
     let only_at_mars = format!("no such entry on {body}: it belongs to Mars Global Surveyor");
-    for table in ["pedr", "mola_clock", "pointing"] {
+    for table in ["pedr", "altimeter_clock", "pointing"] {
         keys.refuse(table, &only_at_mars);
     }
     if site.images.iter().any(|image| image.isd.is_none()) {
@@ -354,7 +354,7 @@ fn kernels_of_spacecraft(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
 fn cameras(images: &[ImageConfig]) -> Vec<&Instrument> {
     let named = images
         .iter()
-        .filter(|image| image.isd.is_none())
+        .filter(|image| image.support().is_none())
         .map(|image| image.instrument.as_ref().unwrap_or(usual_instrument()));
     let usual = images.is_empty().then(usual_instrument);
     named.chain(usual).collect()

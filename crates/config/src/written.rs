@@ -16,7 +16,8 @@ pub(super) struct Written {
 
 impl Written {
     pub(super) fn of(mut table: toml::Table, renames: &BTreeSet<Rename>) -> Self {
-        for rename in renames {
+        // Tables after their keys, which are looked up below the name that the file has.
+        for rename in renames.iter().rev() {
             give_present_name(&mut table, &rename.table, rename);
         }
         let hash = blake3::hash(table.to_string().as_bytes());

@@ -3,48 +3,13 @@
 //! `#[cause(Kind: "advice")]` stands below `#[error("message")]`. On an enum it holds for each variant that does not
 //! state its own; kind and advice may stand apart. A variant without either does not compile.
 //!
-//! ```
-//! use areograph_base::error::{Cause, Kind};
-//!
-//! #[derive(Debug, thiserror::Error, Cause)]
-//! #[cause(Input)]
-//! enum TableError {
-//!     #[error("no row")]
-//!     #[cause("give a table with at least one row")]
-//!     Empty,
-//!     #[error("line {line} is truncated")]
-//!     #[cause(like = Empty)]
-//!     Truncated { line: usize },
-//!     #[error("no column {0}")]
-//!     #[cause(Configuration: "name a column of the table instead of {0}")]
-//!     Column(String),
-//!     #[error("the table is of {body}")]
-//!     #[cause("set body to {word}", word = body.to_lowercase())]
-//!     Body { body: String },
-//! }
-//!
-//! assert_eq!(TableError::Empty.kind(), Kind::Input);
-//! let truncated = TableError::Truncated { line: 3 };
-//! assert_eq!(truncated.advice(), "give a table with at least one row");
-//! let column = TableError::Column("height".to_owned());
-//! assert_eq!(column.kind(), Kind::Configuration);
-//! assert_eq!(column.advice(), "name a column of the table instead of height");
-//! let body = TableError::Body { body: "Mars".to_owned() };
-//! assert_eq!(body.advice(), "set body to mars");
-//! ```
+//! `areograph_base::error`, which passes the macro on, has examples: dependencies of examples here would be built once more, as
+//! those of a compiler plug-in.
 //!
 //! - The advice is a format string. Fields are in scope by reference, under their names or as `_0`, `_1`; `{0}` is the
 //!   first field, as with thiserror. Further arguments are those of [`format!`].
 //! - A kind that depends on the fields is a call: `#[cause(kind_of(code): "{}", advice_on(code))]`.
 //! - `#[cause(like = Other)]` takes kind and advice of another variant.
-//!
-//! ```compile_fail
-//! # use areograph_base::error::Cause;
-//! #[derive(Debug, thiserror::Error, Cause)]
-//! #[error("no row")]
-//! #[cause(Input)] // no advice
-//! struct Empty;
-//! ```
 
 use proc_macro2::{Ident, Span, TokenStream};
 use quote::{format_ident, quote};

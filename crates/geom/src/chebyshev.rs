@@ -58,7 +58,7 @@ impl ChebyshevVector {
         self.interval
     }
 
-    /// Instants apart from the nodes: where an interpolation is worst, and an even spread.
+    /// Instants at which an interpolation is tested: halfway between nodes, where it is worst, and evenly spread.
     pub fn check_instants(&self) -> impl Iterator<Item = Et> + use<> {
         let interval = self.interval;
         let extremes = (0..=NODES).map(|k| (PI * k as f64 / NODES as f64).cos());

@@ -159,7 +159,7 @@ mod tests {
             assert!((back[0] - cell[0]).hypot(back[1] - cell[1]) < 1e-9); // rounding, cells
             let height_m = grid.height_m(cell);
             let expected_m = 10.0 * cell[0] + cell[1];
-            assert!(height_m.is_some_and(|of| (of - expected_m).abs() < 1e-9)); // rounding, metres
+            assert!(height_m.is_some_and(|height_m| (height_m - expected_m).abs() < 1e-9)); // rounding, metres
         }
         let shifted_m = grid.probed_m(&Probe::at([0.25, 0.5]), [2, 1]);
         assert_eq!(shifted_m, grid.height_m([2.25, 1.5]));

@@ -104,21 +104,18 @@ const BY_RANGE_M: f64 = 0.006;
 
 /// Whether the file of the shot in `row` states where the spacecraft was.
 ///
-/// A PEDR file always does: at nadir its spacecraft lies on the radius through the footprint. Of a table see
-/// [`has_own_spacecraft`].
+/// A PEDR file always does: at nadir its spacecraft lies on the radius through the footprint. A table without positions
+/// has the spacecraft on that radius at the range ("nadir by range"): its distance from the footprint is then the range,
+/// and tests nothing.
 #[must_use]
 pub fn states_spacecraft<F>(footprints: &Footprints<F>, row: usize) -> bool {
     let shot = footprints.row(row);
     let file = footprints.files.get(usize::from(shot.file));
-    file.is_some_and(|file| file.version.is_some()) || has_own_spacecraft(&shot)
+    file.is_some_and(|file| !file.is_table) || has_own_spacecraft(&shot)
 }
 
-/// Whether a table states where the spacecraft was.
-///
-/// Otherwise it was put on the radius through the footprint at the range ("nadir by range"), because a table has a range
-/// but no position: its distance from the footprint is then the range, and tests nothing.
-#[must_use]
-pub fn has_own_spacecraft(shot: &Footprint) -> bool {
+/// Whether the spacecraft of a shot of a table is not the one that follows from footprint and range.
+fn has_own_spacecraft(shot: &Footprint) -> bool {
     let beside_m = shot.spacecraft_radius_m - (shot.radius_m + shot.range_m);
     if beside_m.abs() > BY_RANGE_M {
         return true;
@@ -137,4 +134,56 @@ pub fn own_spacecraft(shot: &Footprint) -> Position<BodyFixed> {
         shot.spacecraft_latitude_rad,
         shot.spacecraft_radius_m,
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use areograph_base::{body::Datum, footprints::SourceFile};
+
+    /// Whether a shot at nadir whose spacecraft is `beside_m` from footprint and range has an own spacecraft.
+    fn is_stated(is_table: bool, beside_m: f64) -> bool {
+        let mut footprints = Footprints::<BodyFixed>::new(vec![SourceFile {
+            name: "shots".to_owned(),
+            // The letter is in the name of a file, and says nothing of its content.
+            version: None,
+            datum: Datum::Iau2000,
+            blake3: String::new(),
+            is_table,
+        }]);
+        footprints.push(&Footprint {
+            et_tag_s: 0.0,
+            et_s: 0.0,
+            orbit: 1,
+            file: 0,
+            record: 1,
+            shot: 1,
+            longitude_rad: 1.0,
+            latitude_rad: 0.2,
+            radius_m: 3_394_000.0,
+            radius_crossover_m: 3_394_000.0,
+            areoid_radius_m: 3_396_000.0,
+            range_m: 380_000.0,
+            spacecraft_longitude_rad: 1.0,
+            spacecraft_latitude_rad: 0.2,
+            spacecraft_radius_m: 3_774_000.0 + beside_m,
+            off_nadir_rad: 0.0,
+            channel: 1,
+            class: 1,
+            attitude_flag: 0,
+            orbit_quality: 1,
+            windows: 1,
+        });
+        states_spacecraft(&footprints, 0)
+    }
+
+    #[test]
+    fn only_tables_have_shots_at_nadir_by_range() {
+        // A spacecraft at the range above its footprint: of a PEDR file it is a position, of a table it follows from the range.
+        assert!(is_stated(false, 0.0));
+        assert!(!is_stated(true, 0.0));
+        // Metres: a digit of a table in centimetres, and a residual.
+        assert!(!is_stated(true, 0.005));
+        assert!(is_stated(true, 1.5));
+    }
 }

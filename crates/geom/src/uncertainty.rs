@@ -155,6 +155,10 @@ pub struct UncertaintyBudget {
     pub equation_7: PointUncertainty,
     /// The same by equation 5, where means of opposite sign add up.
     pub equation_5: SignedBudget,
+    /// Ground size of a pixel, metres.
+    pub pixel_size_m: f64,
+    /// Flying height over base.
+    pub height_over_base: f64,
 }
 
 impl UncertaintyBudget {
@@ -172,11 +176,8 @@ impl UncertaintyBudget {
         if budgets.is_empty() {
             return None;
         }
-        let ratio = |one: f64, other: f64| if other > 0.0 { one / other } else { 0.0 };
-        let of_plan = |of: &PointUncertainty| ratio(of.planimetric_m, of.planimetric_px);
-        let of_height = |of: &PointUncertainty| ratio(of.height_px, of.across_px);
-        let pixel_size_m = mean(&|of| of_plan(&of.equation_7));
-        let height_over_base = mean(&|of| of_height(&of.equation_7));
+        let pixel_size_m = mean(&|of| of.pixel_size_m);
+        let height_over_base = mean(&|of| of.height_over_base);
         let along_px = root(&|of| of.along_px);
         let total_along_px = all_have(|of| of.total_along_px);
         let signed_px = root(&|of| of.equation_5.along_px);
@@ -194,6 +195,8 @@ impl UncertaintyBudget {
                 unexplained_px: all_have(|of| of.equation_5.unexplained_px),
                 point: point(signed_px, root(&|of| of.equation_5.point.across_px)),
             },
+            pixel_size_m,
+            height_over_base,
         })
     }
 }
@@ -265,7 +268,9 @@ pub fn uncertainty_budget(input: &BudgetInput) -> Result<UncertaintyBudget, Budg
         )
     };
     let of_pixel = |metres: f64| metres / input.pixel_size_m;
-    let total_along_px = input.misregistration.map(|of| of_pixel(of.rms_m));
+    let total_along_px = input
+        .misregistration
+        .map(|misregistration| of_pixel(misregistration.rms_m));
     let signed_px = apart(ResidualMoments::size_x);
     let mean_x = input
         .sites
@@ -282,9 +287,13 @@ pub fn uncertainty_budget(input: &BudgetInput) -> Result<UncertaintyBudget, Budg
         equation_5: SignedBudget {
             along_px: signed_px,
             // The misregistration is that of the second image against the first.
-            unexplained_px: input.misregistration.map(|of| of_pixel(of.mean_m) + mean_x),
+            unexplained_px: input
+                .misregistration
+                .map(|misregistration| of_pixel(misregistration.mean_m) + mean_x),
             point: point(signed_px, apart(ResidualMoments::size_y)),
         },
+        pixel_size_m: input.pixel_size_m,
+        height_over_base: input.height_over_base,
     })
 }
 
@@ -328,10 +337,16 @@ fn check(input: &BudgetInput) -> Result<(), BudgetError> {
             ]
         })
     });
-    let observed = input.misregistration.iter().map(|of| {
+    let observed = input.misregistration.iter().map(|misregistration| {
         [
-            ("the misregistration of footprints, metres,", of.mean_m),
-            ("the misregistration of footprints, metres,", of.rms_m),
+            (
+                "the misregistration of footprints, metres,",
+                misregistration.mean_m,
+            ),
+            (
+                "the misregistration of footprints, metres,",
+                misregistration.rms_m,
+            ),
         ]
     });
     for (what, value) in of_sites.chain(observed).flatten() {

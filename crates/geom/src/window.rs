@@ -128,6 +128,13 @@ impl Region {
         })
     }
 
+    /// A box around each part, radians: longitude from the first edge eastwards to the second, of any turn, then latitude from
+    /// the third to the fourth. None for the outline of an image.
+    pub fn boxes_rad(&self) -> impl Iterator<Item = [f64; 4]> {
+        let bounds = self.pieces.iter().map(Piece::bounds);
+        bounds.map(|of| [of.west, of.east, of.south, of.north])
+    }
+
     /// Whether some direction within `margin_rad` (great circle) of this one may lie inside.
     ///
     /// Never false when such a direction exists; may be true when none does.

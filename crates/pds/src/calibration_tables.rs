@@ -75,24 +75,24 @@ pub fn read_control(path: &Path) -> Result<Rows<ControlRow>> {
         let matching = ["sigma_matching_horizontal_m", "sigma_matching_vertical_m"];
         let matching = matching.map(|name| optional(header, name));
         Ok(move |row: &csv::StringRecord| {
-            let of = numbers(row, &place)?;
-            if !(of[0] >= -180.0 && of[0] <= 360.0 && of[1].abs() <= 90.0) {
+            let values = numbers(row, &place)?;
+            if !(values[0] >= -180.0 && values[0] <= 360.0 && values[1].abs() <= 90.0) {
                 return Err(format!(
                     "longitude_deg {}, latitude_deg {}: expected -180 to 360 and -90 to 90 degrees",
-                    of[0], of[1]
+                    values[0], values[1]
                 ));
             }
-            if !(RADIUS_M[0]..=RADIUS_M[1]).contains(&of[2]) {
+            if !(RADIUS_M[0]..=RADIUS_M[1]).contains(&values[2]) {
                 return Err(format!(
                     "radius_m {}: expected a distance from the centre of the body, metres",
-                    of[2]
+                    values[2]
                 ));
             }
             Ok(ControlRow {
                 image: image.row(row)?,
-                longitude_deg: of[0],
-                latitude_deg: of[1],
-                radius_m: of[2],
+                longitude_deg: values[0],
+                latitude_deg: values[1],
+                radius_m: values[2],
                 sigma_m: deviations(row, sigma, CONTROL_SIGMA_MAX_M)?,
                 matching_m: deviations(row, matching, CONTROL_SIGMA_MAX_M)?,
             })
@@ -133,7 +133,7 @@ impl ImageColumns {
 }
 
 fn optional(header: &csv::StringRecord, name: &str) -> Option<usize> {
-    header.iter().position(|of| of == name)
+    header.iter().position(|column_name| column_name == name)
 }
 
 /// Standard deviations of optional columns, which may be empty in a row.

@@ -3,8 +3,6 @@
 //! Rows are quoted CSV. Names and positions of the columns come from the label beside the table (`.lbl`); without one
 //! they are those of the mapping mission.
 
-mod columns;
-
 use std::{
     fs::File,
     io::{BufRead as _, BufReader, Read as _},
@@ -13,18 +11,79 @@ use std::{
 
 use chrono::NaiveDateTime;
 
-use self::columns::{COLUMNS, Column, Fields};
-use super::label::{LABEL_BYTES_MAX, parse};
+use super::{
+    index_columns::{self, Column, Fields},
+    label::{LABEL_BYTES_MAX, parse},
+};
 use areograph_base::{
     error::{Cause, IoError, Locate as _, Result},
     units::{METRES_PER_KM, RADIANS_PER_DEGREE, SECONDS_PER_MS},
 };
+
+/// Columns of the cumulative index of the mapping mission, in their order.
+const COLUMNS: [&str; 53] = [
+    "VOLUME_ID",
+    "FILE_SPECIFICATION_NAME",
+    "PRODUCT_ID",
+    "IMAGE_TIME",
+    "INSTRUMENT_NAME",
+    "FILTER_NAME",
+    "LINE_SAMPLES",
+    "LINES",
+    "CROSSTRACK_SUMMING",
+    "DOWNTRACK_SUMMING",
+    "SCALED_PIXEL_WIDTH",
+    "PIXEL_ASPECT_RATIO",
+    "EMISSION_ANGLE",
+    "INCIDENCE_ANGLE",
+    "PHASE_ANGLE",
+    "CENTER_LONGITUDE",
+    "CENTER_LATITUDE",
+    "UPPER_LEFT_LONGITUDE",
+    "UPPER_LEFT_LATITUDE",
+    "UPPER_RIGHT_LONGITUDE",
+    "UPPER_RIGHT_LATITUDE",
+    "LOWER_LEFT_LONGITUDE",
+    "LOWER_LEFT_LATITUDE",
+    "LOWER_RIGHT_LONGITUDE",
+    "LOWER_RIGHT_LATITUDE",
+    "MISSION_PHASE_NAME",
+    "TARGET_NAME",
+    "SPACECRAFT_CLOCK_START_COUNT",
+    "FOCAL_PLANE_TEMPERATURE",
+    "LINE_EXPOSURE_DURATION",
+    "GAIN_MODE_ID",
+    "OFFSET_MODE_ID",
+    "EDIT_MODE_ID",
+    "ENCODING_TYPE",
+    "SCALED_IMAGE_WIDTH",
+    "SCALED_IMAGE_HEIGHT",
+    "SPACECRAFT_ALTITUDE",
+    "TARGET_CENTER_DISTANCE",
+    "SLANT_DISTANCE",
+    "USAGE_NOTE",
+    "NORTH_AZIMUTH",
+    "SUB_SOLAR_AZIMUTH",
+    "SUB_SOLAR_LONGITUDE",
+    "SUB_SOLAR_LATITUDE",
+    "SUB_SPACECRAFT_LONGITUDE",
+    "SUB_SPACECRAFT_LATITUDE",
+    "SOLAR_DISTANCE",
+    "SOLAR_LONGITUDE",
+    "LOCAL_TIME",
+    "IMAGE_SKEW_ANGLE",
+    "RATIONALE_DESC",
+    "DATA_QUALITY_DESC",
+    "ORBIT_NUMBER",
+];
 
 /// An image of the index. Angles are in radians; longitudes are east, though the index has them west.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IndexedImage {
     /// Product, for example `M19/00850`.
     pub product_id: String,
+    /// Volume of the archive, empty where the index does not state it.
+    pub volume: String,
     /// Path on its volume.
     pub file: String,
     /// UTC of the start of the first line.
@@ -153,7 +212,7 @@ pub fn read_index(path: &Path) -> Result<ImageIndex> {
         if bytes.trim_ascii().is_empty() {
             continue;
         }
-        match columns::fields(&bytes, &columns).and_then(|fields| image(&fields)) {
+        match index_columns::fields(&bytes, &columns).and_then(|fields| image(&fields)) {
             Ok(image) => index.images.push(image),
             Err(text) => index.bad_rows.push(BadRow { line, text }),
         }
@@ -186,7 +245,7 @@ fn read_columns(path: &Path) -> Result<Vec<Column>> {
         .read_to_end(&mut bytes)
         .map_err(IoError::on("read"))
         .in_file(path)?;
-    let columns = columns::of_label(&parse(&bytes).in_file(path)?);
+    let columns = index_columns::of_label(&parse(&bytes).in_file(path)?);
     for needed in [
         "PRODUCT_ID",
         "IMAGE_TIME",
@@ -242,6 +301,7 @@ fn image(fields: &Fields<'_>) -> std::result::Result<IndexedImage, String> {
     let phase = known("MISSION_PHASE_NAME").map(str::to_owned);
     Ok(IndexedImage {
         product_id: product_id.to_owned(),
+        volume: known("VOLUME_ID").unwrap_or_default().to_owned(),
         file: text("FILE_SPECIFICATION_NAME").to_owned(),
         utc_start: text("IMAGE_TIME").to_owned(),
         orbit: phase.zip(natural("ORBIT_NUMBER")),

@@ -7,7 +7,7 @@
 //! | an archive of them, by windows | [`archive`] |
 //! | the label of an image | [`read_label()`] |
 //! | the pixels of a MOC image; of any image | [`image_file::ImageFile`]; [`pixel_file::PixelFile`] |
-//! | image support data (ISD) | [`isd`] |
+//! | image support data (ISD); an oriented cube of ISIS | [`isd`]; [`oriented_cube`] |
 //! | tables of shots, tie points, control points | [`shot_table`], [`ties`], [`calibration_tables`] |
 //!
 //! ```
@@ -36,9 +36,11 @@ mod hrsc;
 pub mod image_file;
 pub mod image_index;
 mod image_label;
+pub mod index_columns;
 pub mod isd;
 pub mod label;
 pub mod moc;
+pub mod oriented_cube;
 pub mod pedr;
 pub mod pedr_table;
 pub mod pixel_file;

@@ -22,10 +22,19 @@ use areograph_base::{
 /// An instrument that is not among `cameras`, or none; an image of another spacecraft or target, or one that is
 /// map-projected; a value that is not of its kind, or two values under one keyword.
 pub fn image_label(label: &Label, cameras: &[Instrument]) -> Result<ImageLabel, LabelError> {
+    let read = label_of_camera(label, cameras)?;
+    as_taken(label)?;
+    Ok(read)
+}
+
+/// The same for the label of an image that may be map-projected.
+pub(super) fn label_of_camera(
+    label: &Label,
+    cameras: &[Instrument],
+) -> Result<ImageLabel, LabelError> {
     let instrument = camera(label, cameras, ["FILTER_NAME", "FILTERNAME"])?;
     let spacecraft = ["SPACECRAFT_NAME", "SPACECRAFTNAME"];
     of_mars(label, spacecraft, &SPACECRAFT.label_name)?;
-    as_taken(label)?;
     let size = |pds, isis| match label.only_in("IMAGE", pds)? {
         None => label.only_in("DIMENSIONS", isis),
         found => Ok(found),

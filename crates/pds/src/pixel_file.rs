@@ -249,7 +249,7 @@ pub(super) fn tiff_rows(path: &Path) -> Result<Box<dyn Rows>> {
 }
 
 /// Whether the label describes pixels of an ISIS cube.
-fn is_cube(label: &Label) -> bool {
+pub(super) fn is_cube(label: &Label) -> bool {
     label.entries.iter().any(|entry| entry.group == "CORE")
 }
 

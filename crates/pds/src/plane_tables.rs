@@ -100,8 +100,8 @@ pub fn read_measurements(path: &Path) -> Result<Rows<MeasurementRow>> {
             Err(_) => columns(header, ["x", "y"], COLUMNS)?.to_vec(),
         };
         Ok(move |row: &csv::StringRecord| {
-            let of: Vec<f64> = numbers(row, &places)?;
-            let at = match of[..] {
+            let values: Vec<f64> = numbers(row, &places)?;
+            let at = match values[..] {
                 [x, y] => Place::new(x, y),
                 [right, upper, left, lower] => {
                     box_centre(Place::new(right, upper), Place::new(left, lower))
@@ -144,21 +144,26 @@ pub fn read_controls(path: &Path) -> Result<Rows<ControlRow>> {
         };
         let sigma = [("sigma_m", 1.0), ("sigma_km", METRES_PER_KM)]
             .into_iter()
-            .find_map(|(name, unit_m)| Some((header.iter().position(|of| of == name)?, unit_m)));
+            .find_map(|(name, unit_m)| {
+                Some((
+                    header.iter().position(|column_name| column_name == name)?,
+                    unit_m,
+                ))
+            });
         Ok(move |row: &csv::StringRecord| {
-            let of = numbers(row, &places)?;
+            let values = numbers(row, &places)?;
             let at = match unit_m {
-                Some(unit_m) => ControlPlace::Map(Place::new(of[0], of[1]) * unit_m),
-                None if of[0] >= -180.0 && of[0] <= 360.0 && of[1].abs() <= 90.0 => {
+                Some(unit_m) => ControlPlace::Map(Place::new(values[0], values[1]) * unit_m),
+                None if values[0] >= -180.0 && values[0] <= 360.0 && values[1].abs() <= 90.0 => {
                     ControlPlace::Sphere {
-                        longitude_deg: of[0],
-                        latitude_deg: of[1],
+                        longitude_deg: values[0],
+                        latitude_deg: values[1],
                     }
                 }
                 None => {
                     return Err(format!(
                         "longitude_deg {}, latitude_deg {}: expected -180 to 360 and -90 to 90 degrees",
-                        of[0], of[1]
+                        values[0], values[1]
                     ));
                 }
             };
@@ -189,7 +194,7 @@ pub fn read_pictures(path: &Path) -> Result<Rows<PictureRow>> {
     const COLUMNS: &str = "picture, and where known brick and metres_per_unit";
     read_rows(path, EXAMPLE, |header| {
         let [picture] = columns(header, ["picture"], COLUMNS)?;
-        let place = |name: &str| header.iter().position(|of| of == name);
+        let place = |name: &str| header.iter().position(|column_name| column_name == name);
         let (brick, size) = (place("brick"), place("metres_per_unit"));
         Ok(move |row: &csv::StringRecord| {
             let text =
@@ -223,18 +228,18 @@ pub fn read_ticks(path: &Path) -> Result<Rows<TickRow>> {
         let [picture, tick] = columns(header, ["picture", "tick"], COLUMNS)?;
         let places = columns(header, ["x", "y", "known_x", "known_y"], COLUMNS)?;
         Ok(move |row: &csv::StringRecord| {
-            let of = numbers(row, &places)?;
+            let values = numbers(row, &places)?;
             let written = row.get(tick).unwrap_or_default();
             let mut known = CORNER_TICKS.iter().chain(&EDGE_TICKS);
-            let index = known.position(|of| *of == written).ok_or_else(|| {
+            let index = known.position(|known| *known == written).ok_or_else(|| {
                 let all = [CORNER_TICKS, EDGE_TICKS].concat().join(", ");
                 format!("tick {written:?}: expected one of {all}")
             })?;
             Ok(TickRow {
                 picture: name(row, picture, NAMED)?,
                 tick: index,
-                measured: Place::new(of[0], of[1]),
-                known: Place::new(of[2], of[3]),
+                measured: Place::new(values[0], values[1]),
+                known: Place::new(values[2], values[3]),
             })
         })
     })

@@ -127,7 +127,7 @@ pub(super) fn columns<const N: usize>(
 ) -> std::result::Result<[usize; N], TableError> {
     let mut places = [0; N];
     for (place, column) in places.iter_mut().zip(names) {
-        let found = header.iter().position(|of| of == column);
+        let found = header.iter().position(|column_name| column_name == column);
         *place = found.ok_or(TableError::Column { column, expected })?;
     }
     Ok(places)

@@ -319,10 +319,18 @@ mod tests {
         let table = "point_id,serial_number,sample,line,line_sigma_px,sample_sigma_px\n\
             1,A,2.5,1,0.3,0.2\n1,B,7,8,,\n2,A,1,1,0.3,\n2,B,1,1,0,0.2\n";
         let file = parse_table(table.as_bytes()).unwrap();
-        let sigmas: Vec<_> = file.ties[0].measures.iter().map(|of| of.sigma_px).collect();
+        let sigmas: Vec<_> = file.ties[0]
+            .measures
+            .iter()
+            .map(|measure| measure.sigma_px)
+            .collect();
         assert_eq!(sigmas, [Some([0.3, 0.2]), None]);
         assert_eq!(file.ties.len(), 1);
-        let texts: Vec<&str> = file.complaints.iter().map(|of| &*of.text).collect();
+        let texts: Vec<&str> = file
+            .complaints
+            .iter()
+            .map(|complaint| &*complaint.text)
+            .collect();
         let expected = "expected two numbers above 0, or neither";
         assert_eq!(
             texts,

@@ -80,10 +80,11 @@ fn shot_columns<'a>() -> Vec<Column<Shot<'a>>> {
         columns.push(column(
             sigma,
             Unit::Metre,
-            "standard deviation of the adjusted coordinate, metres",
+            "standard deviation of the adjusted coordinate, metres, with the shift of its profile",
             move |shot: &Shot| sigma_m(shot.0, axis),
         ));
     }
+    columns.extend(local_columns());
     columns.extend([
         range(
             "range_m",
@@ -100,7 +101,7 @@ fn shot_columns<'a>() -> Vec<Column<Shot<'a>>> {
         range(
             "range_redundancy",
             Unit::None,
-            "share of an error of the range that shows in its residual, 0 to 1",
+            "fraction of an error of the range that appears in its residual, 0 to 1",
             |range| Some(range.residual_m.redundancy),
         ),
         range(
@@ -111,6 +112,45 @@ fn shot_columns<'a>() -> Vec<Column<Shot<'a>>> {
         ),
     ]);
     columns
+}
+
+/// Standard deviations towards east, north and up: of a footprint, of what its profile shares, and of the rest.
+fn local_columns<'a>() -> Vec<Column<Shot<'a>>> {
+    type Sigmas = fn(&CorrectedPoint) -> Option<[f64; 3]>;
+    let kinds: [([&'static str; 3], &'static str, Sigmas); 3] = [
+        (
+            ["sigma_east_m", "sigma_north_m", "sigma_up_m"],
+            "the same towards east, north or up, metres",
+            |point| Some(point.local_sigmas_m()),
+        ),
+        (
+            [
+                "shared_sigma_east_m",
+                "shared_sigma_north_m",
+                "shared_sigma_up_m",
+            ],
+            "part of it: standard deviation of the shift that all footprints of the profile share, metres; it does not average out",
+            |point| Some(point.shared?.sigma_m),
+        ),
+        (
+            [
+                "relative_sigma_east_m",
+                "relative_sigma_north_m",
+                "relative_sigma_up_m",
+            ],
+            "the rest: standard deviation without that shift, metres, for differences of footprints of one profile",
+            CorrectedPoint::relative_sigmas_m,
+        ),
+    ];
+    let of_kind = |(names, meaning, of): ([&'static str; 3], &'static str, Sigmas)| {
+        let axes = names.into_iter().enumerate();
+        axes.map(move |(axis, name)| {
+            column(name, Unit::Metre, meaning, move |shot: &Shot| {
+                Some(of(shot.0)?[axis])
+            })
+        })
+    };
+    kinds.into_iter().flat_map(of_kind).collect()
 }
 
 fn sigma_m(point: &CorrectedPoint, axis: usize) -> f64 {

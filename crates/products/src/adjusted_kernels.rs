@@ -216,6 +216,9 @@ fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
          \n\
          Positions: {spacecraft} relative to the centre of Mars, geometric, J2000, with the rotation of Mars of the\n\
          IAU 2000 report (pck00008 to pck00010). {positions}\n\
+         Use positions and attitudes together: along the track the adjustment separates neither from line times, so that the\n\
+         camera may have been farther along its orbit when a line was exposed, and the attitude makes up for it on the\n\
+         ground (adjustment.json, line_time_sigma_s).\n\
          \n\
          Attitudes: J2000 to {bus_frame}. The attitude of an exposure at t is stored at t {sign} {size:.3} s,\n\
          as in the kernels that this file replaces. {others}\n",
@@ -282,7 +285,8 @@ fn metakernel(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<String> 
     Ok(text.replacen(
         "\n\n",
         &format!(
-            "\n\nThe last ones are adjusted: each pair is valid only for its image, not for laser shots or other images, with\n\
+            "\n\nThe last kernels are adjusted: each pair is valid only for its image, not for laser shots or other \
+             images, with\n\
              the pointing bias of {}.\n\n",
             biases.join(", ")
         ),

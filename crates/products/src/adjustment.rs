@@ -2,6 +2,7 @@
 
 mod boresight;
 mod configured;
+mod definitions;
 mod readings;
 
 use std::{borrow::Cow, collections::BTreeMap};
@@ -31,75 +32,8 @@ use areograph_stages::{
 };
 use boresight::BoresightDocument;
 use configured::AdjustmentKeys;
+use definitions::DEFINITIONS;
 use readings::OtherReadingDocument;
-
-/// Definitions of the numbers, for readers of the file.
-const DEFINITIONS: [(&str, &str); 12] = [
-    (
-        "before, after",
-        "with the orientation of the kernels, and with the adjusted one; ground points are intersected anew",
-    ),
-    (
-        "focal",
-        "residual of the intersection in the focal plane, along and across the track, pixels of the image",
-    ),
-    (
-        "reprojection",
-        "measured minus projected place of the intersected point: lines along the track, pixels of the image \
-         across it; residuals of the pairs too (Table 5 of Shan et al. 2005)",
-    ),
-    (
-        "heights",
-        "tie points above the MOLA surface, metres: before the adjustment a test of the orientation, after it the fit of the \
-         adjustment to its control",
-    ),
-    (
-        "along_track_parallax_m",
-        "mean distance along the flight between the two images' positions of a tie point, metres",
-    ),
-    (
-        "footprints",
-        "position of a footprint of the first image in the second by the tie points, minus its projected position: \
-         lines and samples of the second image, metres on the ground, and distances of successive footprints. Only \
-         footprints count that both images show, on a line between those of the tie points; outside are those within the \
-         lines of both images that lie outside one of them. above_mola_m: heights at which the rays of these places meet, minus \
-         those of the footprints",
-    ),
-    (
-        "budget",
-        "eq. 5 to 9 of Shan et al. 2005; pixels are the mean line spacing of the pair. paper_average takes the average of \
-         the images' across-track residuals as the paper computes, equation_7 their sum of squares as its eq. 7 states; \
-         both add the means of the images in quadrature. equation_5 has the differences of the images tie point by tie \
-         point, where means of opposite sign add up, and the mean misregistration that they leave unexplained",
-    ),
-    (
-        "correction, sigmas",
-        "X, Y and Z position in IAU 2000, metres, then rotations about the camera's x, y and z axis, radians; of each \
-         the coefficients of 1, t and t², t = 0 in the middle of the image and 1 at its end. M = exp([rotation]x) M before",
-    ),
-    (
-        "sigmas",
-        "a priori variances times the variance factor. The published model treats footprints in images as measured \
-         independently, which they are not: there they describe how well images agree, not the accuracy of heights and positions",
-    ),
-    (
-        "other_reading",
-        "where a pair disagrees by more than 100 m along the flight: the mean of the tie points by the other of two readings, \
-         all images equally likely to be wrong or one offset of the attitude's clock (attitude_clock_s), minus that of the \
-         adjustment. Which is true is not measured: standard deviations hold for their own reading",
-    ),
-    (
-        "boresight",
-        "where adjustment.common_bus is yes: angles of the laser from the direction by mounting and altimeter file \
-         (towards X of the bus, and at right angles to that and the beam), the offset of each recorded profile from its adjusted position, \
-         and the unknown farthest from its a priori value, in standard deviations of the contradiction",
-    ),
-    (
-        "configured",
-        "a standard deviation above 1e300 leaves the unknown free; without blunder_limit and height_blunder_limit all tie \
-         points are kept",
-    ),
-];
 
 #[derive(Serialize, JsonSchema)]
 #[schemars(
@@ -127,7 +61,9 @@ struct Definition {
 
 #[derive(Serialize, JsonSchema)]
 struct Configured<'a> {
-    model: CameraModel,
+    /// The form of orientation that the configuration requires; otherwise `registration.json` states that of each image.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    model: Option<CameraModel>,
     light_time: LightTime,
     intersection: &'a IntersectionConfig,
     adjustment: AdjustmentKeys<'a>,
@@ -284,6 +220,9 @@ struct ImageDocument<'a> {
     pedr_orbit_m: Option<[f64; 3]>,
     #[schemars(transform = none_negative)]
     sigmas: &'a [f64; ORIENTATION_UNKNOWNS],
+    /// Standard deviation of a delay of all lines that `sigmas` contain; 0 where they contain none.
+    #[schemars(range(min = 0.0))]
+    line_time_sigma_s: f64,
     /// With its standard deviation.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
@@ -360,8 +299,10 @@ fn document<'a>(
             summary: &adjusted.summary,
             heights: adjusted.heights.as_ref(),
             relief: adjusted.relief.as_ref(),
-            boresight: boresight.and_then(|of| Some(BoresightDocument::of(of.as_ref().ok()?))),
-            no_boresight_because: boresight.and_then(|of| Some(of.as_ref().err()?.as_str())),
+            boresight: boresight
+                .and_then(|boresight| Some(BoresightDocument::of(boresight.as_ref().ok()?))),
+            no_boresight_because: boresight
+                .and_then(|boresight| Some(boresight.as_ref().err()?.as_str())),
             attitude_clock_s: adjusted.attitude_clock_s,
             other_reading: other.and_then(|other| Some(other.as_ref().ok()?.into())),
             no_other_reading_because: other.and_then(|other| Some(other.as_ref().err()?.as_str())),
@@ -401,6 +342,7 @@ fn image(image: &CorrectedImage) -> ImageDocument<'_> {
         correction: &image.correction,
         pedr_orbit_m: image.pedr_orbit_m(),
         sigmas: &image.sigmas,
+        line_time_sigma_s: image.line_time_sigma_s,
         time_bias_s: image.time_bias_s,
     }
 }

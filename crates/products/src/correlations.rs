@@ -10,7 +10,7 @@ use areograph_stages::adjust::CorrectedImage;
 
 pub(super) static TABLE: Declaration = Declaration {
     path: "correlations.parquet",
-    what: "correlations between the adjusted orientation unknowns of each image",
+    what: "correlations between the orientation coefficients of each image, with the line times that their covariance contains",
     readers: "scripts",
     rows: "pairs of unknowns",
     role: Role::Data,

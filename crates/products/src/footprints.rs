@@ -50,13 +50,15 @@ pub(super) static PARQUET: Declaration = Declaration {
     content: Content::Table(|| meanings(&columns())),
     write: Write::Site(|path, of| {
         let bounds = bounding_box_deg(&points_deg(of.site));
-        let metadata = vec![
+        let mut metadata = vec![
             (
                 "geo",
                 geo_metadata(of.site.config.body, bounds, None).to_string(),
             ),
             ("frame", frame(of.site.config.body).to_owned()),
         ];
+        let choice = of.site.footprints.ground_choice();
+        metadata.extend(choice.map(|of| ("ground_radius", of.words().to_owned())));
         parquet::write(path, table(of.site), metadata).map(Some)
     }),
     uses: &[Use {
@@ -153,7 +155,8 @@ impl<'a> Shot<'a> {
 
     fn xyz_m(&self, axis: usize) -> f64 {
         let shot = self.footprints.row(self.row);
-        spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, shot.radius_m)[axis]
+        let radius_m = self.footprints.ground_radius_m(self.row);
+        spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, radius_m)[axis]
     }
 
     pub(super) fn point_deg(&self) -> [f64; 2] {
@@ -174,7 +177,7 @@ pub(super) fn features<'a>(site: &'a SiteProducts<'a>) -> Features<'a> {
     let body = site.config.body;
     let point = |shot: &Shot| {
         let [east_deg, north_deg] = shot.point_deg();
-        let height_m = shot.get(|of| &of.radius_crossover_m) - body.map().radius_m;
+        let height_m = shot.get(|footprints| &footprints.radius_crossover_m) - body.map().radius_m;
         [east_deg, north_deg, height_m]
     };
     Features::of_footprints(
@@ -237,13 +240,13 @@ fn identity<'a>() -> Vec<Column<Shot<'a>>> {
             "et_tag_s",
             Unit::Second,
             "time tag of the shot in the file, TDB seconds past J2000",
-            |shot: &Shot| shot.get(|of| &of.et_tag_s),
+            |shot: &Shot| shot.get(|footprints| &footprints.et_tag_s),
         ),
         column(
             "et_s",
             Unit::Second,
             "time of the shot after the MOLA clock correction, TDB seconds past J2000",
-            |shot: &Shot| shot.get(|of| &of.et_s),
+            |shot: &Shot| shot.get(|footprints| &footprints.et_s),
         )
         .in_gis()
         .in_dbase("et_s", 20, 6),
@@ -254,7 +257,7 @@ fn identity<'a>() -> Vec<Column<Shot<'a>>> {
             "orbit",
             Unit::None,
             "orbit number of the frame",
-            |shot: &Shot| shot.get(|of| &of.orbit),
+            |shot: &Shot| shot.get(|footprints| &footprints.orbit),
         )
         .in_gis()
         .in_dbase("orbit", 10, 0),
@@ -267,7 +270,7 @@ fn identity<'a>() -> Vec<Column<Shot<'a>>> {
             "record",
             Unit::None,
             "record of that file, counted from 1 with its label records",
-            |shot: &Shot| shot.get(|of| &of.record),
+            |shot: &Shot| shot.get(|footprints| &footprints.record),
         )
         .in_gis()
         .in_dbase("record", 10, 0),
@@ -275,7 +278,7 @@ fn identity<'a>() -> Vec<Column<Shot<'a>>> {
             "shot",
             Unit::None,
             "shot in the frame, 1 to 20",
-            |shot: &Shot| u32::from(shot.get(|of| &of.shot)),
+            |shot: &Shot| u32::from(shot.get(|footprints| &footprints.shot)),
         )
         .between(1, 20)
         .in_gis()
@@ -287,25 +290,25 @@ fn identity<'a>() -> Vec<Column<Shot<'a>>> {
 fn quality<'a>() -> Vec<Column<Shot<'a>>> {
     vec![
         column("channel", Unit::None, "trigger channel", |shot: &Shot| {
-            u32::from(shot.get(|of| &of.channel))
+            u32::from(shot.get(|footprints| &footprints.channel))
         }),
         column(
             "class",
             Unit::None,
             "classification: 1 ground, 0 cloud or noise",
-            |shot: &Shot| i32::from(shot.get(|of| &of.class)),
+            |shot: &Shot| i32::from(shot.get(|footprints| &footprints.class)),
         ),
         column(
             "attitude_flag",
             Unit::None,
             "0 attitude known, 2 known for part of the frame, 3 unknown",
-            |shot: &Shot| u32::from(shot.get(|of| &of.attitude_flag)),
+            |shot: &Shot| u32::from(shot.get(|footprints| &footprints.attitude_flag)),
         ),
         column(
             "orbit_quality",
             Unit::None,
             "0 orbit from JPL, 1 or more: MOLA team's gravity model number",
-            |shot: &Shot| u32::from(shot.get(|of| &of.orbit_quality)),
+            |shot: &Shot| u32::from(shot.get(|footprints| &footprints.orbit_quality)),
         ),
         column(
             "windows",
@@ -324,14 +327,14 @@ fn ground<'a>() -> Vec<Column<Shot<'a>>> {
             "longitude_deg",
             Unit::Degree,
             "east longitude, 0..360 degrees, IAU 2000",
-            |shot: &Shot| degrees(shot.get(|of| &of.longitude_rad)),
+            |shot: &Shot| degrees(shot.get(|footprints| &footprints.longitude_rad)),
         )
         .in_dbase("lon_deg", 14, 9),
         column(
             "latitude_deg",
             Unit::Degree,
             "areocentric latitude, degrees, IAU 2000",
-            |shot: &Shot| degrees(shot.get(|of| &of.latitude_rad)),
+            |shot: &Shot| degrees(shot.get(|footprints| &footprints.latitude_rad)),
         )
         .in_dbase("lat_deg", 14, 9),
         column(
@@ -350,7 +353,7 @@ fn heights<'a>() -> Vec<Column<Shot<'a>>> {
             "radius_m",
             Unit::Metre,
             "planetary radius before the crossover correction, metres",
-            |shot: &Shot| shot.get(|of| &of.radius_m),
+            |shot: &Shot| shot.get(|footprints| &footprints.radius_m),
         )
         .in_gis()
         .in_dbase("radius_m", 12, 3),
@@ -358,7 +361,7 @@ fn heights<'a>() -> Vec<Column<Shot<'a>>> {
             "radius_crossover_m",
             Unit::Metre,
             "planetary radius after the crossover correction, metres",
-            |shot: &Shot| shot.get(|of| &of.radius_crossover_m),
+            |shot: &Shot| shot.get(|footprints| &footprints.radius_crossover_m),
         )
         .in_gis()
         .in_dbase("radius_x_m", 12, 3),
@@ -366,7 +369,7 @@ fn heights<'a>() -> Vec<Column<Shot<'a>>> {
             "areoid_radius_m",
             Unit::Metre,
             "areoid radius, metres",
-            |shot: &Shot| shot.get(|of| &of.areoid_radius_m),
+            |shot: &Shot| shot.get(|footprints| &footprints.areoid_radius_m),
         ),
         column(
             "topography_m",
@@ -379,19 +382,19 @@ fn heights<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "x_m",
             Unit::Metre,
-            "IAU 2000 body-fixed X of the point with radius_m, metres",
+            "IAU 2000 body-fixed X of the ground: with the radius that all stages use, metres",
             |shot: &Shot| shot.xyz_m(0),
         ),
         column(
             "y_m",
             Unit::Metre,
-            "IAU 2000 body-fixed Y of the point with radius_m, metres",
+            "IAU 2000 body-fixed Y of the ground: with the radius that all stages use, metres",
             |shot: &Shot| shot.xyz_m(1),
         ),
         column(
             "z_m",
             Unit::Metre,
-            "IAU 2000 body-fixed Z of the point with radius_m, metres",
+            "IAU 2000 body-fixed Z of the ground: with the radius that all stages use, metres",
             |shot: &Shot| shot.xyz_m(2),
         ),
     ]
@@ -403,7 +406,7 @@ fn spacecraft<'a>() -> Vec<Column<Shot<'a>>> {
             "range_m",
             Unit::Metre,
             "one-way range to the spacecraft's centre of mass, metres",
-            |shot: &Shot| shot.get(|of| &of.range_m),
+            |shot: &Shot| shot.get(|footprints| &footprints.range_m),
         )
         .in_gis()
         .in_dbase("range_m", 12, 3),
@@ -411,25 +414,25 @@ fn spacecraft<'a>() -> Vec<Column<Shot<'a>>> {
             "spacecraft_longitude_deg",
             Unit::Degree,
             "east longitude of the spacecraft, the file's orbit, IAU 2000",
-            |shot: &Shot| degrees(shot.get(|of| &of.spacecraft_longitude_rad)),
+            |shot: &Shot| degrees(shot.get(|footprints| &footprints.spacecraft_longitude_rad)),
         ),
         column(
             "spacecraft_latitude_deg",
             Unit::Degree,
             "areocentric latitude of the spacecraft, the file's orbit",
-            |shot: &Shot| degrees(shot.get(|of| &of.spacecraft_latitude_rad)),
+            |shot: &Shot| degrees(shot.get(|footprints| &footprints.spacecraft_latitude_rad)),
         ),
         column(
             "spacecraft_radius_m",
             Unit::Metre,
             "distance of the spacecraft from the centre of Mars, the file's orbit",
-            |shot: &Shot| shot.get(|of| &of.spacecraft_radius_m),
+            |shot: &Shot| shot.get(|footprints| &footprints.spacecraft_radius_m),
         ),
         column(
             "off_nadir_deg",
             Unit::Degree,
             "off-nadir angle of the laser, degrees",
-            |shot: &Shot| degrees(shot.get(|of| &of.off_nadir_rad)),
+            |shot: &Shot| degrees(shot.get(|footprints| &footprints.off_nadir_rad)),
         ),
         column(
             "nadir_by_range",

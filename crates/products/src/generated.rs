@@ -46,8 +46,8 @@ fn contents() -> impl Iterator<Item = &'static Content> {
 pub fn documentation() -> String {
     let mut text = "# Products\n\n\
         Generated from the declarations in `crates/products/src`; `tests/products/generated.rs` reports when it is stale.\n\n\
-        Paths are relative to the site's folder, `<image>` stands for the identifier of an image. `manifest.json`, which \
-        is written last, records what all of them were made from.\n\n\
+        Paths are relative to the site's folder, `<image>` stands for the identifier of an image. `manifest.json`, \
+        which is written last, records the inputs of all of them.\n\n\
         | file | what it is | for | one for | rows | schema |\n|---|---|---|---|---|---|\n"
         .to_owned();
     for product in PRODUCTS {
@@ -68,7 +68,8 @@ pub fn documentation() -> String {
         text += &columns_of(product, "");
     }
     text += "\n## Nets of rectified pictures\n\n\
-        Products of `areograph triangulate`, in the folder of the net; `manifest.json` comes last here too. `net:` precedes \
+        Products of `areograph triangulate`, in the folder of the net; `manifest.json` is written last here as well. \
+        `net:` precedes \
         their names below.\n\n\
         | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n";
     for product in NET_PRODUCTS {
@@ -82,7 +83,8 @@ pub fn documentation() -> String {
         text += &columns_of(product, "net: ");
     }
     text += "\n## Calibrations of the lines of a camera\n\n\
-        Products of `areograph calibrate`, in the folder of the calibration; `manifest.json` comes last here too. \
+        Products of `areograph calibrate`, in the folder of the calibration; `manifest.json` is written last here as \
+        well. \
         `calibration:` precedes their names below, `<camera>` stands for a line of the camera.\n\n\
         | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n";
     text += &line_of(&CAMERA_SUPPORT);
@@ -96,7 +98,8 @@ pub fn documentation() -> String {
         text += &columns_of(product, "calibration: ");
     }
     text += "\n## Laser control points from terrain models\n\n\
-        Products of `areograph pedr match`, in the folder `--out`; `manifest.json` comes last here too. `match:` precedes \
+        Products of `areograph pedr match`, in the folder `--out`; `manifest.json` is written last here as well. \
+        `match:` precedes \
         their names below.\n\n\
         | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n";
     text += &line_of(&CONTROL);
@@ -111,7 +114,8 @@ pub fn documentation() -> String {
         text += &columns_of(product, "match: ");
     }
     text += "\n## Archives of PEDR files\n\n\
-        Products of `areograph pedr qa`, in the folder `--out`; `manifest.json` comes last here too. `archive:` precedes \
+        Products of `areograph pedr qa`, in the folder `--out`; `manifest.json` is written last here as well. \
+        `archive:` precedes \
         their names below.\n\n\
         | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n";
     text += &line_of(&SHOTS);

@@ -99,7 +99,10 @@ fn footprints(geometric: &GeometricProducts) -> Vec<Compared> {
     let all = |pairs: &[PairComparison]| {
         let mut heights = BTreeMap::new();
         for (index, pair) in pairs.iter().enumerate() {
-            let profiles = pair.footprints.iter().flat_map(|of| &of.profiles);
+            let profiles = pair
+                .footprints
+                .iter()
+                .flat_map(|footprints| &footprints.profiles);
             for profile in profiles {
                 for footprint in &profile.heights {
                     let id = format!("{}:{}", profile.profile, footprint.row);
@@ -110,7 +113,10 @@ fn footprints(geometric: &GeometricProducts) -> Vec<Compared> {
         heights
     };
     let before = all(geometric.pairs);
-    let after = geometric.adjustment.as_ref().map(|of| all(of.pairs));
+    let after = geometric
+        .adjustment
+        .as_ref()
+        .map(|adjustment| all(adjustment.pairs));
     let after = after.unwrap_or_default();
     let both: BTreeSet<_> = before.keys().chain(after.keys()).collect();
     both.into_iter()
@@ -133,9 +139,11 @@ fn ties(geometric: &GeometricProducts) -> Vec<Compared> {
     let adjusted = geometric.adjustment.as_ref();
     let (before, after) = (
         by_tie(&geometric.heights.ties),
-        by_tie(adjusted.map_or(&[], |of| &of.heights.ties)),
+        by_tie(adjusted.map_or(&[], |adjusted| &adjusted.heights.ties)),
     );
-    let rejected = adjusted.map_or(&[][..], |of| &of.adjusted.rejected).iter();
+    let rejected = adjusted
+        .map_or(&[][..], |adjusted| &adjusted.adjusted.rejected)
+        .iter();
     let rejected = rejected.filter(|point| point.kind == PointKind::Tie);
     let rejected: BTreeMap<usize, String> = rejected
         .map(|point| (point.index, point.reason.to_string()))
@@ -193,7 +201,7 @@ fn columns() -> Vec<Column<Compared>> {
         column(
             "surface_sigma_m",
             Unit::Metre,
-            "standard deviation of the MOLA surface there, metres; missing for footprints, which are its shots",
+            "standard deviation of the MOLA surface at this point, metres; missing for footprints, which are its shots",
             |row: &Compared| row.latest()?.surface_sigma_m,
         ),
         column(

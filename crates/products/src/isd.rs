@@ -370,7 +370,10 @@ fn provenance<'a>(
                 attitude_source(times),
                 match round {
                     Round::Initial | Round::Matching => "",
-                    Round::Adjusted => ", turned by the correction and shifted as the lines are",
+                    Round::Adjusted => {
+                        ", turned by the correction and shifted as the lines are; it belongs to instrument_position, from which tie \
+                         points do not separate it along the track"
+                    }
                 },
             ),
             "image_lines: delivered lines; lines_header were exposed".to_owned(),

@@ -10,8 +10,9 @@ use super::{
     product::{Content, Declaration, Role, Write},
     site::SiteProducts,
 };
-use areograph_base::{kernel_source::CkQuality, schema::DocumentSchema, time::Intervals};
-use areograph_spice::quality_of;
+use areograph_base::{
+    kernel_names::quality_of, kernel_source::CkQuality, schema::DocumentSchema, time::Intervals,
+};
 use areograph_stages::describe_kernels::KernelLine;
 
 pub(super) static KERNELS: Declaration = Declaration {

@@ -49,6 +49,7 @@ mod parquet_file;
 mod pds4_label;
 mod picture;
 mod product;
+mod profile_check;
 mod ranges;
 pub mod read;
 mod registration;
@@ -74,8 +75,8 @@ pub use archive::{
 pub use calibration::{CalibrationProducts, write_calibration_products};
 pub use exchange::{
     ControlMeasure, ControlNetwork, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint,
-    NetworkMeasure, NetworkPoint, isis_serial_number, write_control_network, write_gcp,
-    write_lidar_data,
+    NetworkMeasure, NetworkPoint, ProfileShift, isis_serial_number, write_control_network,
+    write_gcp, write_lidar_data,
 };
 pub use found_shots::ShotsFile;
 pub use generated::{documentation, schemas};

@@ -28,7 +28,11 @@ pub(super) fn convention(site: &SiteProducts) -> String {
             LightTime::Support.positions()
         ),
     };
-    format!("{positions}; ranges of shots are geometric")
+    let choice = site.footprints.ground_choice();
+    let radii = choice.map_or_else(String::new, |of| {
+        format!(", radii of the ground are those {}", of.words())
+    });
+    format!("{positions}; ranges of shots are geometric{radii}")
 }
 
 /// The convention in the metadata of Parquet files.

@@ -69,7 +69,9 @@ fn has(site: &SiteProducts, declaration: &Declaration) -> bool {
             .geometric
             .is_some_and(|geometric| !geometric.ties.matched.is_empty()),
         Write::Surface(_) => site.surface.is_some(),
-        Write::Model(_) => site.surface.is_some_and(|of| !of.account.is_refused),
+        Write::Model(_) => site
+            .surface
+            .is_some_and(|surface| !surface.account.is_refused),
         Write::OfPage(_) => declaration.path != FIGURE.path,
         Write::Footprints(_) => !site.footprints.is_empty(),
         Write::Ties(_) => site.geometric.is_some(),

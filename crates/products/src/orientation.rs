@@ -311,7 +311,7 @@ fn columns<'a>() -> Vec<Column<Sample<'a>>> {
         boresight(
             "boresight_emission_deg",
             Unit::Degree,
-            "angle between normal and camera there, degrees",
+            "angle between surface normal and direction to the camera at this point, degrees",
             |ground| degrees(ground.emission_rad),
         ),
     ]

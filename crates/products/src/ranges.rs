@@ -15,7 +15,7 @@ use super::{
 use areograph_base::{altimetry::MolaClock, footprints::Footprint, schema::DocumentSchema};
 use areograph_config::RangeCheckConfig;
 use areograph_geom::{
-    range_residuals::has_own_spacecraft,
+    range_residuals::states_spacecraft,
     statistics::{Summary, Trend},
 };
 use areograph_stages::{
@@ -27,8 +27,8 @@ use areograph_stages::{
 const DEFINITIONS: [(&str, &str); 7] = [
     (
         "range_minus_distance",
-        "measured range minus |spacecraft in the kernels - footprint with the raw radius|, \
-        both in IAU 2000; the paper's Table 3, with the sign chosen here",
+        "measured range minus |spacecraft in the kernels - footprint with the raw radius|, both in IAU 2000, as in \
+         Table 3 of the paper; the sign is a convention of areograph",
     ),
     (
         "range_minus_distance_crossover",
@@ -53,12 +53,13 @@ const DEFINITIONS: [(&str, &str); 7] = [
         "bias_scan",
         "spread of range_minus_distance against an assumed correction of the time tags; best_s is limited \
         by its scatter and the orbit: uncertainty_s takes the mean difference of the two \
-        orbits as the error of either, a metre along the flight being 0.3 ms",
+        orbits as the error of either, a metre along the flight being 0.3 ms, and contains the slope of that difference and \
+        of the radii's correction along the profile",
     ),
     (
         "summary",
-        "all shots of the site, each once, also when it lies in several windows; its standard deviation includes \
-        differences between profiles, which those of the profiles do not",
+        "all shots of the site, each counted once, even if it lies in several windows; the standard deviation \
+         includes differences between profiles, which those of single profiles do not",
     ),
 ];
 
@@ -317,8 +318,8 @@ fn document<'a>(site: &SiteProducts<'a>) -> Document<'a> {
             })
             .collect(),
         mola_clock: Clock {
-            configured: &site.config.mola_clock,
-            correction_s: site.config.mola_clock.correction_s(),
+            configured: &site.config.altimeter_clock,
+            correction_s: site.config.altimeter_clock.correction_s(),
         },
         limits: &site.config.range_check,
         trajectory_error_m: ranges.trajectory_error_m,
@@ -381,16 +382,12 @@ fn profile_document<'a>(
     }
 }
 
-/// Shots without a spacecraft of their own, of tables.
+/// Shots whose file does not state the position of the spacecraft: those of tables, never of a PEDR file.
 fn nadir_by_range(site: &SiteProducts, profile: &Profile) -> u32 {
-    if site.config.shots.is_empty() {
-        return 0;
-    }
-    let shots = profile
-        .rows
-        .iter()
-        .map(|row| site.footprints.row(*row as usize));
-    let without = shots.filter(|shot| !has_own_spacecraft(shot)).count();
+    let rows = profile.rows.iter();
+    let without = rows
+        .filter(|row| !states_spacecraft(site.footprints, **row as usize))
+        .count();
     u32::try_from(without).unwrap_or(u32::MAX)
 }
 

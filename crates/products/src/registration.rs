@@ -12,7 +12,7 @@ use super::{
     site::{ImageProducts, SiteProducts},
     table::{Column, Table, Unit, column, meanings},
 };
-use areograph_base::schema::DocumentSchema;
+use areograph_base::{altimetry::GroundRadius, schema::DocumentSchema};
 use areograph_config::RegistrationConfig;
 use areograph_geom::{pushbroom::CameraModel, statistics::Summary};
 use areograph_stages::{
@@ -30,8 +30,7 @@ const DEFINITIONS: [(&str, &str); 7] = [
     ),
     (
         "points",
-        "footprints with the radius before the crossover correction (x, y, z of footprints.parquet), \
-        every profile in every image",
+        "footprints with the radius that ground_radius names (x, y, z of footprints.parquet), every profile in every image",
     ),
     (
         "light_time",
@@ -70,8 +69,33 @@ struct Document<'a> {
     site: &'a str,
     #[schemars(length(min = 1))]
     definitions: Vec<Definition>,
-    configured: &'a RegistrationConfig,
+    /// The radius that all stages take for the ground; omitted where the shots have one radius.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ground_radius: Option<GroundRadius>,
+    configured: Configured,
     images: Vec<ImageDocument<'a>>,
+}
+
+/// Keys of `[registration]`.
+#[derive(Serialize, JsonSchema)]
+struct Configured {
+    /// The form of orientation that the configuration requires; otherwise each image states its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    model: Option<CameraModel>,
+    /// Convergence limit of the published iterations.
+    tolerance_lines: f64,
+    /// Maximum number of their steps.
+    steps_max: u32,
+}
+
+impl Configured {
+    const fn of(registration: &RegistrationConfig) -> Self {
+        Self {
+            model: registration.model,
+            tolerance_lines: registration.tolerance_lines,
+            steps_max: registration.steps_max,
+        }
+    }
 }
 
 #[derive(Serialize, JsonSchema)]
@@ -196,88 +220,88 @@ fn columns<'a>() -> Vec<Column<Registered<'a>>> {
             "footprint_row",
             Unit::None,
             "row of the footprint in footprints.parquet, counted from 0",
-            |point: &Registered| point.get(|of| &of.row),
+            |point: &Registered| point.get(|points| &points.row),
         ),
         column(
             "line",
             Unit::Line,
             DEFINITIONS[0].1,
-            |point: &Registered| point.get(|of| &of.line),
+            |point: &Registered| point.get(|points| &points.line),
         ),
         column(
             "sample",
             Unit::Pixel,
             DEFINITIONS[0].1,
-            |point: &Registered| point.get(|of| &of.sample),
+            |point: &Registered| point.get(|points| &points.sample),
         ),
         column(
             "line_offset",
             Unit::Line,
             "lines from the middle of the header image, x of the papers",
-            |point: &Registered| point.get(|of| &of.line_offset),
+            |point: &Registered| point.get(|points| &points.line_offset),
         ),
         column(
             "y_px",
             Unit::Pixel,
             "across-track focal-plane coordinate from the boresight, image pixels, y of the papers \
             (against the samples)",
-            |point: &Registered| point.get(|of| &of.y_px),
+            |point: &Registered| point.get(|points| &points.y_px),
         ),
         column(
             "range_m",
             Unit::Metre,
             "distance from the camera's position to the footprint, metres",
-            |point: &Registered| point.get(|of| &of.range_m),
+            |point: &Registered| point.get(|points| &points.range_m),
         ),
         column(
             "residual_px",
             Unit::Pixel,
             "along-track focal-plane coordinate at the solution, image pixels: the residual of the iteration",
-            |point: &Registered| point.get(|of| &of.residual_px),
+            |point: &Registered| point.get(|points| &points.residual_px),
         ),
         column(
             "step_lines",
             Unit::Line,
             "last step of Newton's method, lines",
-            |point: &Registered| point.get(|of| &of.step_lines),
+            |point: &Registered| point.get(|points| &points.step_lines),
         ),
         column(
             "evaluations",
             Unit::None,
             "evaluations of the orientation by Newton's method",
-            |point: &Registered| point.get(|of| &of.evaluations),
+            |point: &Registered| point.get(|points| &points.evaluations),
         ),
         column(
             "evaluations_frame_first",
             Unit::None,
             "evaluations of the frame-first iteration with the second-order model; 0 outside the image's \
             lines, and where it does not converge",
-            |point: &Registered| point.get(|of| &of.evaluations_frame_first),
+            |point: &Registered| point.get(|points| &points.evaluations_frame_first),
         ),
         column(
             "evaluations_fixed_point",
             Unit::None,
             "the same of eq. 4 of Shan et al. 2005",
-            |point: &Registered| point.get(|of| &of.evaluations_fixed_point),
+            |point: &Registered| point.get(|points| &points.evaluations_fixed_point),
         ),
         column(
             "inside",
             Unit::None,
             "whether the delivered image shows the footprint",
-            |point: &Registered| point.get(|of| &of.inside),
+            |point: &Registered| point.get(|points| &points.inside),
         ),
         column(
             "extrapolated",
             Unit::None,
             "whether it lies beyond the first or last header line, where the orientation is extrapolated",
-            |point: &Registered| point.get(|of| &of.extrapolated),
+            |point: &Registered| point.get(|points| &points.extrapolated),
         ),
     ]
 }
 
 /// Schema of the document.
 pub(super) fn schema() -> DocumentSchema {
-    let keys = "/$defs/RegistrationConfig/properties";
+    let keys = "/$defs/Configured/properties";
     DocumentSchema::of::<Document>("registration")
         .with(&format!("{keys}/tolerance_lines"), "exclusiveMinimum", 0)
         .with(&format!("{keys}/steps_max"), "minimum", 1)
@@ -291,7 +315,8 @@ fn document<'a>(site: &SiteProducts<'a>) -> Document<'a> {
             .iter()
             .map(|(of, is)| Definition { of, is })
             .collect(),
-        configured: &site.config.registration,
+        ground_radius: site.footprints.ground_choice(),
+        configured: Configured::of(&site.config.registration),
         images: site
             .images
             .iter()

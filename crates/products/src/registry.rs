@@ -5,7 +5,7 @@ use super::{
     exchange::{adjusted, geopackage, jigsaw, matched, readme, shapefile, stac, tables},
     figures, footprints, heights, isd, kernel_report, orientation, overlays, page, page_data,
     product::Declaration,
-    ranges, registration, surface, ties,
+    profile_check, ranges, registration, surface, ties,
 };
 
 /// The products. Those of an image that follow each other are written image by image; the catalogue is last, as it
@@ -17,6 +17,7 @@ pub(super) static PRODUCTS: &[&Declaration] = &[
     &footprints::GEOJSON,
     &ranges::TABLE,
     &ranges::DOCUMENT,
+    &profile_check::DOCUMENT,
     &registration::TABLE,
     &registration::DOCUMENT,
     &orientation::TABLE,

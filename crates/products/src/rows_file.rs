@@ -185,7 +185,11 @@ impl RowsWriter {
     fn append(&mut self, batch: &RecordBatch) -> Result<()> {
         let (fields, begun) = (batch.schema(), self.schema.fields().iter());
         let begun = begun.map(|of| (of.name(), of.data_type()));
-        if !begun.eq(fields.fields().iter().map(|of| (of.name(), of.data_type()))) {
+        if !begun.eq(fields
+            .fields()
+            .iter()
+            .map(|field| (field.name(), field.data_type())))
+        {
             return Err(RowsError::Differ.into());
         }
         match &mut self.form {

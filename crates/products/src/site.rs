@@ -16,6 +16,7 @@ use areograph_spice::{KernelSet, RequiredCoverage};
 use areograph_stages::{
     adjust::{Adjusted, CorrectedPoint, PointKind, accuracy_withheld},
     check_heights::HeightCheck,
+    check_profiles::ProfileCheck,
     check_ranges::{ProfileRanges, RangeCheck},
     compare_pairs::PairComparison,
     convert_datum::FileConversion,
@@ -54,6 +55,8 @@ pub struct SiteProducts<'a> {
     pub utc: &'a [String],
     /// Profiles in order.
     pub profiles: &'a [Profile],
+    /// The profiles against each other.
+    pub profile_check: &'a ProfileCheck,
     /// The range check, one entry per profile.
     pub ranges: &'a RangeCheck,
     /// Rejected shots by reason.

@@ -36,14 +36,14 @@ pub(super) static HEIGHTS: Declaration = Declaration {
 
 pub(super) static SIGMAS: Declaration = Declaration {
     path: "surface_sigma.tif",
-    what: "standard deviations of these heights by the matching, metres, in the same cells; surface.json has that of the offset \
-           common to all heights",
+    what: "standard deviations of these heights about the offset common to all, metres, in the same cells: by the match, jitter and \
+           relief inside the compared square; surface.json has that of the offset",
     readers: "GIS, Ames Stereo Pipeline",
     rows: "cells with a height",
     role: Role::Data,
     content: Content::Foreign,
     write: Write::Model(|path, of, surface| {
-        let what = "standard deviation of the height by the matching, metres";
+        let what = "standard deviation of the height about the common offset, metres";
         write(path, of, surface, (what, &surface.model.sigmas_m))
     }),
     uses: &[],

@@ -420,7 +420,12 @@ pub(super) mod tests {
             ];
             Table::new(columns, vec![()])
         };
-        let names = |table: Table| table.columns().map(|of| of.name).collect::<Vec<_>>();
+        let names = |table: Table| {
+            table
+                .columns()
+                .map(|column| column.name)
+                .collect::<Vec<_>>()
+        };
         assert_eq!(names(table().for_parquet()), ["text", "bytes", "number_m"]);
         assert_eq!(names(table().for_text()), ["text", "number_m"]);
         assert_eq!(names(table().for_gis()), ["utc", "text"]);

@@ -56,8 +56,8 @@ fn measurements<'a>(
     site: &SiteProducts<'a>,
     geometric: &GeometricProducts<'a>,
 ) -> Vec<Measurement<'a>> {
-    let adjusted = geometric.adjustment.map(|of| of.adjusted);
-    let points = adjusted.map_or(&[][..], |of| &of.points);
+    let adjusted = geometric.adjustment.map(|adjustment| adjustment.adjusted);
+    let points = adjusted.map_or(&[][..], |adjusted| &adjusted.points);
     let ties = (0_usize..).zip(points);
     let ties = ties.filter(|(_, point)| point.kind == PointKind::Tie);
     let points: BTreeMap<usize, (usize, &CorrectedPoint)> = ties
@@ -69,7 +69,9 @@ fn measurements<'a>(
         .map(|view| ((view.point, view.image), view))
         .collect();
     let before = by_tie(geometric.intersected);
-    let after = geometric.adjustment.map(|of| by_tie(of.intersected));
+    let after = geometric
+        .adjustment
+        .map(|adjustment| by_tie(adjustment.intersected));
     let after = after.unwrap_or_default();
     let reasons = reasons(geometric);
     let mut found = Vec::new();
@@ -110,7 +112,7 @@ fn measurements<'a>(
 /// Reasons for rejecting tie points; the intersection's reason comes first.
 fn reasons(geometric: &GeometricProducts) -> BTreeMap<usize, String> {
     let adjusted = geometric.adjustment.iter();
-    let ties = adjusted.flat_map(|of| &of.adjusted.rejected);
+    let ties = adjusted.flat_map(|adjustment| &adjustment.adjusted.rejected);
     let ties = ties.filter(|point| point.kind == PointKind::Tie);
     let rejected = geometric.intersected.rejected.iter();
     let rejected = rejected.map(|tie| (tie.tie, tie.reason.to_string()));
@@ -126,6 +128,7 @@ fn tie_columns<'a>() -> Vec<Column<Measurement<'a>>> {
     let mut columns = measured_columns();
     columns.extend(intersected_columns());
     columns.extend(adjusted_point_columns());
+    columns.extend(adjusted_sigma_columns());
     columns.extend(residual_columns());
     columns
 }
@@ -262,6 +265,11 @@ fn adjusted_point_columns<'a>() -> Vec<Column<Measurement<'a>>> {
             "distance of the adjusted point from the centre of Mars, metres",
             |row: &Measurement| Some(spherical(row.adjusted?.0).radius_m),
         ),
+    ]
+}
+
+fn adjusted_sigma_columns<'a>() -> Vec<Column<Measurement<'a>>> {
+    vec![
         column(
             "sigma_x_m",
             Unit::Metre,
@@ -278,19 +286,38 @@ fn adjusted_point_columns<'a>() -> Vec<Column<Measurement<'a>>> {
             "sigma_east_m",
             Unit::Metre,
             "the same towards east, metres",
-            |row: &Measurement| Some(local_sigmas_m(row.adjusted?.0)[0]),
+            |row: &Measurement| Some(row.adjusted?.0.local_sigmas_m()[0]),
         ),
         column(
             "sigma_north_m",
             Unit::Metre,
             "the same towards north, metres",
-            |row: &Measurement| Some(local_sigmas_m(row.adjusted?.0)[1]),
+            |row: &Measurement| Some(row.adjusted?.0.local_sigmas_m()[1]),
         ),
         column(
             "sigma_up_m",
             Unit::Metre,
             "the same of the height, metres",
-            |row: &Measurement| Some(local_sigmas_m(row.adjusted?.0)[2]),
+            |row: &Measurement| Some(row.adjusted?.0.local_sigmas_m()[2]),
+        ),
+        column(
+            "relative_sigma_east_m",
+            Unit::Metre,
+            "standard deviation towards east without the error that all tie points share, metres: of the difference from their mean; \
+             the shared error does not average out and is adjustment/heights/mean_sigma_m of adjustment.json",
+            |row: &Measurement| Some(row.adjusted?.0.relative_sigmas_m()?[0]),
+        ),
+        column(
+            "relative_sigma_north_m",
+            Unit::Metre,
+            "the same towards north, metres",
+            |row: &Measurement| Some(row.adjusted?.0.relative_sigmas_m()?[1]),
+        ),
+        column(
+            "relative_sigma_up_m",
+            Unit::Metre,
+            "the same of the height, metres",
+            |row: &Measurement| Some(row.adjusted?.0.relative_sigmas_m()?[2]),
         ),
         column(
             "correlation_east_north",
@@ -330,7 +357,7 @@ fn residual_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "redundancy_along",
             Unit::None,
-            "share of an error of the measurement along the track that shows in its residual, 0 to 1",
+            "fraction of an error of the measurement along the track that appears in its residual, 0 to 1",
             |row: &Measurement| Some(row.adjusted?.1.along_px.redundancy),
         ),
         column(
@@ -374,12 +401,6 @@ fn spherical(point: &CorrectedPoint) -> Spherical {
 fn local_covariance_m2(point: &CorrectedPoint) -> Matrix3<f64> {
     let to_local = local_axes(&point.ground.xyz_m);
     to_local * point.covariance_m2 * to_local.transpose()
-}
-
-/// Standard deviations towards east, north and up, metres.
-fn local_sigmas_m(point: &CorrectedPoint) -> [f64; 3] {
-    let local_m2 = local_covariance_m2(point);
-    [0, 1, 2].map(|axis| local_m2[(axis, axis)].sqrt())
 }
 
 /// Correlation of errors along two of these axes.

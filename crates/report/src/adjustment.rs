@@ -179,24 +179,24 @@ fn observations(summary: &AdjustmentSummary) -> String {
         // Without redundancy, the document has zeros for unknown values.
         let known = |text: String, is_known: bool, places: &str| {
             let cell = Cell::from(text);
-            if is_known { cell.told(places) } else { cell }
+            if is_known { cell.traced(places) } else { cell }
         };
         table.row_of(
             &format!("adjustment.json#/adjustment/summary/types/{index}"),
             true,
             [
                 of.kind.words().into(),
-                Cell::from(whole(of.observations)).told("/observations"),
-                Cell::from(label(of.redundancy, 1)).told("/redundancy"),
+                Cell::from(whole(of.observations)).traced("/observations"),
+                Cell::from(label(of.redundancy, 1)).traced("/redundancy"),
                 format!("{} %", label(each, 1)).into(),
-                Cell::from(label(of.weighted_squares, 2)).told("/weighted_squares"),
+                Cell::from(label(of.weighted_squares, 2)).traced("/weighted_squares"),
                 known(component, of.redundancy > 0.0, "/variance_component"),
                 known(
                     by_chance,
                     limits[1] > 0.0,
                     "/variance_component_limits/0 /variance_component_limits/1",
                 ),
-                Cell::from(of.beyond_limit.to_string()).told("/beyond_limit"),
+                Cell::from(of.beyond_limit.to_string()).traced("/beyond_limit"),
             ],
         );
     }

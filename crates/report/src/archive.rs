@@ -50,7 +50,9 @@ pub fn archive_page(
 fn lead(ranges: &ArchiveRanges, judgement: &Judgement) -> String {
     let (tone, word) = Tone::of(judgement.valid, !judgement.remarks.is_empty());
     let beyond = ranges.profiles();
-    let beyond = beyond.filter(|of| !of.invalid_because.is_empty()).count();
+    let beyond = beyond
+        .filter(|profile| !profile.invalid_because.is_empty())
+        .count();
     let headline = format!(
         "{word}: {} in {}, {beyond} beyond the limits.",
         counted(ranges.profiles().count(), "profile"),
@@ -83,7 +85,10 @@ fn grouped(count: u64) -> String {
 type Figure = fn(&ArchiveProfile) -> f64;
 
 fn over_time(ranges: &ArchiveRanges) -> Result<String> {
-    let checked: Vec<&ArchiveProfile> = ranges.profiles().filter(|of| of.is_judged()).collect();
+    let checked: Vec<&ArchiveProfile> = ranges
+        .profiles()
+        .filter(|profile| profile.is_judged())
+        .collect();
     let Some(first) = checked.first() else {
         return Ok(paragraph("No profile was checked."));
     };
@@ -202,12 +207,12 @@ fn over_off_nadir(ranges: &ArchiveRanges) -> Result<String> {
         table.row(true, cells);
     }
     let points = |beyond: bool| -> Vec<(f64, f64)> {
-        let checked = ranges.profiles().filter(|of| of.is_judged());
+        let checked = ranges.profiles().filter(|profile| profile.is_judged());
         let points: Vec<(f64, f64)> = checked
-            .filter(|of| of.invalid_because.is_empty() != beyond)
-            .map(|of| {
-                let off_nadir_deg = of.off_nadir_rad[0] / RADIANS_PER_DEGREE;
-                (off_nadir_deg, of.mean_without_outliers_m)
+            .filter(|profile| profile.invalid_because.is_empty() != beyond)
+            .map(|profile| {
+                let off_nadir_deg = profile.off_nadir_rad[0] / RADIANS_PER_DEGREE;
+                (off_nadir_deg, profile.mean_without_outliers_m)
             })
             .collect();
         thinned(&points, PROFILES_DRAWN)
@@ -249,7 +254,8 @@ fn map(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>]) -> Result<String> {
         .collect();
     let mut plot = Plot::of(
         "Locations of the profiles".to_owned(),
-        "Some shots of every profile, IAU 2000, areocentric; crosses are the worst profiles beyond a limit.".to_owned(),
+        "Selected shots of every profile, IAU 2000, areocentric; crosses mark the worst profiles beyond a \
+         limit.".to_owned(),
         "east longitude, degrees",
         vec![Panel::of(
             "latitude, degrees",
@@ -279,8 +285,8 @@ fn not_checked(ranges: &ArchiveRanges) -> String {
         "The kernels have a position for every shot.".to_owned()
     } else {
         format!(
-            "The kernels have no position for {} shots: {without} profiles could not be checked, {partly} only in part. They have \
-             not_covered above 0 in profiles.parquet.",
+            "The kernels have no position for {} shots: {without} profiles could not be checked, {partly} only in \
+             part. In profiles.parquet their not_covered is above 0.",
             grouped(ranges.sum(|file| file.not_covered))
         )
     };
@@ -344,8 +350,8 @@ fn how(ranges: &ArchiveRanges) -> String {
         })
         .collect();
     let positions = format!(
-        "Positions come from tables of Chebyshev polynomials that keep within {TRAJECTORY_TOLERANCE_M} m of CSPICE; the largest \
-         distance at independent instants is {:.1e} m. States are geometric.",
+        "Positions are interpolated by Chebyshev polynomials within {TRAJECTORY_TOLERANCE_M} m of CSPICE; the \
+         largest difference at independent instants is {:.1e} m. States are geometric.",
         ranges.trajectory_error_m()
     );
     let clock = format!(

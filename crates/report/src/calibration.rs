@@ -22,8 +22,8 @@ const DRAWN: usize = 3_000;
 /// A plot that cannot be drawn, which is a bug in areograph.
 pub fn calibration_page(config: &CalibrationConfig, of: &Calibration) -> Result<String> {
     let rounds = of.rounds.as_ref();
-    let rounds = rounds.map(|told| -> Result<Section> {
-        let section = rounds_of(told, &of.cameras)?;
+    let rounds = rounds.map(|result| -> Result<Section> {
+        let section = rounds_of(result, &of.cameras)?;
         Ok(Section::new("From round to round", section))
     });
     let rounds: Option<Section> = rounds.transpose()?;
@@ -52,8 +52,8 @@ fn lead(config: &CalibrationConfig, of: &Calibration) -> String {
     let mode = match config.solution.mode {
         CalibrationMode::Differential => "",
         CalibrationMode::AsPublished => {
-            " All angles were estimated from ties only, as published, which can displace the camera far: see the figures after the \
-             ties."
+            " All angles were estimated from ties only, as published, which can displace the camera by large \
+             amounts: see the figures after the ties."
         }
     };
     let mut words = accuracy + mode;
@@ -197,8 +197,8 @@ fn residuals(of: &Calibration) -> Result<String> {
 fn sight(of: &Calibration) -> String {
     let unseen = usize::try_from(of.tie_sight.unseen).unwrap_or(usize::MAX);
     let words = format!(
-        "Of {} angles of the lines, ties leave {} undetermined: {}. These are constrained by a priori values; an \
-         adjustment that frees them moves along them at no cost.",
+        "Of {} angles of the lines, ties leave {} undetermined: {}. They are constrained by a priori values; an \
+         adjustment without these constraints leaves them arbitrary.",
         3 * of.cameras.len(),
         counted(unseen, "combination"),
         of.tie_sight.unseen_words()
@@ -226,13 +226,17 @@ fn sight(of: &Calibration) -> String {
 
 /// The test of ties against the ground.
 fn on_ground(of: &Calibration) -> String {
-    let Some((ground, limit_m)) = of.tie_ground.and_then(|of| Some((of, of.limit_m?))) else {
+    let Some((ground, limit_m)) = of
+        .tie_ground
+        .and_then(|tie_ground| Some((tie_ground, tie_ground.limit_m?)))
+    else {
         return paragraph(
-            "Ties do not show measurements that are wrong along the flight, and their heights were not tested.",
+            "Ties do not reveal errors of measurement along the flight, and their heights were not tested.",
         );
     };
     paragraph(&format!(
-        "Ties do not show measurements that are wrong along the flight: these change heights. The heights of {} tie points were \
+        "Ties do not reveal errors of measurement along the flight, which change heights. The heights of {} tie \
+         points were \
          compared with the ground between laser points. Those farther from it than {limit_m:.0} m (median of {:.1} standard \
          deviations) were left out; smaller errors are not identified.",
         ground.tested, ground.limit_sigmas
@@ -275,14 +279,14 @@ fn cameras(of: &Calibration) -> String {
         );
         table.row(true, cells);
     }
-    let drift = of.drift_m_per_line.map(|of| {
-        let Value { value, sigma } = of;
+    let drift = of.drift_m_per_line.map(|drift_m_per_line| {
+        let Value { value, sigma } = drift_m_per_line;
         format!("{} ± {sigma:.4}", signed(value, 4))
     });
     let words = format!(
         "Offset angles, constant look-angle terms and constant orbit errors are nearly indistinguishable, so their individual σ \
          are large; their combined effect is far better known. The orbit drifts by {} m per line along the body-fixed X, Y, Z. \
-         Support data hold a straight line of equal samples; their residual is in the last column.",
+         Support data describe a straight line of equal samples; the last column states their residual.",
         drift.join(", ")
     );
     table.finish() + &paragraph(&words)
@@ -338,7 +342,8 @@ fn offsets(of: &Calibration) -> String {
             table.row(true, cells);
         }
     }
-    let words = "The σ of the mean contains measurement and laser. The limit leaves room for constant errors of the orbits. An \
+    let words = "The σ of the mean contains measurement and laser. The limit allows for constant errors of the \
+                 orbits. An \
                  error common to the laser points of all orbits, such as another reference sphere, is not tested.";
     table.finish() + &paragraph(words)
 }

@@ -15,7 +15,8 @@ use areograph_stages::calibrate::{CalibrationRound, CameraResult, Rounds, Scatte
 pub(super) fn rounds(of: &Rounds, cameras: &[CameraResult]) -> Result<String> {
     let words = format!(
         "A round measures tie points, makes the lines consistent with them, matches a terrain model with cells of {} m to the laser, \
-         and calibrates with both; the next one begins with its cameras. Rounds end when half of the units are shifted by less than \
+         and calibrates with both; the next round starts from its cameras. Rounds end when half of the units are \
+         shifted by less than \
          half a cell and residuals of control change by less than 2 %, after {} at most.",
         label(of.cell_m, 0),
         of.rounds_max
@@ -50,7 +51,7 @@ fn numbers(of: &Rounds) -> String {
         let [kept, refused] = [0, 1].map(|at| round.units[at] + round.judging[at]);
         let bias = round
             .bias_m
-            .map_or_else(|| "–".to_owned(), |of| signed(of, 1));
+            .map_or_else(|| "–".to_owned(), |bias_m| signed(bias_m, 1));
         let scatter = |of: fn(Scatter) -> Option<Scattered>| {
             round.held_back_scatter.and_then(of).map(|of| of.sigmas)
         };

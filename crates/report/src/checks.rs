@@ -5,7 +5,7 @@ use super::{
     html::{Cell, Column, Table, Tone, escape, link},
     images, misregistration, notes,
     numbers::{number, signed, whole},
-    ranges, registration, scan,
+    profiles, ranges, registration, scan,
     section::Section,
     selection, surface, timeline,
 };
@@ -52,9 +52,9 @@ fn row(table: &mut Table, check: &Check, mut what: String, place: &str) {
     if !check.subject.is_empty() {
         what += &format!(" <small>{}</small>", escape(&check.subject));
     }
-    let told = |text: String, at: &str| match place {
+    let traced = |text: String, at: &str| match place {
         "" => Cell::from(text),
-        _ => Cell::from(text).told(at),
+        _ => Cell::from(text).traced(at),
     };
     table.row_of(
         place,
@@ -62,8 +62,8 @@ fn row(table: &mut Table, check: &Check, mut what: String, place: &str) {
         [
             result(check.outcome),
             Cell::Html(what),
-            told(value(check), value_place(check)),
-            told(limit(check), "/limit"),
+            traced(value(check), value_place(check)),
+            traced(limit(check), "/limit"),
         ],
     );
 }
@@ -135,6 +135,7 @@ pub(super) fn limit(check: &Check) -> String {
 const fn section(kind: CheckKind) -> Option<&'static Section> {
     Some(match kind {
         CheckKind::Footprints => &selection::SECTION,
+        CheckKind::WithheldStretches => &profiles::SECTION,
         CheckKind::HeightAfter
         | CheckKind::HeightBefore
         | CheckKind::HeightOutliers

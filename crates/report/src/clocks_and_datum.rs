@@ -16,7 +16,7 @@ pub(super) const SECTION: Section = Section {
 };
 
 fn biases(site: &SiteProducts) -> String {
-    let clock = &site.config.mola_clock;
+    let clock = &site.config.altimeter_clock;
     let sign = match clock.sign {
         TagSign::Late => "tags are late",
         TagSign::Early => "tags are early",
@@ -133,8 +133,12 @@ fn datum(site: &SiteProducts) -> String {
             ],
         );
     }
+    let choice = site.footprints.ground_choice();
+    let radii = choice.map_or_else(String::new, |of| {
+        format!(" Radii of the ground are those {}.", of.words())
+    });
     let words = format!(
-        "Datum {decided}; products are in {}, W0 = {:.3}°.",
+        "Datum {decided}; products are in {}, W0 = {:.3}°.{radii}",
         site.config.body.names().short_frame,
         site.config.body.model().meridian_deg
     );

@@ -74,7 +74,7 @@ fn lead(comparison: &KernelComparison) -> String {
         (Tone::Remarks, headline)
     } else if !close.is_empty() {
         let headline = format!(
-            "Too close to call: {} ({} m) and {} are about equally far from the mean orbit.",
+            "Not decided: {} ({} m) and {} are about equally far from the mean orbit.",
             closest.set,
             label(closest.size.rms, 3),
             close.join(" and ")
@@ -86,7 +86,7 @@ fn lead(comparison: &KernelComparison) -> String {
             orbit.deviations.len(),
             closest.set,
             pulled.map_or_else(String::new, |far| format!(
-                "; this rests on {}, which pulls the mean",
+                "; this depends on {}, which biases the mean",
                 far.set
             ))
         );
@@ -103,7 +103,7 @@ fn lead(comparison: &KernelComparison) -> String {
     };
     let pulls = orbit.pulls_the_mean().map_or_else(String::new, |far| {
         format!(
-            "{} lies {} m from the mean, farther than all others, and pulls it towards itself. ",
+            "{} lies {} m from the mean, farther than all others, and biases it. ",
             far.set,
             label(far.size.rms, 3)
         )
@@ -173,7 +173,7 @@ fn attitude(attitude: &AttitudeComparison) -> Result<String> {
     let labels = ["radial, ″", "along, ″", "cross, ″"];
     let turns = &attitude.turns;
     let words = paragraph(
-        "Turns from the mean attitude to that of each set, read with the pointing bias. On the ground: the angle \
+        "Rotations from the mean attitude to that of each set, read with the pointing bias. On the ground: the angle \
          between its boresight and that of the mean attitude, times the distance along it to the ellipsoid.",
     );
     let title = "Attitudes against their mean";
@@ -374,7 +374,7 @@ mod tests {
         let page = page_of(&found, &["<i>left out</i>".to_owned()]);
         assert!(page.contains("Of 3 kernel sets &lt;nav&gt; is closest to the mean orbit"));
         assert!(page.contains("2.000 m")); // 1 − (1 + 0 + 8) / 3
-        assert!(page.contains("this rests on ipng") && page.contains("verdict remarks"));
+        assert!(page.contains("this depends on ipng") && page.contains("verdict remarks"));
         assert!(page.contains("id=\"orbits-minus-their-mean\""));
         assert!(!page.contains("<nav>") && !page.contains("<i>left"));
         assert!(!page.contains("id=\"attitude\""));

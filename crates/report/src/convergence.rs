@@ -70,13 +70,13 @@ fn methods(site: &SiteProducts) -> String {
                 [
                     (&image.times.id).into(),
                     name(run).into(),
-                    Cell::from(whole(run.points)).told("/points"),
-                    Cell::from(whole(run.evaluations.n)).told("/evaluations/n"),
-                    Cell::from(format!("{:.2}", run.evaluations.mean)).told("/evaluations/mean"),
-                    Cell::from(format!("{:.0}", run.evaluations.max)).told("/evaluations/max"),
-                    Cell::from(label(difference.mean, 4)).told("/difference_lines/mean"),
+                    Cell::from(whole(run.points)).traced("/points"),
+                    Cell::from(whole(run.evaluations.n)).traced("/evaluations/n"),
+                    Cell::from(format!("{:.2}", run.evaluations.mean)).traced("/evaluations/mean"),
+                    Cell::from(format!("{:.0}", run.evaluations.max)).traced("/evaluations/max"),
+                    Cell::from(label(difference.mean, 4)).traced("/difference_lines/mean"),
                     Cell::from(label(difference.standard_deviation, 4))
-                        .told("/difference_lines/standard_deviation"),
+                        .traced("/difference_lines/standard_deviation"),
                 ],
             );
         }

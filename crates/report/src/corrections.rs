@@ -68,18 +68,35 @@ fn positions(site: &SiteProducts, adjusted: &Adjusted) -> String {
         let in_orbit = orbit_axes(image, Vector3::from(position_m.map(|(value, _)| value)));
         let mut cells: Vec<Cell> = vec![(&corrected.id).into()];
         let axes = position_m.into_iter().enumerate();
-        cells.extend(axes.map(|(axis, value)| with_sigma(value, 1).told(place(axis, ""))));
+        cells.extend(axes.map(|(axis, value)| with_sigma(value, 1).traced(place(axis, ""))));
         cells.extend([1, 2, 0].map(|axis| {
             let component = in_orbit.map(|shift_m| label(shift_m[axis], 1));
             Cell::from(component.unwrap_or_else(|| "–".to_owned()))
         }));
         table.row_of(&of_image(index), true, cells);
     }
-    let words = "From the orbit of the kernels; expected with a simultaneous profile: that of the PEDR (adjustment.orbit_of_pedr).";
+    let mut words = line_times(adjusted);
     if starts_at_pedr {
-        table.finish() + &paragraph(words)
+        words += &paragraph(
+            "Relative to the orbit of the kernels; with a simultaneous profile the expected orbit is that of the PEDR \
+             (adjustment.orbit_of_pedr).",
+        );
+    }
+    table.finish() + &words
+}
+
+/// What the standard deviations of positions contain of line times.
+fn line_times(adjusted: &Adjusted) -> String {
+    let largest_s = adjusted.images.iter().map(|image| image.line_time_sigma_s);
+    let largest_s = largest_s.fold(0.0, f64::max);
+    if largest_s > 0.0 {
+        paragraph(&format!(
+            "±: of the camera when a line was exposed. Line times are known to ±{} ms; along the track they cannot be separated from \
+             position and rotation, which are to be used together.",
+            label(largest_s / SECONDS_PER_MS, 0)
+        ))
     } else {
-        table.finish()
+        String::new()
     }
 }
 
@@ -113,13 +130,13 @@ fn rotations(adjusted: &Adjusted) -> String {
         let mut cells: Vec<Cell> = vec![(&image.id).into()];
         let rotation = constants(image, 3);
         cells.extend(rotation.into_iter().zip(3..).map(|(axis, quantity)| {
-            with_sigma(arcseconds(axis), 1).told(place(quantity, &per_arcsecond))
+            with_sigma(arcseconds(axis), 1).traced(place(quantity, &per_arcsecond))
         }));
         cells.push(image.time_bias_s.map_or_else(
             || "not estimated".into(),
             |(bias_s, sigma_s)| {
                 with_sigma((bias_s / SECONDS_PER_MS, sigma_s / SECONDS_PER_MS), 2)
-                    .told("/time_bias_s/0*1000 /time_bias_s/1*1000")
+                    .traced("/time_bias_s/0*1000 /time_bias_s/1*1000")
             },
         ));
         table.row_of(&of_image(index), true, cells);
@@ -127,7 +144,7 @@ fn rotations(adjusted: &Adjusted) -> String {
     let inseparable = if adjusted.summary.correlated.is_empty() {
         ""
     } else {
-        " A narrow field of view hardly separates position from rotation."
+        " In a narrow field of view position and rotation are nearly indistinguishable."
     };
     table.finish() + &paragraph(&format!("±: a posteriori σ.{inseparable}"))
 }
@@ -135,7 +152,9 @@ fn rotations(adjusted: &Adjusted) -> String {
 /// Range residuals of the same shots with the orbit of the kernels and after the adjustment.
 fn ranges(site: &SiteProducts, adjusted: &Adjusted) -> String {
     if adjusted.ranges.is_empty() {
-        return paragraph("No shot was fired during an exposure: no range takes part.");
+        return paragraph(
+            "No shot was fired during an exposure, so that no range enters the adjustment.",
+        );
     }
     let before_m = checked_ranges(site);
     let mut groups: BTreeMap<(&str, usize), [Vec<f64>; 2]> = BTreeMap::new();
@@ -212,7 +231,7 @@ fn biases(adjusted: &Adjusted) -> String {
             true,
             [
                 profile.into(),
-                with_sigma((*value_m, *sigma_m), 3).told("/1 /2"),
+                with_sigma((*value_m, *sigma_m), 3).traced("/1 /2"),
             ],
         );
     }

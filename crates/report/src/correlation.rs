@@ -59,6 +59,8 @@ struct Matrix<'a> {
     image: &'a str,
     names: Vec<String>,
     values: Vec<f64>,
+    /// Whether the covariance contains the uncertainty of line times.
+    has_line_times: bool,
 }
 
 impl<'a> Matrix<'a> {
@@ -86,6 +88,7 @@ impl<'a> Matrix<'a> {
             image: &image.id,
             names: solved.iter().map(name).collect(),
             values: values.collect(),
+            has_line_times: image.line_time_sigma_s > 0.0,
         })
     }
 
@@ -162,7 +165,13 @@ impl<'a> Matrix<'a> {
                 self.names[place % count]
             )
         });
-        format!("Adjusted orientation unknowns; columns in the order of rows.{most}")
+        let of = if self.has_line_times {
+            "Orientation of the camera at the exposure of its lines: line times, which are no unknowns of the adjustment, \
+             correlate coefficients of position; columns in the order of rows."
+        } else {
+            "Adjusted orientation unknowns; columns in the order of rows."
+        };
+        format!("{of}{most}")
     }
 
     fn csv(&self) -> String {

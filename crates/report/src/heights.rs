@@ -32,7 +32,9 @@ pub(super) const SECTION: Section = Section {
 
 fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
     let adjustment = geometric.adjustment.as_ref();
-    let mut html = adjustment.map_or_else(String::new, |of| statements(site, geometric, of));
+    let mut html = adjustment.map_or_else(String::new, |adjustment| {
+        statements(site, geometric, adjustment)
+    });
     if let Ok(surface) = &geometric.heights.surface {
         html += &heading("Heights against the MOLA surface");
         html += &compared(geometric);
@@ -49,9 +51,9 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
     Ok(html)
 }
 
-/// In place of accuracies that rest on a priori values of another spacecraft.
-pub(super) const NOT_STATED: &str =
-    "not stated: the a priori accuracy is that of another spacecraft";
+/// Why absolute accuracies are withheld.
+pub(super) const WITHHELD_BECAUSE: &str =
+    "the a priori accuracy of orbit and attitude is that of another spacecraft";
 
 /// The three statements of accuracy, and their basis.
 fn statements(
@@ -75,9 +77,11 @@ fn statements(
         |pair: &PairComparison| format!("{} m", label(pair.along_track_parallax_m.abs(), 1));
     let [along, _] = adjustment.adjusted.summary.tie_components;
     let after = worst.and_then(|pair| pair.after).map(parallax);
-    let [height, place] = match site.accuracy_withheld() {
-        Some(_) => [0, 1].map(|_| NOT_STATED.to_owned()),
-        None => absolute(geometric, adjustment),
+    let is_withheld = site.accuracy_withheld().is_some();
+    let [height, place] = if is_withheld {
+        [0, 1].map(|_| format!("withheld: {WITHHELD_BECAUSE}"))
+    } else {
+        absolute(geometric, adjustment)
     };
     let statements = [
         [
@@ -110,10 +114,17 @@ fn statements(
     for cells in statements {
         table.row(true, cells.map(Cell::from));
     }
+    let relief = if is_withheld && adjustment.adjusted.heights.is_some() {
+        paragraph(&format!(
+            "The accuracy of position by relief is withheld: {WITHHELD_BECAUSE}."
+        ))
+    } else {
+        relief::relief(adjustment.adjusted, known_beforehand(geometric))
+    };
     table.finish()
-        + &relief::relief(adjustment.adjusted, known_beforehand(geometric))
+        + &relief
         + &boresight::boresight(adjustment.adjusted)
-        + &readings::two_readings(adjustment.adjusted)
+        + &readings::two_readings(adjustment.adjusted, is_withheld)
 }
 
 fn place_says(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
@@ -236,7 +247,7 @@ fn half_apart_m(geometric: &GeometricProducts) -> Option<f64> {
 /// likely, and half of their difference is no less open.
 pub(super) fn is_open(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> bool {
     let heights = adjustment.adjusted.heights.as_ref();
-    let stated = heights.map(|of| of.mean_sigma_m[0].max(of.mean_sigma_m[1]));
+    let stated = heights.map(|heights| heights.mean_sigma_m[0].max(heights.mean_sigma_m[1]));
     stated
         .zip(half_apart_m(geometric))
         .is_some_and(|(stated_m, half_m)| half_m > stated_m)
@@ -287,10 +298,13 @@ fn compared(geometric: &GeometricProducts) -> String {
             Column::Number("σ of the mean by the surface only"),
         ],
     );
-    let after = geometric.adjustment.iter().map(|of| ("after", of.heights));
+    let after = geometric
+        .adjustment
+        .iter()
+        .map(|adjustment| ("after", adjustment.heights));
     for (state, check) in [("before", geometric.heights)].into_iter().chain(after) {
         let of = |value: f64, name: &str| {
-            Cell::from(label(value, 1)).told(format!("/above_surface_m/{name}"))
+            Cell::from(label(value, 1)).traced(format!("/above_surface_m/{name}"))
         };
         let place = match geometric.adjustment {
             Some(_) => format!("adjustment.json#/{state}/heights"),
@@ -301,13 +315,13 @@ fn compared(geometric: &GeometricProducts) -> String {
             true,
             [
                 state.into(),
-                Cell::from(whole(check.above_m.n)).told("/above_surface_m/n"),
-                Cell::from(whole(check.near_shots)).told("/near_shots"),
+                Cell::from(whole(check.above_m.n)).traced("/above_surface_m/n"),
+                Cell::from(whole(check.near_shots)).traced("/near_shots"),
                 of(check.above_m.median, "median"),
                 of(check.above_m.nmad, "nmad"),
                 of(check.above_m.mean, "mean"),
                 of(check.above_m.standard_deviation, "standard_deviation"),
-                Cell::from(label(check.mean_sigma_m, 1)).told("/mean_sigma_m"),
+                Cell::from(label(check.mean_sigma_m, 1)).traced("/mean_sigma_m"),
             ],
         );
     }
@@ -327,11 +341,17 @@ fn footprints(geometric: &GeometricProducts) -> String {
             Column::Number("1.48 MAD"),
         ],
     );
-    let after = geometric.adjustment.iter().map(|of| ("after", of.pairs));
+    let after = geometric
+        .adjustment
+        .iter()
+        .map(|adjustment| ("after", adjustment.pairs));
     let mut rows = 0;
     for (state, pairs) in [("before", geometric.pairs)].into_iter().chain(after) {
         for (index, pair) in pairs.iter().enumerate() {
-            let profiles = pair.footprints.iter().flat_map(|of| &of.profiles);
+            let profiles = pair
+                .footprints
+                .iter()
+                .flat_map(|footprints| &footprints.profiles);
             for (at, profile) in profiles.enumerate() {
                 let above_m = &profile.above_m;
                 rows += 1;
@@ -346,9 +366,9 @@ fn footprints(geometric: &GeometricProducts) -> String {
                         state.into(),
                         pair.images.join(" and ").into(),
                         profile.profile.clone().into(),
-                        Cell::from(above_m.n.to_string()).told("/n"),
-                        Cell::from(label(above_m.median, 1)).told("/median"),
-                        Cell::from(label(above_m.nmad, 1)).told("/nmad"),
+                        Cell::from(above_m.n.to_string()).traced("/n"),
+                        Cell::from(label(above_m.median, 1)).traced("/median"),
+                        Cell::from(label(above_m.nmad, 1)).traced("/nmad"),
                     ],
                 );
             }
@@ -357,7 +377,8 @@ fn footprints(geometric: &GeometricProducts) -> String {
     if rows == 0 {
         return String::new();
     }
-    let words = "Relief between tie points moves single heights, and the median where it is of one sign along a profile.";
+    let words = "Relief between tie points affects single heights; where it has one sign along a profile, it affects \
+                 the median as well.";
     table.finish() + &paragraph(words)
 }
 

@@ -166,7 +166,7 @@ pub(super) fn link(place: &str, text: &str) -> String {
     format!("<a href=\"{}\">{}</a>", escape(place), escape(text))
 }
 
-/// A list of texts; empty without any.
+/// A list of texts; an empty string for an empty list.
 pub(super) fn list<T: AsRef<str>>(items: &[T]) -> String {
     if items.is_empty() {
         return String::new();
@@ -207,13 +207,13 @@ pub(super) enum Cell {
     /// HTML.
     Html(String),
     /// A cell whose numbers are from products, see [`super::source`].
-    Told(Box<Self>, String),
+    Traced(Box<Self>, String),
 }
 
 impl Cell {
     /// The cell with the places of its numbers in the products, below that of its row.
-    pub(super) fn told(self, places: impl Into<String>) -> Self {
-        Self::Told(Box::new(self), places.into())
+    pub(super) fn traced(self, places: impl Into<String>) -> Self {
+        Self::Traced(Box::new(self), places.into())
     }
 }
 
@@ -299,7 +299,7 @@ impl Table {
             .into_iter()
             .enumerate()
             .map(|(place, cell)| match cell {
-                Cell::Told(cell, places) => self.cell(place, *cell, &from_places(&places)),
+                Cell::Traced(cell, places) => self.cell(place, *cell, &from_places(&places)),
                 cell => self.cell(place, cell, ""),
             })
             .collect();
@@ -339,7 +339,7 @@ impl Table {
                 )
             }
             // Nested marks count once.
-            Cell::Told(cell, _) => self.cell(place, *cell, from),
+            Cell::Traced(cell, _) => self.cell(place, *cell, from),
         }
     }
 

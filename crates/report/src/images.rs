@@ -11,7 +11,7 @@ use areograph_base::{
     error::Result,
     units::{METRES_PER_KM, RADIANS_PER_ARCSECOND, RADIANS_PER_DEGREE},
 };
-use areograph_geom::{light_time::LightTime, polynomial::Fit};
+use areograph_geom::{light_time::LightTime, polynomial::Fit, pushbroom::CameraModel};
 use areograph_products::{ImageProducts, SiteProducts};
 use areograph_stages::{
     fit_sensor_model::EulerModel,
@@ -82,14 +82,14 @@ fn taken(site: &SiteProducts) -> String {
             [
                 (&times.id).into(),
                 (&times.utc_start).into(),
-                Cell::from(whole(times.line_times.lines())).told("/lines_header"),
-                Cell::from(whole(times.lines_delivered)).told("/lines_delivered"),
-                Cell::from(times.samples.to_string()).told("/samples_per_line"),
+                Cell::from(whole(times.line_times.lines())).traced("/lines_header"),
+                Cell::from(whole(times.lines_delivered)).traced("/lines_delivered"),
+                Cell::from(times.samples.to_string()).traced("/samples_per_line"),
                 Cell::from(format!(
                     "{} × {}",
                     times.downtrack_summing, times.crosstrack_summing
                 ))
-                .told("/downtrack_summing /crosstrack_summing"),
+                .traced("/downtrack_summing /crosstrack_summing"),
                 periods_ms(times),
                 format!("{:.2}", times.duration_s()).into(),
                 seen(|ground| format!("{:.1}", ground.range_m / METRES_PER_KM)),
@@ -134,7 +134,7 @@ fn light_time(site: &SiteProducts) -> String {
         };
         if of_images().next().is_some() {
             words += &format!(
-                " With {word} the view moves by {} m, the same ground by {} lines.",
+                " With {word} the view shifts by {} m on the ground, and a ground point by {} lines.",
                 span(|of| of.ground_m, 1),
                 span(|of| of.lines, 2)
             );
@@ -155,7 +155,7 @@ fn periods_ms(times: &ImageTimes) -> Cell {
         1 => vec!["/line_period_s*1000".to_owned()],
         _ => pieces.collect(),
     };
-    Cell::from(periods.join(", ")).told(places.join(" "))
+    Cell::from(periods.join(", ")).traced(places.join(" "))
 }
 
 /// Place of an image in the products.
@@ -188,7 +188,7 @@ fn models(site: &SiteProducts) -> String {
         let valid = image.invalid_because().is_empty();
         let judged = [
             Cell::Plain(format!("{:.4}", model.first_order.position_rmse_m()))
-                .told("/position_rmse_m"),
+                .traced("/position_rmse_m"),
             "–".into(),
             "".into(),
         ];
@@ -197,13 +197,20 @@ fn models(site: &SiteProducts) -> String {
         table.row_of(&first, valid, row(id, "1", &model.first_order, judged));
         let rmse_rad = model.rotation_vector.rmse_rad();
         let position_m = model.second_order.position_rmse_m();
+        // The limits are those of the form in use.
+        let limited = |text: String, share: f64| match model.model {
+            CameraModel::Samples => Cell::Plain(text),
+            CameraModel::FirstOrder | CameraModel::SecondOrder | CameraModel::RotationVector => {
+                Cell::Limited(text, share)
+            }
+        };
         let judged = [
-            Cell::Limited(
+            limited(
                 format!("{position_m:.4}"),
                 position_m / limits.position_rmse_max_m,
             )
-            .told("/position_rmse_m"),
-            Cell::Limited(
+            .traced("/position_rmse_m"),
+            limited(
                 format!("{:.3}", rmse_rad / RADIANS_PER_ARCSECOND),
                 rmse_rad / limits.pointing_rmse_max_rad,
             ),
@@ -211,13 +218,25 @@ fn models(site: &SiteProducts) -> String {
         ];
         table.row_of(&second, valid, row(id, "2", &model.second_order, judged));
     }
-    let words = format!(
+    let mut words = format!(
         "Limits for order 2: position {} m, pointing {}″ (largest component of the rotation vector). On the ground: RMS \
          shift of the boresight.",
         limits.position_rmse_max_m,
         // As written: conversion to radians and back adds digits.
         (1e6 * limits.pointing_rmse_max_rad / RADIANS_PER_ARCSECOND).round() / 1e6
     );
+    for image in site.images {
+        let (model, misfit) = (image.model, image.model.misfit);
+        if model.model == CameraModel::Samples {
+            words += &format!(
+                " Image {} uses no polynomial but an interpolation between its samples; halfway between them, this departs \
+                 by {:.4} m and {:.3}″ (RMS).",
+                image.times.id,
+                misfit.position_rmse_m,
+                misfit.pointing_rmse_rad / RADIANS_PER_ARCSECOND
+            );
+        }
+    }
     table.finish() + &paragraph(&words)
 }
 
@@ -230,21 +249,19 @@ fn row(
 ) -> Vec<Cell> {
     let mut cells: Vec<Cell> = vec![image.into(), order.into()];
     let axes = model.position_m.iter().zip(["x", "y", "z"]);
-    cells.extend(
-        axes.map(|(fit, axis)| {
-            Cell::from(format!("{:.4}", fit.rmse)).told(format!("/{axis}_m/rmse"))
-        }),
-    );
+    cells.extend(axes.map(|(fit, axis)| {
+        Cell::from(format!("{:.4}", fit.rmse)).traced(format!("/{axis}_m/rmse"))
+    }));
     cells.push(position);
     let angles = model.angles_rad.iter().zip(["omega", "phi", "kappa"]);
     cells.extend(angles.map(|(fit, angle)| {
         let arcseconds = format!("{:.3}", fit.rmse / RADIANS_PER_ARCSECOND);
-        Cell::from(arcseconds).told(format!("/{angle}_rad/rmse_arcsec"))
+        Cell::from(arcseconds).traced(format!("/{angle}_rad/rmse_arcsec"))
     }));
     cells.push(pointing);
     let ground = model.pointing_ground_rmse_m();
     let ground = ground.map_or_else(|| "–".to_owned(), |metres| format!("{metres:.3}"));
-    cells.push(Cell::from(ground).told("/pointing_ground_rmse_m"));
+    cells.push(Cell::from(ground).traced("/pointing_ground_rmse_m"));
     cells.push(verdict);
     cells
 }

@@ -187,14 +187,14 @@ fn units(of: &LaserMatch) -> String {
                 .into()
         };
         let sigma = |value: fn(MatchSigma) -> f64| -> Cell {
-            let sigma = unit.found.and_then(|of| of.sigma).map(value);
+            let sigma = unit.found.and_then(|found| found.sigma).map(value);
             sigma
-                .map_or_else(|| "–".to_owned(), |of| label(of, 1))
+                .map_or_else(|| "–".to_owned(), |sigma| label(sigma, 1))
                 .into()
         };
         let judged = |value: Option<f64>| -> Cell {
             value
-                .map_or_else(|| "–".to_owned(), |of| label(of, 1))
+                .map_or_else(|| "–".to_owned(), |value| label(value, 1))
                 .into()
         };
         table.row(
@@ -211,8 +211,8 @@ fn units(of: &LaserMatch) -> String {
                 sigma(|of| of.shift_m[0]),
                 sigma(|of| of.shift_m[1]),
                 sigma(|of| of.bias_m),
-                judged(unit.held_out.map(|of| of.before_m)),
-                judged(unit.held_out.map(|of| of.after_m)),
+                judged(unit.held_out.map(|held_out| held_out.before_m)),
+                judged(unit.held_out.map(|held_out| held_out.after_m)),
                 (&unit.refused_because).into(),
             ],
         );

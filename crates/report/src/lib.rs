@@ -43,6 +43,7 @@ mod numbers;
 mod outlines;
 mod overlays;
 mod plots;
+mod profiles;
 mod provenance;
 mod published;
 mod ranges;
@@ -88,6 +89,7 @@ const SECTIONS: &[Section] = &[
     matching::SECTION,
     surface::SECTION,
     adjustment::SECTION,
+    profiles::SECTION,
     ranges::SECTION,
     scan::SECTION,
     images::SECTION,

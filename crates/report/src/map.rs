@@ -7,7 +7,7 @@ mod legend;
 mod names;
 pub(super) mod relief;
 mod sheets;
-mod told;
+mod words;
 
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ use self::{
     legend::{Legend, STRIP},
     relief::Relief,
     sheets::{Shown, sheets},
-    told::names,
+    words::names,
 };
 use super::{
     graticule::{View, graticule},

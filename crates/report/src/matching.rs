@@ -59,7 +59,8 @@ fn write(site: &SiteProducts, ties: &Ties) -> String {
         );
     }
     paragraph(
-        "In each cell of common ground the place with the most texture was matched to the other image and back. σ: medians of \
+        "In each cell of common ground the point with the strongest texture was matched to the other image and back. \
+         σ: medians of \
          single matches, in the second image. The table is of the second pass, which starts from the adjusted orientation.",
     ) + &table.finish()
 }

@@ -22,7 +22,7 @@ use areograph_stages::{
 };
 
 /// Number of pairs with a sentence each; tables have all.
-const PAIRS_TOLD: usize = 6;
+const PAIRS_SHOWN: usize = 6;
 
 pub(super) use pair::{BeforeAfter, by_footprints};
 
@@ -38,8 +38,8 @@ pub(super) const SECTION: Section = Section {
 
 fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
     let pairs = BeforeAfter::all(geometric);
-    let told = pairs.iter().take(PAIRS_TOLD);
-    let mut html: String = told.map(|pair| paragraph(&pair.sentence())).collect();
+    let shown = pairs.iter().take(PAIRS_SHOWN);
+    let mut html: String = shown.map(|pair| paragraph(&pair.sentence())).collect();
     if pairs.is_empty() {
         html += &paragraph("No two images share tie points that could be intersected.");
     }
@@ -64,8 +64,8 @@ fn read(geometric: &GeometricProducts) -> String {
     let outliers = points.iter().filter(|point| point.outlier).count();
     let adjusted = geometric.adjustment.map_or_else(
         || "; the adjustment failed".to_owned(),
-        |of| {
-            let number = of.intersected.points.len().to_string();
+        |adjustment| {
+            let number = adjustment.intersected.points.len().to_string();
             filled(
                 ", {} with the adjusted one",
                 &[(number, "adjustment.json#/after/intersected")],
@@ -120,7 +120,7 @@ fn rejected(geometric: &GeometricProducts) -> String {
             .or_insert(0) += 1;
     }
     let ties = geometric.adjustment.iter();
-    let ties = ties.flat_map(|of| &of.adjusted.rejected);
+    let ties = ties.flat_map(|adjustment| &adjustment.adjusted.rejected);
     for tie in ties.filter(|left| left.kind == PointKind::Tie) {
         let reason = match tie.reason {
             // The intersection has given the reason.
@@ -192,10 +192,11 @@ fn geometry(pairs: &[BeforeAfter]) -> String {
                 (found.along_track_parallax_m, 2, "/along_track_parallax_m"),
             ];
             let mut cells = pair.head(state, found);
-            cells
-                .extend(numbers.map(|(value, decimals, place)| {
-                    Cell::from(label(value, decimals)).told(place)
-                }));
+            cells.extend(
+                numbers.map(|(value, decimals, place)| {
+                    Cell::from(label(value, decimals)).traced(place)
+                }),
+            );
             table.row_of(&pair.place(state), true, cells);
         }
     }
@@ -230,7 +231,7 @@ fn reprojection(pairs: &[BeforeAfter]) -> String {
                     (of.deviation_y, "deviation_y"),
                 ];
                 cells.extend(moments.map(|(value, name)| {
-                    Cell::from(label(value, 2)).told(format!("/residuals/{image}/{name}"))
+                    Cell::from(label(value, 2)).traced(format!("/residuals/{image}/{name}"))
                 }));
             }
             table.row_of(&pair.place(state), true, cells);
@@ -320,7 +321,7 @@ fn profile_cells(
     let mut cells = vec![
         (&before.1.profile).into(),
         pair.name().into(),
-        pair.told("before", before.0, "lines/n", whole(before.1.lines.n)),
+        pair.traced("before", before.0, "lines/n", whole(before.1.lines.n)),
     ];
     let quantities: [Quantity; 5] = [
         ("lines/mean", |of| Some(label(of.lines.mean, 2))),
@@ -333,7 +334,7 @@ fn profile_cells(
         for (state, of) in [("before", Some(before)), ("after", after)] {
             let cell = of.map(|(index, of)| {
                 let text = quantity(of).unwrap_or_else(|| "–".to_owned());
-                pair.told(state, index, name, text)
+                pair.traced(state, index, name, text)
             });
             cells.push(cell.unwrap_or_else(|| "–".into()));
         }

@@ -40,7 +40,9 @@ pub(super) fn figures(site: &SiteProducts, geometric: &GeometricProducts) -> Res
     let mut html = String::new();
     let panels = 2 * site.images.len().max(1);
     let limit = (ARROWS_ALL / panels).clamp(20, ARROWS_MAX);
-    let adjusted = geometric.adjustment.map_or(&[][..], |of| of.images);
+    let adjusted = geometric
+        .adjustment
+        .map_or(&[][..], |adjustment| adjustment.images);
     for (index, image) in site.images.iter().enumerate() {
         let after = adjusted.get(index);
         if let Some(plot) = after.and_then(|after| footprints(image, after)) {
@@ -157,7 +159,9 @@ fn vectors(
     };
     let mut panels = Vec::new();
     let mut words = "Tie points, measured minus projected; flight to the right.".to_owned();
-    let after = geometric.adjustment.map(|of| of.intersected);
+    let after = geometric
+        .adjustment
+        .map(|adjustment| adjustment.intersected);
     for (state, title, colour, ties) in [
         ("before", "Before", BEFORE, Some(geometric.intersected)),
         ("after", "After", AFTER, after),

@@ -47,7 +47,10 @@ fn lead(config: &NetConfig, net: &Triangulation) -> String {
         "{word}: {}, {}, {} kept.",
         counted(net.pictures.len(), "picture"),
         counted(net.points.len(), "point"),
-        counted(net.controls.iter().filter(|of| of.kept).count(), "control"),
+        counted(
+            net.controls.iter().filter(|control| control.kept).count(),
+            "control"
+        ),
     );
     let [x, y] = totals.deviation_rms_m;
     let [east, north] = totals.control_rms_m;
@@ -70,7 +73,7 @@ fn way(config: &NetConfig) -> String {
     match way.method {
         Method::Scale => format!("BRICK, EXTEND, SCALE{local}: the figure keeps its shape."),
         Method::Mortar => format!(
-            "BRICK, EXTEND, MORTAR, SCALE{local}: bricks give way to the controls by their weights."
+            "BRICK, EXTEND, MORTAR, SCALE{local}: bricks are adjusted to the controls by their weights."
         ),
         Method::OneShot => {
             "All pictures and controls at once, then SCALE; bricks identify blunders.".to_owned()
@@ -100,14 +103,18 @@ fn map(title: &str, caption: &str, mut arrows: Vec<Arrows>, series: Vec<Series>)
     panel.height = (AXIS_WIDTH * height / width).clamp(300.0, 1_400.0) as u32;
     panel.arrows = arrows
         .into_iter()
-        .filter(|of| !of.each.is_empty())
+        .filter(|arrow| !arrow.each.is_empty())
         .collect();
     plot.panels.push(panel);
     Ok(format!("<div class=\"plots\">\n{}</div>\n", figure(&plot)?))
 }
 
 fn deviations(net: &Triangulation) -> Result<String> {
-    let tied: Vec<&MeasurementResult> = net.measurements.iter().filter(|of| shown(of)).collect();
+    let tied: Vec<&MeasurementResult> = net
+        .measurements
+        .iter()
+        .filter(|measurement| shown(measurement))
+        .collect();
     if tied.is_empty() {
         return Ok(paragraph("No point is on several pictures."));
     }
@@ -135,7 +142,8 @@ fn deviations(net: &Triangulation) -> Result<String> {
         .map(|picture| km(picture.centre_m))
         .collect();
     let places: Vec<(f64, f64)> = net.points.iter().map(|point| km(point.place_m)).collect();
-    let caption = "Images of ties from the mean of their point within the brick, where the point lies on the map. \
+    let caption = "Deviations of images of ties from the mean of their point within the brick, drawn at the point on \
+                   the map. \
         Thinned for display.";
     map(
         "Vectors of deviations",
@@ -207,8 +215,10 @@ fn bricks(net: &Triangulation) -> String {
                 seams.points.to_string().into(),
                 "".into(),
             ];
-            let largest: Vec<Cell> =
-                largest_m.map_or_else(|| vec!["".into(), "".into()], |of| of.map(metres).to_vec());
+            let largest: Vec<Cell> = largest_m.map_or_else(
+                || vec!["".into(), "".into()],
+                |largest_m| largest_m.map(metres).to_vec(),
+            );
             cells.extend(largest);
             cells.extend(rms_m.map(metres));
             cells.extend(["".into(), "".into()]);
@@ -232,9 +242,9 @@ fn bricks(net: &Triangulation) -> String {
         .min_by(|(_, a), (_, b)| a.factor.total_cmp(&b.factor));
     if let Some((what, ShrinkageResult { factor, law })) = strongest {
         words = paragraph(&format!(
-            "Two controls without redundancy shrink the figure between them, since residuals of ties shrink with it. The \
-             strongest here is {what}: by {:.1} parts in a million, by the law L′/L = 1 / (1 + 2T / (w L²)) {:.1}. It is put \
-             back everywhere before SCALE.",
+            "Two controls without redundancy shrink the figure between them, since residuals of ties shrink with it. \
+             The largest effect is at {what}: {:.1} parts in a million; the law L′/L = 1 / (1 + 2T / (w L²)) gives \
+             {:.1}. It is removed everywhere before SCALE.",
             1e6 * (1.0 - factor),
             1e6 * (1.0 - law)
         ));
@@ -243,8 +253,11 @@ fn bricks(net: &Triangulation) -> String {
 }
 
 fn blunders(net: &Triangulation) -> String {
-    let mut worst: Vec<&MeasurementResult> =
-        net.measurements.iter().filter(|of| shown(of)).collect();
+    let mut worst: Vec<&MeasurementResult> = net
+        .measurements
+        .iter()
+        .filter(|measurement| shown(measurement))
+        .collect();
     // One reference for all: rejected measurements have no deviation within their brick.
     let length_m = |of: &MeasurementResult| of.deviation.x_m.hypot(of.deviation.y_m);
     worst.sort_by(|a, b| {
@@ -287,7 +300,7 @@ fn blunders(net: &Triangulation) -> String {
         of.removed && same.count() == 2
     };
     let both_go = if worst.iter().copied().any(|of| on_two(&of)) {
-        " Of a point on two pictures, the wrong one cannot be identified, and both are rejected."
+        " For a point on two pictures, the erroneous measurement cannot be identified, and both are rejected."
     } else {
         ""
     };
@@ -326,14 +339,18 @@ fn controls(net: &Triangulation) -> Result<String> {
         table.row(of.kept, cells);
     }
     let vectors = |kept: bool| -> Vec<Arrow> {
-        let of = net.controls.iter().filter(|of| of.kept == kept);
-        of.map(|of| Arrow {
-            from: km(of.given_m),
-            by: km(of.scale_residual_m),
+        let of = net.controls.iter().filter(|control| control.kept == kept);
+        of.map(|control| Arrow {
+            from: km(control.given_m),
+            by: km(control.scale_residual_m),
         })
         .collect()
     };
-    let places = net.controls.iter().map(|of| km(of.given_m)).collect();
+    let places = net
+        .controls
+        .iter()
+        .map(|control| km(control.given_m))
+        .collect();
     let figure = map(
         "Vectors of residuals at the controls",
         "Given minus computed by SCALE of the free figure. Blunders are identified by least median of squares over the \
@@ -374,7 +391,8 @@ fn precision(config: &NetConfig, net: &Triangulation) -> String {
         totals.tie_equations, totals.control_equations, totals.unknowns, totals.redundancy
     );
     let floor = format!(
-        "Pictures are taken as pieces of a conformal map. An orthographic one departs from a similarity on this map by up to \
+        "Pictures are treated as parts of a conformal map. An orthographic one departs from a similarity on this map \
+         by up to \
          {:.2} m here: a systematic lower limit of the deviations for any adjustment.",
         totals.projection_floor_m
     );
@@ -417,7 +435,7 @@ fn pictures(net: &Triangulation) -> String {
             label(x, 3).into(),
             label(y, 3).into(),
             of.sigma_m
-                .map_or_else(String::new, |of| label(of, 1))
+                .map_or_else(String::new, |sigma_m| label(sigma_m, 1))
                 .into(),
             of.ties.to_string().into(),
             metres(of.deviation_rms_m),

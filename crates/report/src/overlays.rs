@@ -98,9 +98,9 @@ fn lead(site: &SiteProducts) -> String {
     report
         + &list(&keys)
         + &paragraph(
-            "Numbers count the shots of a profile, from 1. Marks leave their middle free. Pieces of images have the same \
-             ground in the same place, north up; dark violet is beyond the image or missing. In pictures of two images the \
-             first is red and the second cyan: ground that both have in the same place is grey.",
+            "Numbers count the shots of a profile, from 1. The middle of each mark is open. Image patches show the \
+             same ground at the same place, north up; dark violet marks areas beyond the image or without data. In \
+             composites of two images the first is red and the second cyan, so that coincident ground is grey.",
         )
 }
 

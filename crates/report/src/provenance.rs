@@ -41,7 +41,7 @@ fn write(site: &SiteProducts) -> String {
             [
                 (&kernel.name).into(),
                 (&kernel.role).into(),
-                Cell::from(whole(kernel.bytes)).told("/bytes"),
+                Cell::from(whole(kernel.bytes)).traced("/bytes"),
                 hash(&kernel.blake3),
             ],
         );
@@ -90,7 +90,7 @@ fn write(site: &SiteProducts) -> String {
 fn methods(site: &SiteProducts) -> String {
     let columns = &[Column::Text("stage"), Column::Number("method")];
     let mut table = Table::new(
-        "Stages; the number rises when a stage computes something else",
+        "Stages; the number increases when the method of a stage changes",
         columns,
     );
     for (stage, method) in &site.program.methods {

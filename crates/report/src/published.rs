@@ -29,7 +29,7 @@ fn departure(summary: &AdjustmentSummary) -> &'static str {
              the flight in the measured line and vanish here; its σ0 of 1.01 to 1.06 is not comparable."
         }
         AdjustmentModel::MolaSurface => {
-            "Image coordinates of MOLA are no observations in this model: their rows are empty. The published model \
+            "In this model image coordinates of MOLA are not observations; their rows are empty. The published model \
              (adjustment.model) fills them."
         }
     }
@@ -53,7 +53,7 @@ fn moments(of: &Summary, place: &str) -> [Cell; 2] {
         (of.mean, "mean"),
         (of.standard_deviation, "standard_deviation"),
     ];
-    values.map(|(value, name)| Cell::from(label(value, 3)).told(format!("{place}/{name}")))
+    values.map(|(value, name)| Cell::from(label(value, 3)).traced(format!("{place}/{name}")))
 }
 
 /// Footprints and tie points, each with its place below the summary.
@@ -79,7 +79,7 @@ fn ground_corrections(summary: &AdjustmentSummary) -> String {
         ],
     );
     for (name, place, of) in kinds(summary) {
-        let count = Cell::from(whole(of.corrections_m[0].n)).told("/corrections_m/0/n");
+        let count = Cell::from(whole(of.corrections_m[0].n)).traced("/corrections_m/0/n");
         let mut cells: Vec<Cell> = vec![name.into(), count];
         let axes = of.corrections_m.iter().enumerate();
         cells.extend(axes.flat_map(|(at, axis)| moments(axis, &format!("/corrections_m/{at}"))));
@@ -110,7 +110,7 @@ fn image_coordinates(summary: &AdjustmentSummary) -> String {
             ("MOLA, lines and px", shots, &image.mola_corrections),
             ("tie points, focal-plane px", ties, &image.tie_residuals_px),
         ] {
-            let count = Cell::from(whole(of[0].n)).told("/0/n");
+            let count = Cell::from(whole(of[0].n)).traced("/0/n");
             let mut cells: Vec<Cell> = vec![(&image.image).into(), name.into(), count];
             let axes = of.iter().enumerate();
             cells.extend(axes.flat_map(|(at, axis)| moments(axis, &format!("/{at}"))));
@@ -143,9 +143,9 @@ fn ground_sigmas(summary: &AdjustmentSummary) -> String {
             cells.push(mean);
         }
         let largest = largest
-            .map(|(at, axis)| Cell::from(label(axis.max, 3)).told(format!("/sigmas_m/{at}/max")));
+            .map(|(at, axis)| Cell::from(label(axis.max, 3)).traced(format!("/sigmas_m/{at}/max")));
         cells.extend(largest);
-        cells.push(Cell::from(label(summary.sigma0, 3)).told(format!("{PLACE}/sigma0")));
+        cells.push(Cell::from(label(summary.sigma0, 3)).traced(format!("{PLACE}/sigma0")));
         table.row_of(&format!("{PLACE}/{place}"), true, cells);
     }
     table.finish()

@@ -27,7 +27,12 @@ fn write(site: &SiteProducts) -> Result<String> {
     if site.profiles.is_empty() {
         return Ok(paragraph("No profile."));
     }
-    if site.ranges.profiles.iter().all(|of| !of.is_tested()) {
+    if site
+        .ranges
+        .profiles
+        .iter()
+        .all(|profile| !profile.is_tested())
+    {
         return Ok(untested(site));
     }
     let figures = format!("<div class=\"plots\">\n{}</div>\n", plots::figures(site)?);
@@ -37,7 +42,9 @@ fn write(site: &SiteProducts) -> Result<String> {
         return Ok(all_profiles(site) + &figures + &folded(&title, &tables));
     }
     let profiles = &site.ranges.profiles;
-    let invalid = profiles.iter().any(|of| !of.invalid_because.is_empty());
+    let invalid = profiles
+        .iter()
+        .any(|profile| !profile.invalid_because.is_empty());
     let ways = folded_unless(
         invalid,
         "Limits, and three ways to check a range",
@@ -55,13 +62,14 @@ fn untested(site: &SiteProducts) -> String {
             Column::Number("shots in profiles"),
         ],
     );
-    let shots: usize = site.profiles.iter().map(|of| of.rows.len()).sum();
+    let shots: usize = site.profiles.iter().map(|profile| profile.rows.len()).sum();
     table.row(
         true,
         [whole(site.profiles.len()).into(), whole(shots).into()],
     );
     paragraph(
-        "The range check tests nothing: the tables have no position of the spacecraft, and no kernels cover the shots. The \
+        "The ranges are not tested: the tables contain no position of the spacecraft, and no kernels cover the \
+         shots. The \
          spacecraft is put on the radius through the footprint at the range (nadir by range); its distance from the \
          footprint is the range.",
     ) + &table.finish()
@@ -89,18 +97,23 @@ fn all_profiles(site: &SiteProducts) -> String {
         ],
     );
     let profiles = &site.ranges.profiles;
-    let measured = profiles.iter().filter(|of| of.measured() > 0);
-    let means: Vec<f64> = measured.map(|of| of.mean_without_outliers_m).collect();
+    let measured = profiles.iter().filter(|profile| profile.measured() > 0);
+    let means: Vec<f64> = measured
+        .map(|profile| profile.mean_without_outliers_m)
+        .collect();
     let means = Summary::of(&means);
     let invalid = profiles
         .iter()
-        .filter(|of| !of.invalid_because.is_empty())
+        .filter(|profile| !profile.invalid_because.is_empty())
         .count();
     let shots: u64 = profiles
         .iter()
-        .map(|of| u64::from(of.range_minus_distance_m.n))
+        .map(|profile| u64::from(profile.range_minus_distance_m.n))
         .sum();
-    let outliers: u64 = profiles.iter().map(|of| u64::from(of.outliers)).sum();
+    let outliers: u64 = profiles
+        .iter()
+        .map(|profile| u64::from(profile.outliers))
+        .sum();
     let (squares, freedom) = profiles.iter().fold((0.0, 0.0), |(squares, freedom), of| {
         let own = f64::from(of.range_minus_distance_m.n.saturating_sub(1));
         let variance_m2 = of.range_minus_distance_m.standard_deviation.powi(2);
@@ -156,14 +169,14 @@ fn statistics(site: &SiteProducts) -> String {
         let valid = ranges.invalid_because.is_empty();
         let of_main = |value: f64, name: &str| match main.n {
             0 => Cell::from("–"),
-            _ => Cell::from(metres(value)).told(format!("/range_minus_distance_m/{name}")),
+            _ => Cell::from(metres(value)).traced(format!("/range_minus_distance_m/{name}")),
         };
         table.row_of(
             &place(index),
             valid,
             [
                 (&profile.id).into(),
-                Cell::from(whole(main.n)).told("/range_minus_distance_m/n"),
+                Cell::from(whole(main.n)).traced("/range_minus_distance_m/n"),
                 of_main(main.mean, "mean"),
                 of_main(main.standard_deviation, "standard_deviation"),
                 of_main(main.median, "median"),
@@ -174,7 +187,7 @@ fn statistics(site: &SiteProducts) -> String {
                     whole(ranges.outliers),
                     used_share(outlier_share, limits.outlier_share_max),
                 )
-                .told("/outliers"),
+                .traced("/outliers"),
                 trend(ranges),
                 dash_for_none(images.join(", ")).into(),
                 match (valid, ranges.is_judged(limits)) {
@@ -235,7 +248,7 @@ fn trend(ranges: &ProfileRanges) -> Cell {
             )
         },
     );
-    Cell::from(text).told("/trend_m_s/slope*1000 /trend_m_s/uncertainty*1000")
+    Cell::from(text).traced("/trend_m_s/slope*1000 /trend_m_s/uncertainty*1000")
 }
 
 /// Place of a profile in the products.
@@ -247,7 +260,7 @@ pub(super) fn place(profile: usize) -> String {
 fn known(of: &Summary, name: &str) -> Cell {
     match of.n {
         0 => Cell::from("–"),
-        _ => Cell::from(metres(of.mean)).told(format!("/{name}/mean")),
+        _ => Cell::from(metres(of.mean)).traced(format!("/{name}/mean")),
     }
 }
 
@@ -274,7 +287,7 @@ fn three_ways(site: &SiteProducts) -> String {
             .map(|(at, axis)| known(&ranges.spacecraft_m[at], &format!("spacecraft_{axis}_m")));
         let limited = |of: &Summary, mean_m: f64, limit_m: f64, name: &str| match of.n {
             0 => Cell::from("–"),
-            _ => Cell::Limited(metres(mean_m), mean_m.abs() / limit_m).told(format!("/{name}")),
+            _ => Cell::Limited(metres(mean_m), mean_m.abs() / limit_m).traced(format!("/{name}")),
         };
         let (by_kernels, by_own) = (&ranges.range_minus_distance_m, &ranges.decoding_m);
         table.row_of(

@@ -94,13 +94,13 @@ fn profiles(site: &SiteProducts, images: &[&ImageProducts]) -> String {
                     (&image.times.id).into(),
                     (&profile.id).into(),
                     if together { "yes" } else { "no" }.into(),
-                    Cell::from(whole(on_image.inside)).told("/inside"),
+                    Cell::from(whole(on_image.inside)).traced("/inside"),
                     inside(&points.line).into(),
                     inside(&points.sample).into(),
                     Cell::from(
                         spacing.map_or_else(|| "–".to_owned(), |lines| format!("{lines:.1}")),
                     )
-                    .told("/shot_spacing_lines"),
+                    .traced("/shot_spacing_lines"),
                 ],
             );
         }
@@ -123,7 +123,7 @@ fn profiles(site: &SiteProducts, images: &[&ImageProducts]) -> String {
     table.finish() + &paragraph(&words.join(" "))
 }
 
-/// Footprints near the image, over its lines.
+/// Samples of the footprints near the image, against their lines.
 fn plane(profiles: &[Profile], image: &ImageProducts) -> Plot {
     let points = &image.registration.points;
     let (lines, samples) = (
@@ -199,7 +199,7 @@ fn plane(profiles: &[Profile], image: &ImageProducts) -> Plot {
 /// Effect of the choice of the model.
 fn models(site: &SiteProducts, images: &[&ImageProducts]) -> String {
     let mut table = Table::new(
-        "Other models against the one used, footprints within the image's lines",
+        "Other models compared with the one used, for footprints within the image's lines",
         &[
             Column::Text("image"),
             Column::Text("used"),
@@ -227,8 +227,8 @@ fn models(site: &SiteProducts, images: &[&ImageProducts]) -> String {
             for (summary, name) in [(&other.lines, "lines"), (&other.samples, "samples")] {
                 let mean = Cell::from(label(summary.mean, 4));
                 let deviation = Cell::from(label(summary.standard_deviation, 4));
-                cells.push(mean.told(format!("/{name}/mean")));
-                cells.push(deviation.told(format!("/{name}/standard_deviation")));
+                cells.push(mean.traced(format!("/{name}/mean")));
+                cells.push(deviation.traced(format!("/{name}/standard_deviation")));
             }
             table.row_of(
                 &format!("{}/models/{index}", place(site, image)),

@@ -2,7 +2,7 @@
 //! residual shows, unknowns that cannot be separated, and rejected points.
 
 use super::{
-    heights::{known_beforehand, place_by},
+    heights::{WITHHELD_BECAUSE, known_beforehand, place_by},
     html::{Cell, Column, Table, counted, folded, paragraph},
     numbers::whole,
     plots::label,
@@ -62,8 +62,8 @@ pub(super) fn absolute(
     numbers.push((registration.to_owned(), ""));
     let determined = match &adjustment.adjusted.heights {
         Some(_) if site.accuracy_withheld().is_some() => {
-            "heights follow MOLA; absolute accuracies are not stated, because the a priori accuracy of orbit and attitude is \
-             that of another spacecraft"
+            numbers.push((WITHHELD_BECAUSE.to_owned(), ""));
+            "heights follow MOLA; absolute accuracies are withheld: {}"
         }
         Some(heights) => {
             let [east_m, north_m, up_m] = heights.mean_sigma_m;
@@ -228,12 +228,12 @@ pub(super) fn correlations(summary: &AdjustmentSummary) -> String {
     let mut all: Vec<_> = summary.correlated.iter().enumerate().collect();
     all.sort_by(|(_, a), (_, b)| b.2.abs().total_cmp(&a.2.abs()));
     let Some((_, (first, second, largest))) = all.first() else {
-        return paragraph("No two unknowns of the orientation correlate by more than 0.95.");
+        return paragraph("No two unknowns of the adjustment correlate by more than 0.95.");
     };
     let sum = if *largest < 0.0 { "sum" } else { "difference" };
     let mut html = paragraph(&format!(
         "{} correlate by more than 0.95, most of all {first} and {second} ({}): only their {sum}, each over its σ, is determined. \
-         Do not interpret them singly.",
+         Do not interpret the single values.",
         counted(all.len(), "pair") + " of unknowns",
         label(*largest, 4)
     ));
@@ -244,7 +244,7 @@ pub(super) fn correlations(summary: &AdjustmentSummary) -> String {
     ];
     let mut table = Table::new("Largest correlations", columns);
     for (index, (first, second, coefficient)) in all.iter().take(CORRELATED_SHOWN) {
-        let coefficient = Cell::from(label(*coefficient, 4)).told("/2");
+        let coefficient = Cell::from(label(*coefficient, 4)).traced("/2");
         table.row_of(
             &format!("adjustment.json#/adjustment/summary/correlated/{index}"),
             true,

@@ -39,7 +39,7 @@ fn write(site: &SiteProducts) -> Result<String> {
 }
 
 fn table(site: &SiteProducts) -> String {
-    let configured_s = site.config.mola_clock.correction_s();
+    let configured_s = site.config.altimeter_clock.correction_s();
     let mut table = Table::new(
         "Correction of least spread, seconds",
         &[
@@ -65,10 +65,10 @@ fn table(site: &SiteProducts) -> String {
             [
                 (&ranges.profile).into(),
                 scan.radius.word().into(),
-                Cell::from(with_sign(scan.best_s)).told("/bias_scan/best_s"),
-                Cell::from(plain(scan.uncertainty_s)).told("/bias_scan/uncertainty_s"),
+                Cell::from(with_sign(scan.best_s)).traced("/bias_scan/best_s"),
+                Cell::from(plain(scan.uncertainty_s)).traced("/bias_scan/uncertainty_s"),
                 Cell::from(with_sign(Some(configured_s)))
-                    .told("ranges.json#/mola_clock/correction_s"),
+                    .traced("ranges.json#/mola_clock/correction_s"),
                 with_sign(scan.best_s.map(|best_s| best_s - configured_s)).into(),
                 format!("{least_m:.4}").into(),
             ],
@@ -78,7 +78,7 @@ fn table(site: &SiteProducts) -> String {
 }
 
 fn scan_plot(site: &SiteProducts, index: usize) -> Option<Plot> {
-    let configured_s = site.config.mola_clock.correction_s();
+    let configured_s = site.config.altimeter_clock.correction_s();
     let ranges = &site.ranges.profiles[index];
     let scan = ranges.scan.as_ref()?;
     let points = scan.correction_s.iter().zip(&scan.spread_m);

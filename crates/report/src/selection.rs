@@ -95,7 +95,7 @@ fn rejects(site: &SiteProducts) -> String {
             [
                 reason.into(),
                 Cell::from(whole(*shots))
-                    .told(format!("manifest.json#/rejected/{}", member(reason))),
+                    .traced(format!("manifest.json#/rejected/{}", member(reason))),
                 format!("{share:.1} %").into(),
             ],
         );

@@ -7,7 +7,7 @@ use super::{
     html::{Cell, Column, Table, Tone, counted, escape, link, page, paragraph, verdict},
     numbers::{number, whole},
     sites_map::{self, Place},
-    source::told,
+    source::traced,
     uncertainty,
 };
 use areograph_base::{body::Body, error::Result};
@@ -112,7 +112,7 @@ pub fn sites_page(sites: &[SiteLine]) -> Result<String> {
         maps,
         table(sites),
         words,
-        uncertainty::of_all_sites(&budgets),
+        uncertainty::of_sites(&budgets),
         fidelity,
     ];
     Ok(page("Sites", &lead.concat(), &[]))
@@ -121,7 +121,10 @@ pub fn sites_page(sites: &[SiteLine]) -> Result<String> {
 /// The sites on a body with a known position.
 fn places(sites: &[SiteLine], body: Body) -> Vec<Place<'_>> {
     let placed = sites.iter().filter_map(|site| {
-        let products = site.products.as_ref().filter(|of| of.body == body)?;
+        let products = site
+            .products
+            .as_ref()
+            .filter(|products| products.body == body)?;
         Some(Place {
             name: &site.folder,
             tone: tone(site),
@@ -218,11 +221,11 @@ impl SiteSummary {
                 let [was, is] = [before_m, now_m].map(|metres| number(metres, 2));
                 let now = figure_place(name, now_m);
                 let moved = if was == is {
-                    told(&format!("{what} {is} m"), &now)
+                    traced(&format!("{what} {is} m"), &now)
                 } else {
                     let places =
                         format!("{}#{} {now}", before.manifest, figure_place(name, before_m));
-                    told(&format!("{what} {was} → {is} m"), &places)
+                    traced(&format!("{what} {was} → {is} m"), &places)
                 };
                 format!("<br><small>{moved}</small>")
             });
@@ -235,7 +238,7 @@ impl SiteSummary {
 }
 
 fn cells(site: &SiteLine, newest: Option<DateTime<FixedOffset>>) -> Vec<Cell> {
-    let told = |word: &str, why: &str| {
+    let traced = |word: &str, why: &str| {
         let why = if why.is_empty() {
             String::new()
         } else {
@@ -248,7 +251,7 @@ fn cells(site: &SiteLine, newest: Option<DateTime<FixedOffset>>) -> Vec<Cell> {
             .failure
             .as_deref()
             .map_or("the last run did not finish; see its log", first_line);
-        return vec![(&site.folder).into(), told("no products", because)];
+        return vec![(&site.folder).into(), traced("no products", because)];
     };
     let (word, why) = match &site.failure {
         Some(failure) => (
@@ -262,20 +265,20 @@ fn cells(site: &SiteLine, newest: Option<DateTime<FixedOffset>>) -> Vec<Cell> {
             &format!("{}/report/index.html", site.folder),
             &site.folder,
         )),
-        told(word, &why),
+        traced(word, &why),
     ];
     let counts = summary
         .counts
         .into_iter()
         .zip(["footprints", "profiles", "images"]);
     cells.extend(
-        counts.map(|(count, name)| Cell::from(whole(count)).told(format!("/counts/{name}"))),
+        counts.map(|(count, name)| Cell::from(whole(count)).traced(format!("/counts/{name}"))),
     );
     cells.push(moved(summary.height_off_m, "height_off_surface_m"));
     cells.push(moved(summary.images_apart_m, "along_track_parallax_m"));
     cells.push(summary.range_mean_m.map_or_else(
         || dash().into(),
-        |mean_m| Cell::from(number(mean_m, 2)).told(figure_place("range_mean_m", mean_m)),
+        |mean_m| Cell::from(number(mean_m, 2)).traced(figure_place("range_mean_m", mean_m)),
     ));
     cells.push(summary.trend());
     cells.push(Cell::Html(format!(
@@ -305,9 +308,9 @@ fn moved([before, after]: [Option<f64>; 2], name: &str) -> Cell {
         place(&format!("adjusted_{name}"), after),
     ];
     match (before, after) {
-        (Some(_), Some(_)) => both.told(format!("{before_place} {after_place}")),
-        (Some(_), None) => both.told(before_place),
-        (None, _) => both.told(after_place),
+        (Some(_), Some(_)) => both.traced(format!("{before_place} {after_place}")),
+        (Some(_), None) => both.traced(before_place),
+        (None, _) => both.traced(after_place),
     }
 }
 

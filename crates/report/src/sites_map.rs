@@ -78,7 +78,8 @@ pub(super) fn figure(body: Body, places: &[Place]) -> Result<String> {
         Key::colour("valid with remarks (triangle)", REMARKS),
         Key::mark("invalid or failed (cross)"),
     ];
-    let mut words = "Middles of the sites' first windows; sites with an outline for a window are in the table only. Grey: large \
+    let mut words = "Centres of the first windows of the sites; sites whose window is an outline are listed in the \
+                     table only. Grey: large \
                      features of the ground with their extent (IAU gazetteer, whole degrees), and landing sites (rings)."
         .to_owned();
     if !unnamed.is_empty() {
@@ -118,7 +119,7 @@ fn names<'a>(places: &[Place<'a>], features: &[&Feature]) -> (Labels, Vec<&'a st
     }
     for landing in features
         .iter()
-        .filter(|of| matches!(of.kind, Kind::Landing))
+        .filter(|feature| matches!(feature.kind, Kind::Landing))
     {
         names.keep_off(pixel(landing.place_deg), RING);
     }
@@ -165,7 +166,7 @@ fn draw<'a>(
     let order = [Tone::Good, Tone::Remarks, Tone::Bad];
     let sorted = order
         .into_iter()
-        .flat_map(|tone| places.iter().filter(move |of| of.tone == tone));
+        .flat_map(|tone| places.iter().filter(move |place| place.tone == tone));
     for place in sorted {
         let (x, y) = pixel(place.place_deg);
         match place.tone {

@@ -24,7 +24,7 @@ const CIRCLES: i32 = 3;
 /// Possible emission angles of the outermost circle, degrees.
 const OUTERMOST_DEG: [f64; 8] = [3.0, 6.0, 12.0, 30.0, 45.0, 60.0, 75.0, 90.0];
 /// Number of pairs in the caption; the table has all.
-const PAIRS_TOLD: usize = 3;
+const PAIRS_LISTED: usize = 3;
 /// Radius of the dot of an image.
 const DOT: i32 = 9;
 /// Colour of the images.
@@ -97,7 +97,7 @@ fn words(site: &SiteProducts, images: usize, unnamed: &[&str]) -> String {
         return words;
     };
     let pairs = BeforeAfter::all(geometric);
-    for pair in pairs.iter().take(PAIRS_TOLD) {
+    for pair in pairs.iter().take(PAIRS_LISTED) {
         words += &format!(
             " {}: convergence {}°, base-to-height {}, {} in common.",
             pair.name(),

@@ -7,7 +7,7 @@
 use super::html::{Cell, escape, from_places};
 
 /// `text`, whose numbers are those at `places`, as HTML.
-pub(super) fn told(text: &str, places: &str) -> String {
+pub(super) fn traced(text: &str, places: &str) -> String {
     format!("<span{}>{}</span>", from_places(places), escape(text))
 }
 
@@ -24,7 +24,7 @@ pub(super) fn filled(words: &str, numbers: &[(String, &str)]) -> String {
     for (piece, (number, place)) in pieces.zip(numbers) {
         html += &match *place {
             "" => escape(number),
-            place => told(number, place),
+            place => traced(number, place),
         };
         html += &escape(piece);
     }
@@ -32,9 +32,9 @@ pub(super) fn filled(words: &str, numbers: &[(String, &str)]) -> String {
 }
 
 /// `cell` without its places, for a number that no product has.
-pub(super) fn untold(cell: Cell) -> Cell {
+pub(super) fn untraced(cell: Cell) -> Cell {
     match cell {
-        Cell::Told(cell, _) => untold(*cell),
+        Cell::Traced(cell, _) => untraced(*cell),
         cell => cell,
     }
 }

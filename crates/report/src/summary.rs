@@ -2,18 +2,18 @@
 
 use super::{
     checks,
-    heights::{is_open, place_by},
+    heights::{WITHHELD_BECAUSE, is_open, place_by},
     html::{Tone, counted, escape, list, paragraph, verdict},
     map,
     misregistration::{BeforeAfter, by_footprints},
     numbers::{number, signed, whole},
-    source::told,
+    source::traced,
 };
-use areograph_base::{error::Result, footprints::AdjustmentModel};
+use areograph_base::{error::Result, footprints::AdjustmentModel, verdict::NOT_TESTED};
 use areograph_products::SiteProducts;
 use areograph_stages::{
     compare_pairs::PairComparison,
-    judge::{Check, CheckKind},
+    judge::{Check, CheckKind, NO_BEAM},
 };
 
 /// Number of reasons, and of remarks, listed; the rest are counted.
@@ -57,10 +57,9 @@ fn untested(phrases: &[String]) -> String {
     if phrases.is_empty() {
         return String::new();
     }
-    let phrases: Vec<String> = phrases.iter().map(|phrase| escape(phrase)).collect();
     format!(
-        "<p class=\"about\"><b>Not tested by anything here:</b> {}.</p>\n",
-        phrases.join("; ")
+        "<p class=\"about\"><b>{NOT_TESTED}</b></p>\n{}",
+        list(phrases)
     )
 }
 
@@ -91,15 +90,15 @@ fn about(site: &SiteProducts) -> String {
     if !site.images.is_empty() {
         let taken = days(&mut site.images.iter().map(|image| &*image.times.utc_start));
         let images = counted(site.images.len(), "image");
-        parts.push(told(&images, "manifest.json#/counts/images") + &escape(&taken));
+        parts.push(traced(&images, "manifest.json#/counts/images") + &escape(&taken));
     }
     let shot = days(&mut site.utc.iter().map(String::as_str));
     let footprints = counted(site.footprints.len(), "footprint");
     let profiles = counted(site.profiles.len(), "profile");
     parts.push(format!(
         "{} in {}{}",
-        told(&footprints, "manifest.json#/counts/footprints"),
-        told(&profiles, "manifest.json#/counts/profiles"),
+        traced(&footprints, "manifest.json#/counts/footprints"),
+        traced(&profiles, "manifest.json#/counts/profiles"),
         escape(&shot)
     ));
     let mut words = escape(site.config.description.trim_end_matches('.'));
@@ -164,12 +163,12 @@ fn by_mola(site: &SiteProducts) -> Option<KeyNumber> {
     let (geometric, adjustment) = site.adjustment()?;
     let of = |state| format!("adjustment.json#/{state}/heights/above_surface_m/n");
     let ties = counted(adjustment.heights.above_m.n as usize, "tie point");
-    let ties = told(&ties, &of("after"));
-    let all = told(&whole(geometric.heights.above_m.n), &of("before"));
-    let before_m = told(&signed(before_m, 1), &before_place);
+    let ties = traced(&ties, &of("after"));
+    let all = traced(&whole(geometric.heights.above_m.n), &of("before"));
+    let before_m = traced(&signed(before_m, 1), &before_place);
     Some(KeyNumber {
         what: "Heights against MOLA",
-        value: told(&format!("{} m", signed(after_m, 1)), &after_place),
+        value: traced(&format!("{} m", signed(after_m, 1)), &after_place),
         // Data that control a result cannot test it: then only the number before does.
         note: match site.config.adjustment.model {
             AdjustmentModel::MolaSurface => format!(
@@ -191,7 +190,7 @@ fn between_images(site: &SiteProducts) -> Option<KeyNumber> {
     let before_place = format!("|{}/along_track_parallax_m", pair.place("before"));
     Some(KeyNumber {
         what: "Between images, along track",
-        value: told(
+        value: traced(
             &format!(
                 "{} m",
                 number(after_m.abs(), if after_m.abs() < 1.0 { 2 } else { 1 })
@@ -201,7 +200,7 @@ fn between_images(site: &SiteProducts) -> Option<KeyNumber> {
         note: format!(
             "at the tie points of {}, which the adjustment fits; {} m before{}",
             escape(&after.subject),
-            told(&number(before_m, 0), &before_place),
+            traced(&number(before_m, 0), &before_place),
             at_footprints(pair)
         ),
     })
@@ -212,8 +211,8 @@ fn at_footprints(pair: &BeforeAfter) -> String {
     let of = |state: &str, pair_of: &PairComparison| {
         let [apart_m, sigma_m] = by_footprints(pair_of)?;
         let place = format!("{}/footprints", pair.place(state));
-        let told = |value: f64, name: &str| told(&number(value, 0), &format!("{place}/{name}"));
-        Some([told(apart_m, "apart_m"), told(sigma_m, "apart_sigma_m")])
+        let traced = |value: f64, name: &str| traced(&number(value, 0), &format!("{place}/{name}"));
+        Some([traced(apart_m, "apart_m"), traced(sigma_m, "apart_sigma_m")])
     };
     let [before, after] = [("before", Some(pair.before)), ("after", pair.after)]
         .map(|(state, found)| of(state, found?));
@@ -235,15 +234,14 @@ fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
     if site.accuracy_withheld().is_some() {
         return Some(KeyNumber {
             what: "Absolute accuracy, 1 σ",
-            value: "not stated".to_owned(),
-            note: "the a priori accuracy of orbit and attitude is that of another spacecraft; see the remarks"
-                .to_owned(),
+            value: "withheld".to_owned(),
+            note: format!("{WITHHELD_BECAUSE}; see the remarks"),
         });
     }
     let [east_m, north_m, up_m] = heights.mean_sigma_m;
     Some(KeyNumber {
         what: "Absolute accuracy, 1 σ",
-        value: told(
+        value: traced(
             &format!(
                 "±{} m east, ±{} m north, ±{} m height",
                 number(east_m, 0),
@@ -263,18 +261,18 @@ fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
                     "position by {}, height by MOLA",
                     place_by(&geometric, &adjustment)
                 )
-            } + untested_attitude(site)),
+            } + &untested_attitude(site)),
         ),
     })
 }
 
 /// A clause where nothing tests an attitude error that all images share.
-fn untested_attitude(site: &SiteProducts) -> &'static str {
+fn untested_attitude(site: &SiteProducts) -> String {
     let mut checks = site.verdict.checks.iter();
     if checks.any(|check| check.kind == CheckKind::BeamAcross) {
-        ""
+        String::new()
     } else {
-        "; no simultaneous shot tests the attitude"
+        format!("; {NO_BEAM}")
     }
 }
 
@@ -284,12 +282,12 @@ fn by_ranges(site: &SiteProducts) -> Option<KeyNumber> {
     let profile = escape(&check.subject);
     Some(KeyNumber {
         what: "Range − distance",
-        value: told(&format!("{} m", signed(mean_m, 2)), &place),
+        value: traced(&format!("{} m", signed(mean_m, 2)), &place),
         note: match site.profiles.len() {
             1 => format!("mean of profile {profile}"),
             count => {
                 let profiles = counted(count, "profile");
-                let profiles = told(&profiles, "manifest.json#/counts/profiles");
+                let profiles = traced(&profiles, "manifest.json#/counts/profiles");
                 format!("largest mean of {profiles}, {profile}")
             }
         },

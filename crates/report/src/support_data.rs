@@ -36,8 +36,8 @@ fn write(site: &SiteProducts) -> String {
     let apart: Vec<&str> = apart.map(|(times, _)| &*times.id).collect();
     if !apart.is_empty() {
         words += &format!(
-            " ALE's positions mostly contain light time and aberration, hundreds of metres: neither ranges nor the laser's \
-             mounting are used with {}.",
+            " Positions by ALE usually include light time and aberration, which amount to hundreds of metres: \
+             neither ranges nor the mounting of the laser are used with {}.",
             apart.join(", ")
         );
     }

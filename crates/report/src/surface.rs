@@ -31,7 +31,7 @@ pub(super) const SECTION: Section = Section {
 fn write(site: &SiteProducts, account: &SurfaceAccount) -> Result<String> {
     let table = made(site, account);
     if account.is_refused {
-        let words = "Too few cells matched to be significant: there is no model.";
+        let words = "Too few cells matched to be significant; no model was produced.";
         return Ok(paragraph(words) + &table);
     }
     let model = link("../surface.tif", "surface.tif");
@@ -53,7 +53,9 @@ fn made(site: &SiteProducts, account: &SurfaceAccount) -> String {
             Column::Number("compared (m)"),
             Column::Number("cells of common ground"),
             Column::Number("with a height"),
-            Column::Number("σ, matching (m)"),
+            Column::Number("σ of a cell (m)"),
+            Column::Number("by jitter"),
+            Column::Number("by smoothing"),
             Column::Number("σ, common (m)"),
             Column::Number("convergence (°)"),
             Column::Number("correlation"),
@@ -63,10 +65,10 @@ fn made(site: &SiteProducts, account: &SurfaceAccount) -> String {
     let [first, second] = account.images.map(|image| &site.images[image].times.id);
     let common = account.common_sigma_m.map_or_else(
         || Cell::from("not known"),
-        |sigma_m| Cell::from(label(sigma_m, 1)).told("/heights/common_sigma_m"),
+        |sigma_m| Cell::from(label(sigma_m, 1)).traced("/heights/common_sigma_m"),
     );
     let of =
-        |value: f64, decimals: usize, place: &str| Cell::from(label(value, decimals)).told(place);
+        |value: f64, decimals: usize, place: &str| Cell::from(label(value, decimals)).traced(place);
     table.row_of(
         "surface.json#",
         !account.is_refused,
@@ -74,9 +76,11 @@ fn made(site: &SiteProducts, account: &SurfaceAccount) -> String {
             format!("{first}, {second}").into(),
             of(account.cell_m, 1, "/cells/cell_m"),
             of(account.compared_m, 0, "/matching/compared_m"),
-            Cell::from(whole(account.cells)).told("/cells/common"),
-            Cell::from(whole(account.filled)).told("/cells/filled"),
+            Cell::from(whole(account.cells)).traced("/cells/common"),
+            Cell::from(whole(account.filled)).traced("/cells/filled"),
             of(account.sigma_m, 2, "/heights/sigma_m"),
+            of(account.jitter_m, 2, "/heights/jitter_m"),
+            of(account.smoothing_m, 2, "/heights/smoothing_m"),
             common,
             of(
                 account.convergence_rad / RADIANS_PER_DEGREE,
@@ -89,8 +93,10 @@ fn made(site: &SiteProducts, account: &SurfaceAccount) -> String {
     );
     table.finish()
         + &paragraph(
-            "σ, matching: of one cell against the others, by the residuals of its match. Errors that all heights share are stated separately \
-             (σ, common, by the adjustment). Neighbouring heights within the compared square are correlated.",
+            "σ of a cell: of one height against the others, by the residuals of its match, by jitter of the images (the scatter of \
+             their shifts across the parallax, where no height moves them), and by the relief inside the compared square. Errors that \
+             all heights share are stated separately (σ, common, by the adjustment). Neighbouring heights within the compared square \
+             are correlated.",
         )
 }
 
@@ -105,7 +111,7 @@ fn compared(account: &SurfaceAccount) -> String {
     } = &account.shots;
     if above_m.n == 0 {
         return paragraph(
-            "No footprint of MOLA is on it: there is no independent test of its heights.",
+            "No footprint of MOLA lies on the model, so that its heights have no independent test.",
         );
     }
     let mut all = shots_table("MOLA minus the terrain model, metres");
@@ -159,10 +165,10 @@ fn shots_table(caption: &str) -> Table {
 fn summary_row(name: &str, of: &Summary) -> [Cell; 6] {
     [
         name.into(),
-        Cell::from(whole(of.n)).told("/n"),
-        Cell::from(signed(of.mean, 1)).told("/mean"),
-        Cell::from(label(of.standard_deviation, 1)).told("/standard_deviation"),
-        Cell::from(signed(of.median, 1)).told("/median"),
-        Cell::from(label(of.nmad, 1)).told("/nmad"),
+        Cell::from(whole(of.n)).traced("/n"),
+        Cell::from(signed(of.mean, 1)).traced("/mean"),
+        Cell::from(label(of.standard_deviation, 1)).traced("/standard_deviation"),
+        Cell::from(signed(of.median, 1)).traced("/median"),
+        Cell::from(label(of.nmad, 1)).traced("/nmad"),
     ]
 }

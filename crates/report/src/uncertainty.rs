@@ -5,7 +5,7 @@ use super::{
     misregistration::BeforeAfter,
     plots::label,
     section::Section,
-    source::untold,
+    source::untraced,
 };
 use areograph_geom::uncertainty::{GroundPart, UncertaintyBudget};
 use areograph_products::GeometricProducts;
@@ -48,8 +48,8 @@ const COLUMNS: &[Column] = &[
 ];
 const WORDS: &str = "As the paper computes: D = √(M² + σ²) of the reprojection residuals; across track it averages where its eq. 7 \
                      adds squares, so both are given. Known flaw: eq. 7 adds the means of both images in quadrature, although \
-                     means of opposite sign add up by eq. 5, and eq. 6 assigns the rest to the footprints. Exact shots get such \
-                     a rest as well: it is no accuracy of the altimeter.";
+                     means of opposite sign add up by eq. 5, and eq. 6 assigns the remainder to the footprints. \
+                     Error-free shots leave such a remainder as well; it is not the accuracy of the altimeter.";
 
 /// The same by eq. 5.
 const SIGNED_TITLE: &str = "The same with Δ = Δ1 − Δ2 of every tie point (eq. 5)";
@@ -103,13 +103,13 @@ fn pooled<const N: usize>(
         let head = [Cell::from(format!("all: {pairs}")), "before".into()];
         table.row(
             true,
-            head.into_iter().chain(cells(&budget, true).map(untold)),
+            head.into_iter().chain(cells(&budget, true).map(untraced)),
         );
     }
 }
 
-/// The budget of the pairs of all sites before their adjustments, as the paper pools its three.
-pub(super) fn of_all_sites(budgets: &[UncertaintyBudget]) -> String {
+/// The budget of the pairs of the sites with a budget before their adjustments, as the paper pools its three.
+pub(super) fn of_sites(budgets: &[UncertaintyBudget]) -> String {
     if budgets.len() < 2 {
         return String::new();
     }
@@ -124,7 +124,7 @@ pub(super) fn of_all_sites(budgets: &[UncertaintyBudget]) -> String {
         paragraph(SIGNED_WORDS),
     ];
     folded(
-        "Uncertainty budget of Shan et al. 2005, all sites",
+        "Uncertainty budget of Shan et al. 2005, sites with a budget",
         &html.concat(),
     )
 }
@@ -133,7 +133,7 @@ pub(super) fn of_all_sites(budgets: &[UncertaintyBudget]) -> String {
 fn as_published(budget: &UncertaintyBudget, before: bool) -> [Cell; 6] {
     let footprints = match budget.ground {
         GroundPart::Resolved { along_px } if before => {
-            Cell::from(label(along_px, 2)).told("/budget/ground/resolved/along_px")
+            Cell::from(label(along_px, 2)).traced("/budget/ground/resolved/along_px")
         }
         GroundPart::NotResolvable if before => {
             "not resolvable: orientation explains more than is observed".into()
@@ -172,7 +172,7 @@ fn observed(budget: &UncertaintyBudget, before: bool) -> Cell {
 
 /// A number of the budget at `name` below it.
 fn of(value: f64, name: &str) -> Cell {
-    Cell::from(label(value, 2)).told(format!("/budget/{name}"))
+    Cell::from(label(value, 2)).traced(format!("/budget/{name}"))
 }
 
 /// Reason why a pair has no budget.
@@ -182,7 +182,7 @@ fn without_budget(pair: &BeforeAfter) -> String {
         if let Err(reason) = &found.budget {
             let name = pair.name();
             html += &paragraph(&format!(
-                "{name}, {state} the adjustment: there is no budget: {reason}."
+                "{name} has no budget {state} the adjustment: {reason}."
             ));
         }
     }
@@ -220,7 +220,8 @@ mod tests {
     #[test]
     fn sites_are_pooled_by_their_squares() {
         // √((30² + 40²) / 2) = 35.36, and by eq. 7 that over √2.
-        let html = of_all_sites(&[budget(30.0), budget(40.0)]);
+        let html = of_sites(&[budget(30.0), budget(40.0)]);
+        assert!(html.contains("2005, sites with a budget<"), "{html}");
         assert!(html.contains("all: 2 pairs"), "{html}");
         assert!(
             html.contains(">35.36<") && html.contains(">25.00<"),
@@ -228,6 +229,6 @@ mod tests {
         );
         // No product has these numbers.
         assert!(!html.contains("data-from"), "{html}");
-        assert_eq!(of_all_sites(&[budget(30.0)]), "");
+        assert_eq!(of_sites(&[budget(30.0)]), "");
     }
 }

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::{
     error::SceneError,
-    laser::{CLOCK_HZ, CLOUD_SHARE, FRAME_S, MISSING_SHARE, SHOT_S, crossover_residual_m},
+    laser::{CLOCK_HZ, CLOUD_SHARE, FRAME_S, MISSING_SHARE, SHOT_S, add_orbit_errors, share_of},
     orbit::Orbit,
     random::{mix, normal_of, unit_of},
     sun::mars_from_sun_m,
@@ -177,27 +177,10 @@ pub(super) fn fly(orbit: &Orbit, terrain: &Terrain, frame: &ArchiveFrame) -> Res
         terrain.radius_m(&ground.normalize())
     });
     fly_shots(&looks, radii_m, frame, &mut values);
-    // From here on the file's own ground and spacecraft: a crossover residual too high.
-    values.crossover_residual_m = crossover_residual_m(et);
-    let change_m = values.crossover_residual_m - crossover_residual_m(et.plus(-FRAME_S));
-    let orbit_m = Badness::orbit_m(frame.bad);
-    for shot in 0..SHOTS {
-        let higher_m = values.crossover_residual_m + share_of(shot) * change_m + orbit_m;
-        if values.range_m[shot] > 0.0 {
-            values.shot_radius_m[shot] += higher_m;
-        }
-    }
-    values.mid_radius_m += values.crossover_residual_m + orbit_m;
-    values.spacecraft_radius_m += values.crossover_residual_m + orbit_m;
-    values.spacecraft_radius_change_m += change_m;
+    add_orbit_errors(&mut values, et, true, Badness::orbit_m(frame.bad));
     let mut record = Record::from_frame(&values).map_err(Error::from)?;
     telemetry::enter(&mut record, mix(frame.seed) ^ u64::from(frame.index) << 8);
     Ok(record)
-}
-
-/// Position of a shot, counted from 0, in its frame: −0.475 to 0.475.
-fn share_of(shot: usize) -> f64 {
-    (shot as f64 - 9.5) / SHOTS as f64
 }
 
 /// The values of a frame except its shots, before the crossover residual.

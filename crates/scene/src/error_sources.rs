@@ -113,7 +113,8 @@ pub enum Relief {
     SelfAffine(Roughness),
 }
 
-/// Roughness of self-affine ground: heights `d` apart differ by `ν (d / 300 m)^0.7` (root mean square).
+/// Roughness of self-affine ground: heights `d` apart differ by `ν (d / 300 m)^H` (root mean square), H = 0.7 except for
+/// varied ground.
 ///
 /// The sizes span MOLA's results for plains and highlands, the exponent is the usual one of Mars at these lengths: both
 /// are choices, not the relief of the real sites.
@@ -126,16 +127,20 @@ pub enum Roughness {
     Medium,
     /// ν = 25 m.
     Rough,
+    /// Other ground around every site: H drawn from 0.4 to 0.95, ν from 3 m to 6 m (H = 0.4) or 23 m (H = 0.95), and ν
+    /// changes by factors of one half to two over some 15 km.
+    Varied,
 }
 
 impl Roughness {
-    /// ν, metres: difference of heights 300 m apart (root mean square).
+    /// ν, metres: difference of heights 300 m apart (root mean square); `None` for varied ground.
     #[must_use]
-    pub const fn height_difference_at_300_m(self) -> f64 {
+    pub const fn height_difference_at_300_m(self) -> Option<f64> {
         match self {
-            Self::Plains => 5.0,
-            Self::Medium => 10.0,
-            Self::Rough => 25.0,
+            Self::Plains => Some(5.0),
+            Self::Medium => Some(10.0),
+            Self::Rough => Some(25.0),
+            Self::Varied => None,
         }
     }
 }

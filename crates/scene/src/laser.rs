@@ -40,9 +40,36 @@ pub(super) const CROSSOVER_AMPLITUDE_M: f64 = 0.8;
 pub(super) const CROSSOVER_PERIOD_S: f64 = 3_000.0;
 
 /// The crossover residual at `et`, metres; smooth, to be subtracted from radii.
-pub(super) fn crossover_residual_m(et: Et) -> f64 {
+fn crossover_residual_m(et: Et) -> f64 {
     let turns = (et.seconds() / CROSSOVER_PERIOD_S).rem_euclid(1.0);
     CROSSOVER_AMPLITUDE_M * (std::f64::consts::TAU * turns).sin()
+}
+
+/// Adds errors of the orbit to a file's own ground and spacecraft: the crossover residual at the mid-point, which readers
+/// subtract again, interpolated from frame to frame, and a constant `orbit_m`.
+///
+/// * `has_previous` – whether the file has a frame before this one
+pub(super) fn add_orbit_errors(values: &mut FrameValues, et: Et, has_previous: bool, orbit_m: f64) {
+    let residual_m = crossover_residual_m(et);
+    let change_m = if has_previous {
+        residual_m - crossover_residual_m(et.plus(-FRAME_S))
+    } else {
+        0.0
+    };
+    values.crossover_residual_m = residual_m;
+    for shot in 0..SHOTS {
+        if values.range_m[shot] > 0.0 {
+            values.shot_radius_m[shot] += residual_m + share_of(shot) * change_m + orbit_m;
+        }
+    }
+    values.mid_radius_m += residual_m + orbit_m;
+    values.spacecraft_radius_m += residual_m + orbit_m;
+    values.spacecraft_radius_change_m += change_m;
+}
+
+/// Position of a shot, counted from 0, in its frame: −0.475 to 0.475.
+pub(super) fn share_of(shot: usize) -> f64 {
+    (shot as f64 - 9.5) / SHOTS as f64
 }
 
 /// Target of a shot.
@@ -220,6 +247,7 @@ pub(super) fn fly_frame(
         let shot_look = Look::new(&beam, &beam.direction, et, request);
         shots.push(fly_shot(&shot_look, index, terrain, request, &mut values)?);
     }
+    add_orbit_errors(&mut values, middle_et, request.index > 0, 0.0);
     let mut shots = shots.into_iter();
     let error = SceneError::BeamMisses {
         et_s: middle_et.seconds(),
@@ -285,7 +313,6 @@ fn frame_values(
             / (2.0 * PARALLAX_STEP_M),
         areoid_radius_m: terrain.areoid_radius_m(&up),
         areoid_radius_change_m: areoid_last - areoid_first,
-        crossover_residual_m: crossover_residual_m(middle.et),
         mid_radius_m: mid_radius_m + shift.radial_m(),
         mid_range_m,
         frame_index: u16::try_from(frame_number % 7 + 1).unwrap_or(1),

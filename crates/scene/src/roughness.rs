@@ -16,11 +16,38 @@ use super::{
 const FINEST_M: f64 = 12.5;
 /// Octaves; the coarsest lattice has 51.2 km.
 const OCTAVES: i32 = 13;
-/// Hurst exponent.
+/// Hurst exponent of ground that is not varied.
 const HURST: f64 = 0.7;
 /// Amplitude of an octave in units of `ν (spacing / 300 m)^H` for which the sum of all octaves has the structure
 /// function `ν² (d / 300 m)^2H`, to 4 % in height from 50 m to 2 km.
 const OCTAVE_SHARE: f64 = 0.4251;
+/// Structure function of an octave of unit amplitude at 300 m, from the finest octave on: mean square difference over
+/// places and directions, by numerical integration of the covariance of its nodes.
+const STRUCTURE_AT_300_M: [f64; OCTAVES as usize] = [
+    1.228,
+    1.228,
+    1.228,
+    1.228,
+    1.220,
+    0.7914,
+    0.2766,
+    0.076_13,
+    0.0195,
+    0.004_905,
+    0.001_23,
+    0.000_307_6,
+    0.000_076_9,
+];
+/// Hurst exponents of varied ground; fits to MOLA shots in windows of a degree give 0.38 at Gusev and 0.94 at Gale.
+const VARIED_HURST: [f64; 2] = [0.4, 0.95];
+/// Least roughness of varied ground at 300 m, metres. The largest is that whose shortest waves are, where the ground is
+/// roughest, as steep as those of [`Roughness::Rough`]: on steeper ground a beam would meet several places.
+const VARIED_MIN_M: f64 = 3.0;
+const SHORTEST_M: f64 = 2.0 * FINEST_M;
+/// Lattice on which the roughness of varied ground changes, metres, and the natural logarithm by which a node changes it:
+/// nodes reach √3 times that, a factor of two.
+const CHANGE_M: f64 = 15_000.0;
+const CHANGE: f64 = 0.4;
 /// Full roughness up to the first distance from the site, zero beyond the second, metres; windows extend to 33 km.
 const REACH_M: [f64; 2] = [40_000.0, 60_000.0];
 
@@ -40,6 +67,8 @@ pub(super) struct RoughPatch {
     east: Vector3<f64>,
     north: Vector3<f64>,
     octaves: Vec<Octave>,
+    /// Logarithm of the factor by which the roughness changes; `None` where it is the same everywhere.
+    change: Option<Octave>,
     craters: Vec<Crater>,
     cells: HashMap<[i32; 2], Vec<usize>>,
 }
@@ -69,17 +98,21 @@ impl RoughPatch {
     pub(super) fn new(seed: u64, centre: &Vector3<f64>, roughness: Roughness) -> Self {
         let place = [centre.x, centre.y, centre.z].map(f64::to_bits);
         let key = place.into_iter().fold(seed, |key, bits| mix(key ^ bits));
+        let law = Law::of(roughness, key);
         let mut random = Random::new(key, "roughness");
         let east = Vector3::z().cross(centre).normalize();
-        let octaves = (0..OCTAVES)
-            .map(|octave| Octave::new(octave, roughness, &mut random))
-            .collect();
+        let octaves = (0..OCTAVES).map(|octave| {
+            let spacing_m = FINEST_M * 2.0_f64.powi(octave);
+            Octave::new(spacing_m, law.height_m(spacing_m), &mut random)
+        });
+        let octaves = octaves.collect();
         let craters = craters(&mut random);
         Self {
             centre: *centre,
             east,
             north: centre.cross(&east),
             octaves,
+            change: law.change,
             cells: grid(&craters),
             craters,
         }
@@ -107,20 +140,64 @@ impl RoughPatch {
     /// Height without craters, metres.
     fn noise_m(&self, plan_m: &Vector2<f64>) -> f64 {
         let octaves = self.octaves.iter();
-        octaves.map(|octave| octave.height_m(plan_m)).sum()
+        let height_m: f64 = octaves.map(|octave| octave.height_m(plan_m)).sum();
+        let change = self.change.as_ref();
+        change.map_or(height_m, |change| height_m * change.height_m(plan_m).exp())
+    }
+}
+
+/// How heights differ with distance around a site.
+struct Law {
+    /// Difference 300 m apart, metres.
+    at_300_m: f64,
+    hurst: f64,
+    /// Amplitude of an octave in units of `at_300_m (spacing / 300 m)^hurst`.
+    share: f64,
+    change: Option<Octave>,
+}
+
+impl Law {
+    fn of(roughness: Roughness, key: u64) -> Self {
+        if let Some(at_300_m) = roughness.height_difference_at_300_m() {
+            return Self {
+                at_300_m,
+                hurst: HURST,
+                share: OCTAVE_SHARE,
+                change: None,
+            };
+        }
+        let mut random = Random::new(key, "varied ground");
+        let hurst = random.between(VARIED_HURST[0], VARIED_HURST[1]);
+        let squares = (0..OCTAVES)
+            .zip(STRUCTURE_AT_300_M)
+            .map(|(octave, square)| {
+                let spacing_m = FINEST_M * 2.0_f64.powi(octave);
+                (spacing_m / 300.0).powf(2.0 * hurst) * square
+            });
+        let rough_m = Roughness::Rough.height_difference_at_300_m();
+        let most_m =
+            0.5 * rough_m.unwrap_or(VARIED_MIN_M) * (SHORTEST_M / 300.0).powf(HURST - hurst);
+        Self {
+            at_300_m: random.between_log(VARIED_MIN_M, most_m),
+            hurst,
+            share: squares.sum::<f64>().sqrt().recip(),
+            change: Some(Octave::new(CHANGE_M, CHANGE, &mut random)),
+        }
+    }
+
+    /// Amplitude of the octave with this spacing, metres.
+    fn height_m(&self, spacing_m: f64) -> f64 {
+        self.share * self.at_300_m * (spacing_m / 300.0).powf(self.hurst)
     }
 }
 
 impl Octave {
-    fn new(octave: i32, roughness: Roughness, random: &mut Random) -> Self {
-        let spacing_m = FINEST_M * 2.0_f64.powi(octave);
+    fn new(spacing_m: f64, height_m: f64, random: &mut Random) -> Self {
         let (sin, cos) = random.between(0.0, std::f64::consts::TAU).sin_cos();
         Self {
             per_m: Vector2::new(cos, sin) / spacing_m,
             offset: Vector2::from_fn(|_, _| random.between(0.0, 1.0)),
-            height_m: OCTAVE_SHARE
-                * roughness.height_difference_at_300_m()
-                * (spacing_m / 300.0).powf(HURST),
+            height_m,
             key: random.bits(),
         }
     }
@@ -252,7 +329,7 @@ mod tests {
         for roughness in [Roughness::Plains, Roughness::Medium, Roughness::Rough] {
             for apart_m in [50.0, 100.0, 300.0, 1_000.0, 2_000.0_f64] {
                 let expected_m =
-                    roughness.height_difference_at_300_m() * (apart_m / 300.0).powf(HURST);
+                    roughness.height_difference_at_300_m().unwrap() * (apart_m / 300.0).powf(HURST);
                 let found_m = differ_m(roughness, apart_m);
                 println!("{roughness:?} {apart_m} m: {found_m:.3} m, expected {expected_m:.3} m");
                 // 4 % because there are only thirteen octaves; 18 000 pairs, fewer independent ones at 2 km: 1 %.
@@ -262,6 +339,53 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn varied_ground_differs_between_sites_and_within_one() {
+        let laws: Vec<Law> = (0..200)
+            .map(|key| Law::of(Roughness::Varied, key))
+            .collect();
+        let spread = |of: fn(&Law) -> f64| {
+            let values = laws.iter().map(of);
+            values.fold([f64::INFINITY, 0.0], |[low, high]: [f64; 2], value| {
+                [low.min(value), high.max(value)]
+            })
+        };
+        // Of two hundred drawn ones the outermost lie within a twentieth of the range of the limits.
+        let [low, high] = spread(|law| law.hurst);
+        assert!(low < 0.43 && high > 0.92, "{low} {high}");
+        let [low, high] = spread(|law| law.at_300_m);
+        assert!(low < 3.4 && (12.0..25.0).contains(&high), "{low} {high}");
+        // By the table an octave share is that of the constant where the exponent is, to 1 %.
+        let usual = laws
+            .iter()
+            .map(|law| ((law.hurst - HURST).abs(), law.share));
+        let nearest = usual.reduce(|one, other| if other.0 < one.0 { other } else { one });
+        assert!((nearest.unwrap().1 / OCTAVE_SHARE - 1.0).abs() < 0.01);
+        // Root mean square difference of heights 300 m apart in squares of 10 km.
+        let patch = RoughPatch::new(3, &SITE, Roughness::Varied);
+        let mut random = Random::new(3, "pairs");
+        let mut squares = Vec::new();
+        for corner in 0..36 {
+            let corner_m = Vector2::new(f64::from(corner % 6 - 3), f64::from(corner / 6 - 3));
+            let mut square_m2 = 0.0;
+            for _ in 0..400 {
+                let within = Vector2::from_fn(|_, _| random.between(0.0, 1.0));
+                let from_m = 10_000.0 * (corner_m + within);
+                let (sin, cos) = random.between(0.0, std::f64::consts::TAU).sin_cos();
+                let to_m = from_m + 300.0 * Vector2::new(cos, sin);
+                square_m2 += (patch.noise_m(&to_m) - patch.noise_m(&from_m)).powi(2);
+            }
+            squares.push((square_m2 / 400.0_f64).sqrt());
+        }
+        let most = squares.iter().fold(0.0_f64, |most, of| most.max(*of));
+        let least = squares
+            .iter()
+            .fold(f64::INFINITY, |least, of| least.min(*of));
+        // Factors of one half to two, averaged over squares of two thirds of the lattice; without a change the scatter of
+        // 400 pairs is a fourteenth.
+        assert!(most / least > 1.6, "{least} {most}");
     }
 
     #[test]

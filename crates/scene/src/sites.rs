@@ -112,7 +112,7 @@ impl SiteFile<'_> {
             "# Written by `areograph scene`; paths count from the folder of this file.\n\
              site = {}\ndescription = {}\n\n{}\n\
              [pointing]\nck_bias_s = {}\nsource = {}\n\n\
-             [mola_clock]\nbias_s = {}\nsign = \"late\"\nscope = \"spk_lookup\"\nsource = {}\n\n\
+             [altimeter_clock]\nbias_s = {}\nsign = \"late\"\nscope = \"spk_lookup\"\nsource = {}\n\n\
              [pedr]\nfiles = [{}]\ndatum = \"auto\"\n",
             quoted(self.id),
             quoted(&self.description),

@@ -296,7 +296,7 @@ impl Truth {
             crossover: Crossover {
                 amplitude_m: CROSSOVER_AMPLITUDE_M,
                 period_s: CROSSOVER_PERIOD_S,
-                rule: "residual = amplitude_m sin(2 pi et / period_s) at the frame's mid-point; radii are the raw ones, before its subtraction",
+                rule: "ground and spacecraft of the files are too high by the residual, amplitude_m sin(2 pi et / period_s) at the frame's mid-point; radii are those before its subtraction",
             },
             frame_model: "a PEDR frame is linear in latitude and longitude: near the poles, in slews and on steep ground seen off nadir it cannot represent 20 true footprints to 0.2 m, and it does not include jitter; the counts are under files and profiles",
             images: Vec::new(),

@@ -35,4 +35,5 @@ pub mod shared;
 pub mod start;
 pub mod state;
 pub mod tokens;
+pub mod words;
 pub mod worker;

@@ -45,10 +45,10 @@ pub struct Owner {
 #[derive(Debug, thiserror::Error, Cause)]
 enum LockError {
     #[error("{} has been using this folder since {}", .0.words(), utc_text(.0.started_ms))]
-    #[cause(Io: "{}end that process first", _0.page_or())]
+    #[cause(Io: "{}stop that process first", _0.page_or())]
     Taken(Owner),
     #[error("another service is using this folder")]
-    #[cause(Io: "end that process first")]
+    #[cause(Io: "stop that process first")]
     TakenByUnknown,
     #[error("the folder is on a network file system ({0}), where the database is not safe")]
     #[cause(Configuration: "give outputs.state a folder on a local disk")]

@@ -16,7 +16,7 @@ use super::{
         runs::{put_current, put_run, reserve_job},
         sites::{put_site, put_unread},
     },
-    engine::runs::{Published, current, finished_ms, identify_run, row},
+    engine::runs::{Published, current, finished_ms, identify_run_of, row},
 };
 use areograph_base::error::{IoError, Locate as _, Result};
 use areograph_store::publish::MANIFEST;
@@ -44,7 +44,8 @@ impl Rebuilt {
 }
 
 /// Records the runs of every site below `products`; `None` if `stops` stopped it between two sites. Only their
-/// manifests are read: products are compared with them when they are read, and by the scrub.
+/// manifests are read: products are compared with them when they are read, and by the scrub. A run of another site than
+/// that of its folder is left out.
 ///
 /// # Errors
 /// A disk error.
@@ -73,14 +74,15 @@ pub fn record(
         if !wanted(&folder) {
             continue;
         }
+        let site = folder.file_name().unwrap_or_default().to_string_lossy();
         let mut published = Vec::new();
         for path in runs_in(&folder)? {
             if stops() {
                 return Ok(None);
             }
-            match identify_run(&path) {
+            match identify_run_of(&site, &path) {
                 Ok(run) => published.push(run),
-                Err(failure) => tracing::warn!("a run is left out: {failure}"),
+                Err(failure) => tracing::warn!("a run is not recorded: {failure}"),
             }
         }
         rebuilt.runs += published.len();

@@ -9,7 +9,7 @@ use serde_json::Value;
 use super::{
     database::{Database, DatabaseError, Stored, facts, losses::Loss},
     engine::alerts::{Alert, tell},
-    record::{has_runs, record_all},
+    record::{Rebuilt, has_runs, record_all},
     shared::Shared,
     tokens::random_hex,
 };
@@ -23,7 +23,8 @@ const OWNER: &str = ".areograph-service";
 const ID_BYTES: usize = 16;
 
 /// Ensures that the database belongs to the service that made the products, and marks both. A new database beside
-/// products of an earlier one is recorded as lost: [`recover`] makes it again.
+/// products of an earlier one is recorded as lost: [`recover`] makes it again. An empty folder beside a used database is
+/// not marked: the disk of the products may not be mounted.
 ///
 /// # Errors
 /// The database belongs to another service; a disk error.
@@ -47,32 +48,42 @@ pub fn examine(database: &Database, products: &Path) -> Result<()> {
         (None, None) if is_used => false,
         (None, marked) => marked.is_some() || has_runs(products)?,
     };
-    let is_known = known.is_some();
-    let id = match known.or_else(|| marked.clone()) {
-        Some(id) => id,
-        None => random_hex::<ID_BYTES>().in_file(state)?,
-    };
-    if !is_known {
-        database
-            .write(|transaction| {
-                facts::note(transaction, facts::IDENTITY, &id)?;
-                if is_lost {
-                    facts::note(transaction, facts::RECOVERING, "yes")?;
-                }
-                Ok(())
-            })
-            .in_file(state)?;
-    }
-    // Last: a mark without its database would be taken for a loss.
-    if marked.is_none() {
-        atomic::write(&products.join(OWNER), format!("{id}\n").as_bytes())?;
-    }
-    Ok(())
+    let id = identify(database, known.or(marked), is_lost)?;
+    mark(products, &id, is_used)
 }
 
 fn foreign() -> DatabaseError {
-    let why = "it belongs to another service than the products";
+    let why = "its identity is not that of the products: it may belong to another service";
     DatabaseError::Foreign(why.to_owned())
+}
+
+/// Records the identity of the service, a new one without `known`, and whether the runs on the disk are still to be
+/// recorded.
+fn identify(database: &Database, known: Option<String>, is_lost: bool) -> Result<String> {
+    let state = database.path();
+    let id = match known {
+        Some(id) => id,
+        None => random_hex::<ID_BYTES>().in_file(state)?,
+    };
+    database
+        .write(|transaction| {
+            facts::note(transaction, facts::IDENTITY, &id)?;
+            if is_lost {
+                facts::note(transaction, facts::RECOVERING, "yes")?;
+            }
+            Ok(())
+        })
+        .in_file(state)?;
+    Ok(id)
+}
+
+/// Marks unmarked products with the identity of the service, after its database: a mark without its database would be
+/// taken for a loss. An empty folder beside a used database remains unmarked.
+fn mark(products: &Path, id: &str, is_used: bool) -> Result<()> {
+    if owner(products)?.is_some() || (is_used && !has_runs(products)?) {
+        return Ok(());
+    }
+    atomic::write(&products.join(OWNER), format!("{id}\n").as_bytes())
 }
 
 /// The service that made the products; an incomplete mark counts as none.
@@ -121,48 +132,57 @@ pub fn recover(shared: &Shared) -> Result<()> {
         return Ok(());
     }
     shared.set_recovering(true);
-    tracing::warn!("the database was lost: it is made again from the products");
+    tracing::warn!("the database was lost: the service makes it again from the products");
     let stops = || {
         shared.note_progress();
         shared.ending.is_cancelled()
     };
-    let Some(found) = record_all(shared.database(), products, shared.now_ms(), stops)? else {
-        return Ok(());
-    };
-    let now_ms = shared.now_ms();
-    let loss = found.as_loss(now_ms);
-    let text = loss.words();
-    shared
-        .write(|transaction| {
+    let now_ms = || shared.now_ms();
+    let report = |loss: Loss| {
+        let text = loss.words();
+        let alert = Alert {
+            kind: AlertKind::DatabaseLost,
+            site: None,
+            run: None,
+            text: &text,
+        };
+        shared.write(|transaction| {
             loss.note(transaction)?;
-            facts::remove(transaction, facts::RECOVERING)?;
-            let alert = Alert {
-                kind: AlertKind::DatabaseLost,
-                site: None,
-                run: None,
-                text: &text,
-            };
-            tell(transaction, &config, now_ms, &alert, &Value::Null)
+            tell(transaction, &config, loss.at_ms, &alert, &Value::Null)
         })
-        .in_file(state)?;
-    shared.set_recovering(false);
+    };
+    if make_again(shared.database(), products, now_ms, stops, report)?.is_some() {
+        shared.set_recovering(false);
+    }
     Ok(())
 }
 
-/// Marks a database that was made at the request of a person.
+/// Makes a database again from the runs on the disk: its identity, and that it is lost, are recorded before any run, so
+/// that the next start continues if this is interrupted. `report` records the loss ([`Loss::note`]), which ends it.
+/// `None` if `stops` stopped it between two sites.
 ///
 /// # Errors
 /// A disk error.
-pub fn mark(database: &Database, products: &Path, loss: Loss) -> Result<()> {
-    let id = match owner(products)? {
-        Some(id) => id,
-        None => random_hex::<ID_BYTES>().in_file(database.path())?,
-    };
-    database
-        .write(|transaction| {
-            facts::note(transaction, facts::IDENTITY, &id)?;
-            loss.note(transaction)
+pub fn make_again(
+    database: &Database,
+    products: &Path,
+    now_ms: impl Fn() -> i64,
+    stops: impl Fn() -> bool,
+    report: impl FnOnce(Loss) -> Stored<()>,
+) -> Result<Option<Rebuilt>> {
+    let state = database.path();
+    let (known, is_used) = database
+        .read(|connection| {
+            let known = facts::fact(connection, facts::IDENTITY)?;
+            Ok((known, is_used(connection)?))
         })
-        .in_file(database.path())?;
-    atomic::write(&products.join(OWNER), format!("{id}\n").as_bytes())
+        .in_file(state)?;
+    let marked = owner(products)?;
+    let id = identify(database, known.or(marked), true)?;
+    mark(products, &id, is_used)?;
+    let found = record_all(database, products, now_ms(), stops)?;
+    if let Some(found) = found {
+        report(found.as_loss(now_ms())).in_file(state)?;
+    }
+    Ok(found)
 }

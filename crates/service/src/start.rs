@@ -38,7 +38,7 @@ enum Refused {
     )]
     Public(SocketAddr),
     #[error("{0} changed")]
-    #[cause("restart the service, or put the former value back")]
+    #[cause("restart the service, or restore the former value")]
     NeedsRestart(&'static str),
     #[error("inputs.{0}: {1} is not an existing folder, and this service has never seen it")]
     #[cause(
@@ -179,8 +179,10 @@ pub fn reload(shared: &Shared, listen: Option<SocketAddr>) -> Stored<()> {
         }
     };
     match &text {
-        None => tracing::info!("{} is in force", before.file.display()),
-        Some(text) => tracing::error!("the configuration in force stays: {text}"),
+        None => tracing::info!("the configuration {} is in force", before.file.display()),
+        Some(text) => tracing::error!(
+            "the new configuration is invalid, and the former one stays in force: {text}"
+        ),
     }
     shared.write(|transaction: &Transaction<'_>| {
         let data = json!({ "taken": text.is_none(), "text": text });

@@ -1,9 +1,16 @@
 //! Errors of kernels and of CSPICE.
 
 use areograph_base::{
+    constants::{SPEED_OF_LIGHT_M_S, SUN_DISTANCE_M},
     error::{Cause, Kind},
     time::{Et, Interval},
 };
+
+/// Least and largest time that light takes from the Sun to Mars, seconds.
+pub(super) const SUN_LIGHT_S: [f64; 2] = [
+    SUN_DISTANCE_M[0] / SPEED_OF_LIGHT_M_S,
+    SUN_DISTANCE_M[1] / SPEED_OF_LIGHT_M_S,
+];
 
 /// An error of kernels, of their content, or of a CSPICE call.
 #[derive(Debug, thiserror::Error, Cause)]
@@ -80,15 +87,6 @@ pub enum SpiceError {
         /// Names of the kernels of the set.
         set: Vec<String>,
     },
-    /// A kernel has changed since it was chosen.
-    #[error("kernel changed while it was in use: BLAKE3 was {was}, is {is}")]
-    #[cause("run again when no program is writing to the kernel folder")]
-    KernelChanged {
-        /// Hash when it was chosen.
-        was: String,
-        /// Hash now.
-        is: String,
-    },
     /// A text is too long for CSPICE, or cannot be passed to it.
     #[error("{what} cannot be given to CSPICE: {problem}")]
     #[cause("use shorter paths without control characters, for example by a link")]
@@ -114,6 +112,22 @@ pub enum SpiceError {
         required: Interval,
         /// Kernels that end or begin there.
         neighbours: String,
+    },
+    /// Kernels hold the spacecraft, but not the Sun as Mars sees it.
+    #[error(
+        "no position of the Sun as seen from Mars at {seen} (UTC {utc}); expected Mars in the kernels then, and the Sun \
+         when that light left it, {:.0} to {:.0} s earlier",
+        SUN_LIGHT_S[0], SUN_LIGHT_S[1]
+    )]
+    #[cause(
+        Coverage: "add an ephemeris of the Sun and of Mars that begins 14 minutes before the image, for example a planetary \
+                   one (de*.bsp)"
+    )]
+    NoSun {
+        /// When its light arrives at Mars.
+        seen: Et,
+        /// The same in UTC.
+        utc: String,
     },
     /// No attitude sample within the tolerance.
     #[error("no attitude of {of} within {tolerance_s} s of {kernel_time} (time of the C-kernel)")]
@@ -221,6 +235,11 @@ fn advice_on(short: &str) -> &'static str {
 }
 
 impl SpiceError {
+    /// Whether CSPICE lacks coverage.
+    pub(super) fn is_coverage(&self) -> bool {
+        matches!(self, Self::Spice { short, .. } if kind_of(short) == Kind::Coverage)
+    }
+
     /// The same error of CSPICE, with the `value` that caused it.
     pub(super) fn of(mut self, value: &str) -> Self {
         if let Self::Spice { call, .. } = &mut self {

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::{daf, error::SpiceError, ffi, role::KernelRole, text_kernel};
 use areograph_base::error::{IoError, Locate, Result};
-use areograph_store::files::{InputFiles, file_name, hash_file};
+use areograph_store::files::{InputFiles, file_name};
 
 /// Largest text kernel that is read, bytes; the archive's largest is below 2 MB.
 const TEXT_SIZE_MAX: u64 = 64 << 20;
@@ -168,21 +168,6 @@ impl KernelSet {
             })
         };
         self.explanation.iter().filter(move |line| !plain(line))
-    }
-
-    /// Hashes every kernel again, after use.
-    ///
-    /// # Errors
-    /// [`SpiceError::KernelChanged`] naming the file that has changed since it was loaded.
-    pub fn verify_unchanged(&self) -> Result<()> {
-        for kernel in &self.kernels {
-            let (is, _) = hash_file(&kernel.path)?;
-            if is != kernel.blake3 {
-                let was = kernel.blake3.clone();
-                return Err(SpiceError::KernelChanged { was, is }).in_file(&kernel.path);
-            }
-        }
-        Ok(())
     }
 }
 

@@ -53,7 +53,6 @@ pub use error::SpiceError;
 pub use ffi::PATH_LENGTH_MAX;
 pub use kernels::{Kernel, KernelSet};
 pub use role::KernelRole;
-pub use select::quality_of;
 pub use session::{Attitude, Session, State};
 pub use trajectory::Trajectory;
 pub use view::{KernelView, position_kernels};

@@ -42,7 +42,7 @@ pub(super) fn of_spacecraft(set: &KernelSet, naif: i32, et: Et) -> Option<PathBu
     let mut spks = set.kernels().iter().rev();
     let found = spks.find(|kernel| {
         let segments = (kernel.role == KernelRole::Spk).then(|| daf::segments(&kernel.path));
-        segments.is_some_and(|segments| segments.is_ok_and(|of| of.iter().any(holds)))
+        segments.is_some_and(|segments| segments.is_ok_and(|segments| segments.iter().any(holds)))
     });
     found.map(|kernel| kernel.path.clone())
 }

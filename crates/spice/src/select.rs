@@ -8,7 +8,7 @@ use std::{
 use super::{
     coverage::{RequiredCoverage, interval_of},
     daf::{self, Segment},
-    error::SpiceError,
+    error::{SUN_LIGHT_S, SpiceError},
     kernels::{KernelSet, read_text, role_of},
     needs::{MARS, Need, defines, needs},
     role::KernelRole,
@@ -17,11 +17,12 @@ use super::{
 };
 use areograph_base::{
     body::MARS_IAU2000,
-    constants::SPACECRAFT,
+    constants::{FETCH_FOLDER, NAIF_SUN, SPACECRAFT},
     error::{Error, IoError, Kind, Locate, Result},
     instruments::Instrument,
+    kernel_names::{family_of, natural_order, quality_of, version_of},
     kernel_source::{CkQuality, KernelSelection},
-    time::Intervals,
+    time::{Interval, Intervals},
 };
 use areograph_store::files::{InputFiles, file_name};
 
@@ -29,8 +30,6 @@ use areograph_store::files::{InputFiles, file_name};
 const DEPTH_MAX: usize = 16;
 /// Maximum number of files that are inspected.
 const FILES_MAX: usize = 100_000;
-/// Orbit solutions that mark their files by name; a file without a mark is `nav`.
-const MARKED_FAMILIES: [&str; 2] = ["gsfc", "ipng"];
 
 /// Files of a folder by their content.
 #[derive(Default)]
@@ -136,7 +135,7 @@ impl Found {
     }
 }
 
-/// All regular files below `root`, sorted; links to folders are not followed.
+/// All regular files below `root`, sorted; links to folders are not followed, and files that have not arrived whole are left.
 fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     let mut folders = vec![(root.to_owned(), 0)];
@@ -150,6 +149,9 @@ fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
                 .file_type()
                 .map_err(IoError::on("list folder"))
                 .in_file(entry.path())?;
+            if entry.file_name() == FETCH_FOLDER {
+                continue;
+            }
             if kind.is_dir() && depth < DEPTH_MAX {
                 folders.push((entry.path(), depth + 1));
             } else if entry.path().is_file() {
@@ -228,8 +230,6 @@ fn select_ephemerides(
     required: &Intervals,
     set: &mut Selected<'_>,
 ) -> Result<()> {
-    let holds_spacecraft =
-        |segments: &[Segment]| segments.iter().any(|s| s.integers[0] == SPACECRAFT.naif);
     let family = selection.spk_family.to_ascii_lowercase();
     let of_spacecraft = ephemerides
         .iter()
@@ -249,33 +249,73 @@ fn select_ephemerides(
     // Planets first; of several versions the latest last, so that it wins.
     let mut ordered: Vec<&(PathBuf, Vec<Segment>)> = ephemerides.iter().collect();
     ordered.sort_by_key(|(path, segments)| (holds_spacecraft(segments), natural_order(path)));
+    let sun = when_light_left_sun(required);
+    let touches = |segments: &[Segment]| {
+        let own = holds_spacecraft(segments);
+        let held = held_by(segments, |target| !own || target == SPACECRAFT.naif);
+        meets(&held, required)
+            || (!own && meets(&held_by(segments, |target| target == NAIF_SUN), &sun))
+    };
+    let fits =
+        |path: &Path, segments: &[Segment]| !holds_spacecraft(segments) || family_of(path, &family);
+    let chosen = ordered
+        .iter()
+        .filter(|(path, segments)| fits(path, segments) && touches(segments));
+    let sun_of_chosen = chosen.flat_map(|(_, segments)| {
+        let held = held_by(segments, |target| target == NAIF_SUN);
+        held.as_slice().to_vec()
+    });
+    // Slices of an orbit may hold the Sun themselves: that of its light may be one that ends before the first image.
+    let no_sun = sun.without(&Intervals::union_of(sun_of_chosen));
     for (path, segments) in ordered {
         let own = holds_spacecraft(segments);
-        let held = segments
-            .iter()
-            .filter(|segment| !own || segment.integers[0] == SPACECRAFT.naif)
-            .map(|segment| interval_of([segment.start, segment.stop]));
-        let touches = !Intervals::union_of(held)
-            .intersection(required)
-            .as_slice()
-            .is_empty();
         let name = file_name(path);
-        if own && !family_of(path, &family) {
+        if !fits(path, segments) {
             let line = format!("{name}: not used, not of the orbit solution {family}");
             set.set.explanation.push(line);
-        } else if !touches {
+        } else if touches(segments) {
+            let reason = if own {
+                format!("orbit of {}, solution {family}", SPACECRAFT.name)
+            } else {
+                "planetary ephemeris".to_owned()
+            };
+            set.add(path, &reason)?;
+        } else if meets(&held_by(segments, |target| target == NAIF_SUN), &no_sun) {
+            set.add(path, "the Sun when its light left for Mars")?;
+        } else {
             let line = format!("{name}: not used, holds none of the required times");
             set.set.explanation.push(line);
-        } else if own {
-            set.add(
-                path,
-                &format!("orbit of {}, solution {family}", SPACECRAFT.name),
-            )?;
-        } else {
-            set.add(path, "planetary ephemeris")?;
         }
     }
     Ok(())
+}
+
+fn holds_spacecraft(segments: &[Segment]) -> bool {
+    segments
+        .iter()
+        .any(|segment| segment.integers[0] == SPACECRAFT.naif)
+}
+
+/// Times that the segments of some targets hold.
+fn held_by(segments: &[Segment], target: impl Fn(i32) -> bool) -> Intervals {
+    let of_target = segments
+        .iter()
+        .filter(|segment| target(segment.integers[0]));
+    Intervals::union_of(of_target.map(|segment| interval_of([segment.start, segment.stop])))
+}
+
+fn meets(held: &Intervals, required: &Intervals) -> bool {
+    !held.intersection(required).as_slice().is_empty()
+}
+
+/// When the light of the Sun that is seen from Mars at `required` left it.
+fn when_light_left_sun(required: &Intervals) -> Intervals {
+    let [late_s, early_s] = SUN_LIGHT_S;
+    let left = required
+        .as_slice()
+        .iter()
+        .map(|seen| Interval::new(seen.start.plus(-early_s), seen.stop.plus(-late_s)));
+    Intervals::union_of(left)
 }
 
 /// Attitudes that overlap the required times, the worst quality first, and the intervals that commanded ones fill.
@@ -357,68 +397,4 @@ fn explain_commanded(
         }
         missing = missing.without(&held);
     }
-}
-
-/// Parts of a name between `_`, `-` and `.`, in lower case.
-fn name_parts(path: &Path) -> Vec<String> {
-    file_name(path)
-        .to_ascii_lowercase()
-        .split(['_', '-', '.'])
-        .map(str::to_owned)
-        .collect()
-}
-
-fn family_of(path: &Path, family: &str) -> bool {
-    let parts = name_parts(path);
-    let unmarked = || {
-        !parts
-            .iter()
-            .any(|part| MARKED_FAMILIES.contains(&part.as_str()))
-    };
-    parts.iter().any(|part| part == family) || (family == "nav" && unmarked())
-}
-
-/// Commanded attitude is recognised by its name: `mgs_ext_roto_all_v*`.
-#[must_use]
-pub fn quality_of(path: &Path) -> CkQuality {
-    let parts = name_parts(path);
-    if parts.iter().any(|part| part == "roto" || part == "nominal") {
-        CkQuality::Nominal
-    } else {
-        CkQuality::Reconstructed
-    }
-}
-
-/// Sort key that compares numbers in names as numbers: `v9` before `v10`; in a tie by path.
-fn natural_order(path: &Path) -> (Vec<(usize, String)>, PathBuf) {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let stem = stem.to_ascii_lowercase();
-    let is_digit = |character: char| character.is_ascii_digit();
-    let mut pieces = Vec::new();
-    let mut rest = stem.as_str();
-    while let Some(first) = rest.chars().next() {
-        let end = rest
-            .find(|next| is_digit(next) != is_digit(first))
-            .unwrap_or(rest.len());
-        let (piece, behind) = rest.split_at(end);
-        // Without leading zeros the longer number is the larger one; words have no length.
-        let number = piece.trim_start_matches('0');
-        pieces.push(if is_digit(first) {
-            (number.len(), number.to_owned())
-        } else {
-            (0, piece.to_owned())
-        });
-        rest = behind;
-    }
-    (pieces, path.to_owned())
-}
-
-/// The last number in a name: 61 of `MGS_SCLKSCET.00061.tsc`, 10 of `pck00010.tpc`.
-fn version_of(path: &Path) -> u64 {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let digits = stem.rsplit(|c: char| !c.is_ascii_digit());
-    digits
-        .map(str::parse)
-        .find_map(std::result::Result::ok)
-        .unwrap_or(0)
 }

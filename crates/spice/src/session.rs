@@ -263,11 +263,19 @@ impl Session {
     /// State of the Sun as seen from the centre of Mars (`LT+S`).
     ///
     /// # Errors
-    /// As [`Self::state`].
+    /// [`SpiceError::NoSun`] when the kernels do not hold the Sun when its light left; as [`Self::state`].
     pub fn sun_state(&self, et: Et) -> Result<State> {
         let state = self
             .cspice()
-            .apparent_state(NAIF_SUN, et.seconds(), NAIF_MARS)?;
+            .apparent_state(NAIF_SUN, et.seconds(), NAIF_MARS)
+            .map_err(|error| {
+                if error.is_coverage() {
+                    let utc = self.et_to_utc(et).unwrap_or_else(|_| "unknown".to_owned());
+                    SpiceError::NoSun { seen: et, utc }
+                } else {
+                    error
+                }
+            })?;
         self.finite("apparent position or velocity", "the Sun", et, state)
     }
 

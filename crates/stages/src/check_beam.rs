@@ -26,6 +26,7 @@ use super::{
 };
 use areograph_base::{
     altimetry::MolaClock,
+    constants::GROUND_SPEED_M_S,
     error::Result,
     footprints::{Footprint, Footprints},
     frames::BodyFixed,
@@ -50,8 +51,6 @@ use areograph_store::{
 const EDGE_RAD: f64 = 1.7e-3;
 /// The same for the ends of the exposure, seconds: 3.8 times 0.45 mrad are 0.3 s along the track.
 const END_S: f64 = 0.5;
-/// Speed over the ground, metres per second: converts a distance along the track into time.
-const GROUND_SPEED_M_S: f64 = 3_000.0;
 
 /// The beam of the laser by the attitude of one image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -110,8 +109,8 @@ impl fmt::Display for BeamGap {
             Self::Support => "support data do not state the attitude of the bus",
             Self::OtherSpacecraft => "another spacecraft carries the laser",
             Self::NoBeam => "the altimeter file does not state where the beam points (beam.bus)",
-            Self::NoShot => "no shot was fired during its exposure",
-            Self::NoPosition => "its shots do not state the position of the spacecraft",
+            Self::NoShot => "no shot was fired during the exposure",
+            Self::NoPosition => "the shots do not state the position of the spacecraft",
         })
     }
 }
@@ -128,7 +127,7 @@ stage_inputs! {
         /// The altimeter.
         pub altimeter: &'a Altimeter,
         /// Its clock.
-        pub mola_clock: &'a MolaClock,
+        pub altimeter_clock: &'a MolaClock,
     }
 }
 
@@ -152,7 +151,12 @@ impl Stage for CheckBeam<'_> {
             let shots = simultaneous(index, oriented.image, footprints, profiles);
             Ok(ImageBeam {
                 image: oriented.image.id.clone(),
-                beam: placed.beam(footprints, &shots, self.altimeter, self.mola_clock.bias_s),
+                beam: placed.beam(
+                    footprints,
+                    &shots,
+                    self.altimeter,
+                    self.altimeter_clock.bias_s,
+                ),
             })
         });
         images.collect()
@@ -169,7 +173,7 @@ fn simultaneous(
     let exposures = image.exposures();
     let profiles = profiles.iter();
     let with_image = profiles.filter(|of| of.simultaneous.iter().any(|of| of.image == index));
-    let rows = with_image.flat_map(|of| of.rows.iter().copied());
+    let rows = with_image.flat_map(|profile| profile.rows.iter().copied());
     rows.filter(|row| exposures.contains(Et::from_seconds(footprints.et_s[*row as usize])))
         .collect()
 }

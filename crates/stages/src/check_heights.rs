@@ -171,13 +171,13 @@ stage_inputs! {
         /// Profiles.
         pub profiles: &'a Output<Vec<Profile>>,
         /// Uncertainties of the surface.
-        pub mola_surface: &'a MolaSurfaceConfig,
+        pub laser_surface: &'a MolaSurfaceConfig,
     }
 }
 
 impl Stage for CheckHeights<'_> {
     const NAME: &'static str = "check_heights";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     type Output = HeightCheck;
     stage_inputs!(fingerprint);
 
@@ -191,7 +191,7 @@ impl Stage for CheckHeights<'_> {
             &self.points.all()?,
             footprints,
             self.profiles.value()?,
-            &self.mola_surface.options(footprints.body),
+            &self.laser_surface.options(footprints.body),
         ))
     }
 }
@@ -205,7 +205,7 @@ pub fn check_heights(
     options: &SurfaceOptions,
 ) -> HeightCheck {
     let places_m: Vec<Vector3<f64>> = points.iter().map(|(_, ground)| ground.xyz_m).collect();
-    let shots = MolaShots::of(footprints, profiles);
+    let shots = MolaShots::of(footprints, profiles, options);
     let surface = match shots.surface(&places_m, options) {
         Ok(surface) => surface,
         Err(error) => return HeightCheck::without_surface(error.to_string()),

@@ -16,12 +16,13 @@ use super::{
     register::ImageRegistration,
     site_image::SiteImages,
 };
+use crate::oriented::OrientedImage;
 use areograph_base::{error::Result, footprints::Footprints, frames::BodyFixed, ties::TiePoint};
 use areograph_geom::{
     ellipsoid::spherical_to_xyz_m,
     misregistration::{ImageToImage, Pair},
     oriented_camera::OrientedCamera,
-    pushbroom::{CameraModel, ExteriorOrientation},
+    pushbroom::ExteriorOrientation,
     statistics::Summary,
     uncertainty::{PairResiduals, ResidualMoments, UncertaintyBudget, uncertainty_budget},
 };
@@ -118,8 +119,6 @@ stage_inputs! {
         pub round: Round,
         /// The images.
         pub images: SiteImages<'a>,
-        /// The form of the orientation.
-        pub model: &'a CameraModel,
         /// Tie points.
         pub ties: &'a Output<Ties>,
         /// Their ground points.
@@ -133,7 +132,7 @@ stage_inputs! {
 
 impl Stage for ComparePairs<'_> {
     const NAME: &'static str = "compare_pairs";
-    const METHOD: u32 = 5;
+    const METHOD: u32 = 6;
     type Output = Vec<PairComparison>;
     stage_inputs!(fingerprint);
 
@@ -145,7 +144,7 @@ impl Stage for ComparePairs<'_> {
         let oriented = self.images.oriented()?;
         let images: Vec<_> = oriented
             .iter()
-            .map(|image| image.oriented_camera(*self.model))
+            .map(OrientedImage::oriented_camera)
             .collect();
         let registrations = self.images.0.iter().map(|image| image.registration.value());
         Ok(compare_pairs(
@@ -414,7 +413,7 @@ fn shot_spacing_m(footprints: &Footprints<BodyFixed>, profile: &Profile) -> Opti
         spherical_to_xyz_m(
             footprints.longitude_rad[row],
             footprints.latitude_rad[row],
-            footprints.radius_m[row],
+            footprints.ground_radius_m(row),
         )
     };
     let successive = profile.rows.windows(2);

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::search_footprints::SearchResult;
 use areograph_base::{
-    altimetry::{BiasScope, MolaClock, TagSign},
+    altimetry::{BiasScope, GroundRadius, MolaClock, TagSign},
     body::{Body, Datum},
     error::Result,
     footprints::{AsRead, Footprint, Footprints, SourceFile},
@@ -32,7 +32,7 @@ pub struct Converted {
     pub footprints: Footprints<BodyFixed>,
     /// The conversion of each file, in the order of [`Footprints::files`].
     pub files: Vec<FileConversion>,
-    /// One sentence per file, for log, manifest and report.
+    /// One sentence per file and one on radii, for log, manifest and report.
     pub notes: Vec<String>,
 }
 
@@ -53,19 +53,27 @@ stage_inputs! {
         /// Results of the search.
         pub found: &'a Output<SearchResult>,
         /// The clock of MOLA.
-        pub mola_clock: &'a MolaClock,
+        pub altimeter_clock: &'a MolaClock,
+        /// The radius of the ground.
+        pub ground: &'a GroundRadius,
     }
 }
 
 impl Stage for ConvertDatum<'_> {
     const NAME: &'static str = "convert_datum";
+    const METHOD: u32 = 3;
     const CHECKED: bool = true;
     type Output = Converted;
     stage_inputs!(fingerprint);
 
     fn run(&self, _stop: &AtomicBool) -> Result<Converted> {
-        let footprints = self.found.value()?.footprints.clone();
-        Ok(convert_datum(footprints, self.mola_clock))
+        let mut footprints = self.found.value()?.footprints.clone();
+        footprints.ground = *self.ground;
+        let choice = footprints.ground_choice();
+        let mut converted = convert_datum(footprints, self.altimeter_clock);
+        let note = |of: GroundRadius| format!("radii of the ground are those {}", of.words());
+        converted.notes.extend(choice.map(note));
+        Ok(converted)
     }
 }
 
@@ -276,6 +284,7 @@ mod tests {
             version: Some('K'),
             datum,
             blake3: String::new(),
+            is_table: false,
         }]);
         footprints.push(&Footprint {
             et_tag_s: -11_224_002.177_246_002,

@@ -1,11 +1,14 @@
-//! Exterior orientation as polynomials in the image line, of first and second order.
+//! Exterior orientation as polynomials in the image line, of first and second order, and the choice of the form in use.
+//!
+//! The orbit departs from a polynomial of second order with the third power of the time: an image of minutes keeps no
+//! limit. Unless the configuration requires a form, such an image is interpolated between its samples.
 
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::orientation::{InterpolationCheck, Orientation, OrientationSample};
+use super::orientation::{InterpolationCheck, Nodes, Orientation, OrientationSample};
 use areograph_base::{
     error::{Cause, Result},
     units::RADIANS_PER_ARCSECOND,
@@ -15,7 +18,10 @@ use areograph_geom::{
     attitude::{OmegaPhiKappa, matrix_of_rotation_vector, rotation_vector, unwrap_angles},
     ellipsoid::ray_meets_ellipsoid,
     polynomial::{Fit, Polynomial, root_mean_square},
-    pushbroom::{EulerPolynomial, RotationVectorPolynomial, VectorPolynomial},
+    pushbroom::{
+        CameraModel, EulerPolynomial, ExteriorOrientation as _, RotationVectorPolynomial,
+        SampledOrientation, VectorPolynomial,
+    },
     statistics::largest,
 };
 use areograph_store::{
@@ -33,7 +39,7 @@ pub struct SensorModel {
     pub image: String,
     /// First-order model.
     pub first_order: EulerModel,
-    /// Second-order model, the one to use.
+    /// Second-order model.
     pub second_order: EulerModel,
     /// Second-order model whose rotation has no gimbal lock.
     pub rotation_vector: RotationVectorModel,
@@ -41,7 +47,13 @@ pub struct SensorModel {
     pub cos_phi_min: f64,
     /// Whether ω and κ are badly determined (|cos φ| below 0.1): use `rotation_vector` then.
     pub near_gimbal_lock: bool,
-    /// Why the model breaks the limits of the configuration; empty when it is valid.
+    /// The form in use.
+    pub model: CameraModel,
+    /// Its distances from the orientation.
+    pub misfit: Misfit,
+    /// Why polynomials are not in use although the configuration does not exclude them.
+    pub remark: Option<String>,
+    /// Why the form in use breaks the limits of the configuration; empty when it is valid.
     pub invalid_because: Vec<String>,
 }
 
@@ -149,12 +161,14 @@ stage_inputs! {
         pub samples: &'a Output<Orientation>,
         /// Limits.
         pub orientation: &'a OrientationConfig,
+        /// The form that the configuration requires.
+        pub registration_model: &'a Option<CameraModel>,
     }
 }
 
 impl Stage for FitSensorModel<'_> {
     const NAME: &'static str = "fit_sensor_model";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     type Output = SensorModel;
     stage_inputs!(fingerprint);
 
@@ -163,11 +177,16 @@ impl Stage for FitSensorModel<'_> {
     }
 
     fn run(&self, _stop: &AtomicBool) -> Result<SensorModel> {
-        fit_sensor_model(self.samples.value()?, self.orientation)
+        fit_sensor_model(
+            self.samples.value()?,
+            self.orientation,
+            *self.registration_model,
+        )
     }
 }
 
-/// Fits the models of one image.
+/// Fits the models of one image, and chooses the form in use: the `required` one, or else the rotation vector where it
+/// keeps the limits and the samples where it does not.
 ///
 /// # Errors
 /// Fewer samples than coefficients, or samples that are not finite.
@@ -176,6 +195,7 @@ impl Stage for FitSensorModel<'_> {
 pub fn fit_sensor_model(
     orientation: &Orientation,
     limits: &OrientationConfig,
+    required: Option<CameraModel>,
 ) -> Result<SensorModel> {
     let first_order = euler_model(orientation, 1)?;
     let second_order = euler_model(orientation, 2)?;
@@ -185,9 +205,41 @@ pub fn fit_sensor_model(
         .iter()
         .map(|sample| sample.angles.phi_rad.cos().abs())
         .fold(1.0, f64::min);
+    let polynomials = Misfit {
+        position_rmse_m: second_order.position_rmse_m(),
+        // The rotation is judged by its vector form, which means the same at every latitude.
+        pointing_rmse_rad: rotation_vector.rmse_rad(),
+    };
+    let broken = polynomials.broken_limits("second-order", limits);
+    let (model, remark) = match required {
+        Some(model) => (model, None),
+        None if broken.is_empty() => (CameraModel::RotationVector, None),
+        None => (
+            CameraModel::Samples,
+            Some(format!(
+                "{}: this image is interpolated between its samples",
+                broken.join("; ")
+            )),
+        ),
+    };
+    let (misfit, broken, advice) = match model {
+        CameraModel::FirstOrder | CameraModel::SecondOrder | CameraModel::RotationVector => {
+            (polynomials, broken, advice(orientation))
+        }
+        CameraModel::Samples => {
+            let misfit = Misfit::between_samples(orientation);
+            let broken = misfit.broken_limits("between samples,", limits);
+            (misfit, broken, "; raise orientation.intervals".to_owned())
+        }
+    };
+    let broken = broken.into_iter().map(|reason| reason + &advice);
+    let invalid_because = broken.chain(of_tables(orientation)).collect();
     Ok(SensorModel {
         image: orientation.image.clone(),
-        invalid_because: broken_limits(orientation, &second_order, &rotation_vector, limits),
+        model,
+        misfit,
+        remark,
+        invalid_because,
         first_order,
         second_order,
         rotation_vector,
@@ -287,50 +339,97 @@ fn four_digits(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }
 
-/// The rotation is judged by its vector form, which means the same at every latitude.
-fn broken_limits(
-    orientation: &Orientation,
-    model: &EulerModel,
-    rotation: &RotationVectorModel,
-    limits: &OrientationConfig,
-) -> Vec<String> {
-    let mut broken = Vec::new();
-    let position_rmse_m = model.position_rmse_m();
-    // Written so that NaN breaks a limit.
-    if !(position_rmse_m <= limits.position_rmse_max_m) {
-        let ends = [orientation.samples.first(), orientation.samples.last()];
-        let exposed_s = match ends {
-            [Some(first), Some(last)] => last.et.since(first.et),
-            _ => 0.0,
+/// Distances of a form of the orientation from the orientation itself: of polynomials of second order at the samples, of
+/// the interpolation between samples halfway between them. NaN without a reference.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Misfit {
+    /// Norm of the position RMSE of x, y and z, metres.
+    pub position_rmse_m: f64,
+    /// Largest pointing RMSE of the three components, radians.
+    pub pointing_rmse_rad: f64,
+}
+
+impl Misfit {
+    /// The interpolation between samples against that of the tables, whose nodes are as dense as the kernels require.
+    fn between_samples(orientation: &Orientation) -> Self {
+        let unknown = Self {
+            position_rmse_m: f64::NAN,
+            pointing_rmse_rad: f64::NAN,
         };
-        let advice = if exposed_s > LONG_S {
-            format!(
-                "; over {exposed_s:.0} s an orbit departs from any polynomial of second order: set \
-                 registration.model = \"samples\", which follows it, and orientation.position_rmse_max_m above this"
-            )
-        } else {
-            String::new()
+        let poses: Vec<_> = orientation
+            .samples
+            .iter()
+            .map(|sample| (sample.et.seconds(), sample.pose()))
+            .collect();
+        let Ok(sampled) = SampledOrientation::new(&poses) else {
+            return unknown;
         };
-        broken.push(format!(
-            "second-order position RMSE {position_rmse_m:.4} m; limit {} m{advice}",
-            limits.position_rmse_max_m
-        ));
+        if orientation.tables.et_s.len() < 2 {
+            return unknown;
+        }
+        let tables = Nodes::new(&orientation.tables);
+        let (mut apart_m, mut apart_rad) = (Vec::new(), [const { Vec::new() }; 3]);
+        for pair in orientation.samples.windows(2) {
+            let middle = pair[0].et.plus(0.5 * pair[1].et.since(pair[0].et));
+            let (camera, pose) = (tables.camera(middle), sampled.pose(middle.seconds()));
+            apart_m.push((pose.position_m - camera.position.xyz_m).norm());
+            let turn_rad = rotation_vector(&(pose.mars_to_camera * camera.to_mars.matrix()));
+            for (axis, component_rad) in apart_rad.iter_mut().zip(turn_rad.iter()) {
+                axis.push(*component_rad);
+            }
+        }
+        let pointing = apart_rad.iter().map(|axis| root_mean_square(axis));
+        Self {
+            position_rmse_m: root_mean_square(&apart_m),
+            pointing_rmse_rad: largest(pointing).unwrap_or(f64::NAN),
+        }
     }
-    let pointing_rmse_rad = rotation.rmse_rad();
-    if !(pointing_rmse_rad <= limits.pointing_rmse_max_rad) {
-        broken.push(format!(
-            "second-order pointing RMSE {:.3} arcsec; limit {} arcsec",
-            pointing_rmse_rad / RADIANS_PER_ARCSECOND,
-            four_digits(limits.pointing_rmse_max_rad / RADIANS_PER_ARCSECOND)
-        ));
+
+    fn broken_limits(&self, what: &str, limits: &OrientationConfig) -> Vec<String> {
+        let mut broken = Vec::new();
+        // Written so that NaN breaks a limit.
+        if !(self.position_rmse_m <= limits.position_rmse_max_m) {
+            broken.push(format!(
+                "{what} position RMSE {:.4} m; limit {} m",
+                self.position_rmse_m, limits.position_rmse_max_m
+            ));
+        }
+        if !(self.pointing_rmse_rad <= limits.pointing_rmse_max_rad) {
+            broken.push(format!(
+                "{what} pointing RMSE {:.3} arcsec; limit {} arcsec",
+                self.pointing_rmse_rad / RADIANS_PER_ARCSECOND,
+                four_digits(limits.pointing_rmse_max_rad / RADIANS_PER_ARCSECOND)
+            ));
+        }
+        broken
     }
+}
+
+/// What to do about polynomials that do not fit; empty for an image short enough for them.
+fn advice(orientation: &Orientation) -> String {
+    let ends = [orientation.samples.first(), orientation.samples.last()];
+    let exposed_s = match ends {
+        [Some(first), Some(last)] => last.et.since(first.et),
+        _ => 0.0,
+    };
+    if exposed_s > LONG_S {
+        format!(
+            "; over {exposed_s:.0} s an orbit departs from any polynomial of second order: remove registration.model, or \
+             set it to \"samples\", which follows the orbit"
+        )
+    } else {
+        String::new()
+    }
+}
+
+/// The reason if camera tables are too coarse.
+fn of_tables(orientation: &Orientation) -> Option<String> {
     let interpolation = &orientation.tables.interpolation;
-    if !interpolation.keeps_limit() {
-        broken.push(format!(
+    (!interpolation.keeps_limit()).then(|| {
+        format!(
             "camera tables interpolate with errors up to {:.4} pixels even with a node per line; limit {} pixels",
             interpolation.error_max_px,
             InterpolationCheck::LIMIT_PX
-        ));
-    }
-    broken
+        )
+    })
 }

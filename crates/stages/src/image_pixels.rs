@@ -56,7 +56,7 @@ impl PixelFiles<'_> {
     ///
     /// # Errors
     /// Those of [`Self::opened`]; two such files.
-    pub fn told_apart(&self, times: &[&ImageTimes]) -> Result<Vec<Option<PixelFile>>> {
+    pub fn of_distinct_images(&self, times: &[&ImageTimes]) -> Result<Vec<Option<PixelFile>>> {
         let opened = self.opened(times)?;
         let without_label = || {
             let files = opened.iter().zip(times);
@@ -79,9 +79,9 @@ impl PixelFiles<'_> {
     /// The decoded pixels of all images that have some, from which windows are read.
     ///
     /// # Errors
-    /// Those of [`Self::told_apart`]; errors in writing temporary files.
+    /// Those of [`Self::of_distinct_images`]; errors in writing temporary files.
     pub fn decoded(&self, times: &[&ImageTimes]) -> Result<Vec<Option<Pyramid>>> {
-        let opened = self.told_apart(times)?;
+        let opened = self.of_distinct_images(times)?;
         let decode = |file: &Option<PixelFile>| file.as_ref().map(Pyramid::of).transpose();
         opened.par_iter().map(decode).collect()
     }
@@ -153,14 +153,16 @@ enum PixelsError {
         images[0], images[1], size[0], size[1]
     )]
     #[cause(
-        "give the file of the archive (.imq, .img) or the cube of ISIS for one of the images: otherwise exchanged \
-         pictures cannot be distinguished from orientation errors"
+        "give the file of the archive (.imq, .img) or the cube of ISIS for one of the images: without it exchanged \
+         images cannot be distinguished from orientation errors"
     )]
     Alike { images: [String; 2], size: [u32; 2] },
     #[error(
         "image {image}: label and pixels of one file contradict each other: {first} ({count} contradictions in all)"
     )]
-    #[cause("fetch the file again, label and pixels in one: either may be of another image")]
+    #[cause(
+        "fetch the file again with label and pixels in one file: one of them may belong to another image"
+    )]
     Contradiction {
         image: String,
         first: String,

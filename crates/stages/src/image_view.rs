@@ -7,7 +7,7 @@ use crate::oriented::OrientedImage;
 use areograph_geom::{
     imaging::Affine,
     oriented_camera::OrientedCamera,
-    pushbroom::{CameraModel, ExteriorOrientation, Projector, Unseen},
+    pushbroom::{ExteriorOrientation, Projector, Unseen},
 };
 use areograph_pds::pixel_file::Pyramid;
 
@@ -38,12 +38,8 @@ pub(crate) struct Prediction {
 }
 
 impl<'a> View<'a> {
-    pub(crate) fn of(
-        image: &'a OrientedImage<'a>,
-        model: CameraModel,
-        pixels: &'a Pyramid,
-    ) -> Result<Self, Unseen> {
-        Self::through(image.oriented_camera(model), pixels)
+    pub(crate) fn of(image: &'a OrientedImage<'a>, pixels: &'a Pyramid) -> Result<Self, Unseen> {
+        Self::through(image.oriented_camera(), pixels)
     }
 
     pub(crate) fn through(

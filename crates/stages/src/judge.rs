@@ -12,10 +12,12 @@ mod untested;
 
 pub use areograph_base::verdict::{Check, CheckKind, CheckOutcome, Verdict};
 pub use beam::BeamEvidence;
+pub use untested::NO_BEAM;
 
 use super::{
     adjust::Adjusted,
     check_heights::HeightCheck,
+    check_profiles::ProfileCheck,
     check_ranges::{BiasScan, RangeCheck},
     compare_pairs::PairComparison,
     fit_sensor_model::SensorModel,
@@ -52,6 +54,8 @@ pub struct Evidence<'a> {
     pub warnings: &'a [String],
     /// Faults of skipped records, one sentence each.
     pub complaints: &'a [String],
+    /// The profiles against each other.
+    pub profiles: &'a ProfileCheck,
     /// The adjustment; `None` for a site without tie points.
     pub adjustment: Option<AdjustmentEvidence<'a>>,
     /// The terrain model of a pair; `None` where it is not requested.

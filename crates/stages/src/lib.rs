@@ -10,6 +10,7 @@ pub mod calibrate;
 pub mod check_archive;
 pub mod check_beam;
 pub mod check_heights;
+pub mod check_profiles;
 pub mod check_ranges;
 pub mod compare_kernels;
 pub mod compare_pairs;

@@ -8,17 +8,62 @@ use super::group_profiles::Profile;
 use areograph_base::{footprints::Footprints, frames::BodyFixed};
 use areograph_geom::{
     ellipsoid::spherical_to_xyz_m,
-    surface::{LaserSurface, SurfaceError, SurfaceOptions, SurfaceShot},
+    surface::{
+        Crossover, LaserSurface, ProfileNet, ProfilePriors, SurfaceError, SurfaceOptions,
+        SurfaceShot, crossovers,
+    },
 };
 
-/// Shots of all profiles, each once, in their order along the profiles.
+/// Shots of the profiles that belong to each other, each once, in their order along the profiles.
 #[derive(Debug, Clone)]
-pub struct MolaShots(Vec<SurfaceShot>);
+pub struct MolaShots {
+    pub(super) shots: Vec<SurfaceShot>,
+    /// Standard deviation of the radial error that the shots of a profile share, from crossovers, metres.
+    pub(super) profile_sigma_m: f64,
+}
+
+/// The profiles of a site against each other.
+#[derive(Debug, Clone)]
+pub(super) struct CrossedProfiles {
+    pub(super) crossovers: Vec<Crossover>,
+    pub(super) net: ProfileNet,
+}
 
 impl MolaShots {
-    /// The shots of `profiles`; a shot in two windows belongs to the first.
+    /// The shots of `profiles` without those that do not belong by their crossovers; a shot in two windows belongs to
+    /// the first.
     #[must_use]
-    pub fn of(footprints: &Footprints<BodyFixed>, profiles: &[Profile]) -> Self {
+    pub fn of(
+        footprints: &Footprints<BodyFixed>,
+        profiles: &[Profile],
+        options: &SurfaceOptions,
+    ) -> Self {
+        Self::crossed(footprints, profiles, options).0
+    }
+
+    /// The same, with the crossovers.
+    pub(super) fn crossed(
+        footprints: &Footprints<BodyFixed>,
+        profiles: &[Profile],
+        options: &SurfaceOptions,
+    ) -> (Self, CrossedProfiles) {
+        let mut shots = Self::all(footprints, profiles);
+        let crossovers = crossovers(&shots, options);
+        let priors = ProfilePriors {
+            radial_sigma_m: options.profile_sigma_m,
+            plan_sigma_m: 0.0,
+        };
+        let net = ProfileNet::of(&crossovers, &priors);
+        let left_out: BTreeSet<usize> = net.left_out.iter().map(|of| of.profile).collect();
+        shots.retain(|shot| !left_out.contains(&shot.profile));
+        let belonging = Self {
+            shots,
+            profile_sigma_m: net.radial_sigma_m,
+        };
+        (belonging, CrossedProfiles { crossovers, net })
+    }
+
+    fn all(footprints: &Footprints<BodyFixed>, profiles: &[Profile]) -> Vec<SurfaceShot> {
         let mut used = BTreeSet::new();
         let mut shots = Vec::new();
         for (index, profile) in profiles.iter().enumerate() {
@@ -28,13 +73,21 @@ impl MolaShots {
                     ground_m: spherical_to_xyz_m(
                         footprints.longitude_rad[at],
                         footprints.latitude_rad[at],
-                        footprints.radius_m[at],
+                        footprints.ground_radius_m(at),
                     ),
                     profile: index,
                 });
             }
         }
-        Self(shots)
+        shots
+    }
+
+    /// `options` with the radial error of profiles from crossovers.
+    pub(super) fn options(&self, options: &SurfaceOptions) -> SurfaceOptions {
+        SurfaceOptions {
+            profile_sigma_m: self.profile_sigma_m,
+            ..*options
+        }
     }
 
     /// The surface of all shots, for heights near the places `around`.
@@ -46,23 +99,27 @@ impl MolaShots {
         around: &[Vector3<f64>],
         options: &SurfaceOptions,
     ) -> Result<LaserSurface, SurfaceError> {
-        LaserSurface::new(&self.0, around, options)
+        LaserSurface::new(&self.shots, around, &self.options(options))
     }
 
     /// Every profile separately, with its index, those with most shots first.
     #[must_use]
     pub fn by_profile(&self) -> Vec<(usize, Self)> {
         let mut profiles: Vec<(usize, Self)> = Vec::new();
-        for shot in &self.0 {
-            match profiles
-                .iter_mut()
-                .find(|(index, _)| *index == shot.profile)
-            {
-                Some((_, own)) => own.0.push(*shot),
-                None => profiles.push((shot.profile, Self(vec![*shot]))),
+        for shot in &self.shots {
+            let mut known = profiles.iter_mut();
+            match known.find(|(index, _)| *index == shot.profile) {
+                Some((_, own)) => own.shots.push(*shot),
+                None => profiles.push((
+                    shot.profile,
+                    Self {
+                        shots: vec![*shot],
+                        profile_sigma_m: self.profile_sigma_m,
+                    },
+                )),
             }
         }
-        profiles.sort_by_key(|(_, shots)| std::cmp::Reverse(shots.0.len()));
+        profiles.sort_by_key(|(_, shots)| std::cmp::Reverse(shots.shots.len()));
         profiles
     }
 }

@@ -19,6 +19,8 @@ pub struct OrientedImage<'a> {
     pub image: &'a ImageTimes,
     /// Detector line.
     pub detector: Detector,
+    /// The form in use.
+    pub model: CameraModel,
     /// Polynomials of first order.
     pub first_order: EulerPolynomial,
     /// Polynomials of second order.
@@ -57,6 +59,7 @@ impl<'a> OrientedImage<'a> {
         Ok(Self {
             image,
             detector: image.detector(),
+            model: model.model,
             first_order: model.first_order.orientation(),
             second_order: model.second_order.orientation(),
             rotation_vector: model.rotation_vector_orientation(),
@@ -81,11 +84,19 @@ impl<'a> OrientedImage<'a> {
         }
     }
 
+    /// Finds lines for points with the form in use.
+    ///
+    /// # Errors
+    /// An orientation that sees no ground.
+    pub fn projector(&self) -> std::result::Result<Projector<'_, dyn ExteriorOrientation>, Unseen> {
+        self.projector_of(self.model)
+    }
+
     /// Finds lines for points with the form `required`.
     ///
     /// # Errors
     /// An orientation that sees no ground.
-    pub fn projector(
+    pub fn projector_of(
         &self,
         required: CameraModel,
     ) -> std::result::Result<Projector<'_, dyn ExteriorOrientation>, Unseen> {
@@ -111,15 +122,12 @@ impl<'a> OrientedImage<'a> {
         ))
     }
 
-    /// The image for intersection and adjustment, with the form `required`.
+    /// The image for intersection and adjustment, with the form in use.
     #[must_use]
-    pub fn oriented_camera(
-        &self,
-        required: CameraModel,
-    ) -> OrientedCamera<&(dyn ExteriorOrientation + 'static)> {
+    pub fn oriented_camera(&self) -> OrientedCamera<&(dyn ExteriorOrientation + 'static)> {
         OrientedCamera {
             id: self.image.id.clone(),
-            orientation: self.orientation(required),
+            orientation: self.orientation(self.model),
             detector: self.detector,
             line_times: self.image.line_times.clone(),
         }

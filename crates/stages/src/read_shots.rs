@@ -72,7 +72,7 @@ impl Input for ShotFiles<'_> {
 
 impl Stage for ReadShots<'_> {
     const NAME: &'static str = "search_footprints";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     const CHECKED: bool = true;
     type Output = SearchResult;
     stage_inputs!(fingerprint);
@@ -126,7 +126,10 @@ pub fn read_shots(
     if tables.len() > usize::from(u16::MAX) {
         return Err(TooManyTables(tables.len()).into());
     }
-    let regions: Vec<Region> = windows.iter().map(|of| Region::new(&of.shape)).collect();
+    let regions: Vec<Region> = windows
+        .iter()
+        .map(|window| Region::new(&window.shape))
+        .collect();
     let mut gathered = Gathered {
         body,
         regions: &regions,
@@ -143,6 +146,7 @@ pub fn read_shots(
             version: None,
             datum,
             blake3: file.blake3.clone(),
+            is_table: true,
         });
         let (path, columns) = (&file.path, columns_of(table));
         gathered.layouts.insert(columns == TableColumns::OdePedr);
@@ -305,7 +309,8 @@ impl Gathered<'_> {
             let unknown = flags.filter(|flag| **flag >= NO_ATTITUDE).count();
             if unknown > 0 {
                 notes.push(format!(
-                    "{unknown} shots in the windows have attitude flag 2 or 3: their place assumes a nadir look"
+                    "{unknown} shots in the windows have attitude flag 2 or 3: their positions assume that the laser \
+                     pointed to nadir"
                 ));
             }
         }

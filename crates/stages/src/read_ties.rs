@@ -92,7 +92,7 @@ impl Input for ImageNames<'_> {
 
 impl Stage for ReadTies<'_> {
     const NAME: &'static str = "read_ties";
-    const METHOD: u32 = 5;
+    const METHOD: u32 = 6;
     const CHECKED: bool = true;
     type Output = Ties;
     stage_inputs!(fingerprint);
@@ -364,7 +364,7 @@ mod tests {
         assert_eq!(
             again.remarks,
             [
-                "3 repeat the measurements of another point and are omitted, for example 1 those of 1"
+                "3 duplicate the measurements of another point and are omitted, for example 1 those of 1"
             ]
         );
         // One place of A, two of B.
@@ -390,7 +390,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_do_not_match_are_told() {
+    fn names_that_do_not_match_are_reported() {
         let failure = read(TABLE, &[image("x", None), image("y", None)]).unwrap_err();
         assert_eq!(failure.kind(), Kind::Input);
         assert_eq!(

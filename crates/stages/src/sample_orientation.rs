@@ -8,7 +8,10 @@ mod support;
 
 use std::{fmt, sync::atomic::AtomicBool};
 
-use self::support::support_orientation;
+use self::{
+    against_kernels::{Comparison, compare},
+    support::support_orientation,
+};
 use super::{orientation::CameraReader, tag_times::ImageTimes};
 use areograph_base::{error::Result, time::Et};
 use areograph_config::{KernelsConfig, OrientationConfig, PointingConfig};
@@ -48,7 +51,7 @@ stage_inputs! {
 
 impl Stage for SampleOrientation<'_> {
     const NAME: &'static str = "sample_orientation";
-    const METHOD: u32 = 5;
+    const METHOD: u32 = 6;
     type Output = Orientation;
     stage_inputs!(fingerprint);
 
@@ -61,9 +64,9 @@ impl Stage for SampleOrientation<'_> {
         if let Some(support) = &times.support {
             let epochs = epochs(times, self.orientation.intervals);
             let mut orientation = support_orientation(times, &support.tables, &epochs)?;
-            orientation
-                .invalid_because
-                .extend(self.contradiction(times)?);
+            let compared = self.against_kernels(times);
+            orientation.invalid_because.extend(compared.contradiction);
+            orientation.notes.extend(compared.note);
             return Ok(orientation);
         }
         sample_orientation(
@@ -84,7 +87,8 @@ impl Stage for SampleOrientation<'_> {
         if let Some(support) = &times.support {
             let epochs = epochs(times, self.orientation.intervals);
             let sampled = support_orientation(times, &support.tables, &epochs);
-            let invalid = sampled.and_then(|_| self.contradiction(times));
+            let contradiction = |_| self.against_kernels(times).contradiction;
+            let invalid = sampled.map(contradiction);
             return vec![invalid.map(|reason| finding(times, reason.as_slice()))];
         }
         if self.kernels.kernels().is_none() {
@@ -105,16 +109,16 @@ impl Stage for SampleOrientation<'_> {
 }
 
 impl SampleOrientation<'_> {
-    /// The contradiction of support data with the kernels beside them.
-    fn contradiction(&self, times: &ImageTimes) -> Result<Option<String>> {
-        against_kernels::contradiction(times, self.kernels, self.coverage, self.pointing)
+    /// Support data compared with the kernels beside them.
+    fn against_kernels(&self, times: &ImageTimes) -> Comparison {
+        compare(times, self.kernels, self.coverage, self.pointing)
     }
 }
 
 /// The finding on an image whose orientation can be read, with the reasons why it would be invalid.
 fn finding(times: &ImageTimes, invalid_because: &[String]) -> String {
     let invalid = invalid_because.iter();
-    let invalid = invalid.map(|reason| format!("; products would be invalid: {reason}"));
+    let invalid = invalid.map(|reason| format!("; the products would be invalid: {reason}"));
     format!(
         "image {}: {} lines from {} UTC, first line centre {}, position and attitude covered{}",
         times.id,

@@ -98,7 +98,7 @@ impl Input for KnownPlaces<'_> {
 
 impl Stage for SearchFootprints<'_> {
     const NAME: &'static str = STAGE;
-    const METHOD: u32 = 4;
+    const METHOD: u32 = 5;
     const CHECKED: bool = true;
     type Output = SearchResult;
     stage_inputs!(fingerprint);
@@ -237,6 +237,7 @@ impl Gathered<'_> {
             version: source.version(),
             datum: source.datum(),
             blake3: file.blake3.clone(),
+            is_table: false,
         };
         let copies = &mut self.copies;
         let original = copies.original_of(index, &enlisted.blake3, enlisted.datum);

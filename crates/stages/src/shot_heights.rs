@@ -38,7 +38,7 @@ impl Heights {
         let shots = rows.map(|row| {
             let at = *row as usize;
             let (longitude, latitude) = (footprints.longitude_rad[at], footprints.latitude_rad[at]);
-            spherical_to_xyz_m(longitude, latitude, footprints.radius_m[at])
+            spherical_to_xyz_m(longitude, latitude, footprints.ground_radius_m(at))
         });
         Self::at(footprints.body, shots.collect())
     }

@@ -171,6 +171,8 @@ stage_inputs! {
         pub label: Option<HashedFile>,
         /// The support data that it names instead.
         pub support: Option<HashedFile>,
+        /// The oriented cube that it names instead.
+        pub cube: Option<HashedFile>,
         /// Text kernels.
         pub kernels: &'a KernelView,
     }
@@ -178,7 +180,7 @@ stage_inputs! {
 
 impl Stage for TagTimes<'_> {
     const NAME: &'static str = "tag_times";
-    const METHOD: u32 = 9;
+    const METHOD: u32 = 10;
     const CHECKED: bool = true;
     type Output = ImageTimes;
     stage_inputs!(fingerprint);
@@ -191,7 +193,7 @@ impl Stage for TagTimes<'_> {
         tag_image(
             *self.body,
             self.image,
-            self.support.as_ref(),
+            self.support.as_ref().or(self.cube.as_ref()),
             self.kernels.session()?,
         )
     }
@@ -221,7 +223,7 @@ fn tag_image(
     hashed: Option<&HashedFile>,
     session: &Session,
 ) -> Result<ImageTimes> {
-    let times = match &image.isd {
+    let times = match image.support() {
         Some(path) => supported(body, image, path, hashed, session),
         None => image_times(image, session),
     };
@@ -272,7 +274,7 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
     }
     remarks.extend(camera_agrees(&instrument, all_instruments()));
     of_one_clock(image, instrument.spacecraft, fields.sclk_start.as_deref())?;
-    let told = start_time(image, &fields, session, &mut notes, &mut remarks)?;
+    let stated_start = start_time(image, &fields, session, &mut notes, &mut remarks)?;
     let pieces = Pieces {
         image,
         fields: &fields,
@@ -280,7 +282,7 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
         downtrack_summing,
     };
     let (line_times, exposure_s, start_from) =
-        pieces.line_times(of_file, tells_lines, told, &mut remarks)?;
+        pieces.line_times(of_file, tells_lines, stated_start, &mut remarks)?;
     let start = line_times.start();
     session.require_published_utc(start)?;
     // Without the camera's frame, the orientation stage reports what is missing.

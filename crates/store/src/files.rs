@@ -198,14 +198,14 @@ impl InputFiles {
     #[must_use]
     pub fn learnt(&self) -> Vec<KnownFile> {
         let seen = self.lock();
-        let known = seen.files.values().filter_map(|of| {
+        let known = seen.files.values().filter_map(|known| {
             let passed = seen.passed.iter();
-            let checks = passed.filter(|(blake3, _)| *blake3 == of.file.blake3);
+            let checks = passed.filter(|(blake3, _)| *blake3 == known.file.blake3);
             Some(KnownFile {
-                identity: of.identity,
-                blake3: *blake3::Hash::from_hex(&of.file.blake3).ok()?.as_bytes(),
+                identity: known.identity,
+                blake3: *blake3::Hash::from_hex(&known.file.blake3).ok()?.as_bytes(),
                 checked: checks.map(|(_, check)| *check).max().unwrap_or(0),
-                read_s: of.read_s?,
+                read_s: known.read_s?,
             })
         });
         let new = known.filter(|file| self.earlier.get(&file.identity) != Some(file));

@@ -15,6 +15,7 @@
 //! ```
 
 pub mod atomic;
+pub mod book;
 pub mod cache;
 pub mod files;
 pub mod hashes;

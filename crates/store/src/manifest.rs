@@ -8,6 +8,9 @@ use serde::{Deserialize, Serialize};
 pub use areograph_base::verdict::Verdict;
 use areograph_base::{schema::DocumentSchema, time::Interval};
 
+/// Name of the manifest in a site's folder.
+pub const MANIFEST: &str = "manifest.json";
+
 /// Schema of the manifest.
 #[must_use]
 pub fn schema() -> DocumentSchema {

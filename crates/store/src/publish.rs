@@ -23,8 +23,7 @@ use super::{
 use crate::files::{hash_file, short_hash};
 use areograph_base::error::{Cause, IoError, Locate, Result};
 
-/// Name of the manifest in a site's folder.
-pub const MANIFEST: &str = "manifest.json";
+pub use super::manifest::MANIFEST;
 
 /// Name of the last stage of every flow.
 const PUBLISH: &str = "publish";

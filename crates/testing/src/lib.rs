@@ -16,6 +16,8 @@
 )]
 
 pub mod brute_force;
+pub mod csm_state;
+pub mod cube;
 pub mod eos_2002;
 pub mod golden;
 pub mod kept;

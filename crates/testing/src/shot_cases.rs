@@ -139,6 +139,7 @@ pub fn source(file: usize) -> SourceFile {
         version: None,
         datum: Datum::Iau2000,
         blake3: String::new(),
+        is_table: false,
     }
 }
 

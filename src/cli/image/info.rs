@@ -7,10 +7,11 @@ use serde_json::{Value, json};
 
 use crate::{
     cli::output,
-    config::all_instruments,
+    config::{all_instruments, built_in_instruments},
     error::Error,
     pds::{
         image_file::{Coding, Complaint, Complaints, ImageFile, Statistics},
+        oriented_cube::{Orientation, OrientedCube, PartOfAxis, is_cube_file, read_oriented_cube},
         pixel_file::PixelFile,
     },
     units::SECONDS_PER_MS,
@@ -18,13 +19,14 @@ use crate::{
 
 /// Shows label, size, coding, statistics, and all errors of each image file.
 ///
-/// Cubes and pictures may replace images of the archive. If their values are not bytes, the least is scaled to 1 and the
+/// Cubes and pictures may replace images of the archive. Values other than bytes are scaled, the least to 1 and the
 /// largest to 255, and statistics refer to the scaled values.
 ///
 /// Statistics and the hash are those of the decoded 8-bit pixels in the order of the file; missing lines are excluded.
 /// A line is suspect if it comes from damaged data, or if its place in the image is unknown. A damaged file is not a
-/// failure as long as part of it can be read. `exposures` are the line times in a file of HRSC, in the form of
-/// `images.exposures`: first line, its start in ET seconds, line period in milliseconds.
+/// failure as long as part of it can be read. Of an ISIS cube, `cube` states the part of the camera's image, the map projection,
+/// and whether its tables or the state of its camera model orient the image (`images.cube`), or why not. `exposures` are the line
+/// times in a file of HRSC, in the form of `images.exposures`: first line, its start in ET seconds, line period in milliseconds.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: areograph image info e0202855.imq --json")]
 pub(super) struct Arguments {
@@ -83,6 +85,7 @@ fn info(path: &Path) -> Result<Value, Error> {
     let milliseconds = |seconds: Option<f64>| seconds.map(|seconds| seconds / SECONDS_PER_MS);
     Ok(json!({
         "file": path,
+        "cube": cube(path)?,
         "product_id": label.and_then(|label| label.product_id.clone()),
         "instrument": label.map(|label| &label.instrument.id),
         "sclk_start": fields.sclk_start,
@@ -117,6 +120,40 @@ fn info(path: &Path) -> Result<Value, Error> {
         "complaint_count": opened.map_or(0, Complaints::count) + decoded_count + of_rows.len() as u64,
         "complaints": texts.map(Complaint::to_string).chain(of_rows).collect::<Vec<_>>(),
     }))
+}
+
+/// What a cube is; `None` for another file.
+fn cube(path: &Path) -> Result<Option<Value>, Error> {
+    if !is_cube_file(path)? {
+        return Ok(None);
+    }
+    Ok(Some(
+        match read_oriented_cube(path, built_in_instruments()) {
+            Ok(cube) => described(&cube),
+            Err(failure) => json!({ "oriented": false, "because": failure.cause.to_string() }),
+        },
+    ))
+}
+
+fn described(cube: &OrientedCube) -> Value {
+    let support = &cube.support;
+    let times = &support.line_times;
+    let axis = |axis: &PartOfAxis| json!({ "of": axis.whole, "first": axis.first + 1, "count": axis.count, "summed": axis.factor });
+    json!({
+        "oriented": true,
+        "orientation": match &cube.orientation {
+            Orientation::Tables => "tables of spiceinit".to_owned(),
+            Orientation::State { model, plugin } => format!("state of a camera model by csminit: {model}, {plugin}"),
+        },
+        "instrument": support.instrument.id,
+        "product_id": support.identifier,
+        "start_et_s": times.start().seconds(),
+        "line_period_ms": times.mean_period_s() / SECONDS_PER_MS,
+        "lines": axis(&cube.part.lines),
+        "samples": axis(&cube.part.samples),
+        "projection": cube.projection,
+        "notes": cube.notes(),
+    })
 }
 
 fn coding(coding: Option<Coding>) -> String {

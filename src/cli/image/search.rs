@@ -14,6 +14,7 @@ use self::{
 };
 use crate::{
     cli::output,
+    config::WindowConfig,
     constants::MARS_NAME,
     error::Result,
     geom::{
@@ -21,6 +22,7 @@ use crate::{
         window::Region,
     },
     pds::image_index::{ImageIndex, IndexedImage, read_index},
+    units::RADIANS_PER_DEGREE,
 };
 
 /// An image that was found.
@@ -49,7 +51,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     for path in &arguments.indexes {
         let index = read_index(path)?;
         tell_index(path, &index);
-        found.extend(found_in(path, index, arguments, &regions));
+        found.extend(found_in(
+            path,
+            index,
+            |image| arguments.wants(image),
+            &regions,
+        ));
     }
     // The index of a volume contains all earlier images: duplicates are merged.
     found.sort_by(|a, b| a.image.product_id.cmp(&b.image.product_id));
@@ -74,6 +81,69 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
+/// An image for a new site.
+#[derive(Debug)]
+pub(in crate::cli) struct Proposed {
+    /// Identifier as in site files.
+    pub(in crate::cli) id: String,
+    /// Name of its file in the archive, lower case.
+    pub(in crate::cli) file: String,
+    /// Why it is proposed.
+    pub(in crate::cli) why: String,
+}
+
+/// The images of the best pairs over a window, or without a pair the sharpest image.
+///
+/// * `pixel_max_m` – largest width of a pixel on the ground
+pub(in crate::cli) fn propose(
+    index_path: &Path,
+    window: &WindowConfig,
+    pairs_max: usize,
+    pixel_max_m: f64,
+) -> Result<Vec<Proposed>> {
+    let index = read_index(index_path)?;
+    tell_index(index_path, &index);
+    let region = (window.id.clone(), Region::new(&window.shape));
+    let is_sharp =
+        |image: &IndexedImage| image.pixel_m.is_none_or(|pixel_m| pixel_m <= pixel_max_m);
+    let mut found = found_in(index_path, index, is_sharp, &[region]);
+    found.sort_by(|a, b| a.image.product_id.cmp(&b.image.product_id));
+    found.dedup_by(|a, b| a.image.product_id == b.image.product_id);
+    let mut proposed: Vec<Proposed> = Vec::new();
+    let mut add = |one: &Found, why: String| {
+        let id = one.image.product_id.replace('/', "-");
+        if !proposed.iter().any(|earlier| earlier.id == id) {
+            let file = one.image.file.rsplit('/').next().unwrap_or_default();
+            let file = file.to_ascii_lowercase();
+            proposed.push(Proposed { id, file, why });
+        }
+    };
+    for pair in pairs(&found).iter().take(pairs_max) {
+        for (one, other) in [(0, 1), (1, 0)] {
+            let partner = &pair.images[other].image.product_id;
+            let convergence = pair.convergence_rad.map_or_else(
+                || "unknown convergence".to_owned(),
+                |angle| format!("convergence {:.1}°", angle / RADIANS_PER_DEGREE),
+            );
+            let overlap = 100.0 * pair.overlap;
+            add(
+                pair.images[one],
+                format!("pair with {partner}: overlap {overlap:.0} %, {convergence}"),
+            );
+        }
+    }
+    if found.iter().any(|one| one.image.pixel_m.is_some()) && pairs(&found).is_empty() {
+        let width_m = |one: &&Found| one.image.pixel_m.unwrap_or(f64::INFINITY);
+        let sharpest = found
+            .iter()
+            .min_by(|a, b| width_m(a).total_cmp(&width_m(b)));
+        if let Some(one) = sharpest {
+            add(one, "sharpest image; no pair covers the window".to_owned());
+        }
+    }
+    Ok(proposed)
+}
+
 fn tell_index(path: &Path, index: &ImageIndex) {
     if !index.has_label {
         tracing::warn!(
@@ -96,7 +166,7 @@ fn tell_index(path: &Path, index: &ImageIndex) {
 fn found_in(
     path: &Path,
     index: ImageIndex,
-    arguments: &Arguments,
+    wants: impl Fn(&IndexedImage) -> bool,
     regions: &[(String, Region)],
 ) -> Vec<Found> {
     let (mut found, mut without_target) = (Vec::new(), 0_usize);
@@ -109,7 +179,7 @@ fn found_in(
         }
         if cameras_of(&image).next().is_none() {
             of_no_camera.push(image.product_id);
-        } else if arguments.wants(&image) {
+        } else if wants(&image) {
             match place(&image) {
                 Some((centre_rad, outline)) => {
                     found.extend(meeting(image, centre_rad, outline, regions));

@@ -246,12 +246,12 @@ fn print_table(comparison: &Comparison, unit: f64, attitude: Option<&AttitudeCom
     }
     for close in comparison.nearly_as_close() {
         output::line(format_args!(
-            "  too close to call: {} is nearly as close",
+            "  not decisive: {} is nearly as close",
             close.set
         ));
     }
     if let Some(far) = comparison.pulls_the_mean() {
-        output::line(format_args!("  pulls the mean towards itself: {}", far.set));
+        output::line(format_args!("  biases the mean: {}", far.set));
     }
     if let Some(far) = comparison.decided_by() {
         output::line(format_args!(

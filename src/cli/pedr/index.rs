@@ -19,8 +19,8 @@ use crate::{
 
 /// Creates or updates the index of the PEDR files in and below a folder; only new and changed files are read.
 ///
-/// `run` and `pedr search` use the index automatically; their results are the same with it, without it, and if it is out of
-/// date. It is the file areograph-pedr.index in the folder. If the command is killed, the index remains unchanged.
+/// `run` and `pedr search` use the index automatically. Their results do not depend on it, even if it is out of date. The
+/// index is the file areograph-pedr.index in the folder. If the command is killed, the index remains unchanged.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: areograph pedr index /data/mola")]
 pub(super) struct Arguments {
@@ -100,7 +100,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
 /// Entries of files below folders that cannot be listed, such as an unmounted one; they are used again once it is
 /// mounted.
 fn unseen(earlier: &Index, folder: &Path, failures: &[Error]) -> Vec<IndexedFile> {
-    let closed: Vec<&PathBuf> = failures.iter().filter_map(|of| of.file.as_ref()).collect();
+    let closed: Vec<&PathBuf> = failures
+        .iter()
+        .filter_map(|failure| failure.file.as_ref())
+        .collect();
     let is_unseen = |file: &&IndexedFile| {
         let path = folder.join(file.path());
         closed.iter().any(|closed| path.starts_with(closed))

@@ -26,7 +26,7 @@ use crate::{
 ///
 /// Shots are counted by class, trigger channel, attitude flag and orbit model, excluding shots without a return and
 /// contradictory shots. Ranges are compared with the distance from the spacecraft position in the file to the footprint:
-/// both come from one orbit, so that their difference tests the file and its reader, and requires no kernel.
+/// both come from one orbit, so that their difference tests the file and its reader without kernels.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: areograph pedr info pedr/*.b")]
 pub(super) struct Arguments {
@@ -114,20 +114,20 @@ fn info(path: &Path, file: &File, clock: Option<&Session>) -> Result<(Counts, Va
         "blake3": file.blake3(),
         "complaints": complaints.iter().map(ToString::to_string).collect::<Vec<_>>(),
     });
-    tell_utc(&mut answer, clock, counts.span_s)?;
+    add_utc(&mut answer, clock, counts.span_s)?;
     Ok((counts, answer))
 }
 
 fn info_of_table(path: &Path, clock: Option<&Session>) -> Result<Value, Error> {
     let utc = |text: &str| tables::instant(clock, text);
     let counts = TableCounts::of(path, clock.map(|_| &utc as _))?;
-    let mut answer = counts.tell(path)?;
-    tell_utc(&mut answer, clock, counts.span_s())?;
+    let mut answer = counts.answer(path)?;
+    add_utc(&mut answer, clock, counts.span_s())?;
     Ok(answer)
 }
 
 /// Adds the time span in UTC, where leap seconds are known.
-fn tell_utc(
+fn add_utc(
     answer: &mut Value,
     clock: Option<&Session>,
     span_s: Option<[f64; 2]>,
@@ -153,11 +153,12 @@ fn print(counts: Option<&Counts>, answer: &Value) {
                 statistics("other", &counts.other_range_minus_distance_m);
                 continue;
             }
+            ("range_minus_distance_m", None) => "not determined".to_owned(),
             ("shots_by_class" | "shots_by_channel" | "shots_by_attitude_flag", _) => {
                 let members = value.as_object().into_iter().flatten();
                 counted(
                     &members
-                        .map(|(of, count)| (of.clone(), count.as_u64().unwrap_or(0)))
+                        .map(|(class, count)| (class.clone(), count.as_u64().unwrap_or(0)))
                         .collect(),
                 )
             }

@@ -9,7 +9,7 @@ use crate::{
     body::Body,
     cli::{
         report,
-        single::{Asked, answer},
+        single::{Request, answer},
     },
     error::Cause,
     flow::run_match,
@@ -19,9 +19,9 @@ use crate::{
 /// Finds laser control points: shots of PEDR files over a stereo terrain model, shifted until their heights fit.
 ///
 /// Shots are grouped into segments with relief, and these into units of several passes; for each unit the command finds the
-/// shift at which its heights fit the model (Li et al. 2023). Every fourth shot of a unit is held out for validation. Products go
+/// shift at which its heights fit the model (Li et al. 2023). Every fourth shot of a unit is withheld for validation. Products go
 /// to --out: units with shift and reason, a control point of every unit that is kept, a page; with --isd also control.csv for
-/// `areograph calibrate`. The exit code is 5 if too few units are kept, or if held-out shots do not confirm them.
+/// `areograph calibrate`. The exit code is 5 if too few units are kept, or if the withheld shots do not confirm them.
 ///
 /// Example: areograph scene demo --terrain-model && areograph pedr match demo/model.tif demo/pedr --isd s1=demo/isd/s1.json --isd s2=demo/isd/s2.json --out control
 #[derive(Debug, Args)]
@@ -36,7 +36,7 @@ pub(super) struct Arguments {
     /// Folder of the products.
     #[arg(long, default_value = "match")]
     out: PathBuf,
-    /// An image that the model was made from, by its support data; two or more, named as the cameras of the calibration.
+    /// An image of the stereo model, by its support data; give two or more, with the names of the cameras of the calibration.
     #[arg(long, value_name = "NAME=FILE", value_parser = image)]
     isd: Vec<(String, PathBuf)>,
     /// Radius of the sphere to which heights of the model refer; the default is that of the map in the file.
@@ -64,7 +64,7 @@ pub(super) struct Arguments {
     /// Ratio of the best similarity to the mean of those above 0 that a unit must exceed.
     #[arg(long, default_value_t = 1.0, value_parser = above_zero)]
     least_contrast: f64,
-    /// Largest root mean square of model minus laser at all held-out shots, bias removed, metres.
+    /// Largest root mean square of model minus laser at all withheld shots, bias removed, metres.
     #[arg(long, value_name = "METRES", default_value_t = 60.0, value_parser = above_zero)]
     limit_m: f64,
     /// Seed of the clusters.
@@ -119,7 +119,9 @@ impl Arguments {
         let names: std::collections::BTreeSet<&String> =
             self.isd.iter().map(|(name, _)| name).collect();
         if self.isd.len() == 1 || names.len() < self.isd.len() {
-            return Err(Images(self.isd.iter().map(|of| of.0.clone()).collect()));
+            return Err(Images(
+                self.isd.iter().map(|named| named.0.clone()).collect(),
+            ));
         }
         let images = self.isd.iter().cloned();
         Ok(MatchRequest {
@@ -155,15 +157,15 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
         Ok(request) => request,
         Err(failure) => return report(&failure.into()),
     };
-    let asked = Asked {
+    let named = Request {
         what: "model",
         name: &crate::files::file_name(&arguments.model),
         json: arguments.json,
     };
     let ran = run_match(&request, &arguments.out, arguments.force);
-    answer(&asked, ran, |count| {
+    answer(&named, ran, |count| {
         format!(
-            "{} of {} units kept, {} shots in {} passes, {} held out",
+            "{} of {} units kept, {} shots in {} passes, {} withheld",
             count("units_kept"),
             count("units"),
             count("shots"),

@@ -67,9 +67,9 @@ struct ClockBias(f64);
 /// Profiles that exceed limits, or that could not be checked.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error(
-    "the archive is invalid against these kernels, or was checked only in part; products were written"
+    "the archive contradicts these kernels, or was checked only in part; the products were written"
 )]
-#[cause(Validation: "see the page: it lists the reasons first, then the worst profiles")]
+#[cause(Validation: "read the report: it lists the reasons first and then the worst profiles")]
 struct Invalid;
 
 impl Arguments {
@@ -211,17 +211,17 @@ impl Telling {
 /// Progress of a check after the time `taken`, with the estimated time left.
 fn words(progress: &ArchiveProgress, taken: Duration) -> String {
     let taken_s = taken.as_secs_f64();
-    let of = format!("{} of {} files", progress.files_done, progress.files);
+    let done = format!("{} of {} files", progress.files_done, progress.files);
     let stored = match progress.files_stored {
         0 => String::new(),
         stored => format!(" ({stored} from before)"),
     };
     if progress.bytes_done == 0 {
-        return format!("pedr qa: {of}{stored}");
+        return format!("pedr qa: {done}{stored}");
     }
     let left_s = taken_s * progress.bytes_left as f64 / progress.bytes_done as f64;
     format!(
-        "pedr qa: {of}{stored}, {:.1} million shots, {:.1} million a second, {} left",
+        "pedr qa: {done}{stored}, {:.1} million shots, {:.1} million a second, {} left",
         progress.shots as f64 / 1e6,
         progress.shots as f64 / 1e6 / taken_s,
         duration(left_s),

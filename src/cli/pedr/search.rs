@@ -58,15 +58,19 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
         counts: vec![0; windows.len()],
         ..Answer::default()
     };
-    if tables::are_named(&arguments.paths)? {
+    if tables::tables_among(&arguments.paths)? {
         let read: Vec<&Path> = arguments.paths.iter().map(PathBuf::as_path).collect();
         arguments.require_apart(&read, &[])?;
         let clock = tables::clock(arguments.leap_seconds.as_deref())?;
         let utc = |text: &str| tables::instant(clock.as_ref(), text);
         let utc = clock.as_ref().map(|_| &utc as _);
         let found = search_tables(&arguments.paths, &query, utc, signals.stop())?;
-        answer.files = found.tables.iter().map(|of| of.file.clone()).collect();
-        answer.told_files = found.tables.iter().map(tables::tell).collect();
+        answer.files = found
+            .tables
+            .iter()
+            .map(|table| table.file.clone())
+            .collect();
+        answer.told_files = found.tables.iter().map(tables::described).collect();
         answer.failures = found.failures;
         answer.repeated = Some(found.repeated);
         answer.create(arguments, format)?;
@@ -173,7 +177,7 @@ impl Answer {
         });
         if let Some(repeated) = self.repeated {
             told["repeated_rows"] = json!(repeated);
-            told["spacecraft"] = json!("nadir by range: the tables have no position of it");
+            tables::state_nadir_by_range(&mut told);
         }
         if let Some(time) = time {
             let finite = |et: Et| et.seconds().is_finite().then(|| et.seconds());

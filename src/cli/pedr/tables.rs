@@ -23,13 +23,11 @@ use crate::{
 #[derive(Debug, thiserror::Error, Cause)]
 #[cause(Configuration)]
 enum Misplaced {
-    #[error(
-        "a table of the Orbital Data Explorer, beside files that are not; expected one kind of files"
-    )]
+    #[error("a table of the Orbital Data Explorer among PEDR files; expected files of one kind")]
     #[cause("search tables and PEDR files separately")]
     Mixed,
     #[error(
-        "a table of the Orbital Data Explorer, without positions of the spacecraft; expected PEDR files"
+        "a table of the Orbital Data Explorer, which has no positions of the spacecraft; expected PEDR files"
     )]
     #[cause(
         "name the table in [[shots]] of a site, with layout = \"ode_pedr\" and kernels: its range check compares them"
@@ -45,11 +43,11 @@ fn first(paths: &[PathBuf]) -> (Option<&PathBuf>, bool) {
     (tables.first().copied(), tables.len() == paths.len())
 }
 
-/// Whether these are tables.
+/// Whether these paths are tables.
 ///
 /// # Errors
-/// Some are and some are not.
-pub(super) fn are_named(paths: &[PathBuf]) -> Result<bool> {
+/// Some are tables and some are not.
+pub(super) fn tables_among(paths: &[PathBuf]) -> Result<bool> {
     match first(paths) {
         (None, _) => Ok(false),
         (Some(_), true) => Ok(true),
@@ -86,8 +84,17 @@ pub(super) fn instant(clock: Option<&Session>, text: &str) -> Result<Et> {
 }
 
 /// A table in the answer of a search.
-pub(super) fn tell(table: &SearchedTable) -> Value {
+pub(super) fn described(table: &SearchedTable) -> Value {
     json!({"file": table.file.name, "rows": table.rows, "datum": table.file.datum})
+}
+
+/// States in an answer that the positions of the spacecraft are nadir by range. Positions in PEDR files are measured.
+pub(super) fn state_nadir_by_range(answer: &mut Value) {
+    answer["nadir_by_range"] = true.into();
+    answer["range_minus_distance_m"] = Value::Null;
+    answer["remark"] = "a table has no position of the spacecraft: the position is taken on the radius through the footprint, \
+        at the range, so that a comparison of range and distance tests nothing"
+        .into();
 }
 
 /// Counts of a table.
@@ -137,10 +144,10 @@ impl TableCounts {
     ///
     /// # Errors
     /// The file cannot be read.
-    pub(super) fn tell(&self, path: &Path) -> Result<Value> {
+    pub(super) fn answer(&self, path: &Path) -> Result<Value> {
         let shots: u64 = self.rows_by_orbit.values().sum();
         let (blake3, _) = hash_file(path)?;
-        Ok(json!({
+        let mut answer = json!({
             "file": path,
             "layout": "ode_pedr",
             "rows": self.rows,
@@ -151,14 +158,32 @@ impl TableCounts {
             "shots_by_class": self.shots_by_class,
             "shots_by_channel": self.shots_by_channel,
             "shots_by_attitude_flag": self.shots_by_attitude_flag,
-            "range_minus_distance_m": "not known: the table has no position of the spacecraft",
             "blake3": blake3,
             "complaints": self.complaints,
-        }))
+        });
+        state_nadir_by_range(&mut answer);
+        Ok(answer)
     }
 
     /// First and last time, ET seconds.
     pub(super) const fn span_s(&self) -> Option<[f64; 2]> {
         self.span_s
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_answer_of_a_table_compares_no_range() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("table.csv");
+        std::fs::File::create(&path).unwrap();
+        let answer = TableCounts::default().answer(&path).unwrap();
+        assert_eq!(answer["nadir_by_range"], true);
+        assert!(answer["range_minus_distance_m"].is_null());
+        let remark = answer["remark"].as_str().unwrap();
+        assert!(remark.contains("no position of the spacecraft"), "{remark}");
     }
 }

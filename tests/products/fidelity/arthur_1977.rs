@@ -338,7 +338,8 @@ static ROWS: [Row; 15] = [
             ours: pictures,
             test: "tests/stages/plane.rs::seams_are_wider_than_bricks_are_within_and_local_evens_them_out",
         },
-        note: "Orthographic pictures are used as if they were conformal, which leaves the second number.",
+        note: "The paper uses orthographic pictures as if they were conformal; the second number is the error of \
+               this assumption.",
     },
     Row {
         id: "A77-02",
@@ -349,7 +350,7 @@ static ROWS: [Row; 15] = [
             from: "the equations of a synthetic net",
             ours: unknowns,
         },
-        note: "4m + 2n the rigorous way, with two points a picture 8m.",
+        note: "A rigorous solution has 4m + 2n unknowns, which are 8m with two points a picture.",
     },
     Row {
         id: "A77-03",
@@ -357,10 +358,10 @@ static ROWS: [Row; 15] = [
         place: "tie equations",
         what: "coefficients of a point on three pictures",
         account: Account::Agrees {
-            from: "deviations of a point that is off in one of three pictures",
+            from: "deviations of a point that is in error in one of three pictures",
             ours: thirds,
         },
-        note: "The three equations of an axis add up to zero: they count as two.",
+        note: "The three equations of an axis add up to zero, so that two of them are independent.",
     },
     Row {
         id: "A77-04",
@@ -393,7 +394,8 @@ static ROWS: [Row; 15] = [
             from: "nine pictures, 200 points, noise of 385 m, 20 seeds",
             ours: tie_deviations,
         },
-        note: "Closed loop for the size: deviations are 0.65 of the noise, which is chosen by that law. Largest deviations are data.",
+        note: "The size is a closed loop: deviations are 0.65 of the noise, which is chosen by that law. The \
+               largest deviations need data.",
     },
     Row {
         id: "A77-07",
@@ -401,10 +403,11 @@ static ROWS: [Row; 15] = [
         place: "secondary net, SCALE",
         what: "478 and 483 rejected with 17 and 19 km in Y; then largest 2.1, rms about ±0.8 km",
         account: Account::InPart {
-            from: "twelve controls with 0.8 km of noise, two of them off by 17 and 19 km in Y",
+            from: "twelve controls with 0.8 km of noise, two of them in error by 17 and 19 km in Y",
             ours: gross_controls,
         },
-        note: "Closed loop for the size. One at a time, as the paper rejects, the two would hide each other in every other case.",
+        note: "The size is a closed loop. If they were rejected one at a time, as in the paper, the two errors \
+               would mask each other in every other case.",
     },
     Row {
         id: "A77-08",
@@ -414,7 +417,7 @@ static ROWS: [Row; 15] = [
         account: Account::Data {
             printed: "59.0 56.1, 21.7 25.8; 98.5 62.2, 47.4 26.6; 43.2 33.4, 16.3 13.5",
         },
-        note: "25 pictures on film that are not at hand; deviations follow the noise as in A77-06.",
+        note: "The 25 pictures are on film that is not at hand; deviations follow the noise as in A77-06.",
     },
     Row {
         id: "A77-09",
@@ -424,7 +427,8 @@ static ROWS: [Row; 15] = [
         account: Account::Data {
             printed: "97.9 169.7, 53.9 84.7",
         },
-        note: "Larger than within bricks: so it is in the synthetic net, and LOCAL lowers it (tests/stages/plane.rs::seams_are_wider_than_bricks_are_within_and_local_evens_them_out).",
+        note: "They are larger than within bricks. The synthetic net shows the same, and LOCAL reduces them \
+               (tests/stages/plane.rs::seams_are_wider_than_bricks_are_within_and_local_evens_them_out).",
     },
     Row {
         id: "A77-10",
@@ -435,8 +439,9 @@ static ROWS: [Row; 15] = [
             from: "the table's six points, as given minus computed",
             ours: table_2,
         },
-        note: "Both residual columns are headed δY; the first is δX. A fitted shift and scale leave nothing: \
-               rounding to 0.1 km allows 0.3 km of the sums and 125 ppm of scale, one standard deviation.",
+        note: "Both columns of residuals are headed δY; the first is δX. After a fit of shift and scale both sums \
+               and the remaining scale are zero: rounding to 0.1 km allows 0.3 km of the sums and 125 ppm of scale, \
+               one standard deviation.",
     },
     Row {
         id: "A77-11",
@@ -447,7 +452,7 @@ static ROWS: [Row; 15] = [
             from: "the table's six points",
             ours: remarks,
         },
-        note: "1.8 km is one coordinate; the longest vector is that of point 307.",
+        note: "The printed 1.8 km is one coordinate; the longest vector is that of point 307.",
     },
     Row {
         id: "A77-12",
@@ -457,7 +462,7 @@ static ROWS: [Row; 15] = [
         account: Account::Cited {
             printed: "100 m within; within 2 km of the Mars circles",
         },
-        note: "An estimate from the rows above, without a covariance.",
+        note: "The paper estimates the precision from the rows above, without a covariance.",
     },
     Row {
         id: "A77-13",
@@ -468,7 +473,7 @@ static ROWS: [Row; 15] = [
             from: "nine pictures with 1 km of noise on two controls",
             ours: shrinkage,
         },
-        note: "Residuals of ties lie in the map and shrink with it.",
+        note: "Residuals of ties are measured in the map and shrink with it.",
     },
     Row {
         id: "A77-14",

@@ -10,12 +10,12 @@ use super::row::{Comparison, Kind, Outcome, Paper};
 const RULES: [&str; 6] = [
     "Numbers that five papers print in their tables, equations and results, with ours beside them. Numbers inside pictures are \
      not listed. A row without a number of ours gives the reason.",
-    "Every row has one of four kinds, which is how much an agreement is worth. Only evidence is met. Arithmetic on a paper's own \
-     prints tests the paper, constants are common knowledge, and a closed loop returns what was put in: neither shows that \
-     areograph reproduces a result on the images of the papers.",
-    "Evidence is of two sources: real shots of MOLA in six windows, two of them of the passes of Table 2 at Gusev (PEDR, through \
-     the Mars Orbital Data Explorer), and code that does not know the print, on circular orbits from first principles. Kernels, \
-     images and film of the papers are not at hand: what needs them says so.",
+    "Every row has one of four kinds, which states how much an agreement is worth. Only evidence can be met. Arithmetic on a \
+     paper's own prints tests the paper, constants are common knowledge, and a closed loop returns its input: none of these \
+     shows that areograph reproduces a result on the images of the papers.",
+    "Evidence has two sources: real shots of MOLA in six windows, two of them of the passes of Table 2 at Gusev (PEDR, through \
+     the Mars Orbital Data Explorer), and code without access to the printed value, on circular orbits from first principles. \
+     Kernels, images and film of the papers are not at hand; rows that need them state it.",
     "Closed loops are built with printed values: times, exposures, clock errors of the size of Table 5 (2005), camera errors of the \
      size of Table 5 (2023), noise of tie deviations. E04-01275 has the 8064 lines that Table 4 requires, not the 7424 of Table 2. \
      Tolerances are on the unrounded value.",

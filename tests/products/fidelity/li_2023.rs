@@ -375,7 +375,7 @@ static ROWS: [Row; 25] = [
             from: "focal length, pitch and angles of the table; config/instruments/hrsc_s1.toml",
             ours: camera,
         },
-        note: "8.25″ is cut to 8.2.",
+        note: "The print truncates 8.25″ to 8.2″.",
     },
     Row {
         id: "L23-02",
@@ -410,7 +410,7 @@ static ROWS: [Row; 25] = [
                       25.85 S 45.31 W; I863 2018-11-29, 28.3 m, 103 × 741 km, 30.58 S 37.91 E; I977 2019-01-01, 27.2 \
                       m, 85 × 563 km, 51.09 S 83.93 W",
         },
-        note: "One of the longitudes is east.",
+        note: "The longitude of I863 is east, those of the other images are west.",
     },
     Row {
         id: "L23-05",
@@ -432,9 +432,10 @@ static ROWS: [Row; 25] = [
             from: "eq. 16: cell 35.8 m, pixel 26.9 m, 0.01 m a line, spacing 300 m",
             ours: group_size,
         },
-        note: "35.8 m for the cell is not printed, so that 321 rests on a value from elsewhere; with 15 the cell would be 1.7 m. \
-               The text takes at most 15 and cites another equation. 126 strips with 125,749 points, more than 10,000 kept (one \
-               tenth), 150 clusters: data.",
+        note: "The paper does not print the cell of 35.8 m, so that 321 depends on a value from elsewhere; 15 \
+               points would need a cell of 1.7 m. The text takes at most 15 and cites another equation. The 126 \
+               strips with 125,749 points, of which more than 10,000 (one tenth) are kept in 150 clusters, need \
+               data.",
     },
     Row {
         id: "L23-07",
@@ -457,7 +458,7 @@ static ROWS: [Row; 25] = [
             printed: "−0.645→0.971, 0.312→0.951, 0.794→0.971, 0.297→0.925, 0.719→0.943998, −0.268→0.976, \
                       0.911→0.945, 0.866→0.973",
         },
-        note: "Above 0.9 the bias must be less than half the relief of the unit.",
+        note: "A concordance above 0.9 requires a bias of less than half the relief of the unit.",
     },
     Row {
         id: "L23-09",
@@ -465,12 +466,12 @@ static ROWS: [Row; 25] = [
         place: "table 5",
         what: "I864 before: residual in the focal plane from its parts",
         account: Account::Agrees {
-            from: "root of the squares across and along",
+            from: "root of the sum of squares across and along",
             ours: || focal(&I864_BEFORE),
         },
-        note: "Errors lie across the flight, as the table's heads say; the sentence “mainly along the flight” is \
-               wrong. Nothing of areograph is in this row: L23-22. Control points in plan 25.077 and 36.195 px (682.675 and 1049.461 m), height 507.214 m: \
-               data.",
+        note: "The errors are across the flight, as the heads of the table state; the sentence “mainly along the \
+               flight” is wrong. This row contains no number of areograph (L23-22). Control points in plan, 25.077 \
+               and 36.195 px (682.675 and 1049.461 m), and height, 507.214 m, need data.",
     },
     Row {
         id: "L23-10",
@@ -536,8 +537,8 @@ static ROWS: [Row; 25] = [
             from: "root of the squares across and along",
             ours: || focal(&CALIBRATED[1]),
         },
-        note: "As L23-09. Plan 9.917 and 10.952 px (273.349 and 301.776 m), height 80.013 m: data. The second is above the \
-               “better than 300 m” of the conclusions.",
+        note: "As L23-09. Plan 9.917 and 10.952 px (273.349 and 301.776 m), height 80.013 m: data. The second value \
+               in plan exceeds the “better than 300 m” of the conclusions.",
     },
     Row {
         id: "L23-16",
@@ -548,8 +549,8 @@ static ROWS: [Row; 25] = [
             from: "root of the squares across and along",
             ours: || focal(&CALIBRATED[2]),
         },
-        note: "As L23-09. Plan 6.681 and 10.469 px (178.716 and 286.364 m), height 256.643 m: data. Misses “below 1 px” and \
-               “within 100 m”.",
+        note: "As L23-09. Plan 6.681 and 10.469 px (178.716 and 286.364 m), height 256.643 m: data. The row does \
+               not meet “below 1 px” and “within 100 m”.",
     },
     Row {
         id: "L23-17",
@@ -560,8 +561,8 @@ static ROWS: [Row; 25] = [
             from: "means of the six lines of tables 6 and 7",
             ours: plane_summary,
         },
-        note: "The text turns metres into pixels at 30 m; in the tables a pixel has 25.7 to 29.3 m, not the same \
-               before and after.",
+        note: "The text converts metres into pixels at 30 m; by the tables a pixel measures 25.7 to 29.3 m, with \
+               other values before than after.",
     },
     Row {
         id: "L23-18",
@@ -583,7 +584,8 @@ static ROWS: [Row; 25] = [
             from: "tables 5 to 7",
             ours: abstract_of_it,
         },
-        note: "Rounded freely; I977 and I863 miss what is claimed of all. Heights 500 → 100 m: see L23-18.",
+        note: "The paper rounds freely; I977 and I863 do not meet what it claims of all images. For heights, 500 → \
+               100 m, see L23-18.",
     },
     Row {
         id: "L23-20",
@@ -604,7 +606,7 @@ static ROWS: [Row; 25] = [
             from: "distances of real shots at nadir, orbit 18940",
             ours: spacing,
         },
-        note: "Off nadir, held inertially, it is 340 m (S05-65).",
+        note: "Off nadir, with the attitude held inertially, the spacing is 340 m (S05-65).",
     },
     Row {
         id: "L23-22",
@@ -612,11 +614,11 @@ static ROWS: [Row; 25] = [
         place: "table 5",
         what: "I864 before, a pair",
         account: Account::InPart {
-            from: "synthetic lines with errors of the paper's size, points held back",
+            from: "synthetic lines with errors of the paper's size, withheld points",
             ours: before,
         },
-        note: "The offset angles are chosen to give the printed residuals across; the rest follows from the scene's own orbit and \
-               control.",
+        note: "The offset angles are chosen so that the residuals across are the printed ones; the rest follows \
+               from orbit and control of the scene.",
     },
     Row {
         id: "L23-23",
@@ -624,10 +626,11 @@ static ROWS: [Row; 25] = [
         place: "table 5",
         what: "I864 after, a pair",
         account: Account::Agrees {
-            from: "the same lines calibrated, points held back",
+            from: "the same lines calibrated, withheld points",
             ours: after,
         },
-        note: "Noise of measurements and control is the scene's own: agreement of size, no result on HRSC images.",
+        note: "The noise of measurements and control is that of the scene: the sizes agree, but this is no result \
+               on HRSC images.",
     },
     Row {
         id: "L23-24",
@@ -638,7 +641,7 @@ static ROWS: [Row; 25] = [
             from: "the synthetic lines in another orbit with the first one's parameters",
             ours: elsewhere,
         },
-        note: "Tables 6 and 7 themselves need images of those orbits.",
+        note: "A comparison with tables 6 and 7 needs images of those orbits.",
     },
     Row {
         id: "L23-25",

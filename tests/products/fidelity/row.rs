@@ -66,8 +66,8 @@ impl Kind {
     pub(crate) const fn meaning(self) -> &'static str {
         match self {
             Self::Evidence => {
-                "the print is compared with data that took no part: real shots, or what code without knowledge of the print finds on \
-                 orbits from first principles"
+                "the print is compared with independent data: real shots, or results of code without access to the printed value, \
+                 on orbits from first principles"
             }
             Self::Arithmetic => "a formula applied to the paper's own prints: it tests the paper",
             Self::Constants => {

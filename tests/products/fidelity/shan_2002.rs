@@ -243,8 +243,8 @@ static ROWS: [Row; 9] = [
             from: "the table; nadir of the boresight with R = [κ]₃ [φ]₂ [ω]₁, emission of table 2 in 2005",
             ours: right,
         },
-        note: "The start Y is misprinted: −2435.358. No other order or sense of the angles looks down; the \
-               textbook's matrix with these angles is the transpose.",
+        note: "The Y of the start is misprinted; it is −2435.358. No other order or sense of the angles looks down; \
+               the textbook's matrix of these angles is the transpose.",
     },
     Row {
         id: "S02-02",
@@ -256,8 +256,8 @@ static ROWS: [Row; 9] = [
             from: "the table",
             ours: left,
         },
-        note: "17.97° in 2005, 22.0° by these angles, which also put the points of table 2 far outside the image: no \
-               target for pointing.",
+        note: "The emission angle is 17.97° in 2005 and 22.0° by these angles, which also place the points of table \
+               2 far outside the image. They cannot serve as a reference for pointing.",
     },
     Row {
         id: "S02-03",
@@ -268,7 +268,7 @@ static ROWS: [Row; 9] = [
             from: "the table, across the flight of the right image",
             ours: geometry,
         },
-        note: "Follows from the table; printed in 2005 (S05-60).",
+        note: "The values follow from the table; the paper of 2005 prints them (S05-60).",
     },
     Row {
         id: "S02-04",
@@ -291,7 +291,7 @@ static ROWS: [Row; 9] = [
             from: "the ten points; gaps of two and three",
             ours: spacing,
         },
-        note: "Rows are not consecutive shots.",
+        note: "Successive rows are not consecutive shots.",
     },
     Row {
         id: "S02-06",
@@ -301,7 +301,7 @@ static ROWS: [Row; 9] = [
         account: Account::Data {
             printed: "about 1–2 footprints",
         },
-        note: "By eye; the closed loop of S05-47 is the same.",
+        note: "The paper compares by eye; S05-47 is the closed loop.",
     },
     Row {
         id: "S02-07",

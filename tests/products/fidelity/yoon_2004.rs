@@ -303,7 +303,8 @@ static ROWS: [Row; 23] = [
             ours: inputs,
             test: "tests/truth/scene_mission.rs::the_images_are_flown_as_table_2_prints_them",
         },
-        note: "Days of 2001, without times. Emission angles as S05-17; no header lines and no sum factor here.",
+        note: "The paper prints days of 2001 without times. For emission angles see S05-17; header lines and sum \
+               factor are not printed here.",
     },
     Row {
         id: "Y04-02",
@@ -315,8 +316,9 @@ static ROWS: [Row; 23] = [
             ours: priors,
             test: "crates/geom/tests/geometry/adjust_recipe.rs::the_recipe_comes_out_as_verified",
         },
-        note: "10 m for ranges stand for the 7 m of the instrument. That of MOLA's image coordinates is not printed: 74 and 4 px are our choice. 100 and 200 m for angles \
-               and rates as well; turned into angles by the range.",
+        note: "The 10 m for ranges stand for the 7 m of the instrument. The standard deviation of MOLA's image \
+               coordinates is not printed: 74 and 4 px are our choice. The 100 and 200 m apply to angles and rates \
+               as well, converted into angles by the range.",
     },
     Row {
         id: "Y04-03",
@@ -344,7 +346,7 @@ static ROWS: [Row; 23] = [
         account: Account::Data {
             printed: "91.232/117.676, 106.913/151.426, 54.799/59.585",
         },
-        note: "Two sets of kernels; against which initial ground is not said.",
+        note: "The rows are of two sets of kernels; the paper does not state the initial ground.",
     },
     Row {
         id: "Y04-05",
@@ -370,7 +372,7 @@ static ROWS: [Row; 23] = [
         account: Account::Data {
             printed: "−1.794/2.723, 0.371/0.340, 6.750/1.10",
         },
-        note: "An absolute shift, which depends on what is assumed of the orientations.",
+        note: "This is an absolute shift, which depends on the a priori orientations.",
     },
     Row {
         id: "Y04-07",
@@ -406,7 +408,7 @@ static ROWS: [Row; 23] = [
         account: Account::Data {
             printed: "12.789/61.724, 4.040/15.915, −8.419/−18.116, 47.103/40.515",
         },
-        note: "−18.116 cannot be a spread: a misprint.",
+        note: "−18.116 is a misprint: a spread is not negative.",
     },
     Row {
         id: "Y04-10",
@@ -427,7 +429,8 @@ static ROWS: [Row; 23] = [
                 )
             },
         },
-        note: "The size of σ x is that of the noise, a whole line; how the images share it is geometry. σ y: see Y04-12.",
+        note: "The size of σ x is that of the noise, a whole line; its division between the images is geometry. For \
+               σ y see Y04-12.",
     },
     Row {
         id: "Y04-11",
@@ -463,9 +466,9 @@ static ROWS: [Row; 23] = [
                 )
             },
         },
-        note: "The paper takes the place across the track in the measured line, where a tenth of the residual along \
-               the track appears by the skew; ours is taken in the line that sees the point. Height absorbs the \
-               rest: σ y is no accuracy.",
+        note: "The paper takes the coordinate across the track in the measured line, where the skew of the flight \
+               causes a tenth of the residual along the track; ours is taken in the line that sees the point. \
+               Height absorbs the rest, so that σ y is no accuracy.",
     },
     Row {
         id: "Y04-13",
@@ -509,7 +512,7 @@ static ROWS: [Row; 23] = [
             from: "Σ |x| · line spacing, tables 3 of 2004 and 5 of 2005",
             ours: disagreement,
         },
-        note: "At Eos the two papers do not agree.",
+        note: "At Eos the two papers contradict each other.",
     },
     Row {
         id: "Y04-16",
@@ -530,8 +533,9 @@ static ROWS: [Row; 23] = [
             from: RECIPE,
             ours: gusev_sigmas,
         },
-        note: "The size of σ0 hangs on the standard deviation of MOLA's image coordinates, which is not printed; the published model of \
-               areograph has 0.36 to 0.48 on its synthetic mission. The tolerance is a factor of three.",
+        note: "The size of σ0 depends on the standard deviation of MOLA's image coordinates, which is not printed; \
+               the published model of areograph gives 0.36 to 0.48 on its synthetic mission. The tolerance is a \
+               factor of three.",
     },
     Row {
         id: "Y04-18",
@@ -542,8 +546,8 @@ static ROWS: [Row; 23] = [
             from: "10 m of MOLA's ground points times σ0; ours from first principles",
             ours: isidis_sigmas,
         },
-        note: "18.3 m cannot come out of an adjustment with 10 m a priori: observations make no unknown worse. Ours \
-               keeps to that.",
+        note: "An adjustment with 10 m a priori cannot give 18.3 m: observations do not increase the standard \
+               deviation of an unknown. Ours obeys this.",
     },
     Row {
         id: "Y04-19",
@@ -553,7 +557,7 @@ static ROWS: [Row; 23] = [
         account: Account::Data {
             printed: "about 1 to 2",
         },
-        note: "Those of a synthetic scene have the noise that it was given.",
+        note: "The residuals of a synthetic scene have the noise of its simulation.",
     },
     Row {
         id: "Y04-20",
@@ -564,7 +568,7 @@ static ROWS: [Row; 23] = [
             from: "the rows of table 2",
             ours: remarks,
         },
-        note: "Z at Isidis moves by 23 mm.",
+        note: "At Isidis Z moves by 23 mm.",
     },
     Row {
         id: "Y04-21",
@@ -575,8 +579,8 @@ static ROWS: [Row; 23] = [
             from: RECIPE,
             ours: misregistration,
         },
-        note: "Closed loop: the 249 m before come from clocks off by table 5 and from errors of position. Relative alone: \
-               the two images agree afterwards; where both lie is not corrected.",
+        note: "Closed loop: the 249 m before come from clock errors by table 5 and from errors of position. The \
+               result is relative: the two images agree afterwards, but their common position is not corrected.",
     },
     Row {
         id: "Y04-22",
@@ -594,6 +598,6 @@ static ROWS: [Row; 23] = [
         account: Account::Cited {
             printed: "10 m vertical, 100 m horizontal",
         },
-        note: "2005 quotes 1 m and 100 m.",
+        note: "The paper of 2005 quotes 1 m and 100 m.",
     },
 ];

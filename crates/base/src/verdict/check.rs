@@ -97,7 +97,11 @@ impl Check {
 
     /// A check without a number.
     #[must_use]
-    pub fn told(kind: CheckKind, subject: impl Into<String>, outcome: CheckOutcome) -> Self {
+    pub fn without_number(
+        kind: CheckKind,
+        subject: impl Into<String>,
+        outcome: CheckOutcome,
+    ) -> Self {
         Self {
             kind,
             what: kind.words().to_owned(),
@@ -142,8 +146,8 @@ impl Check {
             text.is_ok_and(|text| (text - limit).abs() <= LIMIT_ACCURACY * limit.abs())
         };
         let of_limit = (0..DECIMALS_MAX).find(tells).unwrap_or(DECIMALS_MAX);
-        let told = written(limit, of_limit);
-        let is_apart = |decimals: &usize| value <= limit || written(value, *decimals) != told;
+        let shown = written(limit, of_limit);
+        let is_apart = |decimals: &usize| value <= limit || written(value, *decimals) != shown;
         let of_value = (least..DECIMALS_MAX).find(is_apart).unwrap_or(least);
         [of_value, of_limit]
     }
@@ -240,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn the_worst_is_told_and_of_equals_the_first() {
+    fn the_worst_is_kept_and_of_equals_the_first() {
         let of = |values: &[(&str, f64)]| {
             let checks = values.iter().map(|(subject, value)| mean(subject, *value));
             Check::worst(checks).unwrap().subject

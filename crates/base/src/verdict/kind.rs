@@ -141,6 +141,8 @@ pub enum CheckKind {
     ControlStretch,
     /// Mean offset of the control of an orbit that was not used in a calibration, in standard deviations of one point.
     OtherOrbitsOffset,
+    /// Share of withheld stretches of profiles beyond the interval that contains 99.7 % of them as stated.
+    WithheldStretches,
 }
 
 impl CheckKind {
@@ -154,6 +156,7 @@ impl CheckKind {
             Self::HeightBefore => "Tie points above MOLA, before (median)",
             Self::HeightOutliers => "Tie points beyond 3.29 σ of MOLA",
             Self::ProfilesApart => "Disagreement of MOLA profiles",
+            Self::WithheldStretches => "Withheld profiles beyond the stated 99.7 %",
             Self::SurfaceFilled => "Terrain model, completeness",
             Self::SurfaceHeight => "MOLA above the terrain model (median)",
             Self::SurfaceSpread => "Spread of MOLA about the terrain model",
@@ -236,6 +239,7 @@ impl CheckKind {
             | Self::Seams => "m",
             Self::HeightOutliers
             | Self::RangeOutliers
+            | Self::WithheldStretches
             | Self::SurfaceFilled
             | Self::TiesRejected
             | Self::TiesLeftOut

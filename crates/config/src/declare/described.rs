@@ -215,6 +215,8 @@ pub(crate) struct DescribedTable {
     /// Names with dots between them, empty for the file itself.
     pub(crate) path: String,
     pub(crate) about: &'static [&'static str],
+    /// A former name that is still understood.
+    pub(crate) was: Option<&'static str>,
     /// Whether it is a list of tables.
     pub(crate) many: Option<Many>,
     pub(crate) keys: Vec<DescribedKey>,

@@ -182,17 +182,32 @@ impl<V: std::default::Default> Presence<V> for Required {
 }
 
 /// A table below this one.
-pub(crate) fn table<T: Table>() -> impl Declare<Value = T> {
-    Below(PhantomData)
+pub(crate) const fn table<T: Table>() -> Below<T> {
+    Below {
+        was: None,
+        read_as: PhantomData,
+    }
 }
 
-struct Below<T>(PhantomData<T>);
+/// The declaration of one table.
+pub(crate) struct Below<T> {
+    was: Option<&'static str>,
+    read_as: PhantomData<T>,
+}
+
+impl<T> Below<T> {
+    /// The former name of the table, which is still understood.
+    pub(crate) const fn was(mut self, name: &'static str) -> Self {
+        self.was = Some(name);
+        self
+    }
+}
 
 impl<T: Table> Declare for Below<T> {
     type Value = T;
 
     fn declare(self, name: &'static str, _: &'static [&'static str], keys: &mut Keys<'_, '_>) -> T {
-        keys.table(name)
+        keys.table(name, self.was)
     }
 }
 

@@ -39,7 +39,7 @@ pub(crate) fn described<T: Table>() -> DescribedTable {
         ..Keys::absent(&mut review)
     };
     T::read(&mut keys);
-    keys.finish_described(T::ABOUT, None)
+    keys.finish_described(T::ABOUT, None, None)
 }
 
 #[derive(Default)]
@@ -94,7 +94,8 @@ impl<'a, 'r> Keys<'a, 'r> {
         self.review
     }
 
-    fn path_of(&self, name: &str) -> String {
+    /// The key `name` of this table as messages name it.
+    pub(crate) fn path_of(&self, name: &str) -> String {
         match &*self.path {
             "" => name.to_owned(),
             path => format!("{path}.{name}"),
@@ -166,8 +167,8 @@ impl<'a, 'r> Keys<'a, 'r> {
     }
 
     fn value_below(&self, table: &str, name: &str) -> Option<&'a Spanned<DeValue<'a>>> {
-        let below = self.table?.get(table)?.get_ref().as_table()?;
-        below.get(name)
+        let (_, below) = self.written(table)?;
+        below.get_ref().as_table()?.get(name)
     }
 
     /// Whether the key `name` of the table `table` below this one is written.
@@ -196,6 +197,7 @@ impl<'a, 'r> Keys<'a, 'r> {
         expected: impl std::fmt::Display,
     ) {
         if let Some(value) = self.value_below(table, name) {
+            let table = self.written(table).map_or(table, |(written, _)| written);
             let key = format!("{}.{name}", self.path_of(table));
             self.review.refuse(value.span(), &key, expected);
         }
@@ -229,9 +231,13 @@ impl<'a, 'r> Keys<'a, 'r> {
             .collect()
     }
 
-    /// The table `name` below this one; without it, its defaults.
-    pub(crate) fn table<T: Table>(&mut self, name: &'static str) -> T {
-        let found = self.find(name, None);
+    /// The table `name` below this one, or `was`, its former name; without it, its defaults.
+    pub(crate) fn table<T: Table>(&mut self, name: &'static str, was: Option<&'static str>) -> T {
+        let found = self.find(name, was);
+        let path = match &found {
+            Some(found) => found.key.clone(),
+            None => self.path_of(name),
+        };
         let span = found.as_ref().map(|found| found.value.span());
         let table = found.and_then(|found| {
             let table = found.value.get_ref().as_table();
@@ -240,13 +246,13 @@ impl<'a, 'r> Keys<'a, 'r> {
             }
             table
         });
-        self.below(name, table, span, None)
+        self.below(path, was, table, span, None)
     }
 
     /// The list of tables `name` below this one; without it, none.
     pub(crate) fn tables<T: Table>(&mut self, name: &'static str, many: Many) -> Vec<T> {
         if self.description.is_some() {
-            self.below::<T>(name, None, None, Some(many));
+            self.below::<T>(self.path_of(name), None, None, None, Some(many));
         }
         let Some(found) = self.find(name, None) else {
             return Vec::new();
@@ -276,20 +282,27 @@ impl<'a, 'r> Keys<'a, 'r> {
             if table.is_none() {
                 self.review.refuse(entry.span(), &found.key, "a table");
             }
-            self.below(name, table, Some(entry.span()), Some(many))
+            self.below(
+                self.path_of(name),
+                None,
+                table,
+                Some(entry.span()),
+                Some(many),
+            )
         });
         read.collect()
     }
 
     fn below<T: Table>(
         &mut self,
-        name: &'static str,
+        path: String,
+        was: Option<&'static str>,
         table: Option<&DeTable<'_>>,
         span: Option<Range<usize>>,
         many: Option<Many>,
     ) -> T {
         let mut keys = Keys {
-            path: self.path_of(name),
+            path,
             table,
             span,
             declared: Vec::new(),
@@ -301,7 +314,7 @@ impl<'a, 'r> Keys<'a, 'r> {
         if let Some(description) = &mut self.description {
             description
                 .tables
-                .push(keys.finish_described(T::ABOUT, many));
+                .push(keys.finish_described(T::ABOUT, was, many));
         } else {
             keys.finish();
         }
@@ -326,6 +339,7 @@ impl<'a, 'r> Keys<'a, 'r> {
     fn finish_described(
         self,
         about: &'static [&'static str],
+        was: Option<&'static str>,
         many: Option<Many>,
     ) -> DescribedTable {
         let Description {
@@ -336,6 +350,7 @@ impl<'a, 'r> Keys<'a, 'r> {
         DescribedTable {
             path: self.path,
             about,
+            was,
             many,
             keys,
             tables,

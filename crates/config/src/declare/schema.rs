@@ -81,9 +81,14 @@ fn of_table(table: &DescribedTable, description: String) -> Schema {
             .into_iter()
             .chain(former)
     });
-    let tables = table.tables.iter().map(|below| {
+    let tables = table.tables.iter().flat_map(|below| {
         let described = of_table(below, one_line(below.about));
-        (below.name().to_owned(), of_tables(below, described))
+        let former = below
+            .was
+            .map(|was| (was.to_owned(), of_former_table(below)));
+        [(below.name().to_owned(), of_tables(below, described))]
+            .into_iter()
+            .chain(former)
     });
     let required = table.keys.iter().filter(|key| key.required);
     Schema {
@@ -118,6 +123,13 @@ fn of_key(key: &DescribedKey) -> Schema {
         description,
         default: key.default.as_ref().map(json_of),
         ..of_kind(&key.kind)
+    }
+}
+
+fn of_former_table(table: &DescribedTable) -> Schema {
+    Schema {
+        deprecated: Some(true),
+        ..of_table(table, format!("Now called {}.", table.name()))
     }
 }
 

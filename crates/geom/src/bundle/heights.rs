@@ -94,7 +94,11 @@ impl Heights {
     /// Change of the height at `index`, as measured minus predicted, with shifts of profiles that are unknowns of their
     /// own, and the columns of these.
     pub(super) fn by_shared(&self, index: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let profiles = self.surface.relief.iter().flat_map(|of| &of.profiles);
+        let profiles = self
+            .surface
+            .relief
+            .iter()
+            .flat_map(|relief| &relief.profiles);
         profiles.flat_map(move |profile| {
             let mut shared = self.shared.iter();
             let columns = shared.find(|(surface_profile, _)| *surface_profile == profile.profile);
@@ -144,7 +148,7 @@ fn predicted(
     shared: &[(usize, [Option<usize>; 3])],
 ) -> SurfaceHeights {
     let mut heights = surface.predict(places_m);
-    let profiles = heights.relief.iter().flat_map(|of| &of.profiles);
+    let profiles = heights.relief.iter().flat_map(|relief| &relief.profiles);
     let is_shared = |profile: usize| shared.iter().any(|(of, _)| *of == profile);
     for profile in profiles.filter(|of| is_shared(of.profile)) {
         let mut by_shift = profile.by_shift.clone();

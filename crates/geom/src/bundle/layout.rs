@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 use rayon::prelude::*;
 
 use super::{
@@ -257,14 +257,21 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
         profile.map_or_else(Vector3::zeros, |profile| state.profile_shifts_m[profile])
     }
 
+    /// East, north and up of the profile that records a point, and the columns of its shift.
+    pub(super) fn shift_of(&self, point: usize) -> Option<(Matrix3<f64>, [Option<usize>; 3])> {
+        let profile = self.profile_of_point[point]?;
+        let bus = self.network.common_bus.as_ref()?;
+        let axes = bus.profiles[profile].axes;
+        Some((axes, self.columns.shift_of_profile[profile]))
+    }
+
     /// Sets the derivatives by the shift of the point's profile in the last row, one of its coordinates.
     fn by_shift(&self, rows: &mut PointRows, point: usize, by_point: &Vector3<f64>) {
-        let bus = self.network.common_bus.as_ref();
-        let (Some(bus), Some(profile)) = (bus, self.profile_of_point[point]) else {
+        let Some((axes, columns)) = self.shift_of(point) else {
             return;
         };
-        let along = bus.profiles[profile].axes * by_point;
-        for (column, along) in self.columns.shift_of_profile[profile].iter().zip(&along) {
+        let along = axes * by_point;
+        for (column, along) in columns.iter().zip(&along) {
             if let Some(column) = column {
                 rows.set_last(*column, *along);
             }

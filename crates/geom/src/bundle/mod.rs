@@ -108,6 +108,7 @@ mod quality;
 mod quasi_newton;
 mod reduce;
 mod reduced_heights;
+mod relative;
 mod relief;
 mod rows;
 mod solve;
@@ -374,6 +375,9 @@ pub struct AdjustedPoint {
     pub ground_m: Vector3<f64>,
     /// Cofactors, m²; σ0² times these is the covariance.
     pub cofactor_m2: Matrix3<f64>,
+    /// Cofactors without an error that it shares, m²: of a point that is recorded with a profile those against the shift of
+    /// the profile, of others those against the mean of the points with an observed height; `None` without either.
+    pub relative_m2: Option<Matrix3<f64>>,
     /// Residuals of the initial coordinates along their principal axes, when they were observed.
     pub priors: Option<[Residual; 3]>,
 }

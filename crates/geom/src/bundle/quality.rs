@@ -1,6 +1,6 @@
 //! Covariances, residuals, redundancy numbers and correlations of the converged adjustment.
 
-use nalgebra::{DMatrix, Matrix3, Matrix3xX, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::{
@@ -12,6 +12,7 @@ use super::{
     point_rows::PointRows,
     reduce::Settled,
     reduced_heights::ReducedHeights,
+    relative::{Mean, against_profile},
     relief,
     unknowns::{State, Unknown},
 };
@@ -146,7 +147,10 @@ pub(super) fn judge<M: ExteriorOrientation>(
     if let Some((of, reduced)) = heights {
         adjustment.height_squares = reduced.weighted_squares();
         adjustment.weighted_squares += adjustment.height_squares;
-        adjustment.mean_cofactor_m2 = mean_cofactor_m2(layout, at, &of.points, factor, reduced);
+        if let Some(mean) = Mean::of(layout, at, &of.points, factor, reduced) {
+            adjustment.mean_cofactor_m2 = Some(mean.cofactor_m2);
+            mean.compare(layout, at, &mut adjustment.points);
+        }
         let left = controls.as_ref().map(|controls| &controls.left);
         adjustment.relief = relief::of_site(layout, settled, of, left);
     }
@@ -222,7 +226,7 @@ fn judge_point<M: ExteriorOrientation>(
     for (place, between) in between.iter().enumerate() {
         transformed_cofactor += between * Vector3::from(coupling.map(|row| row[place])).transpose();
     }
-    if let Some(control) = controls.and_then(|of| of.of_point(point)) {
+    if let Some(control) = controls.and_then(|controls| controls.of_point(point)) {
         let through = Vector3::from(coupling.map(|row| {
             let columns = rows.columns().zip(row);
             columns
@@ -257,51 +261,19 @@ fn judge_point<M: ExteriorOrientation>(
     let priors = layout.network.points[point]
         .known
         .and_then(|_| residuals.last_chunk::<3>().copied());
+    let cofactor_m2 = inverse * transformed_cofactor * inverse.transpose();
+    // Cofactors between the point and the shared unknowns of its rows.
+    let moved = |place: usize| -inverse * between[place];
     Some(Judged {
         point: AdjustedPoint {
             ground_m: at.state.points_m[point],
-            cofactor_m2: inverse * transformed_cofactor * inverse.transpose(),
+            cofactor_m2,
+            relative_m2: against_profile(layout, point, rows, cofactors, moved)
+                .map(|added_m2| cofactor_m2 + added_m2),
             priors,
         },
         residuals,
     })
-}
-
-/// Cofactors of the mean of `points`: the part that their rays leave undetermined averages out, the common part does
-/// not.
-fn mean_cofactor_m2<M: ExteriorOrientation>(
-    layout: &Layout<'_, M>,
-    at: &Linearised,
-    points: &[usize],
-    factor: &Factor,
-    heights: &ReducedHeights,
-) -> Option<Matrix3<f64>> {
-    let columns = layout.columns.len();
-    let mut own_m2 = Matrix3::zeros();
-    let mut by_shared = Matrix3xX::zeros(columns);
-    let mut moves = Matrix3xX::zeros(points.len());
-    let mut rows = PointRows::default();
-    for (index, point) in points.iter().enumerate() {
-        layout.fill(&mut rows, at, *point).ok()?;
-        let inverse = rows.eliminate().try_inverse()?;
-        own_m2 += inverse * inverse.transpose();
-        for (place, column) in rows.columns().enumerate() {
-            let coupling = Vector3::new(rows.row(0)[place], rows.row(1)[place], rows.row(2)[place]);
-            let mut shared = by_shared.column_mut(column);
-            shared -= inverse * coupling;
-        }
-        moves.set_column(index, &(inverse * heights.turned[index]));
-    }
-    own_m2 -= &moves * heights.weights() * moves.transpose();
-    by_shared -= &moves * heights.weighted();
-    let count = points.len() as f64;
-    let mut sum_m2 = own_m2;
-    for axis in 0..3 {
-        let through = factor.solve(&by_shared.row(axis).transpose());
-        let mut column = sum_m2.column_mut(axis);
-        column += &by_shared * through;
-    }
-    (count > 0.0).then(|| sum_m2 / (count * count))
 }
 
 /// A column of a matrix.

@@ -40,7 +40,11 @@ pub(super) fn of_site<M: ExteriorOrientation>(
     let reduced = settled.reduced.heights.as_ref()?;
     let weighted = reduced.weighted_differences();
     let is_shared = |profile: usize| heights.shared.iter().any(|(of, _)| *of == profile);
-    let profiles = heights.surface.relief.iter().flat_map(|of| &of.profiles);
+    let profiles = heights
+        .surface
+        .relief
+        .iter()
+        .flat_map(|relief| &relief.profiles);
     let profiles = profiles.filter(|of| !is_shared(of.profile));
     let shift = |of: &ProfileOnRelief| {
         let variances_m2 = Matrix3::from_diagonal(&of.sigma_m.map(|sigma_m| sigma_m.powi(2)));

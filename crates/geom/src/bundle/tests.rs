@@ -426,7 +426,7 @@ fn cofactors_of_points_equal_those_of_the_dense_equations() {
 }
 
 #[test]
-fn what_the_network_does_not_have_is_told() {
+fn unknown_parts_of_a_network_are_reported() {
     let mut lost = network();
     lost.views[3].point = 99;
     let error = solve(&lost, &BundleOptions::default()).unwrap_err();

@@ -187,7 +187,8 @@ impl Columns {
             of_image[ORIENTATION_UNKNOWNS] =
                 columns.add(Unknown::TimeBias { image }, entry.time_bias_sigma_s);
             columns.of_image.push(of_image);
-            let with_spots = bus.filter(|bus| bus.spots.iter().any(|of| of.view.image == image));
+            let with_spots =
+                bus.filter(|bus| bus.spots.iter().any(|spot| spot.view.image == image));
             let line_time_s = with_spots.map_or(0.0, |bus| bus.line_time_sigma_s);
             let line_time = columns.add(Unknown::LineTime { image }, line_time_s);
             columns.line_time_of_image.push(line_time);

@@ -215,7 +215,9 @@ fn partials_agree_with_central_differences() {
 /// Standard deviations from ties only, degrees, the largest first.
 fn sigmas_deg(of: &TieSight) -> Vec<Option<f64>> {
     let sigmas = of.directions.iter();
-    sigmas.map(|of| of.sigma_rad.map(f64::to_degrees)).collect()
+    sigmas
+        .map(|direction| direction.sigma_rad.map(f64::to_degrees))
+        .collect()
 }
 
 #[test]
@@ -294,7 +296,10 @@ fn three_lines_have_names_for_all_angles() {
         assert!((0.91..1.0 + 1e-9).contains(&square), "{direction:?}");
     }
     let named = |name: &str| {
-        let mut all = sight.directions.iter().flat_map(|of| &of.shares);
+        let mut all = sight
+            .directions
+            .iter()
+            .flat_map(|direction| &direction.shares);
         all.any(|(of, _)| of.words() == name)
     };
     assert!(

@@ -86,7 +86,9 @@ fn alone(part: &Net) -> Figure {
     Figure {
         pictures: vec![0],
         similarities: vec![Similarity::IDENTITY],
-        places: measured.map(|of| (of.point, of.at)).collect(),
+        places: measured
+            .map(|measurement| (measurement.point, measurement.at))
+            .collect(),
         deviations: (0..part.measurements.len())
             .map(|index| (index, Place::new(0.0, 0.0)))
             .collect(),
@@ -223,7 +225,8 @@ pub fn extend(net: &Net, figures: &[Figure]) -> Result<Block, PlaneError> {
         let farthest = distances.reduce(|best, next| if next.0 > best.0 { next } else { best });
         farthest.map(|(_, control)| *control)
     };
-    let middle = controls.iter().map(|of| of.at).sum::<Place>() / controls.len().max(1) as f64;
+    let middle =
+        controls.iter().map(|control| control.at).sum::<Place>() / controls.len().max(1) as f64;
     let first = farthest(middle);
     let second = first.and_then(|first| farthest(first.at));
     let two = first.into_iter().chain(second).collect();

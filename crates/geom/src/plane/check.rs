@@ -57,7 +57,7 @@ pub fn check(net: &Net) -> Result<(), PlaneError> {
 }
 
 /// The first picture of the smallest part that shares fewer than two points with the others and the controls, with the
-/// number of its ties and controls; `None` where the net is rigid.
+/// number of these points; `None` where the net is rigid.
 pub(super) fn loose_picture(net: &Net) -> Option<PlaneError> {
     let map = net.pictures;
     let (by_point, control_of) = (net.by_point(), net.control_of());
@@ -77,8 +77,12 @@ pub(super) fn loose_picture(net: &Net) -> Option<PlaneError> {
     }
     let apart = (0..net.pictures).filter(|picture| part[*picture] != part[map]);
     let picture = apart.min_by_key(|picture| size[part[*picture]])?;
-    let ties = points.iter().filter(|of| of.len() > 1);
-    let ties = ties.filter(|of| of.contains(&picture)).count();
+    // Points that pictures of one part share do not hold the part.
+    let is_inside = |body: &usize| part[*body] == part[picture];
+    let ties = points
+        .iter()
+        .filter(|bodies| bodies.iter().any(is_inside) && !bodies.iter().all(is_inside))
+        .count();
     Some(PlaneError::UnderconnectedPicture { picture, ties })
 }
 

@@ -55,7 +55,8 @@ pub enum PlaneError {
     UnderconnectedPicture {
         /// The picture.
         picture: usize,
-        /// Its points that are ties or controls.
+        /// Its points that are ties or controls; of a part that hangs on few points, those that the part shares with the
+        /// rest of the net and with the controls.
         ties: usize,
     },
     /// Two points of a picture coincide.

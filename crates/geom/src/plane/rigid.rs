@@ -67,7 +67,7 @@ pub fn settle_bricks(net: &Net, bricks: &mut [Vec<usize>]) -> Vec<Moved> {
     let mut all: Vec<Moved> = Vec::new();
     // A picture is moved once at most.
     for _ in 0..net.pictures {
-        let loose: Vec<Vec<usize>> = bricks.iter().map(|of| loose(net, of)).collect();
+        let loose: Vec<Vec<usize>> = bricks.iter().map(|brick| loose(net, brick)).collect();
         let mut holder = vec![None; net.pictures];
         for (index, (brick, loose)) in bricks.iter().zip(&loose).enumerate() {
             for picture in brick.iter().filter(|picture| !loose.contains(picture)) {

@@ -1,4 +1,4 @@
-//! Similarities of the plane, in both directions.
+//! Similarities of the plane, from picture to map.
 
 use super::Place;
 
@@ -9,19 +9,6 @@ pub struct Similarity {
     pub turn: Place,
     /// `A + iB`, map units.
     pub shift: Place,
-}
-
-/// From map to picture, equation 2: `pX + qY + a = x`, `pY − qX + b = y`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ToPicture {
-    /// `p = μ cos θ`, `q = μ sin θ`, picture units per map unit.
-    pub p: f64,
-    /// See `p`.
-    pub q: f64,
-    /// Picture units.
-    pub a: f64,
-    /// Picture units.
-    pub b: f64,
 }
 
 impl Similarity {
@@ -57,43 +44,6 @@ impl Similarity {
             shift: self.map(first.shift),
         }
     }
-
-    /// The same transformation from map to picture; infinite where the scale is 0.
-    #[must_use]
-    pub fn to_picture(&self) -> ToPicture {
-        // Z = turn z + shift, so z = (p − iq) Z + (a + ib) with p − iq = 1/turn.
-        let back = self.turn.inv();
-        let shift = -self.shift * back;
-        ToPicture {
-            p: back.re,
-            q: -back.im,
-            a: shift.re,
-            b: shift.im,
-        }
-    }
-}
-
-impl ToPicture {
-    /// The same transformation from picture to map: `P = p/(p² + q²)`, `Q = q/(p² + q²)`, `A = −(Pa − Qb)`,
-    /// `B = −(Qa + Pb)`.
-    #[must_use]
-    pub fn to_map(&self) -> Similarity {
-        let squares = self.p * self.p + self.q * self.q;
-        let turn = Place::new(self.p / squares, self.q / squares);
-        Similarity {
-            turn,
-            shift: -turn * Place::new(self.a, self.b),
-        }
-    }
-
-    /// The picture position of a point on the map.
-    #[must_use]
-    pub fn picture(&self, map: Place) -> Place {
-        Place::new(
-            self.p * map.re + self.q * map.im + self.a,
-            self.p * map.im - self.q * map.re + self.b,
-        )
-    }
 }
 
 /// Departure of an orthographic picture from a conformal map beyond a similarity, metres: a floor under all deviations
@@ -117,38 +67,6 @@ mod tests {
     use super::*;
 
     const RADIUS_M: f64 = 3_396_000.0;
-
-    #[test]
-    fn both_ways_round_are_one_transformation() {
-        let printed = ToPicture {
-            p: 0.3,
-            q: -1.2,
-            a: 17.0,
-            b: -5.5,
-        };
-        let to_map = printed.to_map();
-        let squares = 0.3_f64.powi(2) + 1.2_f64.powi(2);
-        let (p, q) = (0.3 / squares, -1.2 / squares);
-        // The printed formulas, term by term; rounding of numbers of order ten.
-        assert!((to_map.shift.re + (p * 17.0 + q * 5.5)).abs() < 1e-14);
-        assert!((to_map.shift.im + (q * 17.0 - p * 5.5)).abs() < 1e-14);
-        assert!((to_map.scale() - 1.0 / squares.sqrt()).abs() < 1e-15);
-        assert!((to_map.angle_rad() - (-1.2_f64).atan2(0.3)).abs() < 1e-15);
-        let place = Place::new(-3.0, 8.0);
-        assert!((printed.picture(to_map.map(place)) - place).norm() < 1e-14);
-        let back = to_map.to_picture();
-        let differences = [
-            back.p - printed.p,
-            back.q - printed.q,
-            back.a - printed.a,
-            back.b - printed.b,
-        ];
-        assert!(
-            differences
-                .iter()
-                .all(|difference| difference.abs() < 1e-14)
-        );
-    }
 
     #[test]
     fn one_after_the_other() {

@@ -48,7 +48,6 @@ pub struct Solution {
     /// Position of every picture in the order of elimination.
     place_of: Vec<usize>,
     frames: Vec<Frame>,
-    map: Frame,
 }
 
 /// Origin and size that reduce coordinates to small numbers about 0.
@@ -105,16 +104,16 @@ fn exact(net: &Net) -> Net {
     let controls = net.controls.iter();
     Net {
         measurements: measurements
-            .map(|of| Measurement {
-                at: places[of.point],
-                ..*of
+            .map(|measurement| Measurement {
+                at: places[measurement.point],
+                ..*measurement
             })
             .collect(),
         controls: controls
-            .map(|of| Control {
-                at: places[of.point],
+            .map(|control| Control {
+                at: places[control.point],
                 weight: 1.0,
-                ..*of
+                ..*control
             })
             .collect(),
         ..*net
@@ -159,7 +158,6 @@ fn adjust(net: &Net) -> Result<Solution, PlaneError> {
         steps,
         place_of,
         frames,
-        map,
     };
     Ok(assemble(net, &by_point, pictures, known))
 }
@@ -169,7 +167,6 @@ struct Known {
     steps: Vec<Step>,
     place_of: Vec<usize>,
     frames: Vec<Frame>,
-    map: Frame,
 }
 
 fn assemble(net: &Net, by_point: &Groups, pictures: Vec<Similarity>, known: Known) -> Solution {
@@ -210,7 +207,6 @@ fn assemble(net: &Net, by_point: &Groups, pictures: Vec<Similarity>, known: Know
         steps: known.steps,
         place_of: known.place_of,
         frames: known.frames,
-        map: known.map,
     }
 }
 
@@ -418,11 +414,5 @@ impl Solution {
     #[must_use]
     pub fn measurements_of(net: &Net) -> Vec<Vec<usize>> {
         net.by_point().iter().map(<[usize]>::to_vec).collect()
-    }
-
-    /// Size of the map's frame: the root mean square distance of the controls from their middle, map units.
-    #[must_use]
-    pub const fn map_size(&self) -> f64 {
-        self.map.size
     }
 }

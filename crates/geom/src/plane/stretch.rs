@@ -5,7 +5,7 @@
 
 use super::{
     Place,
-    controls::{FIRST_CHOICE, MEDIAN_OF_SQUARES, ROUNDS},
+    least_median::{Transformation, of_kept, sigma_of, without_gross_errors},
 };
 use crate::random::Random;
 
@@ -85,9 +85,17 @@ impl Affinity {
             of_b: 1.0 / (squares * spread),
         })
     }
+}
 
-    fn residual(&self, from: Place, to: Place) -> f64 {
-        (to - self.a * from - self.b * from.conj() - self.c).norm()
+impl Transformation for Affinity {
+    const UNKNOWNS: usize = 3;
+
+    fn fitted(figure: &[Place], given: &[Place]) -> Option<Self> {
+        Self::fit(figure, given, SPREAD_OF_THREE)
+    }
+
+    fn position(&self, place: Place) -> Place {
+        self.a * place + self.b * place.conj() + self.c
     }
 }
 
@@ -100,7 +108,11 @@ impl Affinity {
 pub fn stretch(figure: &[Place], given: &[Place], kept: &[bool], limit: f64) -> Option<Stretch> {
     let count = figure.len().min(given.len());
     let own = if count >= JUDGED_MIN {
-        Some(selected(&figure[..count], &given[..count], limit)?)
+        let (figure, given) = (&figure[..count], &given[..count]);
+        let samples = triples(count);
+        Some(without_gross_errors::<Affinity, 3>(
+            figure, given, &samples, limit,
+        )?)
     } else {
         None
     };
@@ -110,7 +122,7 @@ pub fn stretch(figure: &[Place], given: &[Place], kept: &[bool], limit: f64) -> 
     }
     let fitted = Affinity::fit(&figure, &given, SPREAD_MIN)?;
     let free = (2 * figure.len() - 6) as f64;
-    let sigma = sigma_of(&fitted, &figure, &given) * fitted.of_b.sqrt();
+    let sigma = sigma_of(&fitted, &figure, &given)? * fitted.of_b.sqrt();
     let (a, b) = (fitted.a, fitted.b);
     Some(Stretch {
         ratio: 2.0 * b.norm() / a.norm(),
@@ -118,66 +130,6 @@ pub fn stretch(figure: &[Place], given: &[Place], kept: &[bool], limit: f64) -> 
         free,
         direction_rad: 0.5 * (a * b).arg(),
     })
-}
-
-/// Controls without gross errors about an affinity.
-fn selected(figure: &[Place], given: &[Place], limit: f64) -> Option<Vec<bool>> {
-    let count = figure.len();
-    let residuals = |of: &Affinity| -> Vec<f64> {
-        let pairs = figure.iter().zip(given);
-        pairs.map(|(from, to)| of.residual(*from, *to)).collect()
-    };
-    // The rank of least median for three complex unknowns.
-    let rank = (count / 2 + 2).min(count) - 1;
-    let mut best: Option<(f64, Affinity)> = None;
-    for three in triples(count) {
-        let [from, to] = [figure, given].map(|of| three.map(|index| of[index]));
-        let Some(affinity) = Affinity::fit(&from, &to, SPREAD_OF_THREE) else {
-            continue;
-        };
-        let mut sizes = residuals(&affinity);
-        let median = *sizes.select_nth_unstable_by(rank, f64::total_cmp).1;
-        if best.is_none_or(|(least, _)| median < least) {
-            best = Some((median, affinity));
-        }
-    }
-    let (median, affinity) = best?;
-    // The correction for small samples of Rousseeuw and Leroy.
-    let small_sample = 1.0 + 5.0 / (count as f64 - 3.0);
-    // Exact data leave rounding, which is not a gross error.
-    let size = given.iter().map(|given| given.norm()).fold(0.0, f64::max);
-    let within = |of: &Affinity, distance: f64| -> Vec<bool> {
-        let reach = distance.max(1e-9 * size);
-        residuals(of).into_iter().map(|of| of <= reach).collect()
-    };
-    let sigma = small_sample * median / MEDIAN_OF_SQUARES.sqrt();
-    let mut kept = within(&affinity, FIRST_CHOICE * sigma);
-    for _ in 0..ROUNDS {
-        let (from, to) = of_kept(figure, given, &kept);
-        let fitted = Affinity::fit(&from, &to, SPREAD_OF_THREE)?;
-        let next = within(&fitted, limit * sigma_of(&fitted, &from, &to));
-        let enough = next.iter().filter(|kept| **kept).count() > count / 2;
-        if next == kept || !enough {
-            break;
-        }
-        kept = next;
-    }
-    Some(kept)
-}
-
-/// Standard deviation of a coordinate of a control about an affinity.
-fn sigma_of(of: &Affinity, from: &[Place], to: &[Place]) -> f64 {
-    let pairs = from.iter().zip(to);
-    let squares: f64 = pairs
-        .map(|(from, to)| of.residual(*from, *to).powi(2))
-        .sum();
-    (squares / (2 * from.len()).saturating_sub(6).max(1) as f64).sqrt()
-}
-
-fn of_kept(figure: &[Place], given: &[Place], kept: &[bool]) -> (Vec<Place>, Vec<Place>) {
-    let pairs = figure.iter().zip(given).zip(kept);
-    let pairs = pairs.filter(|(_, kept)| **kept);
-    pairs.map(|((figure, given), _)| (*figure, *given)).unzip()
 }
 
 /// Every three of some controls; of many controls, a fixed choice.

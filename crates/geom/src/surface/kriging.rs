@@ -34,17 +34,25 @@ impl Weights {
 }
 
 impl Kriging {
+    /// The noise of a shot has `shot_sigma_m`, the radial error that the shots of a profile share `profile_sigma_m`.
     /// `None` when a number is not finite.
-    pub(super) fn new(shots: Vec<Placed>, variogram: Variogram, shot_sigma_m: f64) -> Option<Self> {
+    pub(super) fn new(
+        shots: Vec<Placed>,
+        variogram: Variogram,
+        shot_sigma_m: f64,
+        profile_sigma_m: f64,
+    ) -> Option<Self> {
         let first = shots.first()?.plan_m;
         let reach_m = shots.iter().map(|shot| (shot.plan_m - first).norm());
         let sill_m2 = 2.0 * variogram.at(2.0 * reach_m.fold(1.0, f64::max));
         let matrix = DMatrix::from_fn(shots.len(), shots.len(), |row, column| {
-            let noise_m2 = if row == column {
-                shot_sigma_m.powi(2)
-            } else {
-                0.0
-            };
+            let mut noise_m2 = 0.0;
+            if shots[row].profile == shots[column].profile {
+                noise_m2 += profile_sigma_m.powi(2);
+            }
+            if row == column {
+                noise_m2 += shot_sigma_m.powi(2);
+            }
             sill_m2 - variogram.between(&shots[row].plan_m, &shots[column].plan_m) + noise_m2
         });
         let factor = Cholesky::new(matrix)?;
@@ -98,10 +106,10 @@ impl Kriging {
         }
     }
 
-    /// Covariance of surface minus ground between all `places`, m².
+    /// Covariance of surface minus ground between all `places`, m², with the errors that shots of a profile share.
     ///
-    /// By the equations of the weights, `Γwⱼ − σ²wⱼ = γⱼ + μⱼ`, three of the five terms of
-    /// `−γᵢⱼ + wᵢᵀγⱼ + wⱼᵀγᵢ − wᵢᵀΓwⱼ + σ²wᵢᵀwⱼ` are one.
+    /// By the equations of the weights, `Γwⱼ − Nwⱼ = γⱼ + μⱼ` with the covariance `N` of the errors of the shots, three
+    /// of the five terms of `−γᵢⱼ + wᵢᵀγⱼ + wⱼᵀγᵢ − wᵢᵀΓwⱼ + wᵢᵀNwⱼ` are one.
     pub(super) fn covariance_m2(&self, places: &[Vector2<f64>], weights: &Weights) -> DMatrix<f64> {
         let from_shots = DMatrix::from_fn(self.shots.len(), places.len(), |shot, place| {
             self.variogram

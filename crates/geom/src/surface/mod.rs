@@ -1,8 +1,9 @@
 //! The ground between laser shots: its height by ordinary kriging, with the covariance of its errors.
 //!
 //! Profiles of a laser altimeter sample the ground every 300 m along the track and every few kilometres across it. The
-//! deviation of the ground from its interpolation is estimated from the profiles themselves ([`Variogram`]); errors at
-//! neighbouring points are correlated, so their covariance is full ([`SurfaceHeights::covariance_m2`]).
+//! deviation of the ground from its interpolation is estimated from the profiles themselves ([`Variogram`]), anew for every
+//! place from the shots around it; errors at neighbouring points are correlated, so their covariance is full
+//! ([`SurfaceHeights::covariance_m2`]), and their tails are long ([`tails`]).
 //!
 //! # Source
 //! Ordinary kriging: Cressie 1993, Statistics for spatial data, section 3.2.
@@ -28,21 +29,28 @@
 //! let beside = surface.predict(&[shots[20].ground_m + Vector3::new(0.0, 300.0, 0.0)]);
 //! assert!((beside.heights_m[0] - 50.0).abs() < 1e-6); // metres; a constant comes back
 //! // Beside the profile the ground may be anything like what it is along it.
-//! assert!((4.0..4.5).contains(&beside.sigma_m(0)));
+//! assert!((2.0..3.0).contains(&beside.sigma_m(0)));
 //! # Ok::<(), areograph_geom::surface::SurfaceError>(())
 //! ```
 
+mod crossovers;
 mod kriging;
 mod plan;
+mod profiles;
+pub mod tails;
 mod variogram;
+mod withheld;
 
 use nalgebra::{DMatrix, Matrix3xX, Vector2, Vector3};
 
-use self::{kriging::Kriging, plan::Plan};
+use self::{kriging::Kriging, plan::Plan, variogram::Roughness};
 use crate::ellipsoid::height_m;
 use areograph_base::body::{Body, BodyModel};
 
+pub use crossovers::{Crossover, crossovers};
+pub use profiles::{LeftOut, ProfileNet, ProfilePriors, ProfileShift};
 pub use variogram::Variogram;
+pub use withheld::{Withheld, WithheldScore, withheld};
 
 /// Maximum number of shots for kriging: the cost of the equations grows with their cube.
 const SHOTS_MAX: usize = 1500;
@@ -89,7 +97,7 @@ impl Default for SurfaceOptions {
             shot_sigma_m: 1.0,
             profile_sigma_m: 1.0,
             plan_sigma_m: 130.0,
-            roughness_min_m: 4.0,
+            roughness_min_m: 2.0,
             relief_sigma_m: None,
             body: Body::Mars,
         }
@@ -117,6 +125,7 @@ pub enum SurfaceError {
 pub struct LaserSurface {
     plan: Plan,
     kriging: Kriging,
+    roughness: Roughness,
     options: SurfaceOptions,
 }
 
@@ -129,7 +138,7 @@ pub struct SurfaceHeights {
     pub slopes: Vec<Vector2<f64>>,
     /// Planimetric distance of the nearest shot, metres.
     pub nearest_m: Vec<f64>,
-    /// Covariance of the errors of the heights, m².
+    /// Covariance of the errors of the heights, m²: one standard deviation contains 68 % of them; see [`tails`].
     pub covariance_m2: DMatrix<f64>,
     /// The same without the effect of planimetric errors on a slope.
     pub without_plan_m2: DMatrix<f64>,
@@ -188,22 +197,24 @@ impl LaserSurface {
             .iter()
             .map(|shot| Placed::new(model, &plan, shot))
             .collect();
-        let variogram = Variogram::learn(&placed, options);
+        let roughness = Roughness::learn(&placed, options);
         let around: Vec<Vector2<f64>> = around.iter().map(|place| plan.of(place)).collect();
         let taken = thinned(near(placed, &around));
         if taken.len() < SHOTS_MIN {
             return Err(SurfaceError::TooFew { shots: taken.len() });
         }
-        let kriging =
-            Kriging::new(taken, variogram, options.shot_sigma_m).ok_or(SurfaceError::NotANumber)?;
+        let (shot_m, profile_m) = (options.shot_sigma_m, options.profile_sigma_m);
+        let kriging = Kriging::new(taken, roughness.all, shot_m, profile_m)
+            .ok_or(SurfaceError::NotANumber)?;
         Ok(Self {
             plan,
             kriging,
+            roughness,
             options: *options,
         })
     }
 
-    /// Roughness of the ground.
+    /// Roughness of the ground, of all shots.
     #[must_use]
     pub const fn variogram(&self) -> Variogram {
         self.kriging.variogram
@@ -306,7 +317,8 @@ impl LaserSurface {
             .collect()
     }
 
-    /// Covariance of the errors of the surface at the possible true positions: a planimetric error moves a point away
+    /// Covariance of the errors of the surface at the possible true positions, without those that shots of a profile
+    /// share: a planimetric error moves a point away
     /// from a profile, where the ground is known, as well as towards one.
     fn errors_m2(&self, at: &[Vector2<f64>]) -> DMatrix<f64> {
         let shift_m = std::f64::consts::SQRT_2 * self.options.plan_sigma_m;
@@ -321,13 +333,24 @@ impl LaserSurface {
         } else {
             &[Vector2::zeros()]
         };
+        let profile_m2 = self.options.profile_sigma_m.powi(2);
         let mut covariance_m2 = DMatrix::zeros(at.len(), at.len());
         for shift in shifts {
             let shifted: Vec<Vector2<f64>> = at.iter().map(|place| place + shift).collect();
             let weights = self.kriging.weights(&shifted);
-            covariance_m2 += self.kriging.covariance_m2(&shifted, &weights);
+            let of_profiles = self.kriging.weights_of_profiles(&weights);
+            covariance_m2 += self.kriging.covariance_m2(&shifted, &weights)
+                - of_profiles.tr_mul(&of_profiles) * profile_m2;
         }
-        covariance_m2 / shifts.len() as f64
+        covariance_m2 /= shifts.len() as f64;
+        // Rougher ground deviates more from the same interpolation.
+        let shares: Vec<f64> = at.iter().map(|place| self.roughness.share(place)).collect();
+        for (column, of_column) in shares.iter().enumerate() {
+            for (row, of_row) in shares.iter().enumerate() {
+                covariance_m2[(row, column)] *= of_row * of_column;
+            }
+        }
+        covariance_m2
     }
 
     fn slope(&self, place: &Vector2<f64>) -> Vector2<f64> {

@@ -129,12 +129,33 @@ fn the_covariance_is_the_full_expression_symmetric_and_positive_definite() {
 
 #[test]
 fn roughness_is_learnt_without_the_noise_of_the_shots() {
-    // Heights 300 m apart differ by 10 m every time, 600 m apart by none: the median of five distances is that of
-    // lags 1, 3 and 5, of which 5 has the least in units of 300 m.
+    // Heights an odd number of spacings of 300 m apart differ by 10 m, all others by none; the noise of two shots is
+    // 2 m². Short distances weigh more.
     let shots = profile(&zigzag(101, 10.0), 300.0, 0.0, 0);
     let surface = LaserSurface::new(&shots, &[], &only_ground(1.0)).unwrap();
-    let expected_m = (98.0 / 5.0_f64.powf(1.4)).sqrt();
+    let (mut squares_m2, mut weights) = (0.0, 0.0);
+    for lag in 1..=10 {
+        let difference_m2 = if lag % 2 == 1 { 98.0 } else { -2.0 };
+        let lag = f64::from(lag);
+        squares_m2 += difference_m2 / lag.powf(1.4) / lag;
+        weights += 1.0 / lag;
+    }
+    let expected_m = f64::sqrt(squares_m2 / weights);
     assert!((surface.variogram().roughness_m - expected_m).abs() < 0.01);
+}
+
+#[test]
+fn standard_deviations_follow_the_roughness_of_the_neighbourhood() {
+    // Rough in the south, smooth in the north.
+    let mut heights_m = zigzag(150, 20.0);
+    heights_m.extend(zigzag(150, 4.0));
+    let shots = profile(&heights_m, 300.0, 0.0, 0);
+    let surface = LaserSurface::new(&shots, &[], &only_ground(1.0)).unwrap();
+    let sigma_m = |north_m: f64| surface.predict(&[place(600.0, north_m, 0.0)]).sigma_m(0);
+    let (south_m, middle_m, north_m) = (sigma_m(15_000.0), sigma_m(45_000.0), sigma_m(75_000.0));
+    // Five times rougher; 20 pairs of all shots take part in some 30 of the neighbourhood.
+    assert!(south_m > 1.5 * north_m, "{south_m} {north_m}");
+    assert!((north_m..south_m).contains(&middle_m), "{middle_m}");
 }
 
 #[test]

@@ -176,6 +176,24 @@ fn sites_pooled_are_the_budget_of_all() {
 }
 
 #[test]
+fn pixel_and_geometry_are_pooled_without_residuals_as_well() {
+    let image = ResidualMoments {
+        mean_x: 0.0,
+        deviation_x: 0.0,
+        mean_y: 0.0,
+        deviation_y: 0.0,
+    };
+    let input = BudgetInput {
+        sites: vec![PairResiduals::of_images([image; 2])],
+        ..table_5()
+    };
+    let exact = uncertainty_budget(&input).unwrap();
+    let pooled = UncertaintyBudget::pooled(&[exact.clone(), exact]).unwrap();
+    close(pooled.pixel_size_m, 4.4);
+    close(pooled.height_over_base, 385.0 / 155.0);
+}
+
+#[test]
 fn what_has_no_answer_says_so() {
     let observed = |metres: Option<f64>| BudgetInput {
         misregistration: metres.map(|metres| Misregistration {

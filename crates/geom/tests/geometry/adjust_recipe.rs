@@ -356,7 +356,7 @@ fn range_biases_are_found() {
 }
 
 #[test]
-fn points_that_cannot_take_part_are_told() {
+fn points_that_cannot_take_part_are_reported() {
     let mut simulated = Recipe::GUSEV.simulate();
     let network = &mut simulated.network;
     let tie = simulated.shots;

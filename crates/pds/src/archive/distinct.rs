@@ -92,17 +92,17 @@ impl Seen {
     /// The file that also contains a shot of `span`; of several, the one with the earliest shots.
     #[must_use]
     pub fn holder(&self, span: &Span) -> Option<usize> {
-        let end = (self.spans).partition_point(|of| of.first_s - span.last_s <= SAME_SHOT_S);
+        let end = (self.spans).partition_point(|other| other.first_s - span.last_s <= SAME_SHOT_S);
         let near = self.spans[..end].iter().rev();
-        near.take_while(|of| span.first_s - of.last_s <= SAME_SHOT_S)
-            .filter(|of| of.file != span.file)
+        near.take_while(|other| span.first_s - other.last_s <= SAME_SHOT_S)
+            .filter(|other| other.file != span.file)
             .last()
-            .map(|of| of.file)
+            .map(|other| other.file)
     }
 
     /// Adds a span without a [`holder`](Self::holder).
     pub fn add(&mut self, span: Span) {
-        self.at = (self.spans).partition_point(|of| of.first_s <= span.first_s);
+        self.at = (self.spans).partition_point(|other| other.first_s <= span.first_s);
         self.spans.insert(self.at, span);
     }
 
@@ -124,7 +124,7 @@ impl Seen {
         if holder.is_some() {
             return holder;
         }
-        let after = (self.spans).partition_point(|of| of.first_s <= tag_s);
+        let after = (self.spans).partition_point(|other| other.first_s <= tag_s);
         let own = after.checked_sub(1).filter(|at| {
             let before = &mut self.spans[*at];
             // Files whose records are out of order return to earlier spans.

@@ -67,7 +67,8 @@ impl Listing {
         all.paths.dedup();
         let mut seen = BTreeSet::new();
         // Opening such a file reports the reason.
-        let is_first = |path: &PathBuf| fs::metadata(path).map_or(true, |of| seen.insert(id(&of)));
+        let is_first =
+            |path: &PathBuf| fs::metadata(path).map_or(true, |metadata| seen.insert(id(&metadata)));
         all.paths.retain(is_first);
         all.paths.sort();
         all
@@ -148,6 +149,8 @@ fn is_pedr(path: &Path) -> bool {
 fn decompressed(path: &Path) -> Option<OsString> {
     let ending = path.extension()?.to_str()?;
     let stem = path.file_stem()?;
-    let is_compressed = COMPRESSED.iter().any(|of| ending.eq_ignore_ascii_case(of));
+    let is_compressed = COMPRESSED
+        .iter()
+        .any(|known| ending.eq_ignore_ascii_case(known));
     (is_compressed && is_pedr(Path::new(stem))).then(|| stem.to_owned())
 }

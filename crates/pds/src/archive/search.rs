@@ -50,7 +50,7 @@ struct Unusable {
 
 impl Unusable {
     fn add(&mut self, complaints: &[Complaint]) {
-        for complaint in complaints.iter().filter(|of| of.leaves_out()) {
+        for complaint in complaints.iter().filter(|complaint| complaint.leaves_out()) {
             self.count += 1;
             self.first.get_or_insert_with(|| complaint.to_string());
         }

@@ -77,6 +77,7 @@ impl Source {
             version: self.version,
             datum: self.datum,
             blake3: String::new(),
+            is_table: false,
         }
     }
 

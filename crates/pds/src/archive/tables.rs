@@ -83,6 +83,7 @@ pub fn search_tables(
                 version: None,
                 datum: Datum::Iau2000,
                 blake3: String::new(),
+                is_table: true,
             },
             rows: 0,
         });

@@ -13,7 +13,7 @@ const SHOWN: usize = 60;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Cause)]
 #[cause(Input: "regenerate the support data with the program that made them (ALE's isd_generate), or configure the \
     image by label and kernels")]
-pub(super) enum IsdError {
+pub(crate) enum IsdError {
     #[error("not image support data: {0}; expected a JSON document of one object")]
     NotJson(String),
     #[error("{bytes} bytes; expected image support data of at most {max} bytes")]

@@ -13,6 +13,7 @@
 mod camera;
 mod document;
 mod rewrite;
+mod state;
 mod tables;
 mod target;
 
@@ -30,6 +31,10 @@ pub use self::{
     rewrite::{StraightCamera, rewrite_isd},
     tables::{Rotations, States},
     target::ForeignBody,
+};
+pub(crate) use self::{
+    state::{StateError, support_of_state},
+    tables::neighbour_rates_rad_s,
 };
 use super::file_size::SizedFile;
 use areograph_base::{
@@ -49,7 +54,7 @@ const LINES_MAX: u32 = 10_000_000;
 const SAMPLES_MAX: u32 = 1_000_000;
 const SUMMING_MAX: u32 = 1_000;
 /// Line scanners, the only supported cameras.
-const LINE_SCANNER: &str = "USGS_ASTRO_LINE_SCANNER_SENSOR_MODEL";
+pub(crate) const LINE_SCANNER: &str = "USGS_ASTRO_LINE_SCANNER_SENSOR_MODEL";
 /// Ephemeris times, seconds: five centuries around J2000.
 const ET_S: [f64; 2] = [-1e10, 1e10];
 /// Radii of a target, kilometres.
@@ -119,7 +124,11 @@ fn parse(text: &[u8]) -> Result<ImageSupport> {
         // A position in the text is more specific than the kind of the unexpected value.
         IsdError::NotJson(error.to_string())
     })?;
-    let document = Object::document(&value)?;
+    support_of(&Object::document(&value)?)
+}
+
+/// The support data of a document.
+fn support_of(document: &Object<'_>) -> Result<ImageSupport> {
     let model = document.text("name_model")?;
     if model != LINE_SCANNER {
         return Err(document.refused("name_model", LINE_SCANNER).into());
@@ -130,18 +139,18 @@ fn parse(text: &[u8]) -> Result<ImageSupport> {
         first_detector: document.whole("starting_detector_sample", [0, SAMPLES_MAX])?,
         samples: document.whole("image_samples", [1, SAMPLES_MAX])?,
     };
-    let line_times = line_times(&document)?;
-    let radii_m = radii_m(&document)?;
-    let mut pointing = Rotations::of(&document, "instrument_pointing")?;
-    let (instrument, turn) = camera(&document, samples, &pointing.constant)?;
+    let line_times = line_times(document)?;
+    let radii_m = radii_m(document)?;
+    let mut pointing = Rotations::of(document, "instrument_pointing")?;
+    let (instrument, turn) = camera(document, samples, &pointing.constant)?;
     pointing.constant = turn * pointing.constant;
     let tables = SupportTables {
-        position: States::of(&document, "instrument_position", radii_m[1])?,
-        sun: States::of(&document, "sun_position", radii_m[1])?,
+        position: States::of(document, "instrument_position", radii_m[1])?,
+        sun: States::of(document, "sun_position", radii_m[1])?,
         pointing,
-        body_rotation: Rotations::of(&document, "body_rotation")?,
+        body_rotation: Rotations::of(document, "body_rotation")?,
     };
-    tables.reach_over(&document, &line_times)?;
+    tables.reach_over(document, &line_times)?;
     Ok(ImageSupport {
         instrument,
         line_times,
@@ -150,7 +159,7 @@ fn parse(text: &[u8]) -> Result<ImageSupport> {
         downtrack_summing: samples.downtrack_summing,
         crosstrack_summing: samples.crosstrack_summing,
         radii_m,
-        target: target(&document)?,
+        target: target(document)?,
         platform: document.text("name_platform")?.to_owned(),
         // An identifier of another kind, as a number, names no product.
         identifier: document.text("image_identifier").ok().map(str::to_owned),

@@ -150,6 +150,18 @@ impl Rotations {
     }
 }
 
+/// Angular velocities in J2000 by neighbouring rotations from J2000, two or more of them, radians per second.
+pub(crate) fn neighbour_rates_rad_s(et_s: &[f64], turning: &[Matrix3<f64>]) -> Vec<Vector3<f64>> {
+    let last = turning.len() - 1;
+    let rate = |at: usize| {
+        let [before, after] = [at.saturating_sub(1), (at + 1).min(last)];
+        // The rotation of the axes, in J2000: the frame's matrix has its axes as rows.
+        let turn = turning[after].transpose() * turning[before];
+        rotation_vector(&turn) / (et_s[after] - et_s[before])
+    };
+    (0..turning.len()).map(rate).collect()
+}
+
 /// The constant rotation; the identity where the file has none.
 fn constant(table: &Object<'_>) -> Result<Matrix3<f64>, IsdError> {
     const KEY: &str = "constant_rotation";

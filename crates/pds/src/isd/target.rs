@@ -5,7 +5,7 @@ use areograph_base::{body::Body, error::Cause, time::Et, units::METRES_PER_KM};
 use areograph_geom::{attitude::rotation_vector, body_rotation::body_rotation};
 
 /// Tolerance of radii against those of the products' frame, metres: files round them to ten metres.
-const RADIUS_TOLERANCE_M: f64 = 10.0;
+pub(super) const RADIUS_TOLERANCE_M: f64 = 10.0;
 
 /// Support data of another body.
 #[derive(Debug, thiserror::Error, Cause)]

@@ -252,7 +252,7 @@ impl Reader {
     /// # Errors
     /// It is another one, or has changed.
     pub fn require_identity(&self, earlier: &Identity) -> Result<()> {
-        let content = |of: &Identity| (of.device, of.inode, of.bytes, of.modified);
+        let content = |file: &Identity| (file.device, file.inode, file.bytes, file.modified);
         if content(&self.identity) == content(earlier) {
             return Ok(());
         }

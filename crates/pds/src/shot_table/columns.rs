@@ -1,7 +1,5 @@
 //! Assignment of the columns of a table to quantities and units.
 
-use std::str::FromStr;
-
 use csv::StringRecord;
 
 use super::{ShotTableError, Utc};
@@ -258,22 +256,24 @@ impl Field {
     }
 
     /// The whole number of a row, not negative.
-    pub(super) fn whole<N: FromStr>(
+    pub(super) fn whole<N: TryFrom<u32>>(
         &self,
         record: &StringRecord,
     ) -> std::result::Result<N, String> {
         let text = self.text(record)?;
-        let whole = text.parse().ok().filter(|_| text.parse::<u32>().is_ok());
         let [_, most] = self.limits.unwrap_or([0.0, f64::MAX]);
-        let is_within = text.parse::<f64>().is_ok_and(|number| number <= most);
-        whole.filter(|_| is_within).ok_or_else(|| {
-            let expected = if most < 1e9 {
-                format!("a whole number from 0 to {most}")
-            } else {
-                "a whole number, not negative".to_owned()
-            };
-            self.refused(text, &expected)
-        })
+        let whole = text.parse::<u32>().ok();
+        let whole = whole.filter(|whole| f64::from(*whole) <= most);
+        whole
+            .and_then(|whole| N::try_from(whole).ok())
+            .ok_or_else(|| {
+                let expected = if most < 1e9 {
+                    format!("a whole number from 0 to {most}")
+                } else {
+                    "a whole number, not negative".to_owned()
+                };
+                self.refused(text, &expected)
+            })
     }
 
     /// The instant of a row that is written in UTC.

@@ -95,7 +95,8 @@ impl GeoKeys {
 
     /// Whether coordinates refer to the middle of a cell.
     pub(super) fn is_point(&self) -> bool {
-        self.get(RASTER_TYPE).is_some_and(|of| is_code(of, POINT))
+        self.get(RASTER_TYPE)
+            .is_some_and(|value| is_code(value, POINT))
     }
 
     /// Radius of the sphere, where the file states it.
@@ -129,7 +130,7 @@ impl GeoKeys {
             Some(model) if is_code(model, PROJECTED) => self.equirectangular(radius_m),
             other => Err(refused(
                 "GTModelType",
-                other.map_or_else(|| "missing".to_owned(), |of| of.to_string()),
+                other.map_or_else(|| "missing".to_owned(), |value| value.to_string()),
                 "1 (projected) or 2 (geographic)",
             )),
         }
@@ -147,12 +148,12 @@ impl GeoKeys {
     fn equirectangular(&self, radius_m: f64) -> std::result::Result<Map, TerrainModelError> {
         if !self
             .get(TRANSFORM)
-            .is_some_and(|of| is_code(of, EQUIRECTANGULAR))
+            .is_some_and(|value| is_code(value, EQUIRECTANGULAR))
         {
             let found = self.get(TRANSFORM);
             return Err(refused(
                 "ProjCoordTrans",
-                found.map_or_else(|| "missing".to_owned(), |of| of.to_string()),
+                found.map_or_else(|| "missing".to_owned(), |value| value.to_string()),
                 "17, equirectangular",
             ));
         }
@@ -230,7 +231,9 @@ mod tests {
         let place = map.map(|map| map.place_rad([3_396_190.0 * 0.05, -3_396_190.0 * 0.2]));
         let expected = [std::f64::consts::PI + 0.1, -0.2];
         // A parallel of 60 degrees is half as long as the equator; rounding, radians.
-        assert!(place.is_ok_and(|of| (of[0] - expected[0]).hypot(of[1] - expected[1]) < 1e-12));
+        assert!(
+            place.is_ok_and(|place| (place[0] - expected[0]).hypot(place[1] - expected[1]) < 1e-12)
+        );
     }
 
     #[test]

@@ -222,8 +222,8 @@ impl Tags {
         // Written so that NaN is rejected too.
         let are_sizes = [width, height]
             .iter()
-            .all(|of| **of > 0.0 && of.is_finite());
-        if !are_sizes || self.tie.len() != 6 || !self.tie.iter().all(|of| of.is_finite()) {
+            .all(|size| **size > 0.0 && size.is_finite());
+        if !are_sizes || self.tie.len() != 6 || !self.tie.iter().all(|value| value.is_finite()) {
             return Err(of_scale(&self.scale));
         }
         let half = if self.keys.is_point() { 0.0 } else { 0.5 };

@@ -101,18 +101,18 @@ fn archive(folder: &Path) -> Vec<PathBuf> {
 }
 
 fn brute_force(shots: &[TrueShot], regions: &[Region], time: Option<Interval>) -> Vec<Row> {
-    let in_time = |of: &&TrueShot| {
-        let at = Et::from_seconds(of.shot.et_tag_s);
+    let in_time = |known: &&TrueShot| {
+        let at = Et::from_seconds(known.shot.et_tag_s);
         time.is_none_or(|time| time.contains(at))
     };
-    let rows = shots.iter().filter(in_time).map(|of| {
-        let [longitude, latitude] = of.place_rad;
+    let rows = shots.iter().filter(in_time).map(|known| {
+        let [longitude, latitude] = known.place_rad;
         let held = (0..).zip(regions);
         let held = held.filter(|(_, region)| region.contains(longitude, latitude));
         (
-            usize::from(of.shot.file),
-            of.shot.record,
-            of.shot.shot,
+            usize::from(known.shot.file),
+            known.shot.record,
+            known.shot.shot,
             held.map(|(window, _)| window).collect(),
         )
     });

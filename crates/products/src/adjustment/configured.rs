@@ -39,6 +39,9 @@ pub(super) struct AdjustmentKeys<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = none_negative)]
     rotation_sigma_rad: Option<[f64; 3]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0))]
+    line_time_sigma_s: Option<f64>,
     position_unknowns: PositionUnknowns,
     rotation_unknowns: RotationUnknowns,
     orbit_of_pedr: bool,
@@ -111,6 +114,7 @@ impl<'a> AdjustmentKeys<'a> {
             time_bias_sigma_s: config.time_bias_sigma_s,
             position_sigma_m: is_of_surface.then(|| config.position_sigma_m.map(number)),
             rotation_sigma_rad: is_of_surface.then(|| config.rotation_sigma_rad.map(number)),
+            line_time_sigma_s: is_of_surface.then_some(config.line_time_sigma_s),
             position_unknowns: config.position_unknowns,
             rotation_unknowns: config.rotation_unknowns,
             orbit_of_pedr: config.orbit_of_pedr,

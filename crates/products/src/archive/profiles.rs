@@ -242,7 +242,7 @@ fn orbits<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         column(
             "invalid_because",
             Unit::None,
-            "limits that are exceeded, in words; empty if none is",
+            "exceeded limits, in words; empty if there are none",
             |row: &Row| row.invalid_because.join("; "),
         ),
     ]

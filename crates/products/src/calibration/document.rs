@@ -22,8 +22,8 @@ use areograph_stages::{
 
 pub(super) static DOCUMENT: Declaration<WriteCalibration> = Declaration {
     path: "calibration.json",
-    what: "parameters with standard deviations, what ties do not determine, figures after every step, of withheld control and of \
-           other orbits, verdict",
+    what: "parameters with standard deviations, combinations that ties do not determine, statistics after every \
+           step, of withheld control and of other orbits, verdict",
     readers: "scripts",
     rows: "cameras",
     role: Role::Metadata,

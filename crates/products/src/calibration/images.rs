@@ -71,25 +71,25 @@ fn columns<'a>() -> Vec<Column<&'a ImageResult>> {
             Unit::Pixel,
             "position by the uncalibrated camera (of a laser point: of its given coordinates) minus the measured position, across \
              the flight, pixels",
-            |row: &Row| row.before_px.map(|of| of[0]),
+            |row: &Row| row.before_px.map(|before_px| before_px[0]),
         ),
         column(
             "before_along_px",
             Unit::Pixel,
             "likewise along the flight",
-            |row: &Row| row.before_px.map(|of| of[1]),
+            |row: &Row| row.before_px.map(|before_px| before_px[1]),
         ),
         column(
             "after_across_px",
             Unit::Pixel,
             "the same by the calibrated camera and orbit, across the flight",
-            |row: &Row| row.after_px.map(|of| of[0]),
+            |row: &Row| row.after_px.map(|after_px| after_px[0]),
         ),
         column(
             "after_along_px",
             Unit::Pixel,
             "likewise along the flight",
-            |row: &Row| row.after_px.map(|of| of[1]),
+            |row: &Row| row.after_px.map(|after_px| after_px[1]),
         ),
     ]
 }

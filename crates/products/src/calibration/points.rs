@@ -57,19 +57,19 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
             "longitude_deg",
             Unit::Degree,
             "east longitude where its images intersect, -180 to 180 degrees",
-            |row: &Row| row.place.map(|of| degrees(of[0])),
+            |row: &Row| row.place.map(|place| degrees(place[0])),
         ),
         column(
             "latitude_deg",
             Unit::Degree,
             "areocentric latitude of that, degrees",
-            |row: &Row| row.place.map(|of| degrees(of[1])),
+            |row: &Row| row.place.map(|place| degrees(place[1])),
         ),
         column(
             "radius_m",
             Unit::Metre,
-            "distance of that from the centre of the body, metres",
-            |row: &Row| row.place.map(|of| of[2]),
+            "distance of this point from the centre of the body, metres",
+            |row: &Row| row.place.map(|place| place[2]),
         ),
     ];
     columns.extend(sigmas());
@@ -85,16 +85,16 @@ fn sigmas<'a>() -> [Column<Row<'a>>; 3] {
             Unit::Metre,
             "standard deviation east, of the measurement and of the calibration, metres; empty for a tie point whose height is not \
              tested for errors such as those found at others",
-            |row: &Row| row.sigma_m.map(|of| of[0]),
+            |row: &Row| row.sigma_m.map(|sigma_m| sigma_m[0]),
         ),
         column(
             "sigma_north_m",
             Unit::Metre,
             "likewise north",
-            |row: &Row| row.sigma_m.map(|of| of[1]),
+            |row: &Row| row.sigma_m.map(|sigma_m| sigma_m[1]),
         ),
         column("sigma_up_m", Unit::Metre, "likewise up", |row: &Row| {
-            row.sigma_m.map(|of| of[2])
+            row.sigma_m.map(|sigma_m| sigma_m[2])
         }),
     ]
 }
@@ -106,13 +106,13 @@ fn offs<'a>() -> [Column<Row<'a>>; 3] {
             "off_east_m",
             Unit::Metre,
             "of a laser point: intersected minus the laser's position, east, metres",
-            |row: &Row| row.off_m.map(|of| of[0]),
+            |row: &Row| row.off_m.map(|off_m| off_m[0]),
         ),
         column("off_north_m", Unit::Metre, "likewise north", |row: &Row| {
-            row.off_m.map(|of| of[1])
+            row.off_m.map(|off_m| off_m[1])
         }),
         column("off_up_m", Unit::Metre, "likewise up", |row: &Row| {
-            row.off_m.map(|of| of[2])
+            row.off_m.map(|off_m| off_m[2])
         }),
     ]
 }

@@ -6,7 +6,7 @@ use nalgebra::Matrix3;
 
 use super::{
     gcp::{ControlMeasure, ControlPoint, write_gcp},
-    lidar_data::{LidarPoint, isis_serial_number, write_lidar_data},
+    lidar_data::{LidarPoint, ProfileShift, isis_serial_number, write_lidar_data},
     points::{GroundEstimate, ImageMeasure},
 };
 use crate::{
@@ -17,7 +17,10 @@ use areograph_base::{
     frames::{BodyFixed, Position},
     time::Et,
 };
-use areograph_stages::{adjust::CorrectedPoint, read_ties::Ties};
+use areograph_stages::{
+    adjust::{CorrectedPoint, recorded_m2},
+    read_ties::Ties,
+};
 
 pub(crate) static LIDAR: Declaration = Declaration {
     path: "exchange/lidar.json",
@@ -30,8 +33,10 @@ pub(crate) static LIDAR: Declaration = Declaration {
         let images = of.site.images.iter();
         let names: Vec<String> = images.map(|image| isis_name(of.site, image)).collect();
         let shots = lidar_points(of.site, adjustment, &names);
+        let shared = profile_shifts(of.site, adjustment);
         let some = !shots.is_empty();
-        some.then(|| write_lidar_data(path, &shots)).transpose()
+        some.then(|| write_lidar_data(path, &shared, &shots))
+            .transpose()
     }),
     uses: &[Use {
         program: Program::Isis,
@@ -54,7 +59,8 @@ pub(crate) static CONTROL: Declaration = Declaration {
             .collect();
         let points = control_points(of.site, geometric.ties, adjustment, &files);
         let some = !points.is_empty();
-        some.then(|| write_gcp(path, of.site.config.body, &points))
+        let shared_m = shared_sigma_m(adjustment);
+        some.then(|| write_gcp(path, of.site.config.body, shared_m, &points))
             .transpose()
     }),
     uses: &[Use {
@@ -85,6 +91,38 @@ pub(super) fn adjusted(point: &CorrectedPoint) -> GroundEstimate {
     estimate(point.ground, point.covariance_m2)
 }
 
+/// Standard deviations of the error that all tie points share towards east, north and up, metres.
+pub(super) fn shared_sigma_m(adjustment: &AdjustmentProducts) -> Option<[f64; 3]> {
+    let heights = adjustment.adjusted.heights.as_ref();
+    heights.map(|heights| heights.mean_sigma_m)
+}
+
+/// What is known of the shift of each profile with a range, in their order.
+fn profile_shifts<'a>(
+    site: &'a SiteProducts<'a>,
+    adjustment: &AdjustmentProducts,
+) -> Vec<ProfileShift<'a>> {
+    let result = adjustment.adjusted;
+    let of_ranges = result.ranges.iter().filter_map(|range| {
+        let shared = result.points[range.point].shared?;
+        Some((range.profile, shared.sigma_m))
+    });
+    let by_profile: BTreeMap<usize, [f64; 3]> = of_ranges.collect();
+    let [plan_m, up_m] = profile_sigma_m(site);
+    let shift = |(profile, adjusted_sigma_m): (usize, [f64; 3])| ProfileShift {
+        profile: &site.profiles[profile].id,
+        apriori_sigma_m: [plan_m, plan_m, up_m],
+        adjusted_sigma_m,
+    };
+    by_profile.into_iter().map(shift).collect()
+}
+
+/// A priori standard deviations of the shift of a profile in plan and height, metres.
+fn profile_sigma_m(site: &SiteProducts) -> [f64; 2] {
+    let surface = &site.config.laser_surface;
+    [surface.profile_plan_sigma_m, surface.profile_sigma_m]
+}
+
 /// Shots with a range and their coordinates in the adjusted images: others have no observation equation of
 /// their own in ISIS.
 fn lidar_points<'a>(
@@ -94,6 +132,7 @@ fn lidar_points<'a>(
 ) -> Vec<LidarPoint<'a>> {
     let config = &site.config.adjustment;
     let result = adjustment.adjusted;
+    let [plan_m, up_m] = profile_sigma_m(site);
     let places: Vec<BTreeMap<usize, [f64; 2]>> = adjustment.images.iter().map(places).collect();
     let shots = result.ranges.iter().filter_map(|range| {
         let point = &result.points[range.point];
@@ -119,7 +158,11 @@ fn lidar_points<'a>(
             range_sigma_m: config.range_sigma_m,
             apriori: estimate(
                 point.initial,
-                Matrix3::from_diagonal_element(config.ground_sigma_m.powi(2)),
+                recorded_m2(
+                    &point.initial.xyz_m,
+                    config.ground_sigma_m,
+                    [plan_m, plan_m, up_m],
+                ),
             ),
             adjusted: Some(adjusted(point)),
             simultaneous_images: vec![&names[range.image]],
@@ -168,6 +211,11 @@ fn control_points<'a>(
         Some(ControlPoint {
             id: &point.id,
             ground: adjusted(point),
+            relative_sigma_m: point.shared.map(|shared| {
+                // Rounding may leave the variance of a difference a little below 0.
+                let variances_m2 = shared.relative_m2.diagonal();
+                variances_m2.map(|of_m2| of_m2.max(0.0).sqrt()).into()
+            }),
             measures: measures.collect(),
         })
     });
@@ -188,7 +236,7 @@ pub(super) fn tie_sigmas_px(site: &SiteProducts, adjustment: &AdjustmentProducts
 fn focal_px_per_line(adjustment: &AdjustmentProducts, image: usize) -> f64 {
     let id = &adjustment.images[image].times.id;
     let mut pairs = adjustment.pairs.iter().filter_map(|pair| {
-        let at = pair.images.iter().position(|of| of == id)?;
+        let at = pair.images.iter().position(|image| image == id)?;
         Some(pair.line_spacing_m[at] / pair.pixel_size_m[at])
     });
     pairs.next().unwrap_or(1.0)

@@ -47,6 +47,8 @@ pub(super) struct PointRow<'a> {
     /// Root mean square of the residuals of its measurements, pixels.
     pub(super) rms_px: f64,
     pub(super) ground: GroundEstimate,
+    /// Standard deviations towards east, north and up without the error that all points share, metres, where that is known.
+    pub(super) relative_sigmas_m: Option<[f64; 3]>,
     pub(super) initial_m: Vector3<f64>,
 }
 
@@ -61,7 +63,7 @@ pub(super) struct ImageRow<'a> {
     pub(super) correction: &'a [f64; ORIENTATION_UNKNOWNS],
     pub(super) prior_sigmas: &'a [f64; ORIENTATION_UNKNOWNS],
     pub(super) sigmas: &'a [f64; ORIENTATION_UNKNOWNS],
-    /// Standard deviations of the camera's position in the middle of the image towards east, north and up, metres.
+    /// Standard deviations of the camera's position at the exposure of the middle line towards east, north and up, metres.
     pub(super) local_sigmas_m: [f64; 3],
     /// Numbers of used and of rejected measurements.
     pub(super) measures: [usize; 2],
@@ -112,11 +114,12 @@ pub(super) fn write_residuals(path: &Path, rows: &[ResidualRow]) -> Result<u64> 
         fields.extend(row.place.map(number));
         let residual = row.residual_px;
         let length = residual.map(|[sample, line]| sample.hypot(line));
-        fields.extend([0, 1].map(|axis| optional(residual.map(|of| of[axis]))));
+        fields.extend([0, 1].map(|axis| optional(residual.map(|residual| residual[axis]))));
         fields.push(optional(length));
         fields.push(if row.rejected { "*" } else { "" }.to_owned());
         fields.extend(row.sigma_px.map(number));
-        fields.extend([0, 1].map(|axis| optional(row.redundancy.map(|of| of[axis]))));
+        fields
+            .extend([0, 1].map(|axis| optional(row.redundancy.map(|redundancy| redundancy[axis]))));
         fields.extend(row.standardised.map(optional));
         fields
     };
@@ -126,9 +129,9 @@ pub(super) fn write_residuals(path: &Path, rows: &[ResidualRow]) -> Result<u64> 
 /// Head lines of the points.
 const POINT_HEADS: [&str; 3] = [
     "Point,Point,Accepted,Rejected,Residual,3-d,3-d,3-d,Sigma,Sigma,Sigma,Correction,Correction,Correction,Coordinate,\
-     Coordinate,Coordinate,Sigma,Sigma,Sigma,Correlation,Correlation,Correlation",
-    "ID,,,,,Latitude,Longitude,Radius,Latitude,Longitude,Radius,Latitude,Longitude,Radius,X,Y,Z,X,Y,Z,X Y,X Z,Y Z",
-    "Label,Status,Measures,Measures,RMS,(dd),(dd),(km),(m),(m),(m),(m),(m),(m),(km),(km),(km),(m),(m),(m),,,",
+     Coordinate,Coordinate,Sigma,Sigma,Sigma,Correlation,Correlation,Correlation,Relative Sigma,Relative Sigma,Relative Sigma",
+    "ID,,,,,Latitude,Longitude,Radius,Latitude,Longitude,Radius,Latitude,Longitude,Radius,X,Y,Z,X,Y,Z,X Y,X Z,Y Z,Latitude,Longitude,Radius",
+    "Label,Status,Measures,Measures,RMS,(dd),(dd),(km),(m),(m),(m),(m),(m),(m),(km),(km),(km),(m),(m),(m),,,,(m),(m),(m)",
 ];
 
 pub(super) fn write_points(path: &Path, rows: &[PointRow]) -> Result<u64> {
@@ -160,6 +163,8 @@ pub(super) fn write_points(path: &Path, rows: &[PointRow]) -> Result<u64> {
         let correlation =
             |(a, b): (usize, usize)| covariance_m2[(a, b)] / (sigmas_m[a] * sigmas_m[b]);
         fields.extend([(0, 1), (0, 2), (1, 2)].map(|pair| number(correlation(pair))));
+        let relative_m = row.relative_sigmas_m;
+        fields.extend(north_east_up.map(|axis| optional(relative_m.map(|of| of[axis]))));
         fields
     };
     write(path, &POINT_HEADS, rows.iter().map(fields))

@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
-    adjusted::{adjusted, isis_name, tie_sigmas_px},
+    adjusted::{adjusted, isis_name, shared_sigma_m, tie_sigmas_px},
     bundleout::{ImageRow, PointRow, ResidualRow, write_images, write_points, write_residuals},
     control_network::{ControlNetwork, NetworkMeasure, NetworkPoint, write_control_network},
-    points::ImageMeasure,
+    points::{ImageMeasure, shared_in_words},
 };
 use crate::{
     AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts,
@@ -203,8 +203,9 @@ impl<'a> Joined<'a> {
             }
         };
         let description = format!(
-            "tie points of areograph, adjusted; {}",
-            self.site.config.body.names().short_frame
+            "tie points of areograph, adjusted; {}; {}",
+            self.site.config.body.names().short_frame,
+            shared_in_words(shared_sigma_m(self.adjustment)),
         );
         ControlNetwork {
             id: &self.site.config.site,
@@ -264,6 +265,7 @@ impl<'a> Joined<'a> {
                 measures: residuals.len(),
                 rms_px: root_mean_square(residuals.as_flattened()),
                 ground: adjusted(point),
+                relative_sigmas_m: point.relative_sigmas_m(),
                 initial_m: point.initial.xyz_m,
             }
         };

@@ -4,6 +4,9 @@
 //! upper triangles of covariances of latitude, longitude and radius in radians and metres. Lines and samples
 //! have the middle of the first pixel at 1.
 //!
+//! The matrix of a point contains the shift that all points of its profile share; `sharedErrors`, a member that ISIS does not
+//! read, states it by profiles. The identifier of a point begins with its profile.
+//!
 //! ISIS (2024) takes the adjusted radius from the member `radius` when it reads such a file: the adjusted
 //! members are for other readers.
 //!
@@ -48,10 +51,35 @@ pub struct LidarPoint<'a> {
     pub measures: Vec<ImageMeasure<'a>>,
 }
 
+/// Shift of a profile, an error that all its points share.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ProfileShift<'a> {
+    /// Identifier of the profile.
+    pub profile: &'a str,
+    /// Standard deviations towards east, north and up before the adjustment, metres.
+    pub apriori_sigma_m: [f64; 3],
+    /// The same after it.
+    pub adjusted_sigma_m: [f64; 3],
+}
+
 #[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
 struct Document<'a> {
     points: Vec<Point<'a>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    shared_errors: Vec<SharedError<'a>>,
 }
+
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+struct SharedError<'a> {
+    profile: &'a str,
+    meaning: &'static str,
+    apriori_sigma_east_north_up: [f64; 3],
+    adjusted_sigma_east_north_up: [f64; 3],
+}
+
+const SHARED: &str = "metres; all points of the profile share this shift: their matrices contain it, and it does not average out";
 
 /// Members in the order of ISIS, which is that of the alphabet.
 #[derive(Serialize)]
@@ -99,19 +127,33 @@ pub fn isis_serial_number(image: &ImageTimes) -> Option<String> {
     Some(format!("{spacecraft}/{}/{camera}", clock.trim()))
 }
 
-/// Writes `points` to `path`, which must end in `.json` for ISIS to take it, and reads it back.
+/// Writes `points` to `path`, which must end in `.json` for ISIS to take it, and reads it back; `shifts` are those of their
+/// profiles.
 ///
 /// # Errors
 /// [`Kind::Bug`](areograph_base::error::Kind::Bug) for values that ISIS would reject or misread: ranges,
 /// their standard deviations and variances that are not above 0, numbers that are not finite, two points of
 /// one identifier; [`Kind::Io`](areograph_base::error::Kind::Io).
-pub fn write_lidar_data(path: &Path, points: &[LidarPoint]) -> Result<u64> {
+pub fn write_lidar_data(
+    path: &Path,
+    shifts: &[ProfileShift],
+    points: &[LidarPoint],
+) -> Result<u64> {
     let mut ids = BTreeSet::new();
     for point in points {
         check(point, &mut ids).in_file(path)?;
     }
     let points = points.iter().map(Point::new).collect();
-    let document = Document { points };
+    let shared = shifts.iter().map(|shift| SharedError {
+        profile: shift.profile,
+        meaning: SHARED,
+        apriori_sigma_east_north_up: shift.apriori_sigma_m,
+        adjusted_sigma_east_north_up: shift.adjusted_sigma_m,
+    });
+    let document = Document {
+        points,
+        shared_errors: shared.collect(),
+    };
     write_json(path, &document)?;
     Ok(document.points.len() as u64)
 }

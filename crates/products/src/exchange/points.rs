@@ -51,6 +51,22 @@ impl GroundEstimate {
     }
 }
 
+/// The error that tie points share, for the comments of formats that state each point alone; standard deviations towards
+/// east, north and up, metres.
+pub(super) fn shared_in_words(sigma_m: Option<[f64; 3]>) -> String {
+    let size = sigma_m.map_or_else(
+        || "the error of the a priori orientations".to_owned(),
+        |[east_m, north_m, up_m]| {
+            format!(
+                "an error of {east_m:.1} m east, {north_m:.1} m north and {up_m:.1} m up (standard deviations)"
+            )
+        },
+    );
+    format!(
+        "all points share {size}: the standard deviations contain it, and it does not average out"
+    )
+}
+
 /// Rejects a value that is not above 0.
 pub(super) fn above_zero(what: &str, value: f64) -> Result<(), ProductError> {
     // Written so that NaN is rejected too.

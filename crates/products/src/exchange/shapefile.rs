@@ -348,7 +348,7 @@ mod tests {
 
     /// The library would report a full disk as an error of its own.
     #[test]
-    fn a_full_disk_is_told_as_such() {
+    fn a_full_disk_is_reported_as_such() {
         let full = Path::new("/dev/full");
         let failure = write_attributes(full, example().newest_utc, &table()).unwrap_err();
         assert_eq!(failure.kind(), FailureKind::Io);

@@ -187,49 +187,49 @@ fn lola_like<'a>() -> Vec<Column<Shot<'a>>> {
             "longitude_deg",
             Unit::Degree,
             "east longitude, degrees",
-            |shot: &Shot| degrees(shot.get(|of| &of.longitude_rad)),
+            |shot: &Shot| degrees(shot.get(|footprints| &footprints.longitude_rad)),
         )
         .decimals(DEGREE_DECIMALS),
         column(
             "latitude_deg",
             Unit::Degree,
             "areocentric latitude, degrees",
-            |shot: &Shot| degrees(shot.get(|of| &of.latitude_rad)),
+            |shot: &Shot| degrees(shot.get(|footprints| &footprints.latitude_rad)),
         )
         .decimals(DEGREE_DECIMALS),
         column(
             "radius_crossover_km",
             Unit::Kilometre,
             "radius after the crossover correction, kilometres",
-            |shot: &Shot| shot.get(|of| &of.radius_crossover_m) / METRES_PER_KM,
+            |shot: &Shot| shot.get(|footprints| &footprints.radius_crossover_m) / METRES_PER_KM,
         )
         .decimals(KM_DECIMALS),
         column(
             "range_km",
             Unit::Kilometre,
             "one-way range, kilometres",
-            |shot: &Shot| shot.get(|of| &of.range_m) / METRES_PER_KM,
+            |shot: &Shot| shot.get(|footprints| &footprints.range_m) / METRES_PER_KM,
         )
         .decimals(KM_DECIMALS),
         column(
             "radius_km",
             Unit::Kilometre,
             "radius before the crossover correction, kilometres",
-            |shot: &Shot| shot.get(|of| &of.radius_m) / METRES_PER_KM,
+            |shot: &Shot| shot.get(|footprints| &footprints.radius_m) / METRES_PER_KM,
         )
         .decimals(KM_DECIMALS),
         column(
             "et_s",
             Unit::Second,
             "corrected time of the shot, TDB seconds past J2000",
-            |shot: &Shot| shot.get(|of| &of.et_s),
+            |shot: &Shot| shot.get(|footprints| &footprints.et_s),
         )
         .decimals(SECOND_DECIMALS),
         column(
             "orbit",
             Unit::None,
             "orbit number of the frame",
-            |shot: &Shot| shot.get(|of| &of.orbit),
+            |shot: &Shot| shot.get(|footprints| &footprints.orbit),
         ),
     ]
 }
@@ -241,14 +241,14 @@ fn ode_points<'a>() -> Vec<Column<Shot<'a>>> {
             "LONG_EAST",
             Unit::Degree,
             "east longitude, degrees",
-            |shot: &Shot| degrees(shot.get(|of| &of.longitude_rad)),
+            |shot: &Shot| degrees(shot.get(|footprints| &footprints.longitude_rad)),
         )
         .decimals(DEGREE_DECIMALS),
         column(
             "LAT_NORTH",
             Unit::Degree,
             "areocentric latitude, degrees",
-            |shot: &Shot| degrees(shot.get(|of| &of.latitude_rad)),
+            |shot: &Shot| degrees(shot.get(|footprints| &footprints.latitude_rad)),
         )
         .decimals(DEGREE_DECIMALS),
         column(
@@ -262,28 +262,28 @@ fn ode_points<'a>() -> Vec<Column<Shot<'a>>> {
             "RANGE",
             Unit::Metre,
             "one-way range, metres",
-            |shot: &Shot| shot.get(|of| &of.range_m),
+            |shot: &Shot| shot.get(|footprints| &footprints.range_m),
         )
         .decimals(METRE_DECIMALS),
         column(
             "PLANET_RAD",
             Unit::Metre,
             "radius after the crossover correction, metres",
-            |shot: &Shot| shot.get(|of| &of.radius_crossover_m),
+            |shot: &Shot| shot.get(|footprints| &footprints.radius_crossover_m),
         )
         .decimals(METRE_DECIMALS),
         column(
             "EPHEMERIS_TIME",
             Unit::Second,
             "corrected time of the shot, TDB seconds past J2000",
-            |shot: &Shot| shot.get(|of| &of.et_s),
+            |shot: &Shot| shot.get(|footprints| &footprints.et_s),
         )
         .decimals(SECOND_DECIMALS),
         column(
             "ORBIT",
             Unit::None,
             "orbit number of the frame",
-            |shot: &Shot| shot.get(|of| &of.orbit),
+            |shot: &Shot| shot.get(|footprints| &footprints.orbit),
         ),
     ]
 }

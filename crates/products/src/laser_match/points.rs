@@ -82,7 +82,7 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "model_radius_m",
             Unit::Metre,
-            "height of the model there, from the centre of Mars, metres",
+            "distance of the model surface from the centre of Mars at this point, metres",
             |row: &Row| row.model[2],
         ),
         column(

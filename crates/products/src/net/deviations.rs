@@ -65,7 +65,7 @@ fn columns<'a>() -> Vec<Column<&'a MeasurementResult>> {
         column(
             "redundancy",
             Unit::None,
-            "share of an error of this measurement that shows in its deviation, 0 to 1",
+            "fraction of an error of this measurement that appears in its deviation, 0 to 1",
             |row: &Row| row.redundancy,
         ),
         column(

@@ -52,7 +52,7 @@ pub(super) static MARKS: Declaration = Declaration {
         if of
             .site
             .overlays
-            .and_then(|of| of.quick_look(image))
+            .and_then(|overlays| overlays.quick_look(image))
             .is_none()
         {
             return Ok(None);
@@ -100,7 +100,7 @@ fn features(of: &Context, image: usize) -> Vec<Value> {
     let rejected = geometric
         .adjustment
         .iter()
-        .flat_map(|of| &of.adjusted.rejected);
+        .flat_map(|adjustment| &adjustment.adjusted.rejected);
     let rejected: Vec<_> = rejected
         .filter(|point| point.kind == PointKind::Tie)
         .collect();

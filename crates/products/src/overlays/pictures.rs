@@ -52,7 +52,11 @@ pub fn strip(site: &SiteProducts, image: usize, pixels_max: u64) -> Result<Optio
     let place = |[line, sample]: [f64; 2]| [sample / reduction, line / reduction];
     let spacing = spacing(&marked) / reduction;
     let [step, number_step] = [MARKS_APART, NUMBERS_APART].map(|apart| step(apart / spacing));
-    let shown = || marked.iter().filter(|of| of.number % step == 0);
+    let shown = || {
+        marked
+            .iter()
+            .filter(|footprint| footprint.number % step == 0)
+    };
     for footprint in shown() {
         for (mark, at) in [
             (Mark::Before, footprint.before),

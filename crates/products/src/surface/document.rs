@@ -11,7 +11,7 @@ use areograph_geom::statistics::Summary;
 use areograph_stages::map_surface::{ProfileOnSurface, Surface};
 
 /// Definitions of the numbers, for readers of the file.
-const DEFINITIONS: [(&str, &str); 5] = [
+const DEFINITIONS: [(&str, &str); 7] = [
     (
         "cells",
         "common: cells that both images show by their orientation; filled: those with a height; unfilled: the others by reason: flat \
@@ -20,7 +20,18 @@ const DEFINITIONS: [(&str, &str); 5] = [
     ),
     (
         "sigma_m",
-        "root mean square of the standard deviations in surface_sigma.tif: those of the matching, of one cell against the others",
+        "root mean square of the standard deviations in surface_sigma.tif, of one cell against the others: by its match, by \
+         jitter_m and by smoothing_m",
+    ),
+    (
+        "jitter_m",
+        "standard deviation by jitter of the images against each other: the scatter of their shifts across the parallax, where no \
+         height moves them, without that of the matches",
+    ),
+    (
+        "smoothing_m",
+        "standard deviation of the height of a place against the mean of the compared square, by the relief of the model over two \
+         and four squares",
     ),
     (
         "common_sigma_m",
@@ -102,6 +113,10 @@ struct Heights {
     sphere_m: f64,
     #[schemars(range(min = 0.0))]
     sigma_m: f64,
+    #[schemars(range(min = 0.0))]
+    jitter_m: f64,
+    #[schemars(range(min = 0.0))]
+    smoothing_m: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     common_sigma_m: Option<f64>,
 }
@@ -153,6 +168,8 @@ impl<'a> Document<'a> {
             heights: Heights {
                 sphere_m: surface.model.heights.radius_m,
                 sigma_m: account.sigma_m,
+                jitter_m: account.jitter_m,
+                smoothing_m: account.smoothing_m,
                 common_sigma_m: account.common_sigma_m,
             },
             mola_minus_surface: Shots {

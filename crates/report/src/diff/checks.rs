@@ -32,14 +32,14 @@ pub(super) fn changed(site: &RunDifference) -> String {
     let mut table = Table::new("Checks that changed", columns);
     for (words, before, after) in rows {
         let fails = after.is_some_and(|check| check.outcome == CheckOutcome::Fail);
-        let [before, after] = [before, after].map(|check| check.map_or("–".to_owned(), told));
+        let [before, after] = [before, after].map(|check| check.map_or("–".to_owned(), in_words));
         table.row(!fails, [words.into(), before.into(), after.into()]);
     }
     table.finish()
 }
 
 /// Outcome, value and limit of a check in the form of pages, and its subject.
-fn told(check: &Check) -> String {
+fn in_words(check: &Check) -> String {
     let word = match check.outcome {
         CheckOutcome::Fail => "fail",
         CheckOutcome::Warning => "warning",

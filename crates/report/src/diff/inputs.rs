@@ -210,11 +210,11 @@ fn item_table(what: &str, items: &Items) -> String {
 
 /// Notes and problems of one run only.
 pub(super) fn texts(site: &RunDifference) -> String {
-    let told = |texts: &Texts, what: &str| {
+    let folded_list = |texts: &Texts, what: &str| {
         let runs = [(&texts.only_in_a, "A"), (&texts.only_in_b, "B")].into_iter();
         runs.filter(|(texts, _)| !texts.is_empty())
             .map(|(texts, whose)| paragraph(&format!("{what} only in {whose}:")) + &list(texts))
             .collect::<String>()
     };
-    told(&site.notes, "Notes") + &told(&site.complaints, "Problems")
+    folded_list(&site.notes, "Notes") + &folded_list(&site.complaints, "Problems")
 }

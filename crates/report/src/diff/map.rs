@@ -70,9 +70,9 @@ pub(super) fn figure_of(site: &RunDifference) -> Result<String> {
         height,
         ..Panel::of("north, km", Vec::new())
     };
-    let mut told = Vec::new();
+    let mut parts = Vec::new();
     for (colour, (name, arrows)) in groups.into_iter().enumerate() {
-        told.push(format!("{} {name}", whole(arrows.len())));
+        parts.push(format!("{} {name}", whole(arrows.len())));
         let places = arrows.iter().map(|arrow| arrow.from).collect();
         panel.series.push(Series::dots(name, colour, places));
         let drawn = |arrow: &Arrow| METRES_PER_KM * arrow.by.0.hypot(arrow.by.1) > DRAWN_FROM_M;
@@ -87,7 +87,7 @@ pub(super) fn figure_of(site: &RunDifference) -> Result<String> {
     }
     let words = format!(
         "Positions in A and their movements to B, {times} × magnified: {}. Kilometres east and north of their mean.",
-        told.join(", ")
+        parts.join(", ")
     );
     let title = format!("{}: movements on the ground", site.site);
     figure(&Plot {

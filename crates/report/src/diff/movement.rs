@@ -16,7 +16,8 @@ pub(super) fn tables(site: &RunDifference) -> String {
     if site.footprints.moved() {
         body += &footprints(site);
     }
-    let images: Vec<&ImageDifference> = site.images.iter().filter(|of| of.differs()).collect();
+    let images: Vec<&ImageDifference> =
+        site.images.iter().filter(|image| image.differs()).collect();
     if !images.is_empty() {
         body += &positions(&images, &site.limits);
         body += &pointing(&images, &site.limits);

@@ -145,12 +145,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn changes_are_told_by_key() {
+    fn changes_are_listed_by_key() {
         let a =
             json!({"limits": {"mean_max_m": 5.0, "shots_min": 10}, "classes": [1], "gone": "x"});
         let b =
             json!({"limits": {"mean_max_m": 9.0, "shots_min": 10}, "classes": [0, 1], "new": true});
-        let told: Vec<String> = between(&a, &b)
+        let changes: Vec<String> = between(&a, &b)
             .iter()
             .map(|change| {
                 let [a, b] = [&change.a, &change.b].map(|value| text(value.as_ref()));
@@ -158,7 +158,7 @@ mod tests {
             })
             .collect();
         assert_eq!(
-            told,
+            changes,
             [
                 "classes: [1] → [0,1]",
                 "gone: x → –",

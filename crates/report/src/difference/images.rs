@@ -84,7 +84,7 @@ pub struct ImageMovement {
     pub about_y_arcsec: Component,
     /// Turn about the boresight.
     pub about_z_arcsec: Component,
-    /// Turn of the boresight × its range: effect of the turn on the ground, across the line of sight.
+    /// Change of the boresight direction times its range: the displacement on the ground across the line of sight.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pointing_ground_m: Option<Size>,
     /// Distance between the points where the boresight meets the ellipsoid: position and turn together.
@@ -120,7 +120,7 @@ pub struct SampleMovement {
     pub about_y_arcsec: f64,
     /// About the boresight.
     pub about_z_arcsec: f64,
-    /// Turn of the boresight × its range.
+    /// Change of the boresight direction times its range.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
     pub pointing_ground_m: Option<f64>,
@@ -339,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn movements_are_told_along_the_orbit_and_turns_about_the_camera() {
+    fn movements_are_stated_along_the_orbit_and_turns_about_the_camera() {
         let a = rows(&[-10.0, 0.0, 10.0]);
         let mut b = a.clone();
         // North is along the flight, up is radial; radial × along is west of a polar orbit flown north.

@@ -170,7 +170,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn kernels_of_one_name_are_told_apart_and_order_counts() {
+    fn kernels_of_one_name_are_distinguished_and_order_counts() {
         let list = |entries: &[(&'static str, &'static str)]| {
             items(entries.iter().map(|(name, hash)| (*name, None, *hash)))
         };

@@ -67,8 +67,9 @@ impl Limits {
         let image = &difference.image;
         let Some(movement) = &difference.movement else {
             let asked = self.movement_m.or(self.pointing_arcsec).is_some();
-            let told = format!("image {image}: no sample of A is in B: limits cannot be applied");
-            return Vec::from_iter((asked && difference.samples_only_in_a > 0).then_some(told));
+            let sentence =
+                format!("image {image}: no sample of A is in B: limits cannot be applied");
+            return Vec::from_iter((asked && difference.samples_only_in_a > 0).then_some(sentence));
         };
         let ground_m = movement.boresight_ground_m.map_or(0.0, |ground| ground.max);
         let (metres, arcseconds) = (self.movement_m, self.pointing_arcsec);
@@ -122,10 +123,10 @@ mod tests {
         for limit in [0.0, 1e-9, 1e-3] {
             assert_eq!(verdict(0.5e-6, limit), None, "{limit} m");
             assert!(Limits::share(0.5e-6, limit) <= 1.0, "{limit} m");
-            let told = verdict(2e-3, limit);
-            assert!(
-                told.is_some_and(|told| told.starts_with("it moved by up to 0.0020 m, beyond"))
-            );
+            let sentence = verdict(2e-3, limit);
+            assert!(sentence.is_some_and(|sentence| {
+                sentence.starts_with("it moved by up to 0.0020 m, beyond")
+            }));
             assert!(Limits::share(2e-3, limit) > 1.0, "{limit} m");
             assert!(verdict(f64::NAN, limit).is_some());
         }

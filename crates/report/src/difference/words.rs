@@ -68,7 +68,7 @@ impl RunDifference {
 
     /// The largest movements of each kind.
     fn farthest(&self) -> Vec<String> {
-        let mut told = self.footprints_moved();
+        let mut sentences = self.footprints_moved();
         let images = || {
             self.images
                 .iter()
@@ -80,90 +80,90 @@ impl RunDifference {
         let turn_arcsec = up_to(|movement| movement.turn_arcsec.max);
         let ground_m = up_to(|movement| movement.boresight_ground_m.map_or(0.0, |size| size.max));
         if images().any(|movement| movement.distance_m.moved()) {
-            told.push(format!("cameras by up to {} m", quantity(distance_m)));
+            sentences.push(format!("cameras by up to {} m", quantity(distance_m)));
         }
         if images().any(|movement| movement.turn_arcsec.moved()) {
-            told.push(format!(
+            sentences.push(format!(
                 "pointing by up to {} arcsec",
                 quantity(turn_arcsec)
             ));
         }
         if images().any(|movement| movement.boresight_ground_m.is_some_and(|size| size.moved())) {
-            told.push(format!(
+            sentences.push(format!(
                 "boresights on the ground by up to {} m",
                 quantity(ground_m)
             ));
         }
         if images().any(|movement| movement.time_s.moved()) {
-            told.push(format!("lines in time by up to {} s", quantity(time_s)));
+            sentences.push(format!("lines in time by up to {} s", quantity(time_s)));
         }
-        told
+        sentences
     }
 
     /// Changes, one sentence each, the inputs first; unchanged items are omitted.
     #[must_use]
     pub fn sentences(&self) -> Vec<String> {
-        let mut told = Vec::new();
+        let mut sentences = Vec::new();
         // A changed verdict comes first.
         let verdict_changed = self.verdict_changed();
         if verdict_changed {
-            told.push(self.verdict_sentence());
+            sentences.push(self.verdict_sentence());
         }
-        told.extend(self.of_inputs());
-        told.extend(values("biases", &self.biases));
-        told.extend(values("counts", &self.counts));
-        told.extend(values("figures", &self.figures));
-        told.extend(values("rejected shots", &self.rejected));
-        told.extend(texts("complaints", &self.complaints));
-        told.extend(texts("notes", &self.notes));
+        sentences.extend(self.of_inputs());
+        sentences.extend(values("biases", &self.biases));
+        sentences.extend(values("counts", &self.counts));
+        sentences.extend(values("figures", &self.figures));
+        sentences.extend(values("rejected shots", &self.rejected));
+        sentences.extend(texts("complaints", &self.complaints));
+        sentences.extend(texts("notes", &self.notes));
         if self.outcome != Outcome::NothingChanged {
-            told.push(self.stages_sentence());
-            told.extend(self.of_movements(|_| true));
+            sentences.push(self.stages_sentence());
+            sentences.extend(self.of_movements(|_| true));
         }
         if !verdict_changed {
-            told.push(self.verdict_sentence());
+            sentences.push(self.verdict_sentence());
         }
-        told
+        sentences
     }
 
     /// The same without the contents of the tables below, and without unmoved images.
     #[must_use]
     pub fn first_sentences(&self) -> Vec<String> {
-        let mut told = self.of_inputs();
-        told.extend(texts("complaints", &self.complaints));
-        told.extend(texts("notes", &self.notes));
+        let mut sentences = self.of_inputs();
+        sentences.extend(texts("complaints", &self.complaints));
+        sentences.extend(texts("notes", &self.notes));
         if self.outcome != Outcome::NothingChanged {
-            told.extend(self.of_movements(ImageDifference::differs));
+            sentences.extend(self.of_movements(ImageDifference::differs));
         }
         if !self.verdict_changed() {
-            told.push(self.verdict_sentence());
+            sentences.push(self.verdict_sentence());
         }
-        told
+        sentences
     }
 
     /// Program, kernels and configuration.
     fn of_inputs(&self) -> Vec<String> {
-        let mut told = Vec::new();
+        let mut sentences = Vec::new();
         if self.a.version != self.b.version {
-            told.push(format!(
+            sentences.push(format!(
                 "areograph: {} → {}",
                 self.a.version, self.b.version
             ));
         }
-        told.extend(items("kernels", &self.kernels));
+        sentences.extend(items("kernels", &self.kernels));
         if self.configuration_changed {
-            told.push(self.configuration_sentence());
+            sentences.push(self.configuration_sentence());
         }
-        told
+        sentences
     }
 
     /// Footprints, profiles and the `wanted` images.
     fn of_movements(&self, wanted: fn(&ImageDifference) -> bool) -> Vec<String> {
-        let mut told = vec![format!("footprints: {}", self.footprints_sentence())];
-        told.extend(self.profiles_sentence());
+        let mut sentences = vec![format!("footprints: {}", self.footprints_sentence())];
+        sentences.extend(self.profiles_sentence());
         let images = self.images.iter().filter(|image| wanted(image));
-        told.extend(images.map(image_sentence));
-        told
+        sentences.extend(images.map(image_sentence));
+        sentences
     }
 
     fn configuration_sentence(&self) -> String {
@@ -179,16 +179,16 @@ impl RunDifference {
         let stages = &self.stages;
         let moved = stages.changed.iter().map(|stage| &*stage.name);
         let new = stages.added.iter().map(|stage| &*stage.name);
-        let mut told = vec![format!(
+        let mut sentences = vec![format!(
             "stages with changed inputs: {}",
             names(moved.chain(new).collect())
         )];
         if !stages.removed.is_empty() {
             let gone = stages.removed.iter().map(|stage| &*stage.name).collect();
-            told.push(format!("removed: {}", names(gone)));
+            sentences.push(format!("removed: {}", names(gone)));
         }
-        told.push(format!("the same: {}", stages.unchanged));
-        told.join("; ")
+        sentences.push(format!("the same: {}", stages.unchanged));
+        sentences.join("; ")
     }
 
     /// Movement of footprints.
@@ -196,9 +196,9 @@ impl RunDifference {
         let Some(movement) = &self.footprints.movement else {
             return Vec::new();
         };
-        let mut told = Vec::new();
+        let mut sentences = Vec::new();
         if movement.moved > 0 {
-            told.push(format!(
+            sentences.push(format!(
                 "{} of {} footprints by up to {} m",
                 movement.moved,
                 self.footprints.matched,
@@ -207,20 +207,20 @@ impl RunDifference {
         }
         if movement.topography_m.moved() {
             let heights = signed(movement.topography_m, "m");
-            told.push(format!("heights of footprints by {heights}"));
+            sentences.push(format!("heights of footprints by {heights}"));
         }
         if movement.time_s.moved() {
             let times = signed(movement.time_s, "s");
-            told.push(format!("times of footprints by {times}"));
+            sentences.push(format!("times of footprints by {times}"));
         }
-        told
+        sentences
     }
 
     /// Items that are in one run only, or cannot be compared.
     fn not_compared(&self) -> Vec<String> {
         let footprints = &self.footprints;
         let unmatched = unmatched(footprints.only_in_a, footprints.only_in_b, " footprints");
-        let mut told: Vec<String> = unmatched.collect();
+        let mut sentences: Vec<String> = unmatched.collect();
         let without = |only_in_one: bool| {
             let images = self.images.iter().filter(|image| image.movement.is_none());
             images
@@ -232,21 +232,21 @@ impl RunDifference {
             (without(false), "without a line in common"),
         ] {
             if count > 0 {
-                told.push(format!("{count} image(s) {why}"));
+                sentences.push(format!("{count} image(s) {why}"));
             }
         }
-        told
+        sentences
     }
 
     /// Footprints, without the word.
     fn footprints_sentence(&self) -> String {
         let footprints = &self.footprints;
-        let mut told = vec![format!("{} in both", footprints.matched)];
+        let mut sentences = vec![format!("{} in both", footprints.matched)];
         if let Some(movement) = &footprints.movement {
-            told.push(match &movement.farthest {
+            sentences.push(match &movement.farthest {
                 None => "none moved".to_owned(),
                 Some(farthest) => format!(
-                    "{} moved, by {} m in the mean and up to {} m ({} record {} shot {})",
+                    "{} moved, by {} m on average and up to {} m ({} record {} shot {})",
                     movement.moved,
                     quantity(movement.distance_m.mean),
                     quantity(movement.distance_m.max),
@@ -256,19 +256,19 @@ impl RunDifference {
                 ),
             });
             if movement.topography_m.moved() {
-                told.push(format!("heights by {}", signed(movement.topography_m, "m")));
+                sentences.push(format!("heights by {}", signed(movement.topography_m, "m")));
             }
             if movement.time_s.moved() {
-                told.push(format!("times by {}", signed(movement.time_s, "s")));
+                sentences.push(format!("times by {}", signed(movement.time_s, "s")));
             }
         }
-        told.extend(unmatched(footprints.only_in_a, footprints.only_in_b, ""));
-        told.join(", ")
+        sentences.extend(unmatched(footprints.only_in_a, footprints.only_in_b, ""));
+        sentences.join(", ")
     }
 
     fn profiles_sentence(&self) -> Option<String> {
         let changed = self.profiles.iter().filter(|profile| profile.changed);
-        let told: Vec<String> = changed
+        let sentences: Vec<String> = changed
             .map(|profile| match (&profile.a, &profile.b) {
                 (Some(a), Some(b)) => {
                     let change_m = b.range_minus_distance_m.mean - a.range_minus_distance_m.mean;
@@ -282,7 +282,7 @@ impl RunDifference {
                 _ => format!("{} only in B", profile.profile),
             })
             .collect();
-        (!told.is_empty()).then(|| format!("range residuals of profiles: {}", few(&told)))
+        (!sentences.is_empty()).then(|| format!("range residuals of profiles: {}", few(&sentences)))
     }
 
     fn verdict_sentence(&self) -> String {
@@ -292,13 +292,13 @@ impl RunDifference {
         }
         let all = |verdict: &Verdict| [&verdict.reasons[..], &verdict.remarks].concat();
         let differ = Texts::between(&all(a), &all(b));
-        let mut told = vec![format!("verdict: {} → {}", a.word(), b.word())];
+        let mut sentences = vec![format!("verdict: {} → {}", a.word(), b.word())];
         for (texts, tense) in [(&differ.only_in_a, "no longer"), (&differ.only_in_b, "now")] {
             if !texts.is_empty() {
-                told.push(format!("{tense}: {}", texts.join("; ")));
+                sentences.push(format!("{tense}: {}", texts.join("; ")));
             }
         }
-        told.join("; ")
+        sentences.join("; ")
     }
 }
 
@@ -306,7 +306,7 @@ impl RunDifference {
 fn signed(component: Component, unit: &str) -> String {
     let Component { mean, max_abs } = component;
     format!(
-        "{} {unit} in the mean, at most {} {unit}",
+        "{} {unit} on average, at most {} {unit}",
         quantity(mean),
         quantity(max_abs)
     )
@@ -318,25 +318,25 @@ fn change(change: &Change) -> String {
 }
 
 fn values(what: &str, changes: &[Change]) -> Option<String> {
-    let told: Vec<String> = changes.iter().map(change).collect();
-    (!told.is_empty()).then(|| format!("{what}: {}", told.join("; ")))
+    let sentences: Vec<String> = changes.iter().map(change).collect();
+    (!sentences.is_empty()).then(|| format!("{what}: {}", sentences.join("; ")))
 }
 
 fn texts(what: &str, texts: &Texts) -> Option<String> {
     let runs = [(&texts.only_in_a, "A"), (&texts.only_in_b, "B")].into_iter();
-    let told: Vec<String> = runs
+    let sentences: Vec<String> = runs
         .filter(|(texts, _)| !texts.is_empty())
         .map(|(texts, whose)| format!("only in {whose}: {}", few(texts)))
         .collect();
-    (!texts.is_empty()).then(|| format!("{what} {}", told.join("; ")))
+    (!texts.is_empty()).then(|| format!("{what} {}", sentences.join("; ")))
 }
 
 /// The first texts; the others are counted.
 fn few(texts: &[String]) -> String {
-    let told = texts[..texts.len().min(FEW)].join("; ");
+    let sentences = texts[..texts.len().min(FEW)].join("; ");
     match texts.len().saturating_sub(FEW) {
-        0 => told,
-        more => format!("{told}; and {more} more"),
+        0 => sentences,
+        more => format!("{sentences}; and {more} more"),
     }
 }
 
@@ -352,16 +352,21 @@ fn items(what: &str, items: &Items) -> Option<String> {
             .collect()
     };
     let changed = items.changed.iter();
-    let mut told: Vec<String> = changed
+    let mut sentences: Vec<String> = changed
         .map(|item| named(&item.name, item.role.as_ref(), "changed"))
         .collect();
-    told.extend(unmatched(&items.removed, "removed"));
-    told.extend(unmatched(&items.added, "added"));
+    sentences.extend(unmatched(&items.removed, "removed"));
+    sentences.extend(unmatched(&items.added, "added"));
     if items.reordered {
-        told.push("another load order".to_owned());
+        sentences.push("another load order".to_owned());
     }
-    (!items.is_empty())
-        .then(|| format!("{what}: {}; {} unchanged", told.join(", "), items.unchanged))
+    (!items.is_empty()).then(|| {
+        format!(
+            "{what}: {}; {} unchanged",
+            sentences.join(", "),
+            items.unchanged
+        )
+    })
 }
 
 fn image_sentence(image: &ImageDifference) -> String {
@@ -373,10 +378,10 @@ fn image_sentence(image: &ImageDifference) -> String {
             _ => format!("image {name}: no sample at the same line in both"),
         };
     };
-    let mut told = Vec::new();
-    told.push(if movement.distance_m.moved() {
+    let mut sentences = Vec::new();
+    sentences.push(if movement.distance_m.moved() {
         format!(
-            "moved by {} m in the mean, up to {} m (mean radial {}, along {}, cross {})",
+            "moved by {} m on average, up to {} m (mean radial {}, along {}, cross {})",
             quantity(movement.distance_m.mean),
             quantity(movement.distance_m.max),
             quantity(movement.radial_m.mean),
@@ -386,9 +391,9 @@ fn image_sentence(image: &ImageDifference) -> String {
     } else {
         "not moved".to_owned()
     });
-    told.push(if movement.turn_arcsec.moved() {
+    sentences.push(if movement.turn_arcsec.moved() {
         format!(
-            "turned by {} arcsec in the mean, up to {} (mean about x {}, y {}, z {})",
+            "turned by {} arcsec on average, up to {} (mean about x {}, y {}, z {})",
             quantity(movement.turn_arcsec.mean),
             quantity(movement.turn_arcsec.max),
             quantity(movement.about_x_arcsec.mean),
@@ -399,19 +404,19 @@ fn image_sentence(image: &ImageDifference) -> String {
         "not turned".to_owned()
     });
     if let Some(ground_m) = movement.boresight_ground_m.filter(Size::moved) {
-        told.push(format!(
-            "boresight on the ground by {} m in the mean, up to {} m",
+        sentences.push(format!(
+            "boresight on the ground by {} m on average, up to {} m",
             quantity(ground_m.mean),
             quantity(ground_m.max)
         ));
     }
     if movement.time_s.moved() {
         let times = signed(movement.time_s, "s");
-        told.push(format!("lines at other times, by {times}"));
+        sentences.push(format!("lines at other times, by {times}"));
     }
     let (a, b) = (image.samples_only_in_a, image.samples_only_in_b);
-    told.extend(unmatched(a, b, " samples"));
-    format!("image {name}: {}", told.join("; "))
+    sentences.extend(unmatched(a, b, " samples"));
+    format!("image {name}: {}", sentences.join("; "))
 }
 
 /// Items in one run only.

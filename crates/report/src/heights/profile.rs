@@ -17,7 +17,7 @@ const AFTER: usize = 0;
 
 /// Heights above the ellipsoid, and below them above the surface.
 pub(super) fn plot(geometric: &GeometricProducts) -> Plot {
-    let after = geometric.adjustment.map(|of| of.heights);
+    let after = geometric.adjustment.map(|adjustment| adjustment.heights);
     // The surface is drawn below the points that it controls.
     let latest = after.unwrap_or(geometric.heights);
     let axes = middle_axes(geometric.heights);
@@ -71,7 +71,7 @@ pub(super) fn plot(geometric: &GeometricProducts) -> Plot {
 fn without_extremes(series: &[Series]) -> Extent {
     let mut values: Vec<f64> = series
         .iter()
-        .flat_map(|of| of.points.iter().map(|point| point.1))
+        .flat_map(|line| line.points.iter().map(|point| point.1))
         .collect();
     values.sort_unstable_by(f64::total_cmp);
     let outermost = values.len() / OUTERMOST;
@@ -79,7 +79,7 @@ fn without_extremes(series: &[Series]) -> Extent {
 }
 
 fn words(geometric: &GeometricProducts) -> String {
-    let after = geometric.adjustment.map(|of| of.heights);
+    let after = geometric.adjustment.map(|adjustment| adjustment.heights);
     let median = |check: &HeightCheck| label(check.above_m.median, 1);
     let sigmas: Vec<f64> = geometric
         .heights

@@ -6,21 +6,23 @@ use super::super::{
 };
 use areograph_stages::adjust::{Adjusted, OtherReading};
 
-/// Both readings side by side, if the images disagree significantly.
-pub(super) fn two_readings(adjusted: &Adjusted) -> String {
+/// Both readings side by side, if the images disagree significantly; without standard deviations where the accuracy
+/// `is_withheld`.
+pub(super) fn two_readings(adjusted: &Adjusted, is_withheld: bool) -> String {
     match &adjusted.other_reading {
         None => String::new(),
         Some(Err(reason)) => paragraph(&format!(
             "The other reading of the along-track disagreement (adjustment.attitude_clock) gave no result: {reason}."
         )),
-        Some(Ok(other)) => table(adjusted, other) + &paragraph(WORDS),
+        Some(Ok(other)) => table(adjusted, other, is_withheld) + &paragraph(WORDS),
     }
 }
 
-const WORDS: &str = "Tie points show the offset between images, not which image is wrong. A clock offset rotates nadir-tracking images but not \
+const WORDS: &str = "Tie points show the offset between images, but not which image is in error. A clock offset \
+                     rotates nadir-tracking images but not \
     inertially held ones.";
 
-fn table(adjusted: &Adjusted, other: &OtherReading) -> String {
+fn table(adjusted: &Adjusted, other: &OtherReading, is_withheld: bool) -> String {
     let mut table = Table::new(
         "Two readings of the along-track disagreement, metres",
         &[
@@ -53,32 +55,37 @@ fn table(adjusted: &Adjusted, other: &OtherReading) -> String {
         ),
     ];
     for (place, clock_s, moved_m, sigma_m, products) in rows {
-        let mut cells: Vec<Cell> = vec![reading(clock_s).into(), products.into()];
+        let mut cells: Vec<Cell> = vec![reading(clock_s, is_withheld).into(), products.into()];
         let axes = [0, 1, 2];
         cells.extend(axes.map(|axis| {
             // Differences are from the reading that the products follow.
-            let metres = moved_m.map_or_else(|| "–".to_owned(), |of| label(of[axis], 1));
-            Cell::from(metres).told(format!("/moved_m/{axis}"))
+            let metres = moved_m.map_or_else(|| "–".to_owned(), |moved_m| label(moved_m[axis], 1));
+            Cell::from(metres).traced(format!("/moved_m/{axis}"))
         }));
         cells.extend(axes.map(|axis| {
+            if is_withheld {
+                return Cell::from("withheld");
+            }
             let sigma_m = sigma_m.map(|sigma_m| format!("±{}", label(sigma_m[axis], 1)));
             let sigma_m = Cell::from(sigma_m.unwrap_or_else(|| "–".to_owned()));
-            sigma_m.told(format!("/mean_sigma_m/{axis}"))
+            sigma_m.traced(format!("/mean_sigma_m/{axis}"))
         }));
         table.row_of(&format!("adjustment.json#/adjustment/{place}"), true, cells);
     }
     table.finish()
 }
 
-fn reading(clock_s: Option<(f64, f64)>) -> String {
+fn reading(clock_s: Option<(f64, f64)>, is_withheld: bool) -> String {
     clock_s.map_or_else(
         || "shared: all images equally likely to be in error".to_owned(),
         |(offset_s, sigma_s)| {
-            format!(
-                "by the attitude's clock, off by {} ± {} s",
-                label(offset_s, 2),
-                label(sigma_s, 2)
-            )
+            let sigma = if is_withheld {
+                String::new()
+            } else {
+                format!(" ± {}", label(sigma_s, 2))
+            };
+            let offset = label(offset_s, 2);
+            format!("by an offset of the attitude clock of {offset}{sigma} s")
         },
     )
 }

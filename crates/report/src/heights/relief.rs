@@ -18,14 +18,15 @@ pub(super) fn relief(adjusted: &Adjusted, beforehand: &str) -> String {
     };
     let Some(relief) = &adjusted.relief else {
         return paragraph(
-            "Relief does not help to place the images: the surface has no slope at the tie points.",
+            "Relief does not determine the position of the images: the surface has no slope at the tie points.",
         );
     };
     let [east_m, north_m] = relief.sigma_m;
     let axes = format!("±{} m E, ±{} m N", label(east_m, 0), label(north_m, 0));
     if relief.used {
-        let used =
-            format!("Relief alone fixes position to {axes}; used (adjustment.relief_for_plan).");
+        let used = format!(
+            "Relief alone determines the position to {axes}; it is used (adjustment.relief_for_plan)."
+        );
         return paragraph(&used)
             + &profiles(
                 "Recorded profiles against their positions by relief and images, metres",
@@ -33,7 +34,7 @@ pub(super) fn relief(adjusted: &Adjusted, beforehand: &str) -> String {
             );
     }
     if !(east_m.max(north_m) <= BEYOND_USE_M) {
-        return paragraph("Relief cannot fix the position here.");
+        return paragraph("Relief does not determine the position here.");
     }
     let than = if is_of_use([east_m, north_m], heights) {
         "much better than"
@@ -41,7 +42,7 @@ pub(super) fn relief(adjusted: &Adjusted, beforehand: &str) -> String {
         "no better than"
     };
     paragraph(&format!(
-        "Matching relief alone would fix position to {axes}, {than} {beforehand}; not used \
+        "Relief alone would determine the position to {axes}, {than} {beforehand}; it is not used \
          (adjustment.relief_for_plan)."
     ))
 }

@@ -100,9 +100,10 @@ fn words(of: &LaserMatch, surface: &SimilaritySurface) -> String {
         step => format!(" A pixel is the best of {step} by {step} shifts."),
     };
     paragraph(&format!(
-        "Similarity of the heights of model and laser at every shift ({}), in cells, east to the right and north up. A good match is one \
-         sharp peak. Shots on parallel passes give a ridge, along which the shift is not determined. Of several peaks of equal \
-         height the best is so by chance.{pixels} Shifts without a colour have heights for too few shots.",
+        "Similarity of the heights of model and laser at every shift ({}), in cells, east to the right and north up. \
+         A reliable match has one sharp peak. Shots on parallel passes produce a ridge, along which the shift is not \
+         determined. The best of several peaks of equal height is best by chance only.{pixels} Shifts without a \
+         colour have heights for too few shots.",
         of.similarity.word()
     ))
 }

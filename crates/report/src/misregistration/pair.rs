@@ -16,7 +16,9 @@ pub(crate) struct BeforeAfter<'a> {
 
 impl<'a> BeforeAfter<'a> {
     pub(crate) fn all(geometric: &GeometricProducts<'a>) -> Vec<Self> {
-        let adjusted = geometric.adjustment.map_or(&[][..], |of| of.pairs);
+        let adjusted = geometric
+            .adjustment
+            .map_or(&[][..], |adjustment| adjustment.pairs);
         let of = |(index, before): (usize, &'a PairComparison)| {
             let after = adjusted
                 .iter()
@@ -60,17 +62,17 @@ impl<'a> BeforeAfter<'a> {
     }
 
     /// A cell on one of its profiles.
-    pub(super) fn told(&self, state: &str, profile: usize, name: &str, text: String) -> Cell {
+    pub(super) fn traced(&self, state: &str, profile: usize, name: &str, text: String) -> Cell {
         let place = self.place(state);
         if place.is_empty() {
             return text.into();
         }
-        Cell::from(text).told(format!("{place}/footprints/profiles/{profile}/{name}"))
+        Cell::from(text).traced(format!("{place}/footprints/profiles/{profile}/{name}"))
     }
 
     /// The cells that begin a row.
     pub(super) fn head(&self, state: &'static str, found: &PairComparison) -> Vec<Cell> {
-        let ties = Cell::from(whole(found.ties)).told("/ties");
+        let ties = Cell::from(whole(found.ties)).traced("/ties");
         vec![self.name().into(), state.into(), ties]
     }
 

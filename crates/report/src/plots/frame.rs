@@ -66,7 +66,7 @@ impl Plot {
     }
 
     /// The caption, with the data that are not visible as they are.
-    pub(super) fn told(&self) -> String {
+    pub(super) fn description(&self) -> String {
         let mut words = self.caption.clone();
         let idle: Vec<String> = self
             .panels
@@ -205,7 +205,7 @@ mod tests {
                 .to_vec(),
         });
         assert_eq!(
-            plot(vec![panel]).told(),
+            plot(vec![panel]).description(),
             "Words. 3 points lie beyond the axes and are drawn at their edge. 1 arrow is cut at the edge."
         );
     }
@@ -226,7 +226,7 @@ mod tests {
         ];
         let plot = plot(panels);
         assert_eq!(
-            plot.told(),
+            plot.description(),
             "Words. Not drawn: angle, ° (zero throughout); ground, m (below 0.0005 throughout); nothing, m (no values)."
         );
         let drawn: Vec<&str> = plot.drawn().map(|panel| panel.y_label).collect();

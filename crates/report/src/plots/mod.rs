@@ -229,7 +229,11 @@ pub(super) fn quoted(text: &str) -> String {
 /// A plot that the library rejects, which is a bug in areograph.
 pub(super) fn figure(plot: &Plot) -> Result<String> {
     if plot.drawn().next().is_none() {
-        return Ok(paragraph(&format!("{}: {}", plot.title, plot.told())));
+        return Ok(paragraph(&format!(
+            "{}: {}",
+            plot.title,
+            plot.description()
+        )));
     }
     let height = plot.drawn().map(|panel| panel.height).sum::<u32>() + draw::FOOT;
     let svg = drawn(height, |area| draw::plot(plot, area))?;
@@ -237,7 +241,7 @@ pub(super) fn figure(plot: &Plot) -> Result<String> {
         &plot.title,
         &svg,
         &plot.keys(),
-        &plot.told(),
+        &plot.description(),
         &plot.csv(),
     ))
 }

@@ -116,7 +116,7 @@ fn profile_plot(site: &SiteProducts, index: usize, limit: usize) -> Plot {
     }
     if !shots.outliers.is_empty() {
         panel.series.push(Series {
-            label: "outliers, at the edge when beyond it".to_owned(),
+            label: "outliers; those beyond the axes are drawn at the edge".to_owned(),
             style: Style::Crosses,
             colour: 0,
             points: thinned(&shots.outliers, limit),

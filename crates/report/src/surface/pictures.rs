@@ -77,13 +77,13 @@ pub(super) fn figures(account: &SurfaceAccount, body: Body) -> Result<String> {
     let sigmas = &account.look.sigmas_m;
     let bar = Bar {
         ends: [0.0, ends(sigmas)[1]],
-        words: "standard deviation, matching, m",
+        words: "standard deviation, m",
         colour: relief::colour,
     };
     let of_sigmas = frame.figure(
         "Standard deviations of the terrain model",
         &format!(
-            "By the matching, cell by cell; {} m root mean square. Errors that all heights share are not in it.",
+            "Cell by cell; {} m root mean square. They do not include errors that all heights share.",
             label(account.sigma_m, 2)
         ),
         &bar,
@@ -349,7 +349,7 @@ mod tests {
     fn colours_leave_out_a_few_numbers_and_what_is_none() {
         let mut numbers: Vec<f32> = (0..=100_u8).map(f32::from).collect();
         numbers.push(f32::NAN);
-        assert_eq!(ends(&numbers).map(|of| of as i32), [2, 98]);
-        assert_eq!(ends(&[f32::NAN]).map(|of| of as i32), [0, 1]);
+        assert_eq!(ends(&numbers).map(|end| end as i32), [2, 98]);
+        assert_eq!(ends(&[f32::NAN]).map(|end| end as i32), [0, 1]);
     }
 }

@@ -1,4 +1,4 @@
-//! Alerts: state changes, and undelivered letters to hooks.
+//! Alerts: state changes, and undelivered notifications to hooks.
 
 use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
 
@@ -42,9 +42,9 @@ pub enum Edge {
     From(String),
 }
 
-/// A letter to a hook.
+/// A notification to a hook.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Letter {
+pub struct Notification {
     /// Its number.
     pub id: i64,
     /// Place of the hook in the configuration.
@@ -55,11 +55,11 @@ pub struct Letter {
     pub tries: i64,
 }
 
-/// Records a letter.
+/// Records a notification.
 ///
 /// # Errors
 /// SQLite errors.
-pub fn put_letter(
+pub fn put_notification(
     transaction: &Transaction<'_>,
     now_ms: i64,
     hook: usize,
@@ -73,16 +73,20 @@ pub fn put_letter(
     Ok(())
 }
 
-/// Letters that are due, oldest first.
+/// Notifications that are due, oldest first.
 ///
 /// # Errors
 /// SQLite errors.
-pub fn due_letters(connection: &Connection, now_ms: i64, limit: u32) -> Stored<Vec<Letter>> {
+pub fn due_notifications(
+    connection: &Connection,
+    now_ms: i64,
+    limit: u32,
+) -> Stored<Vec<Notification>> {
     let mut query = connection.prepare_cached(
         "SELECT id, hook, body, tries FROM outbox WHERE delivered_ms IS NULL AND not_before_ms <= ?1 ORDER BY id LIMIT ?2",
     )?;
     let found = query.query_map(params![now_ms, limit], |row| {
-        Ok(Letter {
+        Ok(Notification {
             id: row.get(0)?,
             hook: row.get(1)?,
             body: row.get(2)?,
@@ -92,7 +96,7 @@ pub fn due_letters(connection: &Connection, now_ms: i64, limit: u32) -> Stored<V
     Ok(found.collect::<Result<_, _>>()?)
 }
 
-/// Records that a letter was delivered.
+/// Records that a notification was delivered.
 ///
 /// # Errors
 /// SQLite errors.
@@ -104,7 +108,7 @@ pub fn put_delivered(transaction: &Transaction<'_>, id: i64, now_ms: i64) -> Sto
     Ok(())
 }
 
-/// Records that a letter could not be delivered, and the time of the next attempt.
+/// Records that a notification could not be delivered, and the time of the next attempt.
 ///
 /// # Errors
 /// SQLite errors.

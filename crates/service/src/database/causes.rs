@@ -23,7 +23,7 @@ pub enum CauseKind {
     /// The night's comparison.
     Scheduled,
     /// A person requested it.
-    Asked,
+    Requested,
     /// An earlier job ended without products.
     RetryOf,
     /// A product does not match its manifest.
@@ -41,7 +41,7 @@ impl CauseKind {
             Self::ToolChanged => "tool_changed",
             Self::First => "first",
             Self::Scheduled => "scheduled",
-            Self::Asked => "asked",
+            Self::Requested => "asked",
             Self::RetryOf => "retry_of",
             Self::ProductDamaged => "product_damaged",
         }

@@ -23,7 +23,8 @@ pub enum Priority {
     /// An input changed.
     Changed = 2,
     /// A person requested it.
-    Asked = 3,
+    #[serde(rename = "asked")]
+    Requested = 3,
 }
 
 impl Priority {
@@ -32,7 +33,7 @@ impl Priority {
             ..=0 => Self::Backfill,
             1 => Self::Scheduled,
             2 => Self::Changed,
-            _ => Self::Asked,
+            _ => Self::Requested,
         }
     }
 }
@@ -74,7 +75,7 @@ pub struct Job {
 
 /// A request for a job.
 #[derive(Debug, Clone)]
-pub struct Ask<'a> {
+pub struct JobRequest<'a> {
     /// The site.
     pub site: &'a str,
     /// Its class.
@@ -93,7 +94,7 @@ pub struct Ask<'a> {
 
 /// The result of a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Asked {
+pub struct Enqueued {
     /// The job.
     pub job: i64,
     /// Whether an existing pending job took over the causes.
@@ -128,32 +129,36 @@ pub struct Moved {
 ///
 /// # Errors
 /// SQLite errors.
-pub fn ask(transaction: &Transaction<'_>, now_ms: i64, ask: &Ask<'_>) -> Stored<Asked> {
-    let state = if ask.ready {
+pub fn enqueue(
+    transaction: &Transaction<'_>,
+    now_ms: i64,
+    request: &JobRequest<'_>,
+) -> Stored<Enqueued> {
+    let state = if request.ready {
         JobState::Queued
     } else {
         JobState::Held
     };
-    let pending = pending_job(transaction, ask.site)?;
+    let pending = pending_job(transaction, request.site)?;
     let job = if let Some(job) = &pending {
-        join(transaction, now_ms, job, ask, state)?;
+        join(transaction, now_ms, job, request, state)?;
         job.id
     } else {
         transaction.execute(
             "INSERT INTO job (site, state, priority, force, night, asked_by, created_ms, changed_ms)
              VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?7)",
             params![
-                ask.site, state.name(), ask.priority as i64, ask.force, ask.night, ask.asked_by, now_ms
+                request.site, state.name(), request.priority as i64, request.force, request.night, request.asked_by, now_ms
             ],
         )?;
         let id = transaction.last_insert_rowid();
-        tell(transaction, now_ms, id, ask.site, state, None)?;
+        tell(transaction, now_ms, id, request.site, state, None)?;
         id
     };
-    for cause in ask.causes {
+    for cause in request.causes {
         add_cause(transaction, job, cause)?;
     }
-    Ok(Asked {
+    Ok(Enqueued {
         job,
         joined: pending.is_some(),
     })
@@ -163,21 +168,25 @@ fn join(
     transaction: &Transaction<'_>,
     now_ms: i64,
     job: &Job,
-    ask: &Ask<'_>,
+    request: &JobRequest<'_>,
     state: JobState,
 ) -> Stored<()> {
     transaction.execute(
         "UPDATE job SET priority = max(priority, ?2), force = max(force, ?3), night = coalesce(night, ?4),
          asked_by = coalesce(asked_by, ?5) WHERE id = ?1",
-        params![job.id, ask.priority as i64, ask.force, ask.night, ask.asked_by],
+        params![job.id, request.priority as i64, request.force, request.night, request.asked_by],
     )?;
     let wakes = match job.state {
-        JobState::Blocked | JobState::Waiting => ask.priority >= Priority::Changed,
-        JobState::Held => ask.ready,
+        JobState::Blocked | JobState::Waiting => request.priority >= Priority::Changed,
+        JobState::Held => request.ready,
         _ => false,
     };
     if wakes && job.state != state {
-        transaction.execute("UPDATE job SET failures = 0 WHERE id = ?1", [job.id])?;
+        // The night that wakes a job waits for it, and counts its result.
+        transaction.execute(
+            "UPDATE job SET failures = 0, night = coalesce(?2, night) WHERE id = ?1",
+            params![job.id, request.night],
+        )?;
         let moved = Moved {
             not_before_ms: Some(0),
             ..Moved::default()
@@ -290,7 +299,11 @@ fn tell(
 ///
 /// # Errors
 /// SQLite errors.
-pub fn ask_cancel(transaction: &Transaction<'_>, now_ms: i64, id: i64) -> Stored<Option<JobState>> {
+pub fn request_cancel(
+    transaction: &Transaction<'_>,
+    now_ms: i64,
+    id: i64,
+) -> Stored<Option<JobState>> {
     let Some(found) = job(transaction, id)? else {
         return Ok(None);
     };

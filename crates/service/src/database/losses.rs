@@ -3,7 +3,7 @@
 use rusqlite::{Connection, Transaction};
 
 use super::{Stored, facts};
-use crate::clock::utc_text;
+use crate::{clock::utc_text, words::counted};
 
 /// A loss.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,7 +32,7 @@ impl Loss {
         }))
     }
 
-    /// Records it.
+    /// Records it: the database is no longer lost.
     ///
     /// # Errors
     /// SQLite errors.
@@ -44,16 +44,12 @@ impl Loss {
         ] {
             facts::note(transaction, name, &number.to_string())?;
         }
-        Ok(())
+        facts::remove(transaction, facts::RECOVERING)
     }
 
     /// As text.
     #[must_use]
     pub fn words(&self) -> String {
-        let counted = |count: i64, unit: &str| {
-            let plural = if count == 1 { "" } else { "s" };
-            format!("{count} {unit}{plural}")
-        };
         format!(
             "the database was made again from the products on {}: {}, {}. Tokens, sessions, jobs, nights, events, pins and audit \
              records from before are lost; create new tokens with `areograph service token add`",

@@ -7,6 +7,7 @@ mod events;
 pub mod facts;
 pub mod files;
 mod jobs;
+mod layout;
 pub mod losses;
 pub mod nights;
 pub mod runs;
@@ -26,24 +27,18 @@ use rusqlite::{Connection, OpenFlags, Transaction, TransactionBehavior};
 
 use crate::private::{create_file, create_folder};
 use areograph_base::error::{Cause, IoError, Locate as _, Result};
+use layout::{VERSION, migrate};
 
 pub use causes::{CauseKind, CauseRow, add_cause, causes};
 pub use events::{About, Event, append, events_after, newest_event};
 pub use jobs::{
-    Ask, Asked, Job, JobFilter, Moved, Priority, WrongTransition, active_job, advance, ask,
-    ask_cancel, due_waiting, give_back, job, jobs, jobs_in, next_queued, pending_job,
+    Enqueued, Job, JobFilter, JobRequest, Moved, Priority, WrongTransition, active_job, advance,
+    due_waiting, enqueue, give_back, job, jobs, jobs_in, next_queued, pending_job, request_cancel,
 };
+pub(crate) use layout::free_name;
 
 /// Name of the database in the state folder.
 pub const DATABASE: &str = "areograph.db";
-/// Layout of the tables; a change raises it and adds a step to [`migrate`].
-const VERSION: i64 = 2;
-/// Tables by which a database of the service is recognized.
-const OWN_TABLES: &str = "SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name IN ('service', 'run', 'site', 'token')";
-/// Step from layout 1: when the products of a run were last read, and how many of them do not match its manifest.
-const CHECKED_RUNS: &str = "ALTER TABLE run ADD COLUMN checked_ms INTEGER;
-    ALTER TABLE run ADD COLUMN damaged INTEGER NOT NULL DEFAULT 0;";
-const SCHEMA: &str = include_str!("schema.sql");
 /// Concurrent read connections; a request beyond them opens its own.
 const READERS: usize = 8;
 
@@ -64,18 +59,18 @@ pub enum DatabaseError {
     Sqlite(#[source] rusqlite::Error),
     /// Another program holds a lock.
     #[error("another program has locked the database")]
-    #[cause(Io: "end the program that has the database open, and start again")]
+    #[cause(Io: "close the program that uses the database, and start again")]
     Locked,
     /// There is no database.
-    #[error("there is no database")]
+    #[error("the state folder has no database")]
     #[cause(Configuration: "start the service once, which creates it")]
     Missing,
     /// Something that is not a file has its name.
-    #[error("this is not a file; expected the database of the service")]
-    #[cause(Input: "make a database from the products, which moves it aside: areograph service rebuild")]
+    #[error("not a regular file; expected the database of the service")]
+    #[cause(Input: "run areograph service rebuild, which moves this entry aside and creates a database from the products")]
     NotAFile,
     /// A database without the tables or the layout of the service.
-    #[error("this is not a database of the service: {0}")]
+    #[error("not a database of the service: {0}")]
     #[cause(like = Damaged)]
     Foreign(String),
     /// The file is damaged.
@@ -85,7 +80,7 @@ pub enum DatabaseError {
     Damaged(String),
     /// A newer areograph wrote it.
     #[error("the database has layout {found}; this areograph supports layouts up to {VERSION}")]
-    #[cause(Input: "start the newer areograph, or put back a copy of its layout")]
+    #[cause(Input: "start the newer areograph, or restore a copy of the database with an earlier layout")]
     Newer {
         /// Its layout.
         found: i64,
@@ -253,39 +248,6 @@ fn sound(connection: &Connection) -> Stored<()> {
     Err(DatabaseError::Damaged(found))
 }
 
-fn migrate(connection: &mut Connection, folder: &Path) -> Stored<()> {
-    let found: i64 = connection.query_row("PRAGMA user_version", [], |row| row.get(0))?;
-    if found > VERSION {
-        return Err(DatabaseError::Newer { found });
-    }
-    let count = |sql| connection.query_row(sql, [], |row| row.get::<_, i64>(0));
-    let is_empty = count("SELECT count(*) FROM sqlite_schema")? == 0;
-    if found < 1 && !is_empty {
-        return Err(DatabaseError::Foreign(format!(
-            "its layout is {found}; expected 1 to {VERSION}"
-        )));
-    }
-    if found >= 1 && count(OWN_TABLES)? < 4 {
-        let why = "its tables are those of another program".to_owned();
-        return Err(DatabaseError::Foreign(why));
-    }
-    if found == VERSION {
-        return Ok(());
-    }
-    if !is_empty {
-        let before = folder.join(format!("before-layout-{VERSION}.db"));
-        copy(connection, &before)?;
-    }
-    let transaction = connection.transaction()?;
-    match found {
-        1 => transaction.execute_batch(CHECKED_RUNS)?,
-        _ => transaction.execute_batch(SCHEMA)?,
-    }
-    transaction.pragma_update(None, "user_version", VERSION)?;
-    transaction.commit()?;
-    Ok(())
-}
-
 /// The copy is private; it contains hashes of tokens.
 fn copy(connection: &Connection, path: &Path) -> Stored<()> {
     // SQLite copies into an empty file. It reports one that cannot be created.
@@ -359,32 +321,11 @@ mod tests {
         assert!(text.contains("its layout is 0; expected 1 to 2"), "{text}");
         let (kind, text) = refused(&|path| fs::create_dir(path).unwrap());
         assert_eq!(kind, Kind::Input, "{text}");
-        assert!(text.contains("this is not a file"), "{text}");
+        assert!(text.contains("not a regular file"), "{text}");
         let folder = tempfile::tempdir().unwrap();
         let missing = Database::open_existing(folder.path()).unwrap_err();
         assert_eq!(missing.kind(), Kind::Configuration);
         assert!(!folder.path().join(DATABASE).exists());
-    }
-
-    #[test]
-    fn a_database_of_layout_1_gets_the_present_one_after_a_copy() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(DATABASE);
-        drop(Database::open(folder.path()).unwrap());
-        let former = "ALTER TABLE run DROP COLUMN checked_ms; ALTER TABLE run DROP COLUMN damaged;
-            INSERT INTO fact VALUES ('a', 'b'); PRAGMA user_version = 1";
-        Connection::open(&path)
-            .unwrap()
-            .execute_batch(former)
-            .unwrap();
-        let database = Database::open(folder.path()).unwrap();
-        let found = database.read(|connection| {
-            connection.prepare("SELECT checked_ms, damaged FROM run")?;
-            let sql = "SELECT value FROM fact WHERE name = 'a'";
-            Ok(connection.query_row(sql, [], |row| row.get::<_, String>(0))?)
-        });
-        assert_eq!(found.unwrap(), "b");
-        assert!(folder.path().join("before-layout-2.db").is_file());
     }
 
     #[test]

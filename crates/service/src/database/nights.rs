@@ -3,6 +3,7 @@
 use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
 
 use super::Stored;
+use crate::words::counted;
 
 /// Origin of a night.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -12,7 +13,7 @@ pub enum NightHow {
     /// It was due while the service did not run.
     CaughtUp,
     /// A person, or an external timer, requested it.
-    Asked,
+    Requested,
     /// It was due too long ago and was skipped.
     Missed,
 }
@@ -24,7 +25,7 @@ impl NightHow {
         match self {
             Self::Due => "due",
             Self::CaughtUp => "caught_up",
-            Self::Asked => "asked",
+            Self::Requested => "asked",
             Self::Missed => "missed",
         }
     }
@@ -55,12 +56,8 @@ impl Night {
     /// Its results as text.
     #[must_use]
     pub fn words(&self) -> String {
-        let count = |count: i64, what: &str| {
-            let plural = if count == 1 { "" } else { "s" };
-            format!("{count} {what}{plural}")
-        };
-        let checked = count(self.sites_checked, "site");
-        let (runs, failures) = (count(self.runs, "run"), count(self.failures, "failure"));
+        let checked = counted(self.sites_checked, "site");
+        let (runs, failures) = (counted(self.runs, "run"), counted(self.failures, "failure"));
         format!("{checked} compared, {runs}, {failures}")
     }
 }

@@ -3,6 +3,7 @@
 use rusqlite::{Connection, Transaction};
 
 use super::{Stored, facts};
+use crate::words::counted;
 
 /// One check of products.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -76,13 +77,13 @@ impl ScrubPass {
         let left = if self.complete {
             ""
         } else {
-            "; more runs are left for the next night"
+            "; the next night reads the remaining runs"
         };
         format!(
-            "products were read again: {} runs, {} MiB, {} runs with damaged products{left}",
-            self.runs,
+            "the check read the products of {} ({} MiB) and found damage in {}{left}",
+            counted(self.runs, "run"),
             self.bytes / MIB,
-            self.damaged_runs
+            counted(self.damaged_runs, "run")
         )
     }
 }

@@ -23,7 +23,7 @@ pub struct SiteRow {
     pub current_run: Option<String>,
     /// When all its inputs were last compared, milliseconds of UTC since 1970.
     pub checked_ms: Option<i64>,
-    /// Since when its products do not match its inputs.
+    /// Since when the products do not correspond to the inputs.
     pub stale_since_ms: Option<i64>,
     /// The reason.
     pub stale_because: Option<String>,
@@ -69,7 +69,7 @@ pub fn put_site(transaction: &Transaction<'_>, name: &str, file: &str) -> Stored
 /// # Errors
 /// SQLite errors.
 pub fn disable_site(transaction: &Transaction<'_>, name: &str) -> Stored<()> {
-    let note = "its site file was removed";
+    let note = "the site file was removed";
     transaction.execute(
         "UPDATE site SET enabled = 0, last_note = ?2, stale_since_ms = NULL, stale_because = NULL WHERE name = ?1",
         params![name, note],
@@ -82,7 +82,7 @@ pub fn disable_site(transaction: &Transaction<'_>, name: &str) -> Stored<()> {
 /// # Errors
 /// SQLite errors.
 pub fn put_unread(transaction: &Transaction<'_>, name: &str) -> Stored<()> {
-    let note = "its runs were found on the disk; its site file has not been read yet";
+    let note = "runs of the site were found on the disk; the site file has not been read yet";
     transaction.execute(
         "UPDATE site SET enabled = 0, last_note = ?2 WHERE name = ?1",
         params![name, note],

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::{
     core::{Core, site_folder},
     ending::{Attempt, finish},
-    runs::{Published, current, finished_ms, identify_run, row, run_id, tidy},
+    runs::{Published, current, finished_ms, identify_run_of, row, run_id, tidy},
     workers::Workers,
 };
 use crate::{
@@ -21,6 +21,7 @@ use crate::{
     },
     record::record,
     state::JobState,
+    words::counted,
     worker::{
         parent::{Ended, How},
         process::ProcessIdentity,
@@ -111,7 +112,7 @@ fn adopt_runs<W: Workers>(core: &Core<W>, site: &SiteRow) -> Result<()> {
         if known.in_file(&path)?.is_some() {
             continue;
         }
-        match identify_run(&path) {
+        match identify_run_of(&site.name, &path) {
             Ok(published) => note(core, &published).in_file(&path)?,
             Err(failure) => tracing::warn!("a run is not adopted: {failure}"),
         }
@@ -122,7 +123,12 @@ fn adopt_runs<W: Workers>(core: &Core<W>, site: &SiteRow) -> Result<()> {
     let now_ms = core.now_ms();
     core.shared
         .write(|transaction| {
-            let since_ms = run(transaction, &linked)?.map_or(now_ms, |run| run.published_ms);
+            let found = run(transaction, &linked)?;
+            // A copied folder links to a run of the site from which it was copied.
+            if found.as_ref().is_some_and(|run| run.site != site.name) {
+                return Ok(());
+            }
+            let since_ms = found.map_or(now_ms, |run| run.published_ms);
             put_current(transaction, &site.name, &linked, since_ms)
         })
         .in_file(&folder)
@@ -143,9 +149,9 @@ fn adopt_sites<W: Workers>(core: &Core<W>, known: &[SiteRow]) -> Result<()> {
     let found = record(database, &products, core.now_ms(), unknown, || false)?;
     if let Some(found) = found.filter(|found| found.runs > 0) {
         tracing::warn!(
-            "{} runs of {} unknown sites were found on the disk",
-            found.runs,
-            found.sites
+            "{} of {} were found on the disk",
+            counted(found.runs, "run"),
+            counted(found.sites, "unknown site")
         );
     }
     Ok(())

@@ -7,7 +7,7 @@ use crate::{
     clock::utc_text,
     database::{
         About, Stored,
-        alerts::{Edge, put_alert_state, put_letter},
+        alerts::{Edge, put_alert_state, put_notification},
         append,
     },
 };
@@ -26,7 +26,7 @@ pub struct Alert<'a> {
     pub text: &'a str,
 }
 
-/// Reports an alert: as an event, and by a letter to each hook that subscribes to this kind.
+/// Reports an alert: as an event, and by a notification to each hook that subscribes to this kind.
 ///
 /// # Errors
 /// SQLite errors.
@@ -64,7 +64,7 @@ pub fn tell(
     for (place, hook) in config.hooks.iter().enumerate() {
         if hook.events.is_empty() || hook.events.contains(&alert.kind) {
             let kind = kind.as_str().unwrap_or_default();
-            put_letter(transaction, now_ms, place, kind, &body.to_string())?;
+            put_notification(transaction, now_ms, place, kind, &body.to_string())?;
         }
     }
     Ok(())

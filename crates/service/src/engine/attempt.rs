@@ -169,7 +169,7 @@ fn begin(
     let site = site(transaction, &next.site)?.filter(|site| site.enabled);
     let Some(site) = site else {
         let moved = Moved {
-            outcome: Some(json!({ "text": "its site file was removed" })),
+            outcome: Some(json!({ "text": "the site file was removed" })),
             ..Moved::default()
         };
         advance(transaction, now_ms, next.id, JobState::Cancelled, &moved)?;
@@ -236,7 +236,10 @@ pub async fn follow<W: Workers>(core: Arc<Core<W>>, taken: Taken) -> Option<RunR
         // A full disk: the outcome is kept until it can be recorded.
         match finish(&core, &attempt, &ended, why) {
             Ok(run) => return run,
-            Err(error) => tracing::error!(job = job.id, "unrecorded end of an attempt: {error}"),
+            Err(error) => tracing::error!(
+                job = job.id,
+                "the end of an attempt could not be recorded: {error}"
+            ),
         }
         if core.shared.ending.is_cancelled() {
             // The next service finds the run on the disk.
@@ -299,6 +302,9 @@ fn hear<W: Workers>(core: &Core<W>, attempt: &mut Attempt, heard: Heard<'_>) {
 
 fn told(noted: Stored<()>, attempt: &Attempt) {
     if let Err(error) = noted {
-        tracing::warn!(job = attempt.job, "unrecorded line of a worker: {error}");
+        tracing::warn!(
+            job = attempt.job,
+            "a line of a worker could not be recorded: {error}"
+        );
     }
 }

@@ -8,7 +8,7 @@ use super::alerts::{Alert, tell_edge};
 use crate::{
     contents::{Content, Contents, open_below},
     database::{
-        Ask, CauseKind, CauseRow, Priority, Stored, active_job, ask,
+        CauseKind, CauseRow, JobRequest, Priority, Stored, active_job, enqueue,
         runs::{damaged_products, is_kept, put_checked, put_damaged},
         sites::site,
     },
@@ -65,7 +65,7 @@ pub fn note_damage(
         return Ok(());
     }
     let cause = CauseRow::plain(CauseKind::ProductDamaged, what, now_ms);
-    let asked = Ask {
+    let request = JobRequest {
         site: name,
         priority: Priority::Changed,
         force: true,
@@ -74,10 +74,11 @@ pub fn note_damage(
         ready: true,
         causes: &[cause],
     };
-    ask(transaction, now_ms, &asked).map(|_| ())
+    enqueue(transaction, now_ms, &request).map(|_| ())
 }
 
-/// Records the result of a complete check of a run.
+/// Records the result of a complete check of a run; returns whether its products still existed. Those that were removed
+/// meanwhile are not damaged.
 ///
 /// # Errors
 /// SQLite errors.
@@ -86,16 +87,18 @@ pub fn note_check(
     config: &ServiceConfig,
     now_ms: i64,
     damage: &Damage<'_>,
-) -> Stored<()> {
+) -> Stored<bool> {
+    if !is_kept(transaction, damage.run)? {
+        return Ok(false);
+    }
     put_checked(transaction, damage.run, now_ms)?;
     if damage.products > 0 {
-        return note_damage(transaction, config, now_ms, damage);
-    }
-    if damaged_products(transaction, damage.run)? > 0 {
+        note_damage(transaction, config, now_ms, damage)?;
+    } else if damaged_products(transaction, damage.run)? > 0 {
         put_damaged(transaction, damage.run, 0)?;
         edge(transaction, config, now_ms, damage, None)?;
     }
-    Ok(())
+    Ok(true)
 }
 
 fn edge(
@@ -191,4 +194,67 @@ fn published_manifest(folder: &Path, blake3: &str) -> Option<Manifest> {
     is_published
         .then(|| serde_json::from_slice(&bytes).ok())
         .flatten()
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+    use crate::database::{
+        Database,
+        runs::{RunRow, due_run, put_removed, put_run},
+    };
+    use areograph_config::parse_service;
+
+    fn run(id: &str) -> RunRow {
+        RunRow {
+            id: id.to_owned(),
+            site: "eos".to_owned(),
+            job: 1,
+            attempt: 1,
+            version: String::new(),
+            manifest_blake3: String::new(),
+            valid: true,
+            verdict: "valid".to_owned(),
+            reasons: json!([]),
+            because: json!([]),
+            stages: json!([]),
+            counts: json!({}),
+            figures: json!({}),
+            kernels: json!([]),
+            predecessor: None,
+            published_ms: 0,
+            pinned: false,
+            removed_ms: None,
+        }
+    }
+
+    #[test]
+    fn a_run_that_was_removed_during_its_check_is_not_damaged() {
+        let folder = tempfile::tempdir().unwrap();
+        let text = "[inputs]\nsites = [\".\"]\nkernels = [\"kernels\"]\ndata = [\"data\"]\n";
+        let config = parse_service(text, &folder.path().join("areograph.toml")).unwrap();
+        let database = Database::open(folder.path()).unwrap();
+        let check = |id: &'static str, removed: bool| {
+            database.write(|transaction| {
+                put_run(transaction, &run(id))?;
+                if removed {
+                    put_removed(transaction, id, 1)?;
+                }
+                let damage = Damage {
+                    site: "eos",
+                    run: id,
+                    products: 2,
+                    what: "`footprints.csv` cannot be read",
+                };
+                let existed = note_check(transaction, &config.service, 2, &damage)?;
+                Ok((existed, damaged_products(transaction, id)?))
+            })
+        };
+        assert_eq!(check("kept", false).unwrap(), (true, 2));
+        assert_eq!(check("removed", true).unwrap(), (false, 0));
+        let due = database.read(|connection| due_run(connection, 2, false));
+        assert_eq!(due.unwrap(), None);
+    }
 }

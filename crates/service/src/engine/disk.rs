@@ -13,7 +13,7 @@ use super::{
     core::Core,
     workers::Workers,
 };
-use crate::database::Stored;
+use crate::database::{DatabaseError, Stored};
 use areograph_config::AlertKind;
 
 /// A file that is removed when the disk is full.
@@ -87,6 +87,15 @@ pub fn give_up_reserve(state: &Path) {
             state.display()
         );
     }
+}
+
+/// Whether the disk is full for the database.
+#[must_use]
+pub fn is_full(error: &DatabaseError) -> bool {
+    let DatabaseError::Sqlite(rusqlite::Error::SqliteFailure(failure, _)) = error else {
+        return false;
+    };
+    failure.code == rusqlite::ErrorCode::DiskFull
 }
 
 #[cfg(test)]

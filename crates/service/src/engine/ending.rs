@@ -174,7 +174,7 @@ fn fruit<W: Workers>(core: &Core<W>, attempt: &Attempt, ended: &Ended) -> Stored
             _ => Fruit::None(ended.clone()),
         });
     }
-    let checked = read_run(&folder).and_then(|published| {
+    let checked = read_run(&attempt.site, &folder).and_then(|published| {
         if published.manifest.verdict.valid {
             let site = site_folder(&products, &attempt.site);
             let before = current(&site);

@@ -164,7 +164,7 @@ pub fn wake_blocked(transaction: &Transaction<'_>, now_ms: i64, root: &str) -> S
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::database::{Ask, Database, Priority, ask, job};
+    use crate::database::{Database, JobRequest, Priority, enqueue, job};
 
     #[test]
     fn what_failed_while_its_folder_was_away_is_tried_again_when_it_is_back() {
@@ -183,7 +183,7 @@ mod tests {
                         [site, path],
                     )?;
                 }
-                let asked = Ask {
+                let request = JobRequest {
                     site,
                     priority: Priority::Changed,
                     force: false,
@@ -192,7 +192,7 @@ mod tests {
                     ready: true,
                     causes: &[],
                 };
-                let id = ask(transaction, 0, &asked)?.job;
+                let id = enqueue(transaction, 0, &request)?.job;
                 for state in [JobState::Starting, JobState::Running, JobState::Blocked] {
                     advance(transaction, 0, id, state, &Moved::default())?;
                 }

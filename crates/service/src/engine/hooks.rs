@@ -13,15 +13,15 @@ use super::core::Core;
 use crate::{
     database::{
         Stored,
-        alerts::{Letter, due_letters, put_delivered, put_undelivered},
+        alerts::{Notification, due_notifications, put_delivered, put_undelivered},
     },
     engine::workers::Workers,
 };
 
 /// Longest time that a hook may take.
 const LIMIT: Duration = Duration::from_secs(30);
-/// Letters delivered in one pass.
-const LETTERS_MAX: u32 = 20;
+/// Notifications delivered in one pass.
+const NOTIFICATIONS_MAX: u32 = 20;
 /// Bytes kept of a hook's standard error.
 const COMPLAINT_MAX: u64 = 500;
 /// Delay of the second try, doubled for each further one, and the longest delay.
@@ -29,36 +29,41 @@ const DELAY_MS: (i64, i64) = (60_000, 3_600_000);
 /// Search path of hooks.
 const PATH: &str = "/usr/local/bin:/usr/bin:/bin";
 
-/// Delivers the letters that are due.
+/// Delivers the notifications that are due.
 ///
 /// # Errors
 /// The database cannot be written.
 pub async fn deliver<W: Workers>(core: &Core<W>) -> Stored<()> {
     let now_ms = core.now_ms();
-    let letters = core
+    let notifications = core
         .shared
-        .read(|connection| due_letters(connection, now_ms, LETTERS_MAX))?;
-    for letter in letters {
+        .read(|connection| due_notifications(connection, now_ms, NOTIFICATIONS_MAX))?;
+    for notification in notifications {
         let config = core.shared.config();
-        let hook = usize::try_from(letter.hook).ok();
+        let hook = usize::try_from(notification.hook).ok();
         let outcome = match hook.and_then(|place| config.hooks.get(place)) {
-            Some(hook) => run(&hook.command, &letter.body).await,
+            Some(hook) => run(&hook.command, &notification.body).await,
             None => Err("the hook is no longer configured".to_owned()),
         };
         let now_ms = core.now_ms();
         core.shared.write(|transaction| match &outcome {
-            Ok(()) => put_delivered(transaction, letter.id, now_ms),
+            Ok(()) => put_delivered(transaction, notification.id, now_ms),
             Err(why) => {
-                tracing::warn!(letter = letter.id, "a hook failed: {why}");
-                put_undelivered(transaction, letter.id, why, now_ms + delay_ms(&letter))
+                tracing::warn!(notification = notification.id, "a hook failed: {why}");
+                put_undelivered(
+                    transaction,
+                    notification.id,
+                    why,
+                    now_ms + delay_ms(&notification),
+                )
             }
         })?;
     }
     Ok(())
 }
 
-fn delay_ms(letter: &Letter) -> i64 {
-    let doublings = u32::try_from(letter.tries.min(20)).unwrap_or_default();
+fn delay_ms(notification: &Notification) -> i64 {
+    let doublings = u32::try_from(notification.tries.min(20)).unwrap_or_default();
     DELAY_MS.0.saturating_mul(1 << doublings).min(DELAY_MS.1)
 }
 
@@ -129,14 +134,14 @@ mod tests {
 
     #[test]
     fn delays_grow_up_to_an_hour() {
-        let letter = |tries| Letter {
+        let notification = |tries| Notification {
             id: 1,
             hook: 0,
             body: String::new(),
             tries,
         };
         let delays: Vec<i64> = [0, 1, 5, 6, 60]
-            .map(|tries| delay_ms(&letter(tries)))
+            .map(|tries| delay_ms(&notification(tries)))
             .to_vec();
         assert_eq!(delays, [60_000, 120_000, 1_920_000, 3_600_000, 3_600_000]);
     }

@@ -5,13 +5,13 @@
 //! `turn.rs` repeats turns and begins what is due. Each file is one step of this picture:
 //!
 //! ```text
-//!  round: list folders ─► sweep: changed files ─► settle: quiet, read, opened by CSPICE ─► sites affected
+//!  round: list folders ─► poll: changed files ─► settle: quiet, read, opened by CSPICE ─► sites affected
 //!                                                                                              │
 //!  retention ◄─ diffs ◄─ runs: checked, current, noted ◄─ ending ◄─ attempt ◄─ job ◄─ plans: what would run, and why
 //! ```
 //!
-//! A night is a round at an instant of the schedule; it ends when its jobs end. `adopt.rs` reconciles the database with
-//! the disk at every start. Time and random numbers come from `clock.rs` and `random.rs`, and workers from the trait in
+//! A night is a round at an instant of the schedule, before which `fetch.rs` may retrieve files; it ends when its jobs end.
+//! `adopt.rs` reconciles the database with the disk at every start. Time and random numbers come from `clock.rs` and `random.rs`, and workers from the trait in
 //! `workers.rs`, so that tests substitute all three. Alerts fire on state changes (`alerts.rs`) and are queued for
 //! hooks.
 
@@ -24,6 +24,7 @@ pub mod damage;
 pub mod diffs;
 pub mod disk;
 pub mod ending;
+mod fetch;
 pub mod folders;
 pub mod fresh;
 pub mod hold;
@@ -31,6 +32,7 @@ pub mod hooks;
 pub mod listing;
 pub mod nights;
 pub mod plans;
+pub mod poll;
 pub mod reasons;
 pub mod retention;
 pub mod retry;
@@ -40,7 +42,6 @@ pub mod schedule;
 pub mod scrub;
 pub mod settle;
 pub mod sites;
-pub mod sweep;
 pub mod turn;
 pub mod workers;
 

@@ -87,7 +87,7 @@ pub fn begin_due<W: Workers>(core: &Core<W>) -> Stored<Option<i64>> {
 ///
 /// # Errors
 /// The database cannot be written.
-pub fn begin_asked<W: Workers>(core: &Core<W>) -> Stored<Option<i64>> {
+pub fn begin_requested<W: Workers>(core: &Core<W>) -> Stored<Option<i64>> {
     let zone = core.shared.config().schedule.zone.clone();
     let now_ms = core.now_ms();
     core.shared.write(|transaction| {
@@ -95,7 +95,7 @@ pub fn begin_asked<W: Workers>(core: &Core<W>) -> Stored<Option<i64>> {
         if facts::fact(transaction, facts::SCHEDULE)?.is_some() {
             facts::note(transaction, facts::INTENDED_MS, &now_ms.to_string())?;
         }
-        begin(transaction, now_ms, now_ms, &zone, NightHow::Asked)
+        begin(transaction, now_ms, now_ms, &zone, NightHow::Requested)
     })
 }
 
@@ -133,7 +133,7 @@ pub fn end_done<W: Workers>(core: &Core<W>, night: i64) -> Stored<Option<Night>>
         let Some(night) = end_night(transaction, night, now_ms)? else {
             return Ok(None);
         };
-        let text = format!("the night is over: {}", night.words());
+        let text = format!("the night has ended: {}", night.words());
         let summary = json!({
             "night": night.id,
             "due": utc_text(night.due_ms),

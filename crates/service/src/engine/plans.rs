@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     database::{
-        About, Ask, CauseKind, CauseRow, Moved, Priority, Stored, advance, append, ask,
+        About, CauseKind, CauseRow, JobRequest, Moved, Priority, Stored, advance, append, enqueue,
         files::{FileState, file},
         pending_job,
         runs::{is_run, run},
@@ -33,7 +33,7 @@ use areograph_store::publish::MANIFEST;
 /// Longest time for a plan.
 const LIMIT: Duration = Duration::from_mins(30);
 /// The reason for a run without a stage to run.
-const NOT_KEPT: &str = "its products were made, but not kept as a run";
+const NOT_KEPT: &str = "the products were published, but not kept as a run";
 
 /// A site that a change may affect.
 #[derive(Debug, Clone)]
@@ -151,7 +151,11 @@ impl Context<'_> {
         }
         let runs = stages_run || only_keeps;
         if runs && causes.is_empty() {
-            let (kind, text) = self.without_change(transaction)?;
+            let (kind, text) = match &self.candidate.site.problem {
+                // What was missing has come, and was no input before: a blocked job waits for it, also in a night.
+                Some(_) => (CauseKind::RetryOf, "the site could not be planned before"),
+                None => self.without_change(transaction)?,
+            };
             causes.push(CauseRow::plain(kind, text, self.now_ms));
         }
         let note = if only_keeps {
@@ -167,7 +171,7 @@ impl Context<'_> {
         for cause in &mut causes {
             cause.detail = change_text(cause, answer);
         }
-        self.ask(transaction, &causes)?;
+        self.request(transaction, &causes)?;
         Ok(note)
     }
 
@@ -210,7 +214,7 @@ impl Context<'_> {
             causes.push(CauseRow::plain(kind, text, self.now_ms));
         }
         if !causes.is_empty() {
-            self.ask(transaction, &causes)?;
+            self.request(transaction, &causes)?;
         }
         Ok(text.to_owned())
     }
@@ -308,17 +312,18 @@ impl Context<'_> {
         let pending = pending_job(connection, &site.name)?.is_some();
         Ok(match &site.current_run {
             None if site.round == 0 && !pending => (CauseKind::First, "the site is new"),
-            _ if self.night.is_some() => {
-                (CauseKind::Scheduled, "its products do not match its inputs")
-            }
+            _ if self.night.is_some() => (
+                CauseKind::Scheduled,
+                "the products do not correspond to the inputs",
+            ),
             _ => (
                 CauseKind::RetryOf,
-                "an earlier job ended without products from its inputs",
+                "an earlier job ended without products of these inputs",
             ),
         })
     }
 
-    fn ask(&self, transaction: &Transaction<'_>, causes: &[CauseRow]) -> Stored<()> {
+    fn request(&self, transaction: &Transaction<'_>, causes: &[CauseRow]) -> Stored<()> {
         let only = |kind: CauseKind| causes.iter().all(|cause| cause.kind == kind.name());
         let priority = if only(CauseKind::ToolChanged) {
             Priority::Backfill
@@ -327,7 +332,7 @@ impl Context<'_> {
         } else {
             Priority::Changed
         };
-        let asked = Ask {
+        let request = JobRequest {
             site: self.name(),
             priority,
             force: false,
@@ -336,7 +341,7 @@ impl Context<'_> {
             ready: true,
             causes,
         };
-        ask(transaction, self.now_ms, &asked).map(|_| ())
+        enqueue(transaction, self.now_ms, &request).map(|_| ())
     }
 
     /// Pending work is superseded: the inputs are again as they were. A person's request stays.

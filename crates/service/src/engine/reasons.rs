@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::{
     database::CauseRow,
+    words::sentence,
     worker::protocol::{PlanAnswer, PlannedStage},
 };
 use areograph_store::files::file_name;
@@ -95,7 +96,7 @@ fn several(names: &[&str]) -> String {
     let shown = &names[..names.len().min(NAMED_MAX)];
     let more = names.len() - shown.len();
     if more == 0 {
-        return shown.join(", ");
+        return sentence(shown);
     }
     format!("{} and {more} more", shown.join(", "))
 }
@@ -132,12 +133,12 @@ mod tests {
         cause.path = Some("/mirror/ck/mgs_sc_ext1.bc".to_owned());
         assert_eq!(
             change_text(&cause, &answer),
-            "`mgs_sc_ext1.bc` changed; its coverage overlaps image E02-01453; stages sample_orientation, publish run"
+            "`mgs_sc_ext1.bc` changed; its coverage overlaps image E02-01453; stages sample_orientation and publish run"
         );
         let also = CauseRow::plain(CauseKind::KernelChanged, "`mgs_clock.tsc` changed", 0);
         assert_eq!(
             decision(&[cause, also], &answer),
-            "`mgs_sc_ext1.bc` changed, `mgs_clock.tsc` changed; stages sample_orientation, publish run"
+            "`mgs_sc_ext1.bc` changed and `mgs_clock.tsc` changed; stages sample_orientation and publish run"
         );
         assert_eq!(
             decision(&[], &self::answer(&[])),

@@ -30,7 +30,7 @@ const DAY_MS: i64 = 86_400_000;
 const WEEK_MS: i64 = 7 * DAY_MS;
 /// Runs removed in one step.
 const STEP: usize = 8;
-/// Letters, and jobs without a run, are kept as long as logs.
+/// Notifications, and jobs without a run, are kept as long as logs.
 const SECONDS_PER_DAY: f64 = 86_400.0;
 
 /// Runs of a site that need not be kept; `runs` are all existing ones, the newest first.
@@ -104,7 +104,7 @@ fn remove_run(folder: &Path, run: &str) {
     }
 }
 
-/// Removes old events, letters, requests, jobs and figures of removed runs, and writes the log of the database back.
+/// Removes old events, notifications, requests, jobs and figures of removed runs, and writes the log of the database back.
 ///
 /// # Errors
 /// The database cannot be written.

@@ -64,7 +64,7 @@ pub fn after(attempt: &Fruitless<'_>, random: Random) -> (JobState, Moved) {
     match &attempt.ended.how {
         How::DeadlinePassed => counted(
             JobState::Failed,
-            json!({ "text": "it took longer than workers.deadline_s", "stage": attempt.stage }),
+            json!({ "text": "the attempt took longer than workers.deadline_s", "stage": attempt.stage }),
         ),
         How::ForeignVersion(version) => uncounted(
             attempt,
@@ -105,14 +105,14 @@ fn after_crash(attempt: &Fruitless<'_>, random: Random) -> (JobState, Moved) {
     let rss_mib = attempt.ended.rss_peak_kib as f64 / 1024.0;
     if rss_mib > MEMORY_SHARE * f64::from(attempt.memory_mib) {
         let text = format!(
-            "needs more memory than workers.memory_mib = {} at stage {stage}",
+            "the worker needs more memory than workers.memory_mib = {} at stage {stage}",
             attempt.memory_mib
         );
         let outcome = json!({ "text": text, "stage": attempt.stage, "rss_mib": rss_mib });
         return counted(JobState::Failed, outcome);
     }
     let outcome = json!({
-        "text": format!("crashes at stage {stage}: {}", words(attempt.ended)),
+        "text": format!("the worker crashes at stage {stage}: {}", words(attempt.ended)),
         "stage": attempt.stage,
     });
     again(attempt, CRASH_ATTEMPTS, outcome, random)

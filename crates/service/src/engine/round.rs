@@ -18,9 +18,9 @@ use super::{
     hold::{NotReady, hold_and_release, not_ready, wake_blocked},
     listing::read_list,
     plans::{Candidate, plan},
+    poll::{Poll, Polled, compare},
     settle::settle,
     sites::{SiteBook, bring_in_line},
-    sweep::{Sweep, Swept, compare},
     workers::{Workers, words},
 };
 use crate::{
@@ -59,7 +59,7 @@ pub async fn round<W: Workers>(
     let config = core.shared.config();
     let folders = folders(&config.inputs)?;
     let number = begin(core, &folders)?;
-    let settled = sweep(core, &folders).await?;
+    let settled = poll(core, &folders).await?;
     settle(core, settled, number).await?;
     let site_folders: Vec<String> = folders
         .iter()
@@ -99,7 +99,7 @@ fn begin<W: Workers>(core: &Core<W>, folders: &[Folder]) -> Stored<i64> {
 type Listing = Result<BTreeMap<String, Identity>, String>;
 
 /// Lists all folders in parallel, compares them, and returns the files that have settled.
-async fn sweep<W: Workers>(core: &Arc<Core<W>>, folders: &[Folder]) -> Stored<Vec<FileRow>> {
+async fn poll<W: Workers>(core: &Arc<Core<W>>, folders: &[Folder]) -> Stored<Vec<FileRow>> {
     let mut lists = JoinSet::new();
     for folder in folders {
         let (core, folder) = (Arc::clone(core), folder.clone());
@@ -113,7 +113,7 @@ async fn sweep<W: Workers>(core: &Arc<Core<W>>, folders: &[Folder]) -> Stored<Ve
         match listed {
             // A stopping service has ended its workers, which implies nothing about the folder.
             Ok(_) if core.shared.ending.is_cancelled() => {}
-            Ok((folder, listing)) => settled.extend(note_sweep(core, &folder, &listing)?),
+            Ok((folder, listing)) => settled.extend(note_poll(core, &folder, &listing)?),
             Err(panicked) => tracing::error!("listing a folder failed: {panicked}"),
         }
     }
@@ -136,14 +136,16 @@ async fn list<W: Workers>(core: &Arc<Core<W>>, folder: &Folder) -> Listing {
         .await;
     let listing = match &ended.answer {
         Some(Ok(Answer::List { .. })) => read_list(&into, Path::new(&folder.path), folder.kind),
-        _ if begun.elapsed() >= limit => Err(format!("it could not be listed within {limit_s} s")),
+        _ if begun.elapsed() >= limit => {
+            Err(format!("the folder could not be listed within {limit_s} s"))
+        }
         _ => Err(words(&ended)),
     };
     let _ = std::fs::remove_file(into);
     listing
 }
 
-fn note_sweep<W: Workers>(
+fn note_poll<W: Workers>(
     core: &Core<W>,
     folder: &Folder,
     listing: &Listing,
@@ -164,7 +166,7 @@ fn note_sweep<W: Workers>(
         since_ms: now_ms,
         detail: String::new(),
     });
-    let swept = compare(&Sweep {
+    let polled = compare(&Poll {
         root: &root,
         known: &known,
         found: listing.as_ref().map_err(|why| &**why),
@@ -172,11 +174,11 @@ fn note_sweep<W: Workers>(
         max_loss: config.changes.max_loss,
         quiet_ms: milliseconds(config.changes.quiet_period_s),
     });
-    let Swept {
+    let Polled {
         root: now,
         changed,
         settled,
-    } = swept;
+    } = polled;
     core.shared.write(|transaction| {
         for file in &changed {
             put_file(transaction, file)?;

@@ -41,27 +41,36 @@ pub struct Published {
 /// The folder contains another run than expected.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error(
-    "this run belongs to job {job}, attempt {attempt}, and is named {run}; expected the run of its folder"
+    "the run is {run} of job {job}, attempt {attempt}; expected the run with the name of the folder"
 )]
-#[cause(Input: "move the folder away; the site is run again")]
+#[cause(Input: "move the folder away; the service then runs the site again")]
 struct Foreign {
     job: i64,
     attempt: i64,
     run: String,
 }
 
+/// The folder of a site contains a run of another one, as after a copy of that site's folder.
+#[derive(Debug, thiserror::Error, Cause)]
+#[error("the manifest names site {found}; expected {expected}, the site of the folder")]
+#[cause(Input: "move the folder of the run back below that of its site, or away")]
+struct OtherSite {
+    found: String,
+    expected: String,
+}
+
 /// A manifest that differs from the one that was published.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("the manifest is not the one that was published")]
-#[cause(Input: "restore it from a copy, or move the folder of the run away")]
+#[cause(Input: "restore the manifest from a copy, or move the folder of the run away")]
 struct Altered;
 
-/// Reads a run and checks every product against its manifest.
+/// Reads a run of a site and checks every product against its manifest.
 ///
 /// # Errors
-/// It is incomplete, or belongs to another attempt; a disk error.
-pub fn read_run(folder: &Path) -> Result<Published> {
-    let published = identify_run(folder)?;
+/// It is incomplete, or belongs to another attempt or site; a disk error.
+pub fn read_run(site: &str, folder: &Path) -> Result<Published> {
+    let published = identify_run_of(site, folder)?;
     read_published(folder)?;
     Ok(published)
 }
@@ -96,6 +105,19 @@ pub fn identify_run(folder: &Path) -> Result<Published> {
         manifest,
         manifest_blake3,
     })
+}
+
+/// Reads the manifest of a run in the folder of a site, but no product.
+///
+/// # Errors
+/// As of [`identify_run`]; it is a run of another site.
+pub fn identify_run_of(site: &str, folder: &Path) -> Result<Published> {
+    let published = identify_run(folder)?;
+    if published.manifest.site != site {
+        let (found, expected) = (published.manifest.site, site.to_owned());
+        return Err(OtherSite { found, expected }).in_file(folder);
+    }
+    Ok(published)
 }
 
 /// The current run, by the link.

@@ -25,7 +25,7 @@ pub struct Schedule {
 /// Fields without an instant.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Cause)]
 #[error("schedule.cron is `{cron}`: {reason}")]
-#[cause(Configuration: "give five fields as in `30 2 * * *` that match a future instant")]
+#[cause(Configuration: "give five fields, such as `30 2 * * *`, that match a future instant")]
 pub struct BadSchedule {
     cron: String,
     reason: String,

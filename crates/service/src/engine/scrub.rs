@@ -38,7 +38,7 @@ use areograph_store::files::file_name;
 const STEP: u32 = 16;
 /// Longest time for a step.
 const LIMIT: Duration = Duration::from_mins(30);
-/// Longest time for the products after a night.
+/// Time after which a check of products begins no further run.
 const PASS_MAX: Duration = Duration::from_hours(1);
 /// Time between two looks whether sites still run.
 const PAUSE: Duration = Duration::from_secs(1);
@@ -70,7 +70,7 @@ pub async fn scrub_files<W: Workers>(core: &Arc<Core<W>>) -> Stored<()> {
     let now_ms = core.now_ms();
     core.shared.write(|transaction| {
         for (old, read) in old.iter().zip(&read) {
-            // A sweep may have detected the change meanwhile.
+            // A poll may have detected the change meanwhile.
             let Some(now) = file(transaction, &old.path)?.filter(|now| now == old) else {
                 continue;
             };
@@ -106,7 +106,7 @@ pub async fn scrub_files<W: Workers>(core: &Arc<Core<W>>) -> Stored<()> {
 }
 
 /// Compares the products of one current run, the one read longest ago, with their manifest; damaged ones are made
-/// again.
+/// again. While a site runs, nothing is read.
 ///
 /// # Errors
 /// The database cannot be written.
@@ -114,24 +114,35 @@ pub async fn scrub_products<W: Workers>(core: &Arc<Core<W>>) -> Stored<()> {
     let Some(before_ms) = before_ms(core).filter(|_| products_are_there(core)) else {
         return Ok(());
     };
-    let due = core
-        .shared
-        .read(|connection| due_run(connection, before_ms, true))?;
-    if let Some(run) = due {
+    let (busy, due) = core.shared.read(|connection| {
+        Ok((
+            is_at_work(connection)?,
+            due_run(connection, before_ms, true)?,
+        ))
+    })?;
+    if let Some(run) = due.filter(|_| !busy) {
         scrub_run(core, &run, Seen::default()).await?;
     }
     Ok(())
 }
 
-/// After a night: compares the products of all runs, those read longest ago first, with their manifests. It waits while
-/// sites run, and ends after an hour at the latest; the next night continues.
+/// After a night: compares the products of all runs, those read longest ago first, with their manifests. While a site
+/// runs, no further run begins, nor an hour after the start of the check; the next night continues. A folder that is not
+/// that of this service is reported here, once a night.
 ///
 /// # Errors
 /// The database cannot be written.
 pub async fn scrub_runs<W: Workers>(core: &Arc<Core<W>>) -> Stored<()> {
-    let Some(before_ms) = before_ms(core).filter(|_| products_are_there(core)) else {
+    let Some(before_ms) = before_ms(core) else {
         return Ok(());
     };
+    if !products_are_there(core) {
+        tracing::warn!(
+            "{} is not the folder of products of this service: the check of products is omitted",
+            core.shared.config().outputs.products.display()
+        );
+        return Ok(());
+    }
     let begun = Instant::now();
     let mut pass = ScrubPass::default();
     let mut seen = Seen::default();
@@ -157,8 +168,8 @@ pub async fn scrub_runs<W: Workers>(core: &Arc<Core<W>>) -> Stored<()> {
             break;
         };
         seen = scrubbed.seen;
-        pass.runs += 1;
-        pass.damaged_runs += i64::from(scrubbed.damaged > 0);
+        pass.runs += i64::from(scrubbed.existed);
+        pass.damaged_runs += i64::from(scrubbed.existed && scrubbed.damaged > 0);
         pass.bytes += i64::try_from(scrubbed.bytes).unwrap_or(i64::MAX);
     }
     pass.ended_ms = core.now_ms();
@@ -172,6 +183,8 @@ pub async fn scrub_runs<W: Workers>(core: &Arc<Core<W>>) -> Stored<()> {
 
 /// Result of reading the products of a run.
 struct Scrubbed {
+    /// Whether the run was not removed meanwhile.
+    existed: bool,
     damaged: i64,
     bytes: u64,
     seen: Seen,
@@ -212,9 +225,11 @@ async fn scrub_run<W: Workers>(
         products: check.damaged,
         what: &check.what,
     };
-    core.shared
+    let existed = core
+        .shared
         .write(|transaction| note_check(transaction, &config, now_ms, &damage))?;
     Ok(Some(Scrubbed {
+        existed,
         damaged: check.damaged,
         bytes,
         seen,
@@ -223,18 +238,10 @@ async fn scrub_run<W: Workers>(
 
 /// Whether the folder of products is the one of this service: without its disk, nothing is damaged.
 fn products_are_there<W: Workers>(core: &Core<W>) -> bool {
-    let products = core.shared.config().outputs.products.clone();
-    let own = core
-        .shared
-        .read(|connection| is_own(connection, &products))
-        .unwrap_or(false);
-    if !own {
-        tracing::warn!(
-            "{} is not the folder of products of this service: it is not read again",
-            products.display()
-        );
-    }
-    own
+    let config = core.shared.config();
+    core.shared
+        .read(|connection| is_own(connection, &config.outputs.products))
+        .unwrap_or(false)
 }
 
 fn is_at_work(connection: &Connection) -> Stored<bool> {

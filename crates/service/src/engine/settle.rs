@@ -5,7 +5,7 @@ use std::{path::Path, sync::Arc, time::Duration};
 use serde_json::json;
 use tokio::task::JoinSet;
 
-use super::{core::Core, sweep::is_missing, workers::Workers, workers::words};
+use super::{core::Core, poll::is_missing, workers::Workers, workers::words};
 use crate::{
     database::{
         About, Stored, append,

@@ -176,11 +176,11 @@ pub fn bring_in_line(
             .is_none_or(|file| file.state == FileState::Gone)
             || book.of(&site.file).is_some();
         if gone(&site.name) && file_is_gone {
-            tracing::info!(site = site.name, "its site file was removed");
+            tracing::info!(site = site.name, "the site file was removed");
             disable_site(transaction, &site.name)?;
             if let Some(job) = pending_job(transaction, &site.name)? {
                 let moved = Moved {
-                    outcome: Some(json!({ "text": "its site file was removed" })),
+                    outcome: Some(json!({ "text": "the site file was removed" })),
                     ..Moved::default()
                 };
                 advance(transaction, now_ms, job.id, JobState::Cancelled, &moved)?;

@@ -18,14 +18,15 @@ use tokio_util::task::TaskTracker;
 
 use super::{
     adopt::adopt,
-    agenda::{Agenda, lock},
+    agenda::{Agenda, lock, patience_ms},
     attempt::{AtWork, follow, take},
     core::Core,
     diffs::compare_all,
-    disk::{give_up_reserve, has_room},
+    disk::{give_up_reserve, has_room, is_full},
+    fetch::fetch_all,
     fresh::tell_stale,
     hooks::deliver,
-    nights::{begin_asked, begin_due, end_done},
+    nights::{begin_due, begin_requested, end_done},
     retention::{copy_database, remove_runs, trim},
     retry::milliseconds,
     round::{Purpose, round},
@@ -35,8 +36,8 @@ use super::{
 };
 use crate::{
     database::{
-        DatabaseError, Moved, Stored, advance,
-        alerts::due_letters,
+        Moved, Stored, advance,
+        alerts::due_notifications,
         due_waiting,
         files::any_settling,
         jobs_in,
@@ -52,7 +53,7 @@ use crate::{
 use areograph_base::error::{Locate as _, Result};
 
 /// Longest time between two turns.
-const TICK: Duration = Duration::from_secs(1);
+const POLL_INTERVAL_MAX: Duration = Duration::from_secs(1);
 /// Longest time for a graceful end.
 const END_WITHIN: Duration = Duration::from_secs(23);
 /// Time between two checks of the disks, freshness and retention; and between two cleanups.
@@ -83,7 +84,8 @@ impl<W: Workers> Engine<W> {
         adopt(&core)?;
         let open = core.shared.read(open_night).in_file(&state)?;
         let agenda = Agenda {
-            night: open.map(|night| night.id),
+            night: open.as_ref().map(|night| night.id),
+            to_fetch: open.is_some(),
             to_compare: true,
             has_room: true,
             ..Agenda::default()
@@ -103,10 +105,10 @@ impl<W: Workers> Engine<W> {
         let shared = &self.core.shared;
         while !shared.ending.is_cancelled() {
             self.try_turn();
-            let scan = Duration::from_secs_f64(shared.config().changes.scan_interval_s);
+            let poll = Duration::from_secs_f64(shared.config().changes.scan_interval_s);
             tokio::select! {
                 () = shared.wake.notified() => {}
-                () = sleep(scan.min(TICK)) => {}
+                () = sleep(poll.min(POLL_INTERVAL_MAX)) => {}
                 () = shared.ending.cancelled() => {}
             }
         }
@@ -118,7 +120,7 @@ impl<W: Workers> Engine<W> {
         self.at_work.cancel_all(CancelWhy::Shutdown);
         self.tasks.close();
         if timeout(END_WITHIN, self.tasks.wait()).await.is_err() {
-            tracing::warn!("some workers did not end in time");
+            tracing::warn!("some workers did not stop in time");
         }
     }
 
@@ -148,15 +150,14 @@ impl<W: Workers> Engine<W> {
     }
 
     /// Begins a night now, independent of the schedule, and returns its number. It waits for settling files, since no
-    /// later sweep follows.
+    /// later poll follows.
     ///
     /// # Errors
     /// The database cannot be written.
     pub fn begin_night(&self) -> Stored<Option<i64>> {
-        let night = begin_asked(&self.core)?;
+        let night = begin_requested(&self.core)?;
         let changes = &self.core.shared.config().changes;
-        let patience_s = changes.quiet_period_s + 3.0 * changes.scan_interval_s;
-        let until_ms = self.core.now_ms().saturating_add(milliseconds(patience_s));
+        let until_ms = self.core.now_ms().saturating_add(patience_ms(changes, 0.0));
         self.agenda().begin(night, Some(until_ms));
         Ok(night)
     }
@@ -177,12 +178,13 @@ impl<W: Workers> Engine<W> {
         self.turns.fetch_add(1, Ordering::Relaxed);
         self.move_jobs()?;
         self.see_to_nights()?;
+        self.see_to_fetch();
         self.see_to_round();
         self.see_to_upkeep()?;
         self.see_to_jobs()?;
         self.see_to_comparisons();
         self.see_to_products();
-        self.see_to_letters()
+        self.see_to_notifications()
     }
 
     /// Queues jobs after their waiting time; notifies workers whose jobs are to be cancelled.
@@ -239,16 +241,35 @@ impl<W: Workers> Engine<W> {
         Ok(())
     }
 
+    /// A night begins with files of archives, where the service is configured to fetch them.
+    fn see_to_fetch(&self) {
+        if !self
+            .agenda()
+            .begin_fetch(self.core.shared.config().fetch.nightly)
+        {
+            return;
+        }
+        let (agenda, core) = (Arc::clone(&self.agenda), Arc::clone(&self.core));
+        let fetches = |core: Arc<Core<W>>| async move { fetch_all(&core).await };
+        self.spawn(fetches, move |_| {
+            let changes = &core.shared.config().changes;
+            let patience_ms = patience_ms(changes, 3.0 * changes.sweep_limit_s);
+            lock(&agenda).end_fetch(core.now_ms(), patience_ms);
+        });
+    }
+
     /// One round at a time; a night does not wait for the next one.
     fn see_to_round(&self) {
         let now_ms = self.core.now_ms();
-        let scan_ms = milliseconds(self.core.shared.config().changes.scan_interval_s);
+        let poll_ms = milliseconds(self.core.shared.config().changes.scan_interval_s);
         let purpose = {
             let mut agenda = self.agenda();
-            let night = agenda.night.filter(|_| !agenda.compared);
+            let night = agenda
+                .night
+                .filter(|_| !agenda.compared && !agenda.to_fetch);
             // A clock that was set back does not delay it.
             let since_ms = agenda.round_ms.map(|last_ms| now_ms - last_ms);
-            let is_due = since_ms.is_none_or(|since_ms| since_ms < 0 || since_ms >= scan_ms);
+            let is_due = since_ms.is_none_or(|since_ms| since_ms < 0 || since_ms >= poll_ms);
             if agenda.round || !(is_due || (night.is_some() && !agenda.comparing)) {
                 return;
             }
@@ -365,13 +386,13 @@ impl<W: Workers> Engine<W> {
         self.spawn(scrubs, move |_| lock(&agenda).scrub = false);
     }
 
-    fn see_to_letters(&self) -> Stored<()> {
+    fn see_to_notifications(&self) -> Stored<()> {
         let now_ms = self.core.now_ms();
         let due = self
             .core
             .shared
-            .read(|connection| due_letters(connection, now_ms, 1))?;
-        if due.is_empty() || std::mem::replace(&mut self.agenda().letters, true) {
+            .read(|connection| due_notifications(connection, now_ms, 1))?;
+        if due.is_empty() || std::mem::replace(&mut self.agenda().notifications, true) {
             return Ok(());
         }
         let agenda = Arc::clone(&self.agenda);
@@ -380,7 +401,7 @@ impl<W: Workers> Engine<W> {
                 tracing::error!("hooks failed: {error}");
             }
         };
-        self.spawn(delivers, move |_| lock(&agenda).letters = false);
+        self.spawn(delivers, move |_| lock(&agenda).notifications = false);
         Ok(())
     }
 
@@ -426,12 +447,4 @@ async fn upkeep<W: Workers>(core: &Arc<Core<W>>, trims: bool) -> Stored<()> {
         trim(core)?;
     }
     Ok(())
-}
-
-/// Whether the disk is full for the database.
-fn is_full(error: &DatabaseError) -> bool {
-    let DatabaseError::Sqlite(rusqlite::Error::SqliteFailure(failure, _)) = error else {
-        return false;
-    };
-    failure.code == rusqlite::ErrorCode::DiskFull
 }

@@ -53,12 +53,12 @@ pub fn words(ended: &Ended) -> String {
         (Some(Err(failure)), _) => failure.text.clone(),
         (None, How::Exited(code)) => format!("the worker ended with code {code} and no answer"),
         (None, How::Signalled(signal)) => format!("the worker was ended by signal {signal}"),
-        (None, How::Silent) => "the worker stopped responding and was ended".to_owned(),
+        (None, How::Silent) => "the worker stopped responding, and the service ended it".to_owned(),
         (None, How::DeadlinePassed) => {
-            "the worker exceeded its time limit and was ended".to_owned()
+            "the worker exceeded its time limit, and the service ended it".to_owned()
         }
         (None, How::Cancelled) => "the worker was stopped".to_owned(),
-        (None, How::NoHello) => "the worker sent no hello".to_owned(),
+        (None, How::NoHello) => "the worker did not identify itself".to_owned(),
         (None, How::ForeignVersion(version)) => format!("the worker is areograph {version}"),
         (None, How::Garbled(what)) => format!("the worker sent an invalid message: {what}"),
         (None, How::NotStarted(why)) => format!("the worker could not be started: {why}"),

@@ -47,7 +47,7 @@ pub(super) async fn run(listener: TcpListener, router: Router, app: &Arc<App>) {
         let (stream, peer) = match accepted {
             Ok(accepted) => accepted,
             Err(error) => {
-                // Out of file descriptors, most likely: others must end first.
+                // The process has no free file descriptor: other connections must end first.
                 tracing::warn!("a connection was not accepted: {error}");
                 tokio::time::sleep(Duration::from_millis(100)).await;
                 continue;
@@ -85,7 +85,7 @@ pub(super) async fn run(listener: TcpListener, router: Router, app: &Arc<App>) {
         .await
         .is_err()
     {
-        tracing::warn!("some connections did not end and were cut");
+        tracing::warn!("some connections did not end in time and were closed");
     }
     cut.cancel();
 }

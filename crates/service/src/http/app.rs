@@ -11,7 +11,7 @@ use std::{
 use rusqlite::{Connection, Transaction};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-use super::{hidden::Hidden, metrics::Metrics, plans::Plans, problem::Problem, rate::Rates};
+use super::{metrics::Metrics, plans::Plans, problem::Problem, rate::Rates, redactor::Redactor};
 use crate::{database::Stored, shared::Shared};
 use areograph_config::ServiceConfig;
 
@@ -39,15 +39,15 @@ pub(super) struct App {
     pub(super) plans: Plans,
     reads: Arc<Semaphore>,
     /// With the configuration from which they were derived.
-    hidden: Mutex<(Arc<ServiceConfig>, Arc<Hidden>)>,
+    redactor: Mutex<(Arc<ServiceConfig>, Arc<Redactor>)>,
 }
 
 impl App {
     pub(super) fn new(shared: Arc<Shared>, local: SocketAddr) -> Self {
         let config = shared.config();
-        let hidden = Arc::new(Hidden::of(&config, &shared.program));
+        let redactor = Arc::new(Redactor::of(&config, &shared.program));
         Self {
-            hidden: Mutex::new((config, hidden)),
+            redactor: Mutex::new((config, redactor)),
             shared,
             local,
             metrics: Metrics::new(),
@@ -68,13 +68,13 @@ impl App {
         self.shared.now_ms()
     }
 
-    /// Paths of this machine that clients must not see.
-    pub(super) fn hidden(&self) -> Arc<Hidden> {
+    /// Removes the paths of this machine from answers.
+    pub(super) fn redactor(&self) -> Arc<Redactor> {
         let config = self.config();
-        let mut kept = self.hidden.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut kept = self.redactor.lock().unwrap_or_else(PoisonError::into_inner);
         if !Arc::ptr_eq(&kept.0, &config) {
-            let hidden = Arc::new(Hidden::of(&config, &self.shared.program));
-            *kept = (config, hidden);
+            let redactor = Arc::new(Redactor::of(&config, &self.shared.program));
+            *kept = (config, redactor);
         }
         Arc::clone(&kept.1)
     }

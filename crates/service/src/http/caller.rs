@@ -131,7 +131,7 @@ fn refused(app: &App, text: &str, remote: IpAddr) -> Problem {
             retry_after_s: Some(wait_s),
             ..Problem::new(
                 StatusCode::TOO_MANY_REQUESTS,
-                "Too many wrong tokens from this address, or for this token, were refused. Wait.",
+                "Too many wrong tokens came from this address, or for this token. Try again later.",
             )
         };
     }

@@ -9,7 +9,7 @@ use super::{app::App, caller::Caller, problem::Problem};
 use crate::{
     audit::{Change, note_change},
     database::{
-        Ask, Asked, CauseKind, CauseRow, Job, Priority, ask, ask_cancel, job,
+        CauseKind, CauseRow, Enqueued, Job, JobRequest, Priority, enqueue, job, request_cancel,
         shown::{pin_run, run, site},
     },
     state::JobState,
@@ -29,29 +29,29 @@ pub(super) fn ask_for(
     now_ms: i64,
     wanted: &Wanted,
     caller: &Caller,
-) -> crate::database::Stored<Vec<(String, Asked)>> {
+) -> crate::database::Stored<Vec<(String, Enqueued)>> {
     let who = caller.name();
-    let cause = CauseRow::plain(CauseKind::Asked, &wanted.reason, now_ms);
+    let cause = CauseRow::plain(CauseKind::Requested, &wanted.reason, now_ms);
     let mut jobs = Vec::new();
     for site in &wanted.sites {
-        let wish = Ask {
+        let request = JobRequest {
             site,
-            priority: Priority::Asked,
+            priority: Priority::Requested,
             force: wanted.force,
             night: None,
             asked_by: Some(&who),
             ready: true,
             causes: std::slice::from_ref(&cause),
         };
-        let asked = ask(transaction, now_ms, &wish)?;
+        let enqueued = enqueue(transaction, now_ms, &request)?;
         let change = Change {
             who: &who,
             action: if wanted.force { "run by force" } else { "run" },
-            target: &format!("site {site}, job {}", asked.job),
+            target: &format!("site {site}, job {}", enqueued.job),
             remote: &caller.remote.to_string(),
         };
         note_change(transaction, now_ms, change)?;
-        jobs.push((site.clone(), asked));
+        jobs.push((site.clone(), enqueued));
     }
     Ok(jobs)
 }
@@ -63,7 +63,7 @@ pub(super) async fn run_site(
     wanted: Wanted,
 ) -> Result<Option<i64>, Problem> {
     let now_ms = app.now_ms();
-    let asked = app
+    let enqueued = app
         .write(move |transaction| {
             for name in &wanted.sites {
                 if site(transaction, name)?.is_none() {
@@ -74,7 +74,7 @@ pub(super) async fn run_site(
         })
         .await?;
     app.shared.wake.notify_one();
-    Ok(asked.first().map(|(_, asked)| asked.job))
+    Ok(enqueued.first().map(|(_, enqueued)| enqueued.job))
 }
 
 /// Requests cancellation of a job.
@@ -89,7 +89,7 @@ pub(super) async fn cancel(app: &Arc<App>, caller: Caller, id: i64) -> Result<Jo
             if found.state.is_final() || stopped {
                 return Ok(Some((found, stopped)));
             }
-            ask_cancel(transaction, now_ms, id)?;
+            request_cancel(transaction, now_ms, id)?;
             note(transaction, now_ms, &caller, "cancel", &format!("job {id}"))?;
             Ok(job(transaction, id)?.map(|job| (job, true)))
         })
@@ -115,27 +115,27 @@ pub(super) async fn retry(app: &Arc<App>, caller: Caller, id: i64) -> Result<Job
             };
             let kind = match found.state {
                 JobState::Held | JobState::Queued => return Ok(Ok(found)),
-                JobState::Waiting | JobState::Blocked => CauseKind::Asked,
+                JobState::Waiting | JobState::Blocked => CauseKind::Requested,
                 JobState::Failed | JobState::Invalid | JobState::Cancelled => CauseKind::RetryOf,
                 state => {
-                    let text = format!("Job {id} is {state}: there is nothing to retry.");
+                    let text = format!("Job {id} is {state} and cannot be retried.");
                     return Ok(Err(Problem::conflict(text)));
                 }
             };
             let who = caller.name();
             let detail = format!("job {id} is retried");
-            let wish = Ask {
+            let request = JobRequest {
                 site: &found.site,
-                priority: Priority::Asked,
+                priority: Priority::Requested,
                 force: found.force,
                 night: None,
                 asked_by: Some(&who),
                 ready: true,
                 causes: &[CauseRow::plain(kind, &detail, now_ms)],
             };
-            let asked = ask(transaction, now_ms, &wish)?;
+            let enqueued = enqueue(transaction, now_ms, &request)?;
             note(transaction, now_ms, &caller, "retry", &format!("job {id}"))?;
-            let again = job(transaction, asked.job)?;
+            let again = job(transaction, enqueued.job)?;
             Ok(again.ok_or_else(no_job))
         })
         .await?;
@@ -153,10 +153,10 @@ pub(super) async fn pin(
     let now_ms = app.now_ms();
     app.write(move |transaction| {
         let Some(mut found) = run(transaction, &id)? else {
-            return Ok(Err(Problem::not_found("There is no such run.")));
+            return Ok(Err(Problem::not_found("This run does not exist.")));
         };
         if pinned && found.removed_utc.is_some() {
-            let text = "The products of this run were removed; there is nothing to keep.";
+            let text = "The products of this run were removed and cannot be kept.";
             return Ok(Err(Problem::conflict(text)));
         }
         if found.pinned != pinned {
@@ -187,7 +187,7 @@ fn note(
 }
 
 fn no_job() -> Problem {
-    Problem::new(StatusCode::NOT_FOUND, "There is no such job.")
+    Problem::new(StatusCode::NOT_FOUND, "This job does not exist.")
 }
 
 /// The text of an outcome.

@@ -27,14 +27,14 @@ impl<T: DeserializeOwned + Send> FromRequestParts<Arc<App>> for At<T> {
         // An invalid number names nothing.
         found
             .map(|Path(found)| Self(found))
-            .map_err(|_| Problem::not_found("There is nothing at this address."))
+            .map_err(|_| Problem::not_found("This address does not exist."))
     }
 }
 
 /// Parameters of the query.
-pub(super) struct Asked<T>(pub(super) T);
+pub(super) struct Parameters<T>(pub(super) T);
 
-impl<T: DeserializeOwned + Send> FromRequestParts<Arc<App>> for Asked<T> {
+impl<T: DeserializeOwned + Send> FromRequestParts<Arc<App>> for Parameters<T> {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, app: &Arc<App>) -> Result<Self, Problem> {
@@ -96,7 +96,7 @@ pub(super) async fn body_of(request: Request, media: &str, max: usize) -> Result
         Ok(Ok(bytes)) => Ok(bytes.to_vec()),
         Ok(Err(_)) => Err(Problem::new(
             StatusCode::PAYLOAD_TOO_LARGE,
-            format!("The body was cut short, or is longer than {max} bytes."),
+            format!("The body is incomplete, or longer than {max} bytes."),
         )),
         Err(_) => Err(Problem::new(
             StatusCode::REQUEST_TIMEOUT,
@@ -117,5 +117,5 @@ pub(super) fn name(text: &str) -> Result<&str, Problem> {
     if (1..=64).contains(&text.len()) && text.bytes().all(plain) {
         return Ok(text);
     }
-    Err(Problem::not_found("There is nothing of this name."))
+    Err(Problem::not_found("This name does not exist."))
 }

@@ -52,7 +52,7 @@ pub(super) fn difference(products: &Path, run: &Run) -> Result<Vec<u8>, Problem>
         .join(format!("{}.html", run.id));
     let file = open_below(products, &path).map_err(Problem::internal)?;
     let file =
-        file.ok_or_else(|| Problem::not_found("This run was not compared with another one."))?;
+        file.ok_or_else(|| Problem::not_found("This run has not been compared with another one."))?;
     let mut page = Vec::new();
     file.take(MANIFEST_MAX)
         .read_to_end(&mut page)

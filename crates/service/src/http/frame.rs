@@ -92,7 +92,7 @@ pub(super) fn panicked(panic: Box<dyn Any + Send>) -> Response {
         .downcast_ref::<String>()
         .map(String::as_str)
         .or_else(|| panic.downcast_ref::<&str>().copied());
-    Problem::internal(text.unwrap_or("a panic without a text")).into_response()
+    Problem::internal(text.unwrap_or("a panic without a message")).into_response()
 }
 
 /// Formats an error; those of libraries have only a status.
@@ -152,7 +152,7 @@ fn is_for_programs(path: &str) -> bool {
 
 fn usual_detail(status: StatusCode) -> &'static str {
     match status {
-        StatusCode::NOT_FOUND => "There is nothing at this address.",
+        StatusCode::NOT_FOUND => "This address does not exist.",
         StatusCode::METHOD_NOT_ALLOWED => {
             "This address does not accept this method; the header Allow lists those accepted."
         }

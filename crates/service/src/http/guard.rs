@@ -56,7 +56,7 @@ async fn pass(app: &App, parts: &Parts) -> Result<Caller, Problem> {
     refuse_token_in(uri)?;
     let peer = parts.extensions.get::<Peer>();
     let peer = peer
-        .ok_or_else(|| Problem::internal("a request from nowhere"))?
+        .ok_or_else(|| Problem::internal("a request without the address of its client"))?
         .0;
     let forwarded = headers.contains_key(FORWARDED_FOR) || headers.contains_key(FORWARDED);
     let direct = local_name && !forwarded && peer.ip().is_loopback();
@@ -76,7 +76,7 @@ fn check_host(app: &App, headers: &HeaderMap, uri: &Uri) -> Result<bool, Problem
     let wrong = || {
         Problem::new(
             StatusCode::MISDIRECTED_REQUEST,
-            "This service does not serve this host. Use its own address, or the public_url of its configuration.",
+            "The service does not answer for this host. Use its own address, or the public_url of its configuration.",
         )
     };
     let mut hosts = headers.get_all(header::HOST).iter();
@@ -204,7 +204,10 @@ fn take(app: &App, key: Key, rate: Rate) -> Result<(), Problem> {
         .take(key, rate, Instant::now())
         .map_err(|wait_s| Problem {
             retry_after_s: Some(wait_s),
-            ..Problem::new(StatusCode::TOO_MANY_REQUESTS, "Too many requests. Wait.")
+            ..Problem::new(
+                StatusCode::TOO_MANY_REQUESTS,
+                "Too many requests. Try again later.",
+            )
         })
 }
 

@@ -11,7 +11,7 @@
 //! | forged forms | refused |
 //! | handler | a document, or a `Problem` |
 //!
-//! `Hidden` removes the folders of the machine from every answer. Files are opened below the folder where they belong,
+//! `Redactor` removes the folders of the machine from every answer. Files are opened below the folder where they belong,
 //! by names that a manifest holds (`files`). `docs/http.md` describes the use.
 
 mod accept;
@@ -24,13 +24,13 @@ mod extract;
 mod files;
 mod frame;
 mod guard;
-mod hidden;
 mod logs;
 mod metrics;
 mod pages;
 mod plans;
 mod problem;
 mod rate;
+mod redactor;
 mod stall;
 mod work;
 
@@ -61,7 +61,7 @@ fn router(app: &Arc<App>) -> Router {
     Router::new()
         .merge(api::routes())
         .merge(pages::routes())
-        .fallback(|| async { problem::Problem::not_found("There is nothing at this address.") })
+        .fallback(|| async { problem::Problem::not_found("This address does not exist.") })
         .layer(CsrfLayer::new())
         .layer(from_fn_with_state(Arc::clone(app), guard::guard))
         .layer(CatchPanicLayer::custom(frame::panicked))

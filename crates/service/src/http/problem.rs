@@ -56,7 +56,7 @@ impl Problem {
             cause: Some(cause.to_string()),
             ..Self::new(
                 StatusCode::INTERNAL_SERVER_ERROR,
-                "The service failed to answer this request. Its log holds details under the identifier of the request.",
+                "The service could not answer this request. Its log contains details under the identifier of the request.",
             )
         }
     }

@@ -258,7 +258,7 @@ impl Worker {
                 }
             }
             _ if !self.hello => {
-                let garbled = "its first line is not a hello".to_owned();
+                let garbled = "the first line does not identify the worker".to_owned();
                 self.end_at_once(How::Garbled(garbled));
             }
             Line::Beat { rss_kib } => self.rss_peak_kib = self.rss_peak_kib.max(*rss_kib),

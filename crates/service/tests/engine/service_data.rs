@@ -8,10 +8,15 @@
 
 use crate::fake;
 
-use std::{fs, sync::Arc};
+use std::{fs, process::Command, sync::Arc};
 
 use areograph_base::error::Kind;
-use areograph_service::{database::DATABASE, rebuild::rebuild, state::JobState};
+use areograph_service::{
+    database::{DATABASE, Database},
+    rebuild::rebuild,
+    recover::make_again,
+    state::JobState,
+};
 use fake::{Life, World};
 
 /// 2026-05-01T12:00:00Z.
@@ -155,7 +160,10 @@ fn the_database_of_another_service_is_refused_and_a_rebuilt_one_accepted() {
     let refused = Life::start(&world).map(|_| ()).unwrap_err();
     assert_eq!(refused.kind(), Kind::Input);
     let text = refused.to_string();
-    for part in ["belongs to another service", "areograph service rebuild"] {
+    for part in [
+        "it may belong to another service",
+        "areograph service rebuild",
+    ] {
         assert!(text.contains(part), "{text}");
     }
     let found = rebuild(
@@ -166,6 +174,68 @@ fn the_database_of_another_service_is_refused_and_a_rebuilt_one_accepted() {
     assert_eq!(found.unwrap().runs, 2);
     let life = Life::start(&world).unwrap();
     assert_eq!(runs(&life), before);
+}
+
+#[test]
+fn a_rebuild_that_was_interrupted_is_completed_at_the_next_start() {
+    let (world, life) = two_runs();
+    let before = runs(&life);
+    life.kill();
+    remove_database(&world);
+    let database = Database::open(&world.path("state")).unwrap();
+    let found = make_again(
+        &database,
+        &world.path("products"),
+        || world.clock.now_ms(),
+        || true,
+        |_| panic!("the loss is recorded before the runs"),
+    );
+    assert_eq!(found.unwrap(), None);
+    drop(database);
+    let life = Life::start(&world).unwrap();
+    assert_eq!(runs(&life), before);
+    assert_eq!(alerts(&life), ["database_lost"]);
+}
+
+/// Copies the products of site `a` to the folder of site `b`, with the older run as the current one.
+fn copy_to_b(world: &World, older: &str) {
+    let [from, to] = ["a", "b"].map(|site| world.path(&format!("products/{site}")));
+    let _ = fs::remove_dir_all(&to);
+    let copied = Command::new("cp").arg("-a").arg(from).arg(&to).status();
+    assert!(copied.unwrap().success());
+    fs::remove_file(to.join("current")).unwrap();
+    std::os::unix::fs::symlink(format!("runs/{older}"), to.join("current")).unwrap();
+}
+
+#[test]
+fn a_copied_folder_does_not_count_as_runs_of_its_site() {
+    let (world, life) = two_runs();
+    let before = runs(&life);
+    life.kill();
+    copy_to_b(&world, &before[0]);
+    remove_database(&world);
+    let life = Life::start(&world).unwrap();
+    assert_eq!(runs(&life), before);
+    let current = "SELECT name || ' ' || current_run FROM site ORDER BY name";
+    assert_eq!(life.ask(current), [format!("a {}", before[1])]);
+    let found =
+        "SELECT value FROM fact WHERE name IN ('recovered_runs', 'recovered_sites') ORDER BY name";
+    assert_eq!(life.ask(found), ["2", "1"]);
+}
+
+#[test]
+fn the_link_of_a_copied_folder_is_not_followed() {
+    let (world, life) = two_runs();
+    let older = runs(&life).remove(0);
+    world.site("b", &["other.bsp"]);
+    life.go_on(&world, 60, 15);
+    let current = "SELECT current_run FROM site WHERE name = 'b'";
+    let own = life.ask(current);
+    assert!(own.len() == 1 && !own[0].is_empty(), "{own:?}");
+    life.kill();
+    copy_to_b(&world, &older);
+    let life = Life::start(&world).unwrap();
+    assert_eq!(life.ask(current), own);
 }
 
 #[test]
@@ -204,7 +274,14 @@ fn products_that_are_not_there_are_not_damaged() {
     fs::rename(world.path("products"), world.path("away")).unwrap();
     fs::create_dir(world.path("products")).unwrap();
     life.go_on(&world, 8 * DAY_S, 1);
-    let damaged = life.ask("SELECT id FROM run WHERE damaged > 0");
-    assert_eq!(damaged, [""; 0]);
+    let damaged = "SELECT id FROM run WHERE damaged > 0";
+    assert_eq!(life.ask(damaged), [""; 0]);
+    // A start with an empty folder does not mark it as that of the service.
+    life.kill();
+    fs::remove_dir_all(world.path("products")).unwrap();
+    let life = Life::start(&world).unwrap();
+    assert!(!world.path("products/.areograph-service").exists());
+    life.go_on(&world, 8 * DAY_S, 1);
+    assert_eq!(life.ask(damaged), [""; 0]);
     assert!(!alerts(&life).contains(&"product_damaged".to_owned()));
 }

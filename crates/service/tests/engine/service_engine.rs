@@ -10,7 +10,7 @@ use crate::fake;
 use std::sync::{Arc, atomic::Ordering};
 
 use areograph_service::{
-    database::{Ask, CauseKind, CauseRow, Priority, ask, ask_cancel},
+    database::{CauseKind, CauseRow, JobRequest, Priority, enqueue, request_cancel},
     state::JobState,
 };
 use fake::{Fate, Life, World};
@@ -70,7 +70,7 @@ fn only_the_sites_that_read_a_changed_kernel_run_and_the_reason_is_kept() {
     let stale = life.ask("SELECT stale_because FROM site WHERE name = 'a'");
     assert!(
         stale[0].contains("`a.bsp` changed")
-            && stale[0].contains("waiting for quiet period until 2026-05-01T13:20:00"),
+            && stale[0].contains("the quiet period ends at 2026-05-01T13:20:00"),
         "{stale:?}"
     );
     life.go_on(&world, 60, 2);
@@ -149,14 +149,14 @@ fn a_folder_that_vanishes_runs_nothing_and_is_told_once() {
 
 fn ask_for(life: &Life, site: &str) -> i64 {
     let now_ms = life.shared.now_ms();
-    let cause = CauseRow::plain(CauseKind::Asked, "a test", now_ms);
+    let cause = CauseRow::plain(CauseKind::Requested, "a test", now_ms);
     let asked = life.shared.write(|transaction| {
-        ask(
+        enqueue(
             transaction,
             now_ms,
-            &Ask {
+            &JobRequest {
                 site,
-                priority: Priority::Asked,
+                priority: Priority::Requested,
                 force: false,
                 night: None,
                 asked_by: Some("test"),
@@ -247,7 +247,7 @@ fn failures_are_tried_again_by_their_kind() {
     let text = of("a").outcome.as_ref().unwrap()["text"].as_str().unwrap();
     assert_eq!(
         text,
-        "crashes at stage publish: the worker was ended by signal 9"
+        "the worker crashes at stage publish: the worker was ended by signal 9"
     );
     assert_eq!(of("b").state, JobState::Succeeded);
     let alerts = life.ask("SELECT data FROM event WHERE kind = 'alert'");
@@ -297,7 +297,7 @@ fn what_a_dead_worker_made_is_kept_though_a_plan_finds_nothing_to_run() {
     life.go_on(&world, 60, 2);
     assert_eq!(world.current("a"), world.clean("a"));
     let why = life.ask("SELECT detail FROM cause ORDER BY rowid DESC LIMIT 1");
-    assert_eq!(why, ["its products were made, but not kept as a run"]);
+    assert_eq!(why, ["the products were published, but not kept as a run"]);
 }
 
 /// Site `a` is active, until it is stopped.
@@ -330,7 +330,7 @@ fn a_person_cancels_a_job_at_work_and_one_that_waits() {
         let now_ms = life.shared.now_ms();
         let state = life
             .shared
-            .write(|transaction| ask_cancel(transaction, now_ms, id));
+            .write(|transaction| request_cancel(transaction, now_ms, id));
         state.unwrap().unwrap()
     };
     assert_eq!(cancel(waits), JobState::Cancelled);
@@ -444,4 +444,32 @@ fn a_damaged_product_is_made_again() {
     let why = life.ask("SELECT kind FROM cause WHERE job = 3");
     assert_eq!(why, ["product_damaged"]);
     assert_eq!(world.current("a"), world.clean("a"));
+}
+
+#[test]
+fn products_are_not_read_while_a_site_runs() {
+    let (world, life) = at_work();
+    let run = &life.ask("SELECT current_run FROM site WHERE name = 'b'")[0];
+    std::fs::remove_file(world.path(&format!("products/b/runs/{run}/product.txt"))).unwrap();
+    world.later(8 * 86_400);
+    for _ in 0..5 {
+        world.later(60);
+        for _ in 0..100 {
+            life.turn();
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+    }
+    let damaged = "SELECT id FROM run WHERE damaged > 0";
+    assert_eq!(life.ask(damaged), [""; 0]);
+    world.fate_of.lock().unwrap().clear();
+    let mut jobs = life.jobs().into_iter();
+    let job = jobs.find(|job| job.state == JobState::Running).unwrap();
+    let now_ms = world.clock.now_ms();
+    let cancelled = life
+        .shared
+        .write(|transaction| request_cancel(transaction, now_ms, job.id));
+    cancelled.unwrap().unwrap();
+    life.settle();
+    life.go_on(&world, 60, 4);
+    assert_eq!(life.ask(damaged), [run.as_str()]);
 }

@@ -9,8 +9,8 @@ use std::collections::BTreeMap;
 
 use areograph_service::{
     database::{
-        Ask, CauseKind, CauseRow, Database, DatabaseError, Job, JobFilter, Moved, Priority,
-        advance, ask, ask_cancel, causes, give_back, job, jobs, next_queued,
+        CauseKind, CauseRow, Database, DatabaseError, Job, JobFilter, JobRequest, Moved, Priority,
+        advance, causes, enqueue, give_back, job, jobs, next_queued, request_cancel,
     },
     state::JobState,
 };
@@ -26,7 +26,7 @@ const HISTORIES: u32 = 64;
 /// A random event.
 #[derive(Debug, Clone)]
 enum Step {
-    Ask(usize, u8, bool),
+    Request(usize, u8, bool),
     Take(bool),
     /// A job, by its place among all, is sent to a state.
     Send(usize, usize, bool),
@@ -37,7 +37,7 @@ enum Step {
 fn step() -> impl Strategy<Value = Step> {
     prop_oneof![
         (0..SITES.len(), 0..4_u8, any::<bool>())
-            .prop_map(|(site, class, ready)| Step::Ask(site, class, ready)),
+            .prop_map(|(site, class, ready)| Step::Request(site, class, ready)),
         any::<bool>().prop_map(Step::Take),
         (any::<usize>(), 0..JobState::ALL.len(), any::<bool>())
             .prop_map(|(job, state, counts)| Step::Send(job, state, counts)),
@@ -51,7 +51,7 @@ fn priority(class: u8) -> Priority {
         Priority::Backfill,
         Priority::Scheduled,
         Priority::Changed,
-        Priority::Asked,
+        Priority::Requested,
     ][usize::from(class)]
 }
 
@@ -86,7 +86,7 @@ impl Table {
         let pick = |place: usize| (!all.is_empty()).then(|| all[place % all.len()].clone());
         match step {
             Step::Later(ms) => self.now_ms += i64::from(*ms),
-            Step::Ask(site, class, ready) => self.ask(SITES[*site], priority(*class), *ready),
+            Step::Request(site, class, ready) => self.ask(SITES[*site], priority(*class), *ready),
             Step::Take(backfill) => {
                 let next = self
                     .database
@@ -111,7 +111,7 @@ impl Table {
                 if let Some(found) = pick(*place) {
                     let to = self
                         .database
-                        .write(|transaction| ask_cancel(transaction, now_ms, found.id))
+                        .write(|transaction| request_cancel(transaction, now_ms, found.id))
                         .unwrap()
                         .unwrap();
                     let expected = match found.state {
@@ -132,7 +132,7 @@ impl Table {
             .into_iter()
             .find(|job| job.site == site && is_pending(job.state));
         let cause = CauseRow::plain(CauseKind::KernelChanged, &format!("at {now_ms}"), now_ms);
-        let asked = Ask {
+        let asked = JobRequest {
             site,
             priority: class,
             force: false,
@@ -143,7 +143,7 @@ impl Table {
         };
         let asked = self
             .database
-            .write(|transaction| ask(transaction, now_ms, &asked))
+            .write(|transaction| enqueue(transaction, now_ms, &asked))
             .unwrap();
         assert_eq!(
             asked.joined.then_some(asked.job),
@@ -295,6 +295,6 @@ fn a_job_rises_by_a_class_an_hour_so_that_none_starves() {
     };
     assert_eq!(next(&table, true).as_deref(), Some("eos"));
     assert_eq!(next(&table, false).as_deref(), Some("gusev"));
-    table.ask("isidis", Priority::Asked, true);
+    table.ask("isidis", Priority::Requested, true);
     assert_eq!(next(&table, true).as_deref(), Some("isidis"));
 }

@@ -56,6 +56,10 @@ fn archive(test: &str) -> Option<(TempDir, Interval)> {
         write(root, to, &bytes);
     }
     write(root, "README", b"kernels\n");
+    // An ephemeris that has not arrived whole.
+    fs::create_dir_all(root.join(".fetch/parts")).unwrap();
+    let whole = fs::read(root.join("mgs_map2.bsp")).unwrap();
+    write(root, ".fetch/parts/1.part", &whole[..whole.len() / 2]);
     let times = ["naif0012.tls", "MGS_SCLKSCET.00061.tsc"].map(|name| root.join(name));
     let session = Session::open(&KernelSet::from_files(&times).unwrap()).unwrap();
     let instants =
@@ -128,13 +132,19 @@ fn the_latest_texts_and_the_files_of_the_wanted_time_are_chosen() {
         "mgs_moc_v20.ti",
     ];
     // Commanded attitude comes before telemetry, which therefore wins.
-    let binaries = ["mgs_map2.bsp", "mgs_ext_roto_all_v9.bc", "mgs_sc_map2.bc"];
+    let binaries = [
+        "mgs_map2.bsp",
+        "mgs_map2_first.bsp",
+        "mgs_ext_roto_all_v9.bc",
+        "mgs_sc_map2.bc",
+    ];
     assert_eq!(names(&set), [&texts[..], &binaries[..]].concat());
     let explanation = set.explanation().join("\n");
     for line in [
         "naif0012.tls: latest of 2 with leap seconds",
         "pck00010.tpc: latest of 1 with the rotation of Mars",
-        "mgs_map2_first.bsp: not used, holds none of the required times",
+        // It ends before the exposures, and alone holds the Sun when the light left that Mars saw then.
+        "mgs_map2_first.bsp: the Sun when its light left for Mars",
         "mgs_map2_gsfc_mgm0827.bsp: not used, not of the orbit solution nav",
         "mgs_sc_map2_first.bc: not used, holds no attitude near the required times",
         "README: not used, is a text without a \\begindata block",
@@ -267,13 +277,14 @@ fn kernels_that_meet_inside_the_bias_are_chosen_and_versions_count() {
     let chosen = names(&set);
     let expected = [
         "mgs_map2.bsp",
+        "mgs_map2_first.bsp",
         "mgs_map2_v9.bsp",
         "mgs_map2_v10.bsp",
         "mgs_ext_roto_all_v9.bc",
         "mgs_sc_meet_v9.bc",
         "mgs_sc_meet_v10.bc",
     ];
-    assert_eq!(chosen[chosen.len() - 6..], expected);
+    assert_eq!(chosen[chosen.len() - 7..], expected);
     let explanation = set.explanation().join("\n");
     for line in [
         "mgs_ext_roto_all_v9.bc: NOMINAL attitude of MGS: commanded, not measured".to_owned(),

@@ -10,6 +10,7 @@ use super::{
     height_summary::{self, HeightSummary},
     input::AdjustImage,
     network::Assembled,
+    point_errors::{PointErrors, SharedError},
     points::{PointKind, RejectedPoint},
     relief::{ReliefSummary, relief},
     split::OtherReading,
@@ -17,9 +18,9 @@ use super::{
 };
 use areograph_base::frames::{BodyFixed, Position};
 use areograph_geom::{
-    bundle::{Adjustment, ORIENTATION_UNKNOWNS, Residual, View},
+    bundle::{AdjustedImage, Adjustment, ORIENTATION_UNKNOWNS, Residual, View},
+    ellipsoid::local_axes,
     pushbroom::{CorrectedOrientation, ExteriorOrientation, OrientationCorrection, Sighting},
-    statistics::BAARDA_LIMIT,
 };
 
 /// The adjusted site.
@@ -62,10 +63,12 @@ pub struct CorrectedImage {
     /// Coefficients of the correction at `[3·quantity + power]`, metres and radians: X, Y and Z position,
     /// rotations about the camera's x, y and z axis, each with powers 0, 1 and 2 of `t = x/half_lines`.
     pub correction: [f64; ORIENTATION_UNKNOWNS],
-    /// Their standard deviations; 0 where held fixed.
+    /// Standard deviations of the camera at the exposure of its lines, line times included; 0 where held fixed.
     pub sigmas: [f64; ORIENTATION_UNKNOWNS],
-    /// Their covariance; rows and columns of unknowns that are held fixed are 0.
+    /// Covariance of the same; rows and columns of unknowns that are held fixed are 0.
     pub covariance: DMatrix<f64>,
+    /// Standard deviation of a delay of all lines that these contain, seconds; 0 where they contain none.
+    pub line_time_sigma_s: f64,
     /// Their a priori values.
     pub expected: [f64; ORIENTATION_UNKNOWNS],
     /// Their a priori standard deviations; 0 where held fixed, infinite where free.
@@ -92,8 +95,12 @@ pub struct CorrectedPoint {
     /// Adjusted position.
     pub ground: Position<BodyFixed>,
     /// Covariance of the adjusted coordinates, m²: a priori variances times the summary's variance factor. For a tie
-    /// point that fails the test against the surface but was kept, it includes the distance from the surface.
+    /// point that fails the test against the surface but was kept, it includes the distance from the surface; for a
+    /// footprint, the shift of its profile.
     pub covariance_m2: Matrix3<f64>,
+    /// The part of it that tie points of the site, or footprints of the profile, have in common; `None` for tie points
+    /// where no surface controls heights.
+    pub shared: Option<SharedError>,
 }
 
 /// One scalar observation after the adjustment.
@@ -172,6 +179,28 @@ impl CorrectedImage {
     }
 }
 
+impl CorrectedPoint {
+    /// Standard deviations towards east, north and up, metres.
+    #[must_use]
+    pub fn local_sigmas_m(&self) -> [f64; 3] {
+        self.local_roots_m(&self.covariance_m2)
+    }
+
+    /// The same without the error that the point shares with others; `None` where that is not known.
+    #[must_use]
+    pub fn relative_sigmas_m(&self) -> Option<[f64; 3]> {
+        let shared = self.shared.as_ref()?;
+        Some(self.local_roots_m(&shared.relative_m2))
+    }
+
+    fn local_roots_m(&self, covariance_m2: &Matrix3<f64>) -> [f64; 3] {
+        let to_local = local_axes(&self.ground.xyz_m);
+        let local_m2 = to_local * covariance_m2 * to_local.transpose();
+        // Rounding may leave the variance of a difference a little below 0.
+        [0, 1, 2].map(|axis| local_m2[(axis, axis)].max(0.0).sqrt())
+    }
+}
+
 impl From<Residual> for ScalarResidual {
     fn from(residual: Residual) -> Self {
         Self {
@@ -187,16 +216,17 @@ pub(super) fn collect<M: ExteriorOrientation>(
     images: &[AdjustImage<M>],
     assembled: Assembled<&M>,
     adjustment: Adjustment,
-    summary: AdjustmentSummary,
+    (summary, errors): (AdjustmentSummary, &[Option<PointErrors>]),
     profiles: &[String],
     other_reading: Option<std::result::Result<OtherReading, String>>,
 ) -> Adjusted {
-    let contradicted_m2 = contradicted_m2(&adjustment);
     let mut index_of = vec![None; assembled.points.len()];
     let mut points = Vec::with_capacity(assembled.points.len());
     let variance = summary.variance_factor;
     for (point, outcome) in adjustment.points.iter().enumerate() {
-        let Ok(found) = outcome else { continue };
+        let (Ok(found), Some(errors)) = (outcome, &errors[point]) else {
+            continue;
+        };
         index_of[point] = Some(points.len());
         points.push(CorrectedPoint {
             kind: assembled.kind(point),
@@ -204,14 +234,15 @@ pub(super) fn collect<M: ExteriorOrientation>(
             id: assembled.points[point].name.clone(),
             initial: Position::new(assembled.network.points[point].ground_m),
             ground: Position::new(found.ground_m),
-            covariance_m2: found.cofactor_m2 * variance + contradicted_m2[point],
+            covariance_m2: errors.covariance_m2,
+            shared: errors.shared,
         });
     }
     let views = assembled.network.views.par_iter().zip(&adjustment.views);
     let ranges = assembled.network.ranges.iter().zip(&adjustment.ranges);
     Adjusted {
         heights: height_summary::heights(&assembled, &adjustment),
-        images: corrected_images(images, &assembled, &adjustment, summary.variance_factor),
+        images: corrected_images(images, &assembled, &adjustment, variance),
         other_reading,
         boresight: match &assembled.no_spots {
             Some(reason) => Some(Err(reason.clone())),
@@ -286,22 +317,6 @@ fn in_image_px<M: ExteriorOrientation>(
     ])
 }
 
-/// Additional height variance of points that fail the test against the surface, m².
-///
-/// Such points stand out, but not enough for a blunder, or a neighbour confirms them: ground between the profiles, or
-/// measurements with a common error. The data do not show whether image or altimeter is right.
-fn contradicted_m2(adjustment: &Adjustment) -> Vec<Matrix3<f64>> {
-    let mut added_m2 = vec![Matrix3::zeros(); adjustment.points.len()];
-    for height in &adjustment.compared {
-        let stands_out = height.above_m.abs() > BAARDA_LIMIT * height.sigma_m();
-        if let (true, Ok(point)) = (stands_out, &adjustment.points[height.point]) {
-            let up_m = point.ground_m.normalize() * height.above_m;
-            added_m2[height.point] = up_m * up_m.transpose();
-        }
-    }
-    added_m2
-}
-
 /// A step below this many lines finds the line of a view to 1e-7 lines.
 const LAST_STEP_LINES: f64 = 1e-3;
 
@@ -320,23 +335,32 @@ fn corrected_images<M>(
     adjustment: &Adjustment,
     variance_factor: f64,
 ) -> Vec<CorrectedImage> {
+    let delay_sigma_s = assembled.unseen_delay_s;
     let root = variance_factor.sqrt();
     let found = images.iter().zip(&adjustment.images).enumerate();
-    found
-        .map(|(index, (image, adjusted))| CorrectedImage {
+    let corrected = |(index, (image, adjusted)): (usize, (&AdjustImage<M>, &AdjustedImage))| {
+        let prior_sigmas = prior_sigmas(&assembled.network, index);
+        let mut covariance = &adjusted.cofactors * variance_factor;
+        let delay = image.line_delay.as_ref().filter(|_| delay_sigma_s > 0.0);
+        let delay = delay.map(|of| of.added(delay_sigma_s, &adjusted.cofactors, &prior_sigmas));
+        let line_time_sigma_s = delay.map_or(0.0, |(added, sigma_s)| {
+            covariance += added;
+            sigma_s
+        });
+        CorrectedImage {
             id: image.oriented_camera.id.clone(),
             correction: adjusted.correction.coefficients(),
-            sigmas: std::array::from_fn(|unknown| {
-                root * adjusted.cofactors[(unknown, unknown)].sqrt()
-            }),
-            covariance: &adjusted.cofactors * variance_factor,
+            sigmas: std::array::from_fn(|unknown| covariance[(unknown, unknown)].max(0.0).sqrt()),
+            covariance,
+            line_time_sigma_s,
             expected: expected(&image.expected_m),
-            prior_sigmas: prior_sigmas(&assembled.network, index),
+            prior_sigmas,
             time_bias_s: adjusted
                 .time_bias_s
                 .map(|(bias_s, root_s)| (bias_s, root * root_s)),
             line_period_s: image.line_period_s,
             half_lines: adjusted.correction.half_lines,
-        })
-        .collect()
+        }
+    };
+    found.map(corrected).collect()
 }

@@ -26,10 +26,6 @@ use areograph_geom::{
 /// Standard deviation of a single spot in its image beyond the errors that all spots share, focal-plane pixels: jitter
 /// and interpolation of attitudes. The recorded footprint has a separate error.
 const SPOT_SIGMA_PX: f64 = 0.5;
-/// Plausible delay of lines against the shots, seconds: 45 ms, half the disagreement of the images of a pair (Shan et
-/// al. 2005, Table 5).
-const LINE_TIME_S: f64 = 0.045;
-
 /// Boresight of a laser on the bus of the cameras.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BoresightSummary {
@@ -244,7 +240,7 @@ fn farthest<M>(
     });
     // A free unknown contradicts nothing, but the delay of lines is bounded.
     let late = |found: &Estimate| match found.prior {
-        None => Some(found.value / found.root_cofactor.hypot(LINE_TIME_S)),
+        None => Some(found.value / found.root_cofactor.hypot(assembled.plausible_delay_s)),
         Some(_) => standardised(found),
     };
     let times = bus.line_times_s.iter().enumerate();

@@ -85,13 +85,8 @@ pub(super) fn heights<M>(
         .map(|height| height.above_m)
         .collect();
     let factor = variance_factor(assembled, adjustment);
-    let [east_m, north_m, up_m] = mean_sigma_m(adjustment, factor)?;
+    let mean_sigma_m = datum_sigma_m(adjustment, factor)?;
     let compared = &adjustment.compared;
-    let moved_m = compared
-        .iter()
-        .filter(|of| is_beyond(of))
-        .map(|of| of.above_m);
-    let moved_m = moved_m.sum::<f64>() / compared.len().max(1) as f64;
     let for_height = |of: &&RejectedPoint| matches!(of.reason, RejectionReason::Height { .. });
     Some(HeightSummary {
         ties: adjustment.heights.len(),
@@ -103,8 +98,21 @@ pub(super) fn heights<M>(
         compared: compared.len(),
         beyond_limit: beyond_limit(compared),
         rejected: assembled.rejected.iter().filter(for_height).count(),
-        mean_sigma_m: [east_m, north_m, up_m.hypot(moved_m)],
+        mean_sigma_m,
     })
+}
+
+/// Standard deviations of the error that tie points share towards east, north and up, metres: those of their mean and,
+/// upwards, the shift of the mean by those beyond the limit.
+pub(super) fn datum_sigma_m(adjustment: &Adjustment, variance_factor: f64) -> Option<[f64; 3]> {
+    let [east_m, north_m, up_m] = mean_sigma_m(adjustment, variance_factor)?;
+    let compared = &adjustment.compared;
+    let moved_m = compared
+        .iter()
+        .filter(|of| is_beyond(of))
+        .map(|of| of.above_m);
+    let moved_m = moved_m.sum::<f64>() / compared.len().max(1) as f64;
+    Some([east_m, north_m, up_m.hypot(moved_m)])
 }
 
 /// Standard deviations of the mean of the points with an observed height towards east, north and up, metres.
@@ -119,7 +127,7 @@ pub(super) fn mean_sigma_m(adjustment: &Adjustment, variance_factor: f64) -> Opt
 
 /// Heights beyond the limit of the test.
 pub(super) fn beyond_limit(heights: &[HeightResidual]) -> usize {
-    heights.iter().filter(|of| is_beyond(of)).count()
+    heights.iter().filter(|height| is_beyond(height)).count()
 }
 
 fn is_beyond(height: &HeightResidual) -> bool {

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::line_times::LineDelay;
 use areograph_base::frames::{BodyFixed, Position};
 use areograph_config::{PositionUnknowns, RotationUnknowns};
 use areograph_geom::{
@@ -24,6 +25,8 @@ pub struct AdjustImage<M> {
     pub expected_m: Vector3<f64>,
     /// Rotation rate relative to inertial space, camera components, radians per second.
     pub turn_rad_s: Vector3<f64>,
+    /// Effect of a delay of all lines, where line times may err without being an unknown.
+    pub line_delay: Option<LineDelay>,
     /// Axes of a laser on the same bus, camera components, where the laser's file states them: as columns the
     /// directions of the two boresight angles, and the beam.
     pub laser_axes: Option<Matrix3<f64>>,
@@ -72,7 +75,8 @@ pub(super) fn hold_powers(
 pub struct LaserShots {
     /// Identifiers of the site's profiles, in their order.
     pub profiles: Vec<String>,
-    /// Standard deviations of the offset of a profile as recorded, towards east, north and up, metres.
+    /// Standard deviations of the offset of a profile as recorded, towards east, north and up, metres; its footprints
+    /// share it.
     pub profile_sigma_m: Vector3<f64>,
     /// Shots, each row once.
     pub shots: Vec<LaserShot>,

@@ -8,6 +8,7 @@ use super::{
     attitude_clock::by_attitude_clock,
     error::AdjustError,
     input::{AdjustImage, LaserShots},
+    line_times::delay_sigma_s,
     points::{PointKind, RejectedPoint, RejectionReason},
 };
 use crate::intersect::IntersectedTies;
@@ -40,6 +41,9 @@ pub(super) struct Assembled<M> {
     pub(super) rejected: Vec<RejectedPoint>,
     /// Image coordinates of the footprints by the initial orientations.
     pub(super) mola: Vec<View>,
+    /// Standard deviation of a delay of all lines of an image: as configured, and as far as it is no unknown, seconds.
+    pub(super) plausible_delay_s: f64,
+    pub(super) unseen_delay_s: f64,
     /// Why the laser's position in images is not an observation although it was requested.
     pub(super) no_spots: Option<String>,
 }
@@ -62,6 +66,8 @@ pub(super) fn assemble<'a, M: ExteriorOrientation>(
         profiles: Vec::new(),
         rejected: Vec::new(),
         mola: Vec::new(),
+        plausible_delay_s: config.line_time_sigma_s,
+        unseen_delay_s: delay_sigma_s(config),
         no_spots: None,
     };
     assembled.add_shots(shots, config)?;

@@ -4,9 +4,12 @@ use std::collections::BTreeSet;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::input::{
-    AdjustImage, LaserShot, LaserShots, ShotRange, hold_powers, orientation_sigmas,
-    sigmas_of_powers,
+use super::{
+    input::{
+        AdjustImage, LaserShot, LaserShots, ShotRange, hold_powers, orientation_sigmas,
+        sigmas_of_powers,
+    },
+    line_times::LineDelay,
 };
 use crate::{
     group_profiles::Profile, orientation::Orientation, register::ImageRegistration,
@@ -82,6 +85,12 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
                 .pedr_orbit_m
                 .filter(|_| config.orbit_of_pedr && self.knows_bus())
                 .map_or_else(Vector3::zeros, |off_m| self.orbit_axes() * off_m),
+            line_delay: Some(LineDelay::of(
+                &self.oriented_camera.orientation,
+                0.5 * self.oriented_camera.lines(),
+                self.times.line_times.mean_period_s(),
+                self.range_m(),
+            )),
             oriented_camera: self.oriented_camera,
             line_period_s: self.times.line_times.mean_period_s(),
             sigmas,
@@ -188,7 +197,7 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
                     ground: Position::new(spherical_to_xyz_m(
                         footprints.longitude_rad[at],
                         footprints.latitude_rad[at],
-                        footprints.radius_m[at],
+                        footprints.ground_radius_m(at),
                     )),
                     range,
                     also: ranges.collect(),

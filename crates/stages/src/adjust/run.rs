@@ -9,6 +9,7 @@ use super::{
     error::{AdjustError, CONTRADICTION},
     input::{AdjustImage, LaserShots},
     network::{self, Assembled, Named},
+    point_errors::point_errors,
     points::{PointKind, RejectedPoint, RejectionReason},
     split, summary, words,
 };
@@ -80,9 +81,10 @@ pub fn adjust<'a, M: ExteriorOrientation>(
     let dropped: Vec<RejectedPoint> = dropped.collect();
     assembled.rejected.extend(dropped);
     contradictions(images, &assembled, &adjustment)?;
-    let summary = summary::summarise(images, &assembled, &adjustment, config)?;
+    let errors = point_errors(&assembled, &adjustment, shots);
+    let summary = summary::summarise(images, &assembled, &adjustment, &errors, config)?;
     let factor = summary.variance_factor;
-    let other = split::is_told(disagreement_m, config).then(|| {
+    let other = split::needs_both_readings(disagreement_m, config).then(|| {
         split::other_reading(
             images,
             &assembled,
@@ -97,7 +99,7 @@ pub fn adjust<'a, M: ExteriorOrientation>(
         images,
         assembled,
         adjustment,
-        summary,
+        (summary, &errors),
         &shots.profiles,
         other,
     ))

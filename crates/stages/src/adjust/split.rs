@@ -29,7 +29,7 @@ use areograph_geom::{
 
 /// Images with a smaller along-track disagreement need no other reading, metres: both place the tie points within half
 /// of it, below the stated accuracy of the position.
-const TOLD_ABOVE_M: f64 = 100.0;
+const BOTH_ABOVE_M: f64 = 100.0;
 
 /// Position of the tie points by the other reading.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -44,8 +44,8 @@ pub struct OtherReading {
 }
 
 /// Whether images with this along-track disagreement need both readings.
-pub(super) fn is_told(disagreement_m: f64, config: &AdjustmentConfig) -> bool {
-    config.model == AdjustmentModel::MolaSurface && disagreement_m > TOLD_ABOVE_M
+pub(super) fn needs_both_readings(disagreement_m: f64, config: &AdjustmentConfig) -> bool {
+    config.model == AdjustmentModel::MolaSurface && disagreement_m > BOTH_ABOVE_M
 }
 
 /// Adjusts the remaining tie points by the other reading.

@@ -14,7 +14,7 @@ use areograph_base::{
     error::Result, footprints::AdjustmentModel, instruments::Altimeter, watch::Watch,
 };
 use areograph_config::{AdjustmentConfig, MolaSurfaceConfig};
-use areograph_geom::{pushbroom::CameraModel, surface::SurfaceOptions};
+use areograph_geom::surface::SurfaceOptions;
 use areograph_store::{
     stage::{Output, Round, Stage},
     stage_inputs,
@@ -27,8 +27,6 @@ stage_inputs! {
         pub round: Round,
         /// The images with the orientation of the kernels.
         pub images: SiteImages<'a>,
-        /// The form of the orientation.
-        pub model: &'a CameraModel,
         /// Footprints in IAU 2000.
         pub converted: &'a Output<Converted>,
         /// Profiles.
@@ -44,7 +42,7 @@ stage_inputs! {
         /// The altimeter.
         pub altimeter: &'a Altimeter,
         /// Uncertainties of the MOLA surface.
-        pub mola_surface: &'a MolaSurfaceConfig,
+        pub laser_surface: &'a MolaSurfaceConfig,
         /// Standard deviations and options.
         pub adjustment: &'a AdjustmentConfig,
     }
@@ -52,7 +50,7 @@ stage_inputs! {
 
 impl Stage for Adjust<'_> {
     const NAME: &'static str = "adjust";
-    const METHOD: u32 = 8;
+    const METHOD: u32 = 10;
     type Output = Adjusted;
     stage_inputs!(fingerprint);
 
@@ -72,7 +70,7 @@ impl Stage for Adjust<'_> {
             Ok(Candidate {
                 times: image.times.value()?,
                 orientation: image.orientation.value()?,
-                oriented_camera: oriented.oriented_camera(*self.model),
+                oriented_camera: oriented.oriented_camera(),
                 registration: image.registration.value()?,
                 pedr_orbit_m: orbits_m.get(&index).copied(),
             })
@@ -85,12 +83,12 @@ impl Stage for Adjust<'_> {
             AdjustmentModel::MolaSurface => {
                 let around = starts.points.iter().map(|point| point.ground.xyz_m);
                 let around: Vec<_> = around.collect();
-                let shots = MolaShots::of(footprints, profiles);
                 let options = SurfaceOptions {
                     relief_sigma_m: relief_for_plan
-                        .then_some(self.mola_surface.profile_plan_sigma_m),
-                    ..self.mola_surface.options(footprints.body)
+                        .then_some(self.laser_surface.profile_plan_sigma_m),
+                    ..self.laser_surface.options(footprints.body)
                 };
+                let shots = MolaShots::of(footprints, profiles, &options);
                 shots.surface(&around, &options).ok()
             }
             AdjustmentModel::Published => None,
@@ -103,8 +101,8 @@ impl Stage for Adjust<'_> {
             self.altimeter,
             self.adjustment,
         );
-        let plan_m = self.mola_surface.profile_plan_sigma_m;
-        shots.profile_sigma_m = Vector3::new(plan_m, plan_m, self.mola_surface.profile_sigma_m);
+        let plan_m = self.laser_surface.profile_plan_sigma_m;
+        shots.profile_sigma_m = Vector3::new(plan_m, plan_m, self.laser_surface.profile_sigma_m);
         let pairs = self.pairs.value()?.iter();
         let disagreements_m = pairs.map(|pair| pair.along_track_parallax_m);
         let largest_m = disagreements_m.fold(0.0, f64::max);

@@ -10,6 +10,7 @@ use super::{
     height_summary::beyond_limit,
     input::AdjustImage,
     network::{Assembled, projector},
+    point_errors::PointErrors,
     points::PointKind,
     words::unknown_in_words,
 };
@@ -120,7 +121,7 @@ impl TypeSummary {
 pub struct GroundSummary {
     /// Adjusted minus initial X, Y and Z, metres.
     pub corrections_m: [Summary; 3],
-    /// A posteriori standard deviations of X, Y and Z, metres.
+    /// A posteriori standard deviations of X, Y and Z, metres; of footprints with the shift of their profile.
     pub sigmas_m: [Summary; 3],
 }
 
@@ -177,6 +178,7 @@ pub(super) fn summarise<M: ExteriorOrientation>(
     images: &[AdjustImage<M>],
     assembled: &Assembled<&M>,
     adjustment: &Adjustment,
+    errors: &[Option<PointErrors>],
     config: &AdjustmentConfig,
 ) -> Result<AdjustmentSummary, AdjustError> {
     let (shots, ties) = (0..assembled.shots, assembled.shots..assembled.points.len());
@@ -190,8 +192,8 @@ pub(super) fn summarise<M: ExteriorOrientation>(
         tie_components: tie_components(assembled, adjustment),
         variance_factor: variance_factor(assembled, adjustment),
         types: types(assembled, adjustment),
-        shots: ground(assembled, adjustment, shots),
-        ties: ground(assembled, adjustment, ties),
+        shots: ground(assembled, adjustment, errors, shots),
+        ties: ground(assembled, adjustment, errors, ties),
         images: images
             .iter()
             .enumerate()
@@ -346,14 +348,14 @@ fn of_type(kind: ObservationType, residuals: &[Residual]) -> TypeSummary {
 fn ground<M>(
     assembled: &Assembled<M>,
     adjustment: &Adjustment,
+    errors: &[Option<PointErrors>],
     points: std::ops::Range<usize>,
 ) -> GroundSummary {
-    let factor = variance_factor(assembled, adjustment);
     let found: Vec<(Vector3<f64>, Vector3<f64>)> = points
         .filter_map(|point| {
             let adjusted = adjustment.points[point].as_ref().ok()?;
             let correction_m = adjusted.ground_m - assembled.network.points[point].ground_m;
-            let sigma_m = adjusted.cofactor_m2.diagonal().map(f64::sqrt) * factor.sqrt();
+            let sigma_m = errors[point]?.covariance_m2.diagonal().map(f64::sqrt);
             Some((correction_m, sigma_m))
         })
         .collect();

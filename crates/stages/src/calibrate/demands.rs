@@ -41,7 +41,7 @@ pub(super) fn enough_ties(
 ) -> std::result::Result<(), CalibrateError> {
     for (camera, name) in names.iter().enumerate() {
         let sees = |of: &&OrbitPoint| of.point.sights.iter().any(|sight| sight.camera == camera);
-        let ties = points.iter().filter(|of| of.is(PointKind::Tie));
+        let ties = points.iter().filter(|point| point.is(PointKind::Tie));
         let found = ties.filter(sees).count();
         if found < TIES_MIN {
             return Err(CalibrateError::TooFewTies {
@@ -61,7 +61,7 @@ pub(super) fn enough(
     is_controlled: bool,
 ) -> std::result::Result<(), CalibrateError> {
     enough_ties(points, names)?;
-    let count = |kind| points.iter().filter(|of| of.is(kind)).count();
+    let count = |kind| points.iter().filter(|point| point.is(kind)).count();
     let [controls, held_back] = [PointKind::Control, PointKind::HeldBack].map(count);
     if is_controlled && controls.min(held_back) < CONTROLS_MIN {
         return Err(CalibrateError::TooFewControls {

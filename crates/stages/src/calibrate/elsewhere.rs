@@ -64,16 +64,19 @@ pub(super) fn elsewhere(
                     .reasons
                     .push(format!("orbit {}: {reason}", orbit.orbit)),
                 None if compared.is_kept() => found.remarks.push(format!(
-                    "orbit {}: {}, hardly an improvement",
+                    "orbit {}: {}, no significant improvement",
                     orbit.orbit,
                     compared.words()
                 )),
                 None => {}
             }
         }
-        found
-            .offsets
-            .extend(orbit.offsets.iter().map(|of| of.check(&orbit.orbit)));
+        found.offsets.extend(
+            orbit
+                .offsets
+                .iter()
+                .map(|offset| offset.check(&orbit.orbit)),
+        );
         if !is_worse {
             let reasons = orbit.offsets.iter().filter_map(ControlOffset::reason);
             let reasons = reasons.map(|reason| format!("orbit {}: {reason}", orbit.orbit));

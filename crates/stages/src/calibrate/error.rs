@@ -93,7 +93,7 @@ pub enum CalibrateError {
     TooFewControls {
         /// How many there are.
         found: usize,
-        /// How many are held back.
+        /// How many are withheld.
         held_back: usize,
         /// How many are needed.
         expected: usize,

@@ -20,10 +20,10 @@ pub struct GivenPoints {
 /// Tie points, with their own standard deviations where available.
 pub(super) fn ties(given: &[TiePoint], sigma_px: f64) -> Vec<MeasuredPoint> {
     let measured = |point: &TiePoint| {
-        let measures = point.measures.iter().map(|of| Measured {
-            camera: of.image,
-            place: [of.line, of.sample],
-            sigma_px: of.sigma_px.unwrap_or([sigma_px; 2]),
+        let measures = point.measures.iter().map(|measure| Measured {
+            camera: measure.image,
+            place: [measure.line, measure.sample],
+            sigma_px: measure.sigma_px.unwrap_or([sigma_px; 2]),
         });
         let mut measured: Vec<Measured> = measures.collect();
         measured.sort_by_key(|of| of.camera);

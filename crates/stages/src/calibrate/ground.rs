@@ -89,9 +89,9 @@ pub(super) fn off_ground(
     state: &CalibrationState,
     covariance: &DMatrix<f64>,
 ) -> Option<Tested> {
-    let lasers = points.iter().filter(|of| of.is(PointKind::Control));
+    let lasers = points.iter().filter(|point| point.is(PointKind::Control));
     let lasers_m: Vec<Vector3<f64>> = lasers
-        .filter_map(|of| Some(of.point.known?.place_m))
+        .filter_map(|point| Some(point.point.known?.place_m))
         .collect();
     let laser_ground = ScatteredHeights::new(&lasers_m)?;
     let limit = OFF_SIGMAS.max(TAILS * laser_ground.tail);
@@ -184,7 +184,10 @@ fn worst_of_neighbours(found: &[Option<OnGround>], is_off: impl Fn(&Off) -> bool
 
 /// Why tie points are not tested against the ground.
 pub(super) fn untested(points: &[OrbitPoint]) -> String {
-    let lasers = points.iter().filter(|of| of.is(PointKind::Control)).count();
+    let lasers = points
+        .iter()
+        .filter(|point| point.is(PointKind::Control))
+        .count();
     format!(
         "{lasers} laser points in use, fewer than {POINTS_MIN} or nearly on a line: heights of tie points are not tested, and \
          measurements that are wrong along the flight are not identified"

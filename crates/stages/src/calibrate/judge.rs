@@ -145,7 +145,7 @@ fn scatters(of: &Evidence<'_>) -> Vec<Judged> {
             limit: SCATTER_MAX.max((100.0 * by_chance).ceil() / 100.0),
         })
     };
-    let held_back = of.held_back.map(|of| of.scatter);
+    let held_back = of.held_back.map(|held_back| held_back.scatter);
     let both = |of: Option<Scatter>| of.map_or((None, None), |of| (of.plane, of.height));
     let [(plane, height), (held_plane, held_height)] = [of.used, held_back].map(both);
     [
@@ -179,7 +179,7 @@ fn checks(of: &Evidence<'_>) -> Vec<Check> {
     let check = |kind, found: f64, limit: f64| Check::new(kind, "", found, limit, Fail);
     let mut checks = Vec::new();
     match of.held_back {
-        None => checks.push(Check::told(
+        None => checks.push(Check::without_number(
             CheckKind::HeldBackPlane,
             "no laser control",
             Fail,
@@ -257,7 +257,7 @@ fn remarks(of: &Evidence<'_>) -> Vec<String> {
         of.mode == CalibrationMode::AsPublished,
         format!(
             "all angles are free in the step of ties, as published: {} combinations of them are not determined ({}), and a difference \
-             of scale is taken for a common pitch; the figures after this step may be far off",
+             of scale is taken for a common pitch; the figures after this step may have large errors",
             of.sight.unseen,
             of.sight.unseen_words()
         ),

@@ -39,7 +39,7 @@ impl Squares {
 fn ties(points: &[OrbitPoint], state: &CalibrationState, pixels: &[f64]) -> TieFigures {
     let mut squares = vec![[Squares::default(); 2]; pixels.len()];
     let mut count = 0;
-    for of in points.iter().filter(|of| of.is(PointKind::Tie)) {
+    for of in points.iter().filter(|point| point.is(PointKind::Tie)) {
         let Ok(place_m) = of.point.place(state) else {
             continue;
         };
@@ -68,7 +68,7 @@ fn control(
     let mut squares = vec![[Squares::default(); 2]; pixels.len()];
     let mut heights = Squares::default();
     let mut count = 0;
-    for of in points.iter().filter(|of| of.is(kind)) {
+    for of in points.iter().filter(|point| point.is(kind)) {
         let Some(known) = &of.point.known else {
             continue;
         };

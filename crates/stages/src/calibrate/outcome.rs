@@ -113,7 +113,7 @@ impl Outcome<'_> {
             PointKind::Tie | PointKind::Control => TookPart::Yes,
         };
         let (mut plane, mut height, mut points) = (Missed::default(), Missed::default(), 0_u32);
-        for of in self.points.iter().filter(|of| of.is(kind)) {
+        for of in self.points.iter().filter(|point| point.is(kind)) {
             let misfit = of.point.misfit(self.state, self.covariance, took_part);
             let misfit = misfit.map_err(|why| CalibrateError::Unseen {
                 point: of.name.clone(),
@@ -137,7 +137,11 @@ impl Outcome<'_> {
     pub(super) fn held_back(&self) -> std::result::Result<Option<HeldBack>, CalibrateError> {
         let (mut plane, mut height) = (Squares::default(), Squares::default());
         let (mut sum_m, mut intersected, mut points) = (Vector3::zeros(), 0_u32, 0_u32);
-        for of in self.points.iter().filter(|of| of.is(PointKind::HeldBack)) {
+        for of in self
+            .points
+            .iter()
+            .filter(|point| point.is(PointKind::HeldBack))
+        {
             points += 1;
             if let Some(off_m) = self.off_m(of) {
                 plane.add(off_m.xy().norm());
@@ -158,7 +162,7 @@ impl Outcome<'_> {
         };
         let [wider_plane, wider_height] = [wider(|of| of.plane), wider(|of| of.height)];
         let (mut stated_plane, mut stated_height) = (Squares::default(), Squares::default());
-        for of in self.points.iter().filter(|of| of.is(PointKind::Tie)) {
+        for of in self.points.iter().filter(|point| point.is(PointKind::Tie)) {
             if let Some([east, north, up]) = self.placed(of).and_then(|of| of.1) {
                 stated_plane.add(east.hypot(north) * wider_plane);
                 stated_height.add(up * wider_height);
@@ -229,8 +233,8 @@ impl Outcome<'_> {
                 camera: self.names[measured.camera].clone(),
                 place: measured.place,
                 left_out: of.left_out,
-                before_px: before.as_ref().map(|of| of[index]),
-                after_px: after.as_ref().map(|of| of[index]),
+                before_px: before.as_ref().map(|before| before[index]),
+                after_px: after.as_ref().map(|after| after[index]),
             };
             let images = of.measured.iter().enumerate().map(of_image);
             images.collect::<Vec<_>>()

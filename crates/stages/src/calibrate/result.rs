@@ -119,7 +119,7 @@ impl Figures {
     /// Figures of control points of this kind.
     #[must_use]
     pub fn of(&self, kind: PointKind) -> Option<&ControlFigures> {
-        self.control.iter().find(|of| of.kind == kind)
+        self.control.iter().find(|control| control.kind == kind)
     }
 }
 

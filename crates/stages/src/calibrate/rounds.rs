@@ -29,7 +29,7 @@ impl CalibrationRound {
         control: &LaserMatch,
         done: &Calibration,
     ) -> Self {
-        let figures = |of: &Calibration| of.steps.last().map(|of| of.figures.clone());
+        let figures = |of: &Calibration| of.steps.last().map(|step| step.figures.clone());
         let worst_px = |of: &Calibration| figures(of).and_then(|of| of.ties.worst_px());
         let rms = |kind: PointKind| {
             let last = figures(done);
@@ -65,13 +65,15 @@ impl CalibrationRound {
             control: rms(PointKind::Control),
             held_back: rms(PointKind::HeldBack),
             unit_px: unit_px(control, done),
-            held_back_scatter: done.held_back.as_ref().map(|of| of.scatter),
+            held_back_scatter: done.held_back.as_ref().map(|held_back| held_back.scatter),
             angles_rad: done
                 .cameras
                 .iter()
                 .map(|of| of.angles_rad.map(|of| of.value))
                 .collect(),
-            drift_m_per_line: done.drift_m_per_line.map(|of| of.value),
+            drift_m_per_line: done
+                .drift_m_per_line
+                .map(|drift_m_per_line| drift_m_per_line.value),
         }
     }
 }
@@ -79,10 +81,10 @@ impl CalibrationRound {
 /// Residuals of the control points that were used, by their units.
 fn unit_px(control: &LaserMatch, done: &Calibration) -> BTreeMap<usize, f64> {
     let points = control.points.iter();
-    let of_name: BTreeMap<&str, usize> = points.map(|of| (&*of.name, of.unit)).collect();
+    let of_name: BTreeMap<&str, usize> = points.map(|point| (&*point.name, point.unit)).collect();
     let mut squares: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
     let used = done.images.iter();
-    for image in used.filter(|of| of.kind == PointKind::Control && !of.left_out) {
+    for image in used.filter(|image| image.kind == PointKind::Control && !image.left_out) {
         if let Some((unit, [across, along])) = of_name.get(&*image.point).zip(image.after_px) {
             let of_unit = squares.entry(*unit).or_default();
             of_unit.push(across * across + along * along);
@@ -134,7 +136,7 @@ impl Rounds {
     fn shift_cells(&self) -> f64 {
         self.rounds
             .last()
-            .map_or(f64::INFINITY, |of| of.shift_cells)
+            .map_or(f64::INFINITY, |round| round.shift_cells)
     }
 
     /// Whether another round would change nothing significant.

@@ -76,11 +76,12 @@ fn calibrate_by(
     source: &PointSource<'_>,
     is_controlled: bool,
 ) -> Result<Calibration> {
-    let names: Vec<String> = config.cameras.iter().map(|of| of.id.clone()).collect();
+    let names = config.cameras.iter().map(|camera| camera.id.clone());
+    let names: Vec<String> = names.collect();
     let images = config
         .cameras
         .iter()
-        .map(|of| CameraImage::read(&of.isd, &of.id, config.body));
+        .map(|camera| CameraImage::read(&camera.isd, &camera.id, config.body));
     let images = images.collect::<Result<Vec<_>>>()?;
     belong_together(&images, &names)?;
     let orbit = Orbit::of(images, config.body, None)?;
@@ -105,7 +106,7 @@ fn calibrate_by(
     let sight =
         tie_sight(&work.of(TIES), &work.state).map_err(|why| work.failed("ties", TIES, &why))?;
     work.ties()?;
-    if work.points.iter().any(|of| of.is(PointKind::Control)) {
+    if work.points.iter().any(|point| point.is(PointKind::Control)) {
         work.with_control(&names, &mut complaints)?;
     }
     let calibrated = Calibrated {
@@ -180,14 +181,17 @@ fn left_out(points: &[OrbitPoint]) -> [[usize; 2]; 2] {
     [true, false].map(|tie| {
         let of = points
             .iter()
-            .filter(|of| (of.kind == PointKind::Tie) == tie);
-        [of.clone().count(), of.filter(|of| of.left_out).count()]
+            .filter(|point| (point.kind == PointKind::Tie) == tie);
+        [
+            of.clone().count(),
+            of.filter(|point| point.left_out).count(),
+        ]
     })
 }
 
 /// What no point tests, in words.
 fn untested_words(work: &Work<'_>) -> Vec<String> {
-    if !work.points.iter().any(|of| of.is(PointKind::Control)) {
+    if !work.points.iter().any(|point| point.is(PointKind::Control)) {
         // A reason states that there is no control.
         return Vec::new();
     }
@@ -215,7 +219,7 @@ fn known(config: &CalibrationConfig, orbit: &Orbit) -> Known {
 impl Work<'_> {
     fn all<'a>(&'a self, kinds: &'a [PointKind]) -> impl Iterator<Item = &'a OrbitPoint> {
         let points = self.points.iter();
-        points.filter(|of| kinds.iter().any(|kind| of.is(*kind)))
+        points.filter(|point| kinds.iter().any(|kind| point.is(*kind)))
     }
 
     fn of(&self, kinds: &[PointKind]) -> Vec<GroundPoint> {
@@ -410,8 +414,8 @@ fn missed(point: &GroundPoint, state: &CalibrationState) -> f64 {
         let [across, along] = sight.sigma;
         (residual.x / across).abs().max((residual.y / along).abs())
     });
-    let known = point
-        .known
-        .map_or(0.0, |of| (of.whitening * (of.place_m - place_m)).amax());
+    let known = point.known.map_or(0.0, |known| {
+        (known.whitening * (known.place_m - place_m)).amax()
+    });
     seen.fold(known, f64::max)
 }

@@ -94,7 +94,7 @@ fn offsets(
 ) -> Vec<ControlOffset> {
     let mut planes = vec![Mean::default(); names.len()];
     let mut heights = Mean::default();
-    for of in points.iter().filter(|of| of.is(PointKind::Control)) {
+    for of in points.iter().filter(|point| point.is(PointKind::Control)) {
         let Some(known) = &of.point.known else {
             continue;
         };
@@ -128,7 +128,7 @@ fn calibration_shares(
     of_cameras.rows_mut(drift, 3).fill(0.0);
     of_cameras.columns_mut(drift, 3).fill(0.0);
     let (mut plane, mut height) = (Missed::default(), Missed::default());
-    for of in points.iter().filter(|of| of.is(PointKind::Control)) {
+    for of in points.iter().filter(|point| point.is(PointKind::Control)) {
         if let Ok(Some(misfit)) = of.point.misfit(state, &of_cameras, TookPart::No) {
             plane = plane.and(misfit.plane);
             height = height.and(misfit.height.unwrap_or_default());
@@ -199,7 +199,7 @@ fn noise(points: &[OrbitPoint], state: &CalibrationState) -> Noise {
     let (mut plane, mut height) = (Squares::default(), Squares::default());
     let parameters = state.layout().len();
     let exact = DMatrix::zeros(parameters, parameters);
-    for of in points.iter().filter(|of| of.is(PointKind::Control)) {
+    for of in points.iter().filter(|point| point.is(PointKind::Control)) {
         let Some(known) = &of.point.known else {
             continue;
         };

@@ -251,7 +251,10 @@ impl ArchiveProfile {
             (profile.start_et_s, profile.stop_et_s) = (first.et_s, last.et_s);
             profile.tags_et_s = [first.et_tag_s, last.et_tag_s];
             let spans = spans(0, shots.iter().map(|shot| shot.et_tag_s));
-            profile.spans_et_s = spans.iter().map(|of| [of.first_s, of.last_s]).collect();
+            profile.spans_et_s = spans
+                .iter()
+                .map(|span| [span.first_s, span.last_s])
+                .collect();
         }
         profile.judge(rules);
         (profile, bins)

@@ -141,7 +141,7 @@ impl ArchiveRanges {
     /// Profiles of which no shot, or not every shot, has a position in the kernels.
     #[must_use]
     pub fn not_covered(&self) -> [usize; 2] {
-        let without = self.profiles().filter(|of| of.shots == 0).count();
+        let without = self.profiles().filter(|profile| profile.shots == 0).count();
         let partly = |of: &&ArchiveProfile| of.shots > 0 && of.not_covered > 0;
         [without, self.profiles().filter(partly).count()]
     }
@@ -198,11 +198,11 @@ impl ArchiveRanges {
             self.profiles().filter(is_beyond).count(),
             self.profiles().count(),
         );
-        let told = format!("{beyond} of {all} profiles break a limit, the worst of them:");
-        let told = (beyond > 0).then_some(told).into_iter();
+        let summary = format!("{beyond} of {all} profiles break a limit, the worst of them:");
+        let summary = (beyond > 0).then_some(summary).into_iter();
         let named = self.worst(beyond.min(NAMED)).into_iter();
         let named = named.map(|(_, of)| format!("{}: {}", of.id(), of.invalid_because.join("; ")));
-        told.chain(named).collect()
+        summary.chain(named).collect()
     }
 
     /// Files with too many complaints, which profiles of other files do not reveal.
@@ -274,7 +274,10 @@ mod tests {
     }
 
     fn ranges(profiles: Vec<ArchiveProfile>) -> ArchiveRanges {
-        let shots = profiles.iter().map(|of| u64::from(of.shots)).sum();
+        let shots = profiles
+            .iter()
+            .map(|profile| u64::from(profile.shots))
+            .sum();
         ArchiveRanges {
             files: vec![CheckedFile {
                 path: PathBuf::from("a.b"),

@@ -66,7 +66,7 @@ stage_inputs! {
         /// Kernels that positions may depend on.
         pub kernels: &'a KernelView,
         /// The clock of MOLA.
-        pub mola_clock: &'a MolaClock,
+        pub altimeter_clock: &'a MolaClock,
         /// Limits and the scan of clock biases.
         pub range_check: &'a RangeCheckConfig,
     }
@@ -74,7 +74,7 @@ stage_inputs! {
 
 impl Stage for CheckRanges<'_> {
     const NAME: &'static str = "check_ranges";
-    const METHOD: u32 = 9;
+    const METHOD: u32 = 11;
     type Output = RangeCheck;
     stage_inputs!(fingerprint);
 
@@ -84,12 +84,12 @@ impl Stage for CheckRanges<'_> {
 
     fn run_watched(&self, watch: Watch<'_>) -> Result<RangeCheck> {
         let profiles = self.profiles.value()?;
-        let reach_s = trajectory_reach_s(self.range_check, self.mola_clock);
+        let reach_s = trajectory_reach_s(self.range_check, self.altimeter_clock);
         check_ranges(
             &self.converted.value()?.footprints,
             profiles,
             &trajectory(self.kernels.session()?, profiles, reach_s)?,
-            self.mola_clock,
+            self.altimeter_clock,
             self.range_check,
             watch,
         )
@@ -123,8 +123,8 @@ const TRAJECTORY_TOLERANCE_M: f64 = 0.001;
 
 /// Seconds beyond a profile for which the spacecraft's trajectory is tabulated.
 #[must_use]
-pub fn trajectory_reach_s(range_check: &RangeCheckConfig, mola_clock: &MolaClock) -> f64 {
-    range_check.scan_half_width_s + mola_clock.bias_s + TRAJECTORY_MARGIN_S
+pub fn trajectory_reach_s(range_check: &RangeCheckConfig, altimeter_clock: &MolaClock) -> f64 {
+    range_check.scan_half_width_s + altimeter_clock.bias_s + TRAJECTORY_MARGIN_S
 }
 
 /// Tabulates the spacecraft's trajectory over all profiles, `reach_s` beyond them as far as the kernels go.

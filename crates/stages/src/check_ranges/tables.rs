@@ -1,7 +1,7 @@
 //! The range check of shots of tables: measured range against the table's own spacecraft, and against the spacecraft of
 //! images with its laser, where one was exposed at that time, or else against that of the kernels, where they cover it.
 //!
-//! A table without positions of the spacecraft (`has_own_spacecraft`) is compared with the kernels alone, where these
+//! A table without positions of the spacecraft (`states_spacecraft`) is compared with the kernels alone, where these
 //! cover a profile; else its ranges are not tested.
 //!
 //! `ImageTimes::has_laser` marks images with the laser. No other stage after `search_footprints` distinguishes tables
@@ -26,8 +26,8 @@ use areograph_config::RangeCheckConfig;
 use areograph_geom::{
     orbit_axes::radial_along_cross,
     range_residuals::{
-        RangeResiduals, SpacecraftState, footprint, has_own_spacecraft, own_spacecraft,
-        range_residual_m,
+        RangeResiduals, SpacecraftState, footprint, own_spacecraft, range_residual_m,
+        states_spacecraft,
     },
     statistics::{Summary, outliers},
 };
@@ -49,7 +49,7 @@ stage_inputs! {
         /// Kernels that positions may depend on.
         pub kernels: &'a KernelView,
         /// The clock of the altimeter.
-        pub mola_clock: &'a MolaClock,
+        pub altimeter_clock: &'a MolaClock,
         /// Limits.
         pub range_check: &'a RangeCheckConfig,
     }
@@ -57,7 +57,7 @@ stage_inputs! {
 
 impl Stage for CheckTableRanges<'_> {
     const NAME: &'static str = "check_ranges";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     type Output = RangeCheck;
     stage_inputs!(fingerprint);
 
@@ -65,7 +65,7 @@ impl Stage for CheckTableRanges<'_> {
         let images = self.images.0.iter().map(Output::value);
         let images = images.collect::<Result<Vec<_>>>()?;
         let profiles = self.profiles.value()?;
-        let reach_s = trajectory_reach_s(self.range_check, self.mola_clock);
+        let reach_s = trajectory_reach_s(self.range_check, self.altimeter_clock);
         check_table_ranges(
             &self.converted.value()?.footprints,
             profiles,
@@ -73,7 +73,7 @@ impl Stage for CheckTableRanges<'_> {
                 images: &images,
                 kernels: self.trajectory(reach_s)?.as_ref(),
             },
-            self.mola_clock,
+            self.altimeter_clock,
             self.range_check,
             stop,
         )
@@ -137,7 +137,7 @@ pub fn check_table_ranges(
             let at = clock.spacecraft_time(shot.et_tag_s);
             if let Some(state) = spacecraft.state(at) {
                 let mut residuals = RangeResiduals::of(&shot, &state);
-                if !has_own_spacecraft(&shot) {
+                if !states_spacecraft(footprints, *row as usize) {
                     residuals.forget_own();
                 }
                 shots.push(index, *row, &residuals);
@@ -148,7 +148,8 @@ pub fn check_table_ranges(
         let mut ranges = statistics(profile, &shots, first, None, footprints);
         by_own_spacecraft(&mut ranges, footprints, profile, limits);
         let explain = || {
-            "support data or kernels hold a different orbit from the table's, or its times or radii are others".to_owned()
+            "support data or kernels contain an orbit other than that of the table, or times or radii of the table \
+             are in error".to_owned()
         };
         let limits = RangeCheckConfig {
             mean_max_m: ranges.mean_max_m(limits),
@@ -198,8 +199,10 @@ fn by_own_spacecraft(
     profile: &Profile,
     limits: &RangeCheckConfig,
 ) {
-    let shots = profile.rows.iter().map(|row| footprints.row(*row as usize));
-    let residuals = shots.filter(has_own_spacecraft).map(|shot| {
+    let rows = profile.rows.iter().map(|row| *row as usize);
+    let stated = rows.filter(|row| states_spacecraft(footprints, *row));
+    let residuals = stated.map(|row| {
+        let shot = footprints.row(row);
         let ground = footprint(&shot, shot.radius_m);
         range_residual_m(shot.range_m, &own_spacecraft(&shot), &ground)
     });

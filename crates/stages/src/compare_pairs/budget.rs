@@ -16,7 +16,8 @@ pub(super) fn budget_input(
 ) -> BudgetInput {
     BudgetInput {
         sites: vec![residuals],
-        misregistration: footprints.and_then(|of| misregistration(of, line_spacing_m[1])),
+        misregistration: footprints
+            .and_then(|footprints| misregistration(footprints, line_spacing_m[1])),
         pixel_size_m: mean(line_spacing_m),
         height_over_base,
     }

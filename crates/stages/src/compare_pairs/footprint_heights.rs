@@ -60,7 +60,7 @@ pub(super) fn footprint_heights<M: ExteriorOrientation>(
         let footprint_m = spherical_to_xyz_m(
             footprints.longitude_rad[at],
             footprints.latitude_rad[at],
-            footprints.radius_m[at],
+            footprints.ground_radius_m(at),
         );
         Some(FootprintHeight {
             row: *row,

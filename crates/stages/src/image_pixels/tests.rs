@@ -169,49 +169,55 @@ fn pixels_of_another_image_are_refused() {
     let own = times("M01-00123");
     let files = [archive(&pixels), cube(&pixels, &of_the_camera())];
     for file in &files {
-        let told = folder.refusal(file, &times("M01-00124"));
+        let message = folder.refusal(file, &times("M01-00124"));
         assert!(
-            told.contains("of product M01/00123; expected M0100124"),
-            "{told}"
+            message.contains("of product M01/00123; expected M0100124"),
+            "{message}"
         );
         let later = ImageTimes {
             sclk_start: Some("610472063:131".to_owned()),
             ..times("of a free name")
         };
-        let told = folder.refusal(file, &later);
+        let message = folder.refusal(file, &later);
         assert!(
-            told.contains("begins at clock 610472061:131; expected 610472063:131"),
-            "{told}"
+            message.contains("begins at clock 610472061:131; expected 610472063:131"),
+            "{message}"
         );
         let narrow = ImageTimes {
             samples: 80,
             ..own.clone()
         };
-        let told = folder.refusal(file, &narrow);
-        assert!(told.contains("64 samples in a line; expected 80"), "{told}");
+        let message = folder.refusal(file, &narrow);
+        assert!(
+            message.contains("64 samples in a line; expected 80"),
+            "{message}"
+        );
         let short = ImageTimes {
             line_times: LineTimes::even(Et::from_seconds(0.0), 144, 1e-3).unwrap(),
             ..own.clone()
         };
-        let told = folder.refusal(file, &short);
-        assert!(told.contains("160 lines; expected at most 144"), "{told}");
+        let message = folder.refusal(file, &short);
+        assert!(
+            message.contains("160 lines; expected at most 144"),
+            "{message}"
+        );
     }
     let map = format!(
         "{}\nGroup = Mapping ProjectionName = Sinusoidal End_Group",
         of_the_camera()
     );
-    let told = folder.refusal(&cube(&pixels, &map), &own);
-    assert!(told.contains("map-projected"), "{told}");
+    let message = folder.refusal(&cube(&pixels, &map), &own);
+    assert!(message.contains("map-projected"), "{message}");
     // With a label the last lines may be missing; without one it is unknown which are.
     let less = &pixels[..144 * SAMPLES as usize];
     for file in [archive(less), cube(less, &of_the_camera())] {
         assert!(open_pixels(&folder.write("pixels", &file), &own).is_ok());
     }
     for file in [png(less), tiff(less), cube(less, "")] {
-        let told = folder.refusal(&file, &own);
+        let message = folder.refusal(&file, &own);
         assert!(
-            told.contains("144 lines; expected 160 or 176, as there is no label"),
-            "{told}"
+            message.contains("144 lines; expected 160 or 176, as there is no label"),
+            "{message}"
         );
     }
 }
@@ -231,20 +237,20 @@ fn pictures_that_may_be_exchanged_are_not_matched() {
         hashed("one.png", &png(&pixels)),
         hashed("two.tif", &tiff(&pixels)),
     ];
-    let told = PixelFiles(&files)
-        .told_apart(&[&one, &two])
+    let message = PixelFiles(&files)
+        .of_distinct_images(&[&one, &two])
         .unwrap_err()
         .to_string();
     assert!(
-        told.contains(
+        message.contains(
             "images M01-00123 and M01-00124: the pixels of both are 160 lines of 64 samples"
         ),
-        "{told}"
+        "{message}"
     );
     // Pictures need no label, and one label distinguishes the two.
     assert!(PixelFiles(&files).opened(&[&one, &two]).is_ok());
     let files = [hashed("one.imq", &archive(&pixels)), files[1].clone()];
-    assert!(PixelFiles(&files).told_apart(&[&one, &two]).is_ok());
+    assert!(PixelFiles(&files).of_distinct_images(&[&one, &two]).is_ok());
 }
 
 #[test]
@@ -253,10 +259,10 @@ fn a_label_and_fragments_of_two_images_are_refused() {
     let own = archive(&pixels);
     let other = String::from_utf8_lossy(&own[..2048]).replace("M01/00123", "M01/00124");
     let mixed = [other.as_bytes(), &own[2048..]].concat();
-    let told = folder.refusal(&mixed, &times("M01-00124"));
+    let message = folder.refusal(&mixed, &times("M01-00124"));
     assert!(
-        told.contains("fragment 0, byte 2048: the label states PRODUCT_ID = M01/00124; the fragments state image 123"),
-        "{told}"
+        message.contains("fragment 0, byte 2048: the label states PRODUCT_ID = M01/00124; the fragments state image 123"),
+        "{message}"
     );
 }
 
@@ -269,18 +275,21 @@ fn lines_beyond_those_delivered_are_refused() {
     };
     // Between the received and the exposed lines: neither.
     for file in [archive(&pixels()), cube(&pixels(), &of_the_camera())] {
-        let told = folder.refusal(&file, &less);
+        let message = folder.refusal(&file, &less);
         assert!(
-            told.contains(
+            message.contains(
                 "160 lines; expected at most 144, the lines received of 176 (lines_delivered)"
             ),
-            "{told}"
+            "{message}"
         );
     }
     // Every line that was exposed: in a complete file all were received; else some may be empty.
     let all = vec![80; (LINES[1] * SAMPLES) as usize];
-    let told = folder.refusal(&archive(&all), &times("M01-00123"));
-    assert!(told.contains("176 lines; expected at most 160"), "{told}");
+    let message = folder.refusal(&archive(&all), &times("M01-00123"));
+    assert!(
+        message.contains("176 lines; expected at most 160"),
+        "{message}"
+    );
     let whole = archive(&all);
     for file in [
         whole[..8192].to_vec(),

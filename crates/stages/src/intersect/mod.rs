@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{read_ties::Ties, site_image::SiteImages};
+use crate::oriented::OrientedImage;
 use areograph_base::{
     body::Body,
     error::{Cause, Result},
@@ -23,7 +24,7 @@ use areograph_config::IntersectionConfig;
 use areograph_geom::{
     intersection::{Intersection, IntersectionLimits, Ray, Unintersected, Weighting, intersect},
     oriented_camera::OrientedCamera,
-    pushbroom::{CameraModel, ExteriorOrientation, Projector, Unseen},
+    pushbroom::{ExteriorOrientation, Projector, Unseen},
 };
 use areograph_store::{
     stage::{Output, Round, Stage},
@@ -172,8 +173,6 @@ stage_inputs! {
         pub round: Round,
         /// The images.
         pub images: SiteImages<'a>,
-        /// The form of the orientation.
-        pub model: &'a CameraModel,
         /// Tie points.
         pub ties: &'a Output<Ties>,
         /// Weights and limits.
@@ -194,7 +193,7 @@ impl Stage for Intersect<'_> {
         let oriented = self.images.oriented()?;
         let images: Vec<_> = oriented
             .iter()
-            .map(|image| image.oriented_camera(*self.model))
+            .map(OrientedImage::oriented_camera)
             .collect();
         let body = oriented
             .first()

@@ -52,7 +52,8 @@ impl AdjustmentEvidence<'_> {
             ));
         }
         let heights = self.adjusted.heights.iter();
-        let spread = heights.filter(|of| !(of.beyond_share() <= limits.height_outliers_max));
+        let spread =
+            heights.filter(|heights| !(heights.beyond_share() <= limits.height_outliers_max));
         invalid.extend(spread.map(heights_beyond));
         for (round, pairs, limit_m) in rounds {
             for pair in pairs.iter().filter(|pair| !is_together(pair, limit_m)) {
@@ -76,8 +77,9 @@ impl AdjustmentEvidence<'_> {
         // Written so that NaN counts.
         (!(*sigmas <= limit)).then(|| {
             format!(
-                "laser and images contradict each other: the {unknown} is off by {sigmas:.1} standard deviations, expected at \
-                 most {limit}; check beam.bus of the altimeter, mola_clock and the times of the images, or leave out \
+                "laser and images contradict each other: the {unknown} differs by {sigmas:.1} standard deviations \
+                 from its a priori value, expected at most {limit}; check beam.bus of the altimeter, altimeter_clock and \
+                 the times of the images, or leave out \
                  adjustment.common_bus"
             )
         })
@@ -108,7 +110,7 @@ impl AdjustmentEvidence<'_> {
         self.spots_beyond().map(|spots| {
             format!(
                 "{} of {} image coordinates of laser spots exceed 3.29 of their standard deviations: some shots are \
-                 recorded at a wrong place, or profiles and line times are worse than configured",
+                 recorded at a wrong position, or profiles and line times are less accurate than configured",
                 spots.beyond_limit, spots.observations
             )
         })
@@ -170,8 +172,8 @@ impl AdjustmentEvidence<'_> {
         let [_, _, up_m] = heights.mean_sigma_m;
         if !(up_m <= HEIGHT_LOOSE_M) {
             remarks.push(format!(
-                "MOLA controls heights to ±{up_m:.0} m only: the tie points lie far from its shots, or the a priori σ in \
-                 mola_surface is large"
+                "MOLA controls heights only to ±{up_m:.0} m: the tie points lie far from its shots, or the a priori \
+                 standard deviations in laser_surface are large"
             ));
         }
         let share = heights.beyond_share();
@@ -180,7 +182,7 @@ impl AdjustmentEvidence<'_> {
         }
         if heights.compared < HEIGHTS_MIN {
             remarks.push(format!(
-                "{} tie points are too few to search for blunders by their heights",
+                "{} tie points are too few for the detection of blunders by their heights",
                 heights.compared
             ));
         }
@@ -244,7 +246,8 @@ impl AdjustmentEvidence<'_> {
             .zip(summary.tie_components)
             .map(|(kind, found)| {
                 let of_kind = summary.types.iter().find(|of| of.kind == kind);
-                let is_untested = found <= 1.0 && of_kind.is_none_or(|of| of.redundancy < 1.0);
+                let is_untested =
+                    found <= 1.0 && of_kind.is_none_or(|of_kind| of_kind.redundancy < 1.0);
                 (!is_untested).then_some(found)
             })
     }
@@ -292,7 +295,7 @@ impl AdjustmentEvidence<'_> {
         let is_adjusted = |pair: &PairComparison| {
             self.adjusted_pairs
                 .iter()
-                .any(|of| of.images == pair.images)
+                .any(|adjusted_pair| adjusted_pair.images == pair.images)
         };
         let pairs = self.pairs.iter().filter(|pair| !is_adjusted(pair));
         pairs.map(|pair| pair.images.join(" and ")).collect()
@@ -366,18 +369,18 @@ impl AdjustmentEvidence<'_> {
                 // Written so that NaN counts.
                 Some(found) if !(found <= limits.sigma0_max) => remarks.push(format!(
                     "residuals of the tie points {axis} the track are {found:.2} times what adjustment.tie_sigma_px expects: \
-                     measurements are worse than configured, or a model does not hold"
+                     measurements are less accurate than configured, or a model does not hold"
                 )),
                 Some(_) => {}
                 None => remarks.push(format!(
-                    "tie points have no redundancy {axis} the track: blunders there go undetected"
+                    "tie points have no redundancy {axis} the track: blunders in that direction remain undetected"
                 )),
             }
         }
         remarks.extend(self.components_above());
         for image in self.untied() {
             remarks.push(format!(
-                "image {image} has no tie point in the adjustment: no measurement in it tests or corrects its orientation"
+                "image {image} has no tie point in the adjustment: no measurement tests or corrects its orientation"
             ));
         }
         remarks

@@ -38,6 +38,11 @@ const AXES: [(CheckKind, &str); 2] = [
     (CheckKind::BeamAcross, "across the track"),
 ];
 
+/// Images of which a mean is stated.
+fn on_average(images: usize) -> String {
+    format!("{images} images, on average")
+}
+
 /// A beam along one axis, of an image or on average over all, with its standard deviation.
 struct Deviation {
     axis: usize,
@@ -65,7 +70,7 @@ impl Deviation {
     fn subject(&self) -> String {
         match &*self.subjects {
             [one] => one.clone(),
-            all => format!("mean of {} images", all.len()),
+            all => on_average(all.len()),
         }
     }
 
@@ -80,9 +85,9 @@ impl Deviation {
 
     /// One sentence; `limit` states the limit.
     fn text(&self, limit: &str) -> String {
-        let images = match &*self.subjects {
-            [one] => format!("image {one}"),
-            all => format!("images {}, on average", all.join(" and ")),
+        let (images, whose) = match &*self.subjects {
+            [one] => (format!("image {one}"), "its orientation"),
+            all => (on_average(all.len()), "the orientation of the images"),
         };
         let ground_m = self.angle_rad.abs() * self.range_m;
         let ground = if ground_m < METRES_PER_KM {
@@ -91,7 +96,7 @@ impl Deviation {
             format!("{:.1} km", ground_m / METRES_PER_KM)
         };
         format!(
-            "{images}: the beam of MOLA in the PEDR lies {} mrad {} from its mounting by the attitude of the kernels, {ground} \
+            "{images}: the beam of MOLA in the PEDR lies {} mrad {} from its mounting by {whose}, {ground} \
              on the ground ({} shots), {limit}",
             signed(PER_MILLI * self.angle_rad, 2),
             AXES[self.axis].1,
@@ -121,7 +126,7 @@ impl BeamEvidence<'_> {
             .images
             .iter()
             .find(|of| of.id == image.image);
-        let of_camera = own.and_then(|of| of.rotation_rad);
+        let of_camera = own.and_then(|image| image.rotation_rad);
         // About Y of the camera the beam moves along the track, about X across it.
         let attitude_rad = of_camera.map_or([self.adjustment.rotation_sigma_rad[0]; 2], |sigmas| {
             [sigmas[3], sigmas[0]]
@@ -231,8 +236,8 @@ pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
     let (beam, limit_sigma) = (&evidence.beam, evidence.limits.correction_max_sigma);
     let deviations = beam.deviations();
     let of_axis = |axis: usize| {
-        let such = deviations.iter().filter(|of| of.axis == axis);
-        Check::worst(such.map(|of| of.check(limit_sigma)))
+        let such = deviations.iter().filter(|deviation| deviation.axis == axis);
+        Check::worst(such.map(|deviation| deviation.check(limit_sigma)))
     };
     let inside = beam.places().map(|(image, of, least)| {
         let kind = CheckKind::FootprintsInside;
@@ -240,7 +245,10 @@ pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
     });
     let meets = evidence.images.iter().map(|image| {
         let samples = &image.orientation.samples;
-        let met = samples.iter().filter(|of| of.boresight.is_some()).count();
+        let met = samples
+            .iter()
+            .filter(|sample| sample.boresight.is_some())
+            .count();
         let broken = if met == 0 { Fail } else { Warning };
         let kind = CheckKind::BoresightMeets;
         Check::new(kind, image.id(), met as f64, samples.len() as f64, broken)
@@ -264,12 +272,12 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
     let deviations = evidence.beam.deviations();
     let far = deviations
         .iter()
-        .filter(|of| of.outcome(limit_sigma) == Fail);
+        .filter(|deviation| deviation.outcome(limit_sigma) == Fail);
     let mut reasons: Vec<String> = far
-        .map(|of| {
-            let limit = PER_MILLI * limit_sigma * of.sigma_rad;
-            of.text(&format!(
-                "expected at most {limit:.2} mrad; check the C-kernels, pointing.ck_bias_s, mola_clock, and that the shots are \
+        .map(|deviation| {
+            let limit = PER_MILLI * limit_sigma * deviation.sigma_rad;
+            deviation.text(&format!(
+                "expected at most {limit:.2} mrad; check the C-kernels, pointing.ck_bias_s, altimeter_clock, and that the shots are \
                  of this orbit"
             ))
         })
@@ -277,7 +285,7 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
     for (image, of, least) in evidence.beam.places() {
         if f64::from(of.inside) < least {
             reasons.push(format!(
-                "image {}: {} of {} simultaneous footprints lie in it by the kernels, where the mountings of camera and laser \
+                "image {}: {} of {} simultaneous footprints lie in it by its orientation, where the mountings of camera and laser \
                  place all of them, expected at least {least:.0}; check attitude, frames and times",
                 image.image, of.inside, of.expected_inside
             ));
@@ -294,7 +302,7 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
     }
     let blind = evidence.images.iter().filter(|image| {
         let samples = &image.orientation.samples;
-        samples.iter().all(|of| of.boresight.is_none())
+        samples.iter().all(|sample| sample.boresight.is_none())
     });
     reasons.extend(blind.map(|image| {
         format!(
@@ -311,18 +319,21 @@ pub(super) fn remarks(evidence: &Evidence<'_>) -> Vec<String> {
     let deviations = evidence.beam.deviations();
     let doubtful = deviations
         .iter()
-        .filter(|of| of.outcome(limit_sigma) == Warning);
+        .filter(|deviation| deviation.outcome(limit_sigma) == Warning);
     let mut remarks: Vec<String> = doubtful
-        .map(|of| {
-            let sigmas = of.angle_rad.abs() / of.sigma_rad;
-            of.text(&format!(
+        .map(|deviation| {
+            let sigmas = deviation.angle_rad.abs() / deviation.sigma_rad;
+            deviation.text(&format!(
                 "{sigmas:.1} standard deviations: the position is less certain than stated"
             ))
         })
         .collect();
     for image in evidence.images {
         let samples = &image.orientation.samples;
-        let missed = samples.iter().filter(|of| of.boresight.is_none()).count();
+        let missed = samples
+            .iter()
+            .filter(|sample| sample.boresight.is_none())
+            .count();
         if missed > 0 && missed < samples.len() {
             remarks.push(format!(
                 "image {}: its boresight misses the ellipsoid at {missed} of {} epochs",

@@ -13,6 +13,7 @@ use crate::{
 };
 use areograph_base::units::RADIANS_PER_ARCSECOND;
 use areograph_config::LimitsConfig;
+use areograph_geom::surface::WithheldScore;
 
 /// More than this share of rejected tie points makes a site invalid.
 const REJECTED_SHARE_FAIL: f64 = 0.5;
@@ -20,6 +21,9 @@ const REJECTED_SHARE_FAIL: f64 = 0.5;
 /// Altimeter clocks are off by a tenth of a second (MOLA: 0.117 s): a scan with a wider limit cannot distinguish that
 /// from zero.
 const CLOCK_BLIND_S: f64 = 0.1;
+
+/// Withheld stretches may exceed the stated share by this many standard deviations of their number, and by one.
+const CHANCE_SIGMAS: f64 = 3.0;
 
 /// A quantity that is checked for each profile or image, with its function and its limit.
 type Quantity<T> = (CheckKind, fn(&T) -> f64, f64);
@@ -37,16 +41,21 @@ pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
         ));
     }
     if evidence.adjustment_failure.is_some() {
-        checks.push(Check::told(CheckKind::AdjustmentMade, "", Fail));
+        checks.push(Check::without_number(CheckKind::AdjustmentMade, "", Fail));
     }
     let images = evidence.images.iter();
     let contradicted = images.filter(|image| image.contradictions().next().is_some());
-    checks
-        .extend(contradicted.map(|image| Check::told(CheckKind::Contradiction, image.id(), Fail)));
+    checks.extend(
+        contradicted.map(|image| Check::without_number(CheckKind::Contradiction, image.id(), Fail)),
+    );
+    checks.extend(withheld(evidence));
     checks.extend(of_ranges(evidence));
     checks.extend(clock(evidence));
     checks.extend(beam::checks(evidence));
-    let adjusted = evidence.adjustment.iter().flat_map(|of| of.images);
+    let adjusted = evidence
+        .adjustment
+        .iter()
+        .flat_map(|adjustment| adjustment.images);
     checks.extend(of_images(evidence, adjusted));
     if let Some(adjustment) = &evidence.adjustment {
         checks.extend(of_heights(adjustment, evidence.limits));
@@ -66,11 +75,28 @@ pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
     checks
 }
 
+/// Withheld profiles against the surface of the others; a few stretches more than stated are chance.
+fn withheld(evidence: &Evidence<'_>) -> Option<Check> {
+    let score = evidence.profiles.score?;
+    let stretches = score.stretches as f64;
+    let beyond = 1.0 - WithheldScore::INTERVALS[2];
+    let chance = (beyond * (1.0 - beyond) / stretches).sqrt();
+    let limit = beyond + CHANCE_SIGMAS * chance + 1.0 / stretches;
+    let share = 1.0 - score.inside[2];
+    Some(Check::of_share(
+        CheckKind::WithheldStretches,
+        format!("{} stretches", score.stretches),
+        share,
+        limit,
+        Warning,
+    ))
+}
+
 fn of_ranges(evidence: &Evidence<'_>) -> Vec<Check> {
     let limits = evidence.range_limits;
     let judged = || {
         let profiles = evidence.ranges.profiles.iter();
-        profiles.filter(|of| of.is_judged(limits))
+        profiles.filter(|profile| profile.is_judged(limits))
     };
     let quantities: [Quantity<ProfileRanges>; 3] = [
         (
@@ -123,27 +149,20 @@ fn of_ranges(evidence: &Evidence<'_>) -> Vec<Check> {
 fn of_lengths(evidence: &Evidence<'_>) -> [Option<Check>; 2] {
     let profiles = &evidence.ranges.profiles;
     let tested = evidence.is_tested();
-    let longest = profiles.iter().reduce(|longest, of| {
-        if of.shots > longest.shots {
-            of
-        } else {
-            longest
-        }
-    });
-    let shots = longest.map(|of| {
+    let shots = evidence.longest_profile().map(|longest| {
         let least = f64::from(evidence.range_limits.shots_min);
         let broken = if tested { Fail } else { Warning };
         Check::new(
             CheckKind::Shots,
-            &*of.profile,
-            f64::from(of.shots),
+            &*longest.profile,
+            f64::from(longest.shots),
             least,
             broken,
         )
     });
     let untested = (!tested && !profiles.is_empty()).then(|| {
         let subject = "not tested: no position of the spacecraft";
-        Check::told(CheckKind::RangeMean, subject, Warning)
+        Check::without_number(CheckKind::RangeMean, subject, Warning)
     });
     [untested, shots]
 }
@@ -152,18 +171,19 @@ fn of_lengths(evidence: &Evidence<'_>) -> [Option<Check>; 2] {
 fn clock(evidence: &Evidence<'_>) -> Option<Check> {
     let kind = CheckKind::ClockCorrection;
     let profiles = || evidence.ranges.profiles.iter();
-    let scans = profiles().filter_map(|of| {
-        let scan = of.scan.as_ref()?;
+    let scans = profiles().filter_map(|profile| {
+        let scan = profile.scan.as_ref()?;
         let (best_s, uncertainty_s) = (scan.best_s?, scan.uncertainty_s?);
         let limit_s = clock_limit_s(uncertainty_s);
         let apart_s = best_s - evidence.clock_correction_s;
         // A limit as wide as the bias cannot detect that the bias was omitted.
         let is_blind = limit_s > CLOCK_BLIND_S && apart_s.abs() <= limit_s;
-        (!is_blind).then(|| Check::new(kind, &*of.profile, apart_s, limit_s, Warning))
+        (!is_blind).then(|| Check::new(kind, &*profile.profile, apart_s, limit_s, Warning))
     });
-    let is_scanned = profiles().any(|of| of.scan.is_some());
+    let is_scanned = profiles().any(|profile| profile.scan.is_some());
     // Shots of one viewing direction hardly determine the clock: this is stated, without a warning.
-    let silent = is_scanned.then(|| Check::told(kind, "not determined by these ranges", Pass));
+    let silent =
+        is_scanned.then(|| Check::without_number(kind, "not determined by these ranges", Pass));
     Check::worst(scans).or(silent)
 }
 
@@ -181,12 +201,12 @@ fn of_images<'a>(
     let quantities: [Quantity<JudgedImage>; 3] = [
         (
             CheckKind::PositionRmse,
-            |image| image.model.second_order.position_rmse_m(),
+            |image| image.model.misfit.position_rmse_m,
             limits.position_rmse_max_m,
         ),
         (
             CheckKind::PointingRmse,
-            |image| image.model.rotation_vector.rmse_rad() / RADIANS_PER_ARCSECOND,
+            |image| image.model.misfit.pointing_rmse_rad / RADIANS_PER_ARCSECOND,
             limits.pointing_rmse_max_rad / RADIANS_PER_ARCSECOND,
         ),
         (
@@ -214,7 +234,7 @@ fn of_images<'a>(
         } else {
             Warning
         };
-        Check::told(CheckKind::Attitude, image.id(), outcome)
+        Check::without_number(CheckKind::Attitude, image.id(), outcome)
     });
     checks.extend(Check::worst(attitudes));
     checks
@@ -227,7 +247,7 @@ fn of_heights(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> 
             let subject = if takes_part { "MOLA takes part" } else { "" };
             Check::new(kind, subject, check.above_m.median, limit_m, Fail)
         }
-        Err(_) => Check::told(kind, "no MOLA surface", Warning),
+        Err(_) => Check::without_number(kind, "no MOLA surface", Warning),
     };
     let mut checks = vec![
         median(
@@ -295,7 +315,7 @@ fn of_ties(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> {
     let axes = [CheckKind::TieResidualsAlong, CheckKind::TieResidualsAcross];
     checks.extend(of.axes().zip(axes).map(|(axis, kind)| match axis {
         Some(found) => Check::new(kind, "", found, limits.sigma0_max, Warning),
-        None => Check::told(kind, "untested: no redundancy", Warning),
+        None => Check::without_number(kind, "untested: no redundancy", Warning),
     }));
     checks.extend(components(of));
     checks.extend(joined(of));
@@ -381,11 +401,11 @@ fn joined(of: &AdjustmentEvidence<'_>) -> [Check; 2] {
 /// The boresight of the laser, where `adjustment.common_bus` is set.
 fn boresight(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Option<Check> {
     let Ok(found) = of.adjusted.boresight.as_ref()? else {
-        return Some(Check::told(CheckKind::Boresight, "", Warning));
+        return Some(Check::without_number(CheckKind::Boresight, "", Warning));
     };
     let is_clear = found.without.is_empty() && of.spots_beyond().is_none();
     let Some((unknown, sigmas)) = found.farthest.as_ref() else {
-        return (!is_clear).then(|| Check::told(CheckKind::Boresight, "", Warning));
+        return (!is_clear).then(|| Check::without_number(CheckKind::Boresight, "", Warning));
     };
     let limit = limits.correction_max_sigma;
     let mut check = Check::new(CheckKind::Boresight, unknown, *sigmas, limit, Fail);

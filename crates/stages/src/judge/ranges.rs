@@ -13,15 +13,29 @@ impl Evidence<'_> {
     pub(super) fn is_tested(&self) -> bool {
         self.ranges.profiles.iter().any(ProfileRanges::is_tested)
     }
+
+    /// The longest profile whose ranges are tested, the first of equal ones; where none is tested, the longest of all.
+    pub(super) fn longest_profile(&self) -> Option<&ProfileRanges> {
+        let is_tested = self.is_tested();
+        let profiles = self.ranges.profiles.iter();
+        let compared = profiles.filter(|profile| profile.is_tested() || !is_tested);
+        compared.reduce(|longest, profile| {
+            if profile.shots > longest.shots {
+                profile
+            } else {
+                longest
+            }
+        })
+    }
 }
 
 /// A site none of whose profiles is long enough to be judged.
 pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Option<String> {
-    let (profiles, limits) = (&evidence.ranges.profiles, evidence.range_limits);
-    let longest = profiles.iter().max_by_key(|of| of.shots)?;
+    let limits = evidence.range_limits;
+    let longest = evidence.longest_profile()?;
     (evidence.is_tested() && !longest.is_judged(limits)).then(|| {
         format!(
-            "no profile is long enough to be judged: the longest, {}, has {} shots; limit at least {}",
+            "no profile is long enough to be judged: the longest whose ranges are tested, {}, has {} shots; limit at least {}",
             longest.profile, longest.shots, limits.shots_min
         )
     })
@@ -31,21 +45,27 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Option<String> {
 pub(super) fn remarks(evidence: &Evidence<'_>) -> Vec<String> {
     let (profiles, limits) = (&evidence.ranges.profiles, evidence.range_limits);
     let mut remarks = Vec::new();
-    let untested = profiles.iter().filter(|of| !of.is_tested()).count();
+    let untested = profiles
+        .iter()
+        .filter(|profile| !profile.is_tested())
+        .count();
     if untested > 0 {
         let whose = if untested == profiles.len() {
-            "The range check tests nothing".to_owned()
+            "No range is tested".to_owned()
         } else {
             format!(
-                "The range check does not test {untested} of {} profiles",
+                "The ranges of {untested} of {} profiles are not tested",
                 profiles.len()
             )
         };
         remarks.push(format!(
-            "{whose}: the tables have no position of the spacecraft, and no kernels cover the shots"
+            "{whose}: the tables contain no position of the spacecraft, and no kernels cover the shots"
         ));
     }
-    let short: Vec<&ProfileRanges> = profiles.iter().filter(|of| !of.is_judged(limits)).collect();
+    let short: Vec<&ProfileRanges> = profiles
+        .iter()
+        .filter(|profile| !profile.is_judged(limits))
+        .collect();
     if !short.is_empty() && short.len() < profiles.len() {
         let shots: u32 = short.iter().map(|of| of.shots).sum();
         let named = short.iter().take(NAMED_MAX).map(|of| &*of.profile);
@@ -57,7 +77,11 @@ pub(super) fn remarks(evidence: &Evidence<'_>) -> Vec<String> {
             named.collect::<Vec<_>>().join(", ")
         ));
     }
-    remarks.extend(profiles.iter().filter_map(|of| far_off(of, limits)));
+    remarks.extend(
+        profiles
+            .iter()
+            .filter_map(|profile| far_off(profile, limits)),
+    );
     remarks
 }
 

@@ -69,7 +69,7 @@ pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
         .map(|(kind, subject, value, limit)| Check::new(kind, subject, value, limit, Fail))
         .into()
     } else {
-        vec![Check::told(
+        vec![Check::without_number(
             CheckKind::SurfaceHeight,
             "too few shots on it",
             Warning,

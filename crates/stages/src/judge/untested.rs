@@ -1,79 +1,143 @@
-//! Errors that no datum of the site can show: stated with the verdict, since a valid site may contain them.
+//! Errors that no datum of the site can show, grouped by the reason: stated with the verdict, since a valid site may
+//! contain them.
 
 use super::{Evidence, JudgedImage};
 
-/// What nothing tested, one phrase each.
-pub(super) fn untested(evidence: &Evidence<'_>) -> Vec<String> {
-    let mut phrases: Vec<String> = attitude(evidence).into_iter().collect();
-    let of_labels: Vec<&JudgedImage> = evidence
-        .images
-        .iter()
-        .filter(|image| image.times.support.is_none())
-        .collect();
-    let of_support = evidence.images.len() - of_labels.len();
-    let has_ties = evidence.adjustment.is_some();
-    if !of_labels.is_empty() {
-        phrases.push(match (has_ties, of_labels.len()) {
-            (true, 2..) => "an error that the start times of all images share".to_owned(),
-            _ => format!(
-                "an error that clock and UTC in the label of {} share",
-                listed(&of_labels)
-            ),
-        });
-    }
-    let endless = of_labels
-        .into_iter()
-        .filter(|image| !image.times.has_stop_time);
-    let endless: Vec<&JudgedImage> = endless.collect();
-    if !has_ties && !endless.is_empty() {
-        phrases.push(format!(
-            "line period of {}: no STOP_TIME is stated",
-            listed(&endless)
-        ));
-    }
-    if of_support > 0 && !has_ties {
-        phrases.push("line times of support data".to_owned());
-    }
-    if !evidence.images.is_empty() {
-        phrases.push(
-            if has_ties {
-                "focal length, whose error tie points absorb"
-            } else {
-                "rotation about the line of sight; camera: focal length, distortion, direction of the samples"
-            }
-            .to_owned(),
-        );
-    }
-    if evidence.footprints.is_some_and(|count| count > 0) {
-        phrases.push("errors that ranges and radii of the shots share".to_owned());
-    }
-    phrases
+/// Why the attitude of an image is not tested; the page states the same.
+pub const NO_BEAM: &str = "no beam tests the attitude";
+
+/// Errors that remain undetected for one reason.
+struct Group {
+    errors: Vec<String>,
+    reason: String,
 }
 
-/// Attitudes that no beam tests: with tie points, which test one image against the other, only if no image has one.
-fn attitude(evidence: &Evidence<'_>) -> Option<String> {
+impl Group {
+    fn new(reason: impl Into<String>) -> Self {
+        Self {
+            errors: Vec::new(),
+            reason: reason.into(),
+        }
+    }
+
+    fn with(mut self, error: impl Into<String>) -> Self {
+        self.errors.push(error.into());
+        self
+    }
+
+    /// The errors, and why nothing shows them; `None` without any.
+    fn phrase(&self) -> Option<String> {
+        let errors = self.errors.join("; ");
+        (!errors.is_empty()).then(|| format!("{errors} ({})", self.reason))
+    }
+}
+
+/// What no datum of the site tests, one phrase for each reason.
+pub(super) fn untested(evidence: &Evidence<'_>) -> Vec<String> {
     let is_tested = |image: &&JudgedImage| evidence.beam.tests(image.id());
     let (tested, blind): (Vec<&JudgedImage>, Vec<&JudgedImage>) =
         evidence.images.iter().partition(is_tested);
-    let first = blind.first()?;
-    if evidence.adjustment.is_some() && !tested.is_empty() {
-        return None;
+    let mut groups = if evidence.adjustment.is_none() {
+        attitudes(evidence, &blind)
+    } else if tested.is_empty() {
+        common_attitude(evidence, &blind)
+    } else {
+        // Tie points test one image against the other, so that one beam suffices.
+        Vec::new()
+    };
+    groups.extend(images(evidence));
+    groups.push(shots(evidence, !tested.is_empty()));
+    groups.iter().filter_map(Group::phrase).collect()
+}
+
+/// Attitudes of images that no beam tests, by the reason.
+fn attitudes(evidence: &Evidence<'_>, blind: &[&JudgedImage]) -> Vec<Group> {
+    let mut by_reason: Vec<(String, Vec<&JudgedImage>)> = Vec::new();
+    for image in blind.iter().copied() {
+        let reason = no_beam(evidence, image);
+        let mut known = by_reason.iter_mut();
+        match known.find(|(other, _)| *other == reason) {
+            Some((_, images)) => images.push(image),
+            None => by_reason.push((reason, vec![image])),
+        }
     }
-    let gaps = evidence.beam.images.iter();
-    let gap = gaps
-        .filter(|of| of.image == first.id())
-        .find_map(|of| of.beam.as_ref().err());
-    let why = match gap {
+    let groups = by_reason.into_iter().map(|(reason, images)| {
+        Group::new(format!("{NO_BEAM}: {reason}")).with(format!("attitude of {}", listed(&images)))
+    });
+    groups.collect()
+}
+
+/// With tie points, the attitude error that all images share.
+fn common_attitude(evidence: &Evidence<'_>, blind: &[&JudgedImage]) -> Vec<Group> {
+    let mut reasons: Vec<String> = blind.iter().map(|image| no_beam(evidence, image)).collect();
+    reasons.dedup();
+    let group = Group::new(format!("{NO_BEAM}: {}", reasons.join(", ")));
+    let is_shared = !blind.is_empty();
+    Vec::from_iter(is_shared.then(|| group.with("an attitude error that all images share")))
+}
+
+/// Why no beam tests the attitude of an image.
+fn no_beam(evidence: &Evidence<'_>, image: &JudgedImage) -> String {
+    let beams = evidence.beam.images.iter();
+    let gap = beams
+        .filter(|beam| beam.image == image.id())
+        .find_map(|beam| beam.beam.as_ref().err());
+    match gap {
         Some(gap) => gap.to_string(),
         None if evidence.footprints.is_none() => "the site has no shots".to_owned(),
-        None => "its a priori standard deviation is infinite".to_owned(),
-    };
-    let whose = if evidence.adjustment.is_some() {
-        "attitude error that all images share".to_owned()
-    } else {
-        format!("attitude of {}", listed(&blind))
-    };
-    Some(format!("{whose}: {why}"))
+        None => "the a priori standard deviation is infinite".to_owned(),
+    }
+}
+
+/// Times and cameras of images.
+fn images(evidence: &Evidence<'_>) -> [Group; 3] {
+    let has_ties = evidence.adjustment.is_some();
+    let by_label = |image: &&JudgedImage| image.times.support.is_none();
+    let (of_labels, of_support): (Vec<&JudgedImage>, Vec<&JudgedImage>) =
+        evidence.images.iter().partition(by_label);
+    let endless = of_labels.iter().filter(|image| !image.times.has_stop_time);
+    let endless: Vec<&JudgedImage> = endless.copied().collect();
+    let mut by_ties = Group::new("not observable from tie points");
+    let mut without_ties = Group::new("no tie points were adjusted");
+    let mut one_label = Group::new("stated by the label alone");
+    if has_ties && of_labels.len() > 1 {
+        by_ties = by_ties.with("an error that the start times of all images share");
+    } else if !of_labels.is_empty() {
+        let labels = listed(&of_labels);
+        one_label = one_label.with(format!(
+            "an error that clock and UTC in the label of {labels} share"
+        ));
+    }
+    if !has_ties && !endless.is_empty() {
+        let labels = listed(&endless);
+        one_label = one_label.with(format!("line period of {labels} without STOP_TIME"));
+    }
+    if has_ties {
+        by_ties = by_ties.with("an error of the focal length");
+    } else if !evidence.images.is_empty() {
+        without_ties = without_ties
+            .with("rotation about the line of sight")
+            .with("focal length, distortion and direction of the samples of the camera");
+        if !of_support.is_empty() {
+            without_ties = without_ties.with("line times of support data");
+        }
+    }
+    [one_label, by_ties, without_ties]
+}
+
+/// Errors that both sides of a comparison with shots contain.
+fn shots(evidence: &Evidence<'_>, is_attitude_tested: bool) -> Group {
+    let mut group = Group::new("common to both sides of the comparison");
+    if evidence.footprints.is_some_and(|count| count > 0) {
+        group = group.with("errors that ranges and radii of the shots share");
+    }
+    if is_attitude_tested {
+        group = group.with(
+            "an attitude error that the images share with the footprints of the PEDR, which do not state the attitude they \
+             were computed from",
+        );
+    }
+    group
 }
 
 fn listed(images: &[&JudgedImage]) -> String {

@@ -21,7 +21,6 @@ use super::{
     intersect::IntersectedTies, read_ties::Ties, site_image::SiteImages, tag_times::ImageTimes,
 };
 use areograph_base::error::Result;
-use areograph_geom::pushbroom::CameraModel;
 use areograph_store::{
     stage::{Input, Inputs, Output, Stage},
     stage_inputs,
@@ -114,8 +113,6 @@ stage_inputs! {
         pub images: SiteImages<'a>,
         /// The same with the adjusted one; empty without an adjustment.
         pub adjusted_images: SiteImages<'a>,
-        /// The form of the orientation.
-        pub model: &'a CameraModel,
         /// Files of pixels.
         pub pixels: PixelFiles<'a>,
         /// Footprints in IAU 2000.
@@ -169,8 +166,8 @@ impl Stage for LayOverlays<'_> {
             .collect::<Result<_>>()?;
         let files = self.pixels.opened(&times)?;
         let has_pixels: Vec<bool> = files.iter().map(Option::is_some).collect();
-        let before = views::cameras(self.images.0, *self.model)?;
-        let after = views::cameras(self.adjusted_images.0, *self.model)?;
+        let before = views::cameras(self.images.0)?;
+        let after = views::cameras(self.adjusted_images.0)?;
         let wanted = places::wanted(self, &has_pixels)?;
         let mut planned: Vec<views::PlannedPlace> = (wanted.into_iter())
             .filter_map(|wanted| views::plan(wanted, &before, &after, &times))

@@ -155,7 +155,7 @@ pub(super) fn read(
         ..reduced.finish()
     };
     let opened = file.archive().map(ImageFile::complaints);
-    let (opened, count) = opened.map_or((&[][..], 0), |of| (of.kept(), of.count()));
+    let (opened, count) = opened.map_or((&[][..], 0), |opened| (opened.kept(), opened.count()));
     let (decoded, count_decoded) = strips.complaints();
     let complaints = opened.iter().chain(decoded).take(COMPLAINTS_MAX);
     Ok(ShownImage {
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn damage_of_a_file_is_told_with_its_numbers() {
+    fn damage_of_a_file_is_reported_with_its_numbers() {
         let shown = |missing, complaints: &[&str]| {
             let mut quick_look = Reduced::new(5, 6, 2).finish();
             quick_look.lines_missing = missing;
@@ -316,7 +316,7 @@ mod tests {
             )
         );
         let damage = shown(3, &[]).damage();
-        assert!(damage.is_some_and(|told| told.ends_with("no complaint")));
+        assert!(damage.is_some_and(|text| text.ends_with("no complaint")));
     }
 
     #[test]

@@ -197,7 +197,7 @@ fn of_ties(measured: &MeasuredTies, has_pixels: &[bool]) -> Result<Vec<Wanted>> 
     for is_rejected in [false, true] {
         let mut own: Vec<&Suspect> = suspects
             .iter()
-            .filter(|of| of.is_rejected == is_rejected)
+            .filter(|suspect| suspect.is_rejected == is_rejected)
             .collect();
         own.sort_by(|one, other| {
             other

@@ -14,7 +14,6 @@ use crate::{
     tag_times::ImageTimes,
 };
 use areograph_base::error::Result;
-use areograph_geom::pushbroom::CameraModel;
 
 /// Length on the ground over which lines and samples are counted, metres.
 const STEP_M: f64 = 100.0;
@@ -25,28 +24,25 @@ const COARSER_MAX: f64 = 4.0;
 /// Lines and samples around a piece, for blending.
 const AROUND: f64 = 2.0;
 
-/// An image and how it is oriented.
+/// An oriented image.
 pub(super) struct Camera<'a> {
     oriented: OrientedImage<'a>,
-    model: CameraModel,
 }
 
-/// The images with the orientation of `model`.
+/// The oriented images.
 ///
 /// # Errors
 /// Samples that do not form an orientation.
-pub(super) fn cameras(images: &[SiteImage], model: CameraModel) -> Result<Vec<Camera<'_>>> {
+pub(super) fn cameras(images: &[SiteImage]) -> Result<Vec<Camera<'_>>> {
     let oriented = SiteImages(images).oriented()?.into_iter();
-    Ok(oriented
-        .map(|oriented| Camera { oriented, model })
-        .collect())
+    Ok(oriented.map(|oriented| Camera { oriented }).collect())
 }
 
 impl Camera<'_> {
     /// Line and sample of a point, and their change per metre towards east and north; `None` for a point that it cannot
     /// see.
     fn sees(&self, ground_m: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
-        let projector = self.oriented.projector(self.model).ok()?;
+        let projector = self.oriented.projector().ok()?;
         let at = |point_m: &Vector3<f64>| self.oriented.line_and_sample(&projector, point_m).ok();
         let up = ground_m.normalize();
         let east = Vector3::z().cross(&up).try_normalize(0.0)?;

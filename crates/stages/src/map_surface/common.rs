@@ -98,7 +98,7 @@ impl Common {
         let Some(ground) = Ground::over(body, &places_m, cell_m) else {
             return Err(PairError::NothingInCommon { images: images() });
         };
-        if ground.size.iter().any(|of| *of > CELLS_MAX) || ground.cells() > CELLS_MAX {
+        if ground.size.iter().any(|size| *size > CELLS_MAX) || ground.cells() > CELLS_MAX {
             let cells = ground.size[0].saturating_mul(ground.size[1]);
             return Err(PairError::TooLarge { cell_m, cells });
         }

@@ -22,7 +22,7 @@ pub(super) fn compare(
         for row in &profile.rows {
             let at = *row as usize;
             let place_rad = [footprints.longitude_rad[at], footprints.latitude_rad[at]];
-            let found = on_model(model, place_rad, footprints.radius_m[at], options);
+            let found = on_model(model, place_rad, footprints.ground_radius_m(at), options);
             shots.extend(found.map(|(above_m, sigma_m)| ShotOnSurface {
                 profile: index,
                 row: *row,
@@ -41,9 +41,12 @@ pub(super) fn compare(
     let above_m = summary(&shots);
     let normalised = shots
         .iter()
-        .map(|of| (of.above_m - above_m.median) / of.sigma_m);
+        .map(|shot| (shot.above_m - above_m.median) / shot.sigma_m);
     let normalised: Vec<f64> = normalised.collect();
-    let square = shots.iter().map(|of| of.sigma_m * of.sigma_m).sum::<f64>();
+    let square = shots
+        .iter()
+        .map(|shot| shot.sigma_m * shot.sigma_m)
+        .sum::<f64>();
     ShotComparison {
         sigma_m: (square / shots.len().max(1) as f64).sqrt(),
         spread_sigmas: Summary::of(&normalised).nmad,

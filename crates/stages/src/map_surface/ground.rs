@@ -76,7 +76,7 @@ impl Ground {
         let factor = 1_usize << times;
         Self {
             cell_m: self.cell_m * factor as f64,
-            size: self.size.map(|of| of.div_ceil(factor)),
+            size: self.size.map(|size| size.div_ceil(factor)),
             west: self.west / factor as f64,
             north: self.north / factor as f64,
             ..self.clone()

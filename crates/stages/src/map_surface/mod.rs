@@ -16,6 +16,7 @@ mod common;
 mod compare;
 mod field;
 mod ground;
+mod jitter;
 mod level;
 mod levels;
 mod lines;
@@ -31,7 +32,12 @@ mod tests;
 
 use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 
-use self::{common::Common, compare::compare, levels::all_levels};
+use self::{
+    common::Common,
+    compare::compare,
+    jitter::{JitterAndSmoothing, Sizes},
+    levels::all_levels,
+};
 use super::{
     adjust::Adjusted, convert_datum::Converted, group_profiles::Profile, image_pixels::PixelFiles,
     image_view::View, shot_heights::Heights, site_image::SiteImages, tag_times::ImageTimes,
@@ -43,7 +49,7 @@ use areograph_base::{
     watch::Watch,
 };
 use areograph_config::{MolaSurfaceConfig, SurfaceConfig};
-use areograph_geom::pushbroom::{CameraModel, Unseen};
+use areograph_geom::pushbroom::Unseen;
 use areograph_store::{
     stage::{Input, Inputs, Output, Stage},
     stage_inputs,
@@ -66,8 +72,6 @@ stage_inputs! {
     pub struct MapSurface<'a> {
         /// The images.
         pub images: SiteImages<'a>,
-        /// The form of the orientation.
-        pub model: &'a CameraModel,
         /// Their pixels.
         pub pixels: PixelFiles<'a>,
         /// Footprints in IAU 2000.
@@ -77,7 +81,7 @@ stage_inputs! {
         /// Configuration of the terrain model.
         pub surface: &'a SurfaceConfig,
         /// Uncertainties of shots.
-        pub mola_surface: &'a MolaSurfaceConfig,
+        pub laser_surface: &'a MolaSurfaceConfig,
         /// The adjustment that gave the images their orientation.
         pub adjusted: AdjustmentOfImages<'a>,
         /// Largest common error of heights by the images, metres.
@@ -114,7 +118,7 @@ enum SurfaceError {
 struct Found {
     /// Above the sphere, metres.
     height_m: f64,
-    /// Standard deviation of that, metres.
+    /// Standard deviation of that by the match, metres.
     sigma_m: f64,
     /// Offset of the second image across the parallax, samples of the ground.
     aside: f64,
@@ -126,6 +130,7 @@ type Cell = Option<std::result::Result<Found, Unmatched>>;
 
 impl Stage for MapSurface<'_> {
     const NAME: &'static str = "map_surface";
+    const METHOD: u32 = 2;
     type Output = Surface;
     stage_inputs!(fingerprint);
 
@@ -141,7 +146,7 @@ impl Stage for MapSurface<'_> {
         let mut views = Vec::new();
         for index in self.pair(&times)? {
             if let Some(pixels) = &pixels[index] {
-                let view = View::of(&oriented[index], *self.model, pixels).map_err(|unseen| {
+                let view = View::of(&oriented[index], pixels).map_err(|unseen| {
                     let image = times[index].id.clone();
                     SurfaceError::Unseen { image, unseen }
                 })?;
@@ -166,7 +171,7 @@ impl Stage for MapSurface<'_> {
         let of_heights = adjusted.and_then(|adjusted| adjusted.heights.as_ref());
         account.common_sigma_m = of_heights.map(|of| of.mean_sigma_m[2]);
         account.shots_take_part = of_heights.is_some();
-        let shots = self.mola_surface.options(footprints.body);
+        let shots = self.laser_surface.options(footprints.body);
         account.shots = compare(&surface.model, footprints, profiles, &shots);
         Ok(surface)
     }
@@ -178,7 +183,7 @@ impl MapSurface<'_> {
         let images = times.iter().enumerate();
         let pair: Vec<usize> = match &self.surface.images {
             Some(named) => {
-                let place = |id: &String| times.iter().position(|of| of.id == *id);
+                let place = |id: &String| times.iter().position(|time| time.id == *id);
                 named.iter().filter_map(place).collect()
             }
             None => images
@@ -211,11 +216,11 @@ fn map_surface(
 ) -> Result<Surface> {
     let common = Common::of(views, options.body, heights, options.cell_m)?;
     let cells = all_levels(&common, views, heights, options.off_m, watch)?;
-    Ok(told(&common, &cells))
+    Ok(surface_of(&common, &cells))
 }
 
 /// The model of all cells, and its statistics.
-fn told(common: &Common, cells: &[Cell]) -> Surface {
+fn surface_of(common: &Common, cells: &[Cell]) -> Surface {
     let mut unfilled = BTreeMap::new();
     let (mut found, mut count) = (Vec::new(), 0);
     for cell in cells.iter().flatten() {
@@ -230,21 +235,31 @@ fn told(common: &Common, cells: &[Cell]) -> Surface {
         values.sort_by(f64::total_cmp);
         values.get(values.len() / 2).copied().unwrap_or_default()
     };
-    let square: f64 = found.iter().map(|cell| cell.sigma_m * cell.sigma_m).sum();
     let sample_m = common.sample_m();
+    let compared_m = (2 * search::HALF + 1) as f64 * sample_m;
+    let sizes = Sizes {
+        columns: common.ground.size[1],
+        compared_cells: compared_m / common.ground.cell_m,
+        height_of_sample_m: common.height_of_sample_m(),
+    };
+    let errors = JitterAndSmoothing::of(cells, sizes);
+    let squares_m2 = found.iter().map(|cell| errors.with(cell.sigma_m).powi(2));
+    let square_m2: f64 = squares_m2.sum();
     let pixel_m = common.pixels_m[0].max(common.pixels_m[1]);
     let mut account = SurfaceAccount {
         images: [0, 1],
         cell_m: common.ground.cell_m,
         sample_m,
-        compared_m: (2 * search::HALF + 1) as f64 * sample_m,
+        compared_m,
         cells: count,
         filled: u32::try_from(found.len()).unwrap_or(u32::MAX),
         unfilled,
         is_refused: false,
         convergence_rad: common.convergence_rad,
         height_of_pixel_m: common.height_of_sample_m() * pixel_m / sample_m,
-        sigma_m: (square / found.len().max(1) as f64).sqrt(),
+        sigma_m: (square_m2 / found.len().max(1) as f64).sqrt(),
+        jitter_m: errors.jitter_m,
+        smoothing_m: errors.smoothing_m,
         correlation: median(|cell| cell.correlation),
         aside_m: median(|cell| cell.aside) * sample_m,
         common_sigma_m: None,
@@ -258,7 +273,7 @@ fn told(common: &Common, cells: &[Cell]) -> Surface {
         clippy::cast_possible_truncation,
         reason = "heights of a planet keep a millimetre"
     )]
-    let numbers = |of: fn(&Found) -> f64| -> Vec<f32> {
+    let numbers = |of: &dyn Fn(&Found) -> f64| -> Vec<f32> {
         let number = |cell: &Cell| match cell {
             Some(Ok(cell)) if !account.is_refused => of(cell) as f32,
             _ => f32::NAN,
@@ -266,8 +281,8 @@ fn told(common: &Common, cells: &[Cell]) -> Surface {
         cells.iter().map(number).collect()
     };
     let model = SurfaceModel {
-        sigmas_m: numbers(|cell| cell.sigma_m),
-        heights: common.ground.height_grid(numbers(|cell| cell.height_m)),
+        sigmas_m: numbers(&|cell| errors.with(cell.sigma_m)),
+        heights: common.ground.height_grid(numbers(&|cell| cell.height_m)),
         parallel_rad: common.ground.parallel_rad,
     };
     account.look = model.look(LOOK);

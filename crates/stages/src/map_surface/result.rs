@@ -24,7 +24,8 @@ pub struct SurfaceModel {
     pub heights: HeightGrid,
     /// Latitude at which cells are as wide as high, radians.
     pub parallel_rad: f64,
-    /// Standard deviation of every height by the matching, metres, NaN where there is no height.
+    /// Standard deviation of every height about the common error, metres, NaN where there is no height: by the match, by
+    /// jitter, and by the size of the compared square.
     pub sigmas_m: Vec<f32>,
 }
 
@@ -51,8 +52,12 @@ pub struct SurfaceAccount {
     pub convergence_rad: f64,
     /// Metres of height for a pixel of parallax, of the coarser image.
     pub height_of_pixel_m: f64,
-    /// Root mean square of the standard deviations of all heights by the matching, metres.
+    /// Root mean square of the standard deviations of all heights about the common error, metres.
     pub sigma_m: f64,
+    /// The part of these by jitter of the images against each other, as the shifts across the parallax show it, metres.
+    pub jitter_m: f64,
+    /// The part by the size of the compared square, by the relief of the model, metres.
+    pub smoothing_m: f64,
     /// Median correlation.
     pub correlation: f64,
     /// Median distance of the images across the parallax, metres on the ground: residual orientation errors.

@@ -87,7 +87,7 @@ impl Slopes {
         reason = "slopes of bytes keep their digits"
     )]
     fn of(numbers: Vec<f32>, width: usize, axes: &Matrix2<f64>) -> Self {
-        let axes = axes.map(|of| of as f32);
+        let axes = axes.map(|axis| axis as f32);
         let mut slopes = [vec![f32::NAN; numbers.len()], vec![f32::NAN; numbers.len()]];
         for line in 1..(numbers.len() / width).saturating_sub(1) {
             for sample in 1..width - 1 {

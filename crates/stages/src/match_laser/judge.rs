@@ -81,8 +81,8 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
     let matching = of.matching;
     if (kept as f64) < AGREE_MIN * matching as f64 {
         reasons.push(format!(
-            "{kept} of {matching} matching units agree with each other; expected at least half: the others match by chance, and \
-             these may too"
+            "{kept} of {matching} matching units agree with each other; expected at least half: the others match by \
+             chance, and the former may do so as well"
         ));
     }
     if let Some(held_out) = &of.held_out

@@ -80,7 +80,7 @@ stage_inputs! {
 
 impl Stage for MatchLaser<'_> {
     const NAME: &'static str = "match_laser";
-    const METHOD: u32 = 6;
+    const METHOD: u32 = 7;
     const CALLS: &'static [Called] = &[called::<ConvertDatum<'_>>()];
     type Output = LaserMatch;
     stage_inputs!(fingerprint);
@@ -263,15 +263,15 @@ fn matched(
         enter_surfaces(grid, &units, &mut search, options.search_cells);
     }
     let points = units.iter().zip(&search.units);
-    let points = points.filter(|(_, told)| told.is_kept());
+    let points = points.filter(|(_, result)| result.is_kept());
     let mut points: Vec<MatchedPoint> = points
-        .filter_map(|(unit, told)| unit.point(grid, told))
+        .filter_map(|(unit, result)| unit.point(grid, result))
         .collect();
     enter(asked.cameras, &mut points)?;
     let images: Vec<String> = asked
         .cameras
         .iter()
-        .map(|of| of.camera.id.clone())
+        .map(|camera| camera.camera.id.clone())
         .collect();
     let mut complaints = shots.complaints.clone();
     let unseen = unseen(&images, &points);
@@ -296,7 +296,7 @@ fn matched(
         radius_is_stated: asked.radius_is_stated,
         complaints: complaint_count,
     });
-    let told = LaserMatch {
+    let result = LaserMatch {
         radius_m: grid.radius_m,
         cell_m: grid.cell_m(),
         shots: shots.shots.len(),
@@ -315,7 +315,7 @@ fn matched(
         complaints,
         complaint_count,
     };
-    Ok((told, UnitShots::of(&units)))
+    Ok((result, UnitShots::of(&units)))
 }
 
 /// Units of the points of segments, in the order of their first points; then those of withheld ground.
@@ -398,8 +398,8 @@ fn searched(grid: &HeightGrid, units: &[Unit<'_>], options: &MatchOptions) -> Se
 fn enter_surfaces(grid: &HeightGrid, units: &[Unit<'_>], search: &mut Searched, reach: u32) {
     let measure = search.measure;
     let each = units.par_iter().zip(&mut search.units);
-    each.filter(|(_, told)| told.found.is_some())
-        .for_each(|(unit, told)| told.similarity = Some(unit.surface(grid, measure, reach)));
+    each.filter(|(_, result)| result.found.is_some())
+        .for_each(|(unit, result)| result.similarity = Some(unit.surface(grid, measure, reach)));
 }
 
 /// Median of model minus laser over the kept units that are not withheld, metres.

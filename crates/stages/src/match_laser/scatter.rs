@@ -86,8 +86,10 @@ fn spread(normalised: &[f64], planes: f64) -> f64 {
 fn seen(units: &[UnitResult], cell_m: [f64; 2]) -> Vec<Seen> {
     let first_rad = units.first().map_or(0.0, |unit| unit.place_rad[0]);
     let of = |unit: usize| {
-        let told = units.get(unit).filter(|of| of.is_kept() && !of.judges)?;
-        let (found, place_rad) = (told.found?, told.place_rad);
+        let result = units
+            .get(unit)
+            .filter(|unit| unit.is_kept() && !unit.judges)?;
+        let (found, place_rad) = (result.found?, result.place_rad);
         let sigma = found.sigma?;
         let [east, north] = found.shift_cells;
         let [east_m, north_m] = sigma.shift_m;
@@ -209,7 +211,8 @@ mod tests {
                 "{times}: {widened:?}"
             );
             for (before, after) in before.iter().zip(&after) {
-                let sigma = |of: &UnitResult| of.found.and_then(|of| of.sigma).map(|of| of.bias_m);
+                let sigma =
+                    |of: &UnitResult| of.found.and_then(|found| found.sigma).map(|of| of.bias_m);
                 let ratio = sigma(after).zip(sigma(before)).map(|(a, b)| a / b);
                 // Withheld units are widened too.
                 assert_eq!(

@@ -303,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn a_peak_at_the_border_is_told() {
+    fn a_peak_at_the_border_is_reported() {
         let model = grid(|row, column| ground_m(row - 7.0, column - 12.0));
         let shots = shots();
         let shots: Vec<&Shot> = shots.iter().collect();

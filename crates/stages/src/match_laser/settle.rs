@@ -38,7 +38,7 @@ pub(super) struct Settled {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Unsettled {
     /// Steps diverge, or do not end.
-    #[error("least squares find no position within a cell of its best shift")]
+    #[error("least squares found no position within one cell of its best shift")]
     NotFound,
     /// Without one of the shots the position would not be determined.
     #[error("its position depends on one shot")]

@@ -118,7 +118,10 @@ pub(super) fn shots_over(
     let query = Query::new(vec![region], filter, Judged::Near);
     let mut gathered = Gathered {
         grid,
-        names: sources.iter().map(|of| file_name(of.path())).collect(),
+        names: sources
+            .iter()
+            .map(|source| file_name(source.path()))
+            .collect(),
         turns: (sources.iter())
             .map(|source| DatumTurn::at_tags(source.datum()))
             .collect(),
@@ -170,8 +173,8 @@ impl Gathered<'_> {
                 tag_s: shot.et_tag_s,
                 longitude_rad: shot.longitude_rad,
                 latitude_rad: shot.latitude_rad,
-                radius_m: shot.radius_m,
-                height_m: shot.radius_m - self.grid.radius_m,
+                radius_m: footprints.ground_radius_m(row),
+                height_m: footprints.ground_radius_m(row) - self.grid.radius_m,
                 cell,
                 probe: Probe::at(cell),
                 plan_m: [

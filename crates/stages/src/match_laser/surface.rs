@@ -105,8 +105,8 @@ mod tests {
         assert!(levels.all(|(level, at)| (*level == 0) == (at % 141 - 70 == 7)));
         // 1 − √0.1 of 254 levels above the first; similarities below 0 are that.
         assert_eq!(of.levels.iter().max(), Some(&175));
-        let told = SimilaritySurface::share(175).unwrap();
-        assert!((told - (1.0 - 0.1_f64.sqrt())).abs() <= 0.5 / STEPS); // half a level
+        let share = SimilaritySurface::share(175).unwrap();
+        assert!((share - (1.0 - 0.1_f64.sqrt())).abs() <= 0.5 / STEPS); // half a level
         assert_eq!(SimilaritySurface::share(of.levels[0]), Some(0.0));
         assert_eq!(SimilaritySurface::share(0), None);
     }

@@ -27,7 +27,7 @@ const AGREE_SHARE: f64 = 1.0 / 3.0;
 pub(super) struct Unit<'a> {
     used: Vec<&'a Shot>,
     held_out: Vec<&'a Shot>,
-    told: UnitResult,
+    result: UnitResult,
 }
 
 impl<'a> Unit<'a> {
@@ -53,7 +53,7 @@ impl<'a> Unit<'a> {
             .iter()
             .map(|shot| (shot.plan_m[0] - centre_m[0]).hypot(shot.plan_m[1] - centre_m[1]));
         let squares = shots.iter().map(|shot| (shot.height_m - mean_m).powi(2));
-        let told = UnitResult {
+        let result = UnitResult {
             unit,
             place_rad: grid.place_rad(middle),
             judges,
@@ -69,13 +69,13 @@ impl<'a> Unit<'a> {
         Self {
             used,
             held_out,
-            told,
+            result,
         }
     }
 
     /// Whether its ground is withheld.
     pub(super) const fn judges(&self) -> bool {
-        self.told.judges
+        self.result.judges
     }
 
     /// Names of its shots.
@@ -91,9 +91,9 @@ impl<'a> Unit<'a> {
         measure: Similarity,
         options: &MatchOptions,
     ) -> UnitResult {
-        let mut told = self.told.clone();
-        told.refused_because = self.judged(grid, measure, options, &mut told);
-        told
+        let mut result = self.result.clone();
+        result.refused_because = self.judged(grid, measure, options, &mut result);
+        result
     }
 
     /// Similarity of its heights at all shifts of the search.
@@ -112,12 +112,12 @@ impl<'a> Unit<'a> {
         grid: &HeightGrid,
         measure: Similarity,
         options: &MatchOptions,
-        told: &mut UnitResult,
+        result: &mut UnitResult,
     ) -> String {
-        if told.shots <= POINTS_MIN {
-            return format!("{} shots; expected more than {POINTS_MIN}", told.shots);
+        if result.shots <= POINTS_MIN {
+            return format!("{} shots; expected more than {POINTS_MIN}", result.shots);
         }
-        if told.strips < STRIPS_MIN {
+        if result.strips < STRIPS_MIN {
             return format!("shots of one pass; expected {STRIPS_MIN} or more");
         }
         let Some(mut best) = find(grid, &self.used, measure, options.search_cells) else {
@@ -131,8 +131,8 @@ impl<'a> Unit<'a> {
             return "the model has too few heights at its best shift".to_owned();
         };
         let bias_m = at_best.bias();
-        told.found = Some(found(grid, &best, bias_m, settled.ok()));
-        told.held_out = self.held_out(grid, best.shift, bias_m);
+        result.found = Some(found(grid, &best, bias_m, settled.ok()));
+        result.held_out = self.held_out(grid, best.shift, bias_m);
         let [model_m, laser_m] = at_best.variances().map(f64::sqrt);
         let wrong = [
             (
@@ -165,7 +165,7 @@ impl<'a> Unit<'a> {
             .find_map(|(is_so, why)| is_so.then_some(why));
         wrong
             .or_else(|| settled.err().map(|why| why.to_string()))
-            .or_else(|| not_better(told.held_out.as_ref(), best.shift))
+            .or_else(|| not_better(result.held_out.as_ref(), best.shift))
             .unwrap_or_default()
     }
 
@@ -180,8 +180,8 @@ impl<'a> Unit<'a> {
     }
 
     /// The control point of a kept unit: the used shot nearest to their bias, so that its height is not an outlier.
-    pub(super) fn point(&self, grid: &HeightGrid, told: &UnitResult) -> Option<MatchedPoint> {
-        let found = told.found.as_ref()?;
+    pub(super) fn point(&self, grid: &HeightGrid, result: &UnitResult) -> Option<MatchedPoint> {
+        let found = result.found.as_ref()?;
         let sigma = found.sigma?;
         let [east, north] = found.shift_cells;
         let shift = [-north, east];
@@ -198,8 +198,8 @@ impl<'a> Unit<'a> {
         let [longitude_rad, latitude_rad] =
             grid.place_rad([shot.cell[0] + shift[0], shot.cell[1] + shift[1]]);
         Some(MatchedPoint {
-            unit: told.unit,
-            judges: told.judges,
+            unit: result.unit,
+            judges: result.judges,
             name: shot.name.clone(),
             laser: [shot.longitude_rad, shot.latitude_rad, shot.radius_m],
             model: [longitude_rad, latitude_rad, grid.radius_m + height_m],
@@ -221,12 +221,12 @@ fn found(grid: &HeightGrid, best: &Best, bias_m: f64, settled: Option<Settled>) 
         score: best.score,
         contrast: best.contrast,
         bias_m,
-        sigma: settled.map(|of| {
-            let [south, east] = of.sigma_cells;
+        sigma: settled.map(|settled| {
+            let [south, east] = settled.sigma_cells;
             let [east_m, north_m] = grid.cell_m();
             MatchSigma {
                 shift_m: [east * east_m, south * north_m],
-                bias_m: of.sigma_bias_m,
+                bias_m: settled.sigma_bias_m,
             }
         }),
     }

@@ -63,10 +63,15 @@ pub fn match_lines(lines: &LinesToMatch<'_>, stop: &AtomicBool) -> Result<TiesOf
     }
     let points = points(&matched);
     if points.is_empty() {
-        let name = |index: usize| lines.cameras.get(index).map_or("", |of| &*of.camera.id);
-        let told = matched.iter().flat_map(|of| remarks(&of.account, name));
-        let told: Vec<String> = told.collect();
-        return Err(MatchError::NothingMatched(told.join("; ")).into());
+        let name = |index: usize| {
+            lines
+                .cameras
+                .get(index)
+                .map_or("", |camera| &*camera.camera.id)
+        };
+        let remarks_on_lines = matched.iter().flat_map(|of| remarks(&of.account, name));
+        let remarks_on_lines: Vec<String> = remarks_on_lines.collect();
+        return Err(MatchError::NothingMatched(remarks_on_lines.join("; ")).into());
     }
     Ok(TiesOfLines {
         points,

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use areograph_base::footprints::AdjustmentModel;
+use areograph_base::{constants::GROUND_SPEED_M_S, footprints::AdjustmentModel};
 use areograph_config::{AdjustmentConfig, SiteConfig};
 use areograph_store::stage::Round;
 
@@ -11,8 +11,6 @@ const SIGMAS: f64 = 3.0;
 /// Displacement on the ground of nadir images per second of attitude delay, metres: the attitude turns by 0.9 mrad at
 /// 380 km.
 const ATTITUDE_CLOCK_M_S: f64 = 340.0;
-/// Displacement on the ground per second of line-time delay, metres.
-const LINE_TIMES_M_S: f64 = 3_000.0;
 
 /// Uncertainty of the orientations of images.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -66,7 +64,7 @@ fn sigmas(config: &AdjustmentConfig, image: &str) -> [f64; 2] {
         } else {
             0.0
         };
-    let times_m = LINE_TIMES_M_S * config.time_bias_sigma_s;
+    let times_m = GROUND_SPEED_M_S * config.time_bias_sigma_s;
     let [position_m, pointing_rad] = match config.model {
         AdjustmentModel::MolaSurface => [
             norm(&config.position_sigma_m),

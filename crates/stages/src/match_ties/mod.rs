@@ -33,7 +33,7 @@ use areograph_base::{
     ties::{MatchedPair, TieMeasure, TiePoint},
     watch::Watch,
 };
-use areograph_geom::pushbroom::{CameraModel, Unseen};
+use areograph_geom::pushbroom::Unseen;
 use areograph_store::{
     stage::{Input, Inputs, Output, Round, Stage},
     stage_inputs,
@@ -54,8 +54,6 @@ stage_inputs! {
         pub round: Round,
         /// The images.
         pub images: SiteImages<'a>,
-        /// The form of the orientation.
-        pub model: &'a CameraModel,
         /// Their pixels.
         pub pixels: PixelFiles<'a>,
         /// Footprints in IAU 2000.
@@ -121,7 +119,7 @@ impl Stage for MatchTies<'_> {
         let mut views = Vec::new();
         for (index, (image, pixels)) in oriented.iter().zip(&pixels).enumerate() {
             if let Some(pixels) = pixels {
-                let view = View::of(image, *self.model, pixels).map_err(|unseen| {
+                let view = View::of(image, pixels).map_err(|unseen| {
                     let image = image.image.id.clone();
                     MatchError::Unseen { image, unseen }
                 })?;
@@ -160,7 +158,7 @@ impl Stage for MatchTies<'_> {
             .collect();
         if let Some(times) = times
             && examined.iter().all(Result::is_ok)
-            && let Err(failure) = self.pixels.told_apart(&times)
+            && let Err(failure) = self.pixels.of_distinct_images(&times)
         {
             examined.push(Err(failure));
         }

@@ -95,13 +95,13 @@ impl OrientationSample {
             LightTime::Surface => Ok((left(self.et, &self.position, &self.boresight()), seen)),
             LightTime::Centre => {
                 let mars = session.mars_state(self.et)?;
-                let told_m = without_aberration_m(&seen.xyz_m, &mars.velocity_m_s);
+                let apparent_m = without_aberration_m(&seen.xyz_m, &mars.velocity_m_s);
                 let velocity_m_s = session.state(self.et)?.velocity_m_s;
                 // CSPICE's `LT` uses the light time to the position of the target at the exposure.
-                let (mut earlier_s, mut flown_m) = (light_time_s(told_m.norm()), told_m);
+                let (mut earlier_s, mut flown_m) = (light_time_s(apparent_m.norm()), apparent_m);
                 for _ in 0..STEPS {
                     let then = session.mars_state(self.et.plus(-earlier_s))?;
-                    flown_m = told_m + mars.position.xyz_m - then.position.xyz_m;
+                    flown_m = apparent_m + mars.position.xyz_m - then.position.xyz_m;
                     earlier_s = light_time_s((flown_m + velocity_m_s * earlier_s).norm());
                 }
                 Ok((self.et.plus(-earlier_s), Position::new(flown_m)))

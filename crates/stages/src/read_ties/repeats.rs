@@ -44,7 +44,7 @@ pub(super) fn leave_out(points: &mut Vec<TiePoint>) -> Option<String> {
     });
     example.map(|example| {
         format!(
-            "{repeated} repeat the measurements of another point and are omitted, for example {example}"
+            "{repeated} duplicate the measurements of another point and are omitted, for example {example}"
         )
     })
 }

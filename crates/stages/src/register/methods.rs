@@ -109,7 +109,7 @@ fn summed(
     ground: &[Vector3<f64>],
     ways: &[Way],
 ) -> (MethodRun, Vec<u32>) {
-    let newton = camera.projector(model);
+    let newton = camera.projector_of(model);
     let mut rejected = BTreeMap::new();
     let (mut evaluations, mut differences, mut each) = (Vec::new(), Vec::new(), Vec::new());
     let mut sums: Vec<f64> = Vec::new();

@@ -147,7 +147,7 @@ pub fn register<'a>(
         .zip(profiles)
         .flat_map(|(profile, of)| of.rows.iter().map(move |row| (profile, *row)))
         .collect();
-    let projector = camera.projector(config.model);
+    let projector = camera.projector();
     let mut points = RegisteredPoints::default();
     let mut rejected = BTreeMap::new();
     watch.announce(shots.len());
@@ -178,9 +178,9 @@ pub fn register<'a>(
     points.count(Method::FixedPoint, &on_lines, &methods);
     Ok(ImageRegistration {
         image: image.id.clone(),
-        model: config.model,
+        model: camera.model,
         profiles: points::on_image(&points, profiles.len()),
-        models: camera.differences(config.model, &points, &on_lines, &ground),
+        models: camera.differences(camera.model, &points, &on_lines, &ground),
         methods: methods.into_iter().map(|(run, _)| run).collect(),
         points,
         rejected,
@@ -193,7 +193,7 @@ fn ground_m(footprints: &Footprints<BodyFixed>, row: u32) -> Vector3<f64> {
     spherical_to_xyz_m(
         footprints.longitude_rad[row],
         footprints.latitude_rad[row],
-        footprints.radius_m[row],
+        footprints.ground_radius_m(row),
     )
 }
 
@@ -242,7 +242,7 @@ impl OrientedImage<'_> {
     ) -> Vec<ModelDifference> {
         let others = CameraModel::WORDS.map(|(_, model)| model).into_iter();
         let difference = |model| {
-            let projector = self.projector(model).ok()?;
+            let projector = self.projector_of(model).ok()?;
             let apart: Vec<Option<(f64, f64)>> = ground
                 .par_iter()
                 .zip(on_lines)

@@ -14,7 +14,8 @@ pub(super) fn findings(
     let first = complaints
         .first()
         .map(|complaint| format!("complaints about PEDR files: {said}, the first: {complaint}"));
-    let spoiled = (spoiled_shots > 0)
-        .then(|| format!("shots in the windows left out for spoiled values: {spoiled_shots}"));
+    let spoiled = (spoiled_shots > 0).then(|| {
+        format!("shots in the windows omitted because of invalid values: {spoiled_shots}")
+    });
     first.into_iter().chain(spoiled).collect()
 }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::StartFrom;
 use areograph_base::{
-    constants::Spacecraft,
+    constants::{GROUND_SPEED_M_S, Spacecraft},
     error::Cause,
     instruments::Instrument,
     line_times::LinePiece,
@@ -23,8 +23,6 @@ use areograph_pds::product_named;
 pub(super) const CLOSE_S: f64 = 0.02;
 /// With a larger difference they belong to two images, seconds.
 const TOLERANCE_S: f64 = 1.0;
-/// Ground speed of the spacecraft, metres per second: converts times into distances.
-const GROUND_SPEED_M_S: f64 = 3_000.0;
 
 /// Largest displacement on the ground that stays a remark, metres: the position of a site is stated within 110 m per axis,
 /// and one of the two statements is used without proof.
@@ -105,13 +103,13 @@ pub(super) enum Contradiction {
         apart_s: f64,
     },
     #[error(
-        "image {image}: the first of its exposures begins {apart_s:.3} s away from its {told}; expected at most \
+        "image {image}: the first of its exposures begins {apart_s:.3} s away from its {stated}; expected at most \
          {TOLERANCE_S} s"
     )]
     #[cause("check which of the two belongs to this image: the run would use the exposures")]
     Exposures {
         image: String,
-        told: &'static str,
+        stated: &'static str,
         apart_s: f64,
     },
     #[error(
@@ -213,11 +211,11 @@ pub(super) fn start_agrees(
 pub(super) fn pieces_agree(
     image: &str,
     first: Et,
-    (told, from): (Et, StartFrom),
+    (stated, from): (Et, StartFrom),
     close_s: f64,
 ) -> Result<Option<Disagreement>, Contradiction> {
-    let apart_s = first.since(told).abs();
-    let told = match from {
+    let apart_s = first.since(stated).abs();
+    let stated = match from {
         StartFrom::Sclk => "sclk_start",
         _ => "utc_start",
     };
@@ -225,14 +223,14 @@ pub(super) fn pieces_agree(
     if !(apart_s <= TOLERANCE_S) {
         return Err(Contradiction::Exposures {
             image: image.to_owned(),
-            told,
+            stated,
             apart_s,
         });
     }
     let ground_m = apart_s * GROUND_SPEED_M_S;
     Ok((apart_s > close_s).then(|| Disagreement {
         text: format!(
-            "the first of its exposures begins {apart_s:.3} s away from {told}, {} on the ground; the exposures are used",
+            "the first of its exposures begins {apart_s:.3} s away from {stated}, {} on the ground; the exposures are used",
             ground(ground_m)
         ),
         ground_m,

@@ -36,19 +36,19 @@ impl Pieces<'_> {
         &self,
         rows: Option<&RowTimes>,
         in_rows: bool,
-        told: Option<(Et, StartFrom)>,
+        stated: Option<(Et, StartFrom)>,
         remarks: &mut Vec<Disagreement>,
     ) -> Result<(LineTimes, f64, StartFrom)> {
         let (times, exposure_s, from) = if let Some(exposures) = &self.image.exposures {
-            let (times, exposure_s) = self.listed(exposures, told, remarks)?;
+            let (times, exposure_s) = self.listed(exposures, stated, remarks)?;
             (times, exposure_s, StartFrom::Exposures)
         } else if let Some(rows) = rows {
-            let (times, exposure_s) = self.of_rows(rows, told, remarks)?;
+            let (times, exposure_s) = self.of_rows(rows, stated, remarks)?;
             (times, exposure_s, StartFrom::Lines)
         } else if in_rows && !is_even(self.fields) {
             return Err(ImageError::NoLineTimes(self.image.id.clone()).into());
         } else {
-            let (start, from) = told.ok_or_else(|| ImageError::Missing {
+            let (start, from) = stated.ok_or_else(|| ImageError::Missing {
                 image: self.image.id.clone(),
                 key: if in_rows { "utc_start" } else { "sclk_start" },
             })?;
@@ -78,13 +78,18 @@ impl Pieces<'_> {
     fn listed(
         &self,
         exposures: &[ExposurePiece],
-        told: Option<(Et, StartFrom)>,
+        stated: Option<(Et, StartFrom)>,
         remarks: &mut Vec<Disagreement>,
     ) -> Result<(LineTimes, f64)> {
         let times = line_times_of(exposures, self.lines)?;
         self.require_duration(times.duration_s(), times.mean_period_s())?;
-        if let Some(told) = told {
-            remarks.extend(pieces_agree(&self.image.id, times.start(), told, CLOSE_S)?);
+        if let Some(stated) = stated {
+            remarks.extend(pieces_agree(
+                &self.image.id,
+                times.start(),
+                stated,
+                CLOSE_S,
+            )?);
         }
         let pieces: Vec<_> = times.pieces().collect();
         for [piece, next] in pieces.array_windows() {
@@ -100,7 +105,7 @@ impl Pieces<'_> {
     fn of_rows(
         &self,
         rows: &RowTimes,
-        told: Option<(Et, StartFrom)>,
+        stated: Option<(Et, StartFrom)>,
         remarks: &mut Vec<Disagreement>,
     ) -> Result<(LineTimes, f64)> {
         if rows.lines != self.lines {
@@ -113,11 +118,11 @@ impl Pieces<'_> {
         let times = LineTimes::of_pieces(rows.lines, &rows.pieces)?;
         self.require_duration(times.duration_s(), times.mean_period_s())?;
         remarks.extend(rows.remarks.iter().cloned().map(Disagreement::from));
-        if let Some(told) = told {
+        if let Some(stated) = stated {
             remarks.extend(pieces_agree(
                 &self.image.id,
                 times.start(),
-                told,
+                stated,
                 ROWS_CLOSE_S,
             )?);
         }

@@ -1,15 +1,22 @@
-//! Image support data as a source of times, camera and orientation, checked to be those of the site's body.
+//! Image support data, or an oriented cube, as a source of times, camera and orientation, checked to be those of the site's
+//! body.
 
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Disagreement, ImageTimes, StartFrom, agreement::of_one_product, camera::camera_agrees,
+    Disagreement, ImageTimes, StartFrom,
+    agreement::{mounting_agrees, of_one_clock, of_one_product, start_agrees, stop_agrees},
+    camera::camera_agrees,
 };
 use areograph_base::{body::Body, constants::Spacecraft, error::Result};
-use areograph_config::{ImageConfig, all_instruments};
-use areograph_pds::isd::{ImageSupport, SupportTables, read_isd};
+use areograph_config::{ImageConfig, all_instruments, built_in_instruments};
+use areograph_pds::{
+    ImageLabel,
+    isd::{ImageSupport, SupportTables, read_isd},
+    oriented_cube::{OrientedCube, read_oriented_cube},
+};
 use areograph_spice::Session;
 use areograph_store::files::{HashedFile, file_name};
 
@@ -40,22 +47,27 @@ impl SupportFile {
         image: &ImageConfig,
         path: &Path,
         hashed: Option<&HashedFile>,
-    ) -> Result<(ImageSupport, Self)> {
-        let said = read_isd(path)?;
-        said.sees(body, &image.id)?;
+    ) -> Result<(ImageSupport, Option<OrientedCube>, Self)> {
+        let (support, cube) = if image.cube.is_some() {
+            let cube = read_oriented_cube(path, built_in_instruments())?;
+            (cube.support.clone(), Some(cube))
+        } else {
+            (read_isd(path)?, None)
+        };
+        support.sees(body, &image.id)?;
         of_one_product(
             image,
-            ("support data are those", said.identifier.as_deref()),
+            ("support data are those", support.identifier.as_deref()),
         )?;
         let file = Self {
             name: file_name(path),
             bytes: hashed.map_or(0, |file| file.bytes),
             blake3: hashed.map_or_else(String::new, |file| file.blake3.clone()),
-            platform: said.platform.clone(),
+            platform: support.platform.clone(),
             has_laser: image.has_laser,
-            tables: said.tables.clone(),
+            tables: support.tables.clone(),
         };
-        Ok((said, file))
+        Ok((support, cube, file))
     }
 
     /// Whether it names this spacecraft.
@@ -82,7 +94,7 @@ pub(super) fn supported(
     hashed: Option<&HashedFile>,
     session: &Session,
 ) -> Result<ImageTimes> {
-    let (said, file) = SupportFile::read(body, image, path, hashed)?;
+    let (said, cube, file) = SupportFile::read(body, image, path, hashed)?;
     let start = said.line_times.start();
     session.require_published_utc(start)?;
     let period_s = said.line_times.mean_period_s();
@@ -92,11 +104,19 @@ pub(super) fn supported(
     if file.is_of(said.instrument.spacecraft) {
         remarks.extend(camera_agrees(&said.instrument, all_instruments()));
     }
+    let mut notes = vec![file.note()];
+    let label = cube.as_ref().and_then(|cube| cube.label.as_ref());
+    if let Some(cube) = &cube {
+        notes.extend(cube.notes());
+        if let Some(label) = label {
+            remarks.extend(against_label(image, (cube, label), session)?);
+        }
+    }
     Ok(ImageTimes {
         id: image.id.clone(),
         body,
         start_from: StartFrom::Support,
-        sclk_start: None,
+        sclk_start: label.and_then(|label| label.fields.sclk_start.clone()),
         utc_start: session.et_to_utc(start)?,
         exposure_s: period_s / f64::from(said.downtrack_summing),
         downtrack_summing: said.downtrack_summing,
@@ -104,11 +124,43 @@ pub(super) fn supported(
         lines_delivered: said.line_times.lines(),
         samples: said.samples,
         first_detector: said.first_detector,
-        has_stop_time: false,
-        notes: vec![file.note()],
+        has_stop_time: label.is_some_and(|label| label.utc_stop.is_some()),
+        notes,
         remarks,
         instrument: said.instrument,
         line_times: said.line_times,
         support: Some(file),
     })
+}
+
+/// Disagreements of the tables of a cube with its label.
+fn against_label(
+    image: &ImageConfig,
+    (cube, label): (&OrientedCube, &ImageLabel),
+    session: &Session,
+) -> Result<Vec<Disagreement>> {
+    let support = &cube.support;
+    let sclk = label.fields.sclk_start.as_deref();
+    of_one_clock(image, support.instrument.spacecraft, sclk)?;
+    let mut remarks: Vec<Disagreement> =
+        mounting_agrees(&support.instrument, &support.tables.pointing.constant)
+            .into_iter()
+            .collect();
+    let lines = cube.part.lines;
+    let period_s = support.line_times.mean_period_s() / f64::from(lines.factor);
+    let whole_start = support
+        .line_times
+        .start()
+        .plus(-f64::from(lines.first) * period_s);
+    if let Some(utc) = label.fields.utc_start.as_deref() {
+        let of_utc = session.utc_to_et(utc)?;
+        let clock = (sclk.unwrap_or("of the tables"), whole_start);
+        remarks.extend(start_agrees(&image.id, clock, (utc, of_utc))?);
+        if let Some(stop) = label.utc_stop.as_deref() {
+            let stop = (stop, session.utc_to_et(stop)?);
+            let of_lines = ([lines.whole; 2], period_s);
+            remarks.extend(stop_agrees(&image.id, of_utc, stop, of_lines)?);
+        }
+    }
+    Ok(remarks)
 }

@@ -31,7 +31,7 @@ pub enum NetError {
         what: &'static str,
         /// Its name.
         name: String,
-        /// Its points that are ties or controls.
+        /// Its points that are ties or controls, or those that tie the parts to the rest of the net.
         ties: usize,
     },
     /// Two points of a picture have one place.

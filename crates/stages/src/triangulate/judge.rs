@@ -34,7 +34,7 @@ pub(super) fn judge(of: &Evidence) -> Verdict {
     let mut reasons = Vec::new();
     if totals.redundancy == 0 {
         reasons.push(
-            "the net has no redundancy: wrong measurements cannot be distinguished from right ones"
+            "the net has no redundancy: erroneous measurements cannot be distinguished from correct ones"
                 .to_owned(),
         );
     }
@@ -146,7 +146,7 @@ fn remarks(of: &Evidence) -> Vec<String> {
     let kept = of.controls.len() - rejected.len();
     say(
         kept < CONTROLS_MIN,
-        format!("{kept} controls: a gross error of one could not be identified"),
+        format!("{kept} controls: a gross error in one of them could not be identified"),
     );
     say(
         kept == 2 && of.controls.iter().all(|control| control.sigma_m.is_none()),
@@ -161,8 +161,8 @@ fn remarks(of: &Evidence) -> Vec<String> {
         say(
             x.max(y) > SEAMS_SIGMA * sigma_m,
             format!(
-                "bricks differ at their seams by {:.1} m (rms), measurements within bricks by {sigma_m:.1} m: a brick may \
-                 be bent",
+                "bricks differ at their seams by {:.1} m (rms), measurements within bricks by {sigma_m:.1} m: a \
+                 brick may be distorted",
                 x.max(y)
             ),
         );

@@ -27,13 +27,9 @@ pub(super) struct Laid {
     pub(super) remarks: Vec<String>,
 }
 
-/// Lays the bricks. Pictures that hang on one point in their brick are tied in another; bricks that are still not
-/// connected become one.
-pub(super) fn lay_with_fallback(
-    config: &NetConfig,
-    data: &NetData,
-    names: &Names,
-) -> Result<Laid, NetError> {
+/// Bricks of pictures. Pictures that hang on one point in their brick are tied in another, with a remark where a table names
+/// the bricks.
+pub(super) fn bricks_of(config: &NetConfig, data: &NetData) -> (Bricks, Vec<String>) {
     let named = data.bricks.iter().any(|brick| !brick.is_empty());
     let mut bricks = if named {
         by_name(data)
@@ -41,21 +37,12 @@ pub(super) fn lay_with_fallback(
         by_growth(data, config.triangulation.brick_pictures as usize)
     };
     let moved = settle(data, &mut bricks);
-    match lay(config, data, names, &bricks) {
-        Err(NetError::Underconnected { .. }) if bricks.len() > 1 => {
-            let all = vec![("1".to_owned(), (0..data.net.pictures).collect())];
-            let mut laid = lay(config, data, names, &all)?;
-            let text = "the pictures are not connected in bricks and were tied as one brick";
-            laid.remarks.push(text.to_owned());
-            Ok(laid)
-        }
-        Ok(mut laid) => {
-            // Only names that a table gives are missed.
-            laid.remarks.extend(moved.into_iter().filter(|_| named));
-            Ok(laid)
-        }
-        laid => laid,
-    }
+    (bricks, if named { moved } else { Vec::new() })
+}
+
+/// All pictures in one brick.
+pub(super) fn one_brick(data: &NetData) -> Bricks {
+    vec![("1".to_owned(), (0..data.net.pictures).collect())]
 }
 
 /// Moves pictures that hang on one point in their brick, and states each.
@@ -73,7 +60,8 @@ fn settle(data: &NetData, bricks: &mut Bricks) -> Vec<String> {
     words
 }
 
-type Bricks = Vec<(String, Vec<usize>)>;
+/// Bricks with their names.
+pub(super) type Bricks = Vec<(String, Vec<usize>)>;
 
 fn by_name(data: &NetData) -> Bricks {
     let mut bricks: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
@@ -105,7 +93,8 @@ fn by_growth(data: &NetData, size: usize) -> Bricks {
     bricks
 }
 
-fn lay(
+/// Lays the bricks.
+pub(super) fn lay(
     config: &NetConfig,
     data: &NetData,
     names: &Names,

@@ -2,8 +2,8 @@
 
 use super::{
     error::{Names, NetError},
-    lay::lay_with_fallback,
-    place::place,
+    lay::{Bricks, Laid, bricks_of, lay, one_brick},
+    place::{Placed, place},
     read::NetData,
     result::Triangulation,
     scales::check_sizes,
@@ -21,8 +21,7 @@ pub(super) fn triangulate(config: &NetConfig, data: &NetData) -> Result<Triangul
     let refused = |error: PlaneError| names.of(error, "picture");
     find_mirrored(&data.net).map_err(refused)?;
     check(&data.net).map_err(refused)?;
-    let laid = lay_with_fallback(config, data, &names)?;
-    let placed = place(config, data, &laid).map_err(refused)?;
+    let (laid, placed) = lay_and_place(config, data, &names)?;
     let sizes = check_sizes(config, data, &placed)?;
     Ok(Report {
         config,
@@ -32,4 +31,30 @@ pub(super) fn triangulate(config: &NetConfig, data: &NetData) -> Result<Triangul
         sizes: &sizes,
     }
     .write())
+}
+
+/// Lays the bricks and places them on the map. Bricks that are not connected become one, and those whose seams, without their
+/// blunders, leave a picture on one point: a brick that hangs on points close together turns freely, and its far ties
+/// look wrong although they are not.
+fn lay_and_place(
+    config: &NetConfig,
+    data: &NetData,
+    names: &Names,
+) -> Result<(Laid, Placed), NetError> {
+    let laid_out = |bricks: &Bricks| {
+        let laid = lay(config, data, names, bricks)?;
+        let placed = place(config, data, &laid).map_err(|error| names.of(error, "picture"))?;
+        Ok((laid, placed))
+    };
+    let (bricks, moved) = bricks_of(config, data);
+    let (mut laid, placed, remarks) = match laid_out(&bricks) {
+        Err(NetError::Underconnected { .. }) if bricks.len() > 1 => {
+            let (laid, placed) = laid_out(&one_brick(data))?;
+            let remark = "the pictures are not connected in bricks and were tied as one brick";
+            (laid, placed, vec![remark.to_owned()])
+        }
+        outcome => outcome.map(|(laid, placed)| (laid, placed, moved))?,
+    };
+    laid.remarks.extend(remarks);
+    Ok((laid, placed))
 }

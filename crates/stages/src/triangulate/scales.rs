@@ -126,7 +126,10 @@ impl Scales {
     }
 
     fn beyond(&self) -> Vec<&PictureScale> {
-        self.pictures.iter().filter(|of| of.is_beyond()).collect()
+        self.pictures
+            .iter()
+            .filter(|picture| picture.is_beyond())
+            .collect()
     }
 
     pub(super) fn reasons(&self) -> Vec<String> {
@@ -211,13 +214,19 @@ impl Scales {
     pub(super) fn checks(&self) -> Vec<Check> {
         let worst = self.pictures.iter();
         let worst = worst.max_by(|one, other| one.used().total_cmp(&other.used()));
-        let scale = worst.map(|of| {
-            let off = (of.ratio - 1.0).abs();
-            Check::of_share(CheckKind::PictureScale, &*of.picture, off, of.limit, Fail)
+        let scale = worst.map(|worst| {
+            let off = (worst.ratio - 1.0).abs();
+            Check::of_share(
+                CheckKind::PictureScale,
+                &*worst.picture,
+                off,
+                worst.limit,
+                Fail,
+            )
         });
-        let stretch = self.stretch.as_ref().map(|of| {
-            let limit = Self::stretch_max(of);
-            Check::of_share(CheckKind::ControlStretch, "", of.ratio, limit, Fail)
+        let stretch = self.stretch.as_ref().map(|stretch| {
+            let limit = Self::stretch_max(stretch);
+            Check::of_share(CheckKind::ControlStretch, "", stretch.ratio, limit, Fail)
         });
         scale.into_iter().chain(stretch).collect()
     }

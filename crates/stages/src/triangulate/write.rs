@@ -114,7 +114,7 @@ impl Report<'_> {
         let weights: BTreeMap<usize, f64> = net
             .controls
             .iter()
-            .map(|of| (of.point, of.weight))
+            .map(|control| (control.point, control.weight))
             .collect();
         let points = places.iter().enumerate();
         let points = points.filter_map(|(point, place)| {
@@ -244,8 +244,8 @@ impl Report<'_> {
                 angle_rad: way.angle_rad(),
                 centre_m: [centre.re, centre.im],
                 centre_rad: self.geographic(centre),
-                sigma_m: sigma_m.map(|of| of * shift.sqrt()),
-                sigma_scale: sigma_m.map(|of| of * turn.sqrt() / way.scale()),
+                sigma_m: sigma_m.map(|sigma_m| sigma_m * shift.sqrt()),
+                sigma_scale: sigma_m.map(|sigma_m| sigma_m * turn.sqrt() / way.scale()),
                 ties: count(deviations.len()),
                 deviation_rms_m: rms_of_both(&deviations),
                 projection_floor_m: projection_floor_m(
@@ -344,18 +344,23 @@ impl Report<'_> {
         controls: &[ControlResult],
     ) -> Totals {
         let redundancy = self.placed.solution.redundancy;
-        let used = measurements.iter().filter(|of| !of.removed);
+        let used = measurements
+            .iter()
+            .filter(|measurement| !measurement.removed);
         let deviations: Vec<Place> = used
             .clone()
-            .filter(|of| of.redundancy > ROUNDING)
-            .map(|of| Place::new(of.deviation.x_m, of.deviation.y_m))
+            .filter(|measurement| measurement.redundancy > ROUNDING)
+            .map(|measurement| Place::new(measurement.deviation.x_m, measurement.deviation.y_m))
             .collect();
         let residuals: Vec<Place> = controls
             .iter()
-            .filter(|of| of.kept)
-            .map(|of| Place::new(of.residual_m[0], of.residual_m[1]))
+            .filter(|control| control.kept)
+            .map(|control| Place::new(control.residual_m[0], control.residual_m[1]))
             .collect();
-        let largest_sigma_m = points.iter().filter_map(|of| of.sigma_m).reduce(f64::max);
+        let largest_sigma_m = points
+            .iter()
+            .filter_map(|point| point.sigma_m)
+            .reduce(f64::max);
         Totals {
             tie_equations: redundancy.ties as u64,
             control_equations: redundancy.controls as u64,
@@ -366,13 +371,16 @@ impl Report<'_> {
             scale_sigma_m: self.laid.scaled.sigma,
             control_rms_m: rms(&residuals),
             deviation_rms_m: rms(&deviations),
-            removed: measurements.iter().filter(|of| of.removed).count() as u64,
+            removed: measurements
+                .iter()
+                .filter(|measurement| measurement.removed)
+                .count() as u64,
             flagged: used.filter(|of| of.flagged).count() as u64,
-            rejected_controls: controls.iter().filter(|of| !of.kept).count() as u64,
+            rejected_controls: controls.iter().filter(|control| !control.kept).count() as u64,
             largest_sigma_m,
             projection_floor_m: pictures
                 .iter()
-                .map(|of| of.projection_floor_m)
+                .map(|picture| picture.projection_floor_m)
                 .fold(0.0, f64::max),
         }
     }

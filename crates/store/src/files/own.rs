@@ -1,7 +1,8 @@
-//! What a command may replace: files that areograph wrote as such files itself, recognised by their content.
+//! Files that a command may replace: those that areograph itself wrote as files of this kind, recognised by their
+//! content.
 //!
-//! A format with a place for a mark has one. Files of the others, such as tables of text, are listed with their hashes
-//! in [`LIST`] beside them.
+//! A file contains a mark if its format has a place for one. Other files, such as text tables, are listed with their
+//! hashes in [`LIST`] beside them.
 
 use std::{
     ffi::OsStr,
@@ -11,6 +12,7 @@ use std::{
 };
 
 use super::outputs::require_replaceable;
+use crate::manifest::MANIFEST;
 use areograph_base::error::{Cause, IoError, Locate, Result};
 
 /// List of written files, in their folder.
@@ -18,7 +20,7 @@ const LIST: &str = ".areograph";
 /// Its first line; one line of hash and name for each file follows.
 const LIST_HEAD: &str =
     "Files that areograph wrote into this folder, with their BLAKE3: it replaces no others.\n";
-/// Bytes that tell the kind of a foreign file.
+/// Bytes that identify the kind of a foreign file.
 const KIND_BYTES: u64 = 512;
 /// A mark of this number of bytes is recognised if one of them is damaged.
 const DAMAGED_MARK_MIN: usize = 8;
@@ -26,7 +28,7 @@ const DAMAGED_MARK_MIN: usize = 8;
 /// How files of one kind are recognised.
 #[derive(Debug, Clone, Copy)]
 pub struct Mark {
-    /// Such a file, for messages: "a page that areograph wrote".
+    /// The name of such a file in messages: "a page that areograph wrote".
     pub what: &'static str,
     /// Where the mark is.
     pub at: MarkAt,
@@ -50,7 +52,7 @@ pub enum MarkAt {
 /// A file that a command must not replace.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("is {found}; expected a new path, or {expected}")]
-#[cause(Configuration: "name another file; if this one is not needed any more, remove it first")]
+#[cause(Configuration: "name another file, or remove this one first if you no longer need it")]
 struct Foreign {
     found: String,
     expected: &'static str,
@@ -128,10 +130,11 @@ fn is_product(path: &Path) -> bool {
         return false;
     };
     whole.ancestors().skip(1).any(|folder| {
-        let manifest = fs::read(folder.join("manifest.json")).ok();
-        let manifest = manifest.and_then(|bytes| serde_json::from_slice(&bytes).ok());
-        let Some(manifest) = manifest.filter(|of: &serde_json::Value| of["tool"] == "areograph")
-        else {
+        let manifest = fs::read(folder.join(MANIFEST)).ok();
+        let manifest: Option<serde_json::Value> =
+            manifest.and_then(|bytes| serde_json::from_slice(&bytes).ok());
+        let is_own = |manifest: &serde_json::Value| manifest["tool"] == "areograph";
+        let Some(manifest) = manifest.filter(is_own) else {
             return false;
         };
         let below = whole.strip_prefix(folder).unwrap_or(&whole);
@@ -158,8 +161,8 @@ fn what_is(path: &Path, bytes: u64) -> String {
     ];
     let known = kinds.iter().find(|(mark, _)| start.starts_with(mark));
     known.map_or_else(
-        || format!("a file of {bytes} bytes, not written by this command"),
-        |(_, kind)| format!("{kind}, not written by this command"),
+        || format!("a file of {bytes} bytes that this command did not write"),
+        |(_, kind)| format!("{kind} that this command did not write"),
     )
 }
 
@@ -184,7 +187,7 @@ fn line_of(mut file: &File, path: &Path) -> io::Result<String> {
 /// Lists the content `file`, which is about to receive the name `path`.
 ///
 /// # Errors
-/// The list is not one of areograph, or cannot be written.
+/// Another program wrote the list, or it cannot be written.
 pub(super) fn enlist(file: &File, path: &Path) -> Result<()> {
     const KIND: Mark = Mark {
         what: "a list that areograph wrote",
@@ -200,7 +203,7 @@ pub(super) fn enlist(file: &File, path: &Path) -> Result<()> {
         return Ok(());
     }
     let head = if earlier.is_empty() { LIST_HEAD } else { "" };
-    // A line that a killed command did not end.
+    // A killed command may leave a line without its end.
     let gap = if earlier.is_empty() || earlier.ends_with('\n') {
         ""
     } else {

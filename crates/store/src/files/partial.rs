@@ -51,22 +51,23 @@ impl PartialFolder {
     /// The system's.
     pub fn new_in(parent: &Path) -> io::Result<Self> {
         remove_abandoned(parent);
-        let make = || {
-            let folder = builder().tempdir_in(parent)?;
-            let held = File::open(folder.path())?;
-            io::Result::Ok((folder, held))
-        };
-        let (mut folder, mut held) = make()?;
         for _ in 0..ATTEMPTS {
+            let folder = builder().tempdir_in(parent)?;
+            let held = match File::open(folder.path()) {
+                // Another process took it for abandoned before it could be held.
+                Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+                held => held?,
+            };
             if is_held(&held, folder.path()) {
-                break;
+                return Ok(Self {
+                    folder,
+                    _held: held,
+                });
             }
-            (folder, held) = make()?;
         }
-        Ok(Self {
-            folder,
-            _held: held,
-        })
+        Err(io::Error::other(format!(
+            "{ATTEMPTS} new folders were removed by other processes"
+        )))
     }
 
     /// Its path.
@@ -158,6 +159,22 @@ mod tests {
         entries
             .map(|entry| name(entry).to_string_lossy().into_owned())
             .collect()
+    }
+
+    #[test]
+    fn writers_that_begin_at_once_in_one_folder_do_not_disturb_each_other() {
+        let folder = tempfile::tempdir().unwrap();
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| {
+                    for _ in 0..300 {
+                        let partial = PartialFolder::new_in(folder.path()).unwrap();
+                        File::create(partial.path().join("product")).unwrap();
+                    }
+                });
+            }
+        });
+        assert_eq!(names(folder.path()), BTreeSet::new());
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub use reason::Reason;
 use areograph_base::{error::Result, watch::Watch};
 
 /// Whether a stage works on the orientation of the kernels or on the adjusted one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Round {
     /// The orientation of the kernels.
     Initial,

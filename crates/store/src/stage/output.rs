@@ -47,11 +47,11 @@ impl<T> Output<T> {
         Self { label, known: None }
     }
 
-    /// The same output, by its origin, reduced by `lighten`; unchanged if it is shared.
+    /// The same output, by its origin, without the rows that `drop_rows` removes; unchanged if it is shared.
     #[must_use]
-    pub fn lightened(mut self, lighten: impl FnOnce(&mut T)) -> Self {
+    pub fn without_rows(mut self, drop_rows: impl FnOnce(&mut T)) -> Self {
         if let Some((value, _)) = self.known.as_mut().and_then(Arc::get_mut) {
-            lighten(value);
+            drop_rows(value);
         }
         self
     }
@@ -87,7 +87,10 @@ impl<T> Output<T> {
 /// Enters by content: an earlier stage that runs again and gives the same bytes changes nothing.
 impl<T> Input for &Output<T> {
     fn add_to(&self, _field: &str, inputs: &mut Inputs) {
-        inputs.output(&self.label, self.provenance().map(|of| &*of.blake3));
+        inputs.output(
+            &self.label,
+            self.provenance().map(|provenance| &*provenance.blake3),
+        );
     }
 }
 

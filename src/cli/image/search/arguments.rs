@@ -21,8 +21,8 @@ const PIXEL_MAX_M: f64 = 1e7;
 /// Finds the images of the mission's cumulative index that may show ground of a window, and pairs of them.
 ///
 /// An image is listed if its outline meets a window within the uncertainty of the index: 0.35 degrees of latitude
-/// (areographic or areocentric), 0.3 degrees of longitude over cos(latitude) (prime meridian). So no image is lost, and
-/// images just beside a window are found too; `areograph run` determines the ground that an image shows.
+/// (areographic or areocentric), 0.3 degrees of longitude over cos(latitude) (prime meridian). The search therefore loses
+/// no image, and also finds images just outside a window; `areograph run` determines the ground that an image shows.
 ///
 /// Pairs are images of different orbits (by the index, else by times more than 30 minutes apart) with common ground. Best
 /// first: overlap × min(convergence / 20°, 1) × cos²(difference of the Sun / 2) / ratio of the pixels. Convergence is the

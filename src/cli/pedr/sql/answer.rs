@@ -182,7 +182,7 @@ fn print_table(schema: SchemaRef, batches: &[RecordBatch]) -> Result<()> {
     output::line(table.map_err(NotWritten::refused)?);
     if rows(batches) > TABLE_ROWS_MAX {
         tracing::warn!(
-            "only the first {TABLE_ROWS_MAX} rows are shown; for all rows give --format csv or --out"
+            "the answer shows only the first {TABLE_ROWS_MAX} rows; give --format csv or --out for all rows"
         );
     }
     Ok(())

@@ -157,9 +157,9 @@ pub(super) static ROWS: [Row; 5] = [
             from: FROM,
             ours: || table(0),
         },
-        note: "Closed loop for the size of the disagreement; how it is shared between the images, and what of it \
-               appears across the track, follows from the geometry. σ x comes from kernels of two phases. Our y runs \
-               the other way and is turned here.",
+        note: "The size of the disagreement is a closed loop; its division between the images and its part across \
+               the track follow from the geometry. σ x comes from kernels of two phases. Our y has the opposite \
+               direction and is reversed here.",
     },
     Row {
         id: "S05-50",
@@ -170,8 +170,8 @@ pub(super) static ROWS: [Row; 5] = [
             from: FROM,
             ours: || table(1),
         },
-        note: "As S05-49. With weights in focal-plane pixels image 2 takes more than half; printed is the other way \
-               (S05-52).",
+        note: "As S05-49. With weights in focal-plane pixels image 2 takes more than half; the print has the \
+               reverse (S05-52).",
     },
     Row {
         id: "S05-51",
@@ -182,7 +182,7 @@ pub(super) static ROWS: [Row; 5] = [
             from: FROM,
             ours: || table(2),
         },
-        note: "As S05-49. Image 1 is the one off nadir.",
+        note: "As S05-49. Image 1 is the image off nadir.",
     },
     Row {
         id: "S05-52",
@@ -194,8 +194,9 @@ pub(super) static ROWS: [Row; 5] = [
                    place of pixels",
             ours: sharing,
         },
-        note: "The print follows a law that ignores the slant range, which is computed on this page alone. areograph weights in \
-               focal-plane pixels, whose size on the ground has the range; no `intersection.weighting` gives the print.",
+        note: "The print follows a law that ignores the slant range; only this page computes it. areograph weights \
+               in focal-plane pixels, whose size on the ground depends on the range; no value of \
+               `intersection.weighting` gives the print.",
     },
     Row {
         id: "S05-53",
@@ -206,6 +207,6 @@ pub(super) static ROWS: [Row; 5] = [
             from: "M + σ of table 5",
             ours: remarks,
         },
-        note: "A sum, no root of squares.",
+        note: "The print is a sum, not a root of squares.",
     },
 ];

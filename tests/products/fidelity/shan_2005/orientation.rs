@@ -284,7 +284,7 @@ pub(super) static ROWS: [Row; 11] = [
             from: "circular orbit over the site, 31 samples, sum of squares over 31",
             ours: || sound(0, [TWO_PERCENT, TWO_PERCENT, TWO_PERCENT, ONE_PERCENT]),
         },
-        note: "Second order: three printed digits leave 4 % of the length. Pointing: S05-32.",
+        note: "Of the second order, three printed digits leave 4 % of the length. For pointing see S05-32.",
     },
     Row {
         id: "S05-32",
@@ -292,7 +292,8 @@ pub(super) static ROWS: [Row; 11] = [
         place: "table 4",
         what: "order of the pointing angles",
         account: Account::Explained {
-            from: "exact nadir tracking on the orbit of the nadir images: what a straight line leaves of the angles",
+            from: "exact nadir tracking on the orbit of the nadir images: residuals of the angles from a straight \
+                   line",
             ours: orders_of_angles,
         },
         note: "The table of Shan, Lee & Yoon 2002 has its angles in order 3-2-1, which would force 92″ on E02-02016 \
@@ -309,8 +310,8 @@ pub(super) static ROWS: [Row; 11] = [
             from: "as S05-31, 8064 lines",
             ours: e04_01275,
         },
-        note: "The number of lines is chosen by this row: the 7424 of table 2 give 9.7 m where 11.4 m follow from the print. \
-               Then the length is no evidence; how X, Y and Z share it is.",
+        note: "This row determines the number of lines: the 7424 of table 2 give 9.7 m where 11.4 m follow from the \
+               print. Hence the length is no evidence; its division between X, Y and Z is.",
     },
     Row {
         id: "S05-34",
@@ -343,8 +344,8 @@ pub(super) static ROWS: [Row; 11] = [
             from: "as S05-31",
             ours: || isidis(4),
         },
-        note: "A defect of the trajectory that the paper used: orbital dynamics leave 4 mm of a parabola, not 2.3 m. \
-               φ does not gain by the second order.",
+        note: "The trajectory that the paper used has a defect: orbital dynamics leave 4 mm of a parabola, not 2.3 \
+               m. The second order does not improve φ.",
     },
     Row {
         id: "S05-37",
@@ -367,7 +368,7 @@ pub(super) static ROWS: [Row; 11] = [
             ours: sampling,
             test: "tests/commands/mission.rs::orientation_comes_back",
         },
-        note: "31 instants: both ends.",
+        note: "These are 31 instants, with both ends.",
     },
     Row {
         id: "S05-39",
@@ -400,6 +401,6 @@ pub(super) static ROWS: [Row; 11] = [
             from: "the rows of table 4, length of ω, φ, κ",
             ours: gain,
         },
-        note: "Two of six images gain 30–40 %; angle by angle it is 0 to 72 %.",
+        note: "Two of six images gain 30–40 %; single angles gain 0 to 72 %.",
     },
 ];

@@ -164,20 +164,20 @@ pub(super) static ROWS: [Row; 16] = [
             from: "MOLA GSD of table 2; ground speed of a circular orbit",
             ours: registration_uncertainty,
         },
-        note: "325 is a rounded mean. As an error of a clock it would be 0.107 s; the 0.117 s of the data preparation (S05-15) are \
-               MOLA's own and another quantity.",
+        note: "The printed 325 m are a rounded mean. As an error of a clock they would be 0.107 s; the 0.117 s of \
+               the data preparation (S05-15) are the bias of MOLA's own clock, another quantity.",
     },
     Row {
         id: "S05-02",
         kind: Kind::Constants,
         place: "table 1",
         what: "altitude about 370 km, inclination",
-        account: Account::Input {
+        account: Account::Explained {
             from: "the circular orbit of the rows below",
             ours: orbit,
-            test: "tests/products/fidelity.rs::every_row_comes_out_as_declared",
         },
-        note: "Over the three sites MGS is 380 to 385 km high: S05-69. Real kernels give 92.896°.",
+        note: "370 km is the least altitude, near the south pole; over the three sites MGS is 380 to 385 km high (S05-69). \
+               The inclination by real kernels is 92.896°.",
     },
     Row {
         id: "S05-03",
@@ -188,7 +188,7 @@ pub(super) static ROWS: [Row; 16] = [
             from: "2π√(a³/GM)",
             ours: period,
         },
-        note: "Cut, not rounded.",
+        note: "The print is truncated, not rounded.",
     },
     Row {
         id: "S05-04",
@@ -196,7 +196,7 @@ pub(super) static ROWS: [Row; 16] = [
         place: "table 1",
         what: "velocity",
         account: Account::Agrees {
-            from: "√(GM/a), and the same against the turning ground",
+            from: "√(GM/a), and the same relative to the rotating surface",
             ours: velocity,
         },
         note: "",
@@ -210,7 +210,7 @@ pub(super) static ROWS: [Row; 16] = [
             from: "revolutions of 7064 s in 7 sols of 88 775.244 s, to a whole number",
             ours: revisit,
         },
-        note: "88 revolutions.",
+        note: "These are 88 revolutions.",
     },
     Row {
         id: "S05-06",
@@ -222,7 +222,7 @@ pub(super) static ROWS: [Row; 16] = [
             ours: detector,
             test: "tests/products/products_site.rs::camera_model_times_and_detectors_are_those_of_a_summed_image",
         },
-        note: "The paper has no pitch of the detectors (13 µm).",
+        note: "The paper does not state the pitch of the detectors (13 µm).",
     },
     Row {
         id: "S05-07",
@@ -244,8 +244,8 @@ pub(super) static ROWS: [Row; 16] = [
             from: "config/instruments/moc_wa_red.toml and moc_wa_blue.toml, 370 km",
             ours: wide_angle,
         },
-        note: "Not used in the paper. The files have focal lengths of the two cameras that go with their distortion, 11.2 and \
-               10.9 mm; 280 m would need an altitude of 450 km.",
+        note: "The paper does not use this camera. The files contain the focal lengths that belong to the \
+               distortion of each camera, 11.2 and 10.9 mm; 280 m would require an altitude of 450 km.",
     },
     Row {
         id: "S05-09",
@@ -268,7 +268,7 @@ pub(super) static ROWS: [Row; 16] = [
             from: "0.4 mrad and 370 km of the same table",
             ours: laser_spot,
         },
-        note: "130 m would be 0.35 mrad.",
+        note: "130 m correspond to 0.35 mrad.",
     },
     Row {
         id: "S05-11",
@@ -290,7 +290,7 @@ pub(super) static ROWS: [Row; 16] = [
             from: "ground speed of a circular orbit, 0.1 s",
             ours: along_track,
         },
-        note: "330 m is neither of the two spacings of table 2, nor of real shots (S05-65).",
+        note: "330 m are neither of the two spacings of table 2, nor those of real shots (S05-65).",
     },
     Row {
         id: "S05-13",
@@ -325,7 +325,7 @@ pub(super) static ROWS: [Row; 16] = [
             ours: clock_bias,
             test: "tests/commands/mission.rs::the_three_readings_of_the_clock_bias_differ_as_told",
         },
-        note: "Neither sign nor formula is printed. Three readings are scopes of `mola_clock.scope`: `spk_lookup` \
+        note: "Neither sign nor formula is printed. Three readings are scopes of `altimeter_clock.scope`: `spk_lookup` \
                (default), `both`, `rotation`.",
     },
     Row {

@@ -64,8 +64,8 @@ pub(super) static ROWS: [Row; 3] = [
                       E02-01453: 124, −4.029, 0.299; E02-01301: 71, −25.359, 1.077; E02-02016: 107, −1.435, 0.635",
         },
         note: "Closed loop: an orbit that a synthetic mission shifts comes back as the mean of its ranges \
-               (tests/commands/mission.rs::profile_means_are_the_injected_orbit_differences). The paper has no limit: \
-               E02-01301 would break any of 10 m.",
+               (tests/commands/mission.rs::profile_means_are_the_injected_orbit_differences). The paper has no \
+               limit; E02-01301 would exceed a limit of 10 m.",
     },
     Row {
         id: "S05-29",
@@ -76,7 +76,7 @@ pub(super) static ROWS: [Row; 3] = [
             from: "the rows of table 3",
             ours: remarks,
         },
-        note: "Observations, no limits. Three of six means are below 4 m.",
+        note: "The paper prints observations, not limits. Three of six means are below 4 m.",
     },
     Row {
         id: "S05-30",
@@ -87,6 +87,6 @@ pub(super) static ROWS: [Row; 3] = [
             from: "the rows of table 3",
             ours: conclusions,
         },
-        note: "5 m is the largest single shot, not a mean.",
+        note: "The printed 5 m are the largest single shot, not a mean.",
     },
 ];

@@ -114,7 +114,7 @@ pub(super) static ROWS: [Row; 7] = [
             ours: tolerance,
             test: "tests/stages/registration.rs::iterations_are_counted_for_every_point_within_the_lines",
         },
-        note: "One line in x.",
+        note: "The tolerance is one line in x.",
     },
     Row {
         id: "S05-43",
@@ -125,8 +125,8 @@ pub(super) static ROWS: [Row; 7] = [
             from: "circular orbit, both images, 174 points at 305 m",
             ours: eos,
         },
-        note: "2.9 is what the off-nadir image alone needs. Whether the sum was divided by 174 or 348 is not said. \
-               Eq. 4 needs fewer in each image.",
+        note: "The off-nadir image alone needs 2.9. The paper does not state whether the sum was divided by 174 or \
+               348. Eq. 4 needs fewer iterations in each image.",
     },
     Row {
         id: "S05-44",
@@ -137,7 +137,8 @@ pub(super) static ROWS: [Row; 7] = [
             from: "circular orbit, nadir, 142 points at 305 m",
             ours: gusev,
         },
-        note: "One image, no pair. Frame first needs 11 % more iterations than printed: how the paper begins them is not stated.",
+        note: "The row is of one image, not of a pair. Frame first needs 11 % more iterations than printed; the \
+               paper does not state its start values.",
     },
     Row {
         id: "S05-45",
@@ -148,7 +149,7 @@ pub(super) static ROWS: [Row; 7] = [
             from: "the printed counts of both sites",
             ours: gain,
         },
-        note: "4.7 at Eos.",
+        note: "At Eos the ratio is 4.7.",
     },
     Row {
         id: "S05-46",
@@ -159,7 +160,7 @@ pub(super) static ROWS: [Row; 7] = [
             from: "exposure time and ground speed",
             ours: spacing,
         },
-        note: "Pixels of 5.51 and 3.27 m by the exposure times, which the paper prints as 5.5 and 3.3 m.",
+        note: "By the exposure times the pixels are 5.51 and 3.27 m, which the paper prints as 5.5 and 3.3 m.",
     },
     Row {
         id: "S05-47",
@@ -167,10 +168,10 @@ pub(super) static ROWS: [Row; 7] = [
         place: "results",
         what: "point 74 of ap19215 left where 73 is right; 109 and 108 of ap18933",
         account: Account::Agrees {
-            from: "circular orbit, E02-00665, a clock that is off by the time between two shots",
+            from: "circular orbit, E02-00665, a clock error of the time between two shots",
             ours: same_place,
         },
-        note: "A shift of time that is put in comes back as one footprint. The images themselves were compared by eye.",
+        note: "An inserted shift of time comes back as one footprint. The paper compared the images by eye.",
     },
     Row {
         id: "S05-48",

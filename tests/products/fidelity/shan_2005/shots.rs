@@ -33,14 +33,24 @@ fn orbits() -> Vec<Comparison> {
     let mut all = Vec::new();
     for (image, pass) in IMAGES.iter().zip(&*PASSES) {
         let first = f64::from(image.profile);
+        let orbit = f64::from(pass.orbit);
         all.push(
             number(
-                format!("{}, orbit in the file of twelve", image.id),
+                format!("{}, orbit", image.id),
                 image.profile.to_string(),
-                f64::from(pass.orbit),
+                orbit,
                 0,
             )
-            .between(first, first + 11.0),
+            .departs(0.5),
+        );
+        all.push(
+            derived(
+                format!("{}, orbits after the first of its file", image.id),
+                "one of twelve",
+                orbit - first,
+                0,
+            )
+            .between(0.0, 11.0),
         );
         all.push(
             derived(
@@ -108,21 +118,22 @@ pub(super) static ROWS: [Row; 7] = [
         place: "table 2",
         what: "MOLA GSD of the pair at Gusev, m",
         account: Account::Agrees {
-            from: "distances of real shots of both passes, just behind the images",
+            from: "distances of real shots of both passes, just after the images",
             ours: spacing,
         },
-        note: "The spacing changes by 2 m with height and latitude. About 330 m of table 1 is neither (S05-12).",
+        note: "The spacing changes by 2 m with height and latitude. The 330 m of table 1 are neither of the two spacings (S05-12).",
     },
     Row {
         id: "S05-66",
         kind: Kind::Evidence,
         place: "table 2",
         what: "MOLA profiles of the pair at Gusev, and days between them",
-        account: Account::Agrees {
+        account: Account::Explained {
             from: "orbits and times of the real passes next to the images in time",
             ours: orbits,
         },
-        note: "A file has the name of the first of its twelve orbits. The window of the shots begins behind the images.",
+        note: "The paper prints the names of files: a file is named after the first of its twelve orbits, and the passes are \
+               among these. The window of the shots begins after the end of the images.",
     },
     Row {
         id: "S05-67",
@@ -133,7 +144,7 @@ pub(super) static ROWS: [Row; 7] = [
             from: "time between both real passes over the number of orbits",
             ours: period,
         },
-        note: "Cut, not rounded.",
+        note: "The print is truncated, not rounded.",
     },
     Row {
         id: "S05-68",
@@ -141,10 +152,10 @@ pub(super) static ROWS: [Row; 7] = [
         place: "table 1",
         what: "velocity",
         account: Account::Agrees {
-            from: "real shots of orbit 19053: held inertially, the spot runs as fast as the spacecraft",
+            from: "real shots of orbit 19053, held inertially: the footprint moves at the speed of the spacecraft",
             ours: velocity,
         },
-        note: "Against the turning ground.",
+        note: "The speed is relative to the rotating surface.",
     },
     Row {
         id: "S05-69",
@@ -155,7 +166,7 @@ pub(super) static ROWS: [Row; 7] = [
             from: "real ranges at nadir, orbit 18940",
             ours: altitude,
         },
-        note: "MGS is as low as 370 km near the south pole, not over the sites.",
+        note: "The altitude of MGS is 370 km near the south pole, not over the sites.",
     },
     Row {
         id: "S05-70",
@@ -163,10 +174,11 @@ pub(super) static ROWS: [Row; 7] = [
         place: "introduction",
         what: "accuracy of MOLA, 1 m vertically",
         account: Account::Agrees {
-            from: "radii of real shots where ascending and descending passes cross, smooth ground, robust",
+            from: "radii of real shots, all of equal weight: normalised median absolute deviation of the differences where \
+                   ascending and descending passes cross over smooth ground, divided by √2",
             ours: accuracy,
         },
-        note: "Repeatability, after the crossover adjustment of the MOLA team; an error that all passes share does not show. The \
-               100 m in plan cannot be had from heights.",
+        note: "This is repeatability after the crossover adjustment of the MOLA team; it does not contain an error that all \
+               passes share. Heights do not determine the 100 m in plan.",
     },
 ];

@@ -170,8 +170,8 @@ pub(super) static ROWS: [Row; 11] = [
             ours: emission,
             test: "tests/truth/scene_mission.rs::the_images_are_flown_as_table_2_prints_them",
         },
-        note: "By the paper's text the angle is at the camera, by the archive's use at the ground; only the latter \
-               gives its base of 155 km (S05-60).",
+        note: "By the text of the paper the angle is at the camera, by the use of the archive at the ground; only \
+               the latter gives the printed base of 155 km (S05-60).",
     },
     Row {
         id: "S05-18",
@@ -183,7 +183,7 @@ pub(super) static ROWS: [Row; 11] = [
             ours: start,
             test: "tests/truth/scene_mission.rs::image_starts_are_the_published_times_to_the_clock_tick",
         },
-        note: "Rounded to 10 ms, which is 3 to 5 lines; the clock strings of labels tell more.",
+        note: "The times are rounded to 10 ms, which is 3 to 5 lines; the clock strings of labels are more precise.",
     },
     Row {
         id: "S05-19",
@@ -195,7 +195,8 @@ pub(super) static ROWS: [Row; 11] = [
             ours: exposure,
             test: "crates/scene/src/plan.rs::line_periods_are_those_of_table_2",
         },
-        note: "The period of a summed line: times the ground speed it gives the printed pixel size (S05-23).",
+        note: "This is the period of a summed line: its product with the ground speed is the printed pixel size \
+               (S05-23).",
     },
     Row {
         id: "S05-20",
@@ -219,8 +220,8 @@ pub(super) static ROWS: [Row; 11] = [
             ours: header_lines,
             test: "tests/truth/scene_mission.rs::the_images_are_flown_as_table_2_prints_them",
         },
-        note: "A contradiction of the paper: its table 4 wants 8064 lines of E04-01275 (S05-33). They are flown; the \
-               7424 that are printed are delivered.",
+        note: "The paper contradicts itself: its table 4 requires 8064 lines of E04-01275 (S05-33). The synthetic \
+               image has 8064 lines, of which the printed 7424 are delivered.",
     },
     Row {
         id: "S05-22",
@@ -243,7 +244,7 @@ pub(super) static ROWS: [Row; 11] = [
             from: "exposure time, ground speed of nadir images and of those held inertially",
             ours: pixel_size,
         },
-        note: "Along the track alone.",
+        note: "The size is along the track only.",
     },
     Row {
         id: "S05-24",
@@ -254,7 +255,7 @@ pub(super) static ROWS: [Row; 11] = [
             from: "the orbit of E02-00665, start times, 7064 s",
             ours: orbits,
         },
-        note: "A file has the name of the first of its twelve orbits.",
+        note: "A file is named after the first of its twelve orbits.",
     },
     Row {
         id: "S05-25",
@@ -265,7 +266,7 @@ pub(super) static ROWS: [Row; 11] = [
             from: "10 Hz times the imaging time",
             ours: shots,
         },
-        note: "Every image has fewer than fit in its time: shots are missing. How many is data.",
+        note: "Every image has fewer shots than fit in its time: some are missing. Their number needs data.",
     },
     Row {
         id: "S05-26",
@@ -287,6 +288,6 @@ pub(super) static ROWS: [Row; 11] = [
             from: "lines and times of table 2",
             ours: durations,
         },
-        note: "7.8 to 17.8 s.",
+        note: "The times are 7.8 to 17.8 s.",
     },
 ];

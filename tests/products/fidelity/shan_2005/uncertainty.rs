@@ -239,8 +239,9 @@ pub(super) static ROWS: [Row; 10] = [
             from: "S05-54 and S05-55",
             ours: ground,
         },
-        note: "The rest of one MOLA spacing, found by eye, after S05-54: with means of opposite sign added it is 49.9 px. An error of \
-               a footprint in plan moves both of its projections alike, so that the rest is no accuracy of MOLA.",
+        note: "This is the rest of one MOLA spacing, found by eye, after S05-54; with means of opposite sign added \
+               it is 49.9 px. An error of a footprint in plan moves both of its projections alike, so that the rest \
+               is no accuracy of MOLA.",
     },
     Row {
         id: "S05-57",
@@ -251,8 +252,8 @@ pub(super) static ROWS: [Row; 10] = [
             from: "table 5",
             ours: across,
         },
-        note: "Along the track the paper sums over both images as its eq. 7 says, across the track it averages. \
-               Products and report have both readings.",
+        note: "The paper sums over both images along the track, as its eq. 7 states, and averages across the track. \
+               Products and report contain both readings.",
     },
     Row {
         id: "S05-58",
@@ -263,8 +264,8 @@ pub(super) static ROWS: [Row; 10] = [
             from: "S05-54 and S05-57, 4.4 m",
             ours: plan,
         },
-        note: "The gap between the two footprints of one point, not a standard deviation of a point. By eq. 5 it is larger: \
-               S05-54.",
+        note: "D_p is the distance of the two footprints of one point, not a standard deviation of a point. By eq. \
+               5 it is larger (S05-54).",
     },
     Row {
         id: "S05-59",
@@ -275,7 +276,7 @@ pub(super) static ROWS: [Row; 10] = [
             from: "table 2",
             ours: mean_pixel,
         },
-        note: "Unrounded it would make D_p 182.2 m.",
+        note: "With the unrounded mean D_p would be 182.2 m.",
     },
     Row {
         id: "S05-60",
@@ -309,7 +310,8 @@ pub(super) static ROWS: [Row; 10] = [
             from: "S05-57 and S05-61, 4.4 m",
             ours: height,
         },
-        note: "The same gap in height. With eq. 7 across the track as along it, it would be √2 larger.",
+        note: "D_h is the same distance in height. If eq. 7 were applied across the track as along it, D_h would be \
+               √2 larger.",
     },
     Row {
         id: "S05-63",

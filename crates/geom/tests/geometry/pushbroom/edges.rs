@@ -70,7 +70,7 @@ fn points_behind_the_camera_are_no_numbers() {
 }
 
 #[test]
-fn what_is_no_number_is_told() {
+fn values_that_are_not_finite_are_refused() {
     let model = GUSEV.euler(2);
     let nowhere = Vector3::new(f64::NAN, 0.0, 0.0);
     let projector = Projector::new(&model, f64::from(GUSEV.lines)).unwrap();
@@ -115,7 +115,7 @@ fn points_far_outside_are_still_found() {
 }
 
 #[test]
-fn samples_that_are_no_orientation_are_told() {
+fn samples_that_are_no_orientation_are_refused() {
     let samples = GUSEV.samples();
     let fault = |samples: &[(f64, Pose)]| SampledOrientation::new(samples).unwrap_err();
     assert_eq!(fault(&samples[..2]), SamplesError::TooFew(2));

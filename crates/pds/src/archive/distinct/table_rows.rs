@@ -57,7 +57,8 @@ impl Taken {
 
     /// Whether time and place are equal to the last bit.
     fn equals(&self, other: &Self) -> bool {
-        let bits = |of: &Self| [of.et_s, of.place[0], of.place[1], of.place[2]].map(f64::to_bits);
+        let bits =
+            |row: &Self| [row.et_s, row.place[0], row.place[1], row.place[2]].map(f64::to_bits);
         bits(self) == bits(other)
     }
 

@@ -22,7 +22,7 @@ fn edited(bytes: &[u8], key: &str, value: &str) -> Vec<u8> {
     let equals = line + label[line..].find('=').unwrap() + 1;
     let start = equals
         + label[equals..]
-            .find(|of: char| of != ' ' && of != '"')
+            .find(|letter: char| letter != ' ' && letter != '"')
             .unwrap();
     bytes[start..start + value.len()].copy_from_slice(value.as_bytes());
     bytes
@@ -34,7 +34,7 @@ fn told(bytes: &[u8]) -> (Vec<String>, Vec<String>) {
     let path: PathBuf = folder.path().join("image.imq");
     fs::write(&path, bytes).unwrap();
     let image = ImageFile::open(&path, built_in_instruments()).unwrap();
-    let text = |of: &Complaint| of.to_string();
+    let text = |complaint: &Complaint| complaint.to_string();
     let complaints = image.complaints().kept().iter().map(text).collect();
     (
         complaints,
@@ -114,7 +114,8 @@ fn fragments_behind_the_label_of_another_image_are_noticed() {
         "LINES = 1344; the fragments state 1360 lines",
         "EDIT_MODE_ID = 0; the fragments state 16 as first detector",
     ];
-    let expected = expected.map(|of| format!("fragment 0, byte 2048: the label states {of}"));
+    let expected =
+        expected.map(|statement| format!("fragment 0, byte 2048: the label states {statement}"));
     assert_eq!(contradictions, expected);
 }
 

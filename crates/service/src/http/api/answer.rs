@@ -16,7 +16,7 @@ const USUAL: u32 = 50;
 /// A document, without hidden paths.
 pub(super) fn answer<T: Serialize>(app: &App, document: &T) -> Result<Response, Problem> {
     let text = serde_json::to_string(document).map_err(Problem::internal)?;
-    let mut response = app.hidden().strip(text).into_response();
+    let mut response = app.redactor().redact(text).into_response();
     let form = HeaderValue::from_static("application/json");
     response.headers_mut().insert(header::CONTENT_TYPE, form);
     Ok(response)

@@ -170,5 +170,5 @@ fn message(app: &App, event: Event) -> Result<Message, Problem> {
     Ok(Message::default()
         .id(id)
         .event(kind)
-        .data(app.hidden().strip(text)))
+        .data(app.redactor().redact(text)))
 }

@@ -17,7 +17,7 @@ use crate::{
         app::App,
         caller::{Operator, Reader},
         changes::{cancel, retry},
-        extract::{Asked, At, name},
+        extract::{At, Parameters, name},
         problem::{Problem, ProblemDocument},
     },
     instant::Instant,
@@ -111,7 +111,7 @@ pub(super) struct JobsWanted {
 pub(super) async fn list(
     _: Reader,
     State(app): State<Arc<App>>,
-    Asked(wanted): Asked<JobsWanted>,
+    Parameters(wanted): Parameters<JobsWanted>,
 ) -> Result<Response, Problem> {
     let limit = limit(wanted.limit)?;
     let before = number(wanted.after)?;
@@ -229,5 +229,5 @@ pub(super) async fn retry_one(
 }
 
 fn no_job() -> Problem {
-    Problem::not_found("There is no such job.")
+    Problem::not_found("This job does not exist.")
 }

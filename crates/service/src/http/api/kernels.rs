@@ -13,7 +13,7 @@ use crate::{
         app::App,
         caller::Reader,
         coverage::Covered,
-        extract::{Asked, At},
+        extract::{At, Parameters},
         problem::{Problem, ProblemDocument},
     },
     instant::Instant,
@@ -63,7 +63,7 @@ impl Kernel {
 pub(super) async fn list(
     _: Reader,
     State(app): State<Arc<App>>,
-    Asked(piece): Asked<ByNumber>,
+    Parameters(piece): Parameters<ByNumber>,
 ) -> Result<Response, Problem> {
     let (limit, after) = (piece.limit()?, piece.after()?);
     let found = app

@@ -12,7 +12,7 @@ use crate::{
     http::{
         app::{App, blocking},
         caller::Reader,
-        extract::{Asked, At},
+        extract::{At, Parameters},
         logs::{PIECE, log_piece},
         problem::{Problem, ProblemDocument},
     },
@@ -58,7 +58,7 @@ pub(super) async fn of_job(
     _: Reader,
     State(app): State<Arc<App>>,
     At(job): At<i64>,
-    Asked(wanted): Asked<LogWanted>,
+    Parameters(wanted): Parameters<LogWanted>,
 ) -> Result<Response, Problem> {
     let found = app
         .read(move |connection| attempts(connection, job, ATTEMPTS))
@@ -67,7 +67,7 @@ pub(super) async fn of_job(
     let attempt = found
         .into_iter()
         .find(|attempt| which(attempt.n))
-        .ok_or_else(|| Problem::not_found("There is no such attempt."))?;
+        .ok_or_else(|| Problem::not_found("This attempt does not exist."))?;
     let config = app.config();
     let (log, after) = (attempt.log, wanted.after.unwrap_or(0));
     let piece =

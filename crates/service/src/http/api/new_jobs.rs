@@ -200,7 +200,7 @@ fn make(
     };
     for name in &names {
         if site(transaction, name)?.is_none_or(|site| !site.enabled) {
-            let text = format!("There is no site {name:?} that can be run.");
+            let text = format!("Site {name:?} does not exist or is disabled.");
             return Ok(Err(Problem::not_found(text)));
         }
     }

@@ -15,7 +15,7 @@ use crate::{
     http::{
         app::App,
         caller::Reader,
-        extract::{Asked, At},
+        extract::{At, Parameters},
         problem::{Problem, ProblemDocument},
     },
 };
@@ -31,7 +31,7 @@ const MOST: u32 = 1000;
 pub(super) async fn list(
     _: Reader,
     State(app): State<Arc<App>>,
-    Asked(piece): Asked<ByNumber>,
+    Parameters(piece): Parameters<ByNumber>,
 ) -> Result<Response, Problem> {
     let (limit, before) = (piece.limit()?, piece.after()?);
     let found = app
@@ -80,6 +80,6 @@ pub(super) async fn one(
         .await?;
     answer(
         &app,
-        &found.ok_or_else(|| Problem::not_found("There is no such night."))?,
+        &found.ok_or_else(|| Problem::not_found("This night does not exist."))?,
     )
 }

@@ -45,7 +45,7 @@ pub(super) async fn begin(
     let file = app
         .read(move |connection| site_file(connection, &wanted))
         .await?;
-    let file = file.ok_or_else(|| Problem::not_found("There is no such site."))?;
+    let file = file.ok_or_else(|| Problem::not_found("This site does not exist."))?;
     let place = place(&app)?;
     let plan = app.plans.begin(&site, app.now_ms());
     let out = app.config().outputs.products.join(&site).join("working");
@@ -117,6 +117,6 @@ pub(super) async fn one(
     let plan = app.plans.get(id);
     answer(
         &app,
-        &plan.ok_or_else(|| Problem::not_found("There is no such plan."))?,
+        &plan.ok_or_else(|| Problem::not_found("This plan does not exist."))?,
     )
 }

@@ -16,7 +16,7 @@ use crate::{
         app::App,
         caller::{Operator, Reader},
         changes::pin,
-        extract::{Asked, At, Document, name},
+        extract::{At, Document, Parameters, name},
         problem::{Problem, ProblemDocument},
     },
 };
@@ -32,7 +32,7 @@ pub(super) async fn of_site(
     _: Reader,
     State(app): State<Arc<App>>,
     At(site): At<String>,
-    Asked(piece): Asked<ByName>,
+    Parameters(piece): Parameters<ByName>,
 ) -> Result<Response, Problem> {
     let limit = piece.limit()?;
     let site = find_site(&app, &site).await?.name;
@@ -87,5 +87,5 @@ pub(super) async fn pin_one(
 pub(super) async fn find(app: &App, id: &str) -> Result<Run, Problem> {
     let wanted = name(id)?.to_owned();
     let found = app.read(move |connection| run(connection, &wanted)).await?;
-    found.ok_or_else(|| app.unknown("There is no such run."))
+    found.ok_or_else(|| app.unknown("This run does not exist."))
 }

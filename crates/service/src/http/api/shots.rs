@@ -18,13 +18,14 @@ use crate::{
     http::{
         app::App,
         caller::Reader,
-        extract::{Asked, body_of, json},
+        extract::{Parameters, body_of, json},
         files::require_whole,
         problem::{Problem, ProblemDocument},
         work::{ask, place},
     },
-    worker::protocol::{Answer, What},
+    worker::protocol::{Answer, Failure, What},
 };
+use areograph_base::error::Kind;
 
 /// The product that is searched.
 const FOOTPRINTS: &str = "footprints.parquet";
@@ -84,7 +85,7 @@ pub(super) async fn in_box(
     _: Reader,
     State(app): State<Arc<App>>,
     headers: HeaderMap,
-    Asked(wanted): Asked<BoxWanted>,
+    Parameters(wanted): Parameters<BoxWanted>,
 ) -> Result<Response, Problem> {
     search(&app, &headers, corners_of_box(&wanted.bbox)?).await
 }
@@ -180,9 +181,11 @@ async fn search(
     let place = place(app)?;
     let runs = app.read(current_runs).await?;
     for (_, id) in &runs {
-        // A current run that the database does not know is refused by the worker.
-        if let Ok(run) = find(app, id).await {
-            require_whole(app, run, FOOTPRINTS).await?;
+        match find(app, id).await {
+            Ok(run) => require_whole(app, run, FOOTPRINTS).await?,
+            // The worker refuses a current run that the database does not know.
+            Err(problem) if problem.status == StatusCode::NOT_FOUND => {}
+            Err(problem) => return Err(problem),
         }
     }
     let config = app.config();
@@ -206,12 +209,7 @@ async fn search(
     let (rows, complete) = match ask(app, what, DEADLINE_S).await? {
         Ok(Answer::Shots { rows, complete }) => (rows, complete),
         Ok(_) => return Err(Problem::internal("the worker sent an unexpected answer")),
-        Err(failure) if failure.code == 2 => {
-            return Err(Problem::bad_request(
-                "This region encloses no area: its sides must not cross.",
-            ));
-        }
-        Err(failure) => return Err(Problem::internal(failure.text)),
+        Err(failure) => return Err(problem_of(app, failure)),
     };
     let file = tokio::fs::File::open(&into)
         .await
@@ -230,6 +228,18 @@ async fn search(
     );
     fields.insert(ROW_COUNT, rows.into());
     Ok(response)
+}
+
+/// The failure of a search: the request or the products are named as its cause, without paths of this machine.
+fn problem_of(app: &App, failure: Failure) -> Problem {
+    let is = |kind: Kind| failure.code == kind.exit_code();
+    if is(Kind::Configuration) {
+        return Problem::bad_request(app.redactor().redact(failure.text));
+    }
+    if is(Kind::Input) {
+        return Problem::conflict(app.redactor().redact(failure.text));
+    }
+    Problem::internal(failure.text)
 }
 
 /// The first format in `Accept`; a wildcard means GeoJSON.

@@ -13,7 +13,7 @@ use crate::{
     http::{
         app::App,
         caller::Reader,
-        extract::{Asked, At, name},
+        extract::{At, Parameters, name},
         problem::{Problem, ProblemDocument},
     },
 };
@@ -26,7 +26,7 @@ use crate::{
 pub(super) async fn list(
     _: Reader,
     State(app): State<Arc<App>>,
-    Asked(piece): Asked<ByName>,
+    Parameters(piece): Parameters<ByName>,
 ) -> Result<Response, Problem> {
     let limit = piece.limit()?;
     let after = piece.after()?.unwrap_or_default();
@@ -84,5 +84,5 @@ pub(super) async fn find(app: &App, site_name: &str) -> Result<Site, Problem> {
     let found = app
         .read(move |connection| site(connection, &wanted))
         .await?;
-    found.ok_or_else(|| app.unknown("There is no such site."))
+    found.ok_or_else(|| app.unknown("This site does not exist."))
 }

@@ -2,15 +2,18 @@
 
 use maud::{Markup, html};
 
-use super::parts::{Times, counted};
-use crate::database::shown::{DataStatus, ProductStatus};
+use super::parts::Times;
+use crate::{
+    database::shown::{DataStatus, ProductStatus},
+    words::counted,
+};
 
 /// What needs attention: list items.
 pub(super) fn attention(data: &DataStatus, recovering: bool) -> Markup {
     let products = &data.products;
     html! {
-        @if recovering { li { "The database was lost: it is being made again from the products. Sites appear one after the other." } }
-        @if let Some(loss) = &data.database_loss { li { (sentence(&loss.text)) "." } }
+        @if recovering { li { "The database was lost: the service is making it again from the products. The sites appear one by one." } }
+        @if let Some(loss) = &data.database_loss { li { (capitalised(&loss.text)) "." } }
         @if products.runs_damaged > 0 {
             li {
                 "Products of " (counted(products.runs_damaged, "run")) " do not match their manifests and are withheld: "
@@ -18,7 +21,7 @@ pub(super) fn attention(data: &DataStatus, recovering: bool) -> Markup {
                     @if place > 0 { ", " }
                     a href={ "/runs/" (run.run) } { (run.site) " " (run.run) }
                 }
-                ". A current run is made again; others can be restored from a copy."
+                ". The service makes a current run again. Restore other runs from a copy."
             }
         }
     }
@@ -29,18 +32,18 @@ pub(super) fn last_scrub(products: &ProductStatus, times: &Times) -> Markup {
     html! {
         p {
             @match &products.last_scrub {
-                None => "Products were not read again yet.",
+                None => "The service has not checked the products yet.",
                 Some(scrub) => {
-                    "Products of " (counted(scrub.runs, "run")) " were read again " (times.age(scrub.ended_utc)) "; "
-                    (counted(scrub.damaged_runs, "run")) " with damaged products."
+                    "The service checked the products of " (counted(scrub.runs, "run")) " " (times.age(scrub.ended_utc)) " and found damage in "
+                    (counted(scrub.damaged_runs, "run")) "."
                 }
             }
-            " " (counted(products.runs_due, "run")) " of " (products.runs) " due."
+            " The next check is due for " (counted(products.runs_due, "run")) " of " (products.runs) "."
         }
     }
 }
 
-fn sentence(text: &str) -> String {
+fn capitalised(text: &str) -> String {
     let mut text = text.to_owned();
     if let Some(first) = text.get_mut(..1) {
         first.make_ascii_uppercase();

@@ -23,7 +23,7 @@ use crate::{
         app::{App, blocking},
         caller::{Caller, Reader},
         changes::{cancel, outcome_text, retry},
-        extract::{Asked, At, Filled, name},
+        extract::{At, Filled, Parameters, name},
         logs::{LogPiece, log_piece},
         problem::Problem,
     },
@@ -50,7 +50,7 @@ pub(super) struct JobsWanted {
 pub(super) async fn list(
     Reader(caller): Reader,
     State(app): State<Arc<App>>,
-    Asked(wanted): Asked<JobsWanted>,
+    Parameters(wanted): Parameters<JobsWanted>,
 ) -> Result<Response, Problem> {
     if let Some(site) = &wanted.site {
         name(site)?;
@@ -149,7 +149,7 @@ pub(super) async fn one(
         })
         .await?;
     let (job, causes, attempts, runs) =
-        found.ok_or_else(|| Problem::not_found("There is no such job."))?;
+        found.ok_or_else(|| Problem::not_found("This job does not exist."))?;
     let log = match attempts.first() {
         Some(newest) => {
             let (config, path) = (app.config(), newest.log.clone());

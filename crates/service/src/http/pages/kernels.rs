@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     database::shown::{KernelFile, kernels, roots, used_by},
-    http::{app::App, caller::Reader, coverage::Covered, extract::Asked, problem::Problem},
+    http::{app::App, caller::Reader, coverage::Covered, extract::Parameters, problem::Problem},
 };
 
 /// Kernels on one page.
@@ -32,7 +32,7 @@ pub(super) struct From {
 pub(super) async fn list(
     Reader(caller): Reader,
     State(app): State<Arc<App>>,
-    Asked(from): Asked<From>,
+    Parameters(from): Parameters<From>,
 ) -> Result<Response, Problem> {
     let (found, users, roots) = app
         .read(move |connection| {

@@ -39,7 +39,7 @@ pub(super) struct Page<'a> {
 impl Page<'_> {
     pub(super) fn answer(&self, app: &App, caller: &Caller, body: &Markup) -> Response {
         let markup = self.markup(app, caller, body);
-        Html(app.hidden().strip(markup.into_string())).into_response()
+        Html(app.redactor().redact(markup.into_string())).into_response()
     }
 
     fn markup(&self, app: &App, caller: &Caller, body: &Markup) -> Markup {

@@ -16,7 +16,7 @@ use crate::{
     http::{
         app::App,
         caller::{Known, by_token, cookie_name},
-        extract::{Asked, Filled},
+        extract::{Filled, Parameters},
         guard::limit_login,
         problem::Problem,
     },
@@ -34,7 +34,7 @@ pub(super) struct Next {
 pub(super) async fn form(
     Known(caller): Known,
     State(app): State<Arc<App>>,
-    Asked(Next { next }): Asked<Next>,
+    Parameters(Next { next }): Parameters<Next>,
 ) -> Result<Response, Problem> {
     let next = own_path(next.as_deref());
     let body = html! {
@@ -44,7 +44,7 @@ pub(super) async fn form(
             input id="areograph-token" name="token" type="password" required autocomplete="current-password" spellcheck="false" maxlength="128";
             button type="submit" { "Log in" }
         }
-        p { "Tokens are created on the command line: " code { "areograph service token add" } ". A session ends after an hour without use, and after twelve hours in all." }
+        p { "Create tokens on the command line: " code { "areograph service token add" } ". A session ends after one hour without use, and after twelve hours at the latest." }
     };
     Ok(Page {
         title: "Log in",

@@ -2,8 +2,8 @@
 
 use maud::{Markup, html};
 
-use super::parts::{counted, tone};
-use crate::database::shown::Site;
+use super::parts::tone;
+use crate::{database::shown::Site, words::counted};
 
 /// Units of the picture per degree.
 const SCALE: f64 = 2.0;
@@ -54,7 +54,7 @@ pub(super) fn map(sites: &[Site]) -> Markup {
                 }
             }
             figcaption {
-                (counted(placed.len(), "site")) " with windows; east longitude and areocentric latitude. The colour is that of the verdict."
+                (counted(placed.len(), "site")) " with windows; east longitude and areocentric latitude. The colour shows the verdict."
                 @if sites.len() > placed.len() { " The windows of the others are not known yet." }
             }
         }

@@ -17,7 +17,7 @@ use crate::{
     http::{
         app::App,
         caller::Reader,
-        extract::{Asked, At},
+        extract::{At, Parameters},
         problem::Problem,
     },
 };
@@ -37,7 +37,7 @@ pub(super) struct From {
 pub(super) async fn list(
     Reader(caller): Reader,
     State(app): State<Arc<App>>,
-    Asked(from): Asked<From>,
+    Parameters(from): Parameters<From>,
 ) -> Result<Response, Problem> {
     let found = app
         .read(move |connection| nights(connection, from.after, NIGHTS + 1))
@@ -94,7 +94,8 @@ pub(super) async fn one(
             Ok(Some((night, jobs_of_night(connection, id, MOST)?, runs)))
         })
         .await?;
-    let (night, jobs, runs) = found.ok_or_else(|| Problem::not_found("There is no such night."))?;
+    let (night, jobs, runs) =
+        found.ok_or_else(|| Problem::not_found("This night does not exist."))?;
     let times = times(&app);
     let body = html! {
         div id="night" data-live="" {
@@ -128,7 +129,7 @@ fn night_lead(night: &Night, times: &Times) -> Markup {
                 ", ended " (times.maybe(night.ended_utc)) ". "
                 (night.sites_checked) " sites checked, " (night.runs) " runs, " (night.failures) " failures."
             }
-            @if night.runs == 0 && night.ended_utc.is_some() { p { "Checked; nothing had to run." } }
+            @if night.runs == 0 && night.ended_utc.is_some() { p { "All sites were checked; no run was necessary." } }
         },
     )
 }

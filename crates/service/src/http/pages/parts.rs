@@ -1,7 +1,5 @@
 //! Pieces of pages: times, verdicts, tables.
 
-use std::fmt;
-
 use chrono::{DateTime, Utc};
 use chrono_tz::Tz;
 use maud::{Markup, html};
@@ -153,13 +151,6 @@ pub(super) fn said(sentences: &[String]) -> Markup {
 /// The link to the next page of a list.
 pub(super) fn more(address: Option<String>) -> Markup {
     html! { @if let Some(address) = address { p { a href=(address) rel="next" { "Older" } } } }
-}
-
-/// A number of things.
-pub(super) fn counted(count: impl fmt::Display, what: &str) -> String {
-    let count = count.to_string();
-    let plural = if count == "1" { "" } else { "s" };
-    format!("{count} {what}{plural}")
 }
 
 /// Bytes in a readable unit.

@@ -55,7 +55,8 @@ pub(super) async fn one(
             Ok(Some((this, before, causes)))
         })
         .await?;
-    let (run, before, causes) = found.ok_or_else(|| Problem::not_found("There is no such run."))?;
+    let (run, before, causes) =
+        found.ok_or_else(|| Problem::not_found("This run does not exist."))?;
     let (config, wanted) = (app.config(), run.clone());
     let manifest = blocking(move || manifest(&config.outputs.products, &wanted)).await?;
     let times = times(&app);
@@ -98,7 +99,7 @@ fn run_lead(run: &Run, causes: &[CauseRow], manifest: Option<&Manifest>, times: 
                 @if let Some(removed) = run.removed_utc { " Its products were removed " (times.at(removed)) "." }
                 @else if let Some(checked) = run.checked_utc { " Its products were last read " (times.age(checked)) "." }
             }
-            @if run.damaged > 0 { p { "Products that do not match the manifest, and are withheld: " (run.damaged) "." } }
+            @if run.damaged > 0 { p { "Products withheld because they do not match the manifest: " (run.damaged) "." } }
             (said(&sentences(&run.reasons)))
             @for because in sentences(&run.because) { p { "Because: " (prose(&because)) } }
         @for cause in causes { @if !cause.detail.is_empty() { p { "Because: " (prose(&cause.detail)) } } }

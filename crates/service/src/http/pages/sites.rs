@@ -15,8 +15,7 @@ use super::{
     layout::{Page, form_token, operator},
     map::map,
     parts::{
-        Times, counted, figure, figure_name, lead, more, prose, said, state, table, times, tone,
-        verdict,
+        Times, figure, figure_name, lead, more, prose, said, state, table, times, tone, verdict,
     },
     trend::{figures, headline, trends},
 };
@@ -33,10 +32,11 @@ use crate::{
         app::App,
         caller::{Caller, Reader},
         changes::{Wanted, run_site},
-        extract::{Asked, At, Filled, name},
+        extract::{At, Filled, Parameters, name},
         problem::Problem,
     },
     state::JobState,
+    words::counted,
 };
 
 /// Sites on one page.
@@ -56,7 +56,7 @@ pub(super) struct From {
 pub(super) async fn home(
     Reader(caller): Reader,
     State(app): State<Arc<App>>,
-    Asked(from): Asked<From>,
+    Parameters(from): Parameters<From>,
 ) -> Result<Response, Problem> {
     let after = from.after.unwrap_or_default();
     let before_ms = due_before_ms(&app.config(), app.now_ms());
@@ -215,7 +215,7 @@ fn site_table(sites: &[Site], times: &Times) -> Markup {
 /// Fresh, or since when and why stale.
 fn freshness(site: &Site, times: &Times) -> Markup {
     html! {
-        @if !site.enabled { "Not run: its site file was removed or disables it." }
+        @if !site.enabled { "Not run: the site file was removed, or disables the site." }
         @else if let Some(problem) = &site.problem { "Not run: " (problem) }
         @else if let Some(since) = site.stale_since_utc {
             "Stale since " (times.at(since)) ": " (prose(site.stale_because.as_deref().unwrap_or("its inputs changed")))
@@ -249,7 +249,7 @@ pub(super) async fn one(
     Reader(caller): Reader,
     State(app): State<Arc<App>>,
     At(wanted): At<String>,
-    Asked(from): Asked<From>,
+    Parameters(from): Parameters<From>,
 ) -> Result<Response, Problem> {
     let wanted = name(&wanted)?.to_owned();
     let after = from.after;
@@ -267,7 +267,8 @@ pub(super) async fn one(
             Ok(Some((site, runs, jobs)))
         })
         .await?;
-    let (site, runs, jobs) = found.ok_or_else(|| Problem::not_found("There is no such site."))?;
+    let (site, runs, jobs) =
+        found.ok_or_else(|| Problem::not_found("This site does not exist."))?;
     let times = times(&app);
     let oldest =
         (runs.len() > RUNS).then(|| format!("/sites/{}?after={}", site.name, runs[RUNS - 1].id));
@@ -391,7 +392,7 @@ pub(super) async fn run_now(
         Some(job) => Ok(Redirect::to(&format!("/jobs/{job}")).into_response()),
         None => Err(Problem::new(
             StatusCode::NOT_FOUND,
-            "There is no such site.",
+            "This site does not exist.",
         )),
     }
 }

@@ -3,8 +3,7 @@
 use chrono::{DateTime, SecondsFormat, TimeDelta, Utc};
 use maud::{Markup, html};
 
-use super::parts::counted;
-use crate::http::coverage::Span;
+use crate::{http::coverage::Span, words::counted};
 
 const WIDTH: f64 = 520.0;
 const LINE: f64 = 34.0;

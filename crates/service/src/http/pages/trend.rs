@@ -5,8 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use maud::{Markup, html};
 use serde_json::Value;
 
-use super::parts::{Times, counted, figure, figure_name, sentences, table, verdict};
-use crate::{clock::utc_text, database::shown::Run};
+use super::parts::{Times, figure, figure_name, sentences, table, verdict};
+use crate::{
+    clock::utc_text,
+    database::shown::Run,
+    words::{counted, sentence},
+};
 
 const WIDTH: f64 = 520.0;
 const HEIGHT: f64 = 190.0;
@@ -50,7 +54,7 @@ impl KernelChange {
         let parts: Vec<String> = parts
             .iter()
             .filter(|(_, names)| !names.is_empty())
-            .map(|(what, names)| format!("{} {what}", names.join(", ")))
+            .map(|(what, names)| format!("{} {what}", sentence(names)))
             .collect();
         (!parts.is_empty()).then(|| parts.join("; "))
     }

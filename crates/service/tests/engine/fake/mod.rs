@@ -198,7 +198,10 @@ impl World {
 
     pub(crate) fn started(&self, what: &str) -> usize {
         let started = self.started.lock().unwrap();
-        started.iter().filter(|of| of.starts_with(what)).count()
+        started
+            .iter()
+            .filter(|subject| subject.starts_with(what))
+            .count()
     }
 }
 
@@ -261,7 +264,7 @@ impl Life {
         panic!("no end: {:?}", self.jobs());
     }
 
-    /// Sweeps repeatedly at intervals of `seconds`.
+    /// Polls repeatedly at intervals of `seconds`.
     pub(crate) fn go_on(&self, world: &World, seconds: i64, times: usize) {
         for _ in 0..times {
             world.later(seconds);

@@ -7,7 +7,7 @@ use areograph_base::body::Body;
 use areograph_geom::{ellipsoid::spherical_to_xyz_m, height_grid::HeightGrid, statistics::Summary};
 use areograph_pds::terrain_model::{HeightsAbove, read_terrain_model};
 
-/// Planimetric error of the scene's adjusted orientations on an axis, metres: `mola_surface.plan_sigma_m`.
+/// Planimetric error of the scene's adjusted orientations on an axis, metres: `laser_surface.plan_sigma_m`.
 const PLAN_M: f64 = 130.0;
 
 /// A terrain model of a site, its standard deviations, and its document.

@@ -23,11 +23,11 @@ const BEYOND_STANDARD: i32 = 3;
 
 /// The pipe to the service.
 #[derive(Debug)]
-pub(super) struct Voice {
+pub(super) struct Reporter {
     pipe: Mutex<File>,
 }
 
-impl Voice {
+impl Reporter {
     /// Reserves standard output for the service; from now on, C code prints to standard error.
     pub(super) fn take() -> io::Result<Self> {
         let pipe = fcntl_dupfd_cloexec(stdout(), BEYOND_STANDARD)?;
@@ -38,7 +38,7 @@ impl Voice {
     }
 
     /// Sends a line, in pieces if it is long. If the service has ended, the end of the worker's input shows it.
-    pub(super) fn say(&self, line: &Line) {
+    pub(super) fn send(&self, line: &Line) {
         let Ok(text) = serde_json::to_string(line) else {
             return;
         };
@@ -63,7 +63,7 @@ impl Voice {
 
     /// Reports that a stage begins or has ended.
     pub(super) fn stage(&self, stage: &str, state: &str, because: &str, seconds: f64) {
-        self.say(&Line::Stage {
+        self.send(&Line::Stage {
             stage: stage.to_owned(),
             state: state.to_owned(),
             because: because.to_owned(),
@@ -73,13 +73,13 @@ impl Voice {
 
     /// Sends a heartbeat.
     pub(super) fn beat(&self) {
-        self.say(&Line::Beat {
+        self.send(&Line::Beat {
             rss_kib: rss_kib().unwrap_or(0),
         });
     }
 }
 
-impl Observer for Voice {
+impl Observer for Reporter {
     fn hear(&self, stage: &str, event: &StageEvent<'_>) {
         match event {
             StageEvent::Begins(reason) => self.stage(stage, "running", &reason.to_string(), 0.0),

@@ -1,79 +1,25 @@
-//! Columns of the index, and the fields of a row.
+//! Columns of index tables by their labels, and the fields of a row: rows are quoted CSV, or of fixed length.
 
 use std::{borrow::Cow, collections::BTreeMap};
 
 use crate::label::Label;
 
-/// Columns of the cumulative index of the mapping mission, in their order.
-pub(super) const COLUMNS: [&str; 53] = [
-    "VOLUME_ID",
-    "FILE_SPECIFICATION_NAME",
-    "PRODUCT_ID",
-    "IMAGE_TIME",
-    "INSTRUMENT_NAME",
-    "FILTER_NAME",
-    "LINE_SAMPLES",
-    "LINES",
-    "CROSSTRACK_SUMMING",
-    "DOWNTRACK_SUMMING",
-    "SCALED_PIXEL_WIDTH",
-    "PIXEL_ASPECT_RATIO",
-    "EMISSION_ANGLE",
-    "INCIDENCE_ANGLE",
-    "PHASE_ANGLE",
-    "CENTER_LONGITUDE",
-    "CENTER_LATITUDE",
-    "UPPER_LEFT_LONGITUDE",
-    "UPPER_LEFT_LATITUDE",
-    "UPPER_RIGHT_LONGITUDE",
-    "UPPER_RIGHT_LATITUDE",
-    "LOWER_LEFT_LONGITUDE",
-    "LOWER_LEFT_LATITUDE",
-    "LOWER_RIGHT_LONGITUDE",
-    "LOWER_RIGHT_LATITUDE",
-    "MISSION_PHASE_NAME",
-    "TARGET_NAME",
-    "SPACECRAFT_CLOCK_START_COUNT",
-    "FOCAL_PLANE_TEMPERATURE",
-    "LINE_EXPOSURE_DURATION",
-    "GAIN_MODE_ID",
-    "OFFSET_MODE_ID",
-    "EDIT_MODE_ID",
-    "ENCODING_TYPE",
-    "SCALED_IMAGE_WIDTH",
-    "SCALED_IMAGE_HEIGHT",
-    "SPACECRAFT_ALTITUDE",
-    "TARGET_CENTER_DISTANCE",
-    "SLANT_DISTANCE",
-    "USAGE_NOTE",
-    "NORTH_AZIMUTH",
-    "SUB_SOLAR_AZIMUTH",
-    "SUB_SOLAR_LONGITUDE",
-    "SUB_SOLAR_LATITUDE",
-    "SUB_SPACECRAFT_LONGITUDE",
-    "SUB_SPACECRAFT_LATITUDE",
-    "SOLAR_DISTANCE",
-    "SOLAR_LONGITUDE",
-    "LOCAL_TIME",
-    "IMAGE_SKEW_ANGLE",
-    "RATIONALE_DESC",
-    "DATA_QUALITY_DESC",
-    "ORBIT_NUMBER",
-];
-
 /// The fields of a row by the names of its columns.
-pub(super) type Fields<'a> = BTreeMap<&'a str, Cow<'a, str>>;
+pub type Fields<'a> = BTreeMap<&'a str, Cow<'a, str>>;
 
 /// A column: its name and, where the label states it, its position in a row.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Column {
-    pub(super) name: String,
+pub struct Column {
+    /// Its name, in upper case.
+    pub name: String,
     /// First byte, counted from 0, and the number of bytes.
     bytes: Option<(usize, usize)>,
 }
 
 impl Column {
-    pub(super) fn named(name: &str) -> Self {
+    /// A column that only its order in the row places.
+    #[must_use]
+    pub fn named(name: &str) -> Self {
         Self {
             name: name.to_owned(),
             bytes: None,
@@ -82,7 +28,8 @@ impl Column {
 }
 
 /// The columns that a label describes, in its order.
-pub(super) fn of_label(label: &Label) -> Vec<Column> {
+#[must_use]
+pub fn of_label(label: &Label) -> Vec<Column> {
     let in_columns = label.entries.iter().filter(|entry| entry.group == "COLUMN");
     let mut columns: BTreeMap<usize, BTreeMap<&str, &str>> = BTreeMap::new();
     for entry in in_columns {
@@ -108,7 +55,10 @@ pub(super) fn of_label(label: &Label) -> Vec<Column> {
 
 /// The fields of a row by the names of its columns, without quotes and blanks around them; a doubled quote within quotes is
 /// one.
-pub(super) fn fields<'a>(row: &'a [u8], columns: &'a [Column]) -> Result<Fields<'a>, String> {
+///
+/// # Errors
+/// What is wrong with the row.
+pub fn fields<'a>(row: &'a [u8], columns: &'a [Column]) -> Result<Fields<'a>, String> {
     let row = std::str::from_utf8(row).map_err(|_| "not ASCII text".to_owned())?;
     let separated = separated(row);
     if separated.len() == columns.len() && separated.iter().all(|field| is_whole(field)) {

@@ -6,15 +6,15 @@ use areograph_config::ServiceConfig;
 
 /// Folders as they occur in texts, and their replacements; the longest first.
 #[derive(Debug)]
-pub(super) struct Hidden(Vec<(String, String)>);
+pub(super) struct Redactor(Vec<(String, String)>);
 
-impl Hidden {
+impl Redactor {
     pub(super) fn of(config: &ServiceConfig, program: &Path) -> Self {
         let inputs = &config.inputs;
         let lists = [&inputs.sites, &inputs.kernels, &inputs.data];
         let outputs = [&config.outputs.products, &config.outputs.state];
         let folders = lists.into_iter().flatten().chain(outputs);
-        let mut hidden: Vec<(String, String)> = folders
+        let mut redacted: Vec<(String, String)> = folders
             .map(|folder| &**folder)
             .chain([config.file.as_path(), program])
             .flat_map(|path| {
@@ -27,20 +27,20 @@ impl Hidden {
                 (parent.len() > 1).then(|| (parent + "/", String::new()))
             })
             .collect();
-        hidden.sort_by(|a, b| b.0.len().cmp(&a.0.len()).then_with(|| a.0.cmp(&b.0)));
-        hidden.dedup();
-        Self(hidden)
+        redacted.sort_by(|a, b| b.0.len().cmp(&a.0.len()).then_with(|| a.0.cmp(&b.0)));
+        redacted.dedup();
+        Self(redacted)
     }
 
     /// `text` without the parents of the folders of the configuration.
-    pub(super) fn strip(&self, text: String) -> String {
-        let strip = |text: String, (folder, instead): &(String, String)| {
+    pub(super) fn redact(&self, text: String) -> String {
+        let redact = |text: String, (folder, instead): &(String, String)| {
             if text.contains(&**folder) {
                 text.replace(&**folder, instead)
             } else {
                 text
             }
         };
-        self.0.iter().fold(text, strip)
+        self.0.iter().fold(text, redact)
     }
 }

@@ -1,4 +1,4 @@
-//! `[mola_surface]`.
+//! `[laser_surface]`.
 
 use serde::Deserialize;
 
@@ -22,7 +22,8 @@ declare_table! {
         /// default combines 110 m of the images and 70 m of MOLA.
         plan_sigma_m: f64 = key(zero_or(1e-3, 1e5)).or(SurfaceOptions::default().plan_sigma_m),
         /// Standard deviation of the position of a profile in plan, per axis (MOLA's 100 m in the horizontal, Neumann
-        /// et al. 2001); only where `adjustment.relief_for_plan` or `adjustment.common_bus` is "yes".
+        /// et al. 2001). Stated accuracies of footprints contain it; it weighs profiles where `adjustment.relief_for_plan`
+        /// or `adjustment.common_bus` is "yes".
         profile_plan_sigma_m: f64 = key(from_to(1e-3, 1e5)).or(70.0),
         /// Least roughness: root mean square difference of heights 300 m apart. Larger values are estimated from the
         /// shots.

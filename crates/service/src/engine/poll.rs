@@ -5,12 +5,13 @@ use std::collections::BTreeMap;
 use crate::{
     clock::utc_text,
     database::files::{FileRow, FileState, RootRow, RootState},
+    words::counted,
 };
 use areograph_store::files::Identity;
 
 /// The known state of a folder and its list.
 #[derive(Debug)]
-pub struct Sweep<'a> {
+pub struct Poll<'a> {
     /// The folder as it was.
     pub root: &'a RootRow,
     /// Files known below it.
@@ -27,7 +28,7 @@ pub struct Sweep<'a> {
 
 /// The result.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Swept {
+pub struct Polled {
     /// The new state of the folder.
     pub root: RootRow,
     /// Files that changed.
@@ -38,21 +39,21 @@ pub struct Swept {
 
 /// Compares. An unavailable folder changes no file.
 #[must_use]
-pub fn compare(sweep: &Sweep<'_>) -> Swept {
-    let found = match unavailable(sweep) {
+pub fn compare(poll: &Poll<'_>) -> Polled {
+    let found = match unavailable(poll) {
         Ok(found) => found,
         Err(detail) => {
-            return Swept {
-                root: with_state(sweep, RootState::Unavailable, sweep.root.files, detail),
+            return Polled {
+                root: with_state(poll, RootState::Unavailable, poll.root.files, detail),
                 changed: Vec::new(),
                 settled: Vec::new(),
             };
         }
     };
-    let changed = changed(sweep, found);
+    let changed = changed(poll, found);
     let news: BTreeMap<&str, &FileRow> = changed.iter().map(|file| (&*file.path, file)).collect();
-    let known = sweep.known.values();
-    // A file counts as settling from the sweep that detected its change; only a later one may find it quiet.
+    let known = poll.known.values();
+    // A file counts as settling from the poll that detected its change; only a later one may find it quiet.
     let waiting: Vec<&FileRow> = known
         .filter(|file| file.state == FileState::Settling && !news.contains_key(&*file.path))
         .collect();
@@ -63,74 +64,74 @@ pub fn compare(sweep: &Sweep<'_>) -> Swept {
         .map(last_change_ms)
         .max();
     let files = i64::try_from(found.len()).unwrap_or(i64::MAX);
-    let quiet_from_ms = last_change_ms.map(|change_ms| change_ms.saturating_add(sweep.quiet_ms));
+    let quiet_from_ms = last_change_ms.map(|change_ms| change_ms.saturating_add(poll.quiet_ms));
     let (state, settled, detail) = match quiet_from_ms {
         None => (RootState::Available, Vec::new(), String::new()),
-        Some(from_ms) if news.is_empty() && from_ms <= sweep.now_ms => {
+        Some(from_ms) if news.is_empty() && from_ms <= poll.now_ms => {
             let settled = waiting.into_iter().cloned().collect();
             (RootState::Available, settled, String::new())
         }
         Some(from_ms) => {
             let count = waiting.len() + news.len();
-            let until = utc_text(from_ms.max(sweep.now_ms));
-            let files = if count == 1 { "file" } else { "files" };
-            let detail = format!("{count} {files} changed; waiting for quiet period until {until}");
+            let until = utc_text(from_ms.max(poll.now_ms));
+            let files = counted(count, "file");
+            let detail = format!("{files} changed; the quiet period ends at {until}");
             (RootState::Settling, Vec::new(), detail)
         }
     };
-    Swept {
-        root: with_state(sweep, state, files, detail),
+    Polled {
+        root: with_state(poll, state, files, detail),
         changed,
         settled,
     }
 }
 
 /// The files, or the reason for which the folder is unavailable.
-fn unavailable<'a>(sweep: &Sweep<'a>) -> Result<&'a BTreeMap<String, Identity>, String> {
-    let found = sweep.found.map_err(str::to_owned)?;
+fn unavailable<'a>(poll: &Poll<'a>) -> Result<&'a BTreeMap<String, Identity>, String> {
+    let found = poll.found.map_err(str::to_owned)?;
     if found.is_empty() {
         return Err("the folder is empty".to_owned());
     }
     let there = |file: &&FileRow| file.state != FileState::Gone;
-    let known = sweep.known.values().filter(there).count();
+    let known = poll.known.values().filter(there).count();
     let is_lost = |file: &&FileRow| there(file) && !found.contains_key(&file.path);
-    let lost = sweep.known.values().filter(is_lost).count();
-    if lost as f64 > sweep.max_loss * known as f64 {
+    let lost = poll.known.values().filter(is_lost).count();
+    if lost as f64 > poll.max_loss * known as f64 {
         return Err(format!(
-            "{lost} of {known} files are missing, more than changes.max_loss = {} allows; if this is intended, raise it until the \
-             next sweep",
-            sweep.max_loss
+            "{lost} of {known} files are missing, more than changes.max_loss = {} allows; if the files were removed intentionally, raise it until the \
+             next poll",
+            poll.max_loss
         ));
     }
     Ok(found)
 }
 
-fn with_state(sweep: &Sweep<'_>, state: RootState, files: i64, detail: String) -> RootRow {
-    let since_ms = if state == sweep.root.state {
-        sweep.root.since_ms
+fn with_state(poll: &Poll<'_>, state: RootState, files: i64, detail: String) -> RootRow {
+    let since_ms = if state == poll.root.state {
+        poll.root.since_ms
     } else {
-        sweep.now_ms
+        poll.now_ms
     };
     RootRow {
         files,
         state,
         since_ms,
         detail,
-        ..sweep.root.clone()
+        ..poll.root.clone()
     }
 }
 
-fn changed(sweep: &Sweep<'_>, found: &BTreeMap<String, Identity>) -> Vec<FileRow> {
+fn changed(poll: &Poll<'_>, found: &BTreeMap<String, Identity>) -> Vec<FileRow> {
     let mut changed = Vec::new();
     for (path, identity) in found {
-        match sweep.known.get(path) {
+        match poll.known.get(path) {
             Some(file)
                 if file.identity == *identity
                     && file.state != FileState::Gone
                     && !is_missing(file) => {}
             Some(file) => changed.push(FileRow {
                 identity: *identity,
-                changed_ms: sweep.now_ms,
+                changed_ms: poll.now_ms,
                 state: FileState::Settling,
                 detail: String::new(),
                 ..file.clone()
@@ -139,8 +140,8 @@ fn changed(sweep: &Sweep<'_>, found: &BTreeMap<String, Identity>) -> Vec<FileRow
                 path: path.clone(),
                 identity: *identity,
                 blake3: None,
-                first_seen_ms: sweep.now_ms,
-                changed_ms: sweep.now_ms,
+                first_seen_ms: poll.now_ms,
+                changed_ms: poll.now_ms,
                 checked_ms: None,
                 state: FileState::Settling,
                 detail: String::new(),
@@ -148,11 +149,11 @@ fn changed(sweep: &Sweep<'_>, found: &BTreeMap<String, Identity>) -> Vec<FileRow
             }),
         }
     }
-    let missing = sweep.known.values().filter(|file| {
+    let missing = poll.known.values().filter(|file| {
         file.state != FileState::Gone && !is_missing(file) && !found.contains_key(&file.path)
     });
     changed.extend(missing.map(|file| FileRow {
-        changed_ms: sweep.now_ms,
+        changed_ms: poll.now_ms,
         state: FileState::Settling,
         detail: MISSING.to_owned(),
         ..file.clone()
@@ -197,7 +198,7 @@ mod tests {
         }
     }
 
-    /// A folder that is swept repeatedly, and whose settled files count as read.
+    /// A folder that is polled repeatedly, and whose settled files count as read.
     struct Folder {
         root: RootRow,
         known: BTreeMap<String, FileRow>,
@@ -223,8 +224,8 @@ mod tests {
         }
 
         /// Changed paths, and settled ones.
-        fn sweep(&mut self, now_ms: i64, found: Result<(), &str>) -> (usize, usize) {
-            let swept = compare(&Sweep {
+        fn poll(&mut self, now_ms: i64, found: Result<(), &str>) -> (usize, usize) {
+            let polled = compare(&Poll {
                 root: &self.root,
                 known: &self.known,
                 found: found.map(|()| &self.files),
@@ -232,9 +233,9 @@ mod tests {
                 max_loss: 0.2,
                 quiet_ms: QUIET_MS,
             });
-            let counts = (swept.changed.len(), swept.settled.len());
-            self.root = swept.root;
-            let settled = swept.settled.into_iter().map(|file| FileRow {
+            let counts = (polled.changed.len(), polled.settled.len());
+            self.root = polled.root;
+            let settled = polled.settled.into_iter().map(|file| FileRow {
                 state: if is_missing(&file) {
                     FileState::Gone
                 } else {
@@ -242,7 +243,7 @@ mod tests {
                 },
                 ..file
             });
-            for file in swept.changed.into_iter().chain(settled) {
+            for file in polled.changed.into_iter().chain(settled) {
                 self.known.insert(file.path.clone(), file);
             }
             counts
@@ -252,21 +253,21 @@ mod tests {
     #[test]
     fn a_new_service_uses_old_files_at_its_second_sweep() {
         let mut folder = Folder::new(10);
-        assert_eq!(folder.sweep(QUIET_MS, Ok(())), (10, 0));
+        assert_eq!(folder.poll(QUIET_MS, Ok(())), (10, 0));
         assert_eq!(folder.root.state, RootState::Settling);
-        assert_eq!(folder.sweep(QUIET_MS + 1, Ok(())), (0, 10));
+        assert_eq!(folder.poll(QUIET_MS + 1, Ok(())), (0, 10));
         assert_eq!(folder.root.state, RootState::Available);
-        assert_eq!(folder.sweep(QUIET_MS + 2, Ok(())), (0, 0));
+        assert_eq!(folder.poll(QUIET_MS + 2, Ok(())), (0, 0));
     }
 
     #[test]
     fn a_copy_in_pieces_is_used_once_at_its_end() {
         let mut folder = Folder::new(10);
-        folder.sweep(QUIET_MS, Ok(()));
-        folder.sweep(QUIET_MS + 1, Ok(()));
+        folder.poll(QUIET_MS, Ok(()));
+        folder.poll(QUIET_MS + 1, Ok(()));
         let begin_ms = 2 * QUIET_MS;
         let mut settled = 0;
-        // Pieces every five minutes, an old modification time, sweeps every minute.
+        // Pieces every five minutes, an old modification time, polls every minute.
         for minute in 0..40 {
             let now_ms = begin_ms + minute * 60_000;
             if minute <= 20 && minute % 5 == 0 {
@@ -276,7 +277,7 @@ mod tests {
                 };
                 folder.files.insert("/k/slow.bc".to_owned(), slow);
             }
-            let (_, now_settled) = folder.sweep(now_ms, Ok(()));
+            let (_, now_settled) = folder.poll(now_ms, Ok(()));
             assert!(
                 now_settled == 0 || minute == 30,
                 "settled in minute {minute}"
@@ -289,30 +290,30 @@ mod tests {
     #[test]
     fn a_folder_that_vanishes_or_loses_much_changes_no_file() {
         let mut folder = Folder::new(100);
-        folder.sweep(QUIET_MS, Ok(()));
-        folder.sweep(QUIET_MS + 1, Ok(()));
+        folder.poll(QUIET_MS, Ok(()));
+        folder.poll(QUIET_MS + 1, Ok(()));
         let (known, files) = (folder.known.clone(), folder.files.clone());
-        assert_eq!(folder.sweep(QUIET_MS + 2, Err("not there")), (0, 0));
+        assert_eq!(folder.poll(QUIET_MS + 2, Err("not there")), (0, 0));
         assert_eq!(folder.root.state, RootState::Unavailable);
         assert_eq!(folder.root.since_ms, QUIET_MS + 2);
         folder.files.clear();
-        assert_eq!(folder.sweep(QUIET_MS + 3, Ok(())), (0, 0));
+        assert_eq!(folder.poll(QUIET_MS + 3, Ok(())), (0, 0));
         assert!(folder.root.detail.contains("is empty"));
         folder.files = files.clone();
         folder.files.retain(|path, _| path.as_str() >= "/k/021.bc");
-        assert_eq!(folder.sweep(QUIET_MS + 4, Ok(())), (0, 0));
+        assert_eq!(folder.poll(QUIET_MS + 4, Ok(())), (0, 0));
         assert!(folder.root.detail.contains("21 of 100 files are missing"));
         assert_eq!(folder.root.since_ms, QUIET_MS + 2);
         assert_eq!(folder.known, known);
         // Restored: no change.
         folder.files = files;
-        assert_eq!(folder.sweep(QUIET_MS + 5, Ok(())), (0, 0));
+        assert_eq!(folder.poll(QUIET_MS + 5, Ok(())), (0, 0));
         assert_eq!(folder.root.state, RootState::Available);
         // A single missing file is a change, after the quiet period.
         folder.files.remove("/k/005.bc");
-        assert_eq!(folder.sweep(2 * QUIET_MS, Ok(())), (1, 0));
-        assert_eq!(folder.sweep(3 * QUIET_MS - 1, Ok(())), (0, 0));
-        assert_eq!(folder.sweep(3 * QUIET_MS, Ok(())), (0, 1));
+        assert_eq!(folder.poll(2 * QUIET_MS, Ok(())), (1, 0));
+        assert_eq!(folder.poll(3 * QUIET_MS - 1, Ok(())), (0, 0));
+        assert_eq!(folder.poll(3 * QUIET_MS, Ok(())), (0, 1));
         assert_eq!(folder.known["/k/005.bc"].state, FileState::Gone);
     }
 }

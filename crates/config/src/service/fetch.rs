@@ -1,0 +1,24 @@
+//! `[fetch]`: files of archives before every night.
+
+use std::path::PathBuf;
+
+use crate::{
+    declare::{Declare as _, Keys, declare_table, key},
+    forms::{from_to, text, yes_or_no},
+    paths::FILE,
+};
+
+declare_table! {
+    /// Files of archives, as `areograph fetch` retrieves them: copies of the indexes, and the files that sites name and that
+    /// are missing. Files of other content are never replaced. Failures are alerts; the night continues.
+    pub struct FetchConfig {
+        /// Whether every night begins with it.
+        nightly: bool = key(yes_or_no("", "")).or(false),
+        /// Folder of copies of the indexes and of `fetch.json`; created if missing. Site files state where their files lie.
+        folder: PathBuf = key(text()).or("fetch".to_owned()).then(|path, keys: &mut Keys<'_, '_>| keys.review().resolve(&path)),
+        /// Table with other hosts or layouts, in the form of `config/archives/mgs.toml`.
+        archives: Option<PathBuf> = key(FILE).unused(r#""archives.toml""#),
+        /// Longest time for the indexes, and for the files of one site.
+        limit_s: f64 = key(from_to(1.0, 604_800.0)).or(14_400.0),
+    }
+}

@@ -1,0 +1,52 @@
+//! Files of archives: which ones a site needs, and their transfer, whole or not at all.
+//!
+//! | to | use |
+//! |---|---|
+//! | know the archives and their hosts | [`Archives`] |
+//! | read indexes of archives | [`index`] |
+//! | find the files that times, orbits, images and windows need | [`plan`] |
+//! | transfer them, resumed and verified | [`Filling`] |
+//! | examine a filled folder | [`audit`] |
+//!
+//! A file is identified by size and hash, never by a date or a similar name. Instants are UTC as indexes print them: what
+//! covers what is decided before any leap seconds or clocks are at hand.
+//!
+//! ```
+//! use areograph_fetch::{Archives, Utc};
+//!
+//! let archives = Archives::built_in()?;
+//! let start = Utc::parse("2001-03-17T20:53:12").unwrap();
+//! // Orbits of the laser around the time of an image.
+//! let [first, last] = archives.pedr.orbits_of([start, start]).unwrap();
+//! assert!((19_000..19_100).contains(&first) && last - first < 10);
+//! # Ok::<(), areograph_base::error::Error>(())
+//! ```
+
+mod answer;
+mod archives;
+pub mod audit;
+mod cache;
+mod client;
+mod error;
+mod examined;
+mod filling;
+mod folder;
+mod hashed;
+pub mod index;
+mod outcome;
+mod page;
+mod part;
+pub mod plan;
+mod safe;
+mod state;
+mod table;
+mod transfer;
+mod utc;
+
+pub use archives::{Archives, ImageArchive, KernelArchive, Network, PedrArchive, ShotService};
+pub use cache::Indexes;
+pub use error::FetchError;
+pub use filling::Filling;
+pub use outcome::{Done, Outcome, Standing};
+pub use state::{Record, State, Verified};
+pub use utc::Utc;

@@ -1,0 +1,183 @@
+//! Crossovers: places where two profiles measured the same ground.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Matrix2, Vector2, Vector3};
+
+use super::{
+    Placed, Plan, SurfaceOptions, SurfaceShot, Variogram,
+    variogram::{GAP, usual_step_m},
+};
+
+/// Edge of a cell in which segments of profiles are looked up, metres.
+const CELL_M: f64 = 1_000.0;
+/// Successive shots on either side of a segment whose differences give the roughness there.
+const AROUND: usize = 4;
+/// Profiles that cross at a smaller angle do not give the slope of the ground, radians.
+const ANGLE_MIN_RAD: f64 = 0.05;
+
+/// A place where two profiles cross.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Crossover {
+    /// Their indices, ascending.
+    pub profiles: [usize; 2],
+    /// Where, Mars-fixed, at the mean of both heights, metres.
+    pub place_m: Vector3<f64>,
+    /// Height by the first profile minus height by the second, each interpolated between two shots, metres.
+    pub difference_m: f64,
+    /// Standard deviation of that by the noise of four shots and by the ground between them, metres: without the errors
+    /// that the shots of a profile share.
+    pub sigma_m: f64,
+    /// Slope of the ground towards east and north, metres per metre; zero for profiles that are almost parallel.
+    pub slope: Vector2<f64>,
+}
+
+/// A segment between two successive shots of a profile.
+struct Segment<'a> {
+    from: &'a Placed,
+    to: &'a Placed,
+    /// Index of its first shot.
+    at: usize,
+    /// Mean square difference of successive heights around it, without noise, m².
+    rough_m2: f64,
+    /// Slope along it, metres per metre.
+    slope: f64,
+}
+
+/// Every crossing of two profiles, in the order of the profiles.
+///
+/// `shots` are in their order along the profiles. Gaps of a profile are not crossed.
+#[must_use]
+pub fn crossovers(shots: &[SurfaceShot], options: &SurfaceOptions) -> Vec<Crossover> {
+    let model = options.body.model();
+    let plan = Plan::around(model, shots.iter().map(|shot| shot.ground_m));
+    let placed: Vec<Placed> = shots
+        .iter()
+        .map(|shot| Placed::new(model, &plan, shot))
+        .collect();
+    let segments = segments(&placed, options.shot_sigma_m);
+    let mut cells: BTreeMap<[i64; 2], Vec<usize>> = BTreeMap::new();
+    for (index, segment) in segments.iter().enumerate() {
+        let [one, other] = [cell(&segment.from.plan_m), cell(&segment.to.plan_m)];
+        for east in one[0].min(other[0])..=one[0].max(other[0]) {
+            for north in one[1].min(other[1])..=one[1].max(other[1]) {
+                cells.entry([east, north]).or_default().push(index);
+            }
+        }
+    }
+    let mut found = Vec::new();
+    for (of_cell, inside) in &cells {
+        for (position, first) in inside.iter().enumerate() {
+            for second in &inside[position + 1..] {
+                let (first, second) = (&segments[*first], &segments[*second]);
+                if let Some((shares, place)) = crossing(first, second)
+                    && cell(&place) == *of_cell
+                {
+                    found.push(crossover(shots, [first, second], shares, options));
+                }
+            }
+        }
+    }
+    found.sort_by(|one, other| {
+        let by_place = one.place_m.z.total_cmp(&other.place_m.z);
+        one.profiles.cmp(&other.profiles).then(by_place)
+    });
+    found
+}
+
+fn segments(placed: &[Placed], shot_sigma_m: f64) -> Vec<Segment<'_>> {
+    let longest_m = GAP * usual_step_m(placed);
+    let mut segments = Vec::new();
+    let mut first = 0;
+    for profile in placed.chunk_by(|one, next| one.profile == next.profile) {
+        for (index, pair) in profile.windows(2).enumerate() {
+            let length_m = (pair[1].plan_m - pair[0].plan_m).norm();
+            if length_m > 0.0 && length_m <= longest_m {
+                let around = &profile[index.saturating_sub(AROUND)..];
+                let around = &around[..around.len().min(2 * AROUND + 2)];
+                let squares = around
+                    .windows(2)
+                    .map(|pair| (pair[1].height_m - pair[0].height_m).powi(2));
+                let mean_m2 = squares.sum::<f64>() / (around.len() - 1) as f64;
+                let wide = [
+                    &profile[index.saturating_sub(1)],
+                    &profile[(index + 2).min(profile.len() - 1)],
+                ];
+                let wide_m = (wide[1].plan_m - wide[0].plan_m).norm();
+                segments.push(Segment {
+                    from: &pair[0],
+                    to: &pair[1],
+                    at: first + index,
+                    rough_m2: (mean_m2 - 2.0 * shot_sigma_m.powi(2)).max(0.0),
+                    slope: (wide[1].height_m - wide[0].height_m) / wide_m.max(length_m),
+                });
+            }
+        }
+        first += profile.len();
+    }
+    segments
+}
+
+/// Shares of two segments of different profiles at which they cross, and where.
+fn crossing(first: &Segment, second: &Segment) -> Option<([f64; 2], Vector2<f64>)> {
+    if first.from.profile == second.from.profile {
+        return None;
+    }
+    let [along, across] = [first, second].map(|of| of.to.plan_m - of.from.plan_m);
+    let apart = second.from.plan_m - first.from.plan_m;
+    let cross = along.perp(&across);
+    let shares = [apart.perp(&across) / cross, apart.perp(&along) / cross];
+    // Parallel segments have infinite shares, or NaN.
+    let inside = shares.iter().all(|share| (0.0..1.0).contains(share));
+    inside.then(|| (shares, first.from.plan_m + along * shares[0]))
+}
+
+fn crossover(
+    shots: &[SurfaceShot],
+    segments: [&Segment; 2],
+    shares: [f64; 2],
+    options: &SurfaceOptions,
+) -> Crossover {
+    let (mut heights_m, mut variance_m2) = ([0.0; 2], 0.0);
+    let mut place_m = Vector3::zeros();
+    for ((segment, share), height_m) in segments.iter().zip(shares).zip(&mut heights_m) {
+        let rest = 1.0 - share;
+        *height_m = rest * segment.from.height_m + share * segment.to.height_m;
+        let [from, to] = [segment.at, segment.at + 1].map(|at| shots[at].ground_m);
+        place_m += 0.5 * (rest * from + share * to);
+        let noise = rest * rest + share * share;
+        // Of ground with this exponent about the line between two of its points.
+        let exponent = 2.0 * Variogram::HURST;
+        let of_ground = rest * share.powf(exponent) + share * rest.powf(exponent) - rest * share;
+        variance_m2 += noise * options.shot_sigma_m.powi(2) + of_ground * segment.rough_m2;
+    }
+    let directions = segments.map(|of| (of.to.plan_m - of.from.plan_m).normalize());
+    let slope = if directions[0].perp(&directions[1]).abs() < ANGLE_MIN_RAD {
+        Vector2::zeros()
+    } else {
+        let along = Vector2::new(segments[0].slope, segments[1].slope);
+        let axes = Matrix2::from_rows(&directions.map(|direction| direction.transpose()));
+        axes.try_inverse().unwrap_or_default() * along
+    };
+    let profiles = segments.map(|segment| segment.from.profile);
+    let (profiles, sign) = if profiles[0] < profiles[1] {
+        (profiles, 1.0)
+    } else {
+        ([profiles[1], profiles[0]], -1.0)
+    };
+    Crossover {
+        profiles,
+        place_m,
+        difference_m: sign * (heights_m[0] - heights_m[1]),
+        sigma_m: variance_m2.sqrt(),
+        slope,
+    }
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "a site is some hundred cells across"
+)]
+fn cell(place_m: &Vector2<f64>) -> [i64; 2] {
+    [place_m.x, place_m.y].map(|component_m| (component_m / CELL_M).floor() as i64)
+}

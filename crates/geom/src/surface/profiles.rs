@@ -1,0 +1,417 @@
+//! Errors that the shots of a profile share, from crossovers: its shift, and whether it belongs.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
+
+use super::Crossover;
+use crate::statistics::median;
+
+/// Fewest crossovers, with as many other profiles, by which a profile is left out.
+const EVIDENCE_MIN: usize = 3;
+/// A profile that lies farther from all others than this many standard deviations is left out.
+const LEFT_OUT_SIGMAS: f64 = 5.0;
+/// Weight of the standard deviation a priori in the estimated one, in profiles.
+const PRIOR_PROFILES: f64 = 3.0;
+/// Steps of the estimate; it changes by less than 1 % after half of them.
+const STEPS: usize = 40;
+/// A shift counts in the estimate by at most this many standard deviations.
+const SHIFT_MAX_SIGMAS: f64 = 3.0;
+/// Degrees of freedom of Student's distribution for the weights of crossovers.
+const FREEDOM: f64 = 4.0;
+/// Median absolute deviations in a standard deviation.
+const NORMAL_MAD: f64 = 1.4826;
+
+/// Standard deviations of the shift of a profile a priori, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ProfilePriors {
+    /// Along the radius.
+    pub radial_sigma_m: f64,
+    /// In plan, on each axis.
+    pub plan_sigma_m: f64,
+}
+
+/// A profile that does not belong to the others: at its crossovers it lies above or below all of them by one constant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LeftOut {
+    /// Its index.
+    pub profile: usize,
+    /// Profiles that it crosses, ascending; those that were left out before it are not among them.
+    pub others: Vec<usize>,
+    /// Crossovers with them.
+    pub crossovers: usize,
+    /// Its height above theirs, metres.
+    pub above_m: f64,
+    /// Standard deviation of that, metres.
+    pub sigma_m: f64,
+}
+
+/// The shift of a profile.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ProfileShift {
+    /// Its index.
+    pub profile: usize,
+    /// Its crossovers with profiles that are not left out.
+    pub crossovers: usize,
+    /// How far it is recorded to the east, to the north and above its true position, metres.
+    pub shift_m: Vector3<f64>,
+    /// Covariance of that, m².
+    pub covariance_m2: Matrix3<f64>,
+}
+
+/// The profiles of a site, held against each other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ProfileNet {
+    /// Profiles that do not belong, the worst first.
+    pub left_out: Vec<LeftOut>,
+    /// Standard deviation of the radial shift of the other profiles, from their crossovers and the one a priori, metres.
+    pub radial_sigma_m: f64,
+}
+
+impl ProfileNet {
+    /// Finds the profiles that do not belong, one after the other, and estimates how far the others are shifted.
+    ///
+    /// The estimate is that of expectation and maximisation for a variance component (Dempster et al. 1977).
+    #[must_use]
+    pub fn of(crossovers: &[Crossover], priors: &ProfilePriors) -> Self {
+        let mut used: Vec<Crossover> = crossovers.to_vec();
+        let mut left_out = Vec::new();
+        while let Some(worst) = worst(&used, priors) {
+            used.retain(|crossover| !crossover.profiles.contains(&worst.profile));
+            left_out.push(worst);
+        }
+        Self {
+            left_out,
+            radial_sigma_m: radial_sigma_m(&used, priors.radial_sigma_m),
+        }
+    }
+
+    /// The crossovers of profiles that are not left out.
+    #[must_use]
+    pub fn belonging(&self, crossovers: &[Crossover]) -> Vec<Crossover> {
+        let left_out: BTreeSet<usize> = self.left_out.iter().map(|of| of.profile).collect();
+        let belongs = |crossover: &&Crossover| {
+            let mut profiles = crossover.profiles.iter();
+            !profiles.any(|profile| left_out.contains(profile))
+        };
+        crossovers.iter().filter(belongs).copied().collect()
+    }
+
+    /// Shifts of all profiles with crossovers that are not left out.
+    ///
+    /// Where ground slopes, a shift in plan changes the height. Empty when a number is not finite.
+    #[must_use]
+    pub fn shifts(&self, crossovers: &[Crossover], priors: &ProfilePriors) -> Vec<ProfileShift> {
+        let used = self.belonging(crossovers);
+        let sigmas_m = [
+            priors.plan_sigma_m,
+            priors.plan_sigma_m,
+            self.radial_sigma_m,
+        ];
+        let mut net = Net::new(&used, &sigmas_m);
+        if !(0..4).all(|_| net.step(&sigmas_m)) {
+            return Vec::new();
+        }
+        let covariance_m2 = net.covariance_m2();
+        let shift = |(index, (profile, crossovers)): (usize, (&usize, &usize))| ProfileShift {
+            profile: *profile,
+            crossovers: *crossovers,
+            shift_m: net.shifts.fixed_rows::<3>(3 * index).into_owned(),
+            covariance_m2: covariance_m2
+                .fixed_view::<3, 3>(3 * index, 3 * index)
+                .into_owned(),
+        };
+        net.profiles.iter().enumerate().map(shift).collect()
+    }
+}
+
+/// The profile that belongs least, if it does not belong.
+fn worst(crossovers: &[Crossover], priors: &ProfilePriors) -> Option<LeftOut> {
+    let mut by_profile: BTreeMap<usize, Vec<(usize, f64, f64)>> = BTreeMap::new();
+    for crossover in crossovers {
+        let [first, second] = crossover.profiles;
+        // The other profile has a shift as well.
+        let variance_m2 = crossover.sigma_m.powi(2) + priors.radial_sigma_m.powi(2);
+        for (profile, other, sign) in [(first, second, 1.0), (second, first, -1.0)] {
+            let of_profile = by_profile.entry(profile).or_default();
+            of_profile.push((other, sign * crossover.difference_m, variance_m2));
+        }
+    }
+    let all = by_profile.iter().filter_map(|(profile, crossovers)| {
+        let others: BTreeSet<usize> = crossovers.iter().map(|(other, ..)| *other).collect();
+        let (above_m, sigma_m) = robust_mean(crossovers);
+        let sigma_m = sigma_m.hypot(priors.radial_sigma_m);
+        (others.len() >= EVIDENCE_MIN).then(|| LeftOut {
+            profile: *profile,
+            others: others.into_iter().collect(),
+            crossovers: crossovers.len(),
+            above_m,
+            sigma_m,
+        })
+    });
+    let sigmas = |of: &LeftOut| of.above_m.abs() / of.sigma_m;
+    // Of equal ones the first.
+    let worst = all.reduce(|worst, of| {
+        if sigmas(&of) > sigmas(&worst) {
+            of
+        } else {
+            worst
+        }
+    })?;
+    (sigmas(&worst) > LEFT_OUT_SIGMAS).then_some(worst)
+}
+
+/// Mean of differences by Student's distribution, with its standard deviation: as large as their scatter, if that
+/// exceeds their variances.
+fn robust_mean(differences: &[(usize, f64, f64)]) -> (f64, f64) {
+    let mut values_m: Vec<f64> = differences.iter().map(|(_, value_m, _)| *value_m).collect();
+    let mut mean_m = median(&mut values_m);
+    let mut weights = 0.0;
+    for _ in 0..10 {
+        let mut sum = 0.0;
+        weights = 0.0;
+        for (_, value_m, variance_m2) in differences {
+            let weight = student_weight((value_m - mean_m).powi(2) / variance_m2) / variance_m2;
+            weights += weight;
+            sum += weight * value_m;
+        }
+        mean_m = sum / weights;
+    }
+    let deviations = differences
+        .iter()
+        .map(|(_, value_m, variance_m2)| (value_m - mean_m).abs() / variance_m2.sqrt());
+    let scatter = NORMAL_MAD * median(&mut deviations.collect::<Vec<_>>());
+    (mean_m, scatter.max(1.0) / f64::sqrt(weights))
+}
+
+fn student_weight(square: f64) -> f64 {
+    ((FREEDOM + 1.0) / (FREEDOM + square)).min(1.0)
+}
+
+fn radial_sigma_m(crossovers: &[Crossover], prior_m: f64) -> f64 {
+    if crossovers.is_empty() || prior_m == 0.0 {
+        return prior_m;
+    }
+    let mut sigma_m = prior_m;
+    let mut net = Net::new(crossovers, &[sigma_m]);
+    for _ in 0..STEPS {
+        if !net.step(&[sigma_m]) {
+            return prior_m;
+        }
+        let limit_m2 = (SHIFT_MAX_SIGMAS * sigma_m).powi(2);
+        let shifts = net
+            .shifts
+            .iter()
+            .map(|shift_m| shift_m.powi(2).min(limit_m2));
+        let squares_m2 = shifts.sum::<f64>() + net.covariance_m2().trace();
+        let profiles = net.profiles.len() as f64;
+        let prior_m2 = PRIOR_PROFILES * prior_m.powi(2);
+        sigma_m = ((squares_m2 + prior_m2) / (profiles + PRIOR_PROFILES)).sqrt();
+    }
+    sigma_m
+}
+
+/// Normal equations of the shifts of profiles.
+struct Net<'a> {
+    crossovers: &'a [Crossover],
+    /// Each with the number of its crossovers.
+    profiles: BTreeMap<usize, usize>,
+    /// Indices of the profiles of each crossover.
+    columns: Vec<[usize; 2]>,
+    /// Robust weights.
+    weights: Vec<f64>,
+    /// Unknowns of a profile: its radial shift, or east, north and radial.
+    unknowns: usize,
+    shifts: DVector<f64>,
+    factor: Option<Cholesky<f64, Dyn>>,
+}
+
+impl<'a> Net<'a> {
+    fn new(crossovers: &'a [Crossover], sigmas_m: &[f64]) -> Self {
+        let mut profiles = BTreeMap::new();
+        for profile in crossovers.iter().flat_map(|crossover| crossover.profiles) {
+            *profiles.entry(profile).or_default() += 1;
+        }
+        let index: BTreeMap<usize, usize> = profiles.keys().copied().zip(0..).collect();
+        let columns = crossovers
+            .iter()
+            .map(|crossover| crossover.profiles.map(|profile| index[&profile]));
+        Self {
+            columns: columns.collect(),
+            weights: vec![1.0; crossovers.len()],
+            unknowns: sigmas_m.len(),
+            shifts: DVector::zeros(sigmas_m.len() * profiles.len()),
+            factor: None,
+            profiles,
+            crossovers,
+        }
+    }
+
+    /// Change of a difference with each unknown of the first profile; with those of the second it is the opposite.
+    fn by_shift(&self, crossover: &Crossover) -> Vec<f64> {
+        let slope = crossover.slope;
+        if self.unknowns == 1 {
+            vec![1.0]
+        } else {
+            vec![-slope.x, -slope.y, 1.0]
+        }
+    }
+
+    /// Solves for the shifts, and weighs the crossovers by their residuals; false when a number is not finite.
+    fn step(&mut self, sigmas_m: &[f64]) -> bool {
+        let unknowns = self.shifts.len();
+        let mut normal = DMatrix::zeros(unknowns, unknowns);
+        let mut right = DVector::zeros(unknowns);
+        for index in 0..unknowns {
+            normal[(index, index)] = sigmas_m[index % self.unknowns].powi(-2);
+        }
+        for ((crossover, columns), weight) in
+            self.crossovers.iter().zip(&self.columns).zip(&self.weights)
+        {
+            let weight = weight / crossover.sigma_m.powi(2);
+            let row = self.row(crossover, *columns);
+            for (column, value) in &row {
+                right[*column] += weight * value * crossover.difference_m;
+                for (other, factor) in &row {
+                    normal[(*column, *other)] += weight * value * factor;
+                }
+            }
+        }
+        let Some(factor) = Cholesky::new(normal) else {
+            return false;
+        };
+        self.shifts = factor.solve(&right);
+        self.factor = Some(factor);
+        for (index, crossover) in self.crossovers.iter().enumerate() {
+            let row = self.row(crossover, self.columns[index]);
+            let by_shifts = row
+                .iter()
+                .map(|(column, value)| value * self.shifts[*column]);
+            let left_m = crossover.difference_m - by_shifts.sum::<f64>();
+            self.weights[index] = student_weight((left_m / crossover.sigma_m).powi(2));
+        }
+        self.shifts.iter().all(|shift_m| shift_m.is_finite())
+    }
+
+    fn row(&self, crossover: &Crossover, columns: [usize; 2]) -> Vec<(usize, f64)> {
+        let by_shift = self.by_shift(crossover);
+        let of_profile = |(column, sign): (usize, f64)| {
+            let values = by_shift.iter().enumerate();
+            values
+                .map(move |(unknown, value)| (self.unknowns * column + unknown, sign * value))
+                .collect::<Vec<_>>()
+        };
+        let [first, second] = columns;
+        let mut row = of_profile((first, 1.0));
+        row.extend(of_profile((second, -1.0)));
+        row
+    }
+
+    fn covariance_m2(&self) -> DMatrix<f64> {
+        let unknowns = self.shifts.len();
+        self.factor
+            .as_ref()
+            .map_or_else(|| DMatrix::zeros(unknowns, unknowns), Cholesky::inverse)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        ellipsoid::on_ellipsoid_m,
+        surface::{SurfaceOptions, SurfaceShot, crossovers},
+    };
+    use areograph_base::body::{Body, MARS_IAU2000};
+
+    const PRIORS: ProfilePriors = ProfilePriors {
+        radial_sigma_m: 1.0,
+        plan_sigma_m: 70.0,
+    };
+
+    /// Slope of the ground towards north.
+    const SLOPE: f64 = 0.01;
+
+    /// Straight profiles, every second one turned, `apart_m` from each other, on a slope, each recorded this much too
+    /// high.
+    fn crossing(shifts_m: &[f64], apart_m: f64) -> Vec<SurfaceShot> {
+        let radius_m = MARS_IAU2000.equatorial_radius_m;
+        let mut shots = Vec::new();
+        for (profile, shift_m) in shifts_m.iter().enumerate() {
+            let lean = if profile % 2 == 0 { 0.3 } else { -0.3 };
+            let middle_m = (profile as f64 - 0.5 * shifts_m.len() as f64) * apart_m;
+            for shot in -60..60 {
+                // Off the lattice of the other profiles.
+                let north_m = 301.0 * f64::from(shot) + 7.0 * profile as f64;
+                let east_m = middle_m + lean * north_m;
+                let up = crate::ellipsoid::spherical_to_xyz_m(
+                    east_m / radius_m,
+                    north_m / radius_m,
+                    1.0,
+                );
+                let height_m = SLOPE * north_m + shift_m;
+                shots.push(SurfaceShot {
+                    ground_m: on_ellipsoid_m(Body::Mars.model(), &up) + height_m * up,
+                    profile,
+                });
+            }
+        }
+        shots
+    }
+
+    #[test]
+    fn a_crossover_has_the_difference_the_place_and_the_slope_of_the_ground() {
+        let found = crossovers(&crossing(&[0.0, 5.0], 0.0), &SurfaceOptions::default());
+        let [only] = found.as_slice() else {
+            panic!("{found:?}");
+        };
+        assert_eq!(only.profiles, [0, 1]);
+        // Metres: the ground is straight; the map bends it by centimetres.
+        assert!((only.difference_m + 5.0).abs() < 0.02, "{only:?}");
+        assert!(
+            (only.slope - nalgebra::Vector2::new(0.0, SLOPE)).norm() < 1e-3,
+            "{only:?}"
+        );
+        // Profiles through the origin; two pairs of shots of 1 m, at any share of their distance.
+        assert!(
+            only.place_m.z.abs() < 50.0 && only.place_m.y.abs() < 50.0,
+            "{only:?}"
+        );
+        assert!((1.0..1.6).contains(&only.sigma_m), "{only:?}");
+    }
+
+    #[test]
+    fn a_profile_that_lies_above_all_others_is_left_out_and_only_that() {
+        let mut shifts_m = [0.3, -0.2, 0.1, 0.4, -0.3, 0.0, 0.2, -0.4];
+        shifts_m[3] += 25.0;
+        let found = crossovers(&crossing(&shifts_m, 800.0), &SurfaceOptions::default());
+        let net = ProfileNet::of(&found, &PRIORS);
+        let [only] = net.left_out.as_slice() else {
+            panic!("{:?}", net.left_out);
+        };
+        assert_eq!(
+            (only.profile, only.others.as_slice()),
+            (3, &[0, 2, 4, 6][..])
+        );
+        assert!((only.above_m - 25.4).abs() < 0.5, "{only:?}");
+        assert!(net.radial_sigma_m < 1.0, "{}", net.radial_sigma_m);
+        let shifts = net.shifts(&found, &PRIORS);
+        assert_eq!(shifts.len(), 7);
+        for shift in &shifts {
+            let sigma_m = shift.covariance_m2[(2, 2)].sqrt();
+            let error_m = shift.shift_m.z - shifts_m[shift.profile];
+            // Three crossovers or more of 1.2 m, with as many unknown partners.
+            assert!(error_m.abs() < 3.0 * sigma_m && sigma_m < 1.0, "{shift:?}");
+        }
+    }
+
+    #[test]
+    fn two_profiles_cannot_show_which_of_them_is_wrong() {
+        let found = crossovers(&crossing(&[0.0, 16.0], 0.0), &SurfaceOptions::default());
+        let net = ProfileNet::of(&found, &PRIORS);
+        assert!(net.left_out.is_empty());
+        // Each is shifted by more than was known beforehand.
+        assert!(net.radial_sigma_m > 1.0, "{}", net.radial_sigma_m);
+        assert!(ProfileNet::of(&[], &PRIORS).shifts(&[], &PRIORS).is_empty());
+    }
+}

@@ -1,0 +1,202 @@
+//! Files of archives: before the comparisons of a night, `areograph fetch` runs as a process of its own, first for the
+//! indexes and then for each site file.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Stdio,
+    time::Duration,
+};
+
+use rustix::process::{Pid, Signal, kill_process_group};
+use serde_json::json;
+use tokio::{
+    io::{AsyncRead, AsyncReadExt as _},
+    process::{Child, Command},
+    task::spawn_blocking,
+    time::timeout,
+};
+
+use super::{
+    alerts::{Alert, tell_edge},
+    core::Core,
+    workers::Workers,
+};
+use crate::database::{About, Stored, append};
+use areograph_config::{AlertKind, ServiceConfig};
+
+/// Bytes kept of the end of a complaint.
+const COMPLAINT_MAX: usize = 2_000;
+
+/// Brings the copies of the indexes up to date and fetches what site files need. A failure is an alert; others go on.
+pub(super) async fn fetch_all<W: Workers>(core: &Core<W>) {
+    if let Err(error) = fetch(core).await {
+        tracing::error!("fetching files failed: {error}");
+    }
+}
+
+async fn fetch<W: Workers>(core: &Core<W>) -> Stored<()> {
+    let config = core.shared.config();
+    let mut failures: Vec<String> = Vec::new();
+    let mut fetched = 0_usize;
+    match run(core, &config, None).await {
+        Outcome::Stopped => return Ok(()),
+        // Without its hosts, every site would wait for them in vain.
+        Outcome::Failed(why) => failures.push(format!("indexes: {why}")),
+        Outcome::Done => {
+            let folders = config.inputs.sites.clone();
+            let sites = spawn_blocking(move || site_files(&folders)).await;
+            for site in sites.unwrap_or_default() {
+                match run(core, &config, Some(&site)).await {
+                    Outcome::Stopped => return Ok(()),
+                    Outcome::Done => fetched += 1,
+                    Outcome::Failed(why) => {
+                        let name = site.file_name().unwrap_or_default().to_string_lossy();
+                        failures.push(format!("{name}: {why}"));
+                    }
+                }
+            }
+        }
+    }
+    let now_ms = core.now_ms();
+    core.shared.write(|transaction| {
+        let data = json!({ "sites": fetched, "failures": failures });
+        append(transaction, now_ms, "fetch", About::default(), &data)?;
+        let text = format!(
+            "files of archives were not fetched: {}",
+            failures.join("; ")
+        );
+        let alert = |kind, text| Alert {
+            kind,
+            site: None,
+            run: None,
+            text,
+        };
+        tell_edge(
+            transaction,
+            &config,
+            now_ms,
+            ("fetch", !failures.is_empty()),
+            (
+                &alert(AlertKind::FetchFailed, &text),
+                Some(&alert(
+                    AlertKind::Recovered,
+                    "files of archives are fetched again",
+                )),
+            ),
+        )
+    })
+}
+
+/// Files of sites, in order; a folder that cannot be read has none, as its poll reports.
+fn site_files(folders: &[PathBuf]) -> Vec<PathBuf> {
+    let entries = folders
+        .iter()
+        .filter_map(|folder| fs::read_dir(folder).ok());
+    let paths = entries.flatten().flatten().map(|entry| entry.path());
+    let is_site = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        !name.starts_with('.') && name.ends_with(".toml") && path.is_file()
+    };
+    let mut files: Vec<PathBuf> = paths.filter(is_site).collect();
+    files.sort();
+    files
+}
+
+/// How a process ended.
+#[derive(Debug, PartialEq)]
+enum Outcome {
+    Done,
+    Failed(String),
+    /// The service ends.
+    Stopped,
+}
+
+/// Fetches the indexes, or the files of a site by the indexes that are there.
+async fn run<W: Workers>(core: &Core<W>, config: &ServiceConfig, site: Option<&Path>) -> Outcome {
+    let fetch = &config.fetch;
+    let mut command = Command::new(&core.shared.program);
+    command.args(["--quiet", "fetch"]);
+    match site {
+        Some(site) => command.arg(site).arg("--offline-index"),
+        None => command.arg("--index"),
+    };
+    command.arg("--into").arg(&fetch.folder);
+    if let Some(archives) = &fetch.archives {
+        command.arg("--archives").arg(archives);
+    }
+    command
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .process_group(0)
+        .kill_on_drop(true);
+    let mut child = match command.spawn() {
+        Ok(child) => child,
+        Err(error) => return Outcome::Failed(error.to_string()),
+    };
+    let group = child.id().and_then(|id| i32::try_from(id).ok());
+    let limit = Duration::from_secs_f64(fetch.limit_s);
+    let ended = tokio::select! {
+        ended = timeout(limit, to_the_end(&mut child)) => {
+            ended.unwrap_or_else(|_| Outcome::Failed(format!("did not end within {} s", fetch.limit_s)))
+        }
+        () = core.shared.ending.cancelled() => Outcome::Stopped,
+    };
+    if let Some(group) = group.and_then(Pid::from_raw) {
+        // What has arrived is kept, and no file is ever half there.
+        let _ = kill_process_group(group, Signal::KILL);
+    }
+    ended
+}
+
+async fn to_the_end(child: &mut Child) -> Outcome {
+    let complaint = match child.stderr.take() {
+        Some(errors) => end_of(errors).await,
+        None => String::new(),
+    };
+    match child.wait().await {
+        Ok(status) if status.success() => Outcome::Done,
+        Ok(status) => Outcome::Failed(format!("{status}: {}", complaint.trim())),
+        Err(error) => Outcome::Failed(error.to_string()),
+    }
+}
+
+/// The end of a text, read to its end so that the process never waits for its reader.
+async fn end_of(mut text: impl AsyncRead + Unpin) -> String {
+    let (mut end, mut buffer) = (Vec::new(), vec![0; 4096]);
+    while let Ok(count @ 1..) = text.read(&mut buffer).await {
+        end.extend(buffer.iter().take(count));
+        let surplus = end.len().saturating_sub(COMPLAINT_MAX);
+        end.drain(..surplus);
+    }
+    String::from_utf8_lossy(&end).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn the_end_of_a_long_complaint_is_kept() {
+        let long = format!("{}the reason", "x".repeat(100_000));
+        let end = end_of(long.as_bytes()).await;
+        assert!(end.len() == COMPLAINT_MAX && end.ends_with("the reason"));
+    }
+
+    #[test]
+    fn site_files_are_those_of_polls() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["b.toml", "a.toml", ".c.toml", "d.geojson"] {
+            fs::File::create(folder.path().join(name))
+                .map(drop)
+                .unwrap();
+        }
+        fs::create_dir(folder.path().join("e.toml")).unwrap();
+        let found = site_files(&[folder.path().to_owned(), folder.path().join("none")]);
+        assert_eq!(
+            found,
+            ["a.toml", "b.toml"].map(|name| folder.path().join(name))
+        );
+    }
+}

@@ -1,0 +1,238 @@
+//! Profiles of the altimeter against each other: crossovers, shifts, and the surface tested on withheld profiles.
+//!
+//! Whoever uses the surface between the shots states a height and its standard deviation. Here every profile in turn is
+//! withheld, predicted from the others, and compared.
+
+use std::sync::atomic::AtomicBool;
+
+use nalgebra::Vector3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    convert_datum::Converted,
+    group_profiles::Profile,
+    mola_surface::{CrossedProfiles, MolaShots},
+};
+use areograph_base::{
+    error::Result,
+    footprints::Footprints,
+    frames::{BodyFixed, Position},
+    wording::signed,
+};
+use areograph_config::MolaSurfaceConfig;
+use areograph_geom::{
+    statistics::Summary,
+    surface::{
+        Crossover, LeftOut, ProfilePriors, SurfaceOptions, Withheld, WithheldScore, withheld,
+    },
+};
+use areograph_store::{
+    stage::{Output, Stage},
+    stage_inputs,
+};
+
+/// The profiles of a site against each other.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct ProfileCheck {
+    /// Every crossing of two profiles.
+    pub crossovers: Vec<ProfileCrossover>,
+    /// Differences at the crossovers of profiles that belong, metres.
+    pub differences_m: Summary,
+    /// Standard deviation of the radial error that the shots of a profile share, from crossovers and a priori, metres.
+    pub profile_sigma_m: f64,
+    /// Shifts of profiles with crossovers.
+    pub shifts: Vec<ShiftedProfile>,
+    /// Profiles that do not belong to the others; the surface does not use them.
+    pub left_out: Vec<LeftOutProfile>,
+    /// Stretches of profiles, predicted from the other profiles.
+    pub stretches: Vec<WithheldStretch>,
+    /// How well they are predicted; `None` without any.
+    pub score: Option<WithheldScore>,
+}
+
+/// A crossing of two profiles.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ProfileCrossover {
+    /// Indices of the profiles.
+    pub profiles: [usize; 2],
+    /// Where, at the mean of both heights.
+    pub ground: Position<BodyFixed>,
+    /// Height by the first minus height by the second, metres.
+    pub difference_m: f64,
+    /// Standard deviation of that by noise and interpolation, metres.
+    pub sigma_m: f64,
+}
+
+/// The shift of a profile.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ShiftedProfile {
+    /// Identifier.
+    pub profile: String,
+    /// Crossovers.
+    pub crossovers: usize,
+    /// How far it is recorded to the east, to the north and above its true position, metres.
+    pub shift_m: [f64; 3],
+    /// Covariance of that, m².
+    pub covariance_m2: [[f64; 3]; 3],
+}
+
+/// A profile that does not belong to the others.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LeftOutProfile {
+    /// Identifier.
+    pub profile: String,
+    /// Crossovers with the profiles that it crosses.
+    pub crossovers: usize,
+    /// The profiles that it crosses.
+    pub others: Vec<String>,
+    /// Its height above theirs, metres.
+    pub above_m: f64,
+    /// Standard deviation of that, metres.
+    pub sigma_m: f64,
+}
+
+impl ProfileCheck {
+    /// The remark on profiles that are left out, one sentence.
+    #[must_use]
+    pub fn remark(&self) -> Option<String> {
+        let named = self.left_out.iter().map(|profile| {
+            let (above_m, others) = (signed(profile.above_m, 1), profile.others.len());
+            format!("{} ({above_m} m, {others} profiles)", profile.profile)
+        });
+        let named: Vec<String> = named.collect();
+        (!named.is_empty()).then(|| {
+            format!(
+                "profiles lie above or below all profiles that they cross, and the surface between shots does not use them: {}",
+                named.join(", ")
+            )
+        })
+    }
+}
+
+/// A stretch of a profile, predicted from the other profiles.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct WithheldStretch {
+    /// Identifier of the profile.
+    pub profile: String,
+    /// Shots.
+    pub shots: usize,
+    /// Mean of measured minus predicted heights, metres.
+    pub above_m: f64,
+    /// Standard deviation of that as the surface states it, metres.
+    pub sigma_m: f64,
+    /// Distance of the nearest shot of another profile, metres.
+    pub nearest_shot_m: f64,
+}
+
+stage_inputs! {
+    /// The shots, and what is known of their errors a priori.
+    pub struct CheckProfiles<'a> {
+        /// Footprints in IAU 2000.
+        pub converted: &'a Output<Converted>,
+        /// Profiles.
+        pub profiles: &'a Output<Vec<Profile>>,
+        /// Uncertainties of the surface.
+        pub laser_surface: &'a MolaSurfaceConfig,
+    }
+}
+
+impl Stage for CheckProfiles<'_> {
+    const NAME: &'static str = "check_profiles";
+    const METHOD: u32 = 1;
+    type Output = ProfileCheck;
+    stage_inputs!(fingerprint);
+
+    fn run(&self, _stop: &AtomicBool) -> Result<ProfileCheck> {
+        let footprints = &self.converted.value()?.footprints;
+        Ok(check_profiles(
+            footprints,
+            self.profiles.value()?,
+            &self.laser_surface.options(footprints.body),
+            self.laser_surface.profile_plan_sigma_m,
+        ))
+    }
+}
+
+/// Compares the profiles with each other at their crossovers, and each with the surface of the others.
+#[must_use]
+pub fn check_profiles(
+    footprints: &Footprints<BodyFixed>,
+    profiles: &[Profile],
+    options: &SurfaceOptions,
+    plan_sigma_m: f64,
+) -> ProfileCheck {
+    let (shots, crossed) = MolaShots::crossed(footprints, profiles, options);
+    let stretches = withheld(&shots.shots, &shots.options(options));
+    let score = WithheldScore::of(&stretches);
+    let stretch = |of: Withheld| WithheldStretch {
+        profile: profiles[of.profile].id.clone(),
+        shots: of.shots,
+        above_m: of.above_m,
+        sigma_m: of.sigma_m,
+        nearest_shot_m: of.nearest_m,
+    };
+    ProfileCheck {
+        score,
+        stretches: stretches.into_iter().map(stretch).collect(),
+        ..described(&crossed, profiles, options, plan_sigma_m)
+    }
+}
+
+/// Compares the profiles with each other at their crossovers; no surface is tested.
+#[must_use]
+pub fn cross_profiles(
+    footprints: &Footprints<BodyFixed>,
+    profiles: &[Profile],
+    options: &SurfaceOptions,
+    plan_sigma_m: f64,
+) -> ProfileCheck {
+    let (_, crossed) = MolaShots::crossed(footprints, profiles, options);
+    described(&crossed, profiles, options, plan_sigma_m)
+}
+
+fn described(
+    CrossedProfiles { crossovers, net }: &CrossedProfiles,
+    profiles: &[Profile],
+    options: &SurfaceOptions,
+    plan_sigma_m: f64,
+) -> ProfileCheck {
+    let id = |profile: usize| profiles[profile].id.clone();
+    let priors = ProfilePriors {
+        radial_sigma_m: options.profile_sigma_m,
+        plan_sigma_m,
+    };
+    let belonging = net.belonging(crossovers);
+    let differences_m: Vec<f64> = belonging.iter().map(|of| of.difference_m).collect();
+    let shifts = net.shifts(crossovers, &priors).into_iter();
+    let left_out = net.left_out.iter().map(|of: &LeftOut| LeftOutProfile {
+        profile: id(of.profile),
+        crossovers: of.crossovers,
+        others: of.others.iter().map(|other| id(*other)).collect(),
+        above_m: of.above_m,
+        sigma_m: of.sigma_m,
+    });
+    ProfileCheck {
+        differences_m: Summary::of(&differences_m),
+        profile_sigma_m: net.radial_sigma_m,
+        shifts: shifts
+            .map(|of| ShiftedProfile {
+                profile: id(of.profile),
+                crossovers: of.crossovers,
+                shift_m: of.shift_m.into(),
+                covariance_m2: of.covariance_m2.into(),
+            })
+            .collect(),
+        left_out: left_out.collect(),
+        crossovers: crossovers
+            .iter()
+            .map(|of: &Crossover| ProfileCrossover {
+                profiles: of.profiles,
+                ground: Position::new(Vector3::from(of.place_m)),
+                difference_m: of.difference_m,
+                sigma_m: of.sigma_m,
+            })
+            .collect(),
+        ..ProfileCheck::default()
+    }
+}

@@ -1,0 +1,191 @@
+//! `areograph fetch`.
+
+mod shots;
+mod show;
+mod wish;
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+
+use self::wish::Wanted;
+use super::{stop::Signals, windows::edges};
+use crate::{
+    config::window_of_box,
+    error::Result,
+    fetch::{
+        Archives, FetchError, Filling, Outcome,
+        audit::{audit, verify},
+        plan::Plan,
+    },
+};
+
+/// Fetches the files that a site needs from the archives of the mission.
+///
+/// A site file states what is needed: its images, and the folders and files that do not exist yet. Without one, options
+/// state it. Kernels are chosen by the coverage in the index of their archive, files of the laser by orbits, images by the
+/// cumulative index, tables of shots by the windows. Transfers are resumed, verified by size and checksum or by their rows,
+/// and appear whole or not at all; fetch.json records what every file is. Other files are never replaced without --replace.
+///
+/// Examples:
+///   areograph fetch gale.toml --index
+///   areograph fetch gale.toml --plan
+///   areograph fetch gale.toml
+///   areograph fetch --into mars --image E02-00665 --dates 2001-03-01,2001-03-09
+///   areograph fetch --into gusev --box 175,178.2,-15.1,-14.1
+///   areograph fetch gale.toml --audit
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+#[allow(clippy::struct_excessive_bools, reason = "switches of a command line")]
+pub(super) struct Arguments {
+    /// Site files (TOML); their inputs may be missing.
+    #[arg(value_name = "SITE.toml")]
+    sites: Vec<PathBuf>,
+    /// Folder of fetch.json and of copies of the indexes; also of the files that no site file places. By default that of the
+    /// first site file, else the current one.
+    #[arg(long, value_name = "DIR")]
+    into: Option<PathBuf>,
+    /// An image of the mission.
+    #[arg(long = "image", value_name = "PRODUCT")]
+    images: Vec<String>,
+    /// First and last day for kernels and files of the laser.
+    #[arg(long, value_name = "DAY,DAY", value_parser = wish::days)]
+    dates: Vec<[crate::fetch::Utc; 2]>,
+    /// West, east, south and north edge, degrees: a table of the shots in this box, by the Orbital Data Explorer.
+    #[arg(long = "box", value_name = "W,E,S,N", value_parser = box_of_shots, allow_hyphen_values = true)]
+    edges_deg: Option<[f64; 4]>,
+    /// First and last orbit of files of the laser.
+    #[arg(long, value_name = "FIRST,LAST", value_parser = wish::orbits)]
+    orbits: Vec<[u32; 2]>,
+    /// Only files of these kinds.
+    #[arg(long, value_name = "KIND", value_delimiter = ',')]
+    only: Vec<Kind>,
+    /// Table with other hosts or layouts, in the form of config/archives/mgs.toml.
+    #[arg(long, value_name = "FILE")]
+    archives: Option<PathBuf>,
+    /// Bring the copies of the indexes up to date, and end.
+    #[arg(long, conflicts_with_all = ["plan", "verify", "audit"])]
+    index: bool,
+    /// List the files with sizes and reasons, by the copies of the indexes, and end; no archive is asked.
+    #[arg(long, conflicts_with_all = ["verify", "audit"])]
+    plan: bool,
+    /// Read every fetched file again and compare it with its record, and end.
+    #[arg(long, conflicts_with = "audit")]
+    verify: bool,
+    /// Compare the folder with the copies of the indexes: what is missing, differs or is not needed, and end.
+    #[arg(long)]
+    audit: bool,
+    /// Do not ask for new indexes first.
+    #[arg(long)]
+    offline_index: bool,
+    /// Replace files of other content.
+    #[arg(long)]
+    replace: bool,
+}
+
+/// Kinds of files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Kind {
+    /// SPICE kernels.
+    Kernels,
+    /// PEDR files.
+    Pedr,
+    /// Images with their labels.
+    Images,
+    /// Tables of shots of windows.
+    Shots,
+}
+
+/// Edges of a box, which must be one.
+fn box_of_shots(text: &str) -> std::result::Result<[f64; 4], String> {
+    let [west, east, south, north] = edges(text)?;
+    window_of_box("box", [west, east, south, north]).map_err(|error| error.to_string())?;
+    Ok([west, east, south, north])
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<()> {
+    let archives = match &arguments.archives {
+        Some(path) => Archives::with(path)?,
+        None => Archives::built_in()?,
+    };
+    let signals = Signals::heard()?;
+    let filling = Filling::of(&archives, &arguments.folder(), signals.stop())?;
+    if arguments.verify {
+        return verified(&filling);
+    }
+    let Wanted { wish, notes } = Wanted::of(arguments)?;
+    let mut indexes = Filling::indexes_of(&wish);
+    if arguments.index {
+        // For `areograph init --place`, which looks for images.
+        indexes.images |=
+            arguments.sites.is_empty() && wish.is_empty() && arguments.takes(Kind::Images);
+        let changed = filling.refresh(indexes)?;
+        super::output::line(format_args!("indexes are up to date; changed: {changed}"));
+        return Ok(());
+    }
+    if !(arguments.plan || arguments.audit || arguments.offline_index) {
+        filling.refresh(indexes)?;
+    }
+    let mut plan = filling.plan(&wish)?;
+    plan.notes.splice(0..0, notes);
+    if arguments.audit {
+        show::audit(&audit(&filling, &plan)?);
+        return Ok(());
+    }
+    if arguments.plan {
+        show::plan(&plan, &filling.standing(&plan)?);
+        return Ok(());
+    }
+    fetched(&filling, &plan, arguments.replace)
+}
+
+impl Arguments {
+    fn folder(&self) -> PathBuf {
+        let of_site = || {
+            let folder = self.sites.first()?.parent()?;
+            (folder != Path::new("")).then(|| folder.to_owned())
+        };
+        let given = self.into.clone().or_else(of_site);
+        given.unwrap_or_else(|| PathBuf::from("."))
+    }
+
+    fn takes(&self, kind: Kind) -> bool {
+        self.only.is_empty() || self.only.contains(&kind)
+    }
+}
+
+fn verified(filling: &Filling<'_>) -> Result<()> {
+    let (files, damaged) = verify(filling)?;
+    for one in &damaged {
+        super::output::line(format_args!("{}: {}", one.path.display(), one.problem));
+    }
+    if damaged.is_empty() {
+        super::output::line(format_args!("files as they were fetched: {files}"));
+        return Ok(());
+    }
+    let damaged = damaged.len();
+    Err(FetchError::Damaged { damaged, files }.into())
+}
+
+fn fetched(filling: &Filling<'_>, plan: &Plan, replace: bool) -> Result<()> {
+    let outcomes = filling.fetch(plan, replace, &show::outcome)?;
+    show::lacks(plan);
+    show::summary(&outcomes);
+    let failed = |outcome: &&Outcome| outcome.result.is_err();
+    let failed = outcomes.iter().filter(failed).count();
+    if failed > 0 {
+        // One file's failure is the failure of the command.
+        let mut failures = outcomes
+            .into_iter()
+            .filter_map(|outcome| outcome.result.err());
+        let planned = plan.files.len();
+        return match (failures.next(), failed) {
+            (Some(failure), 1) => Err(failure),
+            _ => Err(FetchError::Incomplete { failed, planned }.into()),
+        };
+    }
+    match plan.lacks.len() {
+        0 => Ok(()),
+        lacks => Err(FetchError::Lacks { lacks }.into()),
+    }
+}
