@@ -35,6 +35,10 @@ use serde_json::Value;
 
 const SEED: u64 = 1;
 
+/// The method of the synthetic net, and what replaces it for bricks.
+const ONE_SHOT: &str = "method = \"one_shot\"";
+const BRICKS: (&str, &str) = (ONE_SHOT, "method = \"scale\"\nlocal = \"yes\"");
+
 /// A folder with the synthetic net, and `net.toml` with some text replaced.
 fn scene(replaced: &[(&str, &str)]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -86,7 +90,7 @@ fn blunders_and_gross_controls_are_those_of_the_truth() {
     for method in ["scale", "mortar", "one_shot"] {
         let local = if method == "one_shot" { "no" } else { "yes" };
         let key = format!("local = \"{local}\"\nmethod = \"{method}\"");
-        let folder = scene(&[("local = \"yes\"", &key)]);
+        let folder = scene(&[(ONE_SHOT, &key)]);
         let (net, truth) = (triangulated(folder.path()).unwrap(), truth(folder.path()));
         let removed: BTreeSet<(String, String)> = net
             .measurements
@@ -139,7 +143,7 @@ fn blunders_and_gross_controls_are_those_of_the_truth() {
 
 #[test]
 fn seams_are_wider_than_bricks_are_within_and_local_evens_them_out() {
-    let folder = scene(&[]);
+    let folder = scene(&[BRICKS]);
     let net = triangulated(folder.path()).unwrap();
     assert_eq!(net.bricks.len(), 3);
     let (seams, within) = (net.seams.unwrap(), &net.bricks);
@@ -168,7 +172,7 @@ fn seams_are_wider_than_bricks_are_within_and_local_evens_them_out() {
 
 #[test]
 fn a_blunder_that_is_alone_in_its_brick_shows_between_the_bricks() {
-    let folder = scene(&[]);
+    let folder = scene(&[BRICKS]);
     let truth = truth(folder.path());
     // A point on two pictures side by side of two bricks.
     let text = fs::read_to_string(folder.path().join("net/measurements.csv")).unwrap();
@@ -202,7 +206,7 @@ fn a_blunder_that_is_alone_in_its_brick_shows_between_the_bricks() {
 
 #[test]
 fn products_are_whole_keep_their_schemas_and_are_not_made_twice() {
-    let folder = scene(&[]);
+    let folder = scene(&[BRICKS]);
     let first = run(folder.path(), false).unwrap();
     assert!(!first.unchanged && first.manifest.verdict.valid);
     let out = &first.folder;
@@ -259,7 +263,7 @@ fn products_are_whole_keep_their_schemas_and_are_not_made_twice() {
 fn at_once_pictures_have_the_size_that_scale_gives_them() {
     let sizes = ["scale", "one_shot"].map(|method| {
         let key = format!("method = \"{method}\"");
-        let folder = scene(&[("local = \"yes\"", &key)]);
+        let folder = scene(&[(ONE_SHOT, &key)]);
         let net = triangulated(folder.path()).unwrap();
         let sizes = net
             .pictures

@@ -199,16 +199,16 @@ declare_table! {
     pub struct TriangulationConfig {
         /// Method that positions the pictures on the map.
         method: Method = key(words([
-            ("scale", Method::Scale, "BRICK, EXTEND, SCALE: the figure keeps its shape"),
+            ("scale", Method::Scale, "BRICK, EXTEND, SCALE: bricks keep their shapes, which may be bent where ties are few"),
             ("mortar", Method::Mortar, "BRICK, EXTEND, MORTAR, SCALE: bricks adapt to the controls by their weights"),
             ("one_shot", Method::OneShot, "all pictures and controls at once, by their weights"),
-        ])).or(Method::Scale),
+        ])).or(Method::OneShot),
         /// LOCAL: evens out the seams between bricks afterwards.
         local: bool = key(yes_or_no("seams remain unchanged", "pictures of a brick adapt to its neighbours")).or(false),
         /// Pictures of a brick, where the table of pictures names no bricks.
         brick_pictures: u32 = key(whole_from_to(2, 100)).or(8),
-        /// Blunders in bricks: measurements flagged beyond 3.5 robust standard deviations without which a brick's
-        /// root mean square falls by 30 %.
+        /// Blunders: measurements whose standardised deviation, in the adjustment of the whole net, is larger than the
+        /// largest by chance in one net of a hundred.
         blunders: Blunders = key(words([
             ("remove", Blunders::Remove, "leave them out and report them"),
             ("report", Blunders::Report, "flag them and use them"),

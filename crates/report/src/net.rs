@@ -75,9 +75,7 @@ fn way(config: &NetConfig) -> String {
         Method::Mortar => format!(
             "BRICK, EXTEND, MORTAR, SCALE{local}: bricks are adjusted to the controls by their weights."
         ),
-        Method::OneShot => {
-            "All pictures and controls at once, then SCALE; bricks identify blunders.".to_owned()
-        }
+        Method::OneShot => "All pictures and controls at once, then SCALE.".to_owned(),
     }
 }
 
@@ -305,7 +303,8 @@ fn blunders(net: &Triangulation) -> String {
         ""
     };
     let words = "Flagged measurements are beyond 3.5 robust standard deviations (by the median) of their brick. One is rejected \
-        when the root mean square of the brick falls by 30 % without it, alone or with others of the same size.";
+        when its deviation in the adjustment of the whole net, divided by its own standard deviation, is larger than the largest \
+        by chance in one net of a hundred.";
     table.finish() + &paragraph(&format!("{words}{both_go}"))
 }
 

@@ -162,7 +162,7 @@ latitude_deg = 0.0
 longitude_deg = 0.0
 
 [triangulation]
-local = \"yes\"
+method = \"one_shot\"
 ";
 
 /// Displaces some measurements of points on three pictures or more as a misidentified crater would; returns their

@@ -1,7 +1,9 @@
 //! Blunders are found where they are: a misidentified tie, and controls that hide each other.
 
+use std::collections::BTreeSet;
+
 use areograph::{
-    geom::plane::{Place, brick, clean, fit_similarity, scale},
+    geom::plane::{Place, brick, find_blunders, fit_similarity, scale},
     scene::{PlaneRecipe, PlaneScene},
 };
 
@@ -41,11 +43,10 @@ fn a_tie_misidentified_by_20_km_is_named_first_and_removed() {
         measured.at += direction / scene.pictures[picture].turn;
         let worst = scene.net.measurements[ranked(&scene)[0]].point;
         first += usize::from(worst == wrong);
-        let cleaned = clean(&scene.net, &(0..9).collect::<Vec<_>>()).unwrap();
-        let points: Vec<usize> = cleaned
-            .blunders
+        let found = find_blunders(&scene.net).unwrap();
+        let points: BTreeSet<usize> = found
             .iter()
-            .map(|blunder| scene.net.measurements[blunder.measurement].point)
+            .map(|index| scene.net.measurements[*index].point)
             .collect();
         removed += usize::from(points.contains(&wrong));
         others += points.iter().filter(|point| **point != wrong).count();
@@ -81,9 +82,7 @@ fn two_blunders_of_one_size_do_not_hide_each_other() {
             let measured = &mut scene.net.measurements[*index];
             measured.at += Place::new(9_000.0, -4_000.0) / scene.pictures[measured.picture].turn;
         }
-        let cleaned = clean(&scene.net, &(0..9).collect::<Vec<_>>()).unwrap();
-        let mut found: Vec<usize> = cleaned.blunders.iter().map(|of| of.measurement).collect();
-        found.sort_unstable();
+        let found = find_blunders(&scene.net).unwrap();
         assert_eq!(found, wrong, "seed {seed}");
     }
 }
@@ -92,12 +91,8 @@ fn two_blunders_of_one_size_do_not_hide_each_other() {
 fn good_bricks_lose_nothing() {
     for seed in 0..20 {
         let scene = nine(250.0).simulate(seed);
-        let cleaned = clean(&scene.net, &(0..9).collect::<Vec<_>>()).unwrap();
-        assert!(
-            cleaned.blunders.is_empty(),
-            "seed {seed}: {:?}",
-            cleaned.blunders
-        );
+        let found = find_blunders(&scene.net).unwrap();
+        assert!(found.is_empty(), "seed {seed}: {found:?}");
     }
 }
 

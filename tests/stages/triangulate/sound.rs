@@ -1,6 +1,6 @@
 //! Nets over many seeds: sound ones are valid and as good as they state; controls of another scale or shape are invalid.
 
-use std::path::Path;
+use std::{collections::BTreeSet, path::Path};
 
 use areograph::{error::Error, scene::write_plane_scene, stages::triangulate::Triangulation};
 use serde_json::Value;
@@ -33,6 +33,7 @@ fn seeds() -> Vec<u64> {
 #[test]
 fn sound_nets_are_valid_and_as_good_as_they_state() {
     let (mut normalised, mut scale, mut stretch) = (Vec::new(), 0.0_f64, 0.0_f64);
+    let mut lost = 0_u32;
     for seed in seeds() {
         let (net, truth) = net_of(seed, |_| {});
         let net = net.unwrap_or_else(|why| panic!("seed {seed}: {why}"));
@@ -45,6 +46,15 @@ fn sound_nets_are_valid_and_as_good_as_they_state() {
             "seed {seed}: {of_sigma} of its standard deviations"
         );
         normalised.push(of_sigma);
+        let wrong = truth["blunders"].as_array().unwrap().iter();
+        let wrong: BTreeSet<&str> = wrong.map(|of| of[1].as_str().unwrap()).collect();
+        let removed = net.measurements.iter().filter(|of| of.removed);
+        let removed: BTreeSet<&str> = removed.map(|of| &*of.point).collect();
+        assert!(
+            wrong.is_subset(&removed),
+            "seed {seed}: {wrong:?} {removed:?}"
+        );
+        lost += u32::try_from(removed.len() - wrong.len()).unwrap();
         for check in &net.verdict.checks {
             let used = check
                 .value
@@ -60,8 +70,10 @@ fn sound_nets_are_valid_and_as_good_as_they_state() {
     let count = normalised.len() as f64;
     let z = (normalised.iter().map(|of| of * of).sum::<f64>() / count).sqrt();
     println!(
-        "{count} nets: error {z:.2} of the stated, scale {scale:.2} and stretch {stretch:.2} of their limits"
+        "{count} nets: {lost} sound points left out, error {z:.2} of the stated, scale {scale:.2} and stretch {stretch:.2} of their limits"
     );
+    // By chance one net of a hundred loses a point.
+    assert!(f64::from(lost) <= 0.02 * count + 1.0, "{lost}");
     // Some twenty nets, each one draw of the similarity that its points share.
     assert!((0.6..1.4).contains(&z), "{z}");
     assert!(scale < 1.0 && stretch < 1.0, "{scale} {stretch}");
@@ -109,11 +121,10 @@ fn controls_of_another_scale_or_shape_are_invalid() {
             &|folder| scaled(folder, 1.0 / 1.609, 1.0 / 1.609),
             "metres_per_unit",
         );
-        // 0.6215, within the half per cent that controls of 800 m leave.
-        assert!(
-            reason.contains("is 0.61") || reason.contains("is 0.62"),
-            "{reason}"
-        );
+        // 1 / 1.609; controls of 800 m leave half a per cent, and a net of two hundred may have three times that.
+        let (_, ratio) = reason.split_once("a unit is ").unwrap();
+        let ratio: f64 = ratio.split(' ').next().unwrap().parse().unwrap();
+        assert!((ratio * 1.609 - 1.0).abs() < 0.0175, "{reason}");
         // A tenth in one coordinate: a twentieth in scale, and a stretch that pictures of unknown scale show too.
         is_invalid(*seed, &|folder| scaled(folder, 1.1, 1.0), "expected");
         let blind = |folder: &Path| {

@@ -1,45 +1,28 @@
-//! Blunders in a brick: the largest deviations, and the solution without them.
+//! Blunders: measurements that contradict the adjustment of the whole net more than chance explains.
+//!
+//! A deviation is judged by its own standard deviation, which is small where a measurement alone holds a picture.
+//! Compared with the deviations of others only, the far ties of a picture that hangs on points close together would look
+//! wrong, although they are right and carry it.
+
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
     Place,
-    bricks::{Figure, brick},
-    net::{Net, Part, PlaneError},
+    bricks::rough_guesses,
+    net::{Net, PlaneError},
+    solve::{Solution, solve},
 };
 
-/// Robust standard deviations beyond which a deviation is flagged.
+/// Robust standard deviations beyond which a deviation within a brick is flagged.
 pub const FLAG_LIMIT: f64 = 3.5;
 /// Factor from the median of absolute normal values to their standard deviation.
 const NORMAL_MEDIAN: f64 = 1.4826;
+/// Probability that a net without blunders loses a measurement.
+const FALSE_ALARM: f64 = 0.01;
+/// Measurements of less redundancy are not tested: their errors leave no deviation.
+const REDUNDANCY_MIN: f64 = 1e-6;
 /// Deviations below this share of a figure's extent are rounding.
 const ROUNDING: f64 = 1e-9;
-/// A removal is kept when it reduces the root mean square by more than this share.
-const DROP: f64 = 0.30;
-/// Measurements removed together where one reduces it too little: blunders of one size mask each other.
-const TOGETHER: usize = 4;
-
-/// A measurement removed from its brick.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Blunder {
-    /// Index of the measurement; for a point on two pictures the first of both, which are not separable.
-    pub measurement: usize,
-    /// Its deviation when it was removed, figure units.
-    pub deviation: Place,
-    /// Root mean square of the brick's deviations before the removal and after it, figure units.
-    pub rms: [f64; 2],
-    /// Whether the whole point was removed, as it was on two pictures.
-    pub whole_point: bool,
-}
-
-/// A brick without its blunders.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Cleaned {
-    /// The brick.
-    pub figure: Figure,
-    /// Removed measurements, in order.
-    pub blunders: Vec<Blunder>,
-    /// Indices of all removed measurements.
-    pub removed: Vec<usize>,
-}
 
 /// Standard deviation of a coordinate from the median of the absolute values; 0 without any.
 #[must_use]
@@ -54,119 +37,214 @@ pub fn robust_sigma(deviations: impl Iterator<Item = Place>) -> f64 {
     NORMAL_MEDIAN * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Solves a brick, removes the worst flagged deviation and solves again, as long as that reduces the root mean square
-/// by more than 30 %.
+/// The measurements of a net that are blunders, ascending, by their deviations in the adjustment of all pictures without
+/// controls.
 ///
-/// A removal that reduces it less is tried with the next ones, up to four together. A point on two pictures is removed
-/// as a whole.
+/// The largest standardised deviations are removed, those of different pictures at once, and the net is adjusted again,
+/// until none exceeds what chance leaves in one net of a hundred. A removed measurement that agrees with the others at the end
+/// is restored. Of a point on two pictures both measurements go: the deviation does not identify which is wrong. A
+/// measurement without which a picture would be free stays.
 ///
 /// # Errors
-/// Those of [`brick`], for the net as it is given.
-pub fn clean(net: &Net, pictures: &[usize]) -> Result<Cleaned, PlaneError> {
-    let Part {
-        net: part,
-        points,
-        measurements,
-    } = net.part(pictures);
-    let all: Vec<usize> = (0..pictures.len()).collect();
-    let figure = brick(&part, &all).map_err(|error| error.of_part(&points, pictures))?;
-    let mut best = State {
-        figure,
-        blunders: Vec::new(),
-        kept: measurements.clone(),
-        net: part,
+/// [`PlaneError`] for a net without a solution.
+/// # Source
+/// Baarda 1968, *A testing procedure for use in geodetic networks* (data snooping), with a robust standard deviation.
+pub fn find_blunders(net: &Net) -> Result<Vec<usize>, PlaneError> {
+    let mut search = Search {
+        net,
+        removed: BTreeSet::new(),
+        fixed: BTreeSet::new(),
+        confirmed: BTreeSet::new(),
+        adjusted: Adjusted::without(net, &BTreeSet::new())?,
     };
-    loop {
-        let before = best.rms();
-        let (mut trial, mut accepted) = (None, None);
-        for _ in 0..TOGETHER {
-            let Some(worse) = trial.as_ref().unwrap_or(&best).without_the_worst(&all) else {
-                break;
-            };
-            if worse.rms() < (1.0 - DROP) * before {
-                accepted = Some(worse);
-                break;
-            }
-            trial = Some(worse);
-        }
-        match accepted {
-            Some(better) => best = better,
-            None => break,
-        }
-    }
-    let removed = measurements.iter().copied();
-    Ok(Cleaned {
-        removed: removed
-            .filter(|index| best.kept.binary_search(index).is_err())
-            .collect(),
-        figure: best.figure.in_net(pictures, &points, &best.kept),
-        blunders: best.blunders,
-    })
+    // No measurement is removed, or tried again, twice: restored ones are fixed, the others confirmed.
+    while search.remove() || search.restore() {}
+    Ok(search.removed.into_iter().collect())
 }
 
-/// An intermediate state of a part of a net.
-struct State {
-    figure: Figure,
-    blunders: Vec<Blunder>,
+struct Search<'a> {
+    net: &'a Net,
+    removed: BTreeSet<usize>,
+    /// Measurements that remain: restored ones, and those without which the net would have no solution.
+    fixed: BTreeSet<usize>,
+    /// Removed measurements that do not agree with the others when they are restored.
+    confirmed: BTreeSet<usize>,
+    adjusted: Adjusted,
+}
+
+impl Search<'_> {
+    /// Removes the worst measurements, of different pictures; returns whether there were any.
+    fn remove(&mut self) -> bool {
+        let tested = self.adjusted.tested();
+        let limit = self.adjusted.limit(&tested);
+        let mut flagged: Vec<(usize, f64)> = tested
+            .into_iter()
+            .map(|(index, of)| (index, of.norm()))
+            .filter(|(index, size)| *size > limit && !self.fixed.contains(index))
+            .collect();
+        flagged.sort_by(|one, two| two.1.total_cmp(&one.1).then(one.0.cmp(&two.0)));
+        let (mut groups, mut busy) = (Vec::new(), BTreeSet::new());
+        for (index, _) in flagged {
+            let of_point = self.adjusted.of_point(self.net.measurements[index].point);
+            let pictures: Vec<usize> = of_point
+                .iter()
+                .map(|at| self.net.measurements[*at].picture)
+                .collect();
+            if pictures.iter().any(|picture| busy.contains(picture)) {
+                continue;
+            }
+            busy.extend(pictures);
+            let both = of_point.len() == 2;
+            groups.push(if both { of_point } else { vec![index] });
+        }
+        if !self.go_on(self.and(&groups.concat())) {
+            for group in &groups {
+                if !self.go_on(self.and(group)) {
+                    self.fixed.extend(group);
+                }
+            }
+        }
+        !groups.is_empty()
+    }
+
+    /// Restores removed measurements, of different pictures, that agree with the others once they take part again; returns
+    /// whether any was left to try.
+    fn restore(&mut self) -> bool {
+        let limit = self.adjusted.limit(&self.adjusted.tested());
+        let (mut groups, mut busy) = (Vec::new(), BTreeSet::new());
+        for (group, kept) in self.left_to_try() {
+            // One that cannot agree would disturb those that are tried with it.
+            if self.adjusted.apart(self.net, &group, &kept) > limit {
+                self.confirmed.extend(group);
+                continue;
+            }
+            let of_point = group.iter().chain(&kept);
+            let pictures: Vec<usize> = of_point
+                .map(|at| self.net.measurements[*at].picture)
+                .collect();
+            if !pictures.iter().any(|picture| busy.contains(picture)) {
+                busy.extend(pictures);
+                groups.push(group);
+            }
+        }
+        let tried: BTreeSet<usize> = groups.iter().flatten().copied().collect();
+        let others = self.removed.difference(&tried).copied().collect();
+        if let Ok(with) = Adjusted::without(self.net, &others) {
+            let tested: BTreeMap<usize, Place> = with.tested().into_iter().collect();
+            let agrees = |at: &usize| tested.get(at).is_some_and(|of| of.norm() <= limit);
+            for group in groups.iter().filter(|group| group.iter().all(agrees)) {
+                self.fixed.extend(group);
+            }
+        }
+        self.confirmed.extend(tried.difference(&self.fixed));
+        let removed: BTreeSet<usize> = self.removed.difference(&self.fixed).copied().collect();
+        if removed.len() < self.removed.len() {
+            self.go_on(removed);
+        }
+        !groups.is_empty()
+    }
+
+    /// Removed measurements that are not confirmed, all of a point together where it has no others, and those others.
+    fn left_to_try(&self) -> Vec<(Vec<usize>, Vec<usize>)> {
+        let mut of_points: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for index in self.removed.difference(&self.confirmed) {
+            let point = self.net.measurements[*index].point;
+            of_points.entry(point).or_default().push(*index);
+        }
+        let mut groups = Vec::new();
+        for (point, gone) in of_points {
+            let kept = self.adjusted.of_point(point);
+            if kept.is_empty() {
+                groups.push((gone, kept));
+            } else {
+                groups.extend(gone.into_iter().map(|one| (vec![one], kept.clone())));
+            }
+        }
+        groups
+    }
+
+    fn and(&self, these: &[usize]) -> BTreeSet<usize> {
+        self.removed.iter().chain(these).copied().collect()
+    }
+
+    /// Adjusts the net without these, if it has a solution.
+    fn go_on(&mut self, removed: BTreeSet<usize>) -> bool {
+        let adjusted = Adjusted::without(self.net, &removed);
+        adjusted.is_ok_and(|adjusted| {
+            self.adjusted = adjusted;
+            self.removed = removed;
+            true
+        })
+    }
+}
+
+/// The adjustment of a net without some measurements, in a figure of its own.
+struct Adjusted {
     net: Net,
     /// Its measurements in the whole net.
-    kept: Vec<usize>,
+    indices: Vec<usize>,
+    of_point: Vec<Vec<usize>>,
+    solution: Solution,
 }
 
-impl State {
-    /// Root mean square of a coordinate of points on several pictures.
-    fn rms(&self) -> f64 {
-        let tied = self.tied();
-        let squares: f64 = tied.iter().map(|(_, deviation)| deviation.norm_sqr()).sum();
-        (squares / (2 * tied.len()).max(1) as f64).sqrt()
-    }
-
-    /// Deviations of points that several pictures of the brick show.
-    fn tied(&self) -> Vec<(usize, Place)> {
-        let mut count = vec![0; self.net.points];
-        for (index, _) in &self.figure.deviations {
-            count[self.net.measurements[*index].point] += 1;
-        }
-        let tied = self.figure.deviations.iter();
-        let tied = tied.filter(|(index, _)| count[self.net.measurements[*index].point] > 1);
-        tied.copied().collect()
-    }
-
-    /// The brick without its worst deviation, if that is flagged and the rest remains connected.
-    fn without_the_worst(&self, all: &[usize]) -> Option<Self> {
-        let tied = self.tied();
-        let sigma = robust_sigma(tied.iter().map(|(_, deviation)| *deviation));
-        let limit = (FLAG_LIMIT * sigma).max(ROUNDING * self.figure.extent());
-        let worst = tied.iter().copied();
-        let worst = worst.reduce(|a, b| if b.1.norm() > a.1.norm() { b } else { a });
-        let (index, deviation) = worst.filter(|(_, of)| of.norm() > limit)?;
-        let point = self.net.measurements[index].point;
-        let of_point = |index: &usize| self.net.measurements[*index].point == point;
-        let whole_point = tied.iter().filter(|(index, _)| of_point(index)).count() == 2;
-        let goes = |at: usize| at == index || whole_point && of_point(&at);
-        let mut net = self.net.clone();
-        let mut at = 0;
-        net.measurements.retain(|_| {
-            at += 1;
-            !goes(at - 1)
-        });
-        let figure = brick(&net, all).ok()?;
-        let kept = self.kept.iter().enumerate();
-        let mut without = Self {
-            figure,
-            blunders: self.blunders.clone(),
-            kept: kept
-                .filter(|(at, _)| !goes(*at))
-                .map(|(_, index)| *index)
-                .collect(),
+impl Adjusted {
+    fn without(whole: &Net, removed: &BTreeSet<usize>) -> Result<Self, PlaneError> {
+        let (mut net, indices) = whole.kept(|index| !removed.contains(&index));
+        net.controls = rough_guesses(&net);
+        Ok(Self {
+            solution: solve(&net)?,
+            of_point: Solution::measurements_of(&net),
             net,
-        };
-        without.blunders.push(Blunder {
-            measurement: self.kept[index],
-            deviation,
-            rms: [self.rms(), without.rms()],
-            whole_point,
+            indices,
+        })
+    }
+
+    /// Measurements of points on several pictures, and their deviations over the root of their redundancy.
+    fn tested(&self) -> Vec<(usize, Place)> {
+        let precision = self.solution.precision();
+        let deviations = self.solution.deviations.iter().enumerate();
+        let tested = deviations.filter_map(|(at, deviation)| {
+            let of = &self.of_point[self.net.measurements[at].point];
+            let redundancy = (of.len() > 1).then(|| precision.deviation(&self.net, of, at))?;
+            let tested = redundancy > REDUNDANCY_MIN;
+            tested.then(|| (self.indices[at], deviation / redundancy.sqrt()))
         });
-        Some(without)
+        tested.collect()
+    }
+
+    /// Size of a standardised deviation that the largest of all exceeds by chance in one net of a hundred.
+    fn limit(&self, tested: &[(usize, Place)]) -> f64 {
+        let sigma = robust_sigma(tested.iter().map(|(_, of)| *of));
+        let mut places = self.solution.places.iter().flatten();
+        let first = places.next().copied().unwrap_or_default();
+        let extent = places.map(|of| (of - first).norm()).fold(0.0, f64::max);
+        // The size of a deviation of two normal coordinates follows Rayleigh's distribution.
+        let limit = (2.0 * (tested.len().max(1) as f64 / FALSE_ALARM).ln()).sqrt();
+        (limit * sigma).max(ROUNDING * extent)
+    }
+
+    /// The kept measurements of a point, in the whole net.
+    fn of_point(&self, point: usize) -> Vec<usize> {
+        let of = self.of_point[point].iter();
+        of.map(|at| self.indices[*at]).collect()
+    }
+
+    /// Distance of removed measurements of a point from the mean of the kept ones, or of each other, over the largest
+    /// standard deviation that it can have: covariances of pictures without a common point are not at hand.
+    fn apart(&self, whole: &Net, group: &[usize], kept: &[usize]) -> f64 {
+        let precision = self.solution.precision();
+        let (one, others) = match (group, kept) {
+            ([one, others @ ..], []) => (one, others),
+            ([one, ..], others) => (one, others),
+            ([], _) => return 0.0,
+        };
+        let share = 1.0 / others.len().max(1) as f64;
+        let (mut apart, mut sigma) = (Place::new(0.0, 0.0), 0.0);
+        for (index, share) in others.iter().map(|at| (at, -share)).chain([(one, 1.0)]) {
+            let of = &whole.measurements[*index];
+            apart += self.solution.pictures[of.picture].map(of.at) * share;
+            sigma += share.abs() * precision.image(of).sqrt();
+        }
+        apart.norm() / (1.0 + share + sigma.powi(2)).sqrt()
     }
 }

@@ -102,7 +102,7 @@ fn alone(part: &Net) -> Figure {
 }
 
 /// Two ties of the picture with most of them, as far apart as possible, where that picture has them.
-fn rough_guesses(part: &Net) -> Vec<Control> {
+pub(super) fn rough_guesses(part: &Net) -> Vec<Control> {
     let by_point = part.by_point();
     let ties = |of: &[usize]| -> Vec<usize> {
         let tied = |index: &&usize| by_point.get(part.measurements[**index].point).len() > 1;
@@ -250,8 +250,7 @@ fn shown_points(net: &Net, figures: &[Figure]) -> Vec<bool> {
 }
 
 /// The net whose pictures are the figures of bricks, without controls.
-#[must_use]
-pub fn bricks_as_pictures(net: &Net, figures: &[Figure]) -> Net {
+fn bricks_as_pictures(net: &Net, figures: &[Figure]) -> Net {
     let measurements = figures.iter().enumerate().flat_map(|(brick, figure)| {
         let places = figure.places.iter();
         places.map(move |(point, at)| Measurement {

@@ -16,7 +16,8 @@
 //! The images of every point become orthonormal contrasts, which have the rank that the symmetric equations of the
 //! paper lack. Pictures are eliminated in the order of least degree (`eliminate`): there are no normal equations, and
 //! the triangular factor gives the covariances of neighbours by the recursion of Takahashi (`inverse`), which libraries
-//! of sparse decompositions do not expose. Blunders are detected within bricks, since a single adjustment spreads them.
+//! of sparse decompositions do not expose. These also standardise the deviations by which blunders are found: a single
+//! adjustment spreads a blunder over its neighbours, and its own standardised deviation remains the largest.
 //! The standard deviations of points are those of the one adjustment, regardless of how the block was georeferenced.
 //!
 //! # Source
@@ -42,8 +43,8 @@ mod stretch;
 /// A position in a picture or on a map: `x + i y`.
 pub type Place = nalgebra::Complex<f64>;
 
-pub use blunders::{Blunder, Cleaned, FLAG_LIMIT, clean, robust_sigma};
-pub use bricks::{Block, Figure, brick, bricks_as_pictures, extend, local, mortar};
+pub use blunders::{FLAG_LIMIT, find_blunders, robust_sigma};
+pub use bricks::{Block, Figure, brick, extend, local, mortar};
 pub use check::check;
 pub use controls::{Scaled, fit_similarity, fit_weighted, scale};
 pub use film::{CornerZero, FilmError, FourCorners, box_centre};

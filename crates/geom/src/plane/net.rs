@@ -89,6 +89,21 @@ pub enum PlaneError {
 }
 
 impl Net {
+    /// The net with some of its measurements, and their indices in this one. Pictures and points keep theirs.
+    #[must_use]
+    pub fn kept(&self, keep: impl Fn(usize) -> bool) -> (Self, Vec<usize>) {
+        let indices: Vec<usize> = (0..self.measurements.len())
+            .filter(|at| keep(*at))
+            .collect();
+        let measurements = indices.iter().map(|at| self.measurements[*at]).collect();
+        let net = Self {
+            measurements,
+            controls: self.controls.clone(),
+            ..*self
+        };
+        (net, indices)
+    }
+
     /// Measurements of every point, as indices.
     pub(super) fn by_point(&self) -> Groups {
         Groups::of(

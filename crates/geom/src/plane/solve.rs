@@ -347,6 +347,12 @@ impl Precision<'_> {
         [block[(0, 0)].re / size.powi(2), block[(1, 1)].re]
     }
 
+    /// For the image of a point on the map, without its own error: the part of its variance that its picture has.
+    #[must_use]
+    pub(super) fn image(&self, of: &Measurement) -> f64 {
+        self.form(&[self.row(of, 1.0)])
+    }
+
     /// For the adjusted position of a point, the mean of its images; `of` are its measurements, `weight` is that of its
     /// control, if it is one.
     ///
@@ -384,7 +390,10 @@ impl Precision<'_> {
     }
 
     fn view(&self, net: &Net, index: usize, share: f64) -> (usize, RowVector2<Place>) {
-        let measured = &net.measurements[index];
+        self.row(&net.measurements[index], share)
+    }
+
+    fn row(&self, measured: &Measurement, share: f64) -> (usize, RowVector2<Place>) {
         let inside = self.solution.frames[measured.picture].inside(measured.at);
         let row = RowVector2::new(inside * share, Place::new(share, 0.0));
         (self.solution.place_of[measured.picture], row)

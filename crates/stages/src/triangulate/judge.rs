@@ -162,7 +162,7 @@ fn remarks(of: &Evidence) -> Vec<String> {
             x.max(y) > SEAMS_SIGMA * sigma_m,
             format!(
                 "bricks differ at their seams by {:.1} m (rms), measurements within bricks by {sigma_m:.1} m: a \
-                 brick may be distorted",
+                 brick may be distorted; one_shot adjusts all pictures at once",
                 x.max(y)
             ),
         );

@@ -6,17 +6,16 @@ use super::{
     error::{Names, NetError},
     read::NetData,
 };
-use areograph_config::{Blunders, NetConfig};
+use areograph_config::{Blunders, Method, NetConfig};
 use areograph_geom::plane::{
-    Block, Blunder, Figure, Net, Place, PlaneError, Scaled, brick, bricks_as_pictures, clean,
-    extend, grow_bricks, same_hand, scale, settle_bricks,
+    Block, Figure, Net, Place, PlaneError, Scaled, brick, extend, find_blunders, grow_bricks,
+    same_hand, scale, settle_bricks,
 };
 
 /// Bricks on the map.
 pub(super) struct Laid {
     pub(super) names: Vec<String>,
     pub(super) figures: Vec<Figure>,
-    pub(super) blunders: Vec<Vec<Blunder>>,
     /// Of every measurement, whether it was left out.
     pub(super) removed: Vec<bool>,
     /// The net of the others, and their indices in the whole one.
@@ -27,16 +26,45 @@ pub(super) struct Laid {
     pub(super) remarks: Vec<String>,
 }
 
-/// Bricks of pictures. Pictures that hang on one point in their brick are tied in another, with a remark where a table names
-/// the bricks.
-pub(super) fn bricks_of(config: &NetConfig, data: &NetData) -> (Bricks, Vec<String>) {
+/// A net without its blunders.
+#[derive(Clone)]
+pub(super) struct Kept {
+    pub(super) net: Net,
+    /// Indices of its measurements in the whole net.
+    alive: Vec<usize>,
+    /// Of every measurement, whether it was left out.
+    removed: Vec<bool>,
+}
+
+/// Leaves out the blunders of a net, where they are to be.
+pub(super) fn without_blunders(config: &NetConfig, data: &NetData) -> Result<Kept, PlaneError> {
+    let mut removed = vec![false; data.net.measurements.len()];
+    if config.triangulation.blunders == Blunders::Remove {
+        for index in find_blunders(&data.net)? {
+            removed[index] = true;
+        }
+    }
+    let (net, alive) = data.net.kept(|index| !removed[index]);
+    Ok(Kept {
+        net,
+        alive,
+        removed,
+    })
+}
+
+/// Bricks of pictures: one for the method that has none. Pictures that hang on one point in their brick are tied in another,
+/// with a remark where a table names the bricks.
+pub(super) fn bricks_of(config: &NetConfig, data: &NetData, net: &Net) -> (Bricks, Vec<String>) {
+    if config.triangulation.method == Method::OneShot {
+        return (one_brick(data), Vec::new());
+    }
     let named = data.bricks.iter().any(|brick| !brick.is_empty());
     let mut bricks = if named {
         by_name(data)
     } else {
-        by_growth(data, config.triangulation.brick_pictures as usize)
+        by_growth(net, config.triangulation.brick_pictures as usize)
     };
-    let moved = settle(data, &mut bricks);
+    let moved = settle(data, net, &mut bricks);
     (bricks, if named { moved } else { Vec::new() })
 }
 
@@ -46,9 +74,9 @@ pub(super) fn one_brick(data: &NetData) -> Bricks {
 }
 
 /// Moves pictures that hang on one point in their brick, and states each.
-fn settle(data: &NetData, bricks: &mut Bricks) -> Vec<String> {
+fn settle(data: &NetData, net: &Net, bricks: &mut Bricks) -> Vec<String> {
     let (names, mut pictures): (Vec<String>, Vec<Vec<usize>>) = bricks.drain(..).unzip();
-    let moved = settle_bricks(&data.net, &mut pictures);
+    let moved = settle_bricks(net, &mut pictures);
     let words = moved.iter().map(|of| {
         format!(
             "picture {} shares fewer than two points with the rest of brick {} and was tied in brick {}",
@@ -81,8 +109,8 @@ fn by_name(data: &NetData) -> Bricks {
         .collect()
 }
 
-fn by_growth(data: &NetData, size: usize) -> Bricks {
-    let of = grow_bricks(&data.net, size);
+fn by_growth(net: &Net, size: usize) -> Bricks {
+    let of = grow_bricks(net, size);
     let count = of.iter().max().map_or(0, |last| last + 1);
     let mut bricks: Bricks = (1..=count)
         .map(|number| (number.to_string(), Vec::new()))
@@ -93,47 +121,30 @@ fn by_growth(data: &NetData, size: usize) -> Bricks {
     bricks
 }
 
-/// Lays the bricks.
+/// Lays the bricks of a net without its blunders.
 pub(super) fn lay(
     config: &NetConfig,
-    data: &NetData,
+    kept: &Kept,
     names: &Names,
     bricks: &Bricks,
 ) -> Result<Laid, NetError> {
-    let mut removed = vec![false; data.net.measurements.len()];
-    let (mut figures, mut blunders) = (Vec::new(), Vec::new());
-    for (_, pictures) in bricks {
-        let refused = |error| names.of(error, "picture");
-        if config.triangulation.blunders == Blunders::Remove {
-            let cleaned = clean(&data.net, pictures).map_err(refused)?;
-            for index in cleaned.removed {
-                removed[index] = true;
-            }
-            figures.push(cleaned.figure);
-            blunders.push(cleaned.blunders);
-        } else {
-            figures.push(brick(&data.net, pictures).map_err(refused)?);
-            blunders.push(Vec::new());
-        }
+    let Kept {
+        net,
+        alive,
+        removed,
+    } = kept.clone();
+    let figures = bricks.iter().map(|(_, pictures)| brick(&net, pictures));
+    let mut figures: Vec<Figure> = figures
+        .collect::<Result<_, _>>()
+        .map_err(|error| names.of(error, "picture"))?;
+    // The deviations of a brick are reported beside those of the whole net.
+    for (index, _) in figures.iter_mut().flat_map(|of| &mut of.deviations) {
+        *index = alive[*index];
     }
     let brick_names: Vec<String> = bricks.iter().map(|(name, _)| name.clone()).collect();
     let of_bricks = Names {
         pictures: &brick_names,
         points: names.points,
-    };
-    if config.triangulation.blunders == Blunders::Remove && figures.len() > 1 {
-        clean_seams(&data.net, &mut figures, &mut removed)
-            .map_err(|error| of_bricks.of(error, "brick"))?;
-    }
-    let alive: Vec<usize> = (0..removed.len())
-        .filter(|index| !removed[*index])
-        .collect();
-    let net = Net {
-        measurements: alive
-            .iter()
-            .map(|index| data.net.measurements[*index])
-            .collect(),
-        ..data.net.clone()
     };
     let block = extend(&net, &figures).map_err(|error| of_bricks.of(error, "brick"))?;
     let shown = shown_controls(&net, &block.places);
@@ -150,7 +161,6 @@ pub(super) fn lay(
     Ok(Laid {
         names: brick_names,
         figures,
-        blunders,
         removed,
         net,
         alive,
@@ -158,24 +168,6 @@ pub(super) fn lay(
         scaled,
         remarks: Vec::new(),
     })
-}
-
-/// Leaves out a brick's measurements of a point that is a blunder among the bricks: the only measurement of a point in
-/// a brick shows nowhere else.
-fn clean_seams(net: &Net, figures: &mut [Figure], removed: &mut [bool]) -> Result<(), PlaneError> {
-    let of_bricks = bricks_as_pictures(net, figures);
-    let all: Vec<usize> = (0..figures.len()).collect();
-    for index in clean(&of_bricks, &all)?.removed {
-        let seam = &of_bricks.measurements[index];
-        let figure = &mut figures[seam.picture];
-        figure.places.retain(|(point, _)| *point != seam.point);
-        for (index, measured) in net.measurements.iter().enumerate() {
-            if measured.point == seam.point && figure.pictures.contains(&measured.picture) {
-                removed[index] = true;
-            }
-        }
-    }
-    Ok(())
 }
 
 /// Controls that have a place in the figure: index, place there, place as given.

@@ -16,7 +16,7 @@ pub struct Triangulation {
     pub measurements: Vec<MeasurementResult>,
     /// Every control that a picture shows.
     pub controls: Vec<ControlResult>,
-    /// The bricks; for a solution of all pictures at once, those in which its blunders were identified.
+    /// The bricks.
     pub bricks: Vec<BrickResult>,
     /// Seams between the bricks; `None` for a single one.
     pub seams: Option<Seams>,

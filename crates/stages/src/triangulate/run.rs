@@ -2,7 +2,7 @@
 
 use super::{
     error::{Names, NetError},
-    lay::{Bricks, Laid, bricks_of, lay, one_brick},
+    lay::{Bricks, Laid, bricks_of, lay, one_brick, without_blunders},
     place::{Placed, place},
     read::NetData,
     result::Triangulation,
@@ -33,20 +33,20 @@ pub(super) fn triangulate(config: &NetConfig, data: &NetData) -> Result<Triangul
     .write())
 }
 
-/// Lays the bricks and places them on the map. Bricks that are not connected become one, and those whose seams, without their
-/// blunders, leave a picture on one point: a brick that hangs on points close together turns freely, and its far ties
-/// look wrong although they are not.
+/// Lays the bricks and places them on the map; bricks that are not connected become one.
 fn lay_and_place(
     config: &NetConfig,
     data: &NetData,
     names: &Names,
 ) -> Result<(Laid, Placed), NetError> {
+    let refused = |error: PlaneError| names.of(error, "picture");
+    let kept = without_blunders(config, data).map_err(refused)?;
     let laid_out = |bricks: &Bricks| {
-        let laid = lay(config, data, names, bricks)?;
-        let placed = place(config, data, &laid).map_err(|error| names.of(error, "picture"))?;
+        let laid = lay(config, &kept, names, bricks)?;
+        let placed = place(config, data, &laid).map_err(refused)?;
         Ok((laid, placed))
     };
-    let (bricks, moved) = bricks_of(config, data);
+    let (bricks, moved) = bricks_of(config, data, &kept.net);
     let (mut laid, placed, remarks) = match laid_out(&bricks) {
         Err(NetError::Underconnected { .. }) if bricks.len() > 1 => {
             let (laid, placed) = laid_out(&one_brick(data))?;

@@ -173,7 +173,7 @@ impl Report<'_> {
     /// Deviations within bricks along the axes of the map, and which of them are flagged.
     fn in_bricks(&self) -> (Vec<Option<Place>>, Vec<bool>) {
         let count = self.data.net.measurements.len();
-        let (mut deviations, mut flagged) = (vec![None; count], vec![false; count]);
+        let (mut deviations, mut flagged) = (vec![None; count], self.laid.removed.clone());
         for (brick, figure) in self.laid.figures.iter().enumerate() {
             let turn = self.placed.bricks[brick].turn;
             let tied = self.tied(figure);
@@ -182,10 +182,6 @@ impl Report<'_> {
             for (index, of) in tied {
                 deviations[index] = Some(of * turn);
                 flagged[index] = of.norm() > limit;
-            }
-            for blunder in &self.laid.blunders[brick] {
-                deviations[blunder.measurement] = Some(blunder.deviation * turn);
-                flagged[blunder.measurement] = true;
             }
         }
         (deviations, flagged)
