@@ -13,7 +13,7 @@ use areograph_testing::moc_file;
 use std::{fs, path::Path, sync::atomic::AtomicBool, time::Instant};
 
 use areograph::{
-    altimetry::ShotFilter,
+    altimetry::{GroundRadius, ShotFilter},
     body::Body,
     config::load_calibration,
     flow::run_calibration,
@@ -104,11 +104,13 @@ fn units(folder: &Path) {
             least_contrast: 1.0,
             limit_m: 60.0,
             seed: 1,
+            ground: GroundRadius::Corrected,
             filter: ShotFilter {
                 classes: vec![1],
                 channels: vec![1, 2, 3, 4],
                 attitude_flags: vec![0, 1],
                 off_nadir_max_rad: 1.5,
+                solar_longitude_rad: None,
             },
         },
         body: Body::Mars,

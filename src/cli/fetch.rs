@@ -33,6 +33,7 @@ use crate::{
 ///   areograph fetch gale.toml
 ///   areograph fetch --into mars --image E02-00665 --dates 2001-03-01,2001-03-09
 ///   areograph fetch --into gusev --box 175,178.2,-15.1,-14.1
+///   areograph fetch --generic-kernels kernels
 ///   areograph fetch gale.toml --audit
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
@@ -54,6 +55,9 @@ pub(super) struct Arguments {
     /// West, east, south and north edge, degrees: a table of the shots in this box, by the Orbital Data Explorer.
     #[arg(long = "box", value_name = "W,E,S,N", value_parser = box_of_shots, allow_hyphen_values = true)]
     edges_deg: Option<[f64; 4]>,
+    /// The latest leap seconds of NAIF's generic kernels into this folder.
+    #[arg(long, value_name = "DIR")]
+    generic_kernels: Option<PathBuf>,
     /// First and last orbit of files of the laser.
     #[arg(long, value_name = "FIRST,LAST", value_parser = wish::orbits)]
     orbits: Vec<[u32; 2]>,

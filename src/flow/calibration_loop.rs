@@ -268,6 +268,7 @@ impl<'a> Lines<'a> {
         shots_within(
             edges,
             &self.config.laser.files,
+            self.config.laser.crossover,
             &self.config.laser.filter,
             SHOTS,
             stop,
@@ -316,6 +317,7 @@ impl<'a> Lines<'a> {
             least_contrast: 1.0,
             limit_m: laser.limit_m,
             seed: u64::from(laser.seed),
+            ground: laser.crossover,
             filter: laser.filter.clone(),
         };
         let request = ModelRequest {

@@ -103,6 +103,7 @@ fn keys(request: &MatchRequest) -> BTreeMap<String, String> {
         ("least_contrast", options.least_contrast.to_string()),
         ("limit_m", options.limit_m.to_string()),
         ("seed", options.seed.to_string()),
+        ("crossover", options.ground.word().to_owned()),
     ];
     keys.map(|(key, value)| (key.to_owned(), value)).into()
 }

@@ -75,6 +75,13 @@ const KERNELS: [(&str, &str, [&str; 2]); 8] = [
 ];
 /// Files of the laser; the second one has the orbits of early March 2001.
 const PEDR: [&str; 3] = ["ap18920l.b", "ap18933l.b", "ap18946l.b"];
+/// Generic kernels: versions of the leap seconds, and files beside them.
+const GENERIC: [(&str, &[u8]); 4] = [
+    ("naif0009.tls", b"until 2008"),
+    ("naif0012.tls", b"until 2016"),
+    ("naif0012.tls.pc", b"until 2016\r\n"),
+    ("latest_leapseconds.tls", b"until 2016"),
+];
 const PEDR_BYTES: usize = 776 * 300;
 const KERNEL_PATH: &str = "/naif/mgsp_1000/data/spk/mgs_ext1.bsp";
 const PEDR_PATH: &str = "/pedr/ap18xxx/ap18933l.b";
@@ -93,6 +100,9 @@ impl Archive {
                 &noise(number, PEDR_BYTES),
             );
         }
+        for (name, text) in GENERIC {
+            write(&root.join("generic/lsk").join(name), text);
+        }
         let server = ArchiveServer::of(&root, listing);
         let archive = Self { folder, server };
         archive.hosts("");
@@ -104,7 +114,7 @@ impl Archive {
         let url = self.server.url();
         let text = format!(
             "contact = 'tester@example.org'\n[network]\nconnect_s = 2\nread_s = 1\nattempts = 3\npause_s = 0.01\npause_max_s = 2\n\
-             [kernels]\nurl = '{url}/naif/'\n[pedr]\nurl = '{url}/pedr/'\nfolders = ['ap18xxx']\n[images]\nurl = '{url}/moc/'\n{more}"
+             [kernels]\nurl = '{url}/naif/'\n[generic]\nurl = '{url}/generic/'\n[pedr]\nurl = '{url}/pedr/'\nfolders = ['ap18xxx']\n[images]\nurl = '{url}/moc/'\n{more}"
         );
         fs::write(self.folder.path().join("hosts.toml"), text).unwrap();
     }
@@ -288,6 +298,38 @@ fn a_plan_states_files_sizes_and_reasons() {
         ),
         "{plan}"
     );
+}
+
+#[test]
+fn generic_kernels_are_the_latest_of_their_listing() {
+    for listing in [Listing::Plain, Listing::Table] {
+        let archive = Archive::new(listing);
+        let arguments = ["--generic-kernels", "generic"];
+        let fetch = || {
+            let mut command = archive.command(&arguments);
+            command.current_dir(archive.folder.path()).output().unwrap()
+        };
+        let first = fetch();
+        assert!(first.status.success(), "{:?}", texts(&first));
+        assert_eq!(files(&archive.path("generic")), ["naif0012.tls"]);
+        let before = archive.server.requests("/generic/lsk/naif0012.tls").len();
+        assert!(fetch().status.success());
+        let after = archive.server.requests("/generic/lsk/naif0012.tls").len();
+        assert_eq!(before, after, "a file that is here is not asked for");
+        // A new version lies beside the former one.
+        write(
+            &archive.path("archive/generic/lsk/naif0013.tls"),
+            b"until 2035",
+        );
+        assert!(fetch().status.success());
+        let found = ["naif0012.tls", "naif0013.tls"];
+        assert_eq!(files(&archive.path("generic")), found);
+        // No listing is no kernel.
+        archive.server.always("/generic/lsk/", Fault::Status(404));
+        let [_, told] = texts(&fetch());
+        assert!(told.contains("HTTP status 404"), "{told}");
+        assert_eq!(files(&archive.path("generic")), found);
+    }
 }
 
 /// Faults after which the right file is there, whole.

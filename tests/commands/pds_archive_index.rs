@@ -69,6 +69,7 @@ fn filter() -> ShotFilter {
         channels: vec![1, 2, 3],
         attitude_flags: vec![0],
         off_nadir_max_rad: 0.02,
+        solar_longitude_rad: None,
     }
 }
 

@@ -283,6 +283,7 @@ fn config() -> SiteConfig {
                 channels: vec![1, 2, 3, 4],
                 attitude_flags: vec![0],
                 off_nadir_max_rad: 0.5,
+                solar_longitude_rad: None,
             },
         },
         windows: vec![WindowConfig {

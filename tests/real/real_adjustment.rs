@@ -523,6 +523,7 @@ fn lola(site: &Site, taken: impl Fn(usize) -> bool) -> LaserSurface {
         .map(|(_, point)| SurfaceShot {
             ground_m: point.ground_m,
             profile: 0,
+            attitude_known: true,
         })
         .collect();
     // Lines of half a metre, of which the network was off by some tens.

@@ -72,6 +72,7 @@ impl Night {
             ("scan_interval_s = 2.0", "scan_interval_s = 0.3"),
             ("min_free_mib = 1024", "min_free_mib = 1"),
             ("nightly = \"no\"", "nightly = \"yes\""),
+            ("# generic_kernels = ", "generic_kernels = "),
             (
                 "# archives = \"archives.toml\"",
                 "archives = \"hosts.toml\"",
@@ -83,7 +84,7 @@ impl Night {
         fs::write(&file, text).unwrap();
         let url = self.server.url();
         let hosts = format!(
-            "[network]\nattempts = 2\npause_s = 0.01\npause_max_s = 1\n[kernels]\nurl = '{url}/naif/'\n[pedr]\nurl = '{url}/pedr/'\n\
+            "[network]\nattempts = 2\npause_s = 0.01\npause_max_s = 1\n[kernels]\nurl = '{url}/naif/'\n[generic]\nurl = '{url}/generic/'\n[pedr]\nurl = '{url}/pedr/'\n\
              folders = ['ap18xxx']\n[images]\nurl = '{url}/moc/'\n[shots]\nurl = '{url}/livegds'\nanswer_s = 20\n"
         );
         write(&self.path("demo/hosts.toml"), hosts.as_bytes());
@@ -96,6 +97,7 @@ impl Night {
             &root.join("naif"),
             &[("LSK", "naif0010.tls", ["", ""], b"text".to_vec())],
         );
+        write(&root.join("generic/lsk/naif0012.tls"), b"leap seconds");
         write(&root.join("pedr/ap18xxx/ap18933l.b"), b"shots");
         write(&root.join("moc/mgsc_1578/index/cumindex.tab"), b"\r\n");
         let heading =
@@ -164,6 +166,8 @@ fn a_night_fetches_what_its_sites_lack() {
         "{words}"
     );
     assert!(!night.table().exists());
+    // Generic kernels come from another host.
+    assert!(night.path("demo/kernels/generic/naif0012.tls").is_file());
     let alerts = night.alerts();
     assert!(alerts.contains(&"fetch_failed".to_owned()), "{alerts:?}");
     let text = "SELECT json_extract(data, '$.text') FROM event WHERE json_extract(data, '$.alert') = 'fetch_failed'";

@@ -24,7 +24,7 @@ use std::{
 };
 
 use areograph::{
-    altimetry::ShotFilter,
+    altimetry::{GroundRadius, ShotFilter},
     body::Body,
     error::Error,
     flow::run_match,
@@ -68,11 +68,13 @@ fn request(search_cells: u32, similarity: Option<Similarity>) -> MatchRequest {
             least_contrast: 1.0,
             limit_m: 60.0,
             seed: 1,
+            ground: GroundRadius::Corrected,
             filter: ShotFilter {
                 classes: vec![1],
                 channels: vec![1, 2, 3, 4],
                 attitude_flags: vec![0, 1],
                 off_nadir_max_rad: 1.5,
+                solar_longitude_rad: None,
             },
         },
         body: Body::Mars,

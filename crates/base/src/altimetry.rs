@@ -4,8 +4,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::body::Datum;
-use crate::time::Et;
+use crate::{body::Datum, season::solar_longitude_rad, time::Et};
 
 /// The clock bias of MOLA: how shot tags become shot times.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -106,6 +105,15 @@ pub enum GroundRadius {
 }
 
 impl GroundRadius {
+    /// Its name in configurations and products.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Corrected => "corrected",
+            Self::Raw => "raw",
+        }
+    }
+
     /// Description, following "the radii".
     #[must_use]
     pub const fn words(self) -> &'static str {
@@ -115,6 +123,10 @@ impl GroundRadius {
         }
     }
 }
+
+/// From this attitude flag of a shot on, its attitude is unknown for it or for a part of its frame, and its footprint
+/// assumes nadir pointing.
+pub const NO_ATTITUDE: u16 = 2;
 
 /// Shots to keep; a shot must pass every test.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -127,6 +139,9 @@ pub struct ShotFilter {
     pub attitude_flags: Vec<u16>,
     /// Largest off-nadir angle, radians.
     pub off_nadir_max_rad: f64,
+    /// First and last areocentric longitude of the Sun, radians from 0 to 2π: the season of Mars; first above last is over 0.
+    /// `None` for all seasons.
+    pub solar_longitude_rad: Option<[f64; 2]>,
 }
 
 impl ShotFilter {
@@ -134,4 +149,18 @@ impl ShotFilter {
     pub const CHANNELS: [u8; 2] = [1, 4];
     /// Upper limit of the largest off-nadir angle, degrees; the lower limit is above 0.
     pub const OFF_NADIR_LIMIT_DEG: f64 = 90.0;
+
+    /// Whether an instant is in the season.
+    #[must_use]
+    pub fn is_in_season(&self, et: Et) -> bool {
+        self.solar_longitude_rad.is_none_or(|[first, last]| {
+            let longitude_rad = solar_longitude_rad(et);
+            let (from, until) = (longitude_rad >= first, longitude_rad <= last);
+            if first <= last {
+                from && until
+            } else {
+                from || until
+            }
+        })
+    }
 }

@@ -29,6 +29,7 @@ pub mod kernel_source;
 pub mod line_times;
 #[cfg(feature = "schema")]
 pub mod schema;
+pub mod season;
 pub mod stored;
 pub mod style;
 pub mod ties;

@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use areograph_base::{
-    altimetry::ShotFilter,
+    altimetry::{GroundRadius, ShotFilter},
     body::Body,
     constants::{CONTROL_SIGMA_MAX_M, SIGMA_MIN},
     error::Error,
@@ -26,6 +26,7 @@ use super::{
         words,
     },
     parse_file,
+    pedr::ground_radius,
     paths::{FILE, Globs},
     problems::Problems,
     read,
@@ -227,6 +228,8 @@ declare_table! {
         seed: u32 = key(whole_from_to(0, u32::MAX)).or(1),
         /// Maximum number of rounds; a calibration that has not converged by then is invalid.
         rounds_max: u32 = key(whole_from_to(1, 100)).or(10),
+        /// Radius of the shots that is that of the ground: corrected by the crossover residuals of the files, or raw.
+        crossover: GroundRadius = key(ground_radius()).or(GroundRadius::Corrected),
         /// Shots to keep.
         filter: ShotFilter = table(),
     }

@@ -12,7 +12,7 @@ use areograph_base::{
 
 use super::{
     declare::{Declare as _, declare_table, key, table},
-    forms::{above_to, list, whole_from_to, words},
+    forms::{Words, above_to, from_to, list, several, whole_from_to, words},
     paths::Globs,
 };
 
@@ -37,10 +37,7 @@ declare_table! {
         ])).or(DatumChoice::Auto),
         /// Radius that every stage takes for the ground: corrected by the crossover residuals of the files (as in Shan,
         /// Lee & Yoon 2002), or raw. The range check reports both; tables of shots have one radius.
-        crossover: GroundRadius = key(words([
-            ("corrected", GroundRadius::Corrected, "where the file has a residual"),
-            ("raw", GroundRadius::Raw, ""),
-        ])).or(GroundRadius::Corrected),
+        crossover: GroundRadius = key(ground_radius()).or(GroundRadius::Corrected),
         /// Shots to keep.
         filter: ShotFilter = table(),
     }
@@ -54,14 +51,31 @@ declare_table! {
         /// Trigger channels. (The MOLA team's grids leave out channel 4.)
         channels = key(list(whole_from_to(ShotFilter::CHANNELS[0], ShotFilter::CHANNELS[1]))).or(vec![1, 2, 3, 4]).map(sorted),
         /// Attitude flags. With 2 (attitude missing for part of the frame) and 3 (for all of it) the footprint
-        /// assumes nadir pointing, which off nadir can be 100 km wrong. 1 has no published meaning; in files
+        /// assumes nadir pointing, which off nadir can be 100 km wrong; the surface counts such profiles as four times as
+        /// uncertain. 1 has no published meaning; in files
         /// before 1998-10 the field is undefined: there, list the values found.
         attitude_flags = key(list(whole_from_to(u16::MIN, u16::MAX))).or(vec![0, 1]).map(sorted),
         /// Largest off-nadir angle of the laser. The default keeps all, because images are taken off nadir too: Shan
         /// et al. 2005, Table 2, has emission angles of up to 22.1 degrees. (The MOLA team's grids stop at 1.0 or 1.2.)
         off_nadir_max_rad as "off_nadir_max_deg" =
             key(above_to(0.0, ShotFilter::OFF_NADIR_LIMIT_DEG)).or(90.0).map(|degrees| degrees * RADIANS_PER_DEGREE),
+        /// First and last areocentric longitude of the Sun: the season of Mars, 0 at the northward equinox; first above last
+        /// is over 0. Without it all seasons.
+        solar_longitude_rad as "solar_longitude_deg" =
+            key(several(from_to(0.0, 360.0), "two numbers [first, last]")).unused("[330.0, 30.0]").map(|season| season.map(|edges| edges.map(|degrees: f64| degrees * RADIANS_PER_DEGREE))),
     }
+}
+
+/// The radius of a shot that is that of the ground.
+pub(super) const fn ground_radius() -> Words<GroundRadius, 2> {
+    words([
+        (
+            GroundRadius::Corrected.word(),
+            GroundRadius::Corrected,
+            "where the file has a residual",
+        ),
+        (GroundRadius::Raw.word(), GroundRadius::Raw, ""),
+    ])
 }
 
 fn sorted<T: Ord>(mut values: Vec<T>) -> Vec<T> {

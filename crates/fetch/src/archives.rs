@@ -21,6 +21,8 @@ pub struct Archives {
     pub network: Network,
     /// Kernels of the mission.
     pub kernels: KernelArchive,
+    /// Kernels of no mission.
+    pub generic: GenericArchive,
     /// Files of the laser.
     pub pedr: PedrArchive,
     /// Images.
@@ -83,6 +85,18 @@ pub struct KernelArchive {
     /// Names of other programs for files of the archive.
     #[serde(default)]
     pub names: BTreeMap<String, String>,
+    /// Source of these values.
+    pub source: String,
+}
+
+/// Kernels of no mission, by listings of their folders.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GenericArchive {
+    /// Root of the folders.
+    pub url: String,
+    /// Folder, beginning and end of the names of the versions of a kernel.
+    pub latest: Vec<[String; 3]>,
     /// Source of these values.
     pub source: String,
 }
@@ -262,6 +276,7 @@ impl Archives {
         let wrong = |problem: String| Err(FetchError::Archives(problem));
         for (key, url) in [
             ("kernels.url", &self.kernels.url),
+            ("generic.url", &self.generic.url),
             ("pedr.url", &self.pedr.url),
             ("images.url", &self.images.url),
         ] {
@@ -284,7 +299,9 @@ impl Archives {
             &self.images.index,
         ];
         let volume = self.kernels.volume.strip_suffix('/');
-        for path in paths.into_iter().map(|path| &**path).chain(volume) {
+        let folders = self.generic.latest.iter().map(|[folder, ..]| &**folder);
+        let paths = paths.into_iter().map(|path| &**path);
+        for path in paths.chain(volume).chain(folders) {
             if !is_path(path) {
                 return wrong(format!("{path:?} is not a path below its url"));
             }
@@ -351,6 +368,10 @@ mod tests {
         for (own, expected) in [
             ("[kernels]\nurl = \"file:///mirror\"", "ends in a slash"),
             ("[kernels]\nindex = \"../x\"", "not a path below"),
+            (
+                "[generic]\nlatest = [[\"..\", \"naif\", \".tls\"]]",
+                "not a path below",
+            ),
             ("[network]\nattempts = 0", "no attempt"),
             ("[network]\nread_s = nan", "outside of 0.001"),
             ("[kernel]\nurl = \"x/\"", "unknown field"),

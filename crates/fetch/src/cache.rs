@@ -18,6 +18,8 @@ use areograph_pds::image_index::{ImageIndex, read_index};
 pub struct Indexes {
     /// Coverage and checksums of kernels.
     pub kernels: bool,
+    /// Listings of kernels of no mission.
+    pub generic: bool,
     /// Listings of files of the laser.
     pub pedr: bool,
     /// The cumulative index of images.
@@ -88,14 +90,27 @@ fn of_images(archives: &Archives) -> [Copy; 2] {
 
 fn of_pedr(archives: &Archives) -> Vec<Copy> {
     let of = &archives.pedr;
-    let page = |folder: &String| Copy {
+    let folders = of.folders.iter();
+    folders
+        .map(|folder| page("pedr", &of.url, folder))
+        .collect()
+}
+
+fn of_generic(archives: &Archives) -> Vec<Copy> {
+    let of = &archives.generic;
+    let folders = of.latest.iter();
+    folders
+        .map(|[folder, ..]| page("generic", &of.url, folder))
+        .collect()
+}
+
+/// The listing of a folder.
+fn page(kind: &str, url: &str, folder: &str) -> Copy {
+    let name = format!("{kind}_{}.html", folder.replace('/', "_"));
+    Copy {
         is_page: true,
-        ..Copy::of(
-            &format!("pedr_{folder}.html"),
-            format!("{}{folder}/", of.url),
-        )
-    };
-    of.folders.iter().map(page).collect()
+        ..Copy::of(&name, format!("{url}{folder}/"))
+    }
 }
 
 impl Indexes {
@@ -106,6 +121,11 @@ impl Indexes {
         }
         if self.images {
             copies.extend(of_images(archives));
+        }
+        if self.generic {
+            copies.extend(of_generic(archives));
+            // Several kernels of one folder.
+            copies.dedup();
         }
         if self.pedr {
             copies.extend(of_pedr(archives));
@@ -170,14 +190,25 @@ impl Cache<'_> {
     /// # Errors
     /// [`FetchError::NoIndex`].
     pub(crate) fn pedr(&self) -> Result<Vec<(String, Vec<Listed>)>> {
-        let folders = &self.archives.pedr.folders;
-        let pages = folders.iter().zip(of_pedr(self.archives));
+        let folders = self.archives.pedr.folders.iter();
+        let pages = folders.zip(of_pedr(self.archives));
         pages
-            .map(|(folder, copy)| {
-                let page = self.read(&copy)?;
-                Ok((folder.clone(), listing(&String::from_utf8_lossy(&page))))
-            })
+            .map(|(folder, copy)| Ok((folder.clone(), self.listed(&copy)?)))
             .collect()
+    }
+
+    /// Files beside each kernel of no mission.
+    ///
+    /// # Errors
+    /// [`FetchError::NoIndex`].
+    pub(crate) fn generic(&self) -> Result<Vec<Vec<Listed>>> {
+        let pages = of_generic(self.archives).into_iter();
+        pages.map(|copy| self.listed(&copy)).collect()
+    }
+
+    fn listed(&self, page: &Copy) -> Result<Vec<Listed>> {
+        let page = self.read(page)?;
+        Ok(listing(&String::from_utf8_lossy(&page)))
     }
 
     /// Images of the mission.

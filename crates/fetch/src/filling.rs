@@ -16,7 +16,10 @@ use crate::{
     folder::Folder,
     outcome::{Done, Outcome, Standing},
     part::Part,
-    plan::{FileKind, Plan, PlannedFile, Wish, find_images, plan_kernels, plan_pedr, plan_shots},
+    plan::{
+        FileKind, Plan, PlannedFile, Wish, find_images, plan_generic, plan_kernels, plan_pedr,
+        plan_shots,
+    },
     state::{Record, State},
     table,
     transfer::{Receiver, Wanted, publish},
@@ -68,6 +71,7 @@ impl<'a> Filling<'a> {
     pub fn indexes_of(wish: &Wish) -> Indexes {
         Indexes {
             kernels: wish.kernels.is_some(),
+            generic: wish.generic.is_some(),
             pedr: wish.pedr.is_some(),
             images: !wish.images.is_empty(),
         }
@@ -103,6 +107,10 @@ impl<'a> Filling<'a> {
                 &cache.kernels()?,
                 &self.archives.kernels,
             ));
+        }
+        if let Some(folder) = &wish.generic {
+            let listed = cache.generic()?;
+            plan.add(plan_generic(folder, &listed, &self.archives.generic));
         }
         if let Some(folder) = &wish.pedr {
             if spans.is_empty() && wish.orbits.is_empty() {

@@ -121,7 +121,11 @@ pub fn largest(values: impl IntoIterator<Item = f64>) -> Option<f64> {
 }
 
 /// The middle of at least one value, the mean of both middles for an even number; their order is lost.
-pub(crate) fn median(values: &mut [f64]) -> f64 {
+///
+/// # Panics
+/// Without a value.
+#[must_use]
+pub fn median(values: &mut [f64]) -> f64 {
     let middle = values.len() / 2;
     let (below, upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
     let upper = *upper;

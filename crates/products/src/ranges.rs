@@ -12,7 +12,10 @@ use super::{
     site::SiteProducts,
     table::{Column, Table, Unit, column, meanings},
 };
-use areograph_base::{altimetry::MolaClock, footprints::Footprint, schema::DocumentSchema};
+use areograph_base::{
+    altimetry::MolaClock, body::Body, footprints::Footprint, schema::DocumentSchema,
+    season::solar_longitude_rad,
+};
 use areograph_config::RangeCheckConfig;
 use areograph_geom::{
     range_residuals::states_spacecraft,
@@ -133,6 +136,9 @@ struct ProfileDocument<'a> {
     orbit: u32,
     et_start_s: f64,
     et_stop_s: f64,
+    /// Areocentric longitude of the Sun at its start, the season of Mars.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    solar_longitude_deg: Option<f64>,
     simultaneous: Vec<SimultaneousImage<'a>>,
     /// Whether it has enough shots to be compared with the limits.
     judged: bool,
@@ -354,6 +360,8 @@ fn profile_document<'a>(
         orbit: profile.orbit,
         et_start_s: profile.interval.start.seconds(),
         et_stop_s: profile.interval.stop.seconds(),
+        solar_longitude_deg: (site.footprints.body == Body::Mars)
+            .then(|| solar_longitude_rad(profile.interval.start).to_degrees()),
         simultaneous: profile
             .simultaneous
             .iter()

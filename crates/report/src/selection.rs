@@ -60,7 +60,7 @@ fn filter(site: &SiteProducts) -> String {
     let filter = &site.config.pedr.filter;
     let join = |values: Vec<String>| values.join(", ");
     format!(
-        "Kept: class {}, trigger channel {}, attitude flag {}, at most {:.1}° off nadir.",
+        "Kept: class {}, trigger channel {}, attitude flag {}, at most {:.1}° off nadir{}.",
         join(filter.classes.iter().map(ToString::to_string).collect()),
         join(filter.channels.iter().map(ToString::to_string).collect()),
         join(
@@ -70,7 +70,11 @@ fn filter(site: &SiteProducts) -> String {
                 .map(ToString::to_string)
                 .collect()
         ),
-        filter.off_nadir_max_rad / RADIANS_PER_DEGREE
+        filter.off_nadir_max_rad / RADIANS_PER_DEGREE,
+        filter.solar_longitude_rad.map_or(String::new(), |edges| {
+            let [first, last] = edges.map(|edge| number(edge / RADIANS_PER_DEGREE, 1));
+            format!(", season Ls {first}° to {last}°")
+        })
     )
 }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use nalgebra::Vector3;
 
 use super::group_profiles::Profile;
-use areograph_base::{footprints::Footprints, frames::BodyFixed};
+use areograph_base::{altimetry::NO_ATTITUDE, footprints::Footprints, frames::BodyFixed};
 use areograph_geom::{
     ellipsoid::spherical_to_xyz_m,
     surface::{
@@ -76,6 +76,7 @@ impl MolaShots {
                         footprints.ground_radius_m(at),
                     ),
                     profile: index,
+                    attitude_known: footprints.attitude_flag[at] < NO_ATTITUDE,
                 });
             }
         }

@@ -7,13 +7,14 @@ use std::{
     sync::atomic::AtomicBool,
 };
 
-use super::{outline_windows::Windows, search_footprints::SearchResult};
+use super::{off_nadir::mark_passes, outline_windows::Windows, search_footprints::SearchResult};
 use areograph_base::{
+    altimetry::NO_ATTITUDE,
     body::{Body, Datum},
     error::{Cause, Result, Stopped},
-    footprints::{Footprint, Footprints, SourceFile},
+    footprints::{AsRead, Footprint, Footprints, SourceFile},
     time::Et,
-    units::wrap_two_pi,
+    units::{RADIANS_PER_DEGREE, wrap_two_pi},
 };
 use areograph_config::{ShotColumns, ShotLayout, ShotTableConfig, WindowConfig};
 use areograph_geom::{
@@ -37,8 +38,6 @@ use areograph_store::{
 const COMPLAINTS_MAX: usize = 1_000;
 /// Classification of ground returns, as in the PEDR: others are rejected.
 const GROUND: i16 = 1;
-/// From this attitude flag on, attitude is unknown for the shot or for a part of its frame.
-const NO_ATTITUDE: u16 = 2;
 
 stage_inputs! {
     /// Tables of shots, and the windows.
@@ -198,6 +197,22 @@ fn empty(body: Body) -> SearchResult {
     }
 }
 
+/// The note on passes off nadir, whose shots get their angle.
+fn passes_off_nadir(footprints: &mut Footprints<AsRead>) -> Option<String> {
+    let passes = mark_passes(footprints).into_iter().map(|pass| {
+        let angle_deg = pass.angle_rad / RADIANS_PER_DEGREE;
+        format!("orbit {} ({angle_deg:.0}°)", pass.orbit)
+    });
+    let passes: Vec<String> = passes.collect();
+    (!passes.is_empty()).then(|| {
+        format!(
+            "passes off nadir, by ranges that are too long for the orbit of the others: {}; their spacecraft was not above \
+             the footprint",
+            passes.join(", ")
+        )
+    })
+}
+
 /// Results of reading all tables.
 struct Gathered<'a> {
     body: Body,
@@ -305,6 +320,9 @@ impl Gathered<'_> {
                  range), because the tables have no position of it"
                     .to_owned(),
             );
+            if !self.layouts.contains(&false) {
+                notes.extend(passes_off_nadir(&mut result.footprints));
+            }
             let flags = result.footprints.attitude_flag.iter();
             let unknown = flags.filter(|flag| **flag >= NO_ATTITUDE).count();
             if unknown > 0 {

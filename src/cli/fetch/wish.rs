@@ -66,6 +66,7 @@ impl Wanted {
         });
         let mut wanted = Self {
             wish: Wish {
+                generic: arguments.generic_kernels.clone(),
                 orbits: arguments.orbits.clone(),
                 spans: spans.collect(),
                 ..Wish::default()
@@ -90,8 +91,9 @@ impl Wanted {
             if wanted.wish.is_empty() && !arguments.index {
                 return Err(FetchError::Nothing.into());
             }
-            // A box has no times, by which kernels and files of the laser are chosen.
-            if wanted.wish.shots.is_empty() || wanted.wish.has_times() {
+            // A box and generic kernels have no times, by which kernels and files of the laser are chosen.
+            let has_others = wanted.wish.generic.is_some() || !wanted.wish.shots.is_empty();
+            if !has_others || wanted.wish.has_times() {
                 wanted.wish.kernels = Some(KernelWish {
                     folder: into.join("kernels"),
                     spk_family: "nav".to_owned(),

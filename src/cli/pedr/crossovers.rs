@@ -2,12 +2,14 @@
 
 use std::path::PathBuf;
 
-use clap::{ArgGroup, Args, ValueEnum};
+use clap::{ArgGroup, Args};
 use serde_json::{Value, json};
 
-use super::{filter::FilterArguments, tables};
+use super::{
+    filter::{FilterArguments, GroundArgument},
+    tables,
+};
 use crate::{
-    altimetry::GroundRadius,
     cli::{output, stop::Signals, windows::WindowArguments},
     config::{MolaSurfaceConfig, WindowConfig},
     error::{Cause, Error, Result},
@@ -41,24 +43,8 @@ pub(super) struct Arguments {
     windows: WindowArguments,
     #[command(flatten)]
     shots: FilterArguments,
-    /// Radii: corrected by the crossover residuals of the files, or raw.
-    #[arg(long, value_enum, default_value = "corrected")]
-    crossover: Radius,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Radius {
-    Corrected,
-    Raw,
-}
-
-impl Radius {
-    const fn ground(self) -> GroundRadius {
-        match self {
-            Self::Corrected => GroundRadius::Corrected,
-            Self::Raw => GroundRadius::Raw,
-        }
-    }
+    #[command(flatten)]
+    ground: GroundArgument,
 }
 
 /// More windows than a shot records.
@@ -99,7 +85,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
         search(&sources, &query, signals.stop(), &mut shots)?;
         shots
     };
-    shots.footprints.ground = arguments.crossover.ground();
+    shots.footprints.ground = arguments.ground.ground();
     let answer = shots.crossed(&windows)?;
     output::json(&answer);
     shots.end()

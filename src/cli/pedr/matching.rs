@@ -4,7 +4,7 @@ use std::{path::PathBuf, process::ExitCode};
 
 use clap::{Args, ValueEnum};
 
-use super::filter::FilterArguments;
+use super::filter::{FilterArguments, GroundArgument};
 use crate::{
     body::Body,
     cli::{
@@ -72,6 +72,8 @@ pub(super) struct Arguments {
     seed: u64,
     #[command(flatten)]
     shots: FilterArguments,
+    #[command(flatten)]
+    ground: GroundArgument,
     /// Match again, even if stored results are up to date.
     #[arg(long)]
     force: bool,
@@ -139,6 +141,7 @@ impl Arguments {
                 least_contrast: self.least_contrast,
                 limit_m: self.limit_m,
                 seed: self.seed,
+                ground: self.ground.ground(),
                 filter: self.shots.filter(),
             },
             body: Body::Mars,

@@ -8,7 +8,7 @@ use std::{
 };
 
 use areograph::{
-    altimetry::{BiasScope, MolaClock, TagSign},
+    altimetry::{BiasScope, GroundRadius, MolaClock, TagSign},
     body::Body,
     config::{self, load_calibration, load_net},
     flow::{
@@ -198,6 +198,7 @@ fn run_model(folder: &Path) -> PathBuf {
             least_contrast: 1.0,
             limit_m: 60.0,
             seed: 1,
+            ground: GroundRadius::Corrected,
             filter: archive_filter(),
         },
         body: Body::Mars,

@@ -16,6 +16,10 @@ declare_table! {
         nightly: bool = key(yes_or_no("", "")).or(false),
         /// Folder of copies of the indexes and of `fetch.json`; created if missing. Site files state where their files lie.
         folder: PathBuf = key(text()).or("fetch".to_owned()).then(|path, keys: &mut Keys<'_, '_>| keys.review().resolve(&path)),
+        /// Folder for the latest leap seconds of NAIF's generic kernels; without it they are not fetched.
+        generic_kernels: Option<PathBuf> = key(text()).unused(r#""kernels/generic""#).then(|path, keys: &mut Keys<'_, '_>| {
+            path.map(|path| keys.review().resolve(&path))
+        }),
         /// Table with other hosts or layouts, in the form of `config/archives/mgs.toml`.
         archives: Option<PathBuf> = key(FILE).unused(r#""archives.toml""#),
         /// Longest time for the indexes, and for the files of one site.

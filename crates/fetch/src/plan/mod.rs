@@ -1,5 +1,6 @@
 //! Which files of the archives times, orbits, images and windows need, and why.
 
+mod generic;
 mod images;
 mod kernels;
 mod pedr;
@@ -12,7 +13,8 @@ use areograph_base::kernel_source::CkQuality;
 use crate::utc::Utc;
 
 pub(crate) use self::{
-    images::find_images, kernels::plan_kernels, pedr::plan_pedr, shots::plan_shots,
+    generic::plan_generic, images::find_images, kernels::plan_kernels, pedr::plan_pedr,
+    shots::plan_shots,
 };
 
 /// What a site needs.
@@ -20,6 +22,8 @@ pub(crate) use self::{
 pub struct Wish {
     /// Kernels, by the times of images and [`Self::spans`]; `None` for no kernels.
     pub kernels: Option<KernelWish>,
+    /// Folder for the latest kernels of no mission; `None` for none of them.
+    pub generic: Option<PathBuf>,
     /// Folder for files of the laser, by [`Self::orbits`], [`Self::spans`] and images; `None` for none of them.
     pub pedr: Option<PathBuf>,
     /// Images.
@@ -36,7 +40,7 @@ impl Wish {
     /// Whether nothing is wanted.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        !self.has_times() && self.shots.is_empty()
+        !self.has_times() && self.shots.is_empty() && self.generic.is_none()
     }
 
     /// Whether anything states a time: an image, a span or orbits.

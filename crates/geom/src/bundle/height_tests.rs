@@ -65,6 +65,7 @@ pub(super) fn surface_with(
                     SurfaceShot {
                         ground_m: up * (point.ground_m.norm() + above_m + wave_m),
                         profile,
+                        attitude_known: true,
                     }
                 })
             })

@@ -21,6 +21,8 @@ const ANGLE_MIN_RAD: f64 = 0.05;
 pub struct Crossover {
     /// Their indices, ascending.
     pub profiles: [usize; 2],
+    /// Factors of the errors that the shots of each share: see [`SurfaceShot::attitude_known`].
+    pub shared: [f64; 2],
     /// Where, Mars-fixed, at the mean of both heights, metres.
     pub place_m: Vector3<f64>,
     /// Height by the first profile minus height by the second, each interpolated between two shots, metres.
@@ -160,13 +162,15 @@ fn crossover(
         axes.try_inverse().unwrap_or_default() * along
     };
     let profiles = segments.map(|segment| segment.from.profile);
-    let (profiles, sign) = if profiles[0] < profiles[1] {
-        (profiles, 1.0)
+    let shared = segments.map(|segment| segment.from.shared);
+    let (profiles, shared, sign) = if profiles[0] < profiles[1] {
+        (profiles, shared, 1.0)
     } else {
-        ([profiles[1], profiles[0]], -1.0)
+        ([profiles[1], profiles[0]], [shared[1], shared[0]], -1.0)
     };
     Crossover {
         profiles,
+        shared,
         place_m,
         difference_m: sign * (heights_m[0] - heights_m[1]),
         sigma_m: variance_m2.sqrt(),

@@ -48,7 +48,7 @@ impl Kriging {
         let matrix = DMatrix::from_fn(shots.len(), shots.len(), |row, column| {
             let mut noise_m2 = 0.0;
             if shots[row].profile == shots[column].profile {
-                noise_m2 += profile_sigma_m.powi(2);
+                noise_m2 += profile_sigma_m.powi(2) * shots[row].shared * shots[column].shared;
             }
             if row == column {
                 noise_m2 += shot_sigma_m.powi(2);
@@ -126,14 +126,14 @@ impl Kriging {
         0.5 * (&covariance + covariance.transpose())
     }
 
-    /// Sums of the weights of each profile, one row a profile.
+    /// Sums of the weights of each profile, times the factor of the errors that its shots share, one row a profile.
     pub(super) fn weights_of_profiles(&self, weights: &Weights) -> DMatrix<f64> {
         let profiles = self.shots.iter().map(|shot| shot.profile + 1).max();
         let places = weights.of_shots.ncols();
         let mut sums = DMatrix::zeros(profiles.unwrap_or_default(), places);
         for (shot, row) in self.shots.iter().zip(weights.of_shots.row_iter()) {
             let mut sum = sums.row_mut(shot.profile);
-            sum += row;
+            sum += row * shot.shared;
         }
         sums
     }

@@ -22,7 +22,7 @@
 //!         let north_rad = f64::from(shot) * 300.0 / 3_396_190.0;
 //!         let up = Vector3::new(north_rad.cos(), 0.0, north_rad.sin());
 //!         let ground_m = on_ellipsoid_m(Body::Mars.model(), &up) + 50.0 * up;
-//!         SurfaceShot { ground_m, profile: 0 }
+//!         SurfaceShot { ground_m, profile: 0, attitude_known: true }
 //!     })
 //!     .collect();
 //! let surface = LaserSurface::new(&shots, &[], &SurfaceOptions::default())?;
@@ -58,6 +58,9 @@ const SHOTS_MAX: usize = 1500;
 const NEAR_M: f64 = 3_000.0;
 /// Minimum number of shots of a surface.
 const SHOTS_MIN: usize = 10;
+/// Errors that a profile of unknown attitude shares, over those of others: robust spread of their crossovers at a real window
+/// near the south pole, 2.9 against 0.7 m.
+const UNKNOWN_ATTITUDE: f64 = 4.0;
 /// Half the baseline of gradients, metres: less than a spot of the laser.
 const GRADIENT_STEP_M: f64 = 30.0;
 
@@ -68,6 +71,20 @@ pub struct SurfaceShot {
     pub ground_m: Vector3<f64>,
     /// Index of its profile.
     pub profile: usize,
+    /// Whether the direction of the laser is known, as the attitude flag of its file states it. Where it is not, errors that
+    /// its profile shares are larger, in plan and along the radius.
+    pub attitude_known: bool,
+}
+
+impl SurfaceShot {
+    /// Factor of the errors that its profile shares.
+    const fn shared(&self) -> f64 {
+        if self.attitude_known {
+            1.0
+        } else {
+            UNKNOWN_ATTITUDE
+        }
+    }
 }
 
 /// Uncertainties of a surface of laser shots.
@@ -372,6 +389,8 @@ struct Placed {
     plan_m: Vector2<f64>,
     height_m: f64,
     profile: usize,
+    /// Factor of the errors that its profile shares.
+    shared: f64,
 }
 
 impl Placed {
@@ -380,6 +399,7 @@ impl Placed {
             plan_m: plan.of(&shot.ground_m),
             height_m: height_m(model, &shot.ground_m).0,
             profile: shot.profile,
+            shared: shot.shared(),
         }
     }
 }

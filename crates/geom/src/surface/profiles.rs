@@ -130,9 +130,13 @@ fn worst(crossovers: &[Crossover], priors: &ProfilePriors) -> Option<LeftOut> {
     let mut by_profile: BTreeMap<usize, Vec<(usize, f64, f64)>> = BTreeMap::new();
     for crossover in crossovers {
         let [first, second] = crossover.profiles;
-        // The other profile has a shift as well.
-        let variance_m2 = crossover.sigma_m.powi(2) + priors.radial_sigma_m.powi(2);
-        for (profile, other, sign) in [(first, second, 1.0), (second, first, -1.0)] {
+        let [own, others] = crossover.shared;
+        for (profile, other, sign, of_other) in
+            [(first, second, 1.0, others), (second, first, -1.0, own)]
+        {
+            // The other profile has a shift as well.
+            let shift_m = priors.radial_sigma_m * of_other;
+            let variance_m2 = crossover.sigma_m.powi(2) + shift_m.powi(2);
             let of_profile = by_profile.entry(profile).or_default();
             of_profile.push((other, sign * crossover.difference_m, variance_m2));
         }
@@ -140,6 +144,7 @@ fn worst(crossovers: &[Crossover], priors: &ProfilePriors) -> Option<LeftOut> {
     let all = by_profile.iter().filter_map(|(profile, crossovers)| {
         let others: BTreeSet<usize> = crossovers.iter().map(|(other, ..)| *other).collect();
         let (above_m, sigma_m) = robust_mean(crossovers);
+        // Unknown attitude explains a shift, but does not make its profile useful.
         let sigma_m = sigma_m.hypot(priors.radial_sigma_m);
         (others.len() >= EVIDENCE_MIN).then(|| LeftOut {
             profile: *profile,
@@ -199,11 +204,9 @@ fn radial_sigma_m(crossovers: &[Crossover], prior_m: f64) -> f64 {
             return prior_m;
         }
         let limit_m2 = (SHIFT_MAX_SIGMAS * sigma_m).powi(2);
-        let shifts = net
-            .shifts
-            .iter()
-            .map(|shift_m| shift_m.powi(2).min(limit_m2));
-        let squares_m2 = shifts.sum::<f64>() + net.covariance_m2().trace();
+        let shifts = net.shifts.iter().zip(&net.shared);
+        let shifts = shifts.map(|(shift_m, shared)| (shift_m / shared).powi(2).min(limit_m2));
+        let squares_m2 = shifts.sum::<f64>() + net.variances_m2().sum::<f64>();
         let profiles = net.profiles.len() as f64;
         let prior_m2 = PRIOR_PROFILES * prior_m.powi(2);
         sigma_m = ((squares_m2 + prior_m2) / (profiles + PRIOR_PROFILES)).sqrt();
@@ -216,6 +219,8 @@ struct Net<'a> {
     crossovers: &'a [Crossover],
     /// Each with the number of its crossovers.
     profiles: BTreeMap<usize, usize>,
+    /// Of each profile, the factor of the errors that its shots share.
+    shared: Vec<f64>,
     /// Indices of the profiles of each crossover.
     columns: Vec<[usize; 2]>,
     /// Robust weights.
@@ -236,8 +241,16 @@ impl<'a> Net<'a> {
         let columns = crossovers
             .iter()
             .map(|crossover| crossover.profiles.map(|profile| index[&profile]));
+        let columns: Vec<[usize; 2]> = columns.collect();
+        let mut shared = vec![1.0; profiles.len()];
+        for (crossover, columns) in crossovers.iter().zip(&columns) {
+            for (column, of) in columns.iter().zip(crossover.shared) {
+                shared[*column] = f64::max(shared[*column], of);
+            }
+        }
         Self {
-            columns: columns.collect(),
+            shared,
+            columns,
             weights: vec![1.0; crossovers.len()],
             unknowns: sigmas_m.len(),
             shifts: DVector::zeros(sigmas_m.len() * profiles.len()),
@@ -263,7 +276,8 @@ impl<'a> Net<'a> {
         let mut normal = DMatrix::zeros(unknowns, unknowns);
         let mut right = DVector::zeros(unknowns);
         for index in 0..unknowns {
-            normal[(index, index)] = sigmas_m[index % self.unknowns].powi(-2);
+            let sigma_m = sigmas_m[index % self.unknowns] * self.shared[index / self.unknowns];
+            normal[(index, index)] = sigma_m.powi(-2);
         }
         for ((crossover, columns), weight) in
             self.crossovers.iter().zip(&self.columns).zip(&self.weights)
@@ -305,6 +319,15 @@ impl<'a> Net<'a> {
         let mut row = of_profile((first, 1.0));
         row.extend(of_profile((second, -1.0)));
         row
+    }
+
+    /// Variances of the shifts of a profile of known attitude; with one unknown a profile.
+    fn variances_m2(&self) -> impl Iterator<Item = f64> {
+        let variances_m2 = self.covariance_m2().diagonal();
+        let shared = self.shared.clone().into_iter();
+        shared
+            .enumerate()
+            .map(move |(index, shared)| variances_m2[index] / shared.powi(2))
     }
 
     fn covariance_m2(&self) -> DMatrix<f64> {
@@ -353,6 +376,7 @@ mod tests {
                 shots.push(SurfaceShot {
                     ground_m: on_ellipsoid_m(Body::Mars.model(), &up) + height_m * up,
                     profile,
+                    attitude_known: true,
                 });
             }
         }

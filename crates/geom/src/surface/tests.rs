@@ -10,6 +10,7 @@ fn profile(heights_m: &[f64], spacing_m: f64, east_m: f64, profile: usize) -> Ve
     let shot = |(shot, height_m): (usize, &f64)| SurfaceShot {
         ground_m: place(east_m, shot as f64 * spacing_m, *height_m),
         profile,
+        attitude_known: true,
     };
     heights_m.iter().enumerate().map(shot).collect()
 }

@@ -8,6 +8,7 @@ use crate::pedr::{Complaint, Reason, SpoiledShots};
 use areograph_base::{
     altimetry::ShotFilter,
     footprints::{AsRead, Footprint, Footprints},
+    time::Et,
 };
 
 /// Reason for the rejection of a shot inside a window; the first that applies counts.
@@ -26,6 +27,8 @@ pub enum ShotRejection {
     Attitude,
     /// Off-nadir angle too large.
     OffNadir,
+    /// Season not accepted.
+    Season,
 }
 
 impl ShotRejection {
@@ -53,6 +56,8 @@ impl ShotRejection {
             Some(Self::Attitude)
         } else if !(shot.off_nadir_rad.abs() <= filter.off_nadir_max_rad) {
             Some(Self::OffNadir)
+        } else if !filter.is_in_season(Et::from_seconds(shot.et_tag_s)) {
+            Some(Self::Season)
         } else {
             None
         }
@@ -68,6 +73,7 @@ impl fmt::Display for ShotRejection {
             Self::Channel => "channel",
             Self::Attitude => "attitude flag",
             Self::OffNadir => "off-nadir angle",
+            Self::Season => "season",
         })
     }
 }

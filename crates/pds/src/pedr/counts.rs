@@ -5,10 +5,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::{Complaint, FieldGuard, File, SHOTS};
+use areograph_base::altimetry::NO_ATTITUDE;
 use areograph_geom::statistics::Summary;
-
-/// Below this attitude flag the footprint is where the beam pointed.
-const NO_ATTITUDE: u16 = 2;
 
 /// Counts of a file. Those by class, channel, flag and model include valid returned shots only.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]

@@ -4,7 +4,10 @@ use super::{
     Frame, RecordError, SHOTS,
     bounds::{MID_RADIUS_M, RADIUS_CM},
 };
-use areograph_base::units::{METRES_PER_CM, RADIANS_PER_MICRODEGREE};
+use areograph_base::{
+    altimetry::NO_ATTITUDE,
+    units::{METRES_PER_CM, RADIANS_PER_MICRODEGREE},
+};
 use areograph_geom::ellipsoid::{local_axes, spherical_to_xyz_m};
 
 /// Range and distance between spacecraft and footprint come from one orbit and agree to about a metre; this tolerance,
@@ -20,8 +23,6 @@ const PARALLAX: f64 = 0.02;
 const TANGENT_MAX: f64 = 10.0;
 /// Nearer to a pole than this, a frame that is straight in longitude and latitude has no direction, radians.
 const POLE_RAD: f64 = 0.5e6 * RADIANS_PER_MICRODEGREE;
-/// From this attitude flag on, the footprint assumes nadir pointing.
-const NO_ATTITUDE: u16 = 2;
 
 /// Shots of a frame that contradict the record.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -39,7 +39,14 @@ async fn fetch<W: Workers>(core: &Core<W>) -> Stored<()> {
     let config = core.shared.config();
     let mut failures: Vec<String> = Vec::new();
     let mut fetched = 0_usize;
-    match run(core, &config, None).await {
+    if let Some(folder) = &config.fetch.generic_kernels {
+        match run(core, &config, What::Generic(folder)).await {
+            Outcome::Stopped => return Ok(()),
+            Outcome::Failed(why) => failures.push(format!("generic kernels: {why}")),
+            Outcome::Done => {}
+        }
+    }
+    match run(core, &config, What::Indexes).await {
         Outcome::Stopped => return Ok(()),
         // Without its hosts, every site would wait for them in vain.
         Outcome::Failed(why) => failures.push(format!("indexes: {why}")),
@@ -47,7 +54,7 @@ async fn fetch<W: Workers>(core: &Core<W>) -> Stored<()> {
             let folders = config.inputs.sites.clone();
             let sites = spawn_blocking(move || site_files(&folders)).await;
             for site in sites.unwrap_or_default() {
-                match run(core, &config, Some(&site)).await {
+                match run(core, &config, What::Site(&site)).await {
                     Outcome::Stopped => return Ok(()),
                     Outcome::Done => fetched += 1,
                     Outcome::Failed(why) => {
@@ -112,14 +119,25 @@ enum Outcome {
     Stopped,
 }
 
-/// Fetches the indexes, or the files of a site by the indexes that are there.
-async fn run<W: Workers>(core: &Core<W>, config: &ServiceConfig, site: Option<&Path>) -> Outcome {
+/// What a process fetches.
+#[derive(Debug, Clone, Copy)]
+enum What<'a> {
+    /// Copies of the indexes.
+    Indexes,
+    /// The latest generic kernels, into a folder.
+    Generic(&'a Path),
+    /// The files of a site, by the indexes that are there.
+    Site(&'a Path),
+}
+
+async fn run<W: Workers>(core: &Core<W>, config: &ServiceConfig, what: What<'_>) -> Outcome {
     let fetch = &config.fetch;
     let mut command = Command::new(&core.shared.program);
     command.args(["--quiet", "fetch"]);
-    match site {
-        Some(site) => command.arg(site).arg("--offline-index"),
-        None => command.arg("--index"),
+    match what {
+        What::Indexes => command.arg("--index"),
+        What::Generic(folder) => command.arg("--generic-kernels").arg(folder),
+        What::Site(site) => command.arg(site).arg("--offline-index"),
     };
     command.arg("--into").arg(&fetch.folder);
     if let Some(archives) = &fetch.archives {

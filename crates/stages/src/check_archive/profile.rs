@@ -378,6 +378,7 @@ mod tests {
                 channels: Vec::new(),
                 attitude_flags: Vec::new(),
                 off_nadir_max_rad: 0.0,
+                solar_longitude_rad: None,
             },
         );
         let clock = MolaClock {

@@ -57,7 +57,7 @@ pub use self::{
 };
 use super::{convert_datum::ConvertDatum, line_camera::LineCamera};
 use areograph_base::{
-    altimetry::ShotFilter,
+    altimetry::{GroundRadius, ShotFilter},
     error::{Result, Stopped},
 };
 use areograph_geom::{ellipsoid::spherical_to_xyz_m, height_grid::HeightGrid, statistics::Summary};
@@ -187,6 +187,7 @@ pub fn match_model(
 pub fn shots_within(
     edges_rad: [f64; 4],
     pedr: &[PathBuf],
+    ground: GroundRadius,
     filter: &ShotFilter,
     most: usize,
     stop: &AtomicBool,
@@ -200,7 +201,7 @@ pub fn shots_within(
         radius_m: 0.0,
         heights_m: vec![f32::NAN],
     };
-    let shots = shots_over(&grid, pedr, filter, stop)?.shots;
+    let shots = shots_over(&grid, pedr, ground, filter, stop)?.shots;
     if shots.is_empty() {
         return Err(no_shots("the ground of the images", edges_rad).into());
     }
@@ -240,7 +241,7 @@ fn matched(
     stop: &AtomicBool,
 ) -> Result<(LaserMatch, UnitShots)> {
     let (grid, options) = (asked.grid, asked.options);
-    let shots = shots_over(grid, asked.pedr, &options.filter, stop)?;
+    let shots = shots_over(grid, asked.pedr, options.ground, &options.filter, stop)?;
     if shots.shots.is_empty() {
         return Err(no_shots("the model", grid.edges_rad()).into());
     }

@@ -6,7 +6,10 @@ use serde::{Deserialize, Serialize};
 
 use super::{similarity::Similarity, surface::SimilaritySurface};
 use crate::{judge::Verdict, line_camera::LineCamera};
-use areograph_base::{altimetry::ShotFilter, body::Body};
+use areograph_base::{
+    altimetry::{GroundRadius, ShotFilter},
+    body::Body,
+};
 use areograph_geom::height_grid::HeightGrid;
 
 /// How laser profiles are matched with a terrain model. Li et al. 2023 and its published program have 15 points, 1000 m², 70 cells,
@@ -30,6 +33,8 @@ pub struct MatchOptions {
     pub limit_m: f64,
     /// Seed of the clusters.
     pub seed: u64,
+    /// Radius of a shot that is that of the ground.
+    pub ground: GroundRadius,
     /// Shots that are taken.
     pub filter: ShotFilter,
 }

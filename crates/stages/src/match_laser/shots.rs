@@ -8,7 +8,7 @@ use super::{
 };
 use crate::convert_datum::DatumTurn;
 use areograph_base::{
-    altimetry::ShotFilter,
+    altimetry::{GroundRadius, ShotFilter},
     error::{Error, Locate as _, Result},
     footprints::{AsRead, Footprints},
     units::wrap_two_pi,
@@ -91,6 +91,7 @@ pub(super) struct Shots {
 pub(super) fn shots_over(
     grid: &HeightGrid,
     paths: &[std::path::PathBuf],
+    ground: GroundRadius,
     filter: &ShotFilter,
     stop: &AtomicBool,
 ) -> Result<Shots> {
@@ -118,6 +119,7 @@ pub(super) fn shots_over(
     let query = Query::new(vec![region], filter, Judged::Near);
     let mut gathered = Gathered {
         grid,
+        ground,
         names: sources
             .iter()
             .map(|source| file_name(source.path()))
@@ -144,6 +146,7 @@ pub(super) fn shots_over(
 /// Takes shots as they are found.
 struct Gathered<'a> {
     grid: &'a HeightGrid,
+    ground: GroundRadius,
     names: Vec<String>,
     turns: Vec<DatumTurn>,
     seen: Seen,
@@ -189,7 +192,8 @@ impl Gathered<'_> {
 }
 
 impl Sink for Gathered<'_> {
-    fn found(&mut self, file: usize, found: Found) -> Result<()> {
+    fn found(&mut self, file: usize, mut found: Found) -> Result<()> {
+        found.footprints.ground = self.ground;
         self.shots.complaint_count += found.complaints.len() as u64;
         for complaint in &found.complaints {
             if self.shots.complaints.len() < COMPLAINTS_MAX {
@@ -265,6 +269,7 @@ mod tests {
             let names: Vec<String> = files.clone().map(|file| source(file).name).collect();
             let mut gathered = Gathered {
                 grid: &grid,
+                ground: GroundRadius::Corrected,
                 names: names.clone(),
                 turns: Vec::new(),
                 seen: Seen::default(),
