@@ -163,7 +163,7 @@ impl Archive {
             channels: vec![1, 2, 3, 4],
             attitude_flags: vec![0, 1],
             off_nadir_max_rad: TAU,
-            solar_longitude_rad: None,
+            solar_longitude_rad: ShotFilter::ALL_SEASONS,
         };
         let query = Query::new(windows.to_vec(), &filter, judged);
         let mut count = Count::default();

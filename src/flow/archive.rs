@@ -125,7 +125,7 @@ pub fn archive_filter() -> ShotFilter {
         channels: vec![1, 2, 3, 4],
         attitude_flags: vec![0, 1],
         off_nadir_max_rad: 90.0 * RADIANS_PER_DEGREE,
-        solar_longitude_rad: None,
+        solar_longitude_rad: ShotFilter::ALL_SEASONS,
     }
 }
 

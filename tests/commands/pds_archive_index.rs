@@ -69,7 +69,7 @@ fn filter() -> ShotFilter {
         channels: vec![1, 2, 3],
         attitude_flags: vec![0],
         off_nadir_max_rad: 0.02,
-        solar_longitude_rad: None,
+        solar_longitude_rad: ShotFilter::ALL_SEASONS,
     }
 }
 

@@ -283,7 +283,7 @@ fn config() -> SiteConfig {
                 channels: vec![1, 2, 3, 4],
                 attitude_flags: vec![0],
                 off_nadir_max_rad: 0.5,
-                solar_longitude_rad: None,
+                solar_longitude_rad: ShotFilter::ALL_SEASONS,
             },
         },
         windows: vec![WindowConfig {

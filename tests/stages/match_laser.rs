@@ -74,7 +74,7 @@ fn request(search_cells: u32, similarity: Option<Similarity>) -> MatchRequest {
                 channels: vec![1, 2, 3, 4],
                 attitude_flags: vec![0, 1],
                 off_nadir_max_rad: 1.5,
-                solar_longitude_rad: None,
+                solar_longitude_rad: ShotFilter::ALL_SEASONS,
             },
         },
         body: Body::Mars,

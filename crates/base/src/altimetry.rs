@@ -140,8 +140,7 @@ pub struct ShotFilter {
     /// Largest off-nadir angle, radians.
     pub off_nadir_max_rad: f64,
     /// First and last areocentric longitude of the Sun, radians from 0 to 2π: the season of Mars; first above last is over 0.
-    /// `None` for all seasons.
-    pub solar_longitude_rad: Option<[f64; 2]>,
+    pub solar_longitude_rad: [f64; 2],
 }
 
 impl ShotFilter {
@@ -150,17 +149,54 @@ impl ShotFilter {
     /// Upper limit of the largest off-nadir angle, degrees; the lower limit is above 0.
     pub const OFF_NADIR_LIMIT_DEG: f64 = 90.0;
 
+    /// The whole year of Mars.
+    pub const ALL_SEASONS: [f64; 2] = [0.0, std::f64::consts::TAU];
+
+    /// Whether the filter selects a season.
+    #[must_use]
+    pub fn has_season(&self) -> bool {
+        /// Degrees to radians round.
+        const ROUNDING_RAD: f64 = 1e-12;
+        let [first, last] = self.solar_longitude_rad;
+        first > ROUNDING_RAD || last < Self::ALL_SEASONS[1] - ROUNDING_RAD
+    }
+
     /// Whether an instant is in the season.
     #[must_use]
     pub fn is_in_season(&self, et: Et) -> bool {
-        self.solar_longitude_rad.is_none_or(|[first, last]| {
-            let longitude_rad = solar_longitude_rad(et);
-            let (from, until) = (longitude_rad >= first, longitude_rad <= last);
-            if first <= last {
-                from && until
+        let [first, last] = self.solar_longitude_rad;
+        let longitude_rad = || solar_longitude_rad(et);
+        !self.has_season()
+            || if first <= last {
+                (first..=last).contains(&longitude_rad())
             } else {
-                from || until
+                !(last..first).contains(&longitude_rad())
             }
-        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_season_may_be_over_0_and_the_whole_year_is_none() {
+        // 1999-01-29, Ls 90°; seconds past J2000.
+        let solstice = Et::from_seconds(-337.0 * 86_400.0);
+        let kept = |edges_deg: [f64; 2]| {
+            let filter = ShotFilter {
+                classes: Vec::new(),
+                channels: Vec::new(),
+                attitude_flags: Vec::new(),
+                off_nadir_max_rad: 1.0,
+                solar_longitude_rad: edges_deg.map(f64::to_radians),
+            };
+            (filter.has_season(), filter.is_in_season(solstice))
+        };
+        assert_eq!(kept([0.0, 360.0]), (false, true));
+        assert_eq!(kept([80.0, 100.0]), (true, true));
+        assert_eq!(kept([100.0, 80.0]), (true, false));
+        assert_eq!(kept([300.0, 100.0]), (true, true));
+        assert_eq!(kept([300.0, 80.0]), (true, false));
     }
 }

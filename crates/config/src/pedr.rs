@@ -60,9 +60,9 @@ declare_table! {
         off_nadir_max_rad as "off_nadir_max_deg" =
             key(above_to(0.0, ShotFilter::OFF_NADIR_LIMIT_DEG)).or(90.0).map(|degrees| degrees * RADIANS_PER_DEGREE),
         /// First and last areocentric longitude of the Sun: the season of Mars, 0 at the northward equinox; first above last
-        /// is over 0. Without it all seasons.
+        /// is over 0. The default is all seasons.
         solar_longitude_rad as "solar_longitude_deg" =
-            key(several(from_to(0.0, 360.0), "two numbers [first, last]")).unused("[330.0, 30.0]").map(|season| season.map(|edges| edges.map(|degrees: f64| degrees * RADIANS_PER_DEGREE))),
+            key(several(from_to(0.0, 360.0), "two numbers [first, last]")).or([0.0, 360.0]).map(|season| season.map(|degrees| degrees * RADIANS_PER_DEGREE)),
     }
 }
 

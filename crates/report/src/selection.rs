@@ -71,10 +71,13 @@ fn filter(site: &SiteProducts) -> String {
                 .collect()
         ),
         filter.off_nadir_max_rad / RADIANS_PER_DEGREE,
-        filter.solar_longitude_rad.map_or(String::new(), |edges| {
+        if filter.has_season() {
+            let edges = filter.solar_longitude_rad;
             let [first, last] = edges.map(|edge| number(edge / RADIANS_PER_DEGREE, 1));
             format!(", season Ls {first}° to {last}°")
-        })
+        } else {
+            String::new()
+        }
     )
 }
 

@@ -24,8 +24,8 @@ pub(super) struct FilterArguments {
     #[arg(long, value_name = "DEGREES", default_value = "90", value_parser = above_to(0.0, ShotFilter::OFF_NADIR_LIMIT_DEG), allow_negative_numbers = true)]
     off_nadir_max_deg: f64,
     /// First and last areocentric longitude of the Sun, degrees: the season of Mars; first above last is over 0.
-    #[arg(long, value_name = "FIRST,LAST", value_parser = season)]
-    solar_longitude_deg: Option<[f64; 2]>,
+    #[arg(long, value_name = "FIRST,LAST", default_value = "0,360", value_parser = season)]
+    solar_longitude_deg: [f64; 2],
 }
 
 impl FilterArguments {
@@ -37,7 +37,7 @@ impl FilterArguments {
             off_nadir_max_rad: self.off_nadir_max_deg * RADIANS_PER_DEGREE,
             solar_longitude_rad: self
                 .solar_longitude_deg
-                .map(|edges| edges.map(|degrees| degrees * RADIANS_PER_DEGREE)),
+                .map(|degrees| degrees * RADIANS_PER_DEGREE),
         }
     }
 }

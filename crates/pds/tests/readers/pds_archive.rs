@@ -40,7 +40,7 @@ fn filter() -> ShotFilter {
         channels: vec![1, 2, 3, 4],
         attitude_flags: vec![0, 3],
         off_nadir_max_rad: 1.0,
-        solar_longitude_rad: None,
+        solar_longitude_rad: ShotFilter::ALL_SEASONS,
     }
 }
 

@@ -309,7 +309,7 @@ mod tests {
                 channels: Vec::new(),
                 attitude_flags: Vec::new(),
                 off_nadir_max_rad: 0.0,
-                solar_longitude_rad: None,
+                solar_longitude_rad: ShotFilter::ALL_SEASONS,
             },
             kernels: Vec::new(),
         }
