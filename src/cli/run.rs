@@ -22,7 +22,6 @@ use crate::{
     },
     products::REPORT,
     store::{hashes::HashCache, manifest::Manifest, publish::read_manifest},
-    verdict::NOT_TESTED,
 };
 
 /// Runs sites from kernels to validated products in `<out>/<site>`.
@@ -240,13 +239,7 @@ fn print_outcome(outcome: &SiteOutcome) {
     for check in verdict.key_checks() {
         output::line(format_args!("  {check}"));
     }
-    // Of an invalid site the reasons matter.
-    if verdict.valid && !verdict.untested.is_empty() {
-        output::line(format_args!("  {NOT_TESTED}"));
-        for phrase in &verdict.untested {
-            output::line(format_args!("    {phrase}"));
-        }
-    }
+    untested(verdict);
 }
 
 /// The report of the only site that has products, or the page over all of them.

@@ -9,6 +9,7 @@ use crate::{
     error::{Kind, Result},
     flow::SingleOutcome,
     store::manifest::Manifest,
+    verdict::{NOT_TESTED, Verdict},
 };
 
 /// Name of such a flow in its answer.
@@ -64,12 +65,23 @@ pub(super) fn answer(
     }
 }
 
-/// Prints reasons and remarks.
+/// Prints reasons, remarks, and what is not tested.
 fn tell(manifest: &Manifest) {
     for reason in &manifest.verdict.reasons {
         output::line(format_args!("  invalid: {reason}"));
     }
     for remark in &manifest.verdict.remarks {
         output::line(format_args!("  remark: {remark}"));
+    }
+    untested(&manifest.verdict);
+}
+
+/// Prints errors that no datum of a valid result can show; of an invalid one the reasons matter.
+pub(super) fn untested(verdict: &Verdict) {
+    if verdict.valid && !verdict.untested.is_empty() {
+        output::line(format_args!("  {NOT_TESTED}"));
+        for phrase in &verdict.untested {
+            output::line(format_args!("    {phrase}"));
+        }
     }
 }

@@ -20,7 +20,7 @@ use crate::{
 };
 
 /// Raised when the layout of the products of a net changes.
-const METHOD: u32 = 3;
+const METHOD: u32 = 4;
 
 /// Triangulates a net and publishes its products in `<out>/<net>`, if an input has changed since the last run.
 ///

@@ -190,6 +190,7 @@ impl Site {
         let verdict = judge(&Evidence {
             wording: self.config.wording(),
             footprints: searched.then_some(self.footprints.len()),
+            ground: self.footprints.ground_choice(),
             ranges: &self.ranges,
             limits: &self.config.limits,
             range_limits: &self.config.range_check,

@@ -4,3 +4,4 @@ mod changes;
 #[path = "../common/mod.rs"]
 mod common;
 mod killed;
+mod killed_writers;

@@ -11,7 +11,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Heading of [`Verdict::untested`] on pages and in messages.
-pub const NOT_TESTED: &str = "Not tested by the data of this site:";
+pub const NOT_TESTED: &str = "Not tested by the data:";
 
 /// Whether the products are within the limits of the configuration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

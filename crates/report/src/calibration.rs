@@ -61,7 +61,9 @@ fn lead(config: &CalibrationConfig, of: &Calibration) -> String {
         words = format!("{}. {words}", config.description);
     }
     let body = paragraph(&words) + &list(&of.verdict.reasons) + &list(&of.verdict.remarks);
-    verdict(tone, &headline, &body) + &checks::listed(&of.verdict.checks)
+    verdict(tone, &headline, &body)
+        + &untested(&of.verdict.untested)
+        + &checks::listed(&of.verdict.checks)
 }
 
 fn stated(of: &HeldBack) -> String {

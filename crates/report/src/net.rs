@@ -2,7 +2,7 @@
 
 use super::{
     checks,
-    html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, verdict},
+    html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, untested, verdict},
     plots::{
         Arrow, Arrows, Extent, GREY, Panel, Plot, Series, figure, label, magnification, thinned,
     },
@@ -63,7 +63,9 @@ fn lead(config: &NetConfig, net: &Triangulation) -> String {
         words = format!("{}. {words}", config.description);
     }
     let body = paragraph(&words) + &list(&net.verdict.reasons) + &list(&net.verdict.remarks);
-    verdict(tone, &headline, &body) + &checks::listed(&net.verdict.checks)
+    verdict(tone, &headline, &body)
+        + &untested(&net.verdict.untested)
+        + &checks::listed(&net.verdict.checks)
 }
 
 /// Steps of the method, by the paper's names.

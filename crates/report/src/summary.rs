@@ -3,13 +3,13 @@
 use super::{
     checks,
     heights::{WITHHELD_BECAUSE, is_open, place_by},
-    html::{Tone, counted, escape, list, paragraph, verdict},
+    html::{Tone, counted, escape, list, paragraph, untested, verdict},
     map,
     misregistration::{BeforeAfter, by_footprints},
     numbers::{number, signed, whole},
     source::traced,
 };
-use areograph_base::{error::Result, footprints::AdjustmentModel, verdict::NOT_TESTED};
+use areograph_base::{error::Result, footprints::AdjustmentModel};
 use areograph_products::SiteProducts;
 use areograph_stages::{
     compare_pairs::PairComparison,
@@ -50,17 +50,6 @@ pub(super) fn lead(site: &SiteProducts) -> Result<String> {
     );
     // The user's text is not changed.
     Ok(about(site) + &site.config.wording().of(found))
-}
-
-/// Errors that no datum of the site can show.
-fn untested(phrases: &[String]) -> String {
-    if phrases.is_empty() {
-        return String::new();
-    }
-    format!(
-        "<p class=\"about\"><b>{NOT_TESTED}</b></p>\n{}",
-        list(phrases)
-    )
 }
 
 fn headline(site: &SiteProducts) -> String {

@@ -26,7 +26,10 @@ use super::{
     read_ties::Ties,
     tag_times::{Disagreement, ImageTimes},
 };
-use areograph_base::wording::{Wording, signed, with_minus};
+use areograph_base::{
+    altimetry::GroundRadius,
+    wording::{Wording, signed, with_minus},
+};
 use areograph_config::{LimitsConfig, OrientationConfig, RangeCheckConfig};
 
 /// The evidence on which a site is judged.
@@ -36,6 +39,8 @@ pub struct Evidence<'a> {
     pub wording: Wording<'a>,
     /// Footprints in the windows; `None` for a site without PEDR files.
     pub footprints: Option<usize>,
+    /// Which of two radii of the shots is that of the ground; `None` where they have one.
+    pub ground: Option<GroundRadius>,
     /// The limits of the configuration.
     pub limits: &'a LimitsConfig,
     /// Limits on ranges.

@@ -104,7 +104,14 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
     let mut checks = checks(of);
     checks.extend(Check::worst(elsewhere.checks.into_iter()));
     checks.extend(Check::worst(elsewhere.offsets.into_iter()));
-    Verdict::of(reasons, remarks, checks)
+    Verdict {
+        untested: vec![
+            "an error of place or radius that the control of all orbits shares (no other control is at hand)"
+                .to_owned(),
+            "a shift along the flight that all ties of a line share (it acts like an angle of the line)".to_owned(),
+        ],
+        ..Verdict::of(reasons, remarks, checks)
+    }
 }
 
 /// Scatter of used or withheld control in the plane or in height, and its limit.

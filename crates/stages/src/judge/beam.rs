@@ -11,7 +11,7 @@ use areograph_config::{AdjustmentConfig, MolaSurfaceConfig};
 use areograph_geom::statistics::BAARDA_LIMIT;
 
 /// Milliradians in a radian.
-const PER_MILLI: f64 = 1e3;
+pub(super) const PER_MILLI: f64 = 1e3;
 /// At least this share of the footprints that the mountings place in an image must lie in it.
 const INSIDE_SHARE_MIN: f64 = 0.5;
 /// Support data may contain apparent positions, up to this far from geometric ones, metres.
@@ -205,6 +205,20 @@ impl BeamEvidence<'_> {
             }
         }
         deviations
+    }
+
+    /// Largest angle that all images may share unnoticed: on each axis the limit in radians, and in metres on the ground.
+    pub(super) fn unnoticed(&self, limit_sigma: f64) -> Vec<[f64; 2]> {
+        let deviations = self.deviations();
+        let on_axis = |axis: usize| {
+            // The mean over passes comes last.
+            let last = deviations
+                .iter()
+                .rfind(|deviation| deviation.axis == axis)?;
+            let limit_rad = limit_sigma * last.sigma_rad;
+            Some([limit_rad, limit_rad * last.range_m])
+        };
+        (0..AXES.len()).filter_map(on_axis).collect()
     }
 
     /// Images whose footprints test the orientation: image, footprints inside, the least number expected.

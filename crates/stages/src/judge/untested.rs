@@ -1,7 +1,9 @@
 //! Errors that no datum of the site can show, grouped by the reason: stated with the verdict, since a valid site may
 //! contain them.
 
-use super::{Evidence, JudgedImage};
+use areograph_base::altimetry::GroundRadius;
+
+use super::{Evidence, JudgedImage, beam::PER_MILLI};
 
 /// Why the attitude of an image is not tested; the page states the same.
 pub const NO_BEAM: &str = "no beam tests the attitude";
@@ -45,8 +47,10 @@ pub(super) fn untested(evidence: &Evidence<'_>) -> Vec<String> {
         // Tie points test one image against the other, so that one beam suffices.
         Vec::new()
     };
+    groups.extend(small_attitude(evidence, !tested.is_empty()));
     groups.extend(images(evidence));
     groups.push(shots(evidence, !tested.is_empty()));
+    groups.extend([radii(evidence), uncovered(evidence)]);
     groups.iter().filter_map(Group::phrase).collect()
 }
 
@@ -76,6 +80,22 @@ fn common_attitude(evidence: &Evidence<'_>, blind: &[&JudgedImage]) -> Vec<Group
     Vec::from_iter(is_shared.then(|| group.with("an attitude error that all images share")))
 }
 
+/// The attitude error that all images may share within the limit of the beam.
+fn small_attitude(evidence: &Evidence<'_>, is_tested: bool) -> Option<Group> {
+    let limits = evidence
+        .beam
+        .unnoticed(evidence.limits.correction_max_sigma);
+    let [[along_rad, along_m], [across_rad, across_m]] = limits.try_into().ok()?;
+    is_tested.then(|| {
+        Group::new("within the limit of the beam").with(format!(
+            "an attitude error that all images share, up to {:.1} mrad along and {:.1} mrad across the track, {along_m:.0} and \
+             {across_m:.0} m on the ground",
+            PER_MILLI * along_rad,
+            PER_MILLI * across_rad
+        ))
+    })
+}
+
 /// Why no beam tests the attitude of an image.
 fn no_beam(evidence: &Evidence<'_>, image: &JudgedImage) -> String {
     let beams = evidence.beam.images.iter();
@@ -101,7 +121,9 @@ fn images(evidence: &Evidence<'_>) -> [Group; 3] {
     let mut without_ties = Group::new("no tie points were adjusted");
     let mut one_label = Group::new("stated by the label alone");
     if has_ties && of_labels.len() > 1 {
-        by_ties = by_ties.with("an error that the start times of all images share");
+        by_ties = by_ties.with(
+            "an error that the start times of all images, or the lines of all tie points, share",
+        );
     } else if !of_labels.is_empty() {
         let labels = listed(&of_labels);
         one_label = one_label.with(format!(
@@ -114,10 +136,15 @@ fn images(evidence: &Evidence<'_>) -> [Group; 3] {
     }
     if has_ties {
         by_ties = by_ties.with("an error of the focal length");
+        if !of_support.is_empty() {
+            by_ties = by_ties
+                .with("an error of the first sample of the detector that support data share");
+        }
     } else if !evidence.images.is_empty() {
         without_ties = without_ties
             .with("rotation about the line of sight")
-            .with("focal length, distortion and direction of the samples of the camera");
+            .with("focal length, distortion and direction of the samples of the camera")
+            .with("first sample and summing of the labels");
         if !of_support.is_empty() {
             without_ties = without_ties.with("line times of support data");
         }
@@ -138,6 +165,28 @@ fn shots(evidence: &Evidence<'_>, is_attitude_tested: bool) -> Group {
         );
     }
     group
+}
+
+/// Shots that no kernel covers: their ranges are compared with the positions of their own table alone.
+fn uncovered(evidence: &Evidence<'_>) -> Group {
+    let group = Group::new("no kernels cover these shots");
+    let mut profiles = evidence.ranges.profiles.iter();
+    if profiles.any(|profile| profile.range_minus_distance_m.n == 0 && profile.is_tested()) {
+        group.with("times and positions of the spacecraft in tables of shots")
+    } else {
+        group
+    }
+}
+
+/// Radii of the ground.
+fn radii(evidence: &Evidence<'_>) -> Group {
+    let is_corrected = evidence.ground == Some(GroundRadius::Corrected);
+    let group = Group::new("no other radius of the ground is at hand");
+    if is_corrected {
+        group.with("an error that the crossover residuals of all profiles share")
+    } else {
+        group
+    }
 }
 
 fn listed(images: &[&JudgedImage]) -> String {

@@ -45,7 +45,23 @@ pub(super) fn judge(of: &Evidence) -> Verdict {
         ));
     }
     reasons.extend(of.scales.reasons());
-    Verdict::of(reasons, remarks(of), checks(of))
+    Verdict {
+        untested: untested(of),
+        ..Verdict::of(reasons, remarks(of), checks(of))
+    }
+}
+
+/// Errors that no datum of the net can show.
+fn untested(of: &Evidence) -> Vec<String> {
+    let shared =
+        "an error of place or direction that all controls share (no other control is at hand)";
+    let stretch = of.scales.stretch_max().map(|limit| {
+        format!(
+            "a stretch of the controls of up to {:.1} % (within their standard deviations)",
+            100.0 * limit
+        )
+    });
+    [shared.to_owned()].into_iter().chain(stretch).collect()
 }
 
 /// Minimum number of controls for identifying a gross error of one of them.

@@ -168,14 +168,14 @@ impl Scales {
         reasons
     }
 
-    /// Limit of the stretch.
-    fn stretch_max(of: &Stretch) -> f64 {
-        STRETCH_MAX.max(of.by_chance(CHANCE_MAX))
+    /// Limit of the stretch, where it is tested.
+    pub(super) fn stretch_max(&self) -> Option<f64> {
+        let by_chance = |of: &Stretch| STRETCH_MAX.max(of.by_chance(CHANCE_MAX));
+        self.stretch.as_ref().map(by_chance)
     }
 
     fn stretched(&self) -> Option<String> {
-        let of = self.stretch.as_ref()?;
-        let limit = Self::stretch_max(of);
+        let (of, limit) = self.stretch.as_ref().zip(self.stretch_max())?;
         // Written so that NaN counts.
         (!(of.ratio <= limit)).then(|| {
             format!(
@@ -224,8 +224,8 @@ impl Scales {
                 Fail,
             )
         });
-        let stretch = self.stretch.as_ref().map(|stretch| {
-            let limit = Self::stretch_max(stretch);
+        let stretch = self.stretch.as_ref().zip(self.stretch_max());
+        let stretch = stretch.map(|(stretch, limit)| {
             Check::of_share(CheckKind::ControlStretch, "", stretch.ratio, limit, Fail)
         });
         scale.into_iter().chain(stretch).collect()

@@ -1,0 +1,208 @@
+//! Every command that writes, killed at changes of files: no file under its final name is half-made, the next run of the same
+//! command ends with the bytes of an undisturbed one, and nothing incomplete remains.
+#![cfg(all(target_os = "linux", target_arch = "x86_64"))]
+#![allow(
+    clippy::disallowed_methods,
+    clippy::unwrap_used,
+    reason = "helpers of tests work in temporary folders and may fail loudly"
+)]
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use areograph_testing::track;
+
+use crate::common::{
+    case::Case,
+    long,
+    mission::{areograph, products, site_run, succeed},
+    traced::{Call, Then, traced},
+};
+
+/// Largest number of kills of one command; those of few changes are killed at each of them.
+fn kills() -> usize {
+    if long() { 150 } else { 3 }
+}
+
+/// What the commands read.
+struct Inputs {
+    folder: tempfile::TempDir,
+    case: Case,
+}
+
+impl Inputs {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for (name, kind) in [("net", "--plane"), ("lines", "--calibration")] {
+            succeed(areograph().args(["--quiet", "scene", kind]).arg(at(name)));
+        }
+        track::write(
+            &at("ap19020l.b"),
+            areograph::body::Datum::Iau2000,
+            0,
+            |_, _| (),
+        );
+        Self {
+            folder,
+            case: Case::new(),
+        }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+}
+
+/// A command that writes into its current folder.
+type Writer = (&'static str, fn(&Inputs, &mut Command));
+
+/// Scenes and configurations, searches, tables, nets, calibrations, sites and pages.
+const WRITERS: [Writer; 13] = [
+    ("scene", |_, command| {
+        command.args(["scene", "scene", "--plane"]);
+    }),
+    ("init", |_, command| {
+        command.args(["init", "gale", "--box", "137.0,138.0,-5.5,-4.0"]);
+    }),
+    ("man", |_, command| {
+        command.args(["man", "."]);
+    }),
+    ("search to Parquet", |inputs, command| {
+        search(inputs, command, "shots.parquet");
+    }),
+    ("search to CSV", |inputs, command| {
+        search(inputs, command, "shots.csv");
+    }),
+    ("search to GeoJSON", |inputs, command| {
+        search(inputs, command, "shots.geojson");
+    }),
+    ("index", |_, command| {
+        command.args(["pedr", "index", "."]);
+    }),
+    ("tables of pedr2tab", |inputs, command| {
+        command.args(["pedr", "tab"]).arg(inputs.path("ap19020l.b"));
+    }),
+    ("triangulate", |inputs, command| {
+        command.arg("triangulate").arg(inputs.path("net/net.toml"));
+    }),
+    ("calibrate", |inputs, command| {
+        let calibration = inputs.path("lines/calibration.toml");
+        command.arg("calibrate").arg(calibration);
+    }),
+    ("run", |inputs, command| {
+        command.arg("run").arg(inputs.case.path("site.toml"));
+    }),
+    ("page of a report", |_, command| {
+        command.arg("report").arg(site_run("isidis"));
+        command.args(["--page", "isidis.html"]);
+    }),
+    ("page of a comparison", |_, command| {
+        let site = site_run("isidis");
+        command.args(["report", "diff"]).arg(&site).arg(&site);
+        command.args(["--page", "difference.html"]);
+    }),
+];
+
+fn search(inputs: &Inputs, command: &mut Command, out: &str) {
+    command
+        .args(["pedr", "search"])
+        .arg(inputs.path("ap19020l.b"));
+    command.args(["--box=-170,170,-60,60", "--out", out]);
+}
+
+/// A folder in which a command runs, with the file that an index is of.
+fn begun(inputs: &Inputs, writer: &Writer) -> (tempfile::TempDir, PathBuf, Command) {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path().canonicalize().unwrap();
+    if writer.0 == "index" {
+        // A link has the same date, which the index records.
+        fs::hard_link(inputs.path("ap19020l.b"), root.join("ap19020l.b")).unwrap();
+    }
+    let mut command = areograph();
+    command.arg("--quiet").current_dir(&root);
+    writer.1(inputs, &mut command);
+    (folder, root, command)
+}
+
+/// Whether a call changes a file below `root`.
+fn changes_file(call: &Call, root: &Path) -> bool {
+    call.changes() && call.path.starts_with(root)
+}
+
+/// Incomplete files and folders below a folder.
+fn incomplete(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if name.starts_with(".partial-") {
+            found.push(path);
+        } else if path.is_dir() {
+            found.extend(incomplete(&path));
+        }
+    }
+    found
+}
+
+/// Kills of a command, each in a folder of its own; returns how many hit.
+fn survives(inputs: &Inputs, writer: &Writer) -> usize {
+    let (_folder, root, command) = begun(inputs, writer);
+    let mut count = 0;
+    let ended = traced(&command, |call| {
+        count += usize::from(changes_file(call, &root));
+        Then::GoOn
+    });
+    assert_eq!(ended.code, Some(0), "{}: {}", writer.0, ended.stderr);
+    let undisturbed: BTreeMap<PathBuf, Vec<u8>> = products(&root);
+    assert!(!undisturbed.is_empty(), "{}", writer.0);
+    let kills = kills().min(count);
+    for number in 0..kills {
+        let place = number * (count - 1) / (kills - 1).max(1);
+        let (_folder, root, mut command) = begun(inputs, writer);
+        let (mut made, mut last) = (0, None);
+        let ended = traced(&command, |call| {
+            if !changes_file(call, &root) {
+                return Then::GoOn;
+            }
+            made += 1;
+            last = Some(call.clone());
+            if made > place { Then::Kill } else { Then::GoOn }
+        });
+        // Threads may save a change or two.
+        assert!(
+            ended.code.is_none() || ended.code == Some(0),
+            "{}",
+            ended.stderr
+        );
+        for (path, bytes) in products(&root) {
+            assert!(
+                undisturbed.get(&path) == Some(&bytes),
+                "{}: half-made {} after a kill before {last:?}",
+                writer.0,
+                path.display()
+            );
+        }
+        succeed(&mut command);
+        assert!(
+            products(&root) == undisturbed,
+            "{}: other files after a kill before {last:?}",
+            writer.0
+        );
+        let left = incomplete(&root);
+        assert!(left.is_empty(), "{}: {left:?} after {last:?}", writer.0);
+    }
+    kills
+}
+
+#[test]
+fn no_command_leaves_a_half_made_file() {
+    let inputs = Inputs::new();
+    let hit: usize = WRITERS.iter().map(|writer| survives(&inputs, writer)).sum();
+    println!("{hit} kills of {} commands", WRITERS.len());
+    assert!(hit >= 2 * WRITERS.len(), "{hit}");
+}
