@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::html::counted;
+use super::many;
 use super::numbers::whole;
 use super::plots::{
     Arrow, Arrows, Extent, GREY, INK, Mark, Panel, Plot, Series, Style, figure, label,
@@ -38,12 +39,13 @@ const AFTER: usize = 0;
 /// A plot that cannot be drawn.
 pub(super) fn figures(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
     let mut html = String::new();
-    let panels = 2 * site.images.len().max(1);
+    let shown = many::shown(site);
+    let panels = 2 * shown.len().max(1);
     let limit = (ARROWS_ALL / panels).clamp(20, ARROWS_MAX);
     let adjusted = geometric
         .adjustment
         .map_or(&[][..], |adjustment| adjustment.images);
-    for (index, image) in site.images.iter().enumerate() {
+    for (index, image) in shown {
         let after = adjusted.get(index);
         if let Some(plot) = after.and_then(|after| footprints(image, after)) {
             html += &figure(&plot)?;
@@ -52,7 +54,7 @@ pub(super) fn figures(site: &SiteProducts, geometric: &GeometricProducts) -> Res
             html += &figure(&plot)?;
         }
     }
-    Ok(format!("<div class=\"plots\">\n{html}</div>\n"))
+    Ok(many::some_of_all(site) + &format!("<div class=\"plots\">\n{html}</div>\n"))
 }
 
 /// Footprints around the middle one with the orientation of the kernels and with the adjusted one, so close that
