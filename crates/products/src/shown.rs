@@ -8,8 +8,9 @@ use std::cmp::Ordering;
 use super::site::{ImageProducts, SiteProducts};
 use areograph_stages::adjust::PointKind;
 
-/// Largest number of images with rows and plots of their own: a page of twelve has about 0.8 MB with tie points.
-pub const IMAGES_SHOWN: usize = 12;
+/// Largest number of images with rows and plots of their own: with tie points each has about 0.15 MB on the page, which stays
+/// below 2 MB for any number of images.
+pub const IMAGES_SHOWN: usize = 6;
 
 /// What decides whether an image of many is shown.
 struct Rank {

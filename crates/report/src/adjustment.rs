@@ -59,7 +59,7 @@ fn write(
     html += &heading("Reliability");
     html += &reliability::redundancy(site, adjusted);
     html += &reliability::correlations(summary);
-    html += &correlation::figures(adjusted)?;
+    html += &correlation::figures(site, adjusted)?;
     html += &reliability::rejected(adjusted);
     Ok(html)
 }

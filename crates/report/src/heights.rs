@@ -41,7 +41,7 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
         html += &apart(geometric.heights);
         html += &format!(
             "<div class=\"plots\">\n{}</div>\n",
-            figure(&profile::plot(geometric))?
+            figure(&profile::plot(site, geometric))?
         );
         html += &folded(
             "The surface, and heights of footprints by images",

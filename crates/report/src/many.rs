@@ -14,7 +14,7 @@ use areograph_products::{IMAGES_SHOWN, ImageProducts, SiteProducts};
 
 /// Largest number of images drawn on the map and the sky plot besides those shown; an outline with its data has about a
 /// kilobyte.
-const OUTLINES: usize = 150;
+const OUTLINES: usize = 100;
 /// Largest number of points of the plot over all images.
 const POINTS: usize = 500;
 

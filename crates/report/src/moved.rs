@@ -18,8 +18,9 @@ use areograph_stages::{intersect::IntersectedTies, register::RegisteredPoints};
 const DOTS_MAX: usize = 300;
 /// Largest number of vectors of all images together; each is drawn once and listed once, about 400 bytes.
 const ARROWS_ALL: usize = 4_000;
-/// Largest number of vectors of one panel.
+/// Largest number of vectors of one panel, and of one of a site of many images.
 const ARROWS_MAX: usize = 250;
+const ARROWS_OF_MANY: usize = 80;
 /// Widths of the image on either side of it within which footprints are compared.
 const WIDTHS_BESIDE: f64 = 0.5;
 /// Lines shown to either side: multiple of the movement of footprints, and minimum.
@@ -41,7 +42,12 @@ pub(super) fn figures(site: &SiteProducts, geometric: &GeometricProducts) -> Res
     let mut html = String::new();
     let shown = many::shown(site);
     let panels = 2 * shown.len().max(1);
-    let limit = (ARROWS_ALL / panels).clamp(20, ARROWS_MAX);
+    let most = if many::are_many(site) {
+        ARROWS_OF_MANY
+    } else {
+        ARROWS_MAX
+    };
+    let limit = (ARROWS_ALL / panels).clamp(20, most);
     let adjusted = geometric
         .adjustment
         .map_or(&[][..], |adjustment| adjustment.images);
