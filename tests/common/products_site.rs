@@ -180,11 +180,43 @@ impl Site {
             model: &self.model,
             registration: &self.registration,
         }];
-        let judged = [JudgedImage {
-            times: &self.times,
-            orientation: &self.orientation,
-            model: &self.model,
-        }];
+        self.with_these(if image { &images } else { &[] }, with)
+    }
+
+    /// The same with so many copies of its image under other names, the last of which is invalid.
+    #[allow(dead_code, reason = "not every test that shares this needs it")]
+    pub(crate) fn with_copies<T>(&self, count: usize, with: impl FnOnce(&SiteProducts) -> T) -> T {
+        let copies = (0..count).map(|index| {
+            let id = format!("M04-{index:05}");
+            let (mut times, mut orientation) = (self.times.clone(), self.orientation.clone());
+            let (mut model, mut registration) = (self.model.clone(), self.registration.clone());
+            times.id.clone_from(&id);
+            orientation.image.clone_from(&id);
+            model.image.clone_from(&id);
+            registration.image = id;
+            if index + 1 == count {
+                model.invalid_because.push("made so by hand".to_owned());
+            }
+            (times, orientation, model, registration)
+        });
+        let copies: Vec<_> = copies.collect();
+        let images = copies.iter();
+        let images = images.map(|(times, orientation, model, registration)| ImageProducts {
+            times,
+            orientation,
+            model,
+            registration,
+        });
+        self.with_these(&images.collect::<Vec<_>>(), with)
+    }
+
+    fn with_these<T>(&self, images: &[ImageProducts], with: impl FnOnce(&SiteProducts) -> T) -> T {
+        let judged = images.iter().map(|image| JudgedImage {
+            times: image.times,
+            orientation: image.orientation,
+            model: image.model,
+        });
+        let judged: Vec<JudgedImage> = judged.collect();
         let searched = !self.config.pedr.files.is_empty();
         let profile_check = self.profile_check();
         let verdict = judge(&Evidence {
@@ -196,7 +228,7 @@ impl Site {
             range_limits: &self.config.range_check,
             orientation_limits: &self.config.orientation,
             clock_correction_s: self.config.altimeter_clock.correction_s(),
-            images: if image { &judged } else { &[] },
+            images: &judged,
             beam: BeamEvidence {
                 images: &[],
                 adjustment: &self.config.adjustment,
@@ -214,7 +246,7 @@ impl Site {
             kernels: &self.kernels,
             metakernel: "KPL/MK\n",
             required: &self.required,
-            images: if image { &images } else { &[] },
+            images,
             footprints: &self.footprints,
             utc: &self.utc,
             profiles: &self.profiles,

@@ -12,5 +12,6 @@ mod generated;
 mod methods;
 mod products_site;
 mod report_geometric;
+mod report_many;
 mod report_page;
 mod report_products;

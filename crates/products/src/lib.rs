@@ -57,6 +57,7 @@ mod registry;
 mod rows_file;
 #[cfg(feature = "sql")]
 mod shot_columns;
+mod shown;
 mod site;
 mod surface;
 mod table;
@@ -91,6 +92,7 @@ pub use product::{Pages, Product};
 pub use rows_file::{Out, RowsFormat, RowsWriter, SQL};
 #[cfg(feature = "sql")]
 pub use shot_columns::ShotColumns;
+pub use shown::IMAGES_SHOWN;
 pub use site::{AdjustmentProducts, GeometricProducts, ImageProducts, Program, SiteProducts};
 
 use rayon::prelude::*;

@@ -15,6 +15,8 @@ use areograph_stages::adjust::PointKind;
 pub struct Listed {
     /// Path below the site's folder.
     pub path: String,
+    /// Index of the image that it belongs to, if it is of one.
+    pub image: Option<usize>,
     /// Contents of the file.
     pub what: &'static str,
     /// Readers of it.
@@ -26,10 +28,9 @@ pub struct Listed {
 pub fn listed(site: &SiteProducts) -> Vec<Listed> {
     let declared = PRODUCTS.iter().filter(|declaration| has(site, declaration));
     let paths = declared.flat_map(|declaration| {
-        let images = |is_there: &dyn Fn(usize) -> bool| -> Vec<&str> {
-            let images = site.images.iter().enumerate();
-            let images = images.filter(|(index, _)| is_there(*index));
-            images.map(|(_, image)| &*image.times.id).collect()
+        let images = |is_there: &dyn Fn(usize) -> bool| -> Vec<Option<usize>> {
+            let images = 0..site.images.len();
+            images.filter(|index| is_there(*index)).map(Some).collect()
         };
         let images = match declaration.write {
             Write::Image(_) | Write::AdjustedImage(_) => images(&|_| true),
@@ -39,10 +40,11 @@ pub fn listed(site: &SiteProducts) -> Vec<Listed> {
                 let overlays = site.overlays;
                 overlays.is_some_and(|overlays| overlays.quick_look(index).is_some())
             }),
-            _ => vec![""],
+            _ => vec![None],
         };
         images.into_iter().map(|image| Listed {
-            path: declaration.path_of(image),
+            path: declaration.path_of(image.map_or("", |index| &site.images[index].times.id)),
+            image,
             what: declaration.what,
             readers: declaration.readers,
         })

@@ -3,6 +3,7 @@
 use super::{
     corrections, correlation,
     html::{Cell, Column, Table, counted, folded, heading, paragraph},
+    many,
     numbers::whole,
     plots::{Extent, Panel, Plot, Series, figure, label},
     reliability, residuals,
@@ -41,7 +42,8 @@ fn write(
         "<div class=\"plots\">\n{}</div>\n",
         residuals::distribution(adjusted)?
     );
-    html += &residuals::images(adjusted);
+    html += &many::some_of_all(site);
+    html += &residuals::images(site, adjusted);
     html += &folded(
         "Observations by kind, and convergence",
         &format!(
@@ -57,7 +59,7 @@ fn write(
     html += &heading("Reliability");
     html += &reliability::redundancy(site, adjusted);
     html += &reliability::correlations(summary);
-    html += &correlation::figures(adjusted)?;
+    html += &correlation::figures(site, adjusted)?;
     html += &reliability::rejected(adjusted);
     Ok(html)
 }

@@ -1,7 +1,8 @@
 //! The clock corrections and the datum as used, with their sources.
 
 use super::{
-    html::{Column, Table, folded, paragraph},
+    html::{Column, Table, counted, folded, paragraph},
+    many,
     numbers::{number as label, signed, whole},
     section::Section,
 };
@@ -56,10 +57,14 @@ fn biases(site: &SiteProducts) -> String {
     let supported = supported.filter(|image| image.times.support.is_some());
     let ids: Vec<&str> = supported.map(|image| &*image.times.id).collect();
     if !ids.is_empty() {
+        let named = match ids.len() {
+            count if many::are_many(site) => counted(count, "image"),
+            _ => ids.join(", "),
+        };
         table.row(
             true,
             [
-                format!("attitude and line times of {}", ids.join(", ")).into(),
+                format!("attitude and line times of {named}").into(),
                 "–".into(),
                 "nothing is applied to support data".into(),
                 "the files under Support data".into(),

@@ -2,9 +2,10 @@
 
 use super::{
     html::{Cell, Column, Table, folded, paragraph},
+    many,
     numbers::whole,
     plots::{Panel, Plot, Series, figure, label},
-    registration::place,
+    registration::{place, registered},
     section::Section,
 };
 use areograph_base::error::Result;
@@ -15,19 +16,21 @@ use areograph_stages::register::{Method, MethodRun};
 pub(super) const SECTION: Section = Section {
     title: "Appendix: iterations from ground to image",
     anchor: "iterations",
-    appears: |site| {
-        let mut images = site.images.iter();
-        images.any(|image| !image.registration.points.is_empty())
-    },
+    appears: |site| site.images.iter().any(registered),
     write,
 };
 
 fn write(site: &SiteProducts) -> Result<String> {
     let mut figures = String::new();
-    for image in site.images.iter().filter(|image| converges(image)) {
+    let images = many::shown(site).into_iter();
+    for (_, image) in images.filter(|(_, image)| converges(image)) {
         figures += &figure(&convergence_plot(image))?;
     }
-    let html = format!("{}<div class=\"plots\">\n{figures}</div>\n", methods(site));
+    let html = format!(
+        "{}{}<div class=\"plots\">\n{figures}</div>\n",
+        many::some_of_all(site),
+        methods(site)
+    );
     Ok(folded("Cost of the published iterations", &html))
 }
 
@@ -61,11 +64,11 @@ fn methods(site: &SiteProducts) -> String {
             Column::Number("standard deviation"),
         ],
     );
-    for image in site.images {
+    for (of_site, image) in many::shown(site) {
         for (index, run) in image.registration.methods.iter().enumerate() {
             let difference = &run.difference_lines;
             table.row_of(
-                &format!("{}/methods/{index}", place(site, image)),
+                &format!("{}/methods/{index}", place(of_site)),
                 u64::from(run.evaluations.n) == run.points,
                 [
                     (&image.times.id).into(),

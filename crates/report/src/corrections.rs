@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 
 use super::{
     html::{Cell, Column, Table, paragraph},
+    many,
     plots::label,
 };
 use areograph_base::units::{RADIANS_PER_ARCSECOND, SECONDS_PER_MS};
@@ -17,7 +18,7 @@ use areograph_stages::adjust::{Adjusted, CorrectedImage};
 pub(super) fn tables(site: &SiteProducts, adjusted: &Adjusted) -> String {
     [
         positions(site, adjusted),
-        rotations(adjusted),
+        rotations(site, adjusted),
         ranges(site, adjusted),
         biases(adjusted),
         attitude_clock(adjusted),
@@ -61,10 +62,13 @@ fn positions(site: &SiteProducts, adjusted: &Adjusted) -> String {
             Column::Number("radial"),
         ],
     );
-    let mut starts_at_pedr = false;
-    for (index, (image, corrected)) in site.images.iter().zip(&adjusted.images).enumerate() {
+    let mut all = adjusted.images.iter();
+    let starts_at_pedr = all.any(|corrected| corrected.pedr_orbit_m().is_some());
+    for (index, image) in many::shown(site) {
+        let Some(corrected) = adjusted.images.get(index) else {
+            continue;
+        };
         let position_m = constants(corrected, 0);
-        starts_at_pedr |= corrected.pedr_orbit_m().is_some();
         let in_orbit = orbit_axes(image, Vector3::from(position_m.map(|(value, _)| value)));
         let mut cells: Vec<Cell> = vec![(&corrected.id).into()];
         let axes = position_m.into_iter().enumerate();
@@ -111,7 +115,7 @@ fn orbit_axes(image: &ImageProducts, shift_m: Vector3<f64>) -> Option<Vector3<f6
     (advance_m.norm() > 0.0).then(|| axes.transpose() * shift_m)
 }
 
-fn rotations(adjusted: &Adjusted) -> String {
+fn rotations(site: &SiteProducts, adjusted: &Adjusted) -> String {
     let mut table = Table::new(
         "Rotation of the camera at the middle of the image, arcseconds",
         &[
@@ -123,7 +127,10 @@ fn rotations(adjusted: &Adjusted) -> String {
         ],
     );
     let per_arcsecond = format!("*{}", RADIANS_PER_ARCSECOND.recip());
-    for (index, image) in adjusted.images.iter().enumerate() {
+    for (index, _) in many::shown(site) {
+        let Some(image) = adjusted.images.get(index) else {
+            continue;
+        };
         let arcseconds = |(value, sigma): (f64, f64)| {
             (value / RADIANS_PER_ARCSECOND, sigma / RADIANS_PER_ARCSECOND)
         };
@@ -158,7 +165,9 @@ fn ranges(site: &SiteProducts, adjusted: &Adjusted) -> String {
     }
     let before_m = checked_ranges(site);
     let mut groups: BTreeMap<(&str, usize), [Vec<f64>; 2]> = BTreeMap::new();
-    for range in &adjusted.ranges {
+    let shown = site.shown_images();
+    let ranges = adjusted.ranges.iter();
+    for range in ranges.filter(|range| shown.binary_search(&range.image).is_ok()) {
         let profile = &*site.profiles[range.profile].id;
         let [before, after] = groups.entry((profile, range.image)).or_default();
         let shot = (range.profile, adjusted.points[range.point].index);

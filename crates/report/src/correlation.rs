@@ -11,10 +11,11 @@ use super::{
 };
 use areograph_base::error::Result;
 use areograph_geom::bundle::{ORIENTATION_UNKNOWNS, Unknown};
+use areograph_products::SiteProducts;
 use areograph_stages::adjust::{Adjusted, CorrectedImage};
 
 /// Number of images whose matrix is drawn; `correlations.parquet` has all.
-const IMAGES_SHOWN: usize = 4;
+const IMAGES_DRAWN: usize = 4;
 /// Correlation from which the matrices are shown unfolded.
 const OF_INTEREST: f64 = 0.95;
 /// Start of the matrix, after the names of its rows.
@@ -30,10 +31,10 @@ const COLOURS: [[f64; 3]; 3] = [
 ///
 /// # Errors
 /// A drawing that cannot be made.
-pub(super) fn figures(adjusted: &Adjusted) -> Result<String> {
-    let images = adjusted.images.iter().enumerate().take(IMAGES_SHOWN);
+pub(super) fn figures(site: &SiteProducts, adjusted: &Adjusted) -> Result<String> {
+    let images = site.shown_images().into_iter().take(IMAGES_DRAWN);
     let matrices: Vec<Matrix> = images
-        .filter_map(|(index, image)| Matrix::of(index, image))
+        .filter_map(|index| Matrix::of(index, adjusted.images.get(index)?))
         .collect();
     let largest = matrices.iter().filter_map(Matrix::largest);
     let largest = largest.fold(0.0, |most: f64, (_, value)| most.max(value.abs()));

@@ -41,7 +41,7 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
         html += &apart(geometric.heights);
         html += &format!(
             "<div class=\"plots\">\n{}</div>\n",
-            figure(&profile::plot(geometric))?
+            figure(&profile::plot(site, geometric))?
         );
         html += &folded(
             "The surface, and heights of footprints by images",
@@ -346,8 +346,10 @@ fn footprints(geometric: &GeometricProducts) -> String {
         .iter()
         .map(|adjustment| ("after", adjustment.pairs));
     let mut rows = 0;
+    let tabled = BeforeAfter::images_tabled(geometric);
     for (state, pairs) in [("before", geometric.pairs)].into_iter().chain(after) {
-        for (index, pair) in pairs.iter().enumerate() {
+        let pairs = pairs.iter().enumerate();
+        for (index, pair) in pairs.filter(|(_, pair)| tabled.contains(&pair.images)) {
             let profiles = pair
                 .footprints
                 .iter()
@@ -379,7 +381,7 @@ fn footprints(geometric: &GeometricProducts) -> String {
     }
     let words = "Relief between tie points affects single heights; where it has one sign along a profile, it affects \
                  the median as well.";
-    table.finish() + &paragraph(words)
+    BeforeAfter::some_of_all(geometric) + &table.finish() + &paragraph(words)
 }
 
 fn apart(check: &HeightCheck) -> String {

@@ -2,6 +2,7 @@
 
 use super::{
     html::{Cell, Column, Table, folded_unless, paragraph},
+    many,
     numbers::whole,
     plots::{GREY, Panel, Plot, Series, figure, label},
     section::Section,
@@ -27,12 +28,12 @@ pub(super) const SECTION: Section = Section {
 };
 
 fn write(site: &SiteProducts) -> Result<String> {
-    let figures = site
-        .images
-        .iter()
-        .map(|image| figure(&residual_plot(image)))
+    let figures = many::shown(site)
+        .into_iter()
+        .map(|(_, image)| figure(&residual_plot(image)))
         .collect::<Result<String>>()?;
-    Ok(taken(site)
+    Ok(many::overview(site)?
+        + &taken(site)
         + &sky::figure(site)?
         + &folded_unless(
             site.images
@@ -64,7 +65,7 @@ fn taken(site: &SiteProducts) -> String {
             Column::Number("emission, degrees"),
         ],
     );
-    for image in site.images {
+    for (_, image) in many::shown(site) {
         let times = image.times;
         let samples = &image.orientation.samples;
         let middle = samples
@@ -183,7 +184,7 @@ fn models(site: &SiteProducts) -> String {
             Column::Text("verdict"),
         ],
     );
-    for image in site.images {
+    for (_, image) in many::shown(site) {
         let (model, id) = (image.model, &image.times.id);
         let valid = image.invalid_because().is_empty();
         let judged = [
@@ -225,7 +226,7 @@ fn models(site: &SiteProducts) -> String {
         // As written: conversion to radians and back adds digits.
         (1e6 * limits.pointing_rmse_max_rad / RADIANS_PER_ARCSECOND).round() / 1e6
     );
-    for image in site.images {
+    for (_, image) in many::shown(site) {
         let (model, misfit) = (image.model, image.model.misfit);
         if model.model == CameraModel::Samples {
             words += &format!(

@@ -33,6 +33,7 @@ mod heights;
 mod html;
 mod images;
 mod laser_match;
+mod many;
 mod map;
 mod matching;
 mod misregistration;

@@ -23,7 +23,8 @@ use self::{
 };
 use super::{
     graticule::{View, graticule},
-    html::paragraph,
+    html::{counted, paragraph},
+    many,
     plots::{COLOURS, Canvas, Drawn, GRID, INK, WIDTH, drawn, figure_html, thinned},
     section::Section,
 };
@@ -84,12 +85,13 @@ fn without_outline(site: &SiteProducts) -> String {
         .filter(|image| image.orientation.outline.is_none())
         .map(|image| &*image.times.id)
         .collect();
-    if missing.is_empty() {
-        return String::new();
-    }
+    let named = match missing.len() {
+        0 => return String::new(),
+        count if many::are_many(site) => counted(count, "image"),
+        _ => missing.join(", "),
+    };
     paragraph(&format!(
-        "Not drawn, because a corner sees no ground: {}.",
-        missing.join(", ")
+        "Not drawn, because a corner sees no ground: {named}."
     ))
 }
 
@@ -105,7 +107,7 @@ fn figure(site: &SiteProducts, shown: Shown, only: bool) -> Result<String> {
     if !only {
         title += &format!(": {}", names(&sheet.shown.windows));
     }
-    let words = sheet.words(relief.as_ref());
+    let words = sheet.words(relief.as_ref()) + &many::drawn_in_words(site);
     Ok(figure_html(
         &title,
         &svg,

@@ -2,10 +2,12 @@
 
 use super::{
     html::{Column, Table, paragraph},
+    misregistration::PAIRS_TABLED,
     numbers::whole,
     plots::label,
     section::Section,
 };
+use areograph_base::ties::MatchedPair;
 use areograph_products::SiteProducts;
 use areograph_stages::read_ties::Ties;
 
@@ -25,6 +27,29 @@ fn matched<'a>(site: &SiteProducts<'a>) -> Option<&'a Ties> {
     (!ties.matched.is_empty()).then_some(ties)
 }
 
+/// The pairs with a row each: all of a few, and of many first those that are refused, then those with the fewest tie
+/// points.
+fn tabled(pairs: &[MatchedPair]) -> Vec<&MatchedPair> {
+    let mut tabled: Vec<(usize, &MatchedPair)> = pairs.iter().enumerate().collect();
+    if pairs.len() > PAIRS_TABLED {
+        tabled.sort_by_key(|(index, pair)| (!pair.is_refused, pair.ties, *index));
+        tabled.truncate(PAIRS_TABLED);
+        tabled.sort_by_key(|(index, _)| *index);
+    }
+    tabled.into_iter().map(|(_, pair)| pair).collect()
+}
+
+fn some_of_all(all: &[MatchedPair], tabled: &[&MatchedPair]) -> String {
+    if tabled.len() == all.len() {
+        return String::new();
+    }
+    paragraph(&format!(
+        "Rows are of {} of {} pairs: those refused, then those with the fewest tie points.",
+        tabled.len(),
+        whole(all.len())
+    ))
+}
+
 fn write(site: &SiteProducts, ties: &Ties) -> String {
     let mut table = Table::new(
         "Matched pairs",
@@ -40,7 +65,8 @@ fn write(site: &SiteProducts, ties: &Ties) -> String {
             Column::Text("cells without a tie point"),
         ],
     );
-    for pair in &ties.matched {
+    let matched = tabled(&ties.matched);
+    for pair in &matched {
         let [first, second] = pair.images.map(|image| &site.images[image].times.id);
         let [parts, with_ties] = pair.parts;
         table.row(
@@ -62,5 +88,6 @@ fn write(site: &SiteProducts, ties: &Ties) -> String {
         "In each cell of common ground the point with the strongest texture was matched to the other image and back. \
          σ: medians of \
          single matches, in the second image. The table is of the second pass, which starts from the adjusted orientation.",
-    ) + &table.finish()
+    ) + &some_of_all(&ties.matched, &matched)
+        + &table.finish()
 }

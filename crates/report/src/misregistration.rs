@@ -24,7 +24,7 @@ use areograph_stages::{
 /// Number of pairs with a sentence each; tables have all.
 const PAIRS_SHOWN: usize = 6;
 
-pub(super) use pair::{BeforeAfter, by_footprints};
+pub(super) use pair::{BeforeAfter, PAIRS_TABLED, by_footprints};
 
 pub(super) const SECTION: Section = Section {
     title: "Tie points and misregistration",
@@ -45,7 +45,11 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
     }
     html += &read(geometric);
     if !pairs.is_empty() {
-        let tables = geometry(&pairs) + &reprojection(&pairs) + &footprints(&pairs);
+        let pairs = BeforeAfter::tabled(pairs);
+        let tables = BeforeAfter::some_of_all(geometric)
+            + &geometry(&pairs)
+            + &reprojection(&pairs)
+            + &footprints(&pairs);
         html += &folded("Tables of the pairs", &tables);
     }
     html += &heading(match geometric.adjustment {

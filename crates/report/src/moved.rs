@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::html::counted;
+use super::many;
 use super::numbers::whole;
 use super::plots::{
     Arrow, Arrows, Extent, GREY, INK, Mark, Panel, Plot, Series, Style, figure, label,
@@ -17,8 +18,9 @@ use areograph_stages::{intersect::IntersectedTies, register::RegisteredPoints};
 const DOTS_MAX: usize = 300;
 /// Largest number of vectors of all images together; each is drawn once and listed once, about 400 bytes.
 const ARROWS_ALL: usize = 4_000;
-/// Largest number of vectors of one panel.
+/// Largest number of vectors of one panel, and of one of a site of many images.
 const ARROWS_MAX: usize = 250;
+const ARROWS_OF_MANY: usize = 80;
 /// Widths of the image on either side of it within which footprints are compared.
 const WIDTHS_BESIDE: f64 = 0.5;
 /// Lines shown to either side: multiple of the movement of footprints, and minimum.
@@ -38,12 +40,18 @@ const AFTER: usize = 0;
 /// A plot that cannot be drawn.
 pub(super) fn figures(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
     let mut html = String::new();
-    let panels = 2 * site.images.len().max(1);
-    let limit = (ARROWS_ALL / panels).clamp(20, ARROWS_MAX);
+    let shown = many::shown(site);
+    let panels = 2 * shown.len().max(1);
+    let most = if many::are_many(site) {
+        ARROWS_OF_MANY
+    } else {
+        ARROWS_MAX
+    };
+    let limit = (ARROWS_ALL / panels).clamp(20, most);
     let adjusted = geometric
         .adjustment
         .map_or(&[][..], |adjustment| adjustment.images);
-    for (index, image) in site.images.iter().enumerate() {
+    for (index, image) in shown {
         let after = adjusted.get(index);
         if let Some(plot) = after.and_then(|after| footprints(image, after)) {
             html += &figure(&plot)?;
@@ -52,7 +60,7 @@ pub(super) fn figures(site: &SiteProducts, geometric: &GeometricProducts) -> Res
             html += &figure(&plot)?;
         }
     }
-    Ok(format!("<div class=\"plots\">\n{html}</div>\n"))
+    Ok(many::some_of_all(site) + &format!("<div class=\"plots\">\n{html}</div>\n"))
 }
 
 /// Footprints around the middle one with the orientation of the kernels and with the adjusted one, so close that

@@ -2,10 +2,13 @@
 
 use super::{
     html::{heading, list, paragraph},
+    numbers::whole,
     section::Section,
 };
 use areograph_products::SiteProducts;
 
+/// Number of notes shown; the rest are counted.
+const NOTES_SHOWN: usize = 50;
 /// Number of problems shown; the rest are counted.
 const COMPLAINTS_SHOWN: usize = 50;
 
@@ -17,7 +20,15 @@ pub(super) const SECTION: Section = Section {
 };
 
 fn write(site: &SiteProducts) -> String {
-    let mut body = list(site.notes);
+    let notes = &site.notes[..site.notes.len().min(NOTES_SHOWN)];
+    let mut body = list(notes);
+    if notes.len() < site.notes.len() {
+        body += &paragraph(&format!(
+            "{} of {} shown; manifest.json has all.",
+            notes.len(),
+            whole(site.notes.len())
+        ));
+    }
     if !site.complaints.is_empty() {
         let shown = &site.complaints[..site.complaints.len().min(COMPLAINTS_SHOWN)];
         body += &heading("Problems in the input");

@@ -2,8 +2,9 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
+use super::many::{self, DrawnImage};
 use areograph_geom::window::WindowShape;
-use areograph_products::{ImageProducts, SiteProducts};
+use areograph_products::SiteProducts;
 
 /// Number of points along the edge of a box window.
 const EDGE_POINTS: u32 = 72;
@@ -11,21 +12,25 @@ const EDGE_POINTS: u32 = 72;
 /// A named ring of (longitude, latitude), radians.
 pub(super) struct Outline {
     pub(super) name: String,
+    /// Whether a map has its name.
+    pub(super) is_named: bool,
     pub(super) ring: Vec<(f64, f64)>,
 }
 
-/// Outlines of the images whose whole edge is on the ground.
+/// Outlines of the images on maps, if their whole edge is on the ground.
 pub(super) fn images(site: &SiteProducts) -> Vec<Outline> {
-    let outline = |image: &ImageProducts| {
+    let outline = |drawn: &DrawnImage| {
+        let image = drawn.image;
         let points = image.orientation.outline.as_ref()?.iter();
         Some(Outline {
             name: image.times.id.clone(),
+            is_named: drawn.is_named,
             ring: points
                 .map(|point| (point.longitude_rad, point.latitude_rad))
                 .collect(),
         })
     };
-    site.images.iter().filter_map(outline).collect()
+    many::drawn(site).iter().filter_map(outline).collect()
 }
 
 /// Rings of the windows.
@@ -52,6 +57,7 @@ pub(super) fn windows(site: &SiteProducts) -> Vec<Outline> {
         };
         rings.into_iter().map(|ring| Outline {
             name: window.id.clone(),
+            is_named: true,
             ring,
         })
     });

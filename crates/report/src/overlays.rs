@@ -6,6 +6,7 @@ use base64::{Engine as _, engine::general_purpose::STANDARD};
 
 use super::{
     html::{self, escape, link, list, paragraph},
+    many,
     numbers::whole,
     plots::label,
     section::Section,
@@ -38,7 +39,10 @@ fn write(site: &SiteProducts) -> Result<String> {
         html::counted(overlays.places.len(), "place"),
     );
     let page = link("overlays.html", "overlays.html");
-    let images = overlays.images.iter().map(|shown| {
+    let own = site.shown_images();
+    let images = overlays.images.iter();
+    let images = images.filter(|shown| own.binary_search(&shown.image).is_ok());
+    let images = images.map(|shown| {
         let id = &site.images[shown.image].times.id;
         let picture = link(&format!("../images/{id}/overlay.png"), "picture");
         let layer = link(
@@ -54,8 +58,9 @@ fn write(site: &SiteProducts) -> Result<String> {
         .map(|place| figure(site, place))
         .transpose()?;
     Ok(format!(
-        "<p>{}{page}.</p>\n<ul>\n{images}</ul>\n{}",
+        "<p>{}{page}.</p>\n{}<ul>\n{images}</ul>\n{}",
         escape(&words),
+        many::some_of_all(site),
         first.unwrap_or_default()
     ))
 }

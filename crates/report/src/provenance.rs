@@ -2,9 +2,12 @@
 
 use super::{
     html::{Cell, Column, Table, escape, folded, link, paragraph},
+    many,
     numbers::whole,
     section::Section,
 };
+use std::collections::HashSet;
+
 use areograph_config::{self as config};
 use areograph_products::{SiteProducts, listed};
 
@@ -46,10 +49,9 @@ fn write(site: &SiteProducts) -> String {
             ],
         );
     }
-    for support in site
-        .images
-        .iter()
-        .filter_map(|image| image.times.support.as_ref())
+    for support in many::shown(site)
+        .into_iter()
+        .filter_map(|(_, image)| image.times.support.as_ref())
     {
         files.row(
             true,
@@ -112,7 +114,10 @@ fn products(site: &SiteProducts) -> String {
         Column::Text("readers"),
     ];
     let mut table = Table::new("Products", columns);
-    for product in listed(site) {
+    let shown = site.shown_images();
+    let is_shown = |index: usize| shown.binary_search(&index).is_ok();
+    let products = listed(site).into_iter();
+    for product in products.filter(|product| product.image.is_none_or(is_shown)) {
         let place = format!("../{}", product.path);
         table.row(
             true,
@@ -123,7 +128,7 @@ fn products(site: &SiteProducts) -> String {
             ],
         );
     }
-    folded("Products", &table.finish())
+    folded("Products", &(table.finish() + &many_have_the_same(site)))
 }
 
 /// The written keys of the configuration beside their defaults; all other keys have the defaults.
@@ -138,13 +143,42 @@ fn settings(site: &SiteProducts) -> String {
     ];
     let mut table = Table::new("Settings as written; all others are the defaults", columns);
     let declared = config::keys();
+    let hidden = hidden(site);
+    let is_hidden = |key: &str| image_of(key).is_some_and(|image| hidden.contains(image));
     for (key, value) in &site.config.keys {
+        if is_hidden(key) {
+            continue;
+        }
         let default = declared.iter().find(|declared| is_of(key, &declared.path));
         let default = default.and_then(|declared| declared.default.as_ref());
         let default = default.map_or_else(|| "–".to_owned(), ToString::to_string);
         table.row(true, [key.into(), value.into(), default.into()]);
     }
-    folded("Settings", &table.finish())
+    folded("Settings", &(table.finish() + &many_have_the_same(site)))
+}
+
+/// A paragraph for tables that list some images of many.
+fn many_have_the_same(site: &SiteProducts) -> String {
+    if !many::are_many(site) {
+        return String::new();
+    }
+    paragraph(
+        "Of the images those with plots of their own are listed; the others have the same, and manifest.json has all.",
+    )
+}
+
+/// Names of the images without rows of their own.
+fn hidden<'a>(site: &SiteProducts<'a>) -> HashSet<&'a str> {
+    let shown = site.shown_images();
+    let images = site.images.iter().enumerate();
+    let hidden = images.filter(|(index, _)| shown.binary_search(index).is_err());
+    hidden.map(|(_, image)| &*image.times.id).collect()
+}
+
+/// The image that a key of the configuration is of.
+fn image_of(key: &str) -> Option<&str> {
+    let (image, _) = key.strip_prefix("images.")?.rsplit_once('.')?;
+    Some(image)
 }
 
 /// Whether a key as written is the declared one: the name of a list of tables is followed by the entry.

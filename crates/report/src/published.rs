@@ -2,12 +2,14 @@
 
 use super::{
     html::{Cell, Column, Table, folded, paragraph},
+    many,
     numbers::whole,
     plots::label,
     section::Section,
 };
 use areograph_base::footprints::AdjustmentModel;
 use areograph_geom::statistics::Summary;
+use areograph_products::SiteProducts;
 use areograph_stages::adjust::{AdjustmentSummary, GroundSummary};
 
 pub(super) const SECTION: Section = Section {
@@ -16,7 +18,7 @@ pub(super) const SECTION: Section = Section {
     appears: |site| site.adjustment().is_some(),
     write: |site| {
         let adjustment = site.adjustment();
-        Ok(adjustment.map_or_else(String::new, |(_, of)| write(&of.adjusted.summary)))
+        Ok(adjustment.map_or_else(String::new, |(_, of)| write(site, &of.adjusted.summary)))
     },
 };
 
@@ -35,9 +37,9 @@ fn departure(summary: &AdjustmentSummary) -> &'static str {
     }
 }
 
-fn write(summary: &AdjustmentSummary) -> String {
+fn write(site: &SiteProducts, summary: &AdjustmentSummary) -> String {
     let tables =
-        ground_corrections(summary) + &image_coordinates(summary) + &ground_sigmas(summary);
+        ground_corrections(summary) + &image_coordinates(site, summary) + &ground_sigmas(summary);
     folded("Tables 2, 3 and 4 for this site", &tables)
 }
 
@@ -91,7 +93,7 @@ fn ground_corrections(summary: &AdjustmentSummary) -> String {
         )
 }
 
-fn image_coordinates(summary: &AdjustmentSummary) -> String {
+fn image_coordinates(site: &SiteProducts, summary: &AdjustmentSummary) -> String {
     let mut table = Table::new(
         "Image coordinates (Table 3 of Yoon & Shan 2004): corrections of MOLA, residuals of tie points",
         &[
@@ -104,7 +106,10 @@ fn image_coordinates(summary: &AdjustmentSummary) -> String {
             Column::Number("std"),
         ],
     );
-    for (index, image) in summary.images.iter().enumerate() {
+    for (index, _) in many::shown(site) {
+        let Some(image) = summary.images.get(index) else {
+            continue;
+        };
         let [shots, ties] = ["mola_corrections", "tie_residuals_px"];
         for (name, place, of) in [
             ("MOLA, lines and px", shots, &image.mola_corrections),
@@ -117,7 +122,7 @@ fn image_coordinates(summary: &AdjustmentSummary) -> String {
             table.row_of(&format!("{PLACE}/images/{index}/{place}"), true, cells);
         }
     }
-    table.finish() + &paragraph(departure(summary))
+    many::some_of_all(site) + &table.finish() + &paragraph(departure(summary))
 }
 
 fn ground_sigmas(summary: &AdjustmentSummary) -> String {

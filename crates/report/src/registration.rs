@@ -2,6 +2,7 @@
 
 use super::{
     html::{Cell, Column, Table, counted, folded, paragraph},
+    many,
     numbers::whole,
     plots::{COLOURS, Extent, GREY, INK, Mark, Panel, Plot, Series, Style, figure, label, thinned},
     section::Section,
@@ -18,6 +19,9 @@ const DOTS_MAX: usize = 600;
 /// Widths of the image shown on either side of it.
 const WIDTHS_BESIDE: f64 = 0.15;
 
+/// An image with its index in the site.
+type Indexed<'a> = (usize, &'a ImageProducts<'a>);
+
 pub(super) const SECTION: Section = Section {
     title: "Registration",
     anchor: "registration",
@@ -25,35 +29,35 @@ pub(super) const SECTION: Section = Section {
     write,
 };
 
-fn registered(image: &ImageProducts) -> bool {
-    !image.registration.points.is_empty()
+/// Whether a footprint has a line in `image`.
+pub(super) fn registered(image: &ImageProducts) -> bool {
+    image.registration.has_points()
 }
 
 fn write(site: &SiteProducts) -> Result<String> {
-    let images = site.images.iter().filter(|image| registered(image));
-    let images: Vec<&ImageProducts> = images.collect();
+    let images = many::shown(site).into_iter();
+    let images: Vec<Indexed> = images.filter(|(_, image)| registered(image)).collect();
     let mut planes = String::new();
-    for image in &images {
+    for (_, image) in &images {
         planes += &figure(&plane(site.profiles, image))?;
     }
     let planes = format!("<div class=\"plots\">\n{planes}</div>\n");
-    let evidence = planes + &models(site, &images);
-    Ok(profiles(site, &images)
+    let evidence = planes + &models(&images);
+    Ok(many::some_of_all(site)
+        + &profiles(site, &images)
         + &folded(
             "Footprints over the lines, and the effect of other camera models",
             &evidence,
         ))
 }
 
-/// Place of an image in the products.
-pub(super) fn place(site: &SiteProducts, image: &ImageProducts) -> String {
-    let mut images = site.images.iter();
-    let index = images.position(|other| other.times.id == image.times.id);
-    format!("registration.json#/images/{}", index.unwrap_or_default())
+/// Place of the image with this index in the products.
+pub(super) fn place(index: usize) -> String {
+    format!("registration.json#/images/{index}")
 }
 
 /// Profiles in the images, and their positions.
-fn profiles(site: &SiteProducts, images: &[&ImageProducts]) -> String {
+fn profiles(site: &SiteProducts, images: &[Indexed]) -> String {
     let mut table = Table::new(
         "Profiles in the images",
         &[
@@ -66,14 +70,12 @@ fn profiles(site: &SiteProducts, images: &[&ImageProducts]) -> String {
             Column::Number("shot spacing, lines"),
         ],
     );
-    let mut elsewhere = 0;
-    for image in images {
+    for (of_site, image) in images {
         let points = &image.registration.points;
-        let of_image = place(site, image);
+        let of_image = place(*of_site);
         let each = site.profiles.iter().zip(&image.registration.profiles);
         for (index, (profile, on_image)) in (0_u32..).zip(each) {
             if on_image.inside == 0 {
-                elsewhere += 1;
                 continue;
             }
             let inside = |values: &[f64]| {
@@ -84,8 +86,8 @@ fn profiles(site: &SiteProducts, images: &[&ImageProducts]) -> String {
                 });
                 format!("{low:.0} to {high:.0}")
             };
-            let with = |at: usize| site.images[at].times.id == image.times.id;
-            let together = profile.simultaneous.iter().any(|of| with(of.image));
+            let mut simultaneous = profile.simultaneous.iter();
+            let together = simultaneous.any(|of| of.image == *of_site);
             let spacing = on_image.shot_spacing_lines;
             table.row_of(
                 &format!("{of_image}/profiles/{index}"),
@@ -105,8 +107,12 @@ fn profiles(site: &SiteProducts, images: &[&ImageProducts]) -> String {
             );
         }
     }
-    let rejected: u64 = images
-        .iter()
+    let all = || site.images.iter().filter(|image| registered(image));
+    let elsewhere = all()
+        .flat_map(|image| &image.registration.profiles)
+        .filter(|on_image| on_image.inside == 0)
+        .count();
+    let rejected: u64 = all()
         .flat_map(|image| image.registration.rejected.values())
         .sum();
     let mut words = Vec::new();
@@ -197,7 +203,7 @@ fn plane(profiles: &[Profile], image: &ImageProducts) -> Plot {
 }
 
 /// Effect of the choice of the model.
-fn models(site: &SiteProducts, images: &[&ImageProducts]) -> String {
+fn models(images: &[Indexed]) -> String {
     let mut table = Table::new(
         "Other models compared with the one used, for footprints within the image's lines",
         &[
@@ -217,7 +223,7 @@ fn models(site: &SiteProducts, images: &[&ImageProducts]) -> String {
             .map(|(word, _)| word.replace('_', " "))
             .collect::<String>()
     };
-    for image in images {
+    for (of_site, image) in images {
         for (index, other) in image.registration.models.iter().enumerate() {
             let mut cells: Vec<Cell> = vec![
                 (&image.times.id).into(),
@@ -230,11 +236,7 @@ fn models(site: &SiteProducts, images: &[&ImageProducts]) -> String {
                 cells.push(mean.traced(format!("/{name}/mean")));
                 cells.push(deviation.traced(format!("/{name}/standard_deviation")));
             }
-            table.row_of(
-                &format!("{}/models/{index}", place(site, image)),
-                true,
-                cells,
-            );
+            table.row_of(&format!("{}/models/{index}", place(*of_site)), true, cells);
         }
     }
     table.finish()

@@ -2,11 +2,13 @@
 
 use super::{
     html::{Column, Table},
+    many,
     numbers::whole,
     plots::{Extent, GREY, Panel, Plot, Series, figure, label},
 };
 use areograph_base::{error::Result, units::RADIANS_PER_ARCSECOND};
 use areograph_geom::statistics::BAARDA_LIMIT;
+use areograph_products::SiteProducts;
 use areograph_stages::adjust::{Adjusted, ImageResidual, PointKind, ScalarResidual};
 
 /// Number of points of a curve.
@@ -15,7 +17,7 @@ const POINTS: usize = 240;
 const SHOWN: f64 = 5.0;
 
 /// One row per image: its tie points, their residuals, and the correction at its middle.
-pub(super) fn images(adjusted: &Adjusted) -> String {
+pub(super) fn images(site: &SiteProducts, adjusted: &Adjusted) -> String {
     let mut table = Table::new(
         "Images, one row each",
         &[
@@ -28,7 +30,10 @@ pub(super) fn images(adjusted: &Adjusted) -> String {
             Column::Number("rotation, ″"),
         ],
     );
-    for (index, image) in adjusted.images.iter().enumerate() {
+    for (index, _) in many::shown(site) {
+        let Some(image) = adjusted.images.get(index) else {
+            continue;
+        };
         let ties = || {
             let views = adjusted.views.iter();
             views.filter(|view| view.kind == PointKind::Tie && view.image == index)

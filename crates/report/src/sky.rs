@@ -7,6 +7,7 @@ use plotters::prelude::*;
 
 use super::{
     html::counted,
+    many::{self, DrawnImage},
     map::labels::{self, Labels},
     misregistration::BeforeAfter,
     plots::{COLOURS, Canvas, Drawn, GRID, INK, WIDTH, drawn, figure_html, label, quoted},
@@ -14,6 +15,7 @@ use super::{
 use areograph_base::{error::Result, units::RADIANS_PER_DEGREE};
 use areograph_geom::ellipsoid::{local_axes, on_ellipsoid_m, spherical_to_xyz_m};
 use areograph_products::{ImageProducts, SiteProducts};
+use areograph_stages::sample_orientation::{BoresightGround, OrientationSample};
 
 /// Height of the picture, its centre and the radius of the outermost circle.
 const HEIGHT: u32 = 720;
@@ -33,6 +35,7 @@ const IMAGE: usize = 3;
 /// Position of an image in the sky of the ground at its middle.
 struct Seen<'a> {
     image: &'a str,
+    is_named: bool,
     azimuth_rad: f64,
     emission_rad: f64,
 }
@@ -42,7 +45,8 @@ struct Seen<'a> {
 /// # Errors
 /// A drawing that cannot be made.
 pub(super) fn figure(site: &SiteProducts) -> Result<String> {
-    let seen: Vec<Seen> = site.images.iter().filter_map(seen).collect();
+    let drawn_images = many::drawn(site);
+    let seen: Vec<Seen> = drawn_images.iter().filter_map(seen).collect();
     if seen.len() < 2 {
         return Ok(String::new());
     }
@@ -60,23 +64,30 @@ pub(super) fn figure(site: &SiteProducts) -> Result<String> {
         title,
         &svg,
         &[],
-        &words(site, seen.len(), &sky.unnamed),
+        &words(site, &sky.unnamed),
         &csv,
     ))
 }
 
 /// Azimuth and emission of the camera at the middle of the image, as seen from the ground.
-fn seen<'a>(image: &ImageProducts<'a>) -> Option<Seen<'a>> {
-    let samples = &image.orientation.samples;
-    let sample = samples.get(samples.len() / 2)?;
-    let ground = sample.boresight.as_ref()?;
+fn seen<'a>(drawn: &DrawnImage<'a>) -> Option<Seen<'a>> {
+    let image = drawn.image;
+    let (sample, ground) = middle(image)?;
     let up = spherical_to_xyz_m(ground.longitude_rad, ground.latitude_rad, 1.0);
     let ground_m = on_ellipsoid_m(image.times.body.model(), &up);
     Some(Seen {
         image: &image.times.id,
+        is_named: drawn.is_named,
         azimuth_rad: azimuth_rad(&ground_m, &sample.position.xyz_m),
         emission_rad: ground.emission_rad,
     })
+}
+
+/// The sample at the middle of an image, and the ground that it sees.
+fn middle<'a>(image: &ImageProducts<'a>) -> Option<(&'a OrientationSample, &'a BoresightGround)> {
+    let samples = &image.orientation.samples;
+    let sample = samples.get(samples.len() / 2)?;
+    Some((sample, sample.boresight.as_ref()?))
 }
 
 /// Direction towards `camera_m` from `ground_m`, from north over east, radians.
@@ -85,11 +96,13 @@ fn azimuth_rad(ground_m: &Vector3<f64>, camera_m: &Vector3<f64>) -> f64 {
     towards.x.atan2(towards.y).rem_euclid(TAU)
 }
 
-fn words(site: &SiteProducts, images: usize, unnamed: &[&str]) -> String {
+fn words(site: &SiteProducts, unnamed: &[&str]) -> String {
+    let images = site.images.iter().filter_map(middle).count();
     let mut words = format!(
         "{} seen from the ground at their middle; zenith at the centre.",
         counted(images, "image")
     );
+    words += &many::drawn_in_words(site);
     if !unnamed.is_empty() {
         words += &format!(" Not labelled for lack of space: {}.", unnamed.join(", "));
     }
@@ -139,7 +152,8 @@ impl<'a> Sky<'a> {
         let mut names = sky.names;
         names.place("N", INK, std::iter::once(above));
         names.place("E", INK, std::iter::once((east.0 + 12, east.1)));
-        for (of, image) in seen.iter().zip(&sky.images) {
+        let named = seen.iter().zip(&sky.images).filter(|(of, _)| of.is_named);
+        for (of, image) in named {
             if !names.place_around(of.image, INK, *image) {
                 sky.unnamed.push(of.image);
             }
@@ -213,6 +227,7 @@ mod tests {
         let seen: Vec<Seen> = (0..9)
             .map(|image| Seen {
                 image: "M00-00001",
+                is_named: true,
                 // Beside the letter of the east, and at the zenith.
                 azimuth_rad: TAU / 4.0,
                 emission_rad: f64::from(image % 3) * 15.0 * RADIANS_PER_DEGREE,

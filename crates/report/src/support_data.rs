@@ -1,7 +1,8 @@
 //! Images by support data: contents of their files, to which nothing is applied.
 
 use super::{
-    html::{Column, Table, paragraph},
+    html::{Column, Table, counted, paragraph},
+    many,
     numbers::whole,
     section::Section,
 };
@@ -26,11 +27,15 @@ fn supported<'a>(
 
 fn write(site: &SiteProducts) -> String {
     let ids: Vec<&str> = supported(site).map(|(times, _)| &*times.id).collect();
+    let named = |ids: &[&str]| match ids.len() {
+        count if many::are_many(site) => counted(count, "image"),
+        _ => ids.join(", "),
+    };
     let mut words = format!(
         "Camera, line times and orientation of {} come from image support data (CSM, as ALE writes them). Nothing is applied \
          to them: no pointing (CK) bias, clock correction or light time, no kernel. Their adjusted orientation is in \
          adjusted_isd.json, not in SPICE kernels.",
-        ids.join(", ")
+        named(&ids)
     );
     let apart = supported(site).filter(|(_, support)| !support.has_laser);
     let apart: Vec<&str> = apart.map(|(times, _)| &*times.id).collect();
@@ -38,7 +43,7 @@ fn write(site: &SiteProducts) -> String {
         words += &format!(
             " Positions by ALE usually include light time and aberration, which amount to hundreds of metres: \
              neither ranges nor the mounting of the laser are used with {}.",
-            apart.join(", ")
+            named(&apart)
         );
     }
     let mut table = Table::new(
@@ -60,7 +65,9 @@ fn write(site: &SiteProducts) -> String {
             Column::Number("s after the last"),
         ],
     );
-    for (times, file) in supported(site) {
+    let shown = many::shown(site).into_iter();
+    let shown = shown.filter_map(|(_, image)| Some((image.times, image.times.support.as_ref()?)));
+    for (times, file) in shown {
         let Instrument {
             optics, detector, ..
         } = &times.instrument;
@@ -86,7 +93,7 @@ fn write(site: &SiteProducts) -> String {
             ],
         );
     }
-    paragraph(&words) + &table.finish()
+    paragraph(&words) + &many::some_of_all(site) + &table.finish()
 }
 
 const fn distortion(model: &DistortionModel) -> &'static str {

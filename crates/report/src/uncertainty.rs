@@ -22,11 +22,22 @@ pub(super) const SECTION: Section = Section {
 
 fn write(geometric: &GeometricProducts) -> String {
     let pairs = BeforeAfter::all(geometric);
+    let before = pairs
+        .iter()
+        .filter_map(|pair| pair.before.budget.clone().ok());
+    let before: Vec<UncertaintyBudget> = before.collect();
+    let pairs = BeforeAfter::tabled(pairs);
     let without: String = pairs.iter().map(without_budget).collect();
     let html = [
-        rows(TITLE, COLUMNS, &pairs, as_published),
+        BeforeAfter::some_of_all(geometric),
+        rows(TITLE, COLUMNS, (&pairs, &before), as_published),
         paragraph(WORDS),
-        rows(SIGNED_TITLE, SIGNED_COLUMNS, &pairs, by_equation_5),
+        rows(
+            SIGNED_TITLE,
+            SIGNED_COLUMNS,
+            (&pairs, &before),
+            by_equation_5,
+        ),
         paragraph(SIGNED_WORDS),
         without,
     ];
@@ -66,11 +77,11 @@ const SIGNED_WORDS: &str = "Means keep their signs. Not by orientation: mean mis
                             tie points does not explain; of several pairs the root mean square. An error of a footprint in plan \
                             moves both of its projections alike and does not show here. Agreement of two images, not accuracy.";
 
-/// A row for each state of each pair with a budget, and one of all pairs before the adjustment.
+/// A row for each state of each of these pairs with a budget, and one of the budgets of all pairs before the adjustment.
 fn rows<const N: usize>(
     title: &str,
     columns: &'static [Column],
-    pairs: &[BeforeAfter],
+    (pairs, before): (&[BeforeAfter], &[UncertaintyBudget]),
     cells: fn(&UncertaintyBudget, bool) -> [Cell; N],
 ) -> String {
     let mut table = Table::new(title, columns);
@@ -83,11 +94,8 @@ fn rows<const N: usize>(
             }
         }
     }
-    let before: Vec<UncertaintyBudget> = (pairs.iter())
-        .filter_map(|pair| pair.before.budget.clone().ok())
-        .collect();
     if before.len() > 1 {
-        pooled(&mut table, &before, cells);
+        pooled(&mut table, before, cells);
     }
     table.finish()
 }

@@ -1,13 +1,15 @@
 //! Heights from south to north: the MOLA surface with its uncertainty, and tie points before and after.
 
+use super::super::many;
 use super::super::plots::{Extent, Panel, Plot, Series, Style, label, thinned};
 use areograph_base::units::METRES_PER_KM;
 use areograph_geom::{ellipsoid::local_axes, statistics::Summary};
-use areograph_products::GeometricProducts;
+use areograph_products::{GeometricProducts, SiteProducts};
 use areograph_stages::check_heights::{HeightCheck, TieHeight};
 
-/// Number of tie points drawn.
+/// Number of tie points drawn, and of those of a site of many images.
 const POINTS_SHOWN: usize = 400;
+const POINTS_OF_MANY: usize = 200;
 /// One value in this many may be beyond each end of the axis of differences.
 const OUTERMOST: usize = 60;
 /// Colours of the surface, of points before and after.
@@ -16,14 +18,19 @@ const BEFORE: usize = 1;
 const AFTER: usize = 0;
 
 /// Heights above the ellipsoid, and below them above the surface.
-pub(super) fn plot(geometric: &GeometricProducts) -> Plot {
+pub(super) fn plot(site: &SiteProducts, geometric: &GeometricProducts) -> Plot {
+    let points_shown = if many::are_many(site) {
+        POINTS_OF_MANY
+    } else {
+        POINTS_SHOWN
+    };
     let after = geometric.adjustment.map(|adjustment| adjustment.heights);
     // The surface is drawn below the points that it controls.
     let latest = after.unwrap_or(geometric.heights);
     let axes = middle_axes(geometric.heights);
     let north_km = |tie: &TieHeight| axes.row(1).transpose().dot(&tie.ground.xyz_m) / METRES_PER_KM;
     let points = |check: &HeightCheck, value: fn(&TieHeight) -> f64| -> Vec<(f64, f64)> {
-        let ties = thinned(&check.ties, POINTS_SHOWN);
+        let ties = thinned(&check.ties, points_shown);
         ties.iter().map(|tie| (north_km(tie), value(tie))).collect()
     };
     let states = || {
@@ -64,7 +71,12 @@ pub(super) fn plot(geometric: &GeometricProducts) -> Plot {
         },
     ];
     let title = "Heights of tie points and of the MOLA surface".to_owned();
-    Plot::of(title, words(geometric), "north of the middle, km", panels)
+    Plot::of(
+        title,
+        words(geometric, points_shown),
+        "north of the middle, km",
+        panels,
+    )
 }
 
 /// An axis for all except the outermost values, which are drawn at its edge.
@@ -78,7 +90,7 @@ fn without_extremes(series: &[Series]) -> Extent {
     Extent::of(values[outermost..values.len() - outermost].iter().copied())
 }
 
-fn words(geometric: &GeometricProducts) -> String {
+fn words(geometric: &GeometricProducts, points_shown: usize) -> String {
     let after = geometric.adjustment.map(|adjustment| adjustment.heights);
     let median = |check: &HeightCheck| label(check.above_m.median, 1);
     let sigmas: Vec<f64> = geometric
@@ -98,8 +110,8 @@ fn words(geometric: &GeometricProducts) -> String {
         },
     );
     let all = geometric.heights.ties.len();
-    let thinned = if all > POINTS_SHOWN {
-        format!(" 1 in {} is drawn.", all.div_ceil(POINTS_SHOWN))
+    let thinned = if all > points_shown {
+        format!(" 1 in {} is drawn.", all.div_ceil(points_shown))
     } else {
         String::new()
     };

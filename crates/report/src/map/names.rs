@@ -17,7 +17,7 @@ impl Sheet {
     pub(super) fn names(&self, lines: &[GridLine]) -> (Labels, usize) {
         let mut unnamed = 0;
         let mut labels = Labels::new(WIDTH as i32, self.height());
-        for image in &self.shown.images {
+        for image in self.shown.images.iter().filter(|image| image.is_named) {
             let wide = labels::width(&image.name);
             let mut corners: Vec<(i32, i32)> = image
                 .ring

@@ -1,8 +1,17 @@
 //! A pair of images, before and after the adjustment.
 
-use super::super::{html::Cell, numbers::whole, plots::label};
-use areograph_products::GeometricProducts;
+use std::collections::{HashMap, HashSet};
+
+use super::super::{
+    html::{Cell, paragraph},
+    numbers::whole,
+    plots::label,
+};
+use areograph_products::{GeometricProducts, IMAGES_SHOWN};
 use areograph_stages::compare_pairs::PairComparison;
+
+/// Largest number of pairs with rows of their own: all pairs of a site whose images are all shown.
+pub(crate) const PAIRS_TABLED: usize = IMAGES_SHOWN * (IMAGES_SHOWN - 1) / 2;
 
 /// A pair of images before the adjustment and, if tie points still join it, after.
 pub(crate) struct BeforeAfter<'a> {
@@ -19,10 +28,12 @@ impl<'a> BeforeAfter<'a> {
         let adjusted = geometric
             .adjustment
             .map_or(&[][..], |adjustment| adjustment.pairs);
+        let mut places: HashMap<&[String; 2], usize> = HashMap::new();
+        for (index, pair) in adjusted.iter().enumerate() {
+            places.entry(&pair.images).or_insert(index);
+        }
         let of = |(index, before): (usize, &'a PairComparison)| {
-            let after = adjusted
-                .iter()
-                .position(|pair| pair.images == before.images);
+            let after = places.get(&before.images).copied();
             Self {
                 before,
                 after: after.map(|at| &adjusted[at]),
@@ -37,6 +48,38 @@ impl<'a> BeforeAfter<'a> {
     pub(crate) fn worst(pairs: &[Self]) -> Option<&Self> {
         let size = |pair: &&Self| pair.before.along_track_parallax_m.abs();
         pairs.iter().max_by(|a, b| size(a).total_cmp(&size(b)))
+    }
+
+    /// The pairs with rows of their own: all of a few, and of many those with the largest along-track parallax, after the
+    /// adjustment where there is one, in the order of the site.
+    pub(crate) fn tabled(mut pairs: Vec<Self>) -> Vec<Self> {
+        if pairs.len() > PAIRS_TABLED {
+            let apart_m = |pair: &Self| {
+                let last = pair.after.unwrap_or(pair.before);
+                last.along_track_parallax_m.abs()
+            };
+            pairs.sort_by(|one, other| apart_m(other).total_cmp(&apart_m(one)));
+            pairs.truncate(PAIRS_TABLED);
+            pairs.sort_by_key(|pair| pair.places[0]);
+        }
+        pairs
+    }
+
+    /// The images of the pairs with rows of their own.
+    pub(crate) fn images_tabled(geometric: &GeometricProducts<'a>) -> HashSet<&'a [String; 2]> {
+        let tabled = Self::tabled(Self::all(geometric)).into_iter();
+        tabled.map(|pair| &pair.before.images).collect()
+    }
+
+    /// A paragraph that states that rows are of some pairs only; empty where they are of all.
+    pub(crate) fn some_of_all(geometric: &GeometricProducts) -> String {
+        match geometric.pairs.len() {
+            all if all > PAIRS_TABLED => paragraph(&format!(
+                "Rows are of the {PAIRS_TABLED} of {} pairs with the largest along-track parallax; adjustment.json has all.",
+                whole(all)
+            )),
+            _ => String::new(),
+        }
     }
 
     /// Both images by name.

@@ -52,6 +52,23 @@ pub struct Orientation {
     pub invalid_because: Vec<String>,
 }
 
+impl Orientation {
+    /// The same without the nodes of its tables for camera models.
+    #[must_use]
+    pub fn without_tables(&self) -> Self {
+        Self {
+            image: self.image.clone(),
+            samples: self.samples.clone(),
+            outline: self.outline.clone(),
+            tables: self.tables.without_nodes(),
+            light_time: self.light_time.clone(),
+            notes: self.notes.clone(),
+            invalid_because: self.invalid_because.clone(),
+            body: self.body,
+        }
+    }
+}
+
 /// Orientation of the camera at one epoch.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OrientationSample {

@@ -56,6 +56,23 @@ pub struct InterpolationCheck {
     pub epochs: usize,
 }
 
+impl CameraTables {
+    /// The same without its nodes, which occupy most of the memory of an image.
+    #[must_use]
+    pub fn without_nodes(&self) -> Self {
+        Self {
+            et_s: Vec::new(),
+            position_m: Vec::new(),
+            velocity_m_s: Vec::new(),
+            inertial_to_bus: Vec::new(),
+            bus_angular_velocity_rad_s: Vec::new(),
+            inertial_to_mars: Vec::new(),
+            mars_angular_velocity_rad_s: Vec::new(),
+            ..*self
+        }
+    }
+}
+
 impl InterpolationCheck {
     /// Largest acceptable error of tables, image pixels: tables with a larger one get more nodes.
     pub const LIMIT_PX: f64 = 0.01;

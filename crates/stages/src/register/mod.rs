@@ -54,6 +54,28 @@ pub struct ImageRegistration {
     pub models: Vec<ModelDifference>,
 }
 
+impl ImageRegistration {
+    /// The same without its points.
+    #[must_use]
+    pub fn without_points(&self) -> Self {
+        Self {
+            image: self.image.clone(),
+            model: self.model,
+            points: RegisteredPoints::default(),
+            rejected: self.rejected.clone(),
+            profiles: self.profiles.clone(),
+            methods: self.methods.clone(),
+            models: self.models.clone(),
+        }
+    }
+
+    /// Whether a footprint has a line in the image or beyond its ends.
+    #[must_use]
+    pub fn has_points(&self) -> bool {
+        self.profiles.iter().any(|profile| profile.points > 0)
+    }
+}
+
 /// Differences of another model of the same image at the same points.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ModelDifference {
