@@ -3,7 +3,7 @@
 use super::{
     calibration_rounds::rounds as rounds_of,
     checks,
-    html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, verdict},
+    html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, untested, verdict},
     numbers::signed,
     plots::{Panel, Plot, Series, figure, label, thinned},
 };

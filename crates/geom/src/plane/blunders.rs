@@ -233,11 +233,10 @@ impl Adjusted {
     /// standard deviation that it can have: covariances of pictures without a common point are not at hand.
     fn apart(&self, whole: &Net, group: &[usize], kept: &[usize]) -> f64 {
         let precision = self.solution.precision();
-        let (one, others) = match (group, kept) {
-            ([one, others @ ..], []) => (one, others),
-            ([one, ..], others) => (one, others),
-            ([], _) => return 0.0,
+        let Some((one, rest)) = group.split_first() else {
+            return 0.0;
         };
+        let others = if kept.is_empty() { rest } else { kept };
         let share = 1.0 / others.len().max(1) as f64;
         let (mut apart, mut sigma) = (Place::new(0.0, 0.0), 0.0);
         for (index, share) in others.iter().map(|at| (at, -share)).chain([(one, 1.0)]) {
