@@ -243,17 +243,32 @@ fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
     (sum / count).sqrt()
 }
 
-/// Errors of points with their stated standard deviations, axis by axis.
-fn of_points(points: &[Vec<[f64; 2]>]) -> Option<Measured> {
+/// Errors of points with their stated standard deviations, axis by axis; of those of which something is stated, if any.
+fn of_points(points: &[Vec<(f64, Option<f64>)>]) -> Option<Measured> {
+    let stated = points.iter().filter_map(|point| {
+        let axes = point
+            .iter()
+            .map(|(error_m, sigma_m)| Some((*error_m, (*sigma_m)?)));
+        axes.collect::<Option<Vec<_>>>()
+    });
+    let stated: Vec<Vec<(f64, f64)>> = stated.collect();
     let axes = 0..points.first()?.len();
-    let single = points
-        .iter()
-        .flatten()
-        .map(|[error_m, sigma_m]| (error_m / sigma_m).abs());
+    if stated.is_empty() {
+        let error_m = |axis: usize| root_mean_square(points.iter().map(|point| point[axis].0));
+        return Some(Measured {
+            error_m: axes.map(error_m).fold(0.0, f64::max),
+            sigma_m: None,
+            single: None,
+            time_s: 0.0,
+        });
+    }
+    let single = stated.iter().flatten();
+    let single = single.map(|(error_m, sigma_m)| (error_m / sigma_m).abs());
     let single = single.fold(0.0, f64::max);
     let axes = axes.map(|axis| {
-        let of = |part: usize| root_mean_square(points.iter().map(|point| point[axis][part]));
-        (of(0), of(1))
+        let errors_m = stated.iter().map(|point| point[axis].0);
+        let sigmas_m = stated.iter().map(|point| point[axis].1);
+        (root_mean_square(errors_m), root_mean_square(sigmas_m))
     });
     Some(Measured::of_axes(axes, single))
 }
@@ -269,11 +284,11 @@ pub(super) fn net(case: &Case) -> Option<Measured> {
     };
     let points = rows.iter().filter_map(|row| {
         let place_m = truth["points_m"].get(&row["point"])?;
-        let sigma_m: f64 = row["sigma_m"].parse().ok()?;
+        let sigma_m = row["sigma_m"].parse().ok();
         let axes = ["x_m", "y_m"].into_iter().enumerate();
         let axes = axes.map(|(axis, name)| {
             let found_m: f64 = row[name].parse().unwrap();
-            [found_m - number(&place_m[axis]), sigma_m]
+            (found_m - number(&place_m[axis]), sigma_m)
         });
         Some(axes.collect())
     });
@@ -304,8 +319,8 @@ pub(super) fn calibration(case: &Case) -> Option<Measured> {
         ) * value("radius_m")?;
         let error_m = local(&true_m) * (found_m - true_m);
         let sigmas = ["sigma_east_m", "sigma_north_m", "sigma_up_m"].map(value);
-        let axes = (0..3).map(|axis| Some([error_m[axis], sigmas[axis]?]));
-        axes.collect::<Option<Vec<_>>>()
+        let axes = (0..3).map(|axis| (error_m[axis], sigmas[axis]));
+        Some(axes.collect())
     });
     of_points(&points.collect::<Vec<_>>())
 }

@@ -41,7 +41,6 @@ To add an input, add a row to a file of `tests/truth/mutations` and run
 /// Three digits.
 fn digits(value: f64) -> String {
     match value {
-        value if value >= 1e5 => format!("{:.0} km", value / 1e3).replace(" km", "e3"),
         value if value >= 100.0 => format!("{value:.0}"),
         value if value >= 10.0 => format!("{value:.1}"),
         _ => format!("{value:.2}"),

@@ -16,7 +16,7 @@ use super::{
 pub(super) const IMAGES: [&str; 2] = ["E02-01301", "E02-02016"];
 
 /// Sound inputs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Start {
     /// The pair over Isidis with its tie points, after a run of it.
