@@ -187,7 +187,7 @@ fn images(out: &Path) -> Option<Measured> {
         if !path.exists() {
             return None;
         }
-        let radii_m = true_m.values().map(|place_m| place_m.norm());
+        let radii_m = true_m.values().map(Vector3::norm);
         let radius_m = radii_m.sum::<f64>() / true_m.len() as f64;
         let mut isd = json(&path);
         for axis in ["semimajor", "semiminor"] {

@@ -27,10 +27,10 @@ A test makes every input from sound files whose truth is known, runs the program
   datum of the site tests.
 
 The error is the largest one of the mean position of the adjusted tie points, by its ratio to the stated standard deviation, on the
-axes east, north and up. Of nets and calibrations it is the root mean square of all points. Without tie points, it is the distance on the
-ground between the place where the camera looks and the place where it looked; nothing is stated of that distance.
+axes east, north and up. Of nets and calibrations it is the root mean square of all points. Without an adjustment, it is the mean distance on the
+ground between the places that an image shows at known pixels and the true ones; nothing is stated of that distance.
 *Worst point* is the largest error of a single point in its own stated standard deviations.
-The sound pair of images has an error of 0.1 to 1 standard deviations.
+The table of sound inputs is for comparison.
 
 Products that are invalid, or that have a remark, can err by more than they state. A script must look at the exit code and at the remarks.
 
@@ -101,7 +101,7 @@ fn page(rows: &[Row], judged: &[Judged<'_>]) -> String {
         .collect();
     if !silent.is_empty() {
         text.push_str(
-            "\n## Not noticed\n\nThese inputs give valid products without a remark, and the error is larger than what is stated.\n",
+            "\n## Not noticed\n\nThese inputs give valid products without a remark, and their result, or a statement about it, is wrong by more than is stated.\n",
         );
         table(&mut text, silent.iter().copied());
         text.push('\n');
