@@ -2,6 +2,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod mutations;
 mod scene_errors;
 mod scene_mission;
 mod scene_ties;

@@ -72,7 +72,7 @@ struct Judged {
     kept_blunders: Vec<String>,
 }
 
-fn table(path: &Path) -> RecordBatch {
+pub(crate) fn table(path: &Path) -> RecordBatch {
     let builder = ParquetRecordBatchReaderBuilder::try_new(File::open(path).unwrap()).unwrap();
     // All rows at once.
     let reader = builder.with_batch_size(1 << 20).build();
@@ -85,12 +85,12 @@ fn texts(table: &RecordBatch, name: &str) -> Vec<String> {
     column.iter().map(|text| text.unwrap().to_owned()).collect()
 }
 
-fn vector(value: &Value) -> Vector3<f64> {
+pub(crate) fn vector(value: &Value) -> Vector3<f64> {
     Vector3::from_fn(|axis, _| value[axis].as_f64().unwrap())
 }
 
 /// Rows towards east, north and up.
-fn local(place_m: &Vector3<f64>) -> Matrix3<f64> {
+pub(crate) fn local(place_m: &Vector3<f64>) -> Matrix3<f64> {
     let up = place_m.normalize();
     let east = Vector3::z().cross(&up).normalize();
     Matrix3::from_rows(&[
