@@ -11,7 +11,8 @@ use serde_json::json;
 use tokio::{sync::Semaphore, task::JoinHandle};
 
 use super::{
-    load_sites, open, output, panicked::flatten, plan, progress::Progress, report, stop::on_signals,
+    load_sites, open, output, panicked::flatten, plan, progress::Progress, report,
+    single::untested, stop::on_signals,
 };
 use crate::{
     config::SiteConfig,

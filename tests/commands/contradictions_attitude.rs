@@ -179,7 +179,7 @@ const WITH_TIES: &[Mistake] = &[
             }
         },
         End::Untested,
-        "an error that the start times of all images share",
+        "an error that the start times of all images, or the lines of all tie points, share",
     ),
 ];
 
