@@ -202,6 +202,7 @@ impl Site {
         let evidence = Evidence {
             wording: self.config.wording(),
             footprints: Some(self.converted.footprints.len()),
+            ground: None,
             limits: &self.config.limits,
             range_limits: &self.config.range_check,
             orientation_limits: &self.config.orientation,
