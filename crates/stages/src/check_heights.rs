@@ -214,8 +214,8 @@ pub fn check_heights(
         return HeightCheck::without_surface("no tie point has a ground point".to_owned());
     }
     let ties: Vec<TieHeight> = points
-        .chunks(TOGETHER)
-        .flat_map(|points| heights(&surface, points))
+        .par_chunks(TOGETHER)
+        .flat_map_iter(|points| heights(&surface, points))
         .collect();
     let step = places_m.len().div_ceil(IN_COMMON_MAX).max(1);
     let places_m: Vec<Vector3<f64>> = places_m.into_iter().step_by(step).collect();

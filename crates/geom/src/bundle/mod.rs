@@ -129,7 +129,7 @@ pub use error::BundleError;
 pub use known::KnownCoordinates;
 pub use part::Part;
 pub use relief::{ProfileShift, ReliefOfSite};
-pub use solve::solve;
+pub use solve::{solve, solve_comparing};
 pub use unknowns::Unknown;
 
 use super::{

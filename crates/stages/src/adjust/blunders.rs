@@ -8,7 +8,7 @@ use super::{
 use areograph_base::watch::Watch;
 use areograph_config::AdjustmentConfig;
 use areograph_geom::{
-    bundle::{Adjustment, BundleError, BundleOptions, Network, Residual, solve},
+    bundle::{Adjustment, BundleError, BundleOptions, Network, Residual, solve, solve_comparing},
     pushbroom::ExteriorOrientation,
     robust::RobustWeight,
 };
@@ -56,6 +56,22 @@ fn solved<M: ExteriorOrientation>(
     adjustment
 }
 
+/// Solves the network once and counts the solution; its heights are compared with the surface only where no standardised
+/// residual exceeds `limit`, because a solution with blunders is followed by another.
+fn solved_within<M: ExteriorOrientation>(
+    assembled: &Assembled<M>,
+    bundle_options: &BundleOptions,
+    limit: f64,
+    watch: Watch<'_>,
+) -> Result<Adjustment, BundleError> {
+    let (network, shots) = (&assembled.network, assembled.shots);
+    let adjustment = solve_comparing(network, bundle_options, |adjustment| {
+        largest(&worst_standardised(network, adjustment, shots)) <= limit
+    });
+    watch.step(1, "solutions");
+    adjustment
+}
+
 /// Adjusts, rejects the worst tie points and repeats until no standardised residual exceeds `limit`; without a limit
 /// all stay.
 fn by_residuals<M: ExteriorOrientation>(
@@ -64,20 +80,19 @@ fn by_residuals<M: ExteriorOrientation>(
     limit: Option<f64>,
     watch: Watch<'_>,
 ) -> Result<Adjustment, BundleError> {
-    let adjustment = solved(assembled, bundle_options, watch);
     let Some(limit) = limit else {
-        return adjustment;
+        return solved(assembled, bundle_options, watch);
     };
-    let adjustment = match adjustment {
+    let adjustment = match solved_within(assembled, bundle_options, limit, watch) {
         // Too many or too large blunders leave no common solution; low weights reveal them.
         Err(BundleError::NotConverged { .. }) if bundle_options.robust.is_none() => {
             let robust = BundleOptions {
                 robust: Some(WHERE_MANY),
                 ..*bundle_options
             };
-            let adjustment = solved(assembled, &robust, watch)?;
+            let adjustment = solved_within(assembled, &robust, limit, watch)?;
             reject_worst(assembled, &robust, limit, adjustment, watch)?;
-            solved(assembled, bundle_options, watch)?
+            solved_within(assembled, bundle_options, limit, watch)?
         }
         other => other?,
     };
@@ -92,9 +107,9 @@ fn reject_worst<M: ExteriorOrientation>(
     mut adjustment: Adjustment,
     watch: Watch<'_>,
 ) -> Result<Adjustment, BundleError> {
-    for _ in 0..ROUNDS_MAX {
+    for round in 1..=ROUNDS_MAX {
         let worst = worst_standardised(&assembled.network, &adjustment, assembled.shots);
-        let largest = worst.iter().copied().fold(0.0, f64::max);
+        let largest = largest(&worst);
         if largest <= limit {
             break;
         }
@@ -106,7 +121,11 @@ fn reject_worst<M: ExteriorOrientation>(
             (point, RejectionReason::Blunder { standardised })
         });
         assembled.reject(rejected.collect());
-        adjustment = solved(assembled, bundle_options, watch)?;
+        adjustment = if round < ROUNDS_MAX {
+            solved_within(assembled, bundle_options, limit, watch)?
+        } else {
+            solved(assembled, bundle_options, watch)?
+        };
     }
     Ok(adjustment)
 }
@@ -156,6 +175,10 @@ impl<M> Assembled<M> {
         }
         self.network.views.retain(|view| !is_rejected[view.point]);
     }
+}
+
+fn largest(standardised: &[f64]) -> f64 {
+    standardised.iter().copied().fold(0.0, f64::max)
 }
 
 /// The largest standardised residual of each tie point, without sign; 0 for shots and dropped points.

@@ -22,7 +22,7 @@ use super::{
 use areograph_base::footprints::AdjustmentModel;
 use areograph_config::AdjustmentConfig;
 use areograph_geom::{
-    bundle::{Adjustment, BundleError, BundleOptions, solve},
+    bundle::{Adjustment, BundleError, BundleOptions, solve_comparing},
     ellipsoid::local_axes,
     pushbroom::ExteriorOrientation,
 };
@@ -63,7 +63,8 @@ pub(super) fn other_reading<M: ExteriorOrientation>(
     } else {
         by_attitude_clock(&mut network, images, config);
     }
-    let other = solve(&network, bundle_options)?;
+    // Of its heights only those observed are used.
+    let other = solve_comparing(&network, bundle_options, |_| false)?;
     let points = adjustment.points.iter().zip(&other.points).enumerate();
     let both_m: Vec<[Vector3<f64>; 2]> = points
         .filter(|(point, _)| assembled.kind(*point) == PointKind::Tie)
