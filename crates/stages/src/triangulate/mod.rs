@@ -65,7 +65,7 @@ impl Input for NetFiles<'_> {
 
 impl Stage for Triangulate<'_> {
     const NAME: &'static str = "triangulate";
-    const METHOD: u32 = 10;
+    const METHOD: u32 = 11;
     type Output = Triangulation;
     stage_inputs!(fingerprint);
 
