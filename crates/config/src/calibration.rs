@@ -26,8 +26,8 @@ use super::{
         words,
     },
     parse_file,
-    pedr::ground_radius,
     paths::{FILE, Globs},
+    pedr::ground_radius,
     problems::Problems,
     read,
 };

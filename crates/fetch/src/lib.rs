@@ -43,7 +43,9 @@ mod table;
 mod transfer;
 mod utc;
 
-pub use archives::{Archives, GenericArchive, ImageArchive, KernelArchive, Network, PedrArchive, ShotService};
+pub use archives::{
+    Archives, GenericArchive, ImageArchive, KernelArchive, Network, PedrArchive, ShotService,
+};
 pub use cache::Indexes;
 pub use error::FetchError;
 pub use filling::Filling;
