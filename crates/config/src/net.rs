@@ -224,7 +224,7 @@ fn seams_need_bricks(written: &TriangulationConfig, keys: &mut Keys<'_, '_>) {
     if written.method == Method::OneShot && written.local {
         keys.refuse(
             "local",
-            "no: one_shot has no bricks whose seams could be evened out",
+            "no, or method = \"scale\": one_shot has no bricks whose seams could be evened out",
         );
     }
 }
