@@ -25,7 +25,7 @@ const PERTURBATIONS: [[f64; 3]; 7] = [
 /// solstice. The error is 0.01° within decades of 2000.
 ///
 /// # Source
-/// Allison & McEwen 2000, Planetary and Space Science 48, 215–235, equations 16 to 19 and table 5.
+/// Allison & `McEwen` 2000, Planetary and Space Science 48, 215–235, equations 16 to 19 and table 5.
 #[must_use]
 pub fn solar_longitude_rad(et: Et) -> f64 {
     let days = et.seconds() / DAY_S;
