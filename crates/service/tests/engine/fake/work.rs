@@ -155,8 +155,11 @@ impl Played {
     }
 
     fn list(&self, root: &Path, into: &Path) -> Ended {
-        let away = self.0.away.lock().unwrap();
-        let gone = away.iter().any(|path| root == Path::new(path));
+        // Released at once: `World::at` holds the files when it takes this lock.
+        let gone = {
+            let away = self.0.away.lock().unwrap();
+            away.iter().any(|path| root == Path::new(path))
+        };
         let mut lines = Vec::new();
         let files = self.0.files.lock().unwrap();
         let found = files
