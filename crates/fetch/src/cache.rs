@@ -15,6 +15,7 @@ use areograph_pds::image_index::{ImageIndex, read_index};
 
 /// Which indexes are wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[allow(clippy::struct_excessive_bools, reason = "one for each index")]
 pub struct Indexes {
     /// Coverage and checksums of kernels.
     pub kernels: bool,
