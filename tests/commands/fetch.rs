@@ -888,7 +888,7 @@ fn a_mirror_on_a_disk_serves_as_an_archive_does() {
             == archive.original(KERNEL_PATH)
     );
     assert_eq!(archive.server.request_count(), 0);
-    archive.hosts("[generic]\nurl = 'x'\n");
+    archive.hosts("[planets]\nurl = 'x'\n");
     let (code, told) = archive.refused(&DAYS);
     assert_eq!(code, 2);
     assert!(

@@ -89,13 +89,13 @@ pub struct KernelArchive {
     pub source: String,
 }
 
-/// Kernels of no mission, by listings of their folders.
+/// Kernels of no mission, by listings of folders.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GenericArchive {
-    /// Root of the folders.
+    /// Root.
     pub url: String,
-    /// Folder, beginning and end of the names of the versions of a kernel.
+    /// Folder, beginning and end of names: of each the latest version.
     pub latest: Vec<[String; 3]>,
     /// Source of these values.
     pub source: String,
@@ -368,10 +368,7 @@ mod tests {
         for (own, expected) in [
             ("[kernels]\nurl = \"file:///mirror\"", "ends in a slash"),
             ("[kernels]\nindex = \"../x\"", "not a path below"),
-            (
-                "[generic]\nlatest = [[\"..\", \"naif\", \".tls\"]]",
-                "not a path below",
-            ),
+            ("[generic]\nlatest = [['..', '', '']]", "not a path below"),
             ("[network]\nattempts = 0", "no attempt"),
             ("[network]\nread_s = nan", "outside of 0.001"),
             ("[kernel]\nurl = \"x/\"", "unknown field"),

@@ -30,7 +30,6 @@ pub mod map_surface;
 pub mod match_laser;
 pub mod match_ties;
 pub mod mola_surface;
-mod off_nadir;
 pub mod orientation;
 pub mod oriented;
 pub mod outline_windows;

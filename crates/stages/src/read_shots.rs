@@ -1,13 +1,16 @@
 //! Reads tables of laser shots for those in a site's windows: the counterpart of the search of PEDR files for other
 //! altimeters.
 
+mod off_nadir;
+
 use std::{
     collections::{BTreeMap, BTreeSet},
     path::Path,
     sync::atomic::AtomicBool,
 };
 
-use super::{off_nadir::mark_passes, outline_windows::Windows, search_footprints::SearchResult};
+use self::off_nadir::mark_passes;
+use super::{outline_windows::Windows, search_footprints::SearchResult};
 use areograph_base::{
     altimetry::NO_ATTITUDE,
     body::{Body, Datum},
