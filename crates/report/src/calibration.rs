@@ -3,7 +3,7 @@
 use super::{
     calibration_rounds::rounds as rounds_of,
     checks,
-    html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, untested, verdict},
+    html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, verdict},
     numbers::signed,
     plots::{Panel, Plot, Series, figure, label, thinned},
 };
@@ -62,7 +62,7 @@ fn lead(config: &CalibrationConfig, of: &Calibration) -> String {
     }
     let body = paragraph(&words) + &list(&of.verdict.reasons) + &list(&of.verdict.remarks);
     verdict(tone, &headline, &body)
-        + &untested(&of.verdict.untested)
+        + &checks::untested(&of.verdict.untested)
         + &checks::listed(&of.verdict.checks)
 }
 

@@ -2,13 +2,14 @@
 
 use super::{
     adjustment, heights,
-    html::{Cell, Column, Table, Tone, escape, link},
+    html::{Cell, Column, Table, Tone, escape, link, list},
     images, misregistration, notes,
     numbers::{number, signed, whole},
     profiles, ranges, registration, scan,
     section::Section,
     selection, surface, timeline,
 };
+use areograph_base::verdict::NOT_TESTED;
 use areograph_products::SiteProducts;
 use areograph_stages::judge::{Check, CheckKind, CheckOutcome};
 
@@ -197,6 +198,17 @@ const fn section(kind: CheckKind) -> Option<&'static Section> {
         | CheckKind::ControlStretch
         | CheckKind::OtherOrbitsOffset => return None,
     })
+}
+
+/// Errors that no datum can show.
+pub(super) fn untested(phrases: &[String]) -> String {
+    if phrases.is_empty() {
+        return String::new();
+    }
+    format!(
+        "<p class=\"about\"><b>{NOT_TESTED}</b></p>\n{}",
+        list(phrases)
+    )
 }
 
 #[cfg(test)]

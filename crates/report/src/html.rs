@@ -3,7 +3,6 @@
 use std::{borrow::Cow, fmt::Write as _};
 
 use super::numbers::whole;
-use areograph_base::verdict::NOT_TESTED;
 
 /// Style of all pages. Reports have no scripts; plots take their colours from here, so that they follow light and dark.
 pub use areograph_base::style::STYLE;
@@ -177,17 +176,6 @@ pub(super) fn list<T: AsRef<str>>(items: &[T]) -> String {
         .map(|item| format!("<li>{}</li>\n", escape(item.as_ref())))
         .collect();
     format!("<ul>\n{}</ul>\n", items.concat())
-}
-
-/// Errors that no datum can show.
-pub(super) fn untested(phrases: &[String]) -> String {
-    if phrases.is_empty() {
-        return String::new();
-    }
-    format!(
-        "<p class=\"about\"><b>{NOT_TESTED}</b></p>\n{}",
-        list(phrases)
-    )
 }
 
 /// Letters and digits of `text` in lower case, the rest as hyphens: a name inside a page or file.

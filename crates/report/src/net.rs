@@ -2,7 +2,7 @@
 
 use super::{
     checks,
-    html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, untested, verdict},
+    html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, verdict},
     plots::{
         Arrow, Arrows, Extent, GREY, Panel, Plot, Series, figure, label, magnification, thinned,
     },
@@ -64,7 +64,7 @@ fn lead(config: &NetConfig, net: &Triangulation) -> String {
     }
     let body = paragraph(&words) + &list(&net.verdict.reasons) + &list(&net.verdict.remarks);
     verdict(tone, &headline, &body)
-        + &untested(&net.verdict.untested)
+        + &checks::untested(&net.verdict.untested)
         + &checks::listed(&net.verdict.checks)
 }
 

@@ -3,7 +3,7 @@
 use super::{
     checks,
     heights::{WITHHELD_BECAUSE, is_open, place_by},
-    html::{Tone, counted, escape, list, paragraph, untested, verdict},
+    html::{Tone, counted, escape, list, paragraph, verdict},
     map,
     misregistration::{BeforeAfter, by_footprints},
     numbers::{number, signed, whole},
@@ -44,7 +44,7 @@ pub(super) fn lead(site: &SiteProducts) -> Result<String> {
         "{}{}{}<div class=\"first\">\n<div>{}</div>\n<div>{}</div>\n</div>\n{remarks}",
         verdict(tone, &headline(site), &first_of(reasons)),
         numbers(site),
-        untested(&site.verdict.untested),
+        checks::untested(&site.verdict.untested),
         checks::table(site),
         map::first(site)?,
     );
