@@ -258,7 +258,7 @@ fn hardly_a_number_of_a_table_is_without_its_place() {
 }
 
 /// Paragraphs and lists with numbers that no document tells, by their first words, with what holds them instead.
-const TEXTS: [(&str, &str); 18] = [
+const TEXTS: [(&str, &str); 19] = [
     ("Relief alone would determine", "tests/report_geometric"),
     ("Surface kriged", "300 m is part of what roughness means"),
     ("At the tie points the surface", "names of profiles"),
@@ -277,6 +277,10 @@ const TEXTS: [(&str, &str); 18] = [
     ("ap18933l.b:", "a note of the manifest"),
     ("ap19043k.b:", "a note of the manifest"),
     ("image E02-", "a note of the manifest"),
+    (
+        "an attitude error that all",
+        "limits of the beam, in the table of checks",
+    ),
 ];
 
 #[test]
