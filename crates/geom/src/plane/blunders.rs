@@ -57,7 +57,7 @@ pub fn find_blunders(net: &Net) -> Result<Vec<usize>, PlaneError> {
         confirmed: BTreeSet::new(),
         adjusted: Adjusted::without(net, &BTreeSet::new())?,
     };
-    // No measurement is removed, or tried again, twice: restored ones are fixed, the others confirmed.
+    // No measurement is removed, or tried again, twice: restored ones are fixed, and what was tried is confirmed.
     while search.remove() || search.restore() {}
     Ok(search.removed.into_iter().collect())
 }
@@ -67,7 +67,7 @@ struct Search<'a> {
     removed: BTreeSet<usize>,
     /// Measurements that remain: restored ones, and those without which the net would have no solution.
     fixed: BTreeSet<usize>,
-    /// Removed measurements that do not agree with the others when they are restored.
+    /// Removed measurements that are not tried again.
     confirmed: BTreeSet<usize>,
     adjusted: Adjusted,
 }
@@ -136,7 +136,8 @@ impl Search<'_> {
                 self.fixed.extend(group);
             }
         }
-        self.confirmed.extend(tried.difference(&self.fixed));
+        // Also where they cannot be restored, so that none is tried twice.
+        self.confirmed.extend(&tried);
         let removed: BTreeSet<usize> = self.removed.difference(&self.fixed).copied().collect();
         if removed.len() < self.removed.len() {
             self.go_on(removed);
