@@ -12,7 +12,7 @@ use self::wish::Wanted;
 use super::{stop::Signals, windows::edges};
 use crate::{
     config::window_of_box,
-    error::Result,
+    error::{Error, Kind as ErrorKind, Result},
     fetch::{
         Archives, FetchError, Filling, Outcome,
         audit::{audit, verify},
@@ -178,15 +178,20 @@ fn fetched(filling: &Filling<'_>, plan: &Plan, replace: bool) -> Result<()> {
     let failed = |outcome: &&Outcome| outcome.result.is_err();
     let failed = outcomes.iter().filter(failed).count();
     if failed > 0 {
-        // One file's failure is the failure of the command.
-        let mut failures = outcomes
+        let mut failures: Vec<Error> = outcomes
             .into_iter()
-            .filter_map(|outcome| outcome.result.err());
+            .filter_map(|outcome| outcome.result.err())
+            .collect();
         let planned = plan.files.len();
-        return match (failures.next(), failed) {
-            (Some(failure), 1) => Err(failure),
-            _ => Err(FetchError::Incomplete { failed, planned }.into()),
-        };
+        // One file's failure is the failure of the command, and so is a lack that all failures share.
+        let is_lack = failures
+            .iter()
+            .all(|failure| failure.kind() == ErrorKind::Coverage);
+        return Err(if failed == 1 || is_lack {
+            failures.swap_remove(0)
+        } else {
+            FetchError::Incomplete { failed, planned }.into()
+        });
     }
     match plan.lacks.len() {
         0 => Ok(()),

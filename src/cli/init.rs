@@ -1,6 +1,7 @@
 //! `areograph init`.
 
 mod place;
+mod tables;
 
 use std::{
     fs,
@@ -22,12 +23,14 @@ use crate::{
 /// Writes a commented site file for a window and images.
 ///
 /// On a terminal the command asks for missing options. The file is DIR/SITE.toml; paths are given relative to the current
-/// folder and written relative to DIR. Without --box the window is the area that the images cover, and 5 km around it.
+/// folder and written relative to DIR. Without --box the window is the area that the images cover, and 5 km around it; without
+/// images it is the box around the shots of the tables.
 ///
 /// Examples:
 ///   areograph init gale
 ///   areograph init gale --box 137.0,138.0,-5.5,-4.0 --kernels kernels/nav.tm --pedr 'pedr/*.b'
 ///   areograph init gale --label labels/e0202855.lbl --label labels/m0402852.lbl --kernels kernels --ties gale.csv
+///   areograph init gusev --shots 'gusev/*.csv' --kernels naif0012.tls
 ///   areograph init gale --place gale --pairs 2    # then: areograph fetch gale/gale.toml
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
@@ -50,6 +53,10 @@ pub(super) struct Arguments {
     /// PEDR files, or globs of them.
     #[arg(long, value_name = "GLOB")]
     pedr: Vec<PathBuf>,
+    /// Tables of shots of the Orbital Data Explorer, or globs of them; with --place, the tables that `areograph fetch` requests,
+    /// in place of PEDR files.
+    #[arg(long, value_name = "GLOB", conflicts_with = "pedr")]
+    shots: Vec<PathBuf>,
     /// Label of an image.
     #[arg(long = "label", value_name = "FILE")]
     labels: Vec<PathBuf>,
@@ -83,11 +90,22 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     if file.exists() {
         return Err(Refused::Exists).in_file(file);
     }
-    let text = answers.new_site(&folder)?.text();
-    // Checked as the future file, so that paths are relative to its folder.
     fs::create_dir_all(&folder)
         .map_err(IoError::on("create the folder"))
         .in_file(&folder)?;
+    let mut site = answers.new_site(&folder)?;
+    // Checked as the future file, so that paths are relative to its folder.
+    if answers.is_placed_by_tables() {
+        site.edges_deg = Some([0.0, 360.0, -90.0, 90.0]);
+        let anywhere = parse(&site.text(), &file)?.site;
+        let read: Vec<PathBuf> = anywhere
+            .shots
+            .into_iter()
+            .flat_map(|table| table.files)
+            .collect();
+        site.edges_deg = Some(tables::box_around_deg(&read)?);
+    }
+    let text = site.text();
     let loaded = parse(&text, &file)?;
     for warning in loaded.warnings {
         tracing::warn!("{warning}");
@@ -108,6 +126,7 @@ struct Answers {
     edges_deg: Option<[f64; 4]>,
     kernels: Vec<PathBuf>,
     pedr: Vec<PathBuf>,
+    shots: Vec<PathBuf>,
     labels: Vec<PathBuf>,
     ties: Vec<PathBuf>,
 }
@@ -121,6 +140,7 @@ impl Answers {
             edges_deg: arguments.edges_deg,
             kernels: arguments.kernels.clone(),
             pedr: arguments.pedr.clone(),
+            shots: arguments.shots.clone(),
             labels: arguments.labels.clone(),
             ties: arguments.ties.clone(),
         };
@@ -138,7 +158,11 @@ impl Answers {
                 "Kernels: a metakernel, a folder, or files in load order",
                 &mut answers.kernels,
             ),
-            ("PEDR files or globs [none: images only]", &mut answers.pedr),
+            ("PEDR files or globs [none]", &mut answers.pedr),
+            (
+                "Tables of shots of the Orbital Data Explorer, or globs [none]",
+                &mut answers.shots,
+            ),
             ("Labels of images [none]", &mut answers.labels),
             ("Tie point files [none]", &mut answers.ties),
         ];
@@ -167,9 +191,9 @@ impl Answers {
         if self.kernels.is_empty() {
             return Err(Refused::Missing("kernels (--kernels)"));
         }
-        if self.pedr.is_empty() && self.labels.is_empty() {
+        if self.pedr.is_empty() && self.shots.is_empty() && self.labels.is_empty() {
             return Err(Refused::Missing(
-                "shots or images of the site (--pedr, --label)",
+                "shots or images of the site (--pedr, --shots, --label)",
             ));
         }
         if !self.pedr.is_empty() && self.edges_deg.is_none() && self.labels.is_empty() {
@@ -180,14 +204,14 @@ impl Answers {
         Ok(())
     }
 
+    /// Whether the window is the box around the shots of tables.
+    fn is_placed_by_tables(&self) -> bool {
+        !self.shots.is_empty() && self.edges_deg.is_none() && self.labels.is_empty()
+    }
+
     /// The same with paths relative to `folder`.
     fn new_site(&self, folder: &Path) -> Result<NewSite, Error> {
-        let seen = |paths: &[PathBuf]| -> Result<Vec<PathBuf>, Error> {
-            let paths = paths
-                .iter()
-                .map(|path| Ok(seen_from(folder, &absolute(path)?)));
-            paths.collect()
-        };
+        let seen = |paths: &[PathBuf]| seen(folder, paths);
         let mut images = Vec::with_capacity(self.labels.len());
         for (label, seen) in self.labels.iter().zip(seen(&self.labels)?) {
             images.push((image_of(label)?, seen));
@@ -198,6 +222,7 @@ impl Answers {
             kernels: seen(&self.kernels)?,
             kernels_are_a_folder: matches!(&self.kernels[..], [one] if one.is_dir()),
             pedr: seen(&self.pedr)?,
+            shots: seen(&self.shots)?,
             edges_deg: self.edges_deg,
             images,
             ties: seen(&self.ties)?,
@@ -257,6 +282,14 @@ fn seen_from(folder: &Path, path: &Path) -> PathBuf {
     }
     let back = here[common..].iter().map(|_| Component::ParentDir);
     back.chain(there[common..].iter().copied()).collect()
+}
+
+/// Paths given relative to the current folder, relative to `folder`.
+fn seen(folder: &Path, paths: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
+    let paths = paths
+        .iter()
+        .map(|path| Ok(seen_from(folder, &absolute(path)?)));
+    paths.collect()
 }
 
 fn tell(text: &str) -> Result<(), Error> {

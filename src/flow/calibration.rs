@@ -22,7 +22,7 @@ use crate::{
 };
 
 /// Raised when the layout of the products of a calibration changes.
-const METHOD: u32 = 5;
+const METHOD: u32 = 6;
 
 /// Calibrates the lines of a camera and publishes the products in `<out>/<calibration>`, if an input has changed
 /// since the last run.

@@ -62,6 +62,7 @@ pub(super) fn judged(
     let verdict = judge(&Evidence {
         wording: config.wording(),
         footprints: searched.then_some(site.book.of::<Converted>()?.footprints.len()),
+        rejected: &book.of::<SearchResult>()?.rejected,
         ground: site.book.of::<Converted>()?.footprints.ground_choice(),
         limits: &config.limits,
         range_limits: &config.range_check,

@@ -257,6 +257,42 @@ fn windows_become_tables() {
     assert!(texts(&info)[0].contains("3000"), "{}", texts(&info)[0]);
 }
 
+/// A part of a window may be empty, a window may not.
+#[test]
+fn an_empty_part_of_a_window_has_a_table_without_rows() {
+    let service = Service::new();
+    let none = r#"{"GDSResults": {"Status": "Success", "Count": "0"}}"#;
+    service.makes_all();
+    service.answers(FROM_ZERO, none);
+    let out = service.fetched(&[]);
+    assert!(out.contains("fetched: 3; present: 0; failed: 0"), "{out}");
+    assert!(
+        out.contains("zero_2.csv: written without rows: the service has no shot in this part"),
+        "{out}"
+    );
+    let empty = service.path("mars/shots/zero_2.csv");
+    let counted = areograph().args(["pedr", "info"]).arg(&empty).output();
+    let [counted, _] = texts(&counted.unwrap());
+    let is_zero = |line: &str| line.split_whitespace().eq(["rows", "0"]);
+    assert!(counted.lines().any(is_zero), "{counted}");
+    let before = service.server.request_count();
+    assert!(
+        service
+            .fetched(&[])
+            .contains("fetched: 0; present: 3; failed: 0")
+    );
+    assert_eq!(service.server.request_count(), before);
+    // Now both parts are empty.
+    for name in ["zero_1.csv", "zero_2.csv"] {
+        fs::remove_file(service.path("mars/shots").join(name)).unwrap();
+    }
+    service.answers(TO_ZERO, none);
+    let output = service.of_site(&[]);
+    assert_eq!(output.status.code(), Some(4), "{}", texts(&output)[1]);
+    assert!(texts(&output)[1].contains("the service has no shot in this box"));
+    assert!(!empty.exists());
+}
+
 #[test]
 fn tables_of_a_user_are_not_asked_for() {
     let service = Service::new();

@@ -61,6 +61,69 @@ fn a_new_site_is_ready_with_and_without_a_window() {
     }
 }
 
+/// A site from tables alone: its window is the box around their shots, over 0° as elsewhere.
+#[test]
+fn tables_of_shots_become_a_site() {
+    let case = Case::pair();
+    let heading = "long_East,lat_North,topography, MOLArange,  planet_rad, c,A,  Ephermis Time,            UTC,          Orbit\r\n";
+    let row = |longitude_deg: f64, latitude_deg: f64, at: u32| {
+        format!(
+            "{longitude_deg:.5},{latitude_deg:.5}, -1000.00, 380000.00, 3392000.00,1,0,{:.5},2001-01-01T00:00:00.000,{}\r\n",
+            f64::from(at).mul_add(0.1, 31_579_264.184),
+            15_000 + at
+        )
+    };
+    fs::create_dir(case.path("tables")).unwrap();
+    case.write(
+        "tables/one.csv",
+        heading.to_owned() + &row(359.504, 1.001, 0),
+    );
+    case.write("tables/two.csv", heading.to_owned() + &row(0.301, 0.5, 1));
+    let arguments = [
+        "sites/zero",
+        "--kernels",
+        "kernels/nav.tm",
+        "--shots",
+        "tables/*.csv",
+    ];
+    succeed(&mut init(&case, &arguments));
+    let text = fs::read_to_string(case.path("sites/zero/zero.toml")).unwrap();
+    for expected in [
+        "files = [\"../../tables/*.csv\"]\n",
+        "layout = \"ode_pedr\"\n",
+        "longitude_deg = [-0.5, 0.31]\n",
+        "latitude_deg = [0.5, 1.01]\n",
+    ] {
+        assert!(text.contains(expected), "{expected} in {text}");
+    }
+    succeed(case.areograph().args([
+        "--quiet",
+        "pedr",
+        "search",
+        "tables/one.csv",
+        "tables/two.csv",
+        "--box=-0.5,0.31,0.5,1.01",
+    ]));
+    // Tables without a shot are no place.
+    case.write("tables/one.csv", heading);
+    case.write("tables/two.csv", heading);
+    let refused = case.outcome(init(
+        &case,
+        &[
+            "new",
+            "--kernels",
+            "kernels/nav.tm",
+            "--shots",
+            "tables/*.csv",
+        ],
+    ));
+    assert!(
+        refused.contains("missing: a shot in the tables"),
+        "{refused}"
+    );
+    assert!(!case.path("new/new.toml").exists());
+}
+
 #[test]
 fn what_cannot_be_a_site_is_refused_and_leaves_no_file() {
     let case = Case::pair();

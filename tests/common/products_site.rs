@@ -225,6 +225,7 @@ impl Site {
             ground: self.footprints.ground_choice(),
             ranges: &self.ranges,
             limits: &self.config.limits,
+            rejected: &BTreeMap::new(),
             range_limits: &self.config.range_check,
             orientation_limits: &self.config.orientation,
             clock_correction_s: self.config.altimeter_clock.correction_s(),

@@ -25,7 +25,7 @@ use crate::common::{
 
 /// Largest number of kills of one command; those of few changes are killed at each of them.
 fn kills() -> usize {
-    if long() { 150 } else { 3 }
+    if long() { 300 } else { 3 }
 }
 
 /// What the commands read.

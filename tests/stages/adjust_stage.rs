@@ -439,6 +439,55 @@ fn blunders_are_found_and_good_ties_kept() {
     );
 }
 
+/// Measurements whose standard deviations lack the jitter of the images: it is found, no good tie point is lost to it, and
+/// blunders are found all the same.
+#[test]
+fn scatter_beyond_the_standard_deviations_is_no_blunder() {
+    const JITTER_PX: f64 = 0.3;
+    const OWN_PX: f64 = 0.06;
+    let mut site = Site::of(Recipe {
+        ties: 300,
+        tie_noise: 0.0,
+        ..Recipe::GUSEV
+    });
+    let per_line = focal_px_per_line(&site.simulated, 0);
+    let mut normals = Normals::new(17);
+    let noise_px = JITTER_PX.hypot(OWN_PX);
+    for tie in &mut site.ties {
+        for measure in &mut tie.measures {
+            measure.line += noise_px * normals.next() / per_line;
+            measure.sample += noise_px * normals.next();
+            measure.sigma_px = Some([OWN_PX / per_line, OWN_PX]);
+        }
+    }
+    let options = AdjustmentConfig {
+        blunder_limit: Some(BAARDA_LIMIT),
+        ..every_tie()
+    };
+    let adjusted = site.adjust(&options).unwrap();
+    let found_px = adjusted.summary.tie_scatter_px;
+    // A median of 300 residuals: 7 %, times four.
+    assert!((found_px / JITTER_PX - 1.0).abs() < 0.28, "{found_px} px");
+    assert!(adjusted.rejected.len() <= 1, "{:?}", adjusted.rejected);
+    let wrong: Vec<usize> = (0..15).map(|place| 20 * place + 7).collect();
+    for tie in &wrong {
+        site.ties[*tie].measures[1].line += 6.0;
+    }
+    let adjusted = site.adjust(&options).unwrap();
+    let rejected: Vec<usize> = adjusted.rejected.iter().map(|point| point.index).collect();
+    assert!(
+        wrong.iter().all(|tie| rejected.contains(tie)),
+        "{rejected:?}"
+    );
+    assert!(rejected.len() <= wrong.len() + 2, "{rejected:?}");
+    // Standard deviations that explain the residuals stay.
+    for measure in site.ties.iter_mut().flat_map(|tie| &mut tie.measures) {
+        measure.sigma_px = Some([noise_px / per_line, noise_px]);
+    }
+    let adjusted = site.adjust(&options).unwrap();
+    assert!(adjusted.summary.tie_scatter_px.abs() < f64::EPSILON);
+}
+
 #[test]
 fn blunders_that_leave_no_common_solution_are_found() {
     let mut site = Site::of(Recipe {

@@ -1,7 +1,9 @@
 //! Stated accuracies and verdicts against the truth of synthetic missions.
 
+mod clean_missions;
 #[path = "../common/mod.rs"]
 mod common;
+mod matched_ties;
 mod mutations;
 mod scene_errors;
 mod scene_mission;

@@ -32,6 +32,8 @@ pub struct NewSite {
     pub kernels_are_a_folder: bool,
     /// Paths or globs of PEDR files; empty for images only.
     pub pedr: Vec<PathBuf>,
+    /// Paths or globs of tables of the Orbital Data Explorer.
+    pub shots: Vec<PathBuf>,
     /// West, east, south and north edge of the window, degrees; without it the window is the outline of the images.
     pub edges_deg: Option<[f64; 4]>,
     /// Identifier and label of every image.
@@ -62,6 +64,13 @@ impl NewSite {
         if !self.pedr.is_empty() {
             file.table("[pedr]");
             file.key("pedr.files", texts(&self.pedr));
+        }
+        if !self.shots.is_empty() {
+            file.table("[[shots]]");
+            file.key("shots.files", texts(&self.shots));
+            file.key("shots.layout", "ode_pedr");
+        }
+        if !(self.pedr.is_empty() && self.shots.is_empty()) {
             self.windows(&mut file);
         }
         for (id, label) in &self.images {
@@ -181,6 +190,10 @@ mod tests {
         site.pedr.clear();
         let loaded = parse(&site.text(), &file).unwrap();
         assert!(loaded.site.windows.is_empty() && loaded.warnings.len() == 1);
+        site.shots = vec!["*.csv".into()];
+        let loaded = parse(&site.text(), &file).unwrap();
+        assert!(loaded.site.shots[0].layout.is_some());
+        assert_eq!(loaded.site.windows.len(), 2);
         site.kernels = vec![PathBuf::from(".")];
         site.kernels_are_a_folder = true;
         parse(&site.text(), &file).unwrap();

@@ -63,7 +63,7 @@ pub(crate) fn examined(
     // A process that was killed between the name and the record.
     if part.meta.sha256.as_ref() == Some(&hashed.sha256) {
         let record = Record {
-            made_url: file.box_deg.map(|_| part.meta.url.clone()),
+            made_url: file.shot_box.as_ref().map(|_| part.meta.url.clone()),
             ..Record::of(&file.url, hashed, verified_by(file, part), &file.why)
         };
         return Ok(Some((Done::Adopted, record)));

@@ -1,7 +1,7 @@
 //! Filling a folder: indexes, plan, transfers side by side, state.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     path::{Path, PathBuf},
     sync::{Mutex, PoisonError, atomic::AtomicBool},
     thread,
@@ -12,19 +12,23 @@ use crate::{
     archives::Archives,
     cache::{Cache, Indexes},
     client::Client,
+    error::FetchError,
     examined::{examined, verified_by},
     folder::Folder,
+    hashed::Hashed,
     outcome::{Done, Outcome, Standing},
     part::Part,
     plan::{
         FileKind, Plan, PlannedFile, Wish, find_images, plan_generic, plan_kernels, plan_pedr,
         plan_shots,
     },
-    state::{Record, State},
+    state::{Record, State, Verified},
     table,
     transfer::{Receiver, Wanted, publish},
 };
 use areograph_base::error::{Locate as _, Result};
+use areograph_pds::shot_table::ode_pedr_heading;
+use areograph_store::atomic;
 
 /// A folder and the archives that fill it.
 #[derive(Debug)]
@@ -222,7 +226,10 @@ impl<'a> Filling<'a> {
                                 file: file.clone(),
                                 result,
                             };
-                            told(&outcome);
+                            // Whether a box may be empty depends on the others of its window.
+                            if !is_empty_box(&outcome) {
+                                told(&outcome);
+                            }
                             locked(outcomes).push(outcome);
                         }
                     });
@@ -232,8 +239,33 @@ impl<'a> Filling<'a> {
         let mut outcomes = outcomes
             .into_inner()
             .unwrap_or_else(PoisonError::into_inner);
+        self.settle_empty_boxes(&mut outcomes, &state, told)?;
         outcomes.sort_by(|one, other| one.file.path.cmp(&other.file.path));
         Ok(outcomes)
+    }
+
+    /// Gives an empty box of a window whose other boxes have shots a table without rows, so that the window is complete.
+    fn settle_empty_boxes(
+        &self,
+        outcomes: &mut [Outcome],
+        state: &Mutex<State>,
+        told: &(dyn Fn(&Outcome) + Sync),
+    ) -> Result<()> {
+        let whole = |outcome: &Outcome| Some(outcome.file.shot_box.as_ref()?.whole.clone());
+        let filled = outcomes.iter().filter(|outcome| outcome.result.is_ok());
+        let filled: BTreeSet<String> = filled.filter_map(whole).collect();
+        for outcome in outcomes.iter_mut().filter(|outcome| is_empty_box(outcome)) {
+            if whole(outcome).is_some_and(|whole| filled.contains(&whole)) {
+                let file = &outcome.file;
+                atomic::write(&file.path, ode_pedr_heading().as_bytes())?;
+                let hashed = Hashed::of(&file.path)?;
+                let record = Record::of(&file.url, hashed, Verified::Rows, &file.why);
+                self.record(&self.folder.relative(&file.path), &record, state)?;
+                outcome.result = Ok((Done::Empty, record));
+            }
+            told(outcome);
+        }
+        Ok(())
     }
 
     /// Makes one file complete and records it.
@@ -274,10 +306,10 @@ impl<'a> Filling<'a> {
         };
         let receiver = self.receiver(client);
         let (mut made_url, mut resumed) = (None, part.bytes());
-        let hashed = if let Some(box_deg) = file.box_deg {
+        let hashed = if let Some(of) = &file.shot_box {
             let wish = table::Wish {
                 file,
-                box_deg,
+                box_deg: of.edges_deg,
                 part: self.part_path(file),
                 limit: self.archives.shots.limit(),
                 replace,
@@ -310,6 +342,16 @@ impl<'a> Filling<'a> {
         state.files.insert(name.to_owned(), record.clone());
         state.write(&self.folder.state())
     }
+}
+
+/// Whether the service has no shot in the box of a table.
+fn is_empty_box(outcome: &Outcome) -> bool {
+    let failure = outcome.result.as_ref().err();
+    let cause = failure.and_then(|failure| {
+        let cause: &dyn std::error::Error = &*failure.cause;
+        cause.downcast_ref()
+    });
+    matches!(cause, Some(FetchError::NoShots { .. }))
 }
 
 /// Scheme and host of an address.

@@ -30,6 +30,8 @@ pub enum Done {
         /// Bytes that were not transferred again.
         resumed: u64,
     },
+    /// It is a table without rows: the service has no shot in its box, and shots in others of the same window.
+    Empty,
 }
 
 /// What became of a planned file.

@@ -193,6 +193,9 @@ fn problem_of(path: &Path, box_deg: [f64; 4], stated: Option<u64>) -> Result<Opt
         Err(failure) => return Err(failure),
     }
     let all = rows.all;
+    if all == 0 {
+        return Ok(Some("it has no rows".to_owned()));
+    }
     if let Some(stated) = stated.filter(|stated| all < *stated) {
         return Ok(Some(format!(
             "{all} rows; expected {stated}, as the service states"

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Factor that makes the median absolute deviation of a normal distribution its standard deviation.
-const NORMAL_MAD: f64 = 1.4826;
+pub const NORMAL_MAD: f64 = 1.4826;
 
 /// Floor of the spread for the detection of outliers, metres: PEDR ranges and radii are whole centimetres, so half of a
 /// profile may agree exactly.

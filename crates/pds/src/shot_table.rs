@@ -2,13 +2,18 @@
 
 mod columns;
 mod ode_pedr;
+mod off_nadir;
 
 use std::{fs::File, path::Path};
 
 use csv::StringRecord;
 
 use self::columns::{Fields, is_header};
-pub use self::{columns::ShotColumns, ode_pedr::is_ode_pedr};
+pub use self::{
+    columns::ShotColumns,
+    ode_pedr::{is_ode_pedr, ode_pedr_heading},
+    off_nadir::{OffNadir, OffNadirPass},
+};
 use areograph_base::{
     body::Body,
     error::{Cause, IoError, Locate, Result},
@@ -172,7 +177,8 @@ enum ShotTableError {
 
 /// Reads the table at `path` and passes every shot, or the fault of its row, to `take`, in order.
 ///
-/// A first row without a number in the configured columns is a header.
+/// A first row without a number in the configured columns is a header. A table of the Orbital Data Explorer may consist of its
+/// heading.
 ///
 /// * `body` – the body of the footprints
 /// * `utc` – the instant of a time in UTC; without it, times in UTC are faults, or not compared
@@ -233,7 +239,11 @@ pub fn read_shot_table(
         };
         take(rows.count(row.and_then(cut)))?;
     }
-    rows.end().in_file(path)
+    match known {
+        // The heading alone is the table of a box without shots.
+        Known::OdePedr if rows.all == 0 => Ok(()),
+        _ => rows.end().in_file(path),
+    }
 }
 
 /// The rows of a table so far.

@@ -104,13 +104,20 @@ fn overview(adjusted: &Adjusted) -> String {
         against_configured(across),
         (label(summary.sigma0, 3), at("/sigma0")),
     ];
-    sentence(
+    let mut html = sentence(
         "{}, {} and {} adjusted together in {}; {} degrees of freedom. Unit-weight σ of tie points {} along track ({}), {} \
          across ({}). σ0 of all observations: {}.",
         &numbers
             .each_ref()
             .map(|(number, place)| (number.clone(), &**place)),
-    )
+    );
+    if summary.tie_scatter_px > 0.0 {
+        html += &sentence(
+            "Tie points scatter by {} px beyond their stated σ, as by jitter of the images; the σ of the adjustment contain it.",
+            &[(label(summary.tie_scatter_px, 2), &*at("/tie_scatter_px"))],
+        );
+    }
+    html
 }
 
 /// The weighted sum of squares from iteration to iteration.

@@ -83,7 +83,7 @@ pub use error_sources::{
     SceneErrors,
 };
 pub use images::Coder;
-pub use mission::{write_scene, write_scene_with_images};
+pub use mission::{TrueGround, write_scene, write_scene_with_images};
 pub use plane::write_plane_scene;
 pub use plane_net::{PlaneRecipe, PlaneScene};
 pub use terrain_model::write_terrain_model_scene;

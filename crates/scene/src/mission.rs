@@ -30,6 +30,7 @@ use areograph_base::{
 };
 use areograph_geom::{body_rotation::body_matrix, ellipsoid::Spherical};
 use areograph_pds::ties::ties_table;
+use nalgebra::Vector3;
 
 /// Fewest and most seconds of frames in a day's file.
 const DAY_S: [f64; 2] = [600.0, 90_000.0];
@@ -60,6 +61,26 @@ pub fn write_scene_with_images(
     write(directory, options, Some((coder, &SITES[..])))
 }
 
+/// The ground of the mission that [`write_scene`] writes.
+#[derive(Debug)]
+pub struct TrueGround(Terrain);
+
+impl TrueGround {
+    /// The ground of the mission with these options.
+    #[must_use]
+    pub fn of(options: &SceneOptions) -> Self {
+        let directions = SITES.map(super::plan::Site::direction);
+        let relief = options.errors.relief;
+        Self(Terrain::new(options.seed, &directions, relief))
+    }
+
+    /// Its distance from the centre of the body in a direction, IAU 2000, metres.
+    #[must_use]
+    pub fn radius_m(&self, direction: &Vector3<f64>) -> f64 {
+        self.0.radius_m(&direction.normalize())
+    }
+}
+
 /// Writes the mission; with the pixels of the narrow-angle images of some sites.
 pub(super) fn write(
     directory: &Path,
@@ -77,8 +98,7 @@ pub(super) fn write(
         .map(fly)
         .collect();
 
-    let directions = SITES.map(super::plan::Site::direction);
-    let terrain = Terrain::new(options.seed, &directions, options.errors.relief);
+    let TrueGround(terrain) = TrueGround::of(options);
     let mut truth = Truth::new(options.seed, options.errors);
     let pedr = draft.folder("pedr")?;
     let mut kept = Vec::new();

@@ -62,6 +62,7 @@ const CRATER_DEPTH: f64 = 0.16;
 const CELL_M: f64 = 1_000.0;
 
 /// The ground around one site, added to the terrain below it.
+#[derive(Debug)]
 pub(super) struct RoughPatch {
     centre: Vector3<f64>,
     east: Vector3<f64>,
@@ -74,6 +75,7 @@ pub(super) struct RoughPatch {
 }
 
 /// Noise on a square lattice.
+#[derive(Debug)]
 struct Octave {
     /// Lattice spacings a metre, and their direction.
     per_m: Vector2<f64>,
@@ -83,11 +85,13 @@ struct Octave {
 }
 
 /// A bowl with a raised rim.
+#[derive(Debug)]
 pub(super) struct Bowl {
     pub radius_m: f64,
     pub depth_m: f64,
 }
 
+#[derive(Debug)]
 struct Crater {
     centre_m: Vector2<f64>,
     bowl: Bowl,

@@ -25,6 +25,7 @@ const CELL_M: f64 = 130_000.0;
 const SITE_CLEARANCE_M: f64 = 60_000.0;
 
 /// A plane wave through space, seen where it cuts the surface.
+#[derive(Debug)]
 struct Wave {
     vector_per_m: Vector3<f64>,
     phase_rad: f64,
@@ -32,12 +33,14 @@ struct Wave {
 }
 
 /// A bowl and its position.
+#[derive(Debug)]
 struct Crater {
     centre_m: Vector3<f64>,
     bowl: Bowl,
 }
 
 /// The shape of the synthetic Mars, in IAU 2000 body-fixed components.
+#[derive(Debug)]
 pub(super) struct Terrain {
     areoid: Vec<Wave>,
     relief: Vec<Wave>,

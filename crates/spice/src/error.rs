@@ -171,9 +171,10 @@ pub enum SpiceError {
     },
     /// The kernels' motion cannot be tabulated to the tolerance.
     #[error(
-        "trajectory near {near}: {error_m} m off with pieces of {piece_s} s; required {tolerance_m} m"
+        "trajectory near {near}: positions and velocities of the kernels do not fit each other, {error_m:.3} m within {piece_s} s; \
+         expected at most {tolerance_m} m"
     )]
-    #[cause(Coverage: "check the SPK for jumps there, or allow a larger tolerance")]
+    #[cause(Coverage: "check the SPK for jumps there, and that its positions are in kilometres and its velocities in kilometres per second")]
     NoConvergence {
         /// Where.
         near: Et,

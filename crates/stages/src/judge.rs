@@ -10,6 +10,8 @@ mod ranges;
 mod surface;
 mod untested;
 
+use std::collections::BTreeMap;
+
 pub use areograph_base::verdict::{Check, CheckKind, CheckOutcome, Verdict};
 pub use beam::BeamEvidence;
 pub use untested::NO_BEAM;
@@ -31,6 +33,7 @@ use areograph_base::{
     wording::{Wording, signed, with_minus},
 };
 use areograph_config::{LimitsConfig, OrientationConfig, RangeCheckConfig};
+use areograph_pds::archive::ShotRejection;
 
 /// The evidence on which a site is judged.
 #[derive(Debug, Clone, Copy)]
@@ -39,6 +42,8 @@ pub struct Evidence<'a> {
     pub wording: Wording<'a>,
     /// Footprints in the windows; `None` for a site without PEDR files.
     pub footprints: Option<usize>,
+    /// Shots in the windows that were left out, by reason.
+    pub rejected: &'a BTreeMap<ShotRejection, u64>,
     /// Which of two radii of the shots is that of the ground; `None` where they have one.
     pub ground: Option<GroundRadius>,
     /// The limits of the configuration.
@@ -130,15 +135,32 @@ pub fn judge(evidence: &Evidence<'_>) -> Verdict {
 }
 
 impl Evidence<'_> {
+    /// Why no footprint is in a window, and what to check.
+    fn no_footprint(&self) -> String {
+        if self.rejected.is_empty() {
+            return "no footprint in any window: check windows, and that pedr.files are those of the site's orbits".to_owned();
+        }
+        let counts = self
+            .rejected
+            .iter()
+            .map(|(reason, count)| format!("{count} ({reason})"));
+        let counts: Vec<String> = counts.collect();
+        let check = if self.rejected.contains_key(&ShotRejection::Spoiled) {
+            "radii, ranges and positions of spoiled shots contradict each other: check their units and their reference sphere"
+        } else {
+            "check pedr.filter"
+        };
+        format!(
+            "no footprint in any window: all shots there are left out, {}; {check}",
+            counts.join(", ")
+        )
+    }
+
     /// Why the site is invalid, one sentence per reason; empty when it is valid.
     fn invalid_because(&self) -> Vec<String> {
         let mut reasons = Vec::new();
         if self.footprints == Some(0) {
-            reasons.push(
-                "no footprint in any window: check windows and pedr.filter, and that pedr.files are those of the \
-                 site's orbits"
-                    .to_owned(),
-            );
+            reasons.push(self.no_footprint());
         }
         for profile in &self.ranges.profiles {
             for reason in &profile.invalid_because {

@@ -1,15 +1,12 @@
 //! Reads tables of laser shots for those in a site's windows: the counterpart of the search of PEDR files for other
 //! altimeters.
 
-mod off_nadir;
-
 use std::{
     collections::{BTreeMap, BTreeSet},
     path::Path,
     sync::atomic::AtomicBool,
 };
 
-use self::off_nadir::mark_passes;
 use super::{outline_windows::Windows, search_footprints::SearchResult};
 use areograph_base::{
     altimetry::NO_ATTITUDE,
@@ -28,7 +25,7 @@ use areograph_geom::{
 use areograph_pds::{
     archive::{Repetition, ShotRejection, TableRows, repetition_complaint},
     pedr::{Complaint, Reason},
-    shot_table::{self, RowComplaint, ShotRow, TableColumns, read_shot_table},
+    shot_table::{self, OffNadir, RowComplaint, ShotRow, TableColumns, read_shot_table},
 };
 use areograph_spice::KernelView;
 use areograph_store::{
@@ -74,7 +71,7 @@ impl Input for ShotFiles<'_> {
 
 impl Stage for ReadShots<'_> {
     const NAME: &'static str = "search_footprints";
-    const METHOD: u32 = 4;
+    const METHOD: u32 = 5;
     const CHECKED: bool = true;
     type Output = SearchResult;
     stage_inputs!(fingerprint);
@@ -139,6 +136,7 @@ pub fn read_shots(
         seen: TableRows::default(),
         repeated: 0,
         layouts: BTreeSet::new(),
+        without_rows: Vec::new(),
         result: empty(body),
     };
     for (index, (table, file)) in (0_u16..).zip(tables) {
@@ -152,11 +150,15 @@ pub fn read_shots(
         });
         let (path, columns) = (&file.path, columns_of(table));
         gathered.layouts.insert(columns == TableColumns::OdePedr);
+        let before = gathered.result.frames_read;
         read_shot_table(path, &columns, body, Some(utc), |row| {
             Stopped::check(stop)?;
             gathered.take(index, datum, path, row);
             Ok(())
         })?;
+        if gathered.result.frames_read == before {
+            gathered.without_rows.push(file_name(path));
+        }
     }
     Ok(gathered.finish(tables.len()))
 }
@@ -202,7 +204,12 @@ fn empty(body: Body) -> SearchResult {
 
 /// The note on passes off nadir, whose shots get their angle.
 fn passes_off_nadir(footprints: &mut Footprints<AsRead>) -> Option<String> {
-    let passes = mark_passes(footprints).into_iter().map(|pass| {
+    let shots: Vec<Footprint> = (0..footprints.len())
+        .map(|row| footprints.row(row))
+        .collect();
+    let off_nadir = OffNadir::of(&shots);
+    footprints.off_nadir_rad = off_nadir.angles_rad;
+    let passes = off_nadir.passes.into_iter().map(|pass| {
         let angle_deg = pass.angle_rad / RADIANS_PER_DEGREE;
         format!("orbit {} ({angle_deg:.0}°)", pass.orbit)
     });
@@ -227,6 +234,8 @@ struct Gathered<'a> {
     repeated: u64,
     /// Whether tables are of the Orbital Data Explorer: of the tables so far.
     layouts: BTreeSet<bool>,
+    /// Names of tables that are a heading alone.
+    without_rows: Vec<String>,
     result: SearchResult,
 }
 
@@ -334,6 +343,12 @@ impl Gathered<'_> {
                      pointed to nadir"
                 ));
             }
+        }
+        if !self.without_rows.is_empty() {
+            notes.push(format!(
+                "tables without rows: {}",
+                self.without_rows.join(", ")
+            ));
         }
         if self.repeated > 0 {
             notes.push(format!(

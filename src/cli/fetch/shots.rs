@@ -7,7 +7,7 @@ use crate::{
     error::{Cause, Error, Result},
     fetch::{
         ShotService,
-        plan::{ShotTable, ShotWish},
+        plan::{ShotBox, ShotTable, ShotWish},
     },
     files::file_name,
     geom::window::{Region, WindowShape},
@@ -33,8 +33,7 @@ enum Unclear {
 struct Piece {
     /// Name of its table.
     name: String,
-    box_deg: [f64; 4],
-    why: String,
+    of: ShotBox,
 }
 
 /// What a site needs, and notes for the reader of the plan.
@@ -82,8 +81,7 @@ pub(super) fn of_box(folder: &Path, edges_deg: [f64; 4]) -> ShotWish {
     let pieces = cut(&name, "--box", &[edges_deg]);
     let table = |piece: Piece| ShotTable {
         path: folder.join(format!("{}.csv", piece.name)),
-        box_deg: piece.box_deg,
-        why: piece.why,
+        of: piece.of,
     };
     ShotWish {
         tables: pieces.into_iter().map(table).collect(),
@@ -105,22 +103,21 @@ fn pieces(site: &SiteConfig) -> (Vec<Piece>, Vec<String>) {
 }
 
 /// The boxes of queries for these boxes; several have numbers behind the name.
-fn cut(name: &str, of: &str, boxes_deg: &[[f64; 4]]) -> Vec<Piece> {
+fn cut(name: &str, whole: &str, boxes_deg: &[[f64; 4]]) -> Vec<Piece> {
     let boxes = boxes_deg
         .iter()
         .flat_map(|edges| ShotService::boxes(*edges));
     let boxes: Vec<[f64; 4]> = boxes.collect();
     let count = boxes.len();
-    let piece = |(number, box_deg): (usize, [f64; 4])| {
-        let [west, east, south, north] = box_deg;
-        Piece {
-            name: match count {
-                1 => name.to_owned(),
-                _ => format!("{name}_{number}"),
-            },
-            box_deg,
-            why: format!("shots of {of}, {west} to {east} east, {south} to {north} north"),
-        }
+    let piece = |(number, edges_deg): (usize, [f64; 4])| Piece {
+        name: match count {
+            1 => name.to_owned(),
+            _ => format!("{name}_{number}"),
+        },
+        of: ShotBox {
+            edges_deg,
+            whole: whole.to_owned(),
+        },
     };
     (1..).zip(boxes).map(piece).collect()
 }
@@ -150,8 +147,7 @@ fn tables(glob: &ShotGlob, pieces: &[Piece]) -> std::result::Result<Vec<ShotTabl
     }
     let table = |piece: &Piece, path: PathBuf| ShotTable {
         path,
-        box_deg: piece.box_deg,
-        why: piece.why.clone(),
+        of: piece.of.clone(),
     };
     match (&parts[..], pieces) {
         (_, []) => Ok(Vec::new()),
@@ -225,7 +221,7 @@ mod tests {
                 polygons: vec![vec![ring.to_vec()]],
             };
             let pieces = cut("p", "p", &boxes_deg(&shape)).into_iter();
-            pieces.map(|piece| piece.box_deg).collect()
+            pieces.map(|piece| piece.of.edges_deg).collect()
         };
         assert_eq!(
             boxes([[3.0, 10.0], [-2.0, 12.0], [1.0, 11.0]]),

@@ -82,6 +82,9 @@ pub(super) fn outcome(outcome: &Outcome) {
                 size(record.bytes)
             ));
         }
+        Ok((Done::Empty, _)) => output::line(format_args!(
+            "{path}: written without rows: the service has no shot in this part of the window"
+        )),
         Ok((Done::Fetched { resumed: 0 }, record)) => {
             output::line(format_args!("{path}: fetched, {}", size(record.bytes)));
         }
@@ -100,7 +103,7 @@ pub(super) fn summary(outcomes: &[Outcome]) {
     let (mut present, mut fetched, mut failed) = (0, 0, 0);
     for outcome in outcomes {
         match &outcome.result {
-            Ok((Done::Fetched { .. }, _)) => fetched += 1,
+            Ok((Done::Fetched { .. } | Done::Empty, _)) => fetched += 1,
             Ok(_) => present += 1,
             Err(_) => failed += 1,
         }

@@ -10,7 +10,7 @@ use std::{
 use clap::Args;
 use serde::Deserialize;
 
-use super::{Arguments, Refused, identifier};
+use super::{Arguments, Refused, identifier, seen};
 use crate::{
     cli::{image::propose, output},
     config::{NewSite, parse_unfilled, window_of_box},
@@ -139,7 +139,11 @@ pub(super) fn run(arguments: &Arguments, folder: &Path) -> Result<(), Error> {
             .unwrap_or_else(|| format!("Proposed for {name}")),
         kernels: vec![PathBuf::from("kernels")],
         kernels_are_a_folder: true,
-        pedr: vec![PathBuf::from("pedr/*.b")],
+        pedr: match arguments.shots.is_empty() {
+            true => vec![PathBuf::from("pedr/*.b")],
+            false => Vec::new(),
+        },
+        shots: seen(folder, &arguments.shots)?,
         edges_deg: Some(edges_deg),
         images: proposed
             .iter()

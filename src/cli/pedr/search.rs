@@ -18,7 +18,10 @@ use crate::{
     files::file_name,
     footprints::{AsRead, Footprints, SourceFile},
     geom::window::Region,
-    pds::archive::{Found, Judged, Opened, Query, Seen, Sink, Source, search, search_tables},
+    pds::{
+        archive::{Found, Judged, Opened, Query, Seen, Sink, Source, search, search_tables},
+        shot_table::OffNadirPass,
+    },
     products::{RowsFormat, ShotsFile},
     time::{Et, Interval},
 };
@@ -73,6 +76,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
         answer.told_files = found.tables.iter().map(tables::described).collect();
         answer.failures = found.failures;
         answer.repeated = Some(found.repeated);
+        answer.passes_off_nadir = found.passes_off_nadir;
         answer.create(arguments, format)?;
         answer.found(0, found.found)?;
     } else {
@@ -118,6 +122,8 @@ struct Answer {
     told_files: Vec<Value>,
     /// Rows of tables that repeat others; `None` in a search of PEDR files.
     repeated: Option<u64>,
+    /// Passes of tables off nadir.
+    passes_off_nadir: Vec<OffNadirPass>,
     window_ids: Vec<String>,
     rows: u64,
     /// Shots of each window.
@@ -178,6 +184,7 @@ impl Answer {
         if let Some(repeated) = self.repeated {
             told["repeated_rows"] = json!(repeated);
             tables::state_nadir_by_range(&mut told);
+            told["passes_off_nadir"] = tables::passes(&self.passes_off_nadir);
         }
         if let Some(time) = time {
             let finite = |et: Et| et.seconds().is_finite().then(|| et.seconds());

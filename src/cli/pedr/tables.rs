@@ -13,7 +13,9 @@ use crate::{
     files::{file_name, hash_file},
     pds::{
         archive::SearchedTable,
-        shot_table::{RowComplaint, ShotRow, TableColumns, Utc, is_ode_pedr, read_shot_table},
+        shot_table::{
+            OffNadirPass, RowComplaint, ShotRow, TableColumns, Utc, is_ode_pedr, read_shot_table,
+        },
     },
     spice::{KernelSet, Session},
     time::Et,
@@ -95,6 +97,16 @@ pub(super) fn state_nadir_by_range(answer: &mut Value) {
     answer["remark"] = "a table has no position of the spacecraft: the position is taken on the radius through the footprint, \
         at the range, so that a comparison of range and distance tests nothing"
         .into();
+}
+
+/// Passes off nadir in an answer.
+pub(super) fn passes(passes: &[OffNadirPass]) -> Value {
+    let passes = passes.iter().map(|pass| {
+        // A hundredth of a degree: the orbit of the others is known to some kilometres.
+        let off_nadir_deg = (pass.angle_rad.to_degrees() * 100.0).round() / 100.0;
+        json!({"orbit": pass.orbit, "off_nadir_deg": off_nadir_deg})
+    });
+    passes.collect()
 }
 
 /// Counts of a table.

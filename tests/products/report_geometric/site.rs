@@ -204,6 +204,7 @@ impl Site {
             footprints: Some(self.converted.footprints.len()),
             ground: None,
             limits: &self.config.limits,
+            rejected: &BTreeMap::new(),
             range_limits: &self.config.range_check,
             orientation_limits: &self.config.orientation,
             ranges: &self.ranges,

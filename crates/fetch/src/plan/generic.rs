@@ -29,7 +29,7 @@ pub(crate) fn plan_generic(into: &Path, listed: &[Vec<Listed>], archive: &Generi
                 is_exact: file.is_exact,
                 md5: None,
                 why: format!("generic kernel, latest of {}", versions.len()),
-                box_deg: None,
+                shot_box: None,
             }),
             None => plan.lacks.push(format!(
                 "generic kernels: the listing of {folder} has no {start}*{end}"

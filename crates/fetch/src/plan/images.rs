@@ -69,7 +69,7 @@ pub(crate) fn find_images(
                 "image {} of {}, {} lines of {} samples",
                 image.product_id, image.utc_start, image.size[1], image.size[0]
             ),
-            box_deg: None,
+            shot_box: None,
         }));
     }
     (plan, spans)

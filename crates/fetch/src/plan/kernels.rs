@@ -76,7 +76,7 @@ impl Planner<'_> {
             is_exact: false,
             md5: self.sums.get(&row.path).cloned(),
             why,
-            box_deg: None,
+            shot_box: None,
         }
     }
 

@@ -108,10 +108,28 @@ pub struct ShotWish {
 pub struct ShotTable {
     /// Where it is put.
     pub path: PathBuf,
+    /// The shots of it.
+    pub of: ShotBox,
+}
+
+/// A box of shots.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShotBox {
     /// West, east, south and north edge, degrees; 0 ≤ west < east ≤ 360.
-    pub box_deg: [f64; 4],
-    /// Why it is needed.
-    pub why: String,
+    pub edges_deg: [f64; 4],
+    /// The window or option whose ground it is, all or a part of it.
+    pub whole: String,
+}
+
+impl ShotBox {
+    /// Why its table is needed.
+    pub(crate) fn why(&self) -> String {
+        let [west, east, south, north] = self.edges_deg;
+        format!(
+            "shots of {}, {west} to {east} east, {south} to {north} north",
+            self.whole
+        )
+    }
 }
 
 /// Kind of a file.
@@ -157,8 +175,8 @@ pub struct PlannedFile {
     pub md5: Option<String>,
     /// Why it is needed.
     pub why: String,
-    /// Box of a table of shots: west, east, south and north edge, degrees.
-    pub box_deg: Option<[f64; 4]>,
+    /// Box of a table of shots.
+    pub shot_box: Option<ShotBox>,
 }
 
 /// Files to fetch, and what no archive has.

@@ -66,7 +66,7 @@ pub(crate) fn plan_pedr(
             is_exact: file.is_exact,
             md5: None,
             why: format!("from orbit {first} on: {}", reasons(&why)),
-            box_deg: None,
+            shot_box: None,
         });
     }
     for ((_, reason), _) in wanted.iter().zip(is_met).filter(|(_, met)| !met) {

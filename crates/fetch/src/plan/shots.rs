@@ -20,13 +20,13 @@ pub(crate) fn plan_shots(
             .iter()
             .map(|table| PlannedFile {
                 kind: FileKind::Shots,
-                url: service.query(table.box_deg),
+                url: service.query(table.of.edges_deg),
                 path: table.path.clone(),
                 bytes: None,
                 is_exact: false,
                 md5: None,
-                why: table.why.clone(),
-                box_deg: Some(table.box_deg),
+                why: table.of.why(),
+                shot_box: Some(table.of.clone()),
             })
             .collect();
         let own: Vec<bool> = files.iter().map(is_own).collect();
@@ -45,7 +45,10 @@ mod tests {
     use std::path::PathBuf;
 
     use super::*;
-    use crate::{archives::Archives, plan::ShotTable};
+    use crate::{
+        archives::Archives,
+        plan::{ShotBox, ShotTable},
+    };
 
     #[test]
     fn only_missing_tables_and_own_ones_are_asked_for() {
@@ -56,8 +59,10 @@ mod tests {
         touch("b.csv");
         let table = |name: &str| ShotTable {
             path: path(name),
-            box_deg: [1.0, 2.0, -3.0, 4.5],
-            why: "window a".to_owned(),
+            of: ShotBox {
+                edges_deg: [1.0, 2.0, -3.0, 4.5],
+                whole: "window a".to_owned(),
+            },
         };
         let wish = |is_absent| ShotWish {
             tables: vec![table("a.csv"), table("b.csv")],

@@ -6,6 +6,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::statistics::NORMAL_MAD;
+
 use super::{
     Place,
     bricks::rough_guesses,
@@ -15,8 +17,6 @@ use super::{
 
 /// Robust standard deviations beyond which a deviation within a brick is flagged.
 pub const FLAG_LIMIT: f64 = 3.5;
-/// Factor from the median of absolute normal values to their standard deviation.
-const NORMAL_MEDIAN: f64 = 1.4826;
 /// Probability that a net without blunders loses a measurement.
 const FALSE_ALARM: f64 = 0.01;
 /// Measurements of less redundancy are not tested: their errors leave no deviation.
@@ -34,7 +34,7 @@ pub fn robust_sigma(deviations: impl Iterator<Item = Place>) -> f64 {
         return 0.0;
     }
     let middle = sizes.len() / 2;
-    NORMAL_MEDIAN * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1
+    NORMAL_MAD * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// The measurements of a net that are blunders, ascending, by their deviations in the adjustment of all pictures without

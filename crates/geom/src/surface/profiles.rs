@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
 
 use super::Crossover;
-use crate::statistics::median;
+use crate::statistics::{NORMAL_MAD, median};
 
 /// Fewest crossovers, with as many other profiles, by which a profile is left out.
 const EVIDENCE_MIN: usize = 3;
@@ -19,8 +19,6 @@ const STEPS: usize = 40;
 const SHIFT_MAX_SIGMAS: f64 = 3.0;
 /// Degrees of freedom of Student's distribution for the weights of crossovers.
 const FREEDOM: f64 = 4.0;
-/// Median absolute deviations in a standard deviation.
-const NORMAL_MAD: f64 = 1.4826;
 
 /// Standard deviations of the shift of a profile a priori, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]

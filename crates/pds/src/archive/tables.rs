@@ -8,7 +8,9 @@ use std::{
 use super::{Found, Query, Repetition, ShotRejection, TableRows};
 use crate::{
     pedr::{Complaint, Reason, SpoiledShots},
-    shot_table::{RowComplaint, ShotRow, TableColumns, Utc, read_shot_table},
+    shot_table::{
+        OffNadir, OffNadirPass, RowComplaint, ShotRow, TableColumns, Utc, read_shot_table,
+    },
 };
 use areograph_base::{
     body::{Body, Datum},
@@ -36,6 +38,8 @@ pub struct FoundInTables {
     pub found: Found,
     /// Rows in the windows that repeat another one.
     pub repeated: u64,
+    /// Passes off nadir, by the ranges of the shots in the windows.
+    pub passes_off_nadir: Vec<OffNadirPass>,
     /// Tables that cannot be read.
     pub failures: Vec<Error>,
 }
@@ -72,6 +76,7 @@ pub fn search_tables(
             tables: Vec::new(),
             found: Found::new(),
             repeated: 0,
+            passes_off_nadir: Vec::new(),
             failures: Vec::new(),
         },
     };
@@ -166,9 +171,21 @@ impl Search<'_> {
         // The sort is stable: shots with equal times stay in the order of the tables.
         self.shots
             .sort_by(|(one, _), (other, _)| one.et_tag_s.total_cmp(&other.et_tag_s));
-        for (shot, windows) in &self.shots {
-            self.all.found.push(shot, windows);
+        let (shots, windows): (Vec<Footprint>, Vec<Vec<u32>>) = self.shots.into_iter().unzip();
+        let off_nadir = OffNadir::of(&shots);
+        let found = &mut self.all.found;
+        for ((shot, windows), off_nadir_rad) in shots.iter().zip(&windows).zip(off_nadir.angles_rad)
+        {
+            let shot = Footprint {
+                off_nadir_rad,
+                ..*shot
+            };
+            match ShotRejection::of(&shot, &SpoiledShots::default(), self.query.filter) {
+                Some(reason) => *found.rejected.entry(reason).or_default() += 1,
+                None => found.push(&shot, windows),
+            }
         }
+        self.all.passes_off_nadir = off_nadir.passes;
         self.all
     }
 }

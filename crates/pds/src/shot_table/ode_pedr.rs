@@ -61,6 +61,13 @@ fn bare(name: &str) -> String {
     kept.map(|letter| letter.to_ascii_lowercase()).collect()
 }
 
+/// The first heading of the service, as a line.
+#[must_use]
+pub fn ode_pedr_heading() -> String {
+    let names = COLUMNS.map(|[name, _]| name);
+    format!("{}\r\n", names.join(","))
+}
+
 /// Checks that a first row is one of the headings of the service.
 pub(super) fn check_heading(record: &StringRecord) -> std::result::Result<(), ShotTableError> {
     for (at, names) in COLUMNS.iter().enumerate() {

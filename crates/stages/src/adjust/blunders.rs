@@ -4,6 +4,7 @@ use super::{
     heights::height_blunders,
     network::Assembled,
     points::{PointKind, RejectedPoint, RejectionReason},
+    tie_scatter::tie_scatter_px,
 };
 use areograph_base::watch::Watch;
 use areograph_config::AdjustmentConfig;
@@ -83,20 +84,51 @@ fn by_residuals<M: ExteriorOrientation>(
     let Some(limit) = limit else {
         return solved(assembled, bundle_options, watch);
     };
-    let adjustment = match solved_within(assembled, bundle_options, limit, watch) {
-        // Too many or too large blunders leave no common solution; low weights reveal them.
-        Err(BundleError::NotConverged { .. }) if bundle_options.robust.is_none() => {
-            let robust = BundleOptions {
-                robust: Some(WHERE_MANY),
-                ..*bundle_options
-            };
+    let mut first = solved_within(assembled, bundle_options, limit, watch);
+    let is_within = |assembled: &Assembled<M>, adjustment: &Adjustment| {
+        let worst = worst_standardised(&assembled.network, adjustment, assembled.shots);
+        largest(&worst) <= limit
+    };
+    let is_doubtful = match &first {
+        Ok(adjustment) => !is_within(assembled, adjustment),
+        Err(BundleError::NotConverged { .. }) => true,
+        Err(_) => false,
+    };
+    if is_doubtful && bundle_options.robust.is_none() {
+        let robust = BundleOptions {
+            robust: Some(WHERE_MANY),
+            ..*bundle_options
+        };
+        if add_scatter(assembled, first.as_ref().ok(), &robust, watch) {
+            first = solved_within(assembled, bundle_options, limit, watch);
+        }
+        if let Err(BundleError::NotConverged { .. }) = first {
+            // Too many or too large blunders leave no common solution; low weights reveal them.
             let adjustment = solved_within(assembled, &robust, limit, watch)?;
             reject_worst(assembled, &robust, limit, adjustment, watch)?;
-            solved_within(assembled, bundle_options, limit, watch)?
+            first = solved_within(assembled, bundle_options, limit, watch);
         }
-        other => other?,
-    };
-    reject_worst(assembled, bundle_options, limit, adjustment, watch)
+    }
+    reject_worst(assembled, bundle_options, limit, first?, watch)
+}
+
+/// Adds the scatter of the tie points to their standard deviations before any is rejected: it is no blunder. Whether there is one.
+///
+/// Low weights of blunders keep these from bending the solution that shows the scatter.
+fn add_scatter<M: ExteriorOrientation>(
+    assembled: &mut Assembled<M>,
+    first: Option<&Adjustment>,
+    robust: &BundleOptions,
+    watch: Watch<'_>,
+) -> bool {
+    let shown = solved(assembled, robust, watch);
+    // Low weights may alternate between solutions. The median of the residuals resists blunders as well.
+    let shown = shown.as_ref().ok().or(first);
+    let scatter_px = shown.map_or(0.0, |shown| tie_scatter_px(assembled, shown));
+    if scatter_px > 0.0 {
+        assembled.scatter_ties(scatter_px);
+    }
+    scatter_px > 0.0
 }
 
 /// Rejects the worst tie points of `adjustment`, adjusts again and repeats until none is beyond `limit`.

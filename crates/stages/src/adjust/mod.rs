@@ -44,6 +44,7 @@ mod run;
 mod split;
 mod stage;
 mod summary;
+mod tie_scatter;
 mod words;
 
 pub use a_priori::accuracy_withheld;

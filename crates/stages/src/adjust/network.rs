@@ -44,6 +44,8 @@ pub(super) struct Assembled<M> {
     /// Standard deviation of a delay of all lines of an image: as configured, and as far as it is no unknown, seconds.
     pub(super) plausible_delay_s: f64,
     pub(super) unseen_delay_s: f64,
+    /// Scatter of tie points that was added to their standard deviations, pixels.
+    pub(super) tie_scatter_px: f64,
     /// Why the laser's position in images is not an observation although it was requested.
     pub(super) no_spots: Option<String>,
 }
@@ -68,6 +70,7 @@ pub(super) fn assemble<'a, M: ExteriorOrientation>(
         mola: Vec::new(),
         plausible_delay_s: config.line_time_sigma_s,
         unseen_delay_s: delay_sigma_s(config),
+        tie_scatter_px: 0.0,
         no_spots: None,
     };
     assembled.add_shots(shots, config)?;

@@ -152,6 +152,11 @@ pub struct AdjustmentSummary {
     /// Standard deviation of unit weight of tie points along and across the track; 0 where nothing controls them.
     #[schemars(transform = none_negative)]
     pub tie_components: [f64; 2],
+    /// Standard deviation by which tie points scatter beyond their own, pixels, from residuals along the track, as by jitter of the
+    /// images; their standard deviations contain it, across the track as well. 0 where chance explains the residuals.
+    #[serde(default)]
+    #[schemars(range(min = 0.0))]
+    pub tie_scatter_px: f64,
     /// Factor by which covariances scale the a priori variances: 1, or the square of the larger of these where it shows
     /// that measurements are worse than configured. A good fit never reduces covariances.
     #[schemars(range(min = 1.0))]
@@ -190,6 +195,7 @@ pub(super) fn summarise<M: ExteriorOrientation>(
         sigma0: adjustment.sigma0(),
         model: config.model,
         tie_components: tie_components(assembled, adjustment),
+        tie_scatter_px: assembled.tie_scatter_px,
         variance_factor: variance_factor(assembled, adjustment),
         types: types(assembled, adjustment),
         shots: ground(assembled, adjustment, errors, shots),

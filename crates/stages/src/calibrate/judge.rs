@@ -16,6 +16,8 @@ const SCATTER_MAX: f64 = 1.5;
 const SCATTER_MIN: f64 = 0.6;
 /// Largest acceptable residual of ties, pixels; beyond it, the lines do not agree.
 const TIES_MAX_PX: f64 = 1.0;
+/// Residuals of ties above this many of their standard deviations are a remark.
+const TIES_SIGMAS: f64 = 2.0;
 /// Share of points that may be left out.
 const LEFT_OUT_MAX: f64 = 0.1;
 /// A calibration moves the image by at most this many a priori standard deviations.
@@ -40,6 +42,8 @@ pub(super) struct Evidence<'a> {
     pub(super) untested: Vec<String>,
     /// A priori knowledge.
     pub(super) known: Known,
+    /// Standard deviation of a tie in a line, pixels.
+    pub(super) tie_sigma_px: f64,
     /// Remarks on the body's frame in the support data.
     pub(super) of_frames: Vec<String>,
     pub(super) complaints: u64,
@@ -105,13 +109,30 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
     checks.extend(Check::worst(elsewhere.checks.into_iter()));
     checks.extend(Check::worst(elsewhere.offsets.into_iter()));
     Verdict {
-        untested: vec![
-            "an error of place or radius that the control of all orbits shares (no other control is at hand)"
-                .to_owned(),
-            "a shift along the flight that all ties of a line share (it acts like an angle of the line)".to_owned(),
-        ],
+        untested: untested(of),
         ..Verdict::of(reasons, remarks, checks)
     }
+}
+
+/// Errors that no datum of the calibration shows.
+fn untested(of: &Evidence<'_>) -> Vec<String> {
+    let mut untested = vec![
+        "an error of place or radius that the control of all orbits shares (no other control is at hand)".to_owned(),
+        "a shift along the flight that all ties of a line share (it acts like an angle of the line)".to_owned(),
+    ];
+    let offsets = of.validation.iter().flat_map(|orbit| &orbit.offsets);
+    let largest_m = |in_height: bool| {
+        let of_kind = offsets
+            .clone()
+            .filter(|offset| offset.camera.is_none() == in_height);
+        of_kind.map(|offset| offset.limit_m).reduce(f64::max)
+    };
+    if let Some((plane_m, height_m)) = largest_m(false).zip(largest_m(true)) {
+        untested.push(format!(
+            "an error of the control of the calibrated orbit up to {plane_m:.0} m in the plane and {height_m:.0} m in height (the control              of other orbits shows larger ones only)"
+        ));
+    }
+    untested
 }
 
 /// Scatter of used or withheld control in the plane or in height, and its limit.
@@ -254,6 +275,10 @@ fn coarse(held_back: &HeldBack, known: Known) -> Option<String> {
 }
 
 fn remarks(of: &Evidence<'_>) -> Vec<String> {
+    let ties_px = of
+        .steps
+        .last()
+        .and_then(|last| last.figures.ties.worst_px());
     let mut remarks = [&*of.of_frames, &*of.untested].concat();
     let mut say = |when: bool, text: String| {
         if when {
@@ -275,6 +300,14 @@ fn remarks(of: &Evidence<'_>) -> Vec<String> {
             format!("points left out: {left_out} of {all}"),
         );
     }
+    let sigmas = ties_px.unwrap_or_default() / of.tie_sigma_px;
+    say(
+        sigmas > TIES_SIGMAS,
+        format!(
+            "residuals of tie points are {sigmas:.1} times their standard deviations (root mean square): these are too small, and positions \
+             are less accurate than stated"
+        ),
+    );
     say(
         of.held_back.is_some_and(|held_back| {
             let Scatter { plane, height } = held_back.scatter;

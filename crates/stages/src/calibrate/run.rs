@@ -24,7 +24,7 @@ use areograph_geom::{
         CalibrationError, CalibrationState, Freedom, GroundPoint, Layout, Parameter, Start, solve,
         tie_sight,
     },
-    statistics::{Summary, outliers},
+    statistics::{Summary, median, outliers},
 };
 
 /// A point is left out when its residual exceeds the median of its kind by this many robust standard deviations: of a
@@ -148,6 +148,7 @@ fn calibrate_by(
         left_out: left_out(&work.points),
         untested: untested_words(&work),
         known: known(config, &orbit),
+        tie_sigma_px: tie_sigma_px(&work.points),
         of_frames: (orbit.images.iter().zip(&names))
             .filter_map(|(image, name)| image.frame_remark(config.body, name))
             .collect(),
@@ -187,6 +188,14 @@ fn left_out(points: &[OrbitPoint]) -> [[usize; 2]; 2] {
             of.filter(|point| point.left_out).count(),
         ]
     })
+}
+
+/// Median standard deviation of the measurements of ties, pixels.
+fn tie_sigma_px(points: &[OrbitPoint]) -> f64 {
+    let ties = points.iter().filter(|point| point.kind == PointKind::Tie);
+    let measured = ties.flat_map(|point| &point.measured);
+    let mut sigmas_px: Vec<f64> = measured.flat_map(|measured| measured.sigma_px).collect();
+    median(&mut sigmas_px)
 }
 
 /// What no point tests, in words.

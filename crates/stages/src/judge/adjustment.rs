@@ -9,7 +9,10 @@ use crate::{
 };
 use areograph_base::{footprints::AdjustmentModel, wording::signed};
 use areograph_config::LimitsConfig;
-use areograph_geom::bundle::Unknown;
+use areograph_geom::{
+    bundle::Unknown,
+    statistics::{NORMAL_MAD, median},
+};
 
 /// Mean heights with a larger standard deviation than this, metres, are hardly controlled.
 pub(super) const HEIGHT_LOOSE_M: f64 = 20.0;
@@ -17,6 +20,11 @@ pub(super) const HEIGHT_LOOSE_M: f64 = 20.0;
 pub(super) const HEIGHT_OUTLIERS_FEW: f64 = 0.03;
 /// A larger share of laser spots beyond their limit is not due to chance, which leaves one in a thousand there.
 const SPOTS_BEYOND_FEW: f64 = 0.05;
+/// Where tie points fit better than this share of their standard deviations, the limit of blunders is too wide. Points measured to
+/// 0.2 px with the default standard deviation of 1 px are above it.
+const TIES_LOOSE: f64 = 0.15;
+/// Scatter of tie points beyond their standard deviations that jitter hardly explains, pixels: it moves images by 0.2 to 0.4 pixels.
+const SCATTER_LARGE_PX: f64 = 1.0;
 /// A mean height within this many of its standard deviations is no contradiction.
 const HEIGHT_SIGMAS: f64 = 3.0;
 
@@ -252,6 +260,18 @@ impl AdjustmentEvidence<'_> {
             })
     }
 
+    /// Median residual of tie points along the track over its expectation, where it is so small that blunders stay undetected. The
+    /// median resists these.
+    fn loose_ties(&self) -> Option<f64> {
+        let ties = self.adjusted.views.iter();
+        let along = ties.filter(|view| view.kind == PointKind::Tie);
+        let mut sizes: Vec<f64> = along
+            .filter_map(|view| view.along_px.standardised.map(f64::abs))
+            .collect();
+        let found = NORMAL_MAD * median(&mut sizes);
+        (!sizes.is_empty() && found < TIES_LOOSE).then_some(found)
+    }
+
     /// Kinds of observation other than tie points with enough redundancy for a test.
     pub(super) fn other_components(&self) -> impl Iterator<Item = &TypeSummary> {
         let types = self.adjusted.summary.types.iter();
@@ -376,6 +396,19 @@ impl AdjustmentEvidence<'_> {
                     "tie points have no redundancy {axis} the track: blunders in that direction remain undetected"
                 )),
             }
+        }
+        remarks.extend(self.loose_ties().map(|found| {
+            format!(
+                "half of the residuals of tie points along the track are below {found:.2} of what their standard deviations predict: blunders of tie \
+                 points may remain; state smaller standard deviations"
+            )
+        }));
+        let scatter_px = self.adjusted.summary.tie_scatter_px;
+        if scatter_px > SCATTER_LARGE_PX {
+            remarks.push(format!(
+                "tie points scatter by {scatter_px:.1} px beyond their stated standard deviations, more than jitter of the images explains: \
+                 measurements are less accurate than stated"
+            ));
         }
         remarks.extend(self.components_above());
         for image in self.untied() {

@@ -70,16 +70,18 @@ fn tables(reader: &CameraReader<'_>, epochs: &[Et]) -> Result<CameraTables> {
     let session = reader.session;
     let [first, last] = [epochs[0], epochs[epochs.len() - 1]];
     let suns = [session.sun_state(first)?, session.sun_state(last)?];
+    // Sites of a thousand images hold them all.
+    let nodes = epochs.len();
     let mut tables = CameraTables {
-        et_s: Vec::new(),
-        position_m: Vec::new(),
-        velocity_m_s: Vec::new(),
+        et_s: Vec::with_capacity(nodes),
+        position_m: Vec::with_capacity(nodes),
+        velocity_m_s: Vec::with_capacity(nodes),
         sun_position_m: suns.map(|sun| sun.position.xyz_m),
         sun_velocity_m_s: suns.map(|sun| sun.velocity_m_s),
-        inertial_to_bus: Vec::new(),
-        bus_angular_velocity_rad_s: Vec::new(),
-        inertial_to_mars: Vec::new(),
-        mars_angular_velocity_rad_s: Vec::new(),
+        inertial_to_bus: Vec::with_capacity(nodes),
+        bus_angular_velocity_rad_s: Vec::with_capacity(nodes),
+        inertial_to_mars: Vec::with_capacity(nodes),
+        mars_angular_velocity_rad_s: Vec::with_capacity(nodes),
         bus_to_camera: session.mounting(reader.instrument, first)?,
         interpolation: InterpolationCheck::default(),
     };

@@ -10,12 +10,19 @@ const SCALE_TOLERANCE: f64 = 0.02;
 /// Pixels by which two files of one camera may place its boresight apart: one counts edges, another centres.
 const BORESIGHT_PX: f64 = 1.0;
 
+/// The known camera that a camera of support data names, by frame and number.
+pub(super) fn known_one<'a>(
+    camera: &Instrument,
+    known: &'a [Instrument],
+) -> Option<&'a Instrument> {
+    known.iter().find(|other| {
+        other.naif.frame == camera.naif.frame && other.naif.instrument == camera.naif.instrument
+    })
+}
+
 /// A remark on a camera with the frame of a known one, but another geometry: kernels cannot show a mirrored detector.
 pub(super) fn camera_agrees(camera: &Instrument, known: &[Instrument]) -> Option<Disagreement> {
-    let is_same = |other: &&Instrument| {
-        other.naif.frame == camera.naif.frame && other.naif.instrument == camera.naif.instrument
-    };
-    let other = known.iter().find(is_same)?;
+    let other = known_one(camera, known)?;
     let pixel_rad = |of: &Instrument| of.optics.pixel_pitch_mm / of.optics.focal_length_mm;
     let scale = pixel_rad(camera) / pixel_rad(other);
     let apart_px = |of: fn(&Instrument) -> f64| (of(camera) - of(other)).abs();

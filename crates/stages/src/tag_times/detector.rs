@@ -95,6 +95,19 @@ pub(super) fn fits_detector(
         }
         .into());
     }
+    within_detector(image, instrument, crosstrack, [first, samples])
+}
+
+/// Checks that the detector of `instrument` covers these samples.
+///
+/// # Errors
+/// [`DetectorError::Detector`].
+pub(super) fn within_detector(
+    image: &str,
+    instrument: &Instrument,
+    crosstrack: u32,
+    [first, samples]: [u32; 2],
+) -> Result<()> {
     let pixels = instrument.detector.pixels;
     let end = u64::from(first) + u64::from(samples) * u64::from(crosstrack);
     if samples == 0 || end > u64::from(pixels) {

@@ -8,9 +8,14 @@ use serde::{Deserialize, Serialize};
 use super::{
     Disagreement, ImageTimes, StartFrom,
     agreement::{mounting_agrees, of_one_clock, of_one_product, start_agrees, stop_agrees},
-    camera::camera_agrees,
+    camera::{camera_agrees, known_one},
+    detector::within_detector,
 };
-use areograph_base::{body::Body, constants::Spacecraft, error::Result};
+use areograph_base::{
+    body::Body,
+    constants::Spacecraft,
+    error::{Locate as _, Result},
+};
 use areograph_config::{ImageConfig, all_instruments, built_in_instruments};
 use areograph_pds::{
     ImageLabel,
@@ -102,6 +107,10 @@ pub(super) fn supported(
     let mut remarks: Vec<Disagreement> = turned.map(Disagreement::from).into_iter().collect();
     // A number of NAIF is that of its spacecraft only.
     if file.is_of(said.instrument.spacecraft) {
+        if let Some(camera) = known_one(&said.instrument, all_instruments()) {
+            let part = [said.first_detector, said.samples];
+            within_detector(&image.id, camera, said.crosstrack_summing, part).in_file(path)?;
+        }
         remarks.extend(camera_agrees(&said.instrument, all_instruments()));
     }
     let mut notes = vec![file.note()];
