@@ -986,4 +986,25 @@ fn a_place_becomes_a_site_that_can_be_filled() {
         assert!(found.iter().any(|file| file == name), "{name} of {found:?}");
     }
     assert!(fs::read(archive.path("mars/images/e0201000.imq")).unwrap() == image);
+    // The same place with tables of shots in place of PEDR files: the query of its window is planned.
+    let tables = archive.path("mars/shots/*.csv");
+    let tables = [
+        "--place",
+        "gale",
+        "--site",
+        "tables",
+        "--shots",
+        &tables.to_string_lossy(),
+    ];
+    let mut command = areograph();
+    command.arg("init").arg(archive.path("mars")).args(tables);
+    let [_, err] = texts(&command.output().unwrap());
+    let written = archive.path("mars/tables.toml");
+    let text = fs::read_to_string(&written).unwrap_or_else(|_| panic!("{err}"));
+    assert!(
+        text.contains("files = [\"shots/*.csv\"]\n") && !text.contains("\n[pedr]\n"),
+        "{text}"
+    );
+    let plan = archive.fetched(&[&written.to_string_lossy(), "--plan"]);
+    assert!(plan.contains("mars/shots/tables.csv: missing"), "{plan}");
 }

@@ -27,7 +27,7 @@ const WORDS: [(&str, usize); 3] = [
 ];
 
 /// Starts of commands that other tests run, with what runs them.
-const ELSEWHERE: [(&str, &str); 14] = [
+const ELSEWHERE: [(&str, &str); 15] = [
     ("scripts/", "continuous integration"),
     ("cargo run", "compiled as an example with the tests"),
     (
@@ -50,6 +50,10 @@ const ELSEWHERE: [(&str, &str); 14] = [
     (
         "areograph init gale --place",
         "tests/commands/fetch.rs, with an index of its own",
+    ),
+    (
+        "areograph init gusev_site --shots",
+        "tests/commands/init.rs, with tables of its own",
     ),
     (
         "areograph fetch ",

@@ -468,7 +468,8 @@ fn scatter_beyond_the_standard_deviations_is_no_blunder() {
     let found_px = adjusted.summary.tie_scatter_px;
     // A median of 300 residuals: 7 %, times four.
     assert!((found_px / JITTER_PX - 1.0).abs() < 0.28, "{found_px} px");
-    assert!(adjusted.rejected.len() <= 1, "{:?}", adjusted.rejected);
+    // Chance puts 0.6 of 600 residuals beyond the limit, and a few more where the scatter is found too small.
+    assert!(adjusted.rejected.len() <= 3, "{:?}", adjusted.rejected);
     let wrong: Vec<usize> = (0..15).map(|place| 20 * place + 7).collect();
     for tie in &wrong {
         site.ties[*tie].measures[1].line += 6.0;
@@ -479,7 +480,7 @@ fn scatter_beyond_the_standard_deviations_is_no_blunder() {
         wrong.iter().all(|tie| rejected.contains(tie)),
         "{rejected:?}"
     );
-    assert!(rejected.len() <= wrong.len() + 2, "{rejected:?}");
+    assert!(rejected.len() <= wrong.len() + 3, "{rejected:?}");
     // Standard deviations that explain the residuals stay.
     for measure in site.ties.iter_mut().flat_map(|tie| &mut tie.measures) {
         measure.sigma_px = Some([noise_px / per_line, noise_px]);

@@ -195,6 +195,10 @@ fn tie_sigma_px(points: &[OrbitPoint]) -> f64 {
     let ties = points.iter().filter(|point| point.kind == PointKind::Tie);
     let measured = ties.flat_map(|point| &point.measured);
     let mut sigmas_px: Vec<f64> = measured.flat_map(|measured| measured.sigma_px).collect();
+    // Without ties there are no residuals either.
+    if sigmas_px.is_empty() {
+        return f64::INFINITY;
+    }
     median(&mut sigmas_px)
 }
 

@@ -268,8 +268,11 @@ impl AdjustmentEvidence<'_> {
         let mut sizes: Vec<f64> = along
             .filter_map(|view| view.along_px.standardised.map(f64::abs))
             .collect();
+        if sizes.is_empty() {
+            return None;
+        }
         let found = NORMAL_MAD * median(&mut sizes);
-        (!sizes.is_empty() && found < TIES_LOOSE).then_some(found)
+        (found < TIES_LOOSE).then_some(found)
     }
 
     /// Kinds of observation other than tie points with enough redundancy for a test.
@@ -399,8 +402,8 @@ impl AdjustmentEvidence<'_> {
         }
         remarks.extend(self.loose_ties().map(|found| {
             format!(
-                "half of the residuals of tie points along the track are below {found:.2} of what their standard deviations predict: blunders of tie \
-                 points may remain; state smaller standard deviations"
+                "residuals of tie points along the track are {found:.2} times their standard deviations (by the median): blunders of tie points may \
+                 remain; configure smaller standard deviations"
             )
         }));
         let scatter_px = self.adjusted.summary.tie_scatter_px;
