@@ -139,9 +139,10 @@ pub(super) fn run(arguments: &Arguments, folder: &Path) -> Result<(), Error> {
             .unwrap_or_else(|| format!("Proposed for {name}")),
         kernels: vec![PathBuf::from("kernels")],
         kernels_are_a_folder: true,
-        pedr: match arguments.shots.is_empty() {
-            true => vec![PathBuf::from("pedr/*.b")],
-            false => Vec::new(),
+        pedr: if arguments.shots.is_empty() {
+            vec![PathBuf::from("pedr/*.b")]
+        } else {
+            Vec::new()
         },
         shots: seen(folder, &arguments.shots)?,
         edges_deg: Some(edges_deg),

@@ -73,8 +73,12 @@ mod tests {
 
     #[test]
     fn longitudes_are_enclosed_the_shorter_way() {
-        assert_eq!(around_deg(&mut [175.2, 174.1, 174.9]), [174.1, 175.2]);
-        assert_eq!(around_deg(&mut [359.5, 0.25, 359.75]), [-0.5, 0.25]);
-        assert_eq!(around_deg(&mut [12.0]), [12.0, 12.0]);
+        for (longitudes_deg, expected) in [
+            (&mut [175.2, 174.1, 174.9][..], "[174.1, 175.2]"),
+            (&mut [359.5, 0.25, 359.75][..], "[-0.5, 0.25]"),
+            (&mut [12.0][..], "[12.0, 12.0]"),
+        ] {
+            assert_eq!(format!("{:?}", around_deg(longitudes_deg)), expected);
+        }
     }
 }
