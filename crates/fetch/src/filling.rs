@@ -84,7 +84,7 @@ impl<'a> Filling<'a> {
     /// Brings copies of indexes up to date; the number of those that have changed.
     ///
     /// # Errors
-    /// [`FetchError`](crate::FetchError); the folder cannot be written.
+    /// [`FetchError`]; the folder cannot be written.
     pub fn refresh(&self, indexes: Indexes) -> Result<usize> {
         let _lock = self.folder.lock()?;
         let client = self.cache().client();
@@ -94,7 +94,7 @@ impl<'a> Filling<'a> {
     /// The files that a wish needs, by the copies of the indexes: no archive is asked.
     ///
     /// # Errors
-    /// [`FetchError::NoIndex`](crate::FetchError::NoIndex); [`FetchError::Index`](crate::FetchError::Index).
+    /// [`FetchError::NoIndex`]; [`FetchError::Index`].
     pub fn plan(&self, wish: &Wish) -> Result<Plan> {
         let (cache, mut spans) = (self.cache(), wish.spans.clone());
         let mut plan = Plan::default();
@@ -195,7 +195,7 @@ impl<'a> Filling<'a> {
     /// * `replace` – whether a file of other content is replaced
     ///
     /// # Errors
-    /// [`FetchError::Busy`](crate::FetchError::Busy); the folder or its state cannot be read or written. Failures of
+    /// [`FetchError::Busy`]; the folder or its state cannot be read or written. Failures of
     /// files are in their outcomes.
     pub fn fetch(
         &self,
