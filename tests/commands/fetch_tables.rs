@@ -282,6 +282,21 @@ fn an_empty_part_of_a_window_has_a_table_without_rows() {
             .contains("fetched: 0; present: 3; failed: 0")
     );
     assert_eq!(service.server.request_count(), before);
+    // A window of another site with the same name is another window, and may not be empty.
+    let site = fs::read_to_string(service.path("mars/gusev.toml")).unwrap();
+    let (head, _) = site.split_once("[[windows]]").unwrap();
+    let other = head
+        .replace("site = \"gusev\"", "site = \"other\"")
+        .replace("shots/", "others/")
+        + "[[windows]]\nid = \"zero\"\nlongitude_deg = [0.0, 1.0]\nlatitude_deg = [0.0, 1.0]\n";
+    assert_ne!(head, other);
+    write(&service.path("mars/other.toml"), other.as_bytes());
+    let both = ["gusev.toml", "other.toml"].map(|name| service.path("mars").join(name));
+    let both = both.each_ref().map(|path| path.to_string_lossy());
+    let mut command = service.command(&[&*both[0], &*both[1], "--only", "shots"]);
+    let output = command.output().unwrap();
+    assert_eq!(output.status.code(), Some(4), "{}", texts(&output)[1]);
+    assert!(!service.path("mars/others/zero.csv").exists());
     // Now both parts are empty.
     for name in ["zero_1.csv", "zero_2.csv"] {
         fs::remove_file(service.path("mars/shots").join(name)).unwrap();

@@ -3,9 +3,9 @@
 
 use std::{fs, path::Path};
 
-use crate::common::{
-    json, long,
-    mission::{areograph, succeed},
+use crate::{
+    common::{json, long, mission::areograph},
+    truth::scene,
 };
 
 const ROUGHNESSES: [&str; 4] = ["plains", "medium", "rough", "varied"];
@@ -13,19 +13,11 @@ const ROUGHNESSES: [&str; 4] = ["plains", "medium", "rough", "varied"];
 /// The sites of a mission that are invalid, with the reasons.
 fn invalid(seed: u32, roughness: &str) -> (usize, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
-    let (mission, out) = (folder.path().join("mission"), folder.path().join("out"));
-    let seed = seed.to_string();
-    let mut scene = areograph();
-    scene.args([
-        "--quiet",
-        "scene",
-        "--seed",
-        &seed,
-        "--realistic",
-        "--roughness",
-        roughness,
-    ]);
-    succeed(scene.arg(&mission));
+    let options = ["--realistic", "--roughness", roughness];
+    let (mission, out) = (
+        scene(folder.path(), seed, &options),
+        folder.path().join("out"),
+    );
     let mut sites: Vec<_> = fs::read_dir(mission.join("sites"))
         .unwrap()
         .map(|entry| entry.unwrap().path())

@@ -17,7 +17,7 @@ use crate::{
         json, long_test,
         mission::{areograph, succeed},
     },
-    truth::{local, table},
+    truth::{local, scene, table},
 };
 
 const SITES: [&str; 3] = ["eos_chasma", "gusev_crater", "isidis"];
@@ -127,20 +127,13 @@ fn matched_ties_of_realistic_images_are_kept_and_heights_scatter_as_stated() {
         (24_003, "rough", Roughness::Rough),
     ] {
         let folder = tempfile::tempdir().unwrap();
-        let (mission, out) = (folder.path().join("mission"), folder.path().join("out"));
-        let mut scene = areograph();
-        scene.args([
-            "--quiet",
-            "scene",
-            "--seed",
-            &seed.to_string(),
-            "--day-s",
-            "600",
-        ]);
-        scene.args(["--realistic", "--images", "--roughness", name]);
-        succeed(scene.arg(&mission));
+        let options = ["--realistic", "--images", "--roughness", name];
+        let (mission, out) = (
+            scene(folder.path(), seed, &options),
+            folder.path().join("out"),
+        );
         let ground = TrueGround::of(&SceneOptions {
-            seed,
+            seed: seed.into(),
             day_s: 600.0,
             errors: SceneErrors::realistic(roughness),
         });
@@ -152,14 +145,9 @@ fn matched_ties_of_realistic_images_are_kept_and_heights_scatter_as_stated() {
         succeed(&mut run);
         for site in SITES {
             let folder = out.join(format!("{site}_matched"));
-            let rejected = json(&folder.join("adjustment.json"))["adjustment"]["rejected"]
-                .as_array()
-                .unwrap()
-                .len();
-            let scatter_px =
-                json(&folder.join("adjustment.json"))["adjustment"]["summary"]["tie_scatter_px"]
-                    .as_f64()
-                    .unwrap();
+            let adjustment = json(&folder.join("adjustment.json"))["adjustment"].take();
+            let rejected = adjustment["rejected"].as_array().unwrap().len();
+            let scatter_px = adjustment["summary"]["tie_scatter_px"].as_f64().unwrap();
             let of_site = Points::of(&folder);
             let ratios: Vec<f64> = of_site
                 .height_errors_m(&ground)

@@ -227,7 +227,7 @@ fn relative_bound_m(site: &Judged) -> f64 {
 }
 
 /// A mission of this seed, with `options`.
-fn scene(folder: &Path, seed: u32, options: &[&str]) -> PathBuf {
+pub(crate) fn scene(folder: &Path, seed: u32, options: &[&str]) -> PathBuf {
     let path = folder.join(format!("seed-{seed}"));
     let mut scene = areograph();
     scene.args([

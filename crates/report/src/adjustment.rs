@@ -113,7 +113,7 @@ fn overview(adjusted: &Adjusted) -> String {
     );
     if summary.tie_scatter_px > 0.0 {
         html += &sentence(
-            "Tie points scatter by {} px beyond their stated σ, as by jitter of the images; the σ of the adjustment contain it.",
+            "Tie points scatter by {} px in addition to their stated σ, as jitter of the images causes; the σ of the adjustment include this scatter.",
             &[(label(summary.tie_scatter_px, 2), &*at("/tie_scatter_px"))],
         );
     }

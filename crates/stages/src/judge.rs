@@ -138,7 +138,7 @@ impl Evidence<'_> {
     /// Why no footprint is in a window, and what to check.
     fn no_footprint(&self) -> String {
         if self.rejected.is_empty() {
-            return "no footprint in any window: check windows, and that pedr.files are those of the site's orbits".to_owned();
+            return "no footprint in any window: check windows, and that the files of shots (pedr.files or shots.files) are those of the site's orbits".to_owned();
         }
         let counts = self
             .rejected

@@ -97,7 +97,8 @@ fn pieces(site: &SiteConfig) -> (Vec<Piece>, Vec<String>) {
         if boxes.is_empty() {
             without_box.push(window.id.clone());
         }
-        pieces.extend(cut(&window.id, &format!("window {}", window.id), &boxes));
+        let whole = format!("window {} of site {}", window.id, site.site);
+        pieces.extend(cut(&window.id, &whole, &boxes));
     }
     (pieces, without_box)
 }

@@ -108,7 +108,7 @@ pub struct ShotWish {
 pub struct ShotTable {
     /// Where it is put.
     pub path: PathBuf,
-    /// The shots of it.
+    /// Its ground.
     pub of: ShotBox,
 }
 
@@ -117,7 +117,7 @@ pub struct ShotTable {
 pub struct ShotBox {
     /// West, east, south and north edge, degrees; 0 ≤ west < east ≤ 360.
     pub edges_deg: [f64; 4],
-    /// The window or option whose ground it is, all or a part of it.
+    /// The window of a site, or the option, whose ground it is, all or a part of it; unique in a fetch.
     pub whole: String,
 }
 

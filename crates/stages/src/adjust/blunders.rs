@@ -94,36 +94,39 @@ fn by_residuals<M: ExteriorOrientation>(
         Err(BundleError::NotConverged { .. }) => true,
         Err(_) => false,
     };
-    if is_doubtful && bundle_options.robust.is_none() {
-        let robust = BundleOptions {
+    if is_doubtful {
+        // Low weights of blunders keep these from bending the solution that shows the scatter.
+        let low_weights = bundle_options.robust.is_none().then_some(BundleOptions {
             robust: Some(WHERE_MANY),
             ..*bundle_options
-        };
-        if add_scatter(assembled, first.as_ref().ok(), &robust, watch) {
+        });
+        if add_scatter(assembled, first.as_ref().ok(), low_weights.as_ref(), watch) {
             first = solved_within(assembled, bundle_options, limit, watch);
         }
-        if let Err(BundleError::NotConverged { .. }) = first {
+        if let (Err(BundleError::NotConverged { .. }), Some(robust)) = (&first, &low_weights) {
             // Too many or too large blunders leave no common solution; low weights reveal them.
-            let adjustment = solved_within(assembled, &robust, limit, watch)?;
-            reject_worst(assembled, &robust, limit, adjustment, watch)?;
+            let adjustment = solved_within(assembled, robust, limit, watch)?;
+            reject_worst(assembled, robust, limit, adjustment, watch)?;
             first = solved_within(assembled, bundle_options, limit, watch);
         }
     }
     reject_worst(assembled, bundle_options, limit, first?, watch)
 }
 
-/// Adds the scatter of the tie points to their standard deviations before any is rejected: it is no blunder. Whether there is one.
+/// Adds the scatter of the tie points to their standard deviations before any is rejected, because it is no blunder; returns whether
+/// there is one.
 ///
-/// Low weights of blunders keep these from bending the solution that shows the scatter.
+/// * `first` – the solution so far, where there is one
+/// * `low_weights` – options of a solution that shows the scatter better
 fn add_scatter<M: ExteriorOrientation>(
     assembled: &mut Assembled<M>,
     first: Option<&Adjustment>,
-    robust: &BundleOptions,
+    low_weights: Option<&BundleOptions>,
     watch: Watch<'_>,
 ) -> bool {
-    let shown = solved(assembled, robust, watch);
     // Low weights may alternate between solutions. The median of the residuals resists blunders as well.
-    let shown = shown.as_ref().ok().or(first);
+    let shown = low_weights.and_then(|options| solved(assembled, options, watch).ok());
+    let shown = shown.as_ref().or(first);
     let scatter_px = shown.map_or(0.0, |shown| tie_scatter_px(assembled, shown));
     if scatter_px > 0.0 {
         assembled.scatter_ties(scatter_px);

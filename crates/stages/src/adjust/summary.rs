@@ -152,8 +152,9 @@ pub struct AdjustmentSummary {
     /// Standard deviation of unit weight of tie points along and across the track; 0 where nothing controls them.
     #[schemars(transform = none_negative)]
     pub tie_components: [f64; 2],
-    /// Standard deviation by which tie points scatter beyond their own, pixels, from residuals along the track, as by jitter of the
-    /// images; their standard deviations contain it, across the track as well. 0 where chance explains the residuals.
+    /// Standard deviation of the scatter of tie points in addition to their own, focal-plane pixels, from residuals along the track, as
+    /// jitter of the images causes; their standard deviations include it, across the track as well. 0 where chance explains the
+    /// residuals, and without a blunder limit.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub tie_scatter_px: f64,

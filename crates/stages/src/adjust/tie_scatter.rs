@@ -19,12 +19,12 @@ const BY_CHANCE: f64 = 3.0;
 const RESIDUALS_MIN: usize = 40;
 /// Residuals with less redundancy hardly show an error.
 const REDUNDANCY_MIN: f64 = 0.05;
-/// Largest scatter that jitter explains, pixels: 5 µrad are 1.4 pixels of the narrow-angle camera.
+/// Largest scatter that may be jitter, focal-plane pixels: 5 µrad are 1.4 pixels of the narrow-angle camera.
 const SCATTER_MAX_PX: f64 = 1.5;
 /// Halvings of the interval in which the scatter is searched: to 1e-6 pixels.
 const HALVINGS: u32 = 21;
 
-/// Standard deviation of the scatter of tie points beyond their own standard deviations, pixels, from residuals along the track;
+/// Standard deviation of the scatter of tie points beyond their own standard deviations, focal-plane pixels, from residuals along the track;
 /// 0 where chance explains them.
 ///
 /// The median of the standardised residuals resists blunders. At most [`SCATTER_MAX_PX`].
@@ -64,7 +64,7 @@ pub(super) fn tie_scatter_px<M>(assembled: &Assembled<M>, adjustment: &Adjustmen
 }
 
 impl<M> Assembled<M> {
-    /// Adds a scatter to the standard deviations of all measurements of tie points.
+    /// Adds a scatter, focal-plane pixels, to the standard deviations of all measurements of tie points; once.
     pub(super) fn scatter_ties(&mut self, scatter_px: f64) {
         let shots = self.shots;
         let ties = self
@@ -75,6 +75,6 @@ impl<M> Assembled<M> {
         for view in ties {
             view.sigma_px = view.sigma_px.map(|sigma_px| sigma_px.hypot(scatter_px));
         }
-        self.tie_scatter_px = self.tie_scatter_px.hypot(scatter_px);
+        self.tie_scatter_px = scatter_px;
     }
 }

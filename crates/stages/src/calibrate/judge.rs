@@ -42,7 +42,7 @@ pub(super) struct Evidence<'a> {
     pub(super) untested: Vec<String>,
     /// A priori knowledge.
     pub(super) known: Known,
-    /// Standard deviation of a tie in a line, pixels.
+    /// Median standard deviation of the measurements of ties, pixels.
     pub(super) tie_sigma_px: f64,
     /// Remarks on the body's frame in the support data.
     pub(super) of_frames: Vec<String>,
@@ -129,7 +129,8 @@ fn untested(of: &Evidence<'_>) -> Vec<String> {
     };
     if let Some((plane_m, height_m)) = largest_m(false).zip(largest_m(true)) {
         untested.push(format!(
-            "an error of the control of the calibrated orbit up to {plane_m:.0} m in the plane and {height_m:.0} m in height (the control              of other orbits shows larger ones only)"
+            "an error of the control of the calibrated orbit up to {plane_m:.0} m in the plane and {height_m:.0} m in height \
+             (the control of other orbits reveals larger errors only)"
         ));
     }
     untested

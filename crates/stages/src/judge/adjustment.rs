@@ -23,7 +23,7 @@ const SPOTS_BEYOND_FEW: f64 = 0.05;
 /// Where tie points fit better than this share of their standard deviations, the limit of blunders is too wide. Points measured to
 /// 0.2 px with the default standard deviation of 1 px are above it.
 const TIES_LOOSE: f64 = 0.15;
-/// Scatter of tie points beyond their standard deviations that jitter hardly explains, pixels: it moves images by 0.2 to 0.4 pixels.
+/// Scatter of tie points in addition to their standard deviations, focal-plane pixels, that jitter rarely causes.
 const SCATTER_LARGE_PX: f64 = 1.0;
 /// A mean height within this many of its standard deviations is no contradiction.
 const HEIGHT_SIGMAS: f64 = 3.0;
@@ -409,8 +409,8 @@ impl AdjustmentEvidence<'_> {
         let scatter_px = self.adjusted.summary.tie_scatter_px;
         if scatter_px > SCATTER_LARGE_PX {
             remarks.push(format!(
-                "tie points scatter by {scatter_px:.1} px beyond their stated standard deviations, more than jitter of the images explains: \
-                 measurements are less accurate than stated"
+                "tie points scatter by {scatter_px:.1} px in addition to their stated standard deviations, where jitter of the images \
+                 usually causes 0.2 to 0.4 px: measurements are less accurate than stated"
             ));
         }
         remarks.extend(self.components_above());
