@@ -34,7 +34,8 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "SECONDS", default_value_t = SECONDS_PER_DAY, conflicts_with = "along")]
     day_s: f64,
     /// Draw errors of the size that the real mission may have had, instead of those of the worked example: line times,
-    /// attitude and jitter, orbit, boresight of the laser, shifted MOLA profiles, noisy shots over rough ground.
+    /// attitude and jitter, orbit, camera, boresight of the laser, shifted MOLA profiles, noisy shots over rough ground. Their
+    /// sizes are drawn as well, and are not those that areograph assumes.
     #[arg(long, conflicts_with = "along")]
     realistic: bool,
     /// With --realistic: roughness of the ground (heights 300 m apart differ by 5, 10 or 25 m).
@@ -133,7 +134,7 @@ impl Arguments {
         };
         SceneErrors {
             tie_noise_px: self.tie_noise_px,
-            ..drawn
+            ..drawn.fair(self.seed)
         }
     }
 }

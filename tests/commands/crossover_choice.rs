@@ -49,16 +49,16 @@ fn profiles_that_crossovers_put_apart_are_noticed_where_their_radii_are_used() {
         sound.starts_with("exit 0\n") && sigmas.abs() < 1.0,
         "{sound}"
     );
-    // The surface is known to some 6 m half a kilometre from a profile.
-    let (_, sigmas) = run(&raised(16), "corrected");
+    // The height of the other profile, 18° off nadir, is known to 65 to 80 m.
+    let (_, sigmas) = run(&raised(200), "corrected");
     assert!(sigmas.abs() > 2.0, "{sigmas}");
-    let (apart, _) = run(&raised(32), "corrected");
+    let (apart, _) = run(&raised(400), "corrected");
     assert!(
         apart.starts_with("exit 5\nisidis: INVALID; ") && apart.contains("profiles"),
         "{apart}"
     );
     // Before the correction the profiles lie where they did.
-    let (raw, sigmas) = run(&raised(32), "raw");
+    let (raw, sigmas) = run(&raised(400), "raw");
     assert!(raw.starts_with("exit 0\n") && sigmas.abs() < 1.0, "{raw}");
 }
 

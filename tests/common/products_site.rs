@@ -541,6 +541,7 @@ fn ranges(profiles: &[Profile]) -> RangeCheck {
         profiles: profiles
             .iter()
             .map(|profile| ProfileRanges {
+                off_nadir_rad: 0.0,
                 shots: u32::try_from(profile.rows.len()).unwrap(),
                 profile: profile.id.clone(),
                 range_minus_distance_m: Summary {

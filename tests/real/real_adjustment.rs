@@ -152,7 +152,7 @@ impl Site {
         };
         LaserShots {
             profiles: vec!["LOLA".to_owned()],
-            profile_sigma_m: Vector3::zeros(),
+            profile_sigmas_m: vec![Vector3::zeros()],
             shots: (0..).zip(&self.points).map(shot).collect(),
             surface: None,
         }
@@ -524,6 +524,7 @@ fn lola(site: &Site, taken: impl Fn(usize) -> bool) -> LaserSurface {
             ground_m: point.ground_m,
             profile: 0,
             attitude_known: true,
+            off_nadir_rad: 0.0,
         })
         .collect();
     // Lines of half a metre, of which the network was off by some tens.

@@ -97,7 +97,7 @@ impl Site {
                 .take(network.range_bias_sigmas_m.len())
                 .map(|orbit: u32| orbit.to_string())
                 .collect(),
-            profile_sigma_m: Vector3::zeros(),
+            profile_sigmas_m: vec![Vector3::zeros(); network.range_bias_sigmas_m.len()],
             shots: network
                 .ranges
                 .iter()

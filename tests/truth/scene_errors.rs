@@ -50,6 +50,7 @@ const NO_TURN: AttitudeErrors = AttitudeErrors {
     linear_sigma_rad: 0.0,
     quadratic_sigma_rad: 0.0,
     jitter: NO_JITTER,
+    slow_jitter: NO_JITTER,
 };
 
 /// A mission of ten-minute days, which images and windows fit into.
@@ -61,6 +62,10 @@ struct Mission {
 static MISSION: LazyLock<Mission> = LazyLock::new(|| Mission::of(11, REALISTIC));
 
 impl Mission {
+    #[allow(
+        clippy::large_types_passed_by_value,
+        reason = "a mission is written in seconds"
+    )]
     fn of(seed: u64, errors: SceneErrors) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let options = SceneOptions {

@@ -15,7 +15,8 @@ declare_table! {
     /// Limits that make a profile valid or invalid.
     pub struct RangeCheckConfig: Deserialize, JsonSchema {
         /// Largest |mean| of range minus distance. The default is our choice: Shan et al. 2005 state no limit; the profiles
-        /// of their Table 3 reach 2 m at nadir and 25.4 m off nadir.
+        /// of their Table 3 reach 2 m at nadir and 25.4 m off nadir. Off nadir, `orbit_max_m` times the sine of the angle is
+        /// added.
         mean_max_m: f64 = key(above_to(0.0, 1e6)).or(10.0),
         /// A shot farther from the median than this many robust standard deviations is an outlier. The default is our
         /// choice; Shan et al. 2005 mention single shots about 5 standard deviations off.

@@ -42,7 +42,7 @@ pub enum FetchError {
     },
     /// The archive cannot be reached, or fails again and again.
     #[error("{url}: {problem}; attempts: {attempts}")]
-    #[cause(Io: "run again later: what has arrived is kept; `areograph fetch --plan` lists what is missing")]
+    #[cause(Io: "run again later: transferred files are kept; `areograph fetch --plan` lists the missing ones")]
     Network {
         /// Address.
         url: String,
@@ -107,7 +107,7 @@ pub enum FetchError {
         url: String,
     },
     /// A service made another table than was asked for.
-    #[error("{url}: not the table of the query: {problem}")]
+    #[error("{url}: this is not the table of the query: {problem}")]
     #[cause(Input: "run again: the service makes the table anew; else open the query of `areograph fetch --plan` in a browser")]
     Table {
         /// Where the service has the table.
@@ -124,7 +124,7 @@ pub enum FetchError {
     },
     /// Files of a plan are not complete.
     #[error("{failed} of {planned} files are not complete")]
-    #[cause(Io: "see the messages above; run again: what has arrived is kept")]
+    #[cause(Io: "see the messages above; run again: transferred files are kept")]
     Incomplete {
         /// Files that failed.
         failed: usize,
@@ -132,7 +132,7 @@ pub enum FetchError {
         planned: usize,
     },
     /// Something is needed that no archive has.
-    #[error("all planned files are complete, but no index has what is needed: {lacks}")]
+    #[error("all planned files are complete, but no index lists the remaining ones: {lacks}")]
     #[cause(Coverage: "see the lines `in_no_index` above; other archives may have it (--archives)")]
     Lacks {
         /// How many things are missing.
@@ -164,6 +164,6 @@ fn advice_on(status: u16) -> &'static str {
             "run `areograph fetch --index`: the index may be older than the archive; else correct the address in the table of \
              archives"
         }
-        _ => "run again later: what has arrived is kept",
+        _ => "run again later: transferred files are kept",
     }
 }

@@ -44,7 +44,7 @@ fn some_of_all(all: &[MatchedPair], tabled: &[&MatchedPair]) -> String {
         return String::new();
     }
     paragraph(&format!(
-        "Rows are of {} of {} pairs: those refused, then those with the fewest tie points.",
+        "The table lists {} of {} pairs: rejected pairs first, then those with the fewest tie points.",
         tabled.len(),
         whole(all.len())
     ))

@@ -27,8 +27,8 @@ pub(super) const SECTION: Section = Section {
 fn write(site: &SiteProducts) -> Result<String> {
     let check = site.profile_check;
     let mut body = paragraph(
-        "Every stretch of a profile is withheld in turn and predicted from the other profiles, as the surface predicts the ground \
-         under tie points. The stretch took no part in its prediction.",
+        "Every stretch of a profile is withheld in turn and predicted from the other profiles, in the same way as the ground \
+         under tie points. The stretch takes no part in its prediction.",
     );
     if let Some(score) = &check.score {
         body += &table(score);

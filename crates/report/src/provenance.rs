@@ -162,9 +162,7 @@ fn many_have_the_same(site: &SiteProducts) -> String {
     if !many::are_many(site) {
         return String::new();
     }
-    paragraph(
-        "Of the images those with plots of their own are listed; the others have the same, and manifest.json has all.",
-    )
+    paragraph("Only images with their own plots are listed; manifest.json lists all images.")
 }
 
 /// Names of the images without rows of their own.

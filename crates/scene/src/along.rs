@@ -10,13 +10,13 @@ use nalgebra::Vector3;
 use super::{
     SceneOptions, SceneSummary,
     arc::{Beam, Flight},
-    drawn::ProfileShift,
     error::SceneError,
     error_sources::{Relief, SceneErrors},
     files::{Draft, put},
     laser::{FRAME_S, LaserErrors},
     mission::write_truth,
     pedr::{PedrRequest, frame_tags, write_pedr},
+    profile_shift::ProfileShift,
     sites::{README_ALONG, SiteFile, SiteImage, SiteKernels, Window},
     terrain::Terrain,
     truth::{KeptShot, ProfileTruth, Truth},
@@ -96,7 +96,7 @@ pub fn write_scene_along(
         true
     })?;
 
-    let mut truth = Truth::new(options.seed, SceneErrors::demo());
+    let mut truth = Truth::new(options.seed, &SceneErrors::demo());
     truth.files.push(file);
     let mut windows = Vec::new();
     for (number, stretch) in (1..).zip(&stretches) {

@@ -1,14 +1,16 @@
 //! Errors drawn for the day of one image, and the flight with them.
 
-use nalgebra::{Matrix3, Rotation3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
 use super::{
     arc::{Arc, Beam, Flight},
     attitude::bus_to_camera,
-    error_sources::{AttitudeErrors, Jitter, Misregistration, PositionErrors, SceneErrors},
+    error_sources::{
+        AttitudeErrors, CameraErrors, Jitter, Misregistration, PositionErrors, SceneErrors,
+    },
+    profile_shift::ProfileShift,
     random::Random,
-    terrain::REFERENCE_RADIUS_M,
 };
 use areograph_base::{body::MARS_IAU2000, error::Result, instruments::Instrument, time::Et};
 use areograph_geom::{
@@ -38,6 +40,27 @@ pub(super) struct DayErrors {
     pub boresight_rad: [f64; 2],
     /// Shift of the day's profile in the PEDR file.
     pub profile_shift: ProfileShift,
+    /// Errors of the camera: the same on all days.
+    pub camera: CameraError,
+}
+
+/// Errors of the camera against its calibration.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(super) struct CameraError {
+    /// Pixels of the detector by which the ends of its line lie before the middle, along the track.
+    pub bend_px: f64,
+    /// True focal length over that of the calibration.
+    pub focal_length_ratio: f64,
+}
+
+impl CameraError {
+    fn draw(sizes: &CameraErrors, seed: u64) -> Self {
+        let mut random = Random::new(seed, "camera errors");
+        Self {
+            bend_px: sizes.bend_sigma_px * random.normal(),
+            focal_length_ratio: 1.0 + sizes.focal_length_sigma * random.normal(),
+        }
+    }
 }
 
 /// Rotation of the bus against the C-kernel: its true matrix from J2000 was `exp([e]×)` times the C-kernel's.
@@ -65,55 +88,6 @@ struct Sinusoid {
     phase_rad: f64,
 }
 
-/// Offset of a profile in the PEDR file from its true position.
-#[derive(Debug, Clone, Serialize)]
-pub(super) struct ProfileShift {
-    /// Towards the east, the north and up, metres.
-    pub east_north_radial_m: [f64; 3],
-    /// The first two as a rotation of Mars.
-    #[serde(skip)]
-    rotation: Matrix3<f64>,
-}
-
-impl ProfileShift {
-    /// No shift.
-    pub(super) fn none() -> Self {
-        Self {
-            east_north_radial_m: [0.0; 3],
-            rotation: Matrix3::identity(),
-        }
-    }
-
-    /// The shift of a profile near `site`, a direction.
-    fn near(site: &Vector3<f64>, east_north_radial_m: [f64; 3]) -> Self {
-        let [east_m, north_m, _] = east_north_radial_m;
-        let east = Vector3::z().cross(site).normalize();
-        let north = site.cross(&east);
-        let moved = east_m * east + north_m * north;
-        let turn_rad = site.cross(&moved) / REFERENCE_RADIUS_M;
-        Self {
-            east_north_radial_m,
-            rotation: Rotation3::new(turn_rad).into_inner(),
-        }
-    }
-
-    /// Radial part, metres.
-    pub(super) const fn radial_m(&self) -> f64 {
-        self.east_north_radial_m[2]
-    }
-
-    /// The rotation from true directions to those of the file, both IAU 2000.
-    pub(super) const fn rotation(&self) -> &Matrix3<f64> {
-        &self.rotation
-    }
-
-    /// Position of a point in the file, IAU 2000, metres.
-    pub(super) fn applied(&self, ground_m: &Vector3<f64>) -> Vector3<f64> {
-        let radius_m = ground_m.norm();
-        self.rotation * ground_m * ((radius_m + self.radial_m()) / radius_m)
-    }
-}
-
 impl AttitudeError {
     fn draw(sizes: &AttitudeErrors, arc: &Arc, random: &mut Random) -> Self {
         let half_image_s = 0.5 * arc.exposed.duration_s();
@@ -127,12 +101,15 @@ impl AttitudeError {
             constant_rad,
             linear_rad,
             quadratic_rad,
-            jitter: sinusoids(&sizes.jitter, random),
+            jitter: [&sizes.jitter, &sizes.slow_jitter]
+                .into_iter()
+                .flat_map(|sizes| sinusoids(sizes, random))
+                .collect(),
         }
     }
 
     /// Rotation at `et` without jitter, radians about the axes of the bus.
-    fn steady_at(&self, et: Et) -> Vector3<f64> {
+    pub(super) fn steady_at(&self, et: Et) -> Vector3<f64> {
         let late_s = et.since(Et::from_seconds(self.middle_et_s));
         let x = (late_s / self.half_image_s).clamp(-POLYNOMIAL_REACH, POLYNOMIAL_REACH);
         self.constant_rad + x * (self.linear_rad + x * self.quadratic_rad)
@@ -191,9 +168,10 @@ impl DayErrors {
         let constant = sizes.constant_sigma_rad.iter();
         let is_turned =
             constant.fold(0.0_f64, |a, b| a.max(*b)) > 0.0 || sizes.jitter.sinusoids > 0;
-        let mut laser = stream("profile");
-        let [east_m, north_m] = [0, 1].map(|_| errors.altimeter.plan_sigma_m * laser.normal());
-        let radial_m = errors.altimeter.radial_sigma_m * laser.normal();
+        let attitude = is_turned.then(|| AttitudeError::draw(sizes, arc, &mut stream("attitude")));
+        let turn_rad = attitude
+            .as_ref()
+            .map_or_else(Vector3::zeros, |of| of.constant_rad);
         let mut boresight = Random::new(seed, "boresight");
         let boresight_rad =
             [0, 1].map(|_| errors.altimeter.boresight_sigma_rad * boresight.normal());
@@ -203,11 +181,9 @@ impl DayErrors {
             bus_position_m,
             camera_position_m,
             boresight_rad,
-            attitude: is_turned.then(|| AttitudeError::draw(sizes, arc, &mut stream("attitude"))),
-            profile_shift: ProfileShift::near(
-                &arc.image.site.direction(),
-                [east_m, north_m, radial_m],
-            ),
+            attitude,
+            profile_shift: ProfileShift::draw(&errors.altimeter, arc, turn_rad, seed),
+            camera: CameraError::draw(&errors.camera, seed),
         }
     }
 
@@ -247,7 +223,11 @@ impl Flown {
     }
 
     /// The C-kernel's matrix at `et`, rotated by the attitude error `turn`.
-    fn turned_by(&self, turn: impl Fn(&AttitudeError, Et) -> Vector3<f64>, et: Et) -> Matrix3<f64> {
+    pub(super) fn turned_by(
+        &self,
+        turn: impl Fn(&AttitudeError, Et) -> Vector3<f64>,
+        et: Et,
+    ) -> Matrix3<f64> {
         let read = et.plus(self.errors.attitude_clock_s);
         let told = self.arc.attitude.j2000_to_bus(read);
         match &self.errors.attitude {
@@ -334,6 +314,19 @@ mod tests {
     }
 
     #[test]
+    fn fair_errors_have_other_sizes_for_every_seed() {
+        let realistic = SceneErrors::realistic(Roughness::Plains);
+        let sizes: Vec<f64> = (0..40)
+            .map(|seed| realistic.fair(seed).altimeter.plan_sigma_m)
+            .collect();
+        assert!(sizes.iter().all(|size_m| (50.0..100.0).contains(size_m)));
+        // Half of 40 draws, to three standard deviations of 3.2.
+        let larger = sizes.iter().filter(|size_m| **size_m > 70.7).count();
+        assert!((10..=30).contains(&larger), "{larger}");
+        assert_eq!(realistic.fair(7), realistic.fair(7));
+    }
+
+    #[test]
     fn a_clock_offset_is_that_of_all_images() {
         let errors = SceneErrors::realistic(Roughness::Plains).with_attitude_clock();
         let [first, second] = [0, 3].map(|image| DayErrors::draw(&errors, &arc(&IMAGES[image]), 5));
@@ -375,25 +368,6 @@ mod tests {
             assert!(drawn.boresight_rad.iter().all(|angle| angle.abs() <= 0.0));
             assert!((drawn.time_bias_lines - image.time_bias_lines).abs() <= 0.0);
             assert_eq!(drawn.profile_shift.rotation(), &Matrix3::identity());
-        }
-    }
-
-    #[test]
-    fn a_profile_moves_east_north_and_up() {
-        let site = IMAGES[0].site.direction();
-        let shift = ProfileShift::near(&site, [70.0, -30.0, 2.0]);
-        let east = Vector3::z().cross(&site).normalize();
-        let north = site.cross(&east);
-        // At the site, and 30 km to the north of it.
-        for away_rad in [0.0, 0.009_f64] {
-            let up = away_rad.cos() * site + away_rad.sin() * north;
-            let moved_m = shift.applied(&(REFERENCE_RADIUS_M * up)) - REFERENCE_RADIUS_M * up;
-            assert!((moved_m.dot(&east) - 70.0).abs() < 0.1, "{moved_m}"); // meridians converge by 0.1 %
-            assert!(
-                (moved_m.dot(&up.cross(&east)) + 30.0).abs() < 0.1,
-                "{moved_m}"
-            );
-            assert!((moved_m.dot(&up) - 2.0).abs() < 0.01, "{moved_m}"); // the plane of the shift: 1 mm
         }
     }
 

@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use super::random::Random;
+
 /// Errors of a synthetic mission. The drawn values are in `truth.json`.
 ///
 /// All are normally distributed about 0 with the given standard deviation, unless stated otherwise.
@@ -15,10 +17,16 @@ pub struct SceneErrors {
     pub attitude: AttitudeErrors,
     /// Errors of the laser altimeter and of its products.
     pub altimeter: AltimeterErrors,
+    /// Errors of the narrow-angle camera against its calibration, the same in all images.
+    pub camera: CameraErrors,
     /// The ground around the sites.
     pub relief: Relief,
-    /// Noise of the measurements of tie points, lines and samples.
+    /// Noise of the measurements of tie points, lines and samples, as the site files state it.
     pub tie_noise_px: f64,
+    /// True noise over the stated one.
+    pub tie_noise_factor: f64,
+    /// Share of the variance of the true noise that neighbouring tie points of an image have in common, 0 to 1.
+    pub tie_noise_common: f64,
 }
 
 /// Cause of the along-track misregistration.
@@ -69,6 +77,8 @@ pub struct AttitudeErrors {
     pub quadratic_sigma_rad: f64,
     /// Jitter about the first two axes, roll and pitch.
     pub jitter: Jitter,
+    /// The same with periods of seconds.
+    pub slow_jitter: Jitter,
 }
 
 /// Sinusoids of the attitude; amplitudes and periods are uniform in their logarithm.
@@ -82,11 +92,27 @@ pub struct Jitter {
     pub period_s: [f64; 2],
 }
 
+impl Jitter {
+    /// No jitter.
+    const NONE: Self = Self {
+        sinusoids: 0,
+        amplitude_rad: [0.0; 2],
+        period_s: [0.0; 2],
+    };
+}
+
 /// Errors of the laser altimeter and of its products.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AltimeterErrors {
-    /// Standard deviation of a profile's shift to the east and to the north, metres.
+    /// Standard deviation of a profile's shift to the east and to the north, metres, without that by the attitude.
     pub plan_sigma_m: f64,
+    /// Share of the bus's attitude error that the coordinates of files contain, because they were computed from the same
+    /// attitude: drawn evenly from 0 to these for every profile at nadir, and off nadir.
+    pub attitude_share_max: [f64; 2],
+    /// Whether a shifted profile off nadir is as much too high or too low as its beam is turned at the same range.
+    pub has_heights_of_shift: bool,
+    /// Chance that a profile lies elsewhere, by [`MISPLACED_M`].
+    pub misplaced_chance: f64,
     /// Standard deviation of a profile's radial shift, metres.
     pub radial_sigma_m: f64,
     /// Standard deviation of a single range, metres.
@@ -101,6 +127,26 @@ pub struct AltimeterErrors {
     /// Whether files contain the instrument's echo data: channel 4, energies, pulse widths, thresholds.
     #[serde(skip)]
     pub tells_echoes: bool,
+}
+
+/// Smallest and largest shift of a misplaced profile in plan, metres.
+pub(super) const MISPLACED_M: [f64; 2] = [500.0, 2_000.0];
+
+/// Errors of the camera.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CameraErrors {
+    /// Standard deviation of the bend of the detector line: its ends lie so many pixels before its middle, along the track.
+    pub bend_sigma_px: f64,
+    /// Standard deviation of the focal length, as a share of it.
+    pub focal_length_sigma: f64,
+}
+
+impl CameraErrors {
+    /// No errors.
+    const NONE: Self = Self {
+        bend_sigma_px: 0.0,
+        focal_length_sigma: 0.0,
+    };
 }
 
 /// The ground around the sites.
@@ -157,14 +203,14 @@ impl SceneErrors {
                 constant_sigma_rad: [0.0; 3],
                 linear_sigma_rad: 0.0,
                 quadratic_sigma_rad: 0.0,
-                jitter: Jitter {
-                    sinusoids: 0,
-                    amplitude_rad: [0.0; 2],
-                    period_s: [0.0; 2],
-                },
+                jitter: Jitter::NONE,
+                slow_jitter: Jitter::NONE,
             },
             altimeter: AltimeterErrors {
                 plan_sigma_m: 0.0,
+                attitude_share_max: [0.0; 2],
+                has_heights_of_shift: false,
+                misplaced_chance: 0.0,
                 radial_sigma_m: 0.0,
                 shot_noise_m: 0.0,
                 range_step_m: 0.0,
@@ -172,8 +218,11 @@ impl SceneErrors {
                 boresight_sigma_rad: 0.0,
                 tells_echoes: false,
             },
+            camera: CameraErrors::NONE,
             relief: Relief::Gentle,
             tie_noise_px: 1.0,
+            tie_noise_factor: 1.0,
+            tie_noise_common: 0.0,
         }
     }
 
@@ -211,9 +260,13 @@ impl SceneErrors {
                     amplitude_rad: [1e-6, 5e-6],
                     period_s: [0.1, 2.0],
                 },
+                slow_jitter: Jitter::NONE,
             },
             altimeter: AltimeterErrors {
                 plan_sigma_m: 70.0,
+                attitude_share_max: [0.0; 2],
+                has_heights_of_shift: false,
+                misplaced_chance: 0.0,
                 radial_sigma_m: 1.0,
                 shot_noise_m: 1.0,
                 range_step_m: 0.375,
@@ -221,8 +274,98 @@ impl SceneErrors {
                 boresight_sigma_rad: 1e-4,
                 tells_echoes: true,
             },
+            camera: CameraErrors::NONE,
             relief: Relief::SelfAffine(roughness),
             tie_noise_px: 1.0,
+            tie_noise_factor: 1.0,
+            tie_noise_common: 0.0,
+        }
+    }
+
+    /// Errors of a mission that shares few assumptions with the default values of areograph: the size of each is drawn for
+    /// every seed over the range of its sources, evenly in the logarithm, and errors are added that the adjustment does not
+    /// model.
+    ///
+    /// # Source
+    /// Beside those of [`realistic`](Self::realistic):
+    /// * attitude 0.26 to 0.5 mrad, the two values there; pitch in proportion. Line times 20 to 40 lines;
+    /// * orbit a fifth to three fifths of the differences of the first months: the nadir profiles of Shan et al. 2005, Table 3,
+    ///   agree with it to 2 m in radius;
+    /// * boresight 0.05 to 0.15 mrad, the two corrections there;
+    /// * profiles 50 to 100 m in plan and 0.5 to 1.5 m in radius; shots 0.5 to 2 m (real crossovers: 0.6 to 0.9 m on smooth
+    ///   ground);
+    /// * coordinates of files contain a part of the attitude error of the bus, because they are computed from telemetry of the
+    ///   same attitude: up to 0.4 of it at nadir, where crossovers correct it, and up to all of it off nadir, where they do
+    ///   not. Five passes off nadir in real tables differ by 7 to 153 m from others, by 206 m (0.5 mrad) times the tangent of the angle;
+    /// * a profile off nadir has the height error of its shift in plan, at the measured range.
+    ///
+    /// Choices: half to twice the drift and jitter; slow jitter of 2 to 10 µrad and 2 to 10 s, below the 24 µrad of residuals to
+    /// a parabola (Shan et al. 2005, Table 4); one profile of 40 lies 0.5 to 2 km elsewhere; detector line bent by 0.15 to 0.6
+    /// pixels, focal length known to 0.025 to 0.1 %; tie points with 0.7 to 1.4 times the stated noise, up to two thirds of
+    /// its variance common to neighbours.
+    #[must_use]
+    pub fn fair(self, seed: u64) -> Self {
+        let mut random = Random::new(seed, "sizes of errors");
+        let mut within = |least: f64, most: f64| random.between_log(least, most);
+        let misregistration = match self.misregistration {
+            Misregistration::Published => Misregistration::Published,
+            Misregistration::LineTimes { sigma_lines } => Misregistration::LineTimes {
+                sigma_lines: sigma_lines * within(20.0, 40.0) / 30.0,
+            },
+            Misregistration::AttitudeClock { sigma_s } => Misregistration::AttitudeClock {
+                sigma_s: sigma_s * within(0.7, 1.4),
+            },
+        };
+        let orbit = within(0.2, 0.6);
+        let position = match self.position {
+            PositionErrors::Camera { sigma_m } => PositionErrors::Camera {
+                sigma_m: orbit * sigma_m,
+            },
+            PositionErrors::Bus {
+                sigma_radial_along_cross_m,
+            } => PositionErrors::Bus {
+                sigma_radial_along_cross_m: sigma_radial_along_cross_m.map(|of_m| orbit * of_m),
+            },
+        };
+        let turn = within(0.26, 0.5) / 0.4;
+        let (jitter, slow) = (within(0.5, 2.0), within(0.5, 2.0));
+        let attitude = AttitudeErrors {
+            constant_sigma_rad: self.attitude.constant_sigma_rad.map(|of_rad| turn * of_rad),
+            linear_sigma_rad: self.attitude.linear_sigma_rad * within(0.5, 2.0),
+            quadratic_sigma_rad: self.attitude.quadratic_sigma_rad * within(0.5, 2.0),
+            jitter: Jitter {
+                amplitude_rad: self.attitude.jitter.amplitude_rad.map(|of| jitter * of),
+                ..self.attitude.jitter
+            },
+            slow_jitter: Jitter {
+                sinusoids: 1,
+                amplitude_rad: [2e-6, 5e-6].map(|of| slow * of),
+                period_s: [2.0, 10.0],
+            },
+        };
+        let altimeter = AltimeterErrors {
+            plan_sigma_m: within(50.0, 100.0),
+            attitude_share_max: [0.4, 1.0],
+            has_heights_of_shift: true,
+            misplaced_chance: 1.0 / 40.0,
+            radial_sigma_m: within(0.5, 1.5),
+            shot_noise_m: within(0.5, 2.0),
+            boresight_sigma_rad: within(5e-5, 1.5e-4),
+            ..self.altimeter
+        };
+        let camera = CameraErrors {
+            bend_sigma_px: within(0.15, 0.6),
+            focal_length_sigma: within(2.5e-4, 1e-3),
+        };
+        Self {
+            misregistration,
+            position,
+            attitude,
+            altimeter,
+            camera,
+            tie_noise_factor: within(0.7, 1.4),
+            tie_noise_common: random.between(0.0, 2.0 / 3.0),
+            ..self
         }
     }
 

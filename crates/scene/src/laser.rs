@@ -4,9 +4,9 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{
     arc::{Beam, Flight},
-    drawn::ProfileShift,
     error::SceneError,
     error_sources::AltimeterErrors,
+    profile_shift::ProfileShift,
     random::{mix, normal_of, unit_of},
     sun::mars_from_sun_m,
     terrain::Terrain,

@@ -54,6 +54,7 @@ mod pedr;
 pub mod plan;
 mod plane;
 mod plane_net;
+mod profile_shift;
 mod pushbroom_pair;
 mod roughness;
 mod sites;
@@ -79,8 +80,8 @@ pub use calibration::write_calibration_scene;
 pub use calibration_loop::{LineScene, write_calibration_loop_scene, write_line_scene};
 pub use error::SceneError;
 pub use error_sources::{
-    AltimeterErrors, AttitudeErrors, Jitter, Misregistration, PositionErrors, Relief, Roughness,
-    SceneErrors,
+    AltimeterErrors, AttitudeErrors, CameraErrors, Jitter, Misregistration, PositionErrors, Relief,
+    Roughness, SceneErrors,
 };
 pub use images::Coder;
 pub use mission::{TrueGround, write_scene, write_scene_with_images};

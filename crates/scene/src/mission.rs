@@ -18,7 +18,7 @@ use super::{
     plan::{IMAGES, LOST_IMAGE, SITES, Site},
     sites::{README, planned_label, planned_site},
     terrain::Terrain,
-    ties::{ties_name, write_ties},
+    ties::{TieNoise, ties_name, write_ties},
     truth::{
         ContextTruth, DrawnTruth, FileTruth, ImageTruth, KeptShot, OrbitDifference, ProfileTruth,
         Truth,
@@ -99,7 +99,7 @@ pub(super) fn write(
         .collect();
 
     let TrueGround(terrain) = TrueGround::of(options);
-    let mut truth = Truth::new(options.seed, options.errors);
+    let mut truth = Truth::new(options.seed, &options.errors);
     let pedr = draft.folder("pedr")?;
     let mut kept = Vec::new();
     for flown in &days {
@@ -121,8 +121,8 @@ pub(super) fn write(
             .filter(|flown| flown.arc.image.site.id == site.id)
             .collect();
         if let [first, second] = own[..] {
-            let noise_px = options.errors.tie_noise_px;
-            let pair = write_ties(&ties, [first, second], &terrain, noise_px, options.seed)?;
+            let noise = TieNoise::of(&options.errors);
+            let pair = write_ties(&ties, [first, second], &terrain, noise, options.seed)?;
             let arcs = [&first.arc, &second.arc];
             let has_pixels = images.is_some_and(|(_, sites)| is_of(site, sites));
             let file = planned_site(site, arcs, &options.errors, &pair, has_pixels);

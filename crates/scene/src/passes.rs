@@ -6,11 +6,11 @@ use nalgebra::Vector3;
 
 use super::{
     arc::{Beam, Flight},
-    drawn::ProfileShift,
     error_sources::{Roughness, SceneErrors},
     laser::LaserErrors,
     orbit::Orbit,
     pedr::{PedrRequest, frame_tags, write_pedr},
+    profile_shift::ProfileShift,
     random::mix,
     terrain::Terrain,
 };

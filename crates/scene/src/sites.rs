@@ -180,13 +180,14 @@ pub(super) fn window(site: &Site, [east_deg, north_deg]: [f64; 2]) -> Window {
     }
 }
 
-/// Limit of mean range residuals where errors are drawn, metres. A profile shifted by 70 m is 26 m too near or too far
-/// at 22 degrees off nadir; orbits add 9 m.
+/// Limit of mean range residuals where profiles are shifted without the height that a turned beam has, metres. A profile
+/// shifted by 70 m is then 26 m too near or too far at 22 degrees off nadir; orbits add 9 m.
 const RANGE_MEAN_MAX_M: f64 = 85.0;
 
 /// Limit of mean range residuals, where not the usual one.
 pub(super) fn range_mean_max_m(errors: &SceneErrors) -> Option<f64> {
-    (*errors != SceneErrors::demo()).then_some(RANGE_MEAN_MAX_M)
+    let is_shifted_level = !errors.altimeter.has_heights_of_shift;
+    (is_shifted_level && *errors != SceneErrors::demo()).then_some(RANGE_MEAN_MAX_M)
 }
 
 /// The site file of `site`, with the images and PEDR files of its arcs and the tie points of `ties`; the images may

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use super::{
     drawn::Flown,
     error::SceneError,
+    error_sources::SceneErrors,
     files::put,
     random::Random,
     terrain::Terrain,
@@ -69,7 +70,11 @@ impl<'a> TrueImage<'a> {
         };
         let orientation = SampledOrientation::new(&poses(flown, terrain, intervals)?)
             .map_err(|error| no_camera(flown, &error))?;
-        let detector = Detector::new(usual_instrument(), image.summing, 0, image.samples());
+        let calibrated = Detector::new(usual_instrument(), image.summing, 0, image.samples());
+        let detector = Detector {
+            focal_length_px: calibrated.focal_length_px * flown.errors.camera.focal_length_ratio,
+            ..calibrated
+        };
         Ok(Self {
             flown,
             oriented_camera: OrientedCamera {
@@ -91,6 +96,16 @@ impl<'a> TrueImage<'a> {
             self.oriented_camera.lines(),
         );
         Ok(projector.map_err(|error| no_camera(self.flown, &error))?)
+    }
+
+    /// Direction that a sample sees, in the camera.
+    fn look(&self, sample: f64) -> Vector3<f64> {
+        let detector = &self.oriented_camera.detector;
+        let pixels = f64::from(usual_instrument().detector.pixels);
+        let from_middle = sample / detector.samples - 0.5;
+        let bend_px = self.flown.errors.camera.bend_px * (2.0 * from_middle).powi(2);
+        let ahead = bend_px * detector.samples / pixels / detector.focal_length_px;
+        detector.look(sample) + Vector3::new(ahead, 0.0, 0.0)
     }
 
     /// Largest line and sample of a tie point.
@@ -116,7 +131,7 @@ impl<'a> TrueImage<'a> {
     ) -> Option<Vector3<f64>> {
         let (x_lines, _) = self.oriented_camera.focal_plane_coordinates(line, sample);
         let pose = self.oriented_camera.orientation.pose(x_lines);
-        let camera = self.oriented_camera.detector.look(sample);
+        let camera = self.look(sample);
         let direction = pose.mars_to_camera.tr_mul(&camera).normalize();
         let range_m = terrain.range_m(&pose.position_m, &direction)?;
         Some(pose.position_m + range_m * direction)
@@ -133,7 +148,7 @@ impl<'a> TrueImage<'a> {
         let pose = self.oriented_camera.orientation.pose(x_lines);
         let mut before: [Option<f64>; 2] = [None; 2];
         let ground = samples.map(|sample| {
-            let camera = self.oriented_camera.detector.look(sample);
+            let camera = self.look(sample);
             let direction = pose.mars_to_camera.tr_mul(&camera).normalize();
             let range_m = match before {
                 [Some(last_m), Some(earlier_m)] => {
@@ -146,6 +161,18 @@ impl<'a> TrueImage<'a> {
             range_m.map(|range_m| pose.position_m + range_m * direction)
         });
         ground.collect()
+    }
+
+    /// When the bent line sees a point, lines from the middle; `x_lines` is when a straight line sees it.
+    fn bent_line(&self, x_lines: f64, sample: f64, ground_m: &Vector3<f64>) -> f64 {
+        let ahead = |x_lines: f64| {
+            let camera_m = self.oriented_camera.orientation.pose(x_lines);
+            let camera_m = camera_m.camera_vector_m(ground_m);
+            camera_m.x / camera_m.z
+        };
+        // A line later the point has moved by as much as anywhere near.
+        x_lines
+            + (self.look(sample).x / self.look(sample).z) / (ahead(x_lines + 1.0) - ahead(x_lines))
     }
 
     /// Image coordinates of a point, unless outside or too near to an edge.
@@ -161,10 +188,11 @@ impl<'a> TrueImage<'a> {
             .focal_px(&seen.camera_m)
             .ok()?
             .y;
+        let sample = self.oriented_camera.detector.sample(y_px);
         let measure = TieMeasure {
             image: self.oriented_camera.id.clone(),
-            line: seen.x + 0.5 * self.oriented_camera.lines(),
-            sample: self.oriented_camera.detector.sample(y_px),
+            line: self.bent_line(seen.x, sample, ground_m) + 0.5 * self.oriented_camera.lines(),
+            sample,
             sigma_px: None,
         };
         let [line_end, sample_end] = self.extent_px();
@@ -253,7 +281,54 @@ fn no_camera(flown: &Flown, error: &dyn std::error::Error) -> SceneError {
     }
 }
 
-/// Writes the tie points of a pair into `folder`, measured with noise of `noise_px`.
+/// Noise of tie points.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TieNoise {
+    /// Standard deviation, lines and samples.
+    sigma_px: f64,
+    /// Share of its variance that neighbours have in common.
+    common: f64,
+}
+
+impl TieNoise {
+    /// That of a mission.
+    pub(super) fn of(errors: &SceneErrors) -> Self {
+        Self {
+            sigma_px: errors.tie_noise_factor * errors.tie_noise_px,
+            common: errors.tie_noise_common,
+        }
+    }
+}
+
+/// Errors that neighbouring tie points have in common: waves over an image, of standard deviation 1.
+struct Waves(Vec<[f64; 3]>);
+
+impl Waves {
+    const COUNT: u32 = 12;
+    /// Shortest and longest wave, pixels.
+    const LENGTH_PX: [f64; 2] = [300.0, 3_000.0];
+
+    fn draw(random: &mut Random) -> Self {
+        let waves = (0..Self::COUNT).map(|_| {
+            let [shortest_px, longest_px] = Self::LENGTH_PX;
+            let number = std::f64::consts::TAU / random.between_log(shortest_px, longest_px);
+            let (sin, cos) = random.between(0.0, std::f64::consts::TAU).sin_cos();
+            let phase = random.between(0.0, std::f64::consts::TAU);
+            [number * sin, number * cos, phase]
+        });
+        Self(waves.collect())
+    }
+
+    fn at(&self, line: f64, sample: f64) -> f64 {
+        let waves = self.0.iter();
+        let sum: f64 = waves
+            .map(|[by_line, by_sample, phase]| (by_line * line + by_sample * sample + phase).cos())
+            .sum();
+        sum * (2.0 / f64::from(Self::COUNT)).sqrt()
+    }
+}
+
+/// Writes the tie points of a pair into `folder`, measured with noise.
 ///
 /// # Errors
 /// [`SceneError::NoCamera`]; errors of writing.
@@ -261,7 +336,7 @@ pub(super) fn write_ties(
     folder: &Path,
     [first, second]: [&Flown; 2],
     terrain: &Terrain,
-    noise_px: f64,
+    noise: TieNoise,
     seed: u64,
 ) -> Result<TiesTruth> {
     let site = first.arc.image.site.id;
@@ -271,7 +346,7 @@ pub(super) fn write_ties(
     ];
     let mut random = Random::new(seed, &format!("ties {site}"));
     let exact = exact_ties(&pair, terrain, &mut random)?;
-    let (measured, truth) = spoil(exact, noise_px, &mut random);
+    let (measured, truth) = spoil(exact, noise, &mut random);
     put(&folder.join(ties_name(site)), &ties_table(&measured))?;
     Ok(TiesTruth {
         site,
@@ -308,15 +383,21 @@ fn exact_ties(
 /// Adds noise to all measurements, and blunders to a few.
 fn spoil(
     ties: Vec<Tie>,
-    noise_px: f64,
+    noise: TieNoise,
     random: &mut Random,
 ) -> (Vec<TiePoint<String>>, Vec<TieTruth>) {
+    // Drawn apart, so that the other draws do not depend on it.
+    let mut of_waves = random.clone();
+    let waves: [[Waves; 2]; 2] = [(); 2].map(|()| [(); 2].map(|()| Waves::draw(&mut of_waves)));
+    let own_px = noise.sigma_px * (1.0 - noise.common).sqrt();
+    let common_px = noise.sigma_px * noise.common.sqrt();
     let spoilt = ties.into_iter().enumerate().map(|(index, tie)| {
         let id = format!("tie-{:03}", index + 1);
         let mut measures = tie.measures.to_vec();
-        for measure in &mut measures {
-            measure.line += noise_px * random.normal();
-            measure.sample += noise_px * random.normal();
+        for (measure, [lines, samples]) in measures.iter_mut().zip(&waves) {
+            let common = [lines, samples].map(|of| common_px * of.at(measure.line, measure.sample));
+            measure.line += own_px * random.normal() + common[0];
+            measure.sample += own_px * random.normal() + common[1];
         }
         let blunder =
             (index % BLUNDER_EVERY == BLUNDER_EVERY / 2).then(|| blunder(&mut measures, random));

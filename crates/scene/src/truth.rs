@@ -276,14 +276,14 @@ pub(super) struct BlunderTruth {
 
 impl Truth {
     /// The true values common to all missions; images, files and profiles are added later.
-    pub(super) fn new(seed: u64, errors: SceneErrors) -> Self {
+    pub(super) fn new(seed: u64, errors: &SceneErrors) -> Self {
         Self {
             made_by: "areograph scene",
             synthetic: "all of this is invented; only ids, times, summing, lines, line periods and emission angles of the narrow-angle images follow Shan et al. 2005",
             table_2: "emission angles are those of Shan et al. 2005, Table 2, taken at the ground; of E04-01275 the table prints 7424 header lines, for which the first-order RMSE in their Table 4 would be 9.7 m instead of the 11.45 m printed; here it has 8064 lines, of which 7424 are delivered",
             orbit: "positions of images belong to the orbit gsfc (kernels/gsfc.tm), which is true except for errors_drawn; nav (used by the site files) and ipng differ from it by orbit_differences",
             seed,
-            errors,
+            errors: *errors,
             errors_rule: "errors are standard deviations and ranges, errors_drawn the values drawn from them for the day of each image; lines were exposed time_bias_lines later than the label states; the true attitude of the bus is that of the C-kernel, its bias removed, attitude_clock_s later, turned by attitude: matrix from J2000 to the bus = exp([e]x) times that of the kernel, e = constant + linear x + quadratic x^2 (x = (et - middle) / half_image, held beyond -4 and 4) + jitter; bus_position_m (camera and laser) and camera_position_m (camera only) are added to the orbit gsfc, IAU 2000; the laser points boresight_rad from +Z of the bus towards its X and Y, the same in the whole mission; east_north_radial_m is the position of the shots in the PEDR file minus their true position; the spacecraft of the file is that of gsfc, moved along the beam until ranges agree with the ground of the file",
             errors_drawn: Vec::new(),
             biases: Biases {

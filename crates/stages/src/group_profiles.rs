@@ -14,6 +14,7 @@ use areograph_base::{
     time::{Et, Interval},
 };
 use areograph_config::WindowConfig;
+use areograph_geom::statistics::median;
 use areograph_store::{
     stage::{InOrder, Output, Stage},
     stage_inputs,
@@ -51,6 +52,14 @@ impl Profile {
     /// An orbit crosses a wide window twice, on its day and its night side, tens of minutes apart; clouds and lost
     /// packets cause gaps of seconds.
     pub const PAUSE_S: f64 = 300.0;
+
+    /// Median angle of its beam off nadir, radians.
+    #[must_use]
+    pub fn off_nadir_rad(&self, footprints: &Footprints<BodyFixed>) -> f64 {
+        let angles_rad = self.rows.iter();
+        let angles_rad = angles_rad.map(|row| footprints.off_nadir_rad[*row as usize].abs());
+        median(&mut angles_rad.collect::<Vec<f64>>())
+    }
 }
 
 stage_inputs! {

@@ -6,11 +6,12 @@ use nalgebra::Vector3;
 
 use super::group_profiles::Profile;
 use areograph_base::{altimetry::NO_ATTITUDE, footprints::Footprints, frames::BodyFixed};
+use areograph_config::MolaSurfaceConfig;
 use areograph_geom::{
-    ellipsoid::spherical_to_xyz_m,
+    ellipsoid::{local_axes, spherical_to_xyz_m},
     surface::{
         Crossover, LaserSurface, ProfileNet, ProfilePriors, SurfaceError, SurfaceOptions,
-        SurfaceShot, crossovers,
+        SurfaceShot, crossovers, turned_sigmas_m,
     },
 };
 
@@ -30,6 +31,38 @@ pub(super) struct CrossedProfiles {
 }
 
 impl MolaShots {
+    /// Standard deviations of the shift of each profile as recorded, towards east, north and up, metres: those of all profiles,
+    /// and off nadir the attitude error that crossovers leave there.
+    #[must_use]
+    pub fn profile_sigmas_m(
+        footprints: &Footprints<BodyFixed>,
+        profiles: &[Profile],
+        options: &MolaSurfaceConfig,
+    ) -> Vec<Vector3<f64>> {
+        let ground_m = |row: u32| {
+            let at = row as usize;
+            spherical_to_xyz_m(
+                footprints.longitude_rad[at],
+                footprints.latitude_rad[at],
+                footprints.ground_radius_m(at),
+            )
+        };
+        let of_profile = |profile: &Profile| {
+            let (first, last) = (profile.rows[0], profile.rows[profile.rows.len() - 1]);
+            let [across_m, up_m] = turned_sigmas_m(profile.off_nadir_rad(footprints));
+            let (first_m, last_m) = (ground_m(first), ground_m(last));
+            let along = local_axes(&first_m) * (last_m - first_m);
+            let track = along.xy().try_normalize(0.0).unwrap_or_default();
+            let plan_m = options.profile_plan_sigma_m;
+            Vector3::new(
+                plan_m.hypot(across_m * track.y),
+                plan_m.hypot(across_m * track.x),
+                options.profile_sigma_m.hypot(up_m),
+            )
+        };
+        profiles.iter().map(of_profile).collect()
+    }
+
     /// The shots of `profiles` without those that do not belong by their crossovers; a shot in two windows belongs to
     /// the first.
     #[must_use]
@@ -77,6 +110,7 @@ impl MolaShots {
                     ),
                     profile: index,
                     attitude_known: footprints.attitude_flag[at] < NO_ATTITUDE,
+                    off_nadir_rad: footprints.off_nadir_rad[at],
                 });
             }
         }

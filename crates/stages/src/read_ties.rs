@@ -403,12 +403,12 @@ mod tests {
         );
         assert_eq!(
             single.unwrap_err().cause.to_string(),
-            "2 tie points, none of them measured in two images of the site"
+            "none of the 2 tie points is measured in two images of the site"
         );
         let empty = read("point_id,serial_number,sample,line\n", &[image("x", None)]);
         assert_eq!(
             empty.unwrap_err().cause.to_string(),
-            "no tie point file holds a measurement"
+            "the tie point files contain no measurement"
         );
     }
 }

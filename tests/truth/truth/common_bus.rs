@@ -156,7 +156,7 @@ fn holds(trial: Trial<'_>) {
         for site in &sites {
             let [plain_m, bus_m] = [&site.plain, &site.bus].map(|of| of.mean_sigmas_m[*axis]);
             let name = &site.bus.name;
-            assert!(bus_m < 0.65 * plain_m, "{name}: {bus_m} {plain_m}");
+            assert!(bus_m < 0.75 * plain_m, "{name}: {bus_m} {plain_m}");
         }
     }
     for axis in 0..2 {
@@ -187,7 +187,7 @@ fn the_laser_tells_the_place_across_the_flight() {
     });
 }
 
-/// What 36 sites, both ways, gave stands in decision 0021.
+/// Over more missions, decision 0021 states the result.
 #[test]
 fn the_place_by_the_laser_holds_over_36_sites() {
     if !long_test("the place by the laser over 36 sites, four minutes") {
@@ -196,7 +196,6 @@ fn the_place_by_the_laser_holds_over_36_sites() {
     holds(ACROSS);
 }
 
-/// What 36 sites with relief as well gave stands in decision 0021.
 #[test]
 fn the_place_by_laser_and_relief_holds_over_36_sites() {
     if !long_test("the place by laser and relief over 36 sites, four minutes") {
@@ -308,7 +307,7 @@ fn shots_of_another_time_and_missing_ones_are_reported() {
     );
     let (_, told, _) = with_laser(&mission, "unknown", &LASER[..LASER.find("[beam]").unwrap()]);
     assert!(
-        told.contains("adjustment.common_bus did nothing: the altimeter file does not state"),
+        told.contains("adjustment.common_bus has no effect: the altimeter file does not state"),
         "{told}"
     );
 }

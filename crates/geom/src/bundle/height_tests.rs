@@ -66,6 +66,7 @@ pub(super) fn surface_with(
                         ground_m: up * (point.ground_m.norm() + above_m + wave_m),
                         profile,
                         attitude_known: true,
+                        off_nadir_rad: 0.0,
                     }
                 })
             })

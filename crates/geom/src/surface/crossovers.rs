@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::{
-    Placed, Plan, SurfaceOptions, SurfaceShot, Variogram,
+    Placed, Plan, SharedErrors, SurfaceOptions, SurfaceShot, Variogram,
     variogram::{GAP, usual_step_m},
 };
 
@@ -21,8 +21,8 @@ const ANGLE_MIN_RAD: f64 = 0.05;
 pub struct Crossover {
     /// Their indices, ascending.
     pub profiles: [usize; 2],
-    /// Factors of the errors that the shots of each share: see [`SurfaceShot::attitude_known`].
-    pub shared: [f64; 2],
+    /// Factors of the errors that the shots of each share.
+    pub shared: [SharedErrors; 2],
     /// Where, Mars-fixed, at the mean of both heights, metres.
     pub place_m: Vector3<f64>,
     /// Height by the first profile minus height by the second, each interpolated between two shots, metres.
@@ -55,7 +55,7 @@ pub fn crossovers(shots: &[SurfaceShot], options: &SurfaceOptions) -> Vec<Crosso
     let plan = Plan::around(model, shots.iter().map(|shot| shot.ground_m));
     let placed: Vec<Placed> = shots
         .iter()
-        .map(|shot| Placed::new(model, &plan, shot))
+        .map(|shot| Placed::new(model, &plan, shot, options.profile_sigma_m))
         .collect();
     let segments = segments(&placed, options.shot_sigma_m);
     let mut cells: BTreeMap<[i64; 2], Vec<usize>> = BTreeMap::new();

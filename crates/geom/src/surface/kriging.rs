@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector2};
 
-use super::{Placed, Variogram};
+use super::{Placed, SharedErrors, Variogram};
 
 /// The kriging equations of some shots, factorised.
 #[derive(Debug, Clone)]
@@ -48,7 +48,8 @@ impl Kriging {
         let matrix = DMatrix::from_fn(shots.len(), shots.len(), |row, column| {
             let mut noise_m2 = 0.0;
             if shots[row].profile == shots[column].profile {
-                noise_m2 += profile_sigma_m.powi(2) * shots[row].shared * shots[column].shared;
+                let shared = shots[row].shared.radial * shots[column].shared.radial;
+                noise_m2 += profile_sigma_m.powi(2) * shared;
             }
             if row == column {
                 noise_m2 += shot_sigma_m.powi(2);
@@ -126,14 +127,42 @@ impl Kriging {
         0.5 * (&covariance + covariance.transpose())
     }
 
-    /// Sums of the weights of each profile, times the factor of the errors that its shots share, one row a profile.
-    pub(super) fn weights_of_profiles(&self, weights: &Weights) -> DMatrix<f64> {
+    /// Sums of the weights of each profile, times the factor of the radial errors that its shots share, one row a profile.
+    pub(super) fn radial_of_profiles(&self, weights: &Weights) -> DMatrix<f64> {
+        self.weights_of_profiles(weights, |shared| shared.radial)
+    }
+
+    /// The sums alone.
+    pub(super) fn sums_of_profiles(&self, weights: &Weights) -> DMatrix<f64> {
+        self.weights_of_profiles(weights, |_shared| 1.0)
+    }
+
+    /// Largest factors of the errors that shots of a profile share.
+    pub(super) fn shared_of(&self, profile: usize) -> SharedErrors {
+        let shots = self.shots.iter().filter(|shot| shot.profile == profile);
+        shots.fold(SharedErrors::LEAST, |largest, shot| {
+            largest.or_larger(&shot.shared)
+        })
+    }
+
+    /// The same for the part of the errors in plan by which they exceed those of a profile at nadir of known attitude.
+    pub(super) fn farther_of_profiles(&self, weights: &Weights) -> DMatrix<f64> {
+        self.weights_of_profiles(weights, |shared| {
+            (shared.plan.powi(2) - 1.0).max(0.0).sqrt()
+        })
+    }
+
+    fn weights_of_profiles(
+        &self,
+        weights: &Weights,
+        factor: impl Fn(&SharedErrors) -> f64,
+    ) -> DMatrix<f64> {
         let profiles = self.shots.iter().map(|shot| shot.profile + 1).max();
         let places = weights.of_shots.ncols();
         let mut sums = DMatrix::zeros(profiles.unwrap_or_default(), places);
         for (shot, row) in self.shots.iter().zip(weights.of_shots.row_iter()) {
             let mut sum = sums.row_mut(shot.profile);
-            sum += row * shot.shared;
+            sum += row * factor(&shot.shared);
         }
         sums
     }

@@ -22,7 +22,7 @@
 //!         let north_rad = f64::from(shot) * 300.0 / 3_396_190.0;
 //!         let up = Vector3::new(north_rad.cos(), 0.0, north_rad.sin());
 //!         let ground_m = on_ellipsoid_m(Body::Mars.model(), &up) + 50.0 * up;
-//!         SurfaceShot { ground_m, profile: 0, attitude_known: true }
+//!         SurfaceShot { ground_m, profile: 0, attitude_known: true, off_nadir_rad: 0.0 }
 //!     })
 //!     .collect();
 //! let surface = LaserSurface::new(&shots, &[], &SurfaceOptions::default())?;
@@ -37,18 +37,25 @@ mod crossovers;
 mod kriging;
 mod plan;
 mod profiles;
+mod shot;
 pub mod tails;
 mod variogram;
 mod withheld;
 
 use nalgebra::{DMatrix, Matrix3xX, Vector2, Vector3};
 
-use self::{kriging::Kriging, plan::Plan, variogram::Roughness};
+use self::{
+    kriging::{Kriging, Weights},
+    plan::Plan,
+    shot::PROFILE_PLAN_M,
+    variogram::Roughness,
+};
 use crate::ellipsoid::height_m;
 use areograph_base::body::{Body, BodyModel};
 
 pub use crossovers::{Crossover, crossovers};
 pub use profiles::{LeftOut, ProfileNet, ProfilePriors, ProfileShift};
+pub use shot::{NADIR_MAX_RAD, SharedErrors, SurfaceShot, turned_sigmas_m};
 pub use variogram::Variogram;
 pub use withheld::{Withheld, WithheldScore, withheld};
 
@@ -58,34 +65,8 @@ const SHOTS_MAX: usize = 1500;
 const NEAR_M: f64 = 3_000.0;
 /// Minimum number of shots of a surface.
 const SHOTS_MIN: usize = 10;
-/// Errors that a profile of unknown attitude shares, over those of others: robust spread of their crossovers at a real window
-/// near the south pole, 2.9 against 0.7 m.
-const UNKNOWN_ATTITUDE: f64 = 4.0;
 /// Half the baseline of gradients, metres: less than a spot of the laser.
 const GRADIENT_STEP_M: f64 = 30.0;
-
-/// A laser shot on the ground. Shots of a profile are in their order along it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SurfaceShot {
-    /// Its footprint, Mars-fixed, metres.
-    pub ground_m: Vector3<f64>,
-    /// Index of its profile.
-    pub profile: usize,
-    /// Whether the direction of the laser is known, as the attitude flag of its file states it. Where it is not, errors that
-    /// its profile shares are larger, in plan and along the radius.
-    pub attitude_known: bool,
-}
-
-impl SurfaceShot {
-    /// Factor of the errors that its profile shares.
-    const fn shared(&self) -> f64 {
-        if self.attitude_known {
-            1.0
-        } else {
-            UNKNOWN_ATTITUDE
-        }
-    }
-}
 
 /// Uncertainties of a surface of laser shots.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -212,7 +193,7 @@ impl LaserSurface {
         let plan = Plan::around(model, shots.iter().map(|shot| shot.ground_m));
         let placed: Vec<Placed> = shots
             .iter()
-            .map(|shot| Placed::new(model, &plan, shot))
+            .map(|shot| Placed::new(model, &plan, shot, options.profile_sigma_m))
             .collect();
         let roughness = Roughness::learn(&placed, options);
         let around: Vec<Vector2<f64>> = around.iter().map(|place| plan.of(place)).collect();
@@ -272,7 +253,7 @@ impl LaserSurface {
         let weights = self.kriging.weights(&at);
         let slopes: Vec<Vector2<f64>> = at.iter().map(|place| self.slope(place)).collect();
         let mut covariance_m2 = self.errors_m2(&at);
-        let of_profiles = self.kriging.weights_of_profiles(&weights);
+        let of_profiles = self.kriging.radial_of_profiles(&weights);
         covariance_m2 += of_profiles.tr_mul(&of_profiles) * self.options.profile_sigma_m.powi(2);
         let without_plan_m2 = covariance_m2.clone();
         let relief = self.options.relief_sigma_m.map(|sigma_m| Relief {
@@ -281,7 +262,7 @@ impl LaserSurface {
                 .zip(&slopes)
                 .map(|(place, slope)| self.plan.by_place(place, slope))
                 .collect(),
-            profiles: self.on_relief(&slopes, &of_profiles, sigma_m),
+            profiles: self.on_relief(&slopes, &weights, sigma_m),
         });
         if let Some(relief) = &relief {
             for profile in &relief.profiles {
@@ -293,6 +274,17 @@ impl LaserSurface {
             let slopes_matrix = DMatrix::from_fn(2, at.len(), |axis, place| slopes[place][axis]);
             covariance_m2 +=
                 slopes_matrix.tr_mul(&slopes_matrix) * self.options.plan_sigma_m.powi(2);
+            // Profiles that are farther from their place than others, each by itself.
+            let farther = self.kriging.farther_of_profiles(&weights);
+            for profile in farther
+                .row_iter()
+                .filter(|profile| profile.iter().any(|of| of.abs() > 0.0))
+            {
+                let by_shift = DMatrix::from_fn(2, at.len(), |axis, place| {
+                    slopes[place][axis] * profile[place]
+                });
+                covariance_m2 += by_shift.tr_mul(&by_shift) * PROFILE_PLAN_M.powi(2);
+            }
         }
         SurfaceHeights {
             body: self.options.body,
@@ -311,13 +303,14 @@ impl LaserSurface {
         }
     }
 
-    /// Each profile by its share in the heights, `of_profiles`.
+    /// Each profile by its share in the heights, of `weights`.
     fn on_relief(
         &self,
         slopes: &[Vector2<f64>],
-        of_profiles: &DMatrix<f64>,
+        weights: &Weights,
         sigma_m: f64,
     ) -> Vec<ProfileOnRelief> {
+        let of_profiles = self.kriging.sums_of_profiles(weights);
         let by_shift = |profile: usize| {
             Matrix3xX::from_fn(slopes.len(), |axis, place| {
                 let shift = if axis < 2 { slopes[place][axis] } else { -1.0 };
@@ -326,10 +319,17 @@ impl LaserSurface {
         };
         let profiles = self.profiles().into_iter();
         profiles
-            .map(|profile| ProfileOnRelief {
-                profile,
-                by_shift: by_shift(profile),
-                sigma_m: Vector3::new(sigma_m, sigma_m, self.options.profile_sigma_m),
+            .map(|profile| {
+                let shared = self.kriging.shared_of(profile);
+                let (plan_m, radial_m) = (
+                    shared.plan * sigma_m,
+                    shared.radial * self.options.profile_sigma_m,
+                );
+                ProfileOnRelief {
+                    profile,
+                    by_shift: by_shift(profile),
+                    sigma_m: Vector3::new(plan_m, plan_m, radial_m),
+                }
             })
             .collect()
     }
@@ -355,7 +355,7 @@ impl LaserSurface {
         for shift in shifts {
             let shifted: Vec<Vector2<f64>> = at.iter().map(|place| place + shift).collect();
             let weights = self.kriging.weights(&shifted);
-            let of_profiles = self.kriging.weights_of_profiles(&weights);
+            let of_profiles = self.kriging.radial_of_profiles(&weights);
             covariance_m2 += self.kriging.covariance_m2(&shifted, &weights)
                 - of_profiles.tr_mul(&of_profiles) * profile_m2;
         }
@@ -389,17 +389,17 @@ struct Placed {
     plan_m: Vector2<f64>,
     height_m: f64,
     profile: usize,
-    /// Factor of the errors that its profile shares.
-    shared: f64,
+    /// Factors of the errors that its profile shares.
+    shared: SharedErrors,
 }
 
 impl Placed {
-    fn new(model: &BodyModel, plan: &Plan, shot: &SurfaceShot) -> Self {
+    fn new(model: &BodyModel, plan: &Plan, shot: &SurfaceShot, profile_sigma_m: f64) -> Self {
         Self {
             plan_m: plan.of(&shot.ground_m),
             height_m: height_m(model, &shot.ground_m).0,
             profile: shot.profile,
-            shared: shot.shared(),
+            shared: shot.shared(profile_sigma_m),
         }
     }
 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
 
-use super::Crossover;
+use super::{Crossover, SharedErrors};
 use crate::statistics::{NORMAL_MAD, median};
 
 /// Fewest crossovers, with as many other profiles, by which a profile is left out.
@@ -133,7 +133,7 @@ fn worst(crossovers: &[Crossover], priors: &ProfilePriors) -> Option<LeftOut> {
             [(first, second, 1.0, others), (second, first, -1.0, own)]
         {
             // The other profile has a shift as well.
-            let shift_m = priors.radial_sigma_m * of_other;
+            let shift_m = priors.radial_sigma_m * of_other.radial;
             let variance_m2 = crossover.sigma_m.powi(2) + shift_m.powi(2);
             let of_profile = by_profile.entry(profile).or_default();
             of_profile.push((other, sign * crossover.difference_m, variance_m2));
@@ -203,7 +203,8 @@ fn radial_sigma_m(crossovers: &[Crossover], prior_m: f64) -> f64 {
         }
         let limit_m2 = (SHIFT_MAX_SIGMAS * sigma_m).powi(2);
         let shifts = net.shifts.iter().zip(&net.shared);
-        let shifts = shifts.map(|(shift_m, shared)| (shift_m / shared).powi(2).min(limit_m2));
+        let shifts =
+            shifts.map(|(shift_m, shared)| (shift_m / shared.radial).powi(2).min(limit_m2));
         let squares_m2 = shifts.sum::<f64>() + net.variances_m2().sum::<f64>();
         let profiles = net.profiles.len() as f64;
         let prior_m2 = PRIOR_PROFILES * prior_m.powi(2);
@@ -217,8 +218,8 @@ struct Net<'a> {
     crossovers: &'a [Crossover],
     /// Each with the number of its crossovers.
     profiles: BTreeMap<usize, usize>,
-    /// Of each profile, the factor of the errors that its shots share.
-    shared: Vec<f64>,
+    /// Of each profile, the factors of the errors that its shots share.
+    shared: Vec<SharedErrors>,
     /// Indices of the profiles of each crossover.
     columns: Vec<[usize; 2]>,
     /// Robust weights.
@@ -240,10 +241,10 @@ impl<'a> Net<'a> {
             .iter()
             .map(|crossover| crossover.profiles.map(|profile| index[&profile]));
         let columns: Vec<[usize; 2]> = columns.collect();
-        let mut shared = vec![1.0; profiles.len()];
+        let mut shared = vec![SharedErrors::LEAST; profiles.len()];
         for (crossover, columns) in crossovers.iter().zip(&columns) {
             for (column, of) in columns.iter().zip(crossover.shared) {
-                shared[*column] = f64::max(shared[*column], of);
+                shared[*column] = shared[*column].or_larger(&of);
             }
         }
         Self {
@@ -274,7 +275,16 @@ impl<'a> Net<'a> {
         let mut normal = DMatrix::zeros(unknowns, unknowns);
         let mut right = DVector::zeros(unknowns);
         for index in 0..unknowns {
-            let sigma_m = sigmas_m[index % self.unknowns] * self.shared[index / self.unknowns];
+            let shared = &self.shared[index / self.unknowns];
+            let unknown = index % self.unknowns;
+            // The last unknown of a profile is its radial shift.
+            let is_radial = unknown + 1 == self.unknowns;
+            let shared = if is_radial {
+                shared.radial
+            } else {
+                shared.plan
+            };
+            let sigma_m = sigmas_m[unknown] * shared;
             normal[(index, index)] = sigma_m.powi(-2);
         }
         for ((crossover, columns), weight) in
@@ -325,7 +335,7 @@ impl<'a> Net<'a> {
         let shared = self.shared.clone().into_iter();
         shared
             .enumerate()
-            .map(move |(index, shared)| variances_m2[index] / shared.powi(2))
+            .map(move |(index, shared)| variances_m2[index] / shared.radial.powi(2))
     }
 
     fn covariance_m2(&self) -> DMatrix<f64> {
@@ -375,6 +385,7 @@ mod tests {
                     ground_m: on_ellipsoid_m(Body::Mars.model(), &up) + height_m * up,
                     profile,
                     attitude_known: true,
+                    off_nadir_rad: 0.0,
                 });
             }
         }

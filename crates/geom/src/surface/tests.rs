@@ -11,6 +11,7 @@ fn profile(heights_m: &[f64], spacing_m: f64, east_m: f64, profile: usize) -> Ve
         ground_m: place(east_m, shot as f64 * spacing_m, *height_m),
         profile,
         attitude_known: true,
+        off_nadir_rad: 0.0,
     };
     heights_m.iter().enumerate().map(shot).collect()
 }

@@ -160,7 +160,7 @@ fn predicted(
         .map(|(height_m, predicted_m)| height_m - predicted_m);
     let variance_m2 = found.covariance_m2.sum() / (count * count)
         + options.shot_sigma_m.powi(2) / count
-        + (options.profile_sigma_m * stretch[0].shared()).powi(2);
+        + (options.profile_sigma_m * stretch[0].shared(options.profile_sigma_m).radial).powi(2);
     Some(Withheld {
         profile,
         first: from,

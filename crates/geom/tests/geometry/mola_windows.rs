@@ -70,6 +70,7 @@ fn window(table: &str, weighed: bool) -> Option<Window> {
                 ground_m,
                 profile,
                 attitude_known: !weighed || *attitude_flag < NO_ATTITUDE,
+                off_nadir_rad: 0.0,
             }
         },
     );
@@ -183,7 +184,8 @@ fn profiles_of_unknown_attitude_count_as_uncertain_as_they_are() {
     }
     let spread_m = |unknown: bool| {
         let of_kind = weighed.crossovers.iter();
-        let of_kind = of_kind.filter(|of| of.shared.iter().any(|shared| *shared > 1.0) == unknown);
+        let of_kind =
+            of_kind.filter(|of| of.shared.iter().any(|shared| shared.radial > 1.0) == unknown);
         let differences_m: Vec<f64> = of_kind.map(|of| of.difference_m).collect();
         Summary::of(&differences_m).nmad
     };

@@ -19,6 +19,7 @@ use areograph_base::{
 };
 use areograph_stages::{
     adjust::{CorrectedPoint, recorded_m2},
+    mola_surface::MolaShots,
     read_ties::Ties,
 };
 
@@ -108,19 +109,14 @@ fn profile_shifts<'a>(
         Some((range.profile, shared.sigma_m))
     });
     let by_profile: BTreeMap<usize, [f64; 3]> = of_ranges.collect();
-    let [plan_m, up_m] = profile_sigma_m(site);
+    let apriori =
+        MolaShots::profile_sigmas_m(site.footprints, site.profiles, &site.config.laser_surface);
     let shift = |(profile, adjusted_sigma_m): (usize, [f64; 3])| ProfileShift {
         profile: &site.profiles[profile].id,
-        apriori_sigma_m: [plan_m, plan_m, up_m],
+        apriori_sigma_m: apriori[profile].into(),
         adjusted_sigma_m,
     };
     by_profile.into_iter().map(shift).collect()
-}
-
-/// A priori standard deviations of the shift of a profile in plan and height, metres.
-fn profile_sigma_m(site: &SiteProducts) -> [f64; 2] {
-    let surface = &site.config.laser_surface;
-    [surface.profile_plan_sigma_m, surface.profile_sigma_m]
 }
 
 /// Shots with a range and their coordinates in the adjusted images: others have no observation equation of
@@ -132,7 +128,8 @@ fn lidar_points<'a>(
 ) -> Vec<LidarPoint<'a>> {
     let config = &site.config.adjustment;
     let result = adjustment.adjusted;
-    let [plan_m, up_m] = profile_sigma_m(site);
+    let shifts =
+        MolaShots::profile_sigmas_m(site.footprints, site.profiles, &site.config.laser_surface);
     let places: Vec<BTreeMap<usize, [f64; 2]>> = adjustment.images.iter().map(places).collect();
     let shots = result.ranges.iter().filter_map(|range| {
         let point = &result.points[range.point];
@@ -161,7 +158,7 @@ fn lidar_points<'a>(
                 recorded_m2(
                     &point.initial.xyz_m,
                     config.ground_sigma_m,
-                    [plan_m, plan_m, up_m],
+                    shifts[range.profile].into(),
                 ),
             ),
             adjusted: Some(adjusted(point)),

@@ -14,7 +14,7 @@ pub(super) enum DifferenceError {
     #[cause("copy the first products elsewhere before running again, or run into another --out")]
     SameFolder,
     /// A site's folder beside a folder of sites.
-    #[error("it holds the products of one site, the other folder those of several")]
+    #[error("this folder contains the products of one site, the other one those of several sites")]
     #[cause("name two folders of one site, or two output folders with sites")]
     OneAndSeveral,
     /// Products of two sites.

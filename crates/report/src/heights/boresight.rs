@@ -16,7 +16,7 @@ const MRAD_PER_RADIAN: f64 = 1e3;
 pub(super) fn boresight(adjusted: &Adjusted) -> String {
     match &adjusted.boresight {
         None => String::new(),
-        Some(Err(reason)) => paragraph(&format!("adjustment.common_bus did nothing: {reason}.")),
+        Some(Err(reason)) => paragraph(&format!("adjustment.common_bus has no effect: {reason}.")),
         Some(Ok(found)) => {
             let caption = "Recorded profiles against their positions by laser and images, metres";
             words(found) + &table(&found.images) + &profiles(caption, &found.profile_shifts)

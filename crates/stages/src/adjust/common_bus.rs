@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     error::AdjustError,
-    input::{AdjustImage, LaserShots, ShotRange},
+    input::{AdjustImage, LaserShot, LaserShots, ShotRange},
     network::{Assembled, projector},
     relief::ProfileOffset,
     words::unknown_in_words,
@@ -26,6 +26,13 @@ use areograph_geom::{
 /// Standard deviation of a single spot in its image beyond the errors that all spots share, focal-plane pixels: jitter
 /// and interpolation of attitudes. The recorded footprint has a separate error.
 const SPOT_SIGMA_PX: f64 = 0.5;
+/// Share of the attitude error of the bus that coordinates of PEDR files may contain: they are computed from telemetry of the
+/// same attitude, and crossovers remove an unknown part of its error. Half is a choice: synthetic missions with shares drawn up
+/// to 0.4 at nadir and to 1 off nadir hold it (`tests/truth/truth/stated.rs`).
+const ATTITUDE_IN_FILES: f64 = 0.5;
+/// Index of the constant rotation about the camera's x axis, which moves an image across its track.
+const ROLL: usize = 9;
+
 /// Boresight of a laser on the bus of the cameras.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BoresightSummary {
@@ -105,7 +112,7 @@ pub(super) fn add_spots<M: ExteriorOrientation>(
     let profiles = profiles.map(|(profile, middle_m)| RecordedProfile {
         surface_profile: profile.index,
         axes: local_axes(middle_m),
-        sigma_m: shots.profile_sigma_m,
+        sigma_m: shift_sigmas_m(images, shots, profile.index),
     });
     assembled.network.common_bus = Some(CommonBus {
         boresight_sigma_rad: config.boresight_sigma_rad,
@@ -115,6 +122,37 @@ pub(super) fn add_spots<M: ExteriorOrientation>(
         spots,
     });
     Ok(Ok(()))
+}
+
+/// Standard deviations of the shift of a recorded profile towards east, north and up, metres, with the attitude error that it may
+/// share with the images.
+fn shift_sigmas_m<M>(
+    images: &[AdjustImage<M>],
+    shots: &LaserShots,
+    profile: usize,
+) -> Vector3<f64> {
+    let own_m = shots.profile_sigmas_m[profile];
+    let of_profile = shots.shots.iter().filter(|shot| shot.profile == profile);
+    let simultaneous: Vec<(&LaserShot, &ShotRange)> = of_profile
+        .filter_map(|shot| Some((shot, shot.range.as_ref()?)))
+        .collect();
+    let (Some((first, _)), Some((last, _))) = (simultaneous.first(), simultaneous.last()) else {
+        return own_m;
+    };
+    let along = local_axes(&first.ground.xyz_m) * (last.ground.xyz_m - first.ground.xyz_m);
+    let track = along.xy().try_normalize(0.0).unwrap_or_default();
+    // Across the track alone: along it the standard deviations of rotations contain line times, which files do not share.
+    let of_attitude_m = simultaneous
+        .iter()
+        .map(|(_, range)| range.range_m * images[range.image].sigmas[ROLL])
+        .filter(|shift_m| shift_m.is_finite())
+        .fold(0.0, f64::max);
+    let shared_m = ATTITUDE_IN_FILES * of_attitude_m;
+    Vector3::new(
+        own_m.x.hypot(shared_m * track.y),
+        own_m.y.hypot(shared_m * track.x),
+        own_m.z,
+    )
 }
 
 /// The spot of a shot in an image; `None` where it falls outside the image, as it may near an end.

@@ -75,9 +75,9 @@ pub(super) fn hold_powers(
 pub struct LaserShots {
     /// Identifiers of the site's profiles, in their order.
     pub profiles: Vec<String>,
-    /// Standard deviations of the offset of a profile as recorded, towards east, north and up, metres; its footprints
+    /// Standard deviations of the offset of each profile as recorded, towards east, north and up, metres; its footprints
     /// share it.
-    pub profile_sigma_m: Vector3<f64>,
+    pub profile_sigmas_m: Vec<Vector3<f64>>,
     /// Shots, each row once.
     pub shots: Vec<LaserShot>,
     /// The ground between all shots of the site, where it controls the heights of tie points.

@@ -64,11 +64,12 @@ pub(super) fn point_errors<M>(
             });
         }
         // The shift of the profile is no unknown: what is known of it beforehand comes on top.
-        let shift_m2 = shift_m2(&found.ground_m, &shots.profile_sigma_m);
+        let profile_m = shots.profile_sigmas_m[shots.shots[point].profile];
+        let shift_m2 = shift_m2(&found.ground_m, &profile_m);
         Some(PointErrors {
             covariance_m2: covariance_m2 + shift_m2,
             shared: Some(SharedError {
-                sigma_m: shots.profile_sigma_m.into(),
+                sigma_m: profile_m.into(),
                 relative_m2: covariance_m2,
             }),
         })

@@ -208,10 +208,11 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
     let weighed = candidates
         .into_iter()
         .map(|candidate| candidate.weighed(laser, config));
+    let count = profiles.len();
     let profiles = profiles.iter().map(|profile| profile.id.clone()).collect();
     let shots = LaserShots {
         profiles,
-        profile_sigma_m: Vector3::zeros(),
+        profile_sigmas_m: vec![Vector3::zeros(); count],
         shots,
         surface,
     };

@@ -50,7 +50,7 @@ stage_inputs! {
 
 impl Stage for Adjust<'_> {
     const NAME: &'static str = "adjust";
-    const METHOD: u32 = 11;
+    const METHOD: u32 = 12;
     type Output = Adjusted;
     stage_inputs!(fingerprint);
 
@@ -101,8 +101,8 @@ impl Stage for Adjust<'_> {
             self.altimeter,
             self.adjustment,
         );
-        let plan_m = self.laser_surface.profile_plan_sigma_m;
-        shots.profile_sigma_m = Vector3::new(plan_m, plan_m, self.laser_surface.profile_sigma_m);
+        shots.profile_sigmas_m =
+            MolaShots::profile_sigmas_m(footprints, profiles, self.laser_surface);
         let pairs = self.pairs.value()?.iter();
         let disagreements_m = pairs.map(|pair| pair.along_track_parallax_m);
         let largest_m = disagreements_m.fold(0.0, f64::max);

@@ -117,7 +117,7 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
 /// Errors that no datum of the calibration shows.
 fn untested(of: &Evidence<'_>) -> Vec<String> {
     let mut untested = vec![
-        "an error of place or radius that the control of all orbits shares (no other control is at hand)".to_owned(),
+        "an error of place or radius that the control of all orbits shares (no other control is available)".to_owned(),
         "a shift along the flight that all ties of a line share (it acts like an angle of the line)".to_owned(),
     ];
     let offsets = of.validation.iter().flat_map(|orbit| &orbit.offsets);

@@ -57,7 +57,7 @@ stage_inputs! {
 
 impl Stage for CheckTableRanges<'_> {
     const NAME: &'static str = "check_ranges";
-    const METHOD: u32 = 4;
+    const METHOD: u32 = 5;
     type Output = RangeCheck;
     stage_inputs!(fingerprint);
 
@@ -151,11 +151,9 @@ pub fn check_table_ranges(
             "support data or kernels contain an orbit other than that of the table, or times or radii of the table \
              are in error".to_owned()
         };
-        let limits = RangeCheckConfig {
-            mean_max_m: ranges.mean_max_m(limits),
-            ..limits.clone()
-        };
-        ranges.invalid_because = ranges.figures().broken_limits(&limits, explain);
+        ranges.invalid_because = ranges
+            .figures()
+            .broken_limits(&ranges.limits(limits), explain);
         checked.push(ranges);
     }
     Ok(RangeCheck {

@@ -96,7 +96,7 @@ impl AdjustmentEvidence<'_> {
     /// Images without laser control, where `adjustment.common_bus` is set.
     fn laser_missing(&self) -> Option<String> {
         match self.adjusted.boresight.as_ref()? {
-            Err(reason) => Some(format!("adjustment.common_bus did nothing: {reason}")),
+            Err(reason) => Some(format!("adjustment.common_bus has no effect: {reason}")),
             Ok(boresight) if !boresight.without.is_empty() => Some(format!(
                 "adjustment.common_bus does not control {}: no shot of a profile falls within their exposure",
                 boresight.without.join(", ")

@@ -85,14 +85,16 @@ pub(super) fn remarks(evidence: &Evidence<'_>) -> Vec<String> {
     remarks
 }
 
-/// A profile whose mean is beyond the limit, but does not make the site invalid: it is too short, or its radii are corrected
-/// by crossovers.
+/// A profile whose mean is beyond the limit, but does not make the site invalid: it is too short, off nadir, or its radii are
+/// corrected by crossovers.
 fn far_off(of: &ProfileRanges, limits: &RangeCheckConfig) -> Option<String> {
     let mean_m = of.mean_without_outliers_m;
-    let why = if of.is_judged(limits) {
+    let why = if !of.is_judged(limits) {
+        "not judged"
+    } else if of.decoding_m.n == 0 {
         "radii corrected by crossovers"
     } else {
-        "not judged"
+        "off nadir, where the error of the orbit across the track contributes"
     };
     let is_open = of.invalid_because.is_empty()
         && (!of.is_judged(limits) || of.mean_max_m(limits) > limits.mean_max_m);

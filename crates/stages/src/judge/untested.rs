@@ -135,7 +135,7 @@ fn images(evidence: &Evidence<'_>) -> [Group; 3] {
         one_label = one_label.with(format!("line period of {labels} without STOP_TIME"));
     }
     if has_ties {
-        by_ties = by_ties.with("an error of the focal length");
+        by_ties = by_ties.with("an error of the focal length, or a bend of the detector line");
         if !of_support.is_empty() {
             by_ties = by_ties
                 .with("an error of the first sample of the detector that support data share");
@@ -181,9 +181,9 @@ fn uncovered(evidence: &Evidence<'_>) -> Group {
 /// Radii of the ground.
 fn radii(evidence: &Evidence<'_>) -> Group {
     let is_corrected = evidence.ground == Some(GroundRadius::Corrected);
-    let group = Group::new("no other radius of the ground is at hand");
+    let group = Group::new("no other radius of the ground is available");
     if is_corrected {
-        group.with("an error that the crossover residuals of all profiles share")
+        group.with("an error that the crossover residuals of all profiles at nadir share")
     } else {
         group
     }

@@ -16,10 +16,10 @@ const NAMES_QUOTED: usize = 5;
 #[derive(Debug, thiserror::Error, Cause)]
 #[cause(Input)]
 pub(super) enum TiesError {
-    #[error("no tie point file holds a measurement")]
+    #[error("the tie point files contain no measurement")]
     #[cause("give files with measurements in ties.files")]
     Empty,
-    #[error("{points} tie points, none of them measured in two images of the site")]
+    #[error("none of the {points} tie points is measured in two images of the site")]
     #[cause("measure tie points in at least two images, or leave out the table ties")]
     NoneJoins { points: usize },
     #[error("tie points are measured in {found}; expected images of the site: {expected}")]

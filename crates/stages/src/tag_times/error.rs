@@ -13,7 +13,7 @@ pub(super) enum ImageError {
     #[cause(Configuration: "add `{key}` to the image's table, or name its label")]
     Missing { image: String, key: &'static str },
     #[error(
-        "image {0}: its label states no line times, which its file holds beside each line; expected line times"
+        "image {0}: the label states no line times, because the image file contains them beside each line; expected line times"
     )]
     #[cause(
         "give the file of the archive, label and rows in one, as images.label; or the pieces of its line times as \

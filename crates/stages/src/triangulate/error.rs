@@ -8,7 +8,7 @@ use areograph_geom::plane::{FilmError, PlaneError};
 #[cause(Input)]
 pub enum NetError {
     /// The tables hold no measurement.
-    #[error("no table holds a measurement")]
+    #[error("the tables contain no measurement")]
     #[cause("give tables with measurements in measurements.files")]
     NoMeasurement,
     /// Fewer than two controls that a picture shows.

@@ -54,7 +54,7 @@ pub(super) fn judge(of: &Evidence) -> Verdict {
 /// Errors that no datum of the net can show.
 fn untested(of: &Evidence) -> Vec<String> {
     let shared =
-        "an error of place or direction that all controls share (no other control is at hand)";
+        "an error of place or direction that all controls share (no other control is available)";
     let stretch = of.scales.stretch_max().map(|limit| {
         format!(
             "a stretch of the controls of up to {:.1} % (within their standard deviations)",

@@ -1,0 +1,306 @@
+//! Missions with drawn errors, run and held against their truth: what every stated number is tested by.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::Path,
+    sync::{Mutex, atomic::AtomicUsize, atomic::Ordering},
+    thread,
+};
+
+use areograph::{
+    geom::pushbroom::ExteriorOrientation as _,
+    scene::{Roughness, SceneErrors, SceneOptions, write_scene},
+};
+use arrow_array::{RecordBatch, cast::AsArray, types::Float64Type};
+use nalgebra::Vector3;
+use serde_json::Value;
+
+use super::{
+    Judged, SITES,
+    common::json,
+    local,
+    misregistration::{true_camera, true_footprints_m},
+    run, table, texts,
+};
+
+/// Errors of one kind of point of a site, towards east, north and up, metres.
+pub(super) struct Errors {
+    /// Of each point, and what is stated of it.
+    pub(super) single: Vec<[Vector3<f64>; 2]>,
+    /// The same of the error that the points share: of their mean.
+    pub(super) shared: [Vector3<f64>; 2],
+    /// Of each point without it.
+    pub(super) relative: Vec<[Vector3<f64>; 2]>,
+}
+
+/// An error, and what is stated of it.
+pub(super) type Pair = [f64; 2];
+
+/// What a run states of a site, against truth.
+pub(super) struct Site {
+    pub(super) name: String,
+    /// The verdict of its manifest.
+    pub(super) verdict: Value,
+    /// Whether a profile of the site lies elsewhere, which no default value describes.
+    pub(super) has_misplaced_profile: bool,
+    /// What the adjustment states; nothing where there is none.
+    pub(super) stated: Option<Stated>,
+}
+
+/// What the adjustment of a site states, against truth.
+pub(super) struct Stated {
+    pub(super) judged: Judged,
+    /// By profile.
+    pub(super) footprints: Vec<Errors>,
+    pub(super) ties: Errors,
+    /// Position of each camera at the exposure of its middle line, X, Y and Z.
+    pub(super) cameras: Vec<[Pair; 3]>,
+    /// Clock corrections by profiles at nadir, and by others.
+    pub(super) clocks: [Vec<Pair>; 2],
+    /// Remarks of the verdict.
+    pub(super) remarks: String,
+}
+
+impl Site {
+    pub(super) fn is_valid(&self) -> bool {
+        self.verdict["valid"] == true
+    }
+
+    /// Texts of a list of the verdict.
+    pub(super) fn list(&self, list: &str) -> String {
+        self.verdict[list].to_string()
+    }
+}
+
+fn column<'a>(of: &'a RecordBatch, name: &str) -> &'a arrow_array::Float64Array {
+    of.column_by_name(name)
+        .unwrap()
+        .as_primitive::<Float64Type>()
+}
+
+/// A row of three columns.
+fn three(of: &RecordBatch, prefix: &str, row: usize) -> Vector3<f64> {
+    let axes = ["east", "north", "up"].map(|axis| format!("{prefix}_{axis}_m"));
+    Vector3::from(axes.map(|name| column(of, &name).value(row)))
+}
+
+impl Errors {
+    /// Errors with their standard deviations, those without the shared error, and that of the shared one.
+    fn of(
+        single: Vec<[Vector3<f64>; 2]>,
+        relative_m: &[Vector3<f64>],
+        shared_m: Vector3<f64>,
+    ) -> Self {
+        let errors_m = single.iter().map(|[error_m, _]| error_m);
+        let mean_m = errors_m.sum::<Vector3<f64>>() / single.len() as f64;
+        let relative = single.iter().zip(relative_m);
+        Self {
+            relative: relative
+                .map(|([error_m, _], sigma_m)| [error_m - mean_m, *sigma_m])
+                .collect(),
+            shared: [mean_m, shared_m],
+            single,
+        }
+    }
+}
+
+/// Footprints of the adjustment against where the shots truly fell, by profile.
+fn footprints(truth: &Value, folder: &Path) -> Vec<Errors> {
+    let true_m = true_footprints_m(truth, &table(&folder.join("footprints.parquet")));
+    let adjusted = table(&folder.join("adjusted_footprints.parquet"));
+    let mut profiles: BTreeMap<String, Vec<[Vector3<f64>; 4]>> = BTreeMap::new();
+    for (row, name) in texts(&adjusted, "footprint").into_iter().enumerate() {
+        let (profile, footprint) = name.rsplit_once(':').unwrap();
+        let Some(true_m) = true_m.get(&footprint.parse().unwrap()) else {
+            continue;
+        };
+        let axes = ["adjusted_x_m", "adjusted_y_m", "adjusted_z_m"];
+        let adjusted_m = Vector3::from(axes.map(|axis| column(&adjusted, axis).value(row)));
+        let found = [
+            local(true_m) * (adjusted_m - true_m),
+            three(&adjusted, "sigma", row),
+            three(&adjusted, "relative_sigma", row),
+            three(&adjusted, "shared_sigma", row),
+        ];
+        profiles.entry(profile.to_owned()).or_default().push(found);
+    }
+    let of_profile = |found: Vec<[Vector3<f64>; 4]>| {
+        let single = found.iter().map(|of| [of[0], of[1]]).collect();
+        let relative_m: Vec<Vector3<f64>> = found.iter().map(|of| of[2]).collect();
+        Errors::of(single, &relative_m, found[0][3])
+    };
+    // A profile that hardly touches an image has no mean of its own.
+    let profiles = profiles.into_values().filter(|found| found.len() >= 20);
+    profiles.map(of_profile).collect()
+}
+
+/// Tie points without blunders.
+fn ties(mission: &Path, out: &Path, site: &str) -> Errors {
+    let judged = Judged::of(mission, out, site);
+    let single = judged.errors_m.iter().zip(&judged.sigmas_m);
+    let single = single.map(|(error_m, sigma_m)| [*error_m, *sigma_m]);
+    Errors::of(single.collect(), &judged.relative_m, judged.mean_sigmas_m)
+}
+
+/// Cameras at the exposure of the middle line.
+fn cameras(own: &Value, document: &Value, folder: &Path) -> Vec<[Pair; 3]> {
+    let images = document["adjustment"]["images"].as_array().unwrap();
+    let cameras = images.iter().zip(own["cameras"].as_array().unwrap());
+    let of_image = |(image, truth): (&Value, &Value)| {
+        let id = image["image"].as_str().unwrap();
+        assert_eq!(truth["image"], id);
+        let found = table(&folder.join(format!("images/{id}/adjusted_orientation.parquet")));
+        let offsets = column(&found, "line_offset");
+        let middle = (0..found.num_rows())
+            .find(|row| offsets.value(*row).abs() < 1e-6)
+            .unwrap();
+        let position_m =
+            Vector3::from(["x_m", "y_m", "z_m"].map(|axis| column(&found, axis).value(middle)));
+        let off_m = position_m - true_camera(truth).0.pose(0.0).position_m;
+        [0, 1, 2].map(|axis| [off_m[axis], image["sigmas"][3 * axis].as_f64().unwrap()])
+    };
+    cameras.map(of_image).collect()
+}
+
+/// Clock corrections by the ranges of profiles, nadir ones first.
+fn clocks(truth: &Value, folder: &Path) -> [Vec<Pair>; 2] {
+    let true_s = -truth["biases"]["mola_clock_bias_s"].as_f64().unwrap();
+    let images = truth["images"].as_array().unwrap();
+    let mut found = [Vec::new(), Vec::new()];
+    let document = json(&folder.join("ranges.json"));
+    for profile in document["profiles"].as_array().unwrap() {
+        let scan = &profile["bias_scan"];
+        let numbers = ["best_s", "uncertainty_s"].map(|name| scan[name].as_f64());
+        let ([Some(best_s), Some(uncertainty_s)], Some(image)) = (
+            numbers,
+            profile["simultaneous"].get(0).map(|of| &of["image"]),
+        ) else {
+            continue;
+        };
+        let look = &images.iter().find(|of| of["id"] == *image).unwrap()["look"];
+        let way = usize::from(look != "nadir");
+        found[way].push([best_s - true_s, uncertainty_s]);
+    }
+    found
+}
+
+/// A mission to fly.
+#[derive(Clone, Copy)]
+pub(super) struct Plan<'a> {
+    pub(super) seed: u32,
+    pub(super) ground: Roughness,
+    /// Noise of tie points as the site files state it, pixels.
+    pub(super) noise_px: f64,
+    /// Further keys of the adjustment.
+    pub(super) keys: &'a str,
+}
+
+impl Plan<'_> {
+    /// With all errors as drawn.
+    pub(super) fn drawn(seed: u32, ground: Roughness, noise_px: f64) -> Self {
+        Self {
+            seed,
+            ground,
+            noise_px,
+            keys: "",
+        }
+    }
+
+    fn write(&self, mission: &Path) {
+        // CSPICE serves one thread.
+        static ONE: Mutex<()> = Mutex::new(());
+        let errors = SceneErrors {
+            tie_noise_px: self.noise_px,
+            ..SceneErrors::realistic(self.ground).fair(self.seed.into())
+        };
+        let options = SceneOptions {
+            seed: self.seed.into(),
+            day_s: 600.0,
+            errors,
+        };
+        {
+            let _one = ONE.lock().unwrap();
+            write_scene(mission, &options).unwrap();
+        }
+        for site in SITES {
+            let path = mission.join(format!("sites/{site}.toml"));
+            let text = fs::read_to_string(&path).unwrap();
+            let keys = format!("[adjustment]\n{}", self.keys);
+            fs::write(&path, text.replacen("[adjustment]\n", &keys, 1)).unwrap();
+        }
+    }
+
+    /// Writes, runs and removes the mission.
+    fn flown(&self) -> Vec<Site> {
+        let folder = tempfile::tempdir().unwrap();
+        let (mission, out) = (folder.path().join("mission"), folder.path().join("out"));
+        self.write(&mission);
+        let output = run(&mission, &out).output().unwrap();
+        // 5: a site is invalid.
+        let code = output.status.code();
+        assert!(
+            matches!(code, Some(0 | 5)),
+            "seed {}: {code:?} {}",
+            self.seed,
+            String::from_utf8_lossy(&output.stderr)
+        );
+        let truth = json(&mission.join("truth.json"));
+        SITES
+            .map(|site| self.site(&mission, &out, &truth, site))
+            .into()
+    }
+
+    fn site(&self, mission: &Path, out: &Path, truth: &Value, site: &str) -> Site {
+        let folder = out.join(site);
+        let mut sites = truth["ties"].as_array().unwrap().iter();
+        let own = sites.find(|of| of["site"] == site).unwrap();
+        let is_of_site = |image: &Value| {
+            let mut cameras = own["cameras"].as_array().unwrap().iter();
+            cameras.any(|camera| camera["image"] == *image)
+        };
+        let mut drawn = truth["errors_drawn"].as_array().unwrap().iter();
+        let has_misplaced_profile = drawn.any(|drawn| {
+            drawn["profile_shift"]["is_misplaced"] == true && is_of_site(&drawn["image"])
+        });
+        let document = json(&folder.join("adjustment.json"));
+        let is_adjusted = document["adjustment"]["heights"].is_object();
+        let verdict = json(&folder.join("manifest.json"))["verdict"].clone();
+        let stated = is_adjusted.then(|| Stated {
+            remarks: verdict["remarks"].to_string(),
+            judged: Judged::of(mission, out, site),
+            footprints: footprints(truth, &folder),
+            ties: ties(mission, out, site),
+            cameras: cameras(own, &document, &folder),
+            clocks: clocks(truth, &folder),
+        });
+        Site {
+            name: format!("{} {site}", self.seed),
+            verdict,
+            has_misplaced_profile,
+            stated,
+        }
+    }
+}
+
+/// The sites of all missions, two missions at a time.
+pub(super) fn flown(plans: &[Plan<'_>]) -> Vec<Site> {
+    let next = AtomicUsize::new(0);
+    let sites: Mutex<BTreeMap<usize, Vec<Site>>> = Mutex::new(BTreeMap::new());
+    let fly = || {
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(plan) = plans.get(index) else { break };
+            let flown = plan.flown();
+            sites.lock().unwrap().insert(index, flown);
+        }
+    };
+    let workers = thread::available_parallelism().map_or(1, usize::from);
+    thread::scope(|scope| {
+        for _ in 0..workers.min(plans.len()) {
+            scope.spawn(fly);
+        }
+    });
+    let sites = sites.into_inner().unwrap();
+    sites.into_values().flatten().collect()
+}
