@@ -111,7 +111,7 @@ pub struct AltimeterErrors {
     pub attitude_share_max: [f64; 2],
     /// Whether a shifted profile off nadir is as much too high or too low as its beam is turned at the same range.
     pub has_heights_of_shift: bool,
-    /// Chance that a profile lies elsewhere, by [`MISPLACED_M`].
+    /// Chance that a profile lies 0.5 to 2 km elsewhere.
     pub misplaced_chance: f64,
     /// Standard deviation of a profile's radial shift, metres.
     pub radial_sigma_m: f64,

@@ -102,7 +102,8 @@ impl Quantity {
     /// Fails unless what is stated holds.
     fn assert_holds(&self) {
         let chance = by_chance(self.independent);
-        let low = if self.is_bound {
+        // Sizes are drawn for a mission: of few missions all may be small.
+        let low = if self.is_bound || !long() {
             0.0
         } else {
             chance[0].min(0.8)
