@@ -640,7 +640,7 @@ fn damaged_and_exchanged_files_are_told() {
         (
             "label = 'h5270_0000_ir2.img'",
             "label = 'alone.lbl'",
-            "its label states no line times",
+            "the label states no line times",
         ),
         (
             "pixels = 'h5270_0000_ir2.img'",

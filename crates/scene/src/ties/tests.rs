@@ -152,21 +152,25 @@ fn a_bent_line_sees_the_ground_that_it_measures() {
     let mut days = days("isidis", &SceneErrors::demo(), 1);
     let terrain = terrain(1, &SceneErrors::demo());
     let straight = TrueImage::new(&days[0], &terrain).unwrap();
-    let (line, sample) = (2_000.0, 40.0);
+    let (line, sample) = (2_000.0, 150.0);
     let beside_m = straight.ground_m(&terrain, line, sample).unwrap();
     let at_end = (2.0 * (sample / straight.oriented_camera.detector.samples - 0.5)).powi(2);
     drop(straight);
     days[0].errors.camera.bend_px = 4.0;
-    days[0].errors.camera.focal_length_ratio = 1.001;
     let image = TrueImage::new(&days[0], &terrain).unwrap();
     let ground_m = image.ground_m(&terrain, line, sample).unwrap();
     let measured = image
         .measure(&image.projector().unwrap(), &ground_m)
         .unwrap();
     // Terrain is met to millimetres, a thousandth of a pixel.
-    assert!((measured.line - line).abs() < 0.01 && (measured.sample - sample).abs() < 0.01);
+    let off_px = [measured.line - line, measured.sample - sample];
+    // The sample is that of the straight line two lines before: the flight is turned by some degrees against the columns.
+    assert!(
+        off_px[0].abs() < 0.01 && off_px[1].abs() < 0.2,
+        "{off_px:?}"
+    );
     let apart_m = (ground_m - beside_m).norm();
-    // Four pixels of the detector of 1.5 m, and half a pixel by the focal length.
+    // Four pixels of the detector of 1.5 m at the ends.
     let pixel_m = 1.5;
     assert!(
         (apart_m / (4.0 * pixel_m * at_end) - 1.0).abs() < 0.3,

@@ -83,7 +83,7 @@ impl Input for CalibrationFiles<'_> {
 
 impl Stage for Calibrate<'_> {
     const NAME: &'static str = "calibrate";
-    const METHOD: u32 = 10;
+    const METHOD: u32 = 11;
     type Output = Calibration;
     stage_inputs!(fingerprint);
 
