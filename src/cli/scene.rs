@@ -134,7 +134,7 @@ impl Arguments {
         };
         SceneErrors {
             tie_noise_px: self.tie_noise_px,
-            ..drawn.fair(self.seed)
+            ..drawn.with_drawn_sizes(self.seed)
         }
     }
 }

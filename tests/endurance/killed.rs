@@ -80,7 +80,12 @@ fn kill_before(command: &Command, out: &Path, place: usize) {
         made += 1;
         if made > place { Then::Kill } else { Then::GoOn }
     });
-    assert_eq!(ended.code, None, "ended before change {place}");
+    // A run over the remains of another can make a change fewer than the one that was measured, and end by itself.
+    let is_over = ended.code == Some(0) && made + 1 >= place;
+    assert!(
+        ended.code.is_none() || is_over,
+        "ended before change {place} of {made}"
+    );
 }
 
 /// Places of the calls that `of` wants.

@@ -28,9 +28,11 @@ use std::{
     },
 };
 
+use serde::Deserialize;
 use serde_json::Value;
 
 use crate::common::{self, case::Case, json};
+use change::Change;
 use measure::Measured;
 use rows::{Answer, Row};
 use start::Start;
@@ -71,6 +73,18 @@ impl Ending {
             let mut texts = entries.iter().map(|entry| entry.as_str().unwrap());
             texts.any(|text| text.contains(phrase))
         })
+    }
+}
+
+/// Makes `changes = […]` of a row in the folder of a case.
+pub(crate) fn change(case: &Case, changes: &str) {
+    #[derive(Deserialize)]
+    struct Changes {
+        changes: Vec<Change>,
+    }
+    let parsed: Changes = toml::from_str(changes).unwrap();
+    for change in parsed.changes {
+        change.make(case, changes);
     }
 }
 

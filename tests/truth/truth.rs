@@ -14,6 +14,7 @@ use crate::common;
 mod across;
 mod attitude_clock;
 mod common_bus;
+mod everything_errs;
 mod flown;
 mod footprint_heights;
 mod light_time;
@@ -23,6 +24,7 @@ mod overlays;
 mod relief;
 mod shared_errors;
 mod stated;
+mod unmodelled;
 
 use std::{
     collections::BTreeMap,

@@ -118,7 +118,6 @@ pub fn write_scene_along(
         kernels: SiteKernels::Metakernel(metakernel.display().to_string()),
         pedr: vec![format!("../pedr/{PEDR_NAME}")],
         ties: None,
-        range_mean_max_m: None,
         windows,
         images,
     };

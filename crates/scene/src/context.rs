@@ -8,13 +8,10 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 use super::{
     drawn::Flown,
     error::SceneError,
-    error_sources::SceneErrors,
     kernels::wide_angle_metakernel,
     plan::{LOST_IMAGE, Site},
     random::Random,
-    sites::{
-        Label, SiteFile, SiteImage, SiteKernels, SiteTies, image_label, range_mean_max_m, window,
-    },
+    sites::{Label, SiteFile, SiteImage, SiteKernels, SiteTies, image_label, window},
     terrain::Terrain,
     ties::ties_name,
     truth::{ContextShot, ContextTruth, KeptShot, Poses},
@@ -356,7 +353,7 @@ pub(super) fn context_ties(
 }
 
 /// The site file of the images: PEDR files of their days and of one without an image, rival orbits to choose from.
-pub(super) fn context_site(images: &[ContextImage<'_>], errors: &SceneErrors) -> SiteFile<'static> {
+pub(super) fn context_site(images: &[ContextImage<'_>]) -> SiteFile<'static> {
     let days = images.iter().map(|image| image.flown.arc.image);
     let mut pedr: Vec<String> = days
         .chain([&LOST_IMAGE])
@@ -377,7 +374,6 @@ pub(super) fn context_site(images: &[ContextImage<'_>], errors: &SceneErrors) ->
             note: "The noise of these tie points is a fifth of a pixel.".to_owned(),
             sigma_px: [NOISE_PX; 2],
         }),
-        range_mean_max_m: range_mean_max_m(errors),
         windows: vec![window(&CONTEXT_SITE, WINDOW_HALF_DEG)],
         images: images
             .iter()

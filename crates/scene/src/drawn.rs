@@ -314,16 +314,16 @@ mod tests {
     }
 
     #[test]
-    fn fair_errors_have_other_sizes_for_every_seed() {
+    fn sizes_of_errors_are_drawn_for_every_seed() {
         let realistic = SceneErrors::realistic(Roughness::Plains);
         let sizes: Vec<f64> = (0..40)
-            .map(|seed| realistic.fair(seed).altimeter.plan_sigma_m)
+            .map(|seed| realistic.with_drawn_sizes(seed).altimeter.plan_sigma_m)
             .collect();
         assert!(sizes.iter().all(|size_m| (50.0..100.0).contains(size_m)));
         // Half of 40 draws, to three standard deviations of 3.2.
         let larger = sizes.iter().filter(|size_m| **size_m > 70.7).count();
         assert!((10..=30).contains(&larger), "{larger}");
-        assert_eq!(realistic.fair(7), realistic.fair(7));
+        assert_eq!(realistic.with_drawn_sizes(7), realistic.with_drawn_sizes(7));
     }
 
     #[test]

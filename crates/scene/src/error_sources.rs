@@ -104,13 +104,12 @@ impl Jitter {
 /// Errors of the laser altimeter and of its products.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AltimeterErrors {
-    /// Standard deviation of a profile's shift to the east and to the north, metres, without that by the attitude.
+    /// Standard deviation of a profile's shift to the east and to the north, metres, without that by the attitude. Off nadir the
+    /// height of the profile follows, as that of a beam that is turned at the same range.
     pub plan_sigma_m: f64,
     /// Share of the bus's attitude error that the coordinates of files contain, because they were computed from the same
     /// attitude: drawn evenly from 0 to these for every profile at nadir, and off nadir.
     pub attitude_share_max: [f64; 2],
-    /// Whether a shifted profile off nadir is as much too high or too low as its beam is turned at the same range.
-    pub has_heights_of_shift: bool,
     /// Chance that a profile lies 0.5 to 2 km elsewhere.
     pub misplaced_chance: f64,
     /// Standard deviation of a profile's radial shift, metres.
@@ -209,7 +208,6 @@ impl SceneErrors {
             altimeter: AltimeterErrors {
                 plan_sigma_m: 0.0,
                 attitude_share_max: [0.0; 2],
-                has_heights_of_shift: false,
                 misplaced_chance: 0.0,
                 radial_sigma_m: 0.0,
                 shot_noise_m: 0.0,
@@ -226,7 +224,7 @@ impl SceneErrors {
         }
     }
 
-    /// Plausible errors of the real mission, drawn anew for every seed: a fair test of stated uncertainties.
+    /// Plausible errors of the real mission, drawn anew for every seed, of the sizes that areograph assumes.
     ///
     /// # Source
     /// * line times 30 lines: half of the 225 to 271 m by which the images of a pair disagree (Shan et al. 2005, Table 5);
@@ -265,7 +263,6 @@ impl SceneErrors {
             altimeter: AltimeterErrors {
                 plan_sigma_m: 70.0,
                 attitude_share_max: [0.0; 2],
-                has_heights_of_shift: false,
                 misplaced_chance: 0.0,
                 radial_sigma_m: 1.0,
                 shot_noise_m: 1.0,
@@ -296,15 +293,15 @@ impl SceneErrors {
     ///   ground);
     /// * coordinates of files contain a part of the attitude error of the bus, because they are computed from telemetry of the
     ///   same attitude: up to 0.4 of it at nadir, where crossovers correct it, and up to all of it off nadir, where they do
-    ///   not. Five passes off nadir in real tables differ by 7 to 153 m from others, by 206 m (0.5 mrad) times the tangent of the angle;
-    /// * a profile off nadir has the height error of its shift in plan, at the measured range.
+    ///   not. Five passes off nadir in real tables differ by 7 to 153 m from others, by 206 m (0.5 mrad) times the tangent of the
+    ///   angle.
     ///
     /// Choices: half to twice the drift and jitter; slow jitter of 2 to 10 µrad and 2 to 10 s, below the 24 µrad of residuals to
     /// a parabola (Shan et al. 2005, Table 4); one profile of 40 lies 0.5 to 2 km elsewhere; detector line bent by 0.15 to 0.6
     /// pixels, focal length known to 0.025 to 0.1 %; tie points with 0.7 to 1.4 times the stated noise, up to two thirds of
     /// its variance common to neighbours.
     #[must_use]
-    pub fn fair(self, seed: u64) -> Self {
+    pub fn with_drawn_sizes(self, seed: u64) -> Self {
         let mut random = Random::new(seed, "sizes of errors");
         let mut within = |least: f64, most: f64| random.between_log(least, most);
         let misregistration = match self.misregistration {
@@ -346,7 +343,6 @@ impl SceneErrors {
         let altimeter = AltimeterErrors {
             plan_sigma_m: within(50.0, 100.0),
             attitude_share_max: [0.4, 1.0],
-            has_heights_of_shift: true,
             misplaced_chance: 1.0 / 40.0,
             radial_sigma_m: within(0.5, 1.5),
             shot_noise_m: within(0.5, 2.0),

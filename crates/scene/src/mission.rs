@@ -189,7 +189,7 @@ fn write_context(
         &draft.folder("ties")?.join(ties_name(id)),
         &ties_table(&ties),
     )?;
-    let site = context_site(&images, &options.errors);
+    let site = context_site(&images);
     let path = draft.folder("sites")?.join(format!("{id}.toml"));
     put(&path, &site.to_toml())?;
     let shots = |image: &ContextImage<'_>| {

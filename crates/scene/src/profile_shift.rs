@@ -71,19 +71,17 @@ impl ProfileShift {
         }
         let east = Vector3::z().cross(&site).normalize();
         let north = site.cross(&east);
-        let looking = Looking::of(arc, &site);
+        let beam = MiddleBeam::of(arc, &site);
         let [at_nadir, off_nadir] = sizes.attitude_share_max;
         let most = match arc.image.look {
             Look::Nadir => at_nadir,
             Look::Roll { .. } => off_nadir,
         };
         // The files' coordinates lie where the attitude of the kernels has the beam.
-        let moved_m = -random.between(0.0, most) * looking.moved_m(turn_rad);
+        let moved_m = -random.between(0.0, most) * beam.moved_m(turn_rad);
         east_m += moved_m.dot(&east);
         north_m += moved_m.dot(&north);
-        if sizes.has_heights_of_shift {
-            radial_m += looking.outward.dot(&(east_m * east + north_m * north));
-        }
+        radial_m += beam.outward.dot(&(east_m * east + north_m * north));
         Self {
             is_misplaced,
             ..Self::near(&site, [east_m, north_m, radial_m])
@@ -108,7 +106,7 @@ impl ProfileShift {
 }
 
 /// The beam in the middle of an image, by the kernels.
-struct Looking {
+struct MiddleBeam {
     /// From the bus to IAU 2000.
     bus_to_mars: Matrix3<f64>,
     range_m: f64,
@@ -117,7 +115,7 @@ struct Looking {
     outward: Vector3<f64>,
 }
 
-impl Looking {
+impl MiddleBeam {
     fn of(arc: &Arc, up: &Vector3<f64>) -> Self {
         let middle = arc.exposed.start.plus(0.5 * arc.exposed.duration_s());
         let mars = body_matrix(&MARS_IAU2000, middle);
@@ -167,7 +165,6 @@ mod tests {
                 radial_sigma_m: 0.0,
                 boresight_sigma_rad: 0.0,
                 attitude_share_max: [1.0; 2],
-                has_heights_of_shift: true,
                 ..SceneErrors::realistic(Roughness::Plains).altimeter
             },
             ..SceneErrors::realistic(Roughness::Plains)
@@ -178,7 +175,7 @@ mod tests {
             let middle = arc.exposed.start.plus(0.5 * arc.exposed.duration_s());
             let mars = body_matrix(&MARS_IAU2000, middle);
             let by_kernels = mars * arc.attitude.j2000_to_bus(middle).tr_mul(&Vector3::z());
-            let range_m = Looking::of(&arc, &image.site.direction()).range_m;
+            let range_m = MiddleBeam::of(&arc, &image.site.direction()).range_m;
             let shift = drawn.profile_shift.clone();
             let flown = Flown { arc, errors: drawn };
             let beam = mars

@@ -91,8 +91,6 @@ pub(super) struct SiteFile<'a> {
     pub pedr: Vec<String>,
     /// Tie points, if any.
     pub ties: Option<SiteTies>,
-    /// Limit of the mean range residual, where not the usual one.
-    pub range_mean_max_m: Option<f64>,
     /// Windows.
     pub windows: Vec<Window>,
     /// Images.
@@ -134,12 +132,6 @@ impl SiteFile<'_> {
                 ties.sigma_px,
             );
         }
-        if let Some(mean_max_m) = self.range_mean_max_m {
-            let _infallible = write!(
-                text,
-                "\n[range_check]\n# Shifted profiles off nadir and errors of the orbit: three standard deviations.\nmean_max_m = {mean_max_m:?}\n",
-            );
-        }
         for window in &self.windows {
             let [west, east] = window.longitude_deg;
             let [south, north] = window.latitude_deg;
@@ -178,16 +170,6 @@ pub(super) fn window(site: &Site, [east_deg, north_deg]: [f64; 2]) -> Window {
         longitude_deg: around(site.longitude_deg, east_deg),
         latitude_deg: around(site.latitude_deg, north_deg),
     }
-}
-
-/// Limit of mean range residuals where profiles are shifted without the height that a turned beam has, metres. A profile
-/// shifted by 70 m is then 26 m too near or too far at 22 degrees off nadir; orbits add 9 m.
-const RANGE_MEAN_MAX_M: f64 = 85.0;
-
-/// Limit of mean range residuals, where not the usual one.
-pub(super) fn range_mean_max_m(errors: &SceneErrors) -> Option<f64> {
-    let is_shifted_level = !errors.altimeter.has_heights_of_shift;
-    (is_shifted_level && *errors != SceneErrors::demo()).then_some(RANGE_MEAN_MAX_M)
 }
 
 /// The site file of `site`, with the images and PEDR files of its arcs and the tie points of `ties`; the images may
@@ -233,7 +215,6 @@ pub(super) fn planned_site<'a>(
             note,
             sigma_px,
         }),
-        range_mean_max_m: range_mean_max_m(errors),
         windows: vec![window(
             site,
             [

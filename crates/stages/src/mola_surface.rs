@@ -8,10 +8,10 @@ use super::group_profiles::Profile;
 use areograph_base::{altimetry::NO_ATTITUDE, footprints::Footprints, frames::BodyFixed};
 use areograph_config::MolaSurfaceConfig;
 use areograph_geom::{
-    ellipsoid::{local_axes, spherical_to_xyz_m},
+    ellipsoid::spherical_to_xyz_m,
     surface::{
         Crossover, LaserSurface, ProfileNet, ProfilePriors, SurfaceError, SurfaceOptions,
-        SurfaceShot, crossovers, turned_sigmas_m,
+        SurfaceShot, crossovers, turned_sigmas_m, with_across_track,
     },
 };
 
@@ -51,14 +51,9 @@ impl MolaShots {
             let (first, last) = (profile.rows[0], profile.rows[profile.rows.len() - 1]);
             let [across_m, up_m] = turned_sigmas_m(profile.off_nadir_rad(footprints));
             let (first_m, last_m) = (ground_m(first), ground_m(last));
-            let along = local_axes(&first_m) * (last_m - first_m);
-            let track = along.xy().try_normalize(0.0).unwrap_or_default();
             let plan_m = options.profile_plan_sigma_m;
-            Vector3::new(
-                plan_m.hypot(across_m * track.y),
-                plan_m.hypot(across_m * track.x),
-                options.profile_sigma_m.hypot(up_m),
-            )
+            let own_m = Vector3::new(plan_m, plan_m, options.profile_sigma_m.hypot(up_m));
+            with_across_track(own_m, [&first_m, &last_m], across_m)
         };
         profiles.iter().map(of_profile).collect()
     }

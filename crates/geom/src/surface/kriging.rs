@@ -132,7 +132,14 @@ impl Kriging {
         self.weights_of_profiles(weights, |shared| shared.radial)
     }
 
-    /// The sums alone.
+    /// The same of the part of the errors in plan by which they exceed those of a profile at nadir of known attitude.
+    pub(super) fn farther_of_profiles(&self, weights: &Weights) -> DMatrix<f64> {
+        self.weights_of_profiles(weights, |shared| {
+            (shared.plan.powi(2) - 1.0).max(0.0).sqrt()
+        })
+    }
+
+    /// Sums of the weights of each profile, one row a profile.
     pub(super) fn sums_of_profiles(&self, weights: &Weights) -> DMatrix<f64> {
         self.weights_of_profiles(weights, |_shared| 1.0)
     }
@@ -142,13 +149,6 @@ impl Kriging {
         let shots = self.shots.iter().filter(|shot| shot.profile == profile);
         shots.fold(SharedErrors::LEAST, |largest, shot| {
             largest.or_larger(&shot.shared)
-        })
-    }
-
-    /// The same for the part of the errors in plan by which they exceed those of a profile at nadir of known attitude.
-    pub(super) fn farther_of_profiles(&self, weights: &Weights) -> DMatrix<f64> {
-        self.weights_of_profiles(weights, |shared| {
-            (shared.plan.powi(2) - 1.0).max(0.0).sqrt()
         })
     }
 

@@ -2,6 +2,8 @@
 
 use nalgebra::Vector3;
 
+use crate::ellipsoid::local_axes;
+
 /// Errors that a profile of unknown attitude shares, over those of others: robust spread of their crossovers at a real window
 /// near the south pole, 2.9 against 0.7 m.
 const UNKNOWN_ATTITUDE: f64 = 4.0;
@@ -13,6 +15,7 @@ const OFF_NADIR_M: f64 = 200.0;
 pub const NADIR_MAX_RAD: f64 = std::f64::consts::PI / 180.0;
 /// Shift of a profile at nadir in plan on an axis, metres (Neumann et al. 2001), of which [`SharedErrors::plan`] is a multiple.
 pub(super) const PROFILE_PLAN_M: f64 = 70.0;
+
 /// A laser shot on the ground. Shots of a profile are in their order along it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceShot {
@@ -38,6 +41,24 @@ pub fn turned_sigmas_m(off_nadir_rad: f64) -> [f64; 2] {
     } else {
         [0.0; 2]
     }
+}
+
+/// Standard deviations towards east, north and up with an additional one across a track, metres.
+///
+/// * `ends_m` – first and last place of the track, Mars-fixed; of a single place the direction is unknown, and nothing is added
+#[must_use]
+pub fn with_across_track(
+    sigmas_m: Vector3<f64>,
+    ends_m: [&Vector3<f64>; 2],
+    across_m: f64,
+) -> Vector3<f64> {
+    let along = local_axes(ends_m[0]) * (ends_m[1] - ends_m[0]);
+    let track = along.xy().try_normalize(0.0).unwrap_or_default();
+    Vector3::new(
+        sigmas_m.x.hypot(across_m * track.y),
+        sigmas_m.y.hypot(across_m * track.x),
+        sigmas_m.z,
+    )
 }
 
 /// Errors that the shots of a profile share, over those of a profile at nadir of known attitude.

@@ -21,6 +21,7 @@ use areograph_geom::{
     ellipsoid::local_axes,
     pushbroom::{ExteriorOrientation, Projector},
     statistics::Summary,
+    surface::with_across_track,
 };
 
 /// Standard deviation of a single spot in its image beyond the errors that all spots share, focal-plane pixels: jitter
@@ -139,20 +140,14 @@ fn shift_sigmas_m<M>(
     let (Some((first, _)), Some((last, _))) = (simultaneous.first(), simultaneous.last()) else {
         return own_m;
     };
-    let along = local_axes(&first.ground.xyz_m) * (last.ground.xyz_m - first.ground.xyz_m);
-    let track = along.xy().try_normalize(0.0).unwrap_or_default();
     // Across the track alone: along it the standard deviations of rotations contain line times, which files do not share.
     let of_attitude_m = simultaneous
         .iter()
         .map(|(_, range)| range.range_m * images[range.image].sigmas[ROLL])
         .filter(|shift_m| shift_m.is_finite())
         .fold(0.0, f64::max);
-    let shared_m = ATTITUDE_IN_FILES * of_attitude_m;
-    Vector3::new(
-        own_m.x.hypot(shared_m * track.y),
-        own_m.y.hypot(shared_m * track.x),
-        own_m.z,
-    )
+    let ends_m = [&first.ground.xyz_m, &last.ground.xyz_m];
+    with_across_track(own_m, ends_m, ATTITUDE_IN_FILES * of_attitude_m)
 }
 
 /// The spot of a shot in an image; `None` where it falls outside the image, as it may near an end.

@@ -135,7 +135,9 @@ fn images(evidence: &Evidence<'_>) -> [Group; 3] {
         one_label = one_label.with(format!("line period of {labels} without STOP_TIME"));
     }
     if has_ties {
-        by_ties = by_ties.with("an error of the focal length, or a bend of the detector line");
+        by_ties = by_ties
+            .with("an error of the focal length, or a bend of the detector line")
+            .with("errors of single tie points across the track");
         if !of_support.is_empty() {
             by_ties = by_ties
                 .with("an error of the first sample of the detector that support data share");
