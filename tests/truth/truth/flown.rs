@@ -291,7 +291,11 @@ impl Plan<'_> {
             drawn["profile_shift"]["is_misplaced"] == true && is_of_site(&drawn["image"])
         });
         let path = folder.join("adjustment.json");
-        let document = path.exists().then(|| json(&path)).unwrap_or_default();
+        let document = if path.exists() {
+            json(&path)
+        } else {
+            Value::Null
+        };
         let is_adjusted = document["adjustment"]["heights"].is_object();
         let verdict = json(&folder.join("manifest.json"))["verdict"].clone();
         let stated = is_adjusted.then(|| Stated {

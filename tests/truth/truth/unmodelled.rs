@@ -243,16 +243,14 @@ impl Trial {
     /// Mean errors of the valid sites on an axis.
     fn means(&self, axis: usize) -> Vec<Pair> {
         let stated = self.valid().filter_map(|site| site.stated.as_ref());
-        stated
-            .map(|of| of.ties.shared.map(|of| of[axis]).into())
-            .collect()
+        stated.map(|of| of.ties.shared.map(|of| of[axis])).collect()
     }
 
     /// Height errors of single tie points of the valid sites.
     fn singles(&self) -> Vec<Pair> {
         let stated = self.valid().filter_map(|site| site.stated.as_ref());
         let single = stated.flat_map(|of| &of.ties.single);
-        single.map(|of| of.map(|of| of.z).into()).collect()
+        single.map(|of| of.map(|of| of.z)).collect()
     }
 
     /// Whether what is stated holds on an axis, by more than chance allows.
