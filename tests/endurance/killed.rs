@@ -70,8 +70,9 @@ fn changes(command: &Command, out: &Path) -> Vec<Call> {
     changes
 }
 
-/// Runs until just before the change at `place` in their order, and kills there.
-fn kill_before(command: &Command, out: &Path, place: usize) {
+/// Runs until just before the change at `place` in their order, and kills there; whether the run came that far. A run over the
+/// remains of another can make one change fewer than the one that was measured, and ends by itself.
+fn kill_before(command: &Command, out: &Path, place: usize) -> bool {
     let mut made = 0;
     let ended = traced(command, |call| {
         if !changes_file(call, out) {
@@ -80,12 +81,12 @@ fn kill_before(command: &Command, out: &Path, place: usize) {
         made += 1;
         if made > place { Then::Kill } else { Then::GoOn }
     });
-    // A run over the remains of another can make a change fewer than the one that was measured, and end by itself.
-    let is_over = ended.code == Some(0) && made + 1 >= place;
+    let is_killed = ended.code.is_none();
     assert!(
-        ended.code.is_none() || is_over,
-        "ended before change {place} of {made}"
+        is_killed || (ended.code == Some(0) && made == place),
+        "ended after {made} changes, before change {place}"
     );
+    is_killed
 }
 
 /// Places of the calls that `of` wants.
@@ -121,7 +122,7 @@ fn killed_at_changes_of_a_first_run() {
     for place in chosen {
         let call = &changes[place];
         let out = root.join(format!("killed-{place}"));
-        kill_before(&run(&site, &out, "2"), &out, place);
+        assert!(kill_before(&run(&site, &out, "2"), &out, place), "{call:?}");
         for (path, bytes) in products(&out) {
             assert!(
                 undisturbed.get(&path) == Some(&bytes),
@@ -179,14 +180,14 @@ fn kill_republishing(of: fn(&[Call]) -> Vec<usize>) {
     assert!(with.len() > without.len());
     let [adding, removing] =
         [adding, removing].map(|changes| (changes, spread(&of(changes), kills_republishing() / 2)));
-    let mut second_image = false;
+    let (mut second_image, mut ended) = (false, 0);
     for attempt in 0..kills_republishing() {
         second_image = !second_image;
         change(&case, second_image);
         let (changes, kills) = if second_image { &adding } else { &removing };
         let place = kills[attempt / 2];
         let call = &changes[place];
-        kill_before(&case.run(), &out, place);
+        ended += usize::from(!kill_before(&case.run(), &out, place));
         // By turns of two: each direction meets both.
         if attempt / 2 % 2 == 1 {
             second_image = !second_image;
@@ -202,6 +203,8 @@ fn kill_republishing(of: fn(&[Call]) -> Vec<usize>) {
             "products differ after a kill before {call:?}"
         );
     }
+    // At most the last change of either direction.
+    assert!(ended <= 2, "{ended} runs ended before they were killed");
 }
 
 /// Where the journal of the publication gets its name.

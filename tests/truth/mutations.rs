@@ -77,7 +77,7 @@ impl Ending {
 }
 
 /// Makes `changes = […]` of a row in the folder of a case.
-pub(crate) fn change(case: &Case, changes: &str) {
+pub(crate) fn make_changes(case: &Case, changes: &str) {
     #[derive(Deserialize)]
     struct Changes {
         changes: Vec<Change>,

@@ -145,8 +145,8 @@ impl Input for CheckedPoints<'_> {
 impl CheckedPoints<'_> {
     /// Planimetric error between the points and the shots on each axis, metres.
     ///
-    /// Before heights control it, rays of two images meet across the track near where one of the images has the point: its
-    /// place errs by √2 of the mean of two.
+    /// Before heights control it, a nadir and an oblique ray meet across the track near where the nadir image has the point: its
+    /// place errs by √2 of the mean of two. Along the track, this is an upper bound.
     fn plan_sigma_m(&self, laser_surface: &MolaSurfaceConfig) -> f64 {
         let (all_m, profile_m) = (
             laser_surface.plan_sigma_m,
@@ -218,7 +218,8 @@ impl Stage for CheckHeights<'_> {
 
 /// Compares tie points, each with its index, with the surface of all shots.
 ///
-/// * `plan_sigma_m` – planimetric error between the points and the shots on each axis, metres
+/// * `plan_sigma_m` – planimetric error between the points and the shots on each axis, metres; profiles are compared with each
+///   other by that of `options`, whatever the points
 #[must_use]
 pub fn check_heights(
     points: &[(usize, Position<BodyFixed>)],

@@ -205,8 +205,8 @@ pub(super) struct Plan<'a> {
     pub(super) keys: &'a str,
     /// Changes the errors.
     pub(super) errors: fn(&mut SceneErrors),
-    /// Changes the files.
-    pub(super) files: fn(&Case),
+    /// Changes the files of the mission of a seed.
+    pub(super) files: fn(&Case, u32),
 }
 
 impl Plan<'_> {
@@ -219,7 +219,7 @@ impl Plan<'_> {
             sizes: Sizes::Drawn,
             keys: "",
             errors: |_| {},
-            files: |_| {},
+            files: |_, _| {},
         }
     }
 
@@ -255,7 +255,7 @@ impl Plan<'_> {
             }
             case.write(&path, text);
         }
-        (self.files)(case);
+        (self.files)(case, self.seed);
     }
 
     /// Writes, runs and removes the mission.
@@ -315,7 +315,7 @@ impl Plan<'_> {
     }
 }
 
-/// The sites of all missions, two missions at a time.
+/// The sites of all missions, as many at a time as there are processors.
 pub(super) fn flown(plans: &[Plan<'_>]) -> Vec<Site> {
     let next = AtomicUsize::new(0);
     let sites: Mutex<BTreeMap<usize, Vec<Site>>> = Mutex::new(BTreeMap::new());

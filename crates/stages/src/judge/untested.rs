@@ -49,6 +49,14 @@ pub(super) fn untested(evidence: &Evidence<'_>) -> Vec<String> {
     };
     groups.extend(small_attitude(evidence, !tested.is_empty()));
     groups.extend(images(evidence));
+    groups.extend(evidence.adjustment.map(|of| {
+        let reason = if of.adjusted.heights.is_some() {
+            "within the limit of their heights"
+        } else {
+            "heights absorb them"
+        };
+        Group::new(reason).with("errors of single tie points across the track")
+    }));
     groups.push(shots(evidence, !tested.is_empty()));
     groups.extend([radii(evidence), uncovered(evidence)]);
     groups.iter().filter_map(Group::phrase).collect()
@@ -135,9 +143,7 @@ fn images(evidence: &Evidence<'_>) -> [Group; 3] {
         one_label = one_label.with(format!("line period of {labels} without STOP_TIME"));
     }
     if has_ties {
-        by_ties = by_ties
-            .with("an error of the focal length, or a bend of the detector line")
-            .with("errors of single tie points across the track");
+        by_ties = by_ties.with("an error of the focal length, or a bend of the detector line");
         if !of_support.is_empty() {
             by_ties = by_ties
                 .with("an error of the first sample of the detector that support data share");
