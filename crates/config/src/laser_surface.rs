@@ -19,8 +19,7 @@ declare_table! {
         /// Radial error that all shots of a profile share (1 m after crossovers, Neumann et al. 2001).
         profile_sigma_m: f64 = key(zero_or(1e-3, 1e4)).or(SurfaceOptions::default().profile_sigma_m),
         /// Error in plan between images and shots, shared by all tie points; on a slope it becomes one of height. The
-        /// default combines 110 m of the images and 70 m of MOLA. Before the adjustment, the part of the images is multiplied by √2:
-        /// across the track, the intersection of a nadir and an oblique ray errs like one image, and not like the mean of two.
+        /// default combines 110 m of the images and 70 m of MOLA.
         plan_sigma_m: f64 = key(zero_or(1e-3, 1e5)).or(SurfaceOptions::default().plan_sigma_m),
         /// Standard deviation of the position of a profile in plan, per axis (MOLA's 100 m in the horizontal, Neumann
         /// et al. 2001). Stated accuracies of footprints contain it; it weighs profiles where `adjustment.relief_for_plan`

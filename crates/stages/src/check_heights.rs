@@ -143,24 +143,6 @@ impl Input for CheckedPoints<'_> {
 }
 
 impl CheckedPoints<'_> {
-    /// Planimetric error between the points and the shots on each axis, metres.
-    ///
-    /// Before heights control it, a nadir and an oblique ray meet across the track near where the nadir image has the point: its
-    /// place errs by √2 of the mean of two. Along the track, this is an upper bound.
-    fn plan_sigma_m(&self, laser_surface: &MolaSurfaceConfig) -> f64 {
-        let (all_m, profile_m) = (
-            laser_surface.plan_sigma_m,
-            laser_surface.profile_plan_sigma_m,
-        );
-        match self {
-            Self::Intersected(_) => {
-                let images_m2 = (all_m.powi(2) - profile_m.powi(2)).max(0.0);
-                (all_m.powi(2) + images_m2).sqrt()
-            }
-            Self::Adjusted(_) => all_m,
-        }
-    }
-
     /// Every point with the index of its tie point.
     fn all(&self) -> Result<Vec<(usize, Position<BodyFixed>)>> {
         Ok(match self {
@@ -195,7 +177,7 @@ stage_inputs! {
 
 impl Stage for CheckHeights<'_> {
     const NAME: &'static str = "check_heights";
-    const METHOD: u32 = 5;
+    const METHOD: u32 = 4;
     type Output = HeightCheck;
     stage_inputs!(fingerprint);
 
@@ -205,36 +187,26 @@ impl Stage for CheckHeights<'_> {
 
     fn run(&self, _stop: &AtomicBool) -> Result<HeightCheck> {
         let footprints = &self.converted.value()?.footprints;
-        let options = self.laser_surface.options(footprints.body);
         Ok(check_heights(
             &self.points.all()?,
             footprints,
             self.profiles.value()?,
-            &options,
-            self.points.plan_sigma_m(self.laser_surface),
+            &self.laser_surface.options(footprints.body),
         ))
     }
 }
 
 /// Compares tie points, each with its index, with the surface of all shots.
-///
-/// * `plan_sigma_m` – planimetric error between the points and the shots on each axis, metres; profiles are compared with each
-///   other by that of `options`, whatever the points
 #[must_use]
 pub fn check_heights(
     points: &[(usize, Position<BodyFixed>)],
     footprints: &Footprints<BodyFixed>,
     profiles: &[Profile],
     options: &SurfaceOptions,
-    plan_sigma_m: f64,
 ) -> HeightCheck {
     let places_m: Vec<Vector3<f64>> = points.iter().map(|(_, ground)| ground.xyz_m).collect();
     let shots = MolaShots::of(footprints, profiles, options);
-    let of_points = SurfaceOptions {
-        plan_sigma_m,
-        ..*options
-    };
-    let surface = match shots.surface(&places_m, &of_points) {
+    let surface = match shots.surface(&places_m, options) {
         Ok(surface) => surface,
         Err(error) => return HeightCheck::without_surface(error.to_string()),
     };

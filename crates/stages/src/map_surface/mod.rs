@@ -130,7 +130,7 @@ type Cell = Option<std::result::Result<Found, Unmatched>>;
 
 impl Stage for MapSurface<'_> {
     const NAME: &'static str = "map_surface";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 2;
     type Output = Surface;
     stage_inputs!(fingerprint);
 
