@@ -52,9 +52,11 @@ struct Quantity {
 /// Largest ratio, and largest share beyond three standard deviations, of statements that hold.
 const RATIO_MOST: f64 = 1.25;
 const BEYOND_MOST: f64 = 0.005;
-/// Known fault: the surface before the adjustment, where points are far from their place.
+/// Least ratio of an upper bound.
+const BOUND_LEAST: f64 = 0.4;
+/// Known fault: ground that varies more between profiles than along them.
 const SURFACE_BEFORE: &str = "MOLA surface at the tie points before the adjustment, height";
-const SURFACE_BEFORE_MOST: f64 = 1.35;
+const SURFACE_BEFORE_MOST: f64 = 1.4;
 
 impl Quantity {
     fn z(&self) -> f64 {
@@ -116,10 +118,10 @@ impl Quantity {
     fn assert_holds(&self) {
         let chance = by_chance(self.independent);
         // Sizes are drawn for a mission: of few missions all may be small.
-        let low = if self.is_bound || !long() {
-            0.0
-        } else {
-            chance[0].min(0.8)
+        let low = match (long(), self.is_bound) {
+            (false, _) => 0.0,
+            (true, true) => BOUND_LEAST,
+            (true, false) => chance[0].min(0.8),
         };
         let z = self.z();
         assert!(
@@ -243,14 +245,14 @@ fn plans(keys: &'static str) -> Vec<Plan<'static>> {
 }
 
 /// Tie points of the valid sites.
-struct TieCounts {
-    good: usize,
-    lost: usize,
-    kept_blunders: usize,
+pub(super) struct TieCounts {
+    pub(super) good: usize,
+    pub(super) lost: usize,
+    pub(super) kept_blunders: usize,
 }
 
 impl TieCounts {
-    fn of(sites: &[Site]) -> Self {
+    pub(super) fn of(sites: &[Site]) -> Self {
         let valid = || sites.iter().filter(|site| site.is_valid());
         let stated = || valid().filter_map(|site| site.stated.as_ref());
         let lost = stated().map(|of| of.judged.lost.len()).sum();
@@ -309,8 +311,8 @@ Below each table, the page lists the quantities that exceed their standard devia
 
 - *Heights of single tie points.* Jitter in roll changes heights but causes no residuals. The scatter of tie points is estimated from residuals
   along the track, which jitter in pitch causes. Where jitter in pitch is the smaller one, the scatter is too small for heights.
-- *MOLA surface before the adjustment.* Tie points are then one to two hundred metres from their place. The cause is not identified; only the
-  height check before the adjustment uses this number.
+- *MOLA surface before the adjustment.* The synthetic ground varies more at 400 m and more from the shots than these suggest, probably because of its
+  craters. On real ground the stated intervals contain as many withheld stretches as they should ([*Theory*](theory.md)).
 - *Footprints.* Shifts of profiles are drawn with up to 100 m, where areograph assumes 70 m, and a profile contributes all its footprints at
   once. A misplaced profile can remain within the limit of the beam.
 - *Places of tie points with `common_bus`.* The points of a site share their error: one site of about 90 exceeds three standard deviations,

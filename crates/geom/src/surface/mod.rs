@@ -334,9 +334,8 @@ impl LaserSurface {
             .collect()
     }
 
-    /// Covariance of the errors of the surface at the possible true positions, without those that shots of a profile
-    /// share: a planimetric error moves a point away
-    /// from a profile, where the ground is known, as well as towards one.
+    /// Covariance of the errors of the surface at the possible true positions, without those that shots of a profile share: a
+    /// planimetric error moves a point away from a profile, where the ground is known, as well as towards one.
     fn errors_m2(&self, at: &[Vector2<f64>]) -> DMatrix<f64> {
         let shift_m = std::f64::consts::SQRT_2 * self.options.plan_sigma_m;
         let all_around = [

@@ -221,6 +221,15 @@ impl BeamEvidence<'_> {
         (0..AXES.len()).filter_map(on_axis).collect()
     }
 
+    /// Largest error in the place of the shots of a single image that its limits leave unnoticed, metres.
+    pub(super) fn unnoticed_of_one_m(&self, limit_sigma: f64) -> Option<f64> {
+        let deviations = self.deviations();
+        let limits_m = deviations
+            .iter()
+            .map(|of| limit_sigma * of.sigma_rad * of.range_m);
+        limits_m.reduce(f64::max)
+    }
+
     /// Images whose footprints test the orientation: image, footprints inside, the least number expected.
     fn places(&self) -> impl Iterator<Item = (&ImageBeam, &Beam, f64)> {
         let tested = self

@@ -58,7 +58,7 @@ pub(super) fn untested(evidence: &Evidence<'_>) -> Vec<String> {
         Group::new(reason).with("errors of single tie points across the track")
     }));
     groups.push(shots(evidence, !tested.is_empty()));
-    groups.extend([radii(evidence), uncovered(evidence)]);
+    groups.extend([orbit(evidence), radii(evidence), uncovered(evidence)]);
     groups.iter().filter_map(Group::phrase).collect()
 }
 
@@ -88,19 +88,24 @@ fn common_attitude(evidence: &Evidence<'_>, blind: &[&JudgedImage]) -> Vec<Group
     Vec::from_iter(is_shared.then(|| group.with("an attitude error that all images share")))
 }
 
-/// The attitude error that all images may share within the limit of the beam.
+/// The attitude error that all images may share within the limit of the beam, and that of the place of a profile.
 fn small_attitude(evidence: &Evidence<'_>, is_tested: bool) -> Option<Group> {
     let limits = evidence
         .beam
         .unnoticed(evidence.limits.correction_max_sigma);
     let [[along_rad, along_m], [across_rad, across_m]] = limits.try_into().ok()?;
+    let one_m = evidence
+        .beam
+        .unnoticed_of_one_m(evidence.limits.correction_max_sigma)?;
     is_tested.then(|| {
-        Group::new("within the limit of the beam").with(format!(
-            "an attitude error that all images share, up to {:.1} mrad along and {:.1} mrad across the track, {along_m:.0} and \
-             {across_m:.0} m on the ground",
-            PER_MILLI * along_rad,
-            PER_MILLI * across_rad
-        ))
+        Group::new("within the limit of the beam")
+            .with(format!(
+                "an attitude error that all images share, up to {:.1} mrad along and {:.1} mrad across the track, {along_m:.0} and \
+                 {across_m:.0} m on the ground",
+                PER_MILLI * along_rad,
+                PER_MILLI * across_rad
+            ))
+            .with(format!("the place of a single profile, up to {one_m:.0} m"))
     })
 }
 
@@ -181,6 +186,19 @@ fn uncovered(evidence: &Evidence<'_>) -> Group {
     let mut profiles = evidence.ranges.profiles.iter();
     if profiles.any(|profile| profile.range_minus_distance_m.n == 0 && profile.is_tested()) {
         group.with("times and positions of the spacecraft in tables of shots")
+    } else {
+        group
+    }
+}
+
+/// The orbit, where that of the shots' own files tests it.
+fn orbit(evidence: &Evidence<'_>) -> Group {
+    let group = Group::new("within range_check.orbit_max_m");
+    if evidence.footprints.is_some_and(|count| count > 0) {
+        group.with(format!(
+            "an error of the orbit along or across the track, up to {} m",
+            evidence.range_limits.orbit_max_m
+        ))
     } else {
         group
     }
