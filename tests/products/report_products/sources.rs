@@ -258,7 +258,7 @@ fn hardly_a_number_of_a_table_is_without_its_place() {
 }
 
 /// Paragraphs and lists with numbers that no document tells, by their first words, with what holds them instead.
-const TEXTS: [(&str, &str); 19] = [
+const TEXTS: [(&str, &str); 20] = [
     ("Relief alone would determine", "tests/report_geometric"),
     ("Surface kriged", "300 m is part of what roughness means"),
     ("At the tie points the surface", "names of profiles"),
@@ -280,6 +280,10 @@ const TEXTS: [(&str, &str); 19] = [
     (
         "an attitude error that all",
         "limits of the beam, in the table of checks",
+    ),
+    (
+        "an error of the orbit along",
+        "the configuration; in the table of limits of ranges",
     ),
 ];
 
