@@ -33,7 +33,7 @@ PATHS = [
     "/api/v1/jobs?limit=50",
     "/api/v1/sites/eos_chasma/runs",
     "/api/v1/kernels",
-    "/api/v1/runs/{run}/files/footprints.csv",
+    "/api/v1/runs/{run}/files/footprints.parquet",
 ]
 
 

@@ -3,6 +3,7 @@
 mod calibrate;
 mod check;
 mod completions;
+mod export;
 mod fetch;
 mod image;
 mod init;
@@ -88,6 +89,7 @@ enum Command {
     #[command(after_help = "Example: areograph pedr info ap10001l.b")]
     Pedr(pedr::Arguments),
     Report(report::Arguments),
+    Export(export::Arguments),
     Triangulate(triangulate::Arguments),
     Calibrate(calibrate::Arguments),
     Scene(scene::Arguments),
@@ -159,6 +161,7 @@ fn run(command: Command) -> ExitCode {
         Command::Image(arguments) => finish(image::run(&arguments)),
         Command::Pedr(arguments) => pedr::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
+        Command::Export(arguments) => finish(export::run(&arguments)),
         Command::Triangulate(arguments) => triangulate::run(&arguments),
         Command::Calibrate(arguments) => calibrate::run(&arguments),
         Command::Scene(arguments) => finish(scene::run(&arguments)),

@@ -14,6 +14,7 @@ mod choice;
 mod compare;
 mod driver;
 mod evidence;
+mod export;
 mod kernels;
 mod laser_match;
 mod manifest;
@@ -46,6 +47,7 @@ pub use compare::{
     require_different,
 };
 pub use driver::StageReason;
+pub use export::{Exported, export_site};
 pub use laser_match::run_match;
 pub use net::run_net;
 pub use observer::{Observer, StageEvent};

@@ -34,7 +34,7 @@ use crate::{
 };
 
 /// Raised when the layout of products changes.
-const METHOD: u32 = 25;
+const METHOD: u32 = 26;
 
 /// The configuration as written, the outlines that it names, all kernels and their paths relative to `folder`, and
 /// the inputs of every stage.

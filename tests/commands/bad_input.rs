@@ -38,6 +38,12 @@ fn compare(case: &Case, arguments: &[&str]) -> Command {
     command
 }
 
+fn export(case: &Case, format: &str, to: &str) -> Command {
+    let mut command = case.areograph();
+    command.args(["export", "out/case", format, "--to", to]);
+    command
+}
+
 fn run_into(case: &Case, out: &str) -> Command {
     let mut command = case.areograph();
     command.args(["--quiet", "run", "site.toml", "--out", out]);
@@ -47,6 +53,28 @@ fn run_into(case: &Case, out: &str) -> Command {
 /// Spoils one thing of a good case and says what to run.
 const CASES: &[(&str, Spoil)] = &[
     ("good", Case::run),
+    ("export_without_products", |case| {
+        fs::create_dir_all(case.path("out/case")).unwrap();
+        export(case, "gpkg", "gis")
+    }),
+    ("export_in_an_unknown_format", |case| {
+        export(case, "geopackage", "gis")
+    }),
+    ("export_among_the_products", |case| {
+        assert!(case.outcome(case.run()).starts_with("exit 0"));
+        export(case, "gpkg", "out/case/exchange/more")
+    }),
+    ("export_over_a_file", |case| {
+        assert!(case.outcome(case.run()).starts_with("exit 0"));
+        fs::create_dir(case.path("gis")).unwrap();
+        case.write("gis/footprints.gpkg", "not ours");
+        export(case, "gpkg", "gis")
+    }),
+    ("export_of_damaged_products", |case| {
+        assert!(case.outcome(case.run()).starts_with("exit 0"));
+        case.truncate("out/case/report/page.postcard", 1_000);
+        export(case, "gpkg", "gis")
+    }),
     ("site_file_missing", |case| {
         fs::remove_file(case.path("site.toml")).unwrap();
         case.run()
@@ -566,7 +594,7 @@ fn damaged_stores_and_products_are_made_again() {
     assert!(case.outcome(case.run()).starts_with("exit 0"));
     let before = common::mission::products(&case.path("out"));
     case.write("out/case/.cache/convert_datum", b"damaged");
-    case.write("out/case/footprints.csv", b"edited");
+    case.write("out/case/footprints.parquet", b"edited");
     fs::remove_file(case.path("out/case/ranges.json")).unwrap();
     assert!(
         case.outcome(case.run())

@@ -231,7 +231,7 @@ fn a_run_replaces_only_products_and_pages() {
     assert!(!case.path("out/case/.lock").exists());
     fs::remove_file(case.path("out/index.html")).unwrap();
     // Files in the places of products, a manifest of another program, a folder of incomplete files.
-    for file in ["footprints.csv", "manifest.json"] {
+    for file in ["footprints.parquet", "manifest.json"] {
         let path = format!("out/case/{file}");
         case.write(&path, "{\"name\": \"mine\"}");
         for arguments in [&[][..], &["--force"]] {

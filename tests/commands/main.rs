@@ -10,6 +10,7 @@ mod contradictions_attitude;
 mod crossover_choice;
 mod damaged_kernels;
 mod example_kernels;
+mod export;
 mod fetch;
 mod fetch_tables;
 mod foreign_files;

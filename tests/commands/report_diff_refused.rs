@@ -163,15 +163,15 @@ fn products_that_contradict_the_manifest_are_refused() {
              manifest.json\n  what to do: run the site again: damaged products are written anew\n"
         )
     };
-    case.write("aside/case/footprints.csv", "mine");
+    case.write("aside/case/footprints.parquet", "mine");
     let hash = &blake3::hash(b"mine").to_hex()[..12];
     let expected = message(
-        "footprints.csv",
+        "footprints.parquet",
         &format!("has 4 bytes with the hash {hash}"),
     );
     assert_eq!(diff(&case, &["aside", "out"]), expected);
-    fs::remove_file(case.path("aside/case/footprints.csv")).unwrap();
-    let expected = message("footprints.csv", "is missing");
+    fs::remove_file(case.path("aside/case/footprints.parquet")).unwrap();
+    let expected = message("footprints.parquet", "is missing");
     assert_eq!(diff(&case, &["out", "aside"]), expected);
     // What the manifest vouches for may still be of another version.
     copy_products(&case.path("before/case"), &case.path("aside/case"));

@@ -7,8 +7,8 @@ use areograph::{
     body::Body,
     body::Datum,
     config::{
-        KernelsConfig, OrientationConfig, PedrConfig, PointingConfig, RangeCheckConfig, SiteConfig,
-        WindowConfig, usual_instrument,
+        KernelsConfig, OrientationConfig, PedrConfig, PointingConfig, ProductsConfig,
+        RangeCheckConfig, ShotFormat, SiteConfig, WindowConfig, usual_instrument,
     },
     footprints::{Footprint, Footprints, SourceFile},
     frames::{BodyFixed, Frame, Position, Rotation},
@@ -339,6 +339,9 @@ fn config() -> SiteConfig {
         orientation: OrientationConfig {
             pointing_rmse_max_rad: 1e-4,
             ..OrientationConfig::default()
+        },
+        products: ProductsConfig {
+            formats: ShotFormat::WORDS.map(|(_, format)| format).into(),
         },
         ..SiteConfig::default()
     }

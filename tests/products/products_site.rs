@@ -143,8 +143,8 @@ fn every_product_is_there_with_its_rows() {
     let shots = u64::from(SHOTS);
     let expected = [
         ("footprints.csv", shots),
-        ("footprints.xml", shots),
         ("footprints.parquet", shots),
+        ("footprints.xml", shots),
         ("footprints.geojson", shots),
         ("ranges.parquet", shots),
         ("ranges.json", 1),
@@ -265,7 +265,7 @@ fn a_long_table_comes_back_in_pieces() {
     }
     let (folder, products) = written("long", &site, false);
     assert_eq!(
-        products[2],
+        products[1],
         ("footprints.parquet".to_owned(), u64::from(ROWS))
     );
     let file = File::open(folder.join("footprints.parquet")).unwrap();
@@ -452,9 +452,7 @@ fn an_empty_site_has_empty_products() {
     assert_eq!(
         rows,
         [
-            ("footprints.csv", 0),
             ("footprints.parquet", 0),
-            ("footprints.geojson", 0),
             ("ranges.parquet", 0),
             ("ranges.json", 0),
             ("profiles.json", 0),
@@ -474,7 +472,6 @@ fn an_empty_site_has_empty_products() {
         reason.starts_with("no footprint in any window: "),
         "{reason}"
     );
-    check_schema("footprints", &json(&folder.join("footprints.geojson")));
     check_schema("registration", &json(&folder.join("registration.json")));
     let page = fs::read_to_string(folder.join("report/index.html")).unwrap();
     assert!(page.contains("Invalid, for one reason:"));

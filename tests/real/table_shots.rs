@@ -49,6 +49,8 @@ files = ["network.pvl"]
 model = "samples"
 [orientation]
 intervals = 96
+[products]
+formats = ["geojson"]
 "#;
 
 /// The site of the pair, with copies of its files; none without the real data.

@@ -579,6 +579,11 @@ fn folders_are_listed_without_transfers_under_way() {
 #[test]
 fn shots_within_a_polygon_are_found_in_all_formats() {
     let case = Case::new();
+    case.replace(
+        "site.toml",
+        "[[windows]]",
+        "[products]\nformats = [\"csv\"]\n[[windows]]",
+    );
     run(&case, "0001");
     let search = |polygon: &[[f64; 2]], format: &str, rows_max| {
         let what = What::Shots {

@@ -34,6 +34,7 @@ mod paths;
 mod pedr;
 mod pointing;
 mod problems;
+mod products;
 mod range_check;
 mod service;
 mod shots;
@@ -80,6 +81,7 @@ pub use orientation::{OrientationConfig, RegistrationConfig};
 pub use pedr::PedrConfig;
 pub use pointing::{PointingConfig, UsedBias};
 pub use problems::Problems;
+pub use products::{ProductsConfig, ShotFormat};
 pub use range_check::{RangeCheckConfig, SCAN_STEPS_MAX};
 pub use service::{
     AlertKind, ChangesConfig, FetchConfig, FreshnessConfig, HookConfig, HttpConfig, LoadedService,

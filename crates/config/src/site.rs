@@ -29,6 +29,7 @@ use super::{
     orientation::{OrientationConfig, RegistrationConfig},
     pedr::PedrConfig,
     pointing::{PointingConfig, has_turned_sign},
+    products::ProductsConfig,
     range_check::RangeCheckConfig,
     shots::{SHOTS, ShotLayout, ShotTableConfig},
     surface::SurfaceConfig,
@@ -96,6 +97,8 @@ declare_table! {
         surface: SurfaceConfig = table(),
         /// Limits on tie points, their adjustment and the terrain model.
         limits: LimitsConfig = table(),
+        /// Products on request.
+        products: ProductsConfig = table(),
     }
     settle clock_of_altimeter
     check across_tables

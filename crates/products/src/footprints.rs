@@ -12,6 +12,7 @@ use super::{
     text_table,
 };
 use areograph_base::{footprints::Footprints, frames::BodyFixed, schema::DocumentSchema};
+use areograph_config::ShotFormat;
 use areograph_geom::{
     ellipsoid::{AreocentricLatitude, spherical_to_xyz_m},
     range_residuals::states_spacecraft,
@@ -24,7 +25,9 @@ pub(super) static CSV: Declaration = Declaration {
     rows: "shots",
     role: Role::Data,
     content: Content::Table(text_columns),
-    write: Write::Site(|path, of| text_table::write(path, table(of.site)).map(Some)),
+    write: Write::Footprints(ShotFormat::Csv, |path, of| {
+        text_table::write(path, table(of.site))
+    }),
     uses: &[],
 };
 
@@ -35,8 +38,8 @@ pub(super) static LABEL: Declaration = Declaration {
     rows: "shots",
     role: Role::Metadata,
     content: Content::Foreign,
-    write: Write::Footprints(|path, of| {
-        pds4_label::write(path, &of.directory.join(CSV.path), table(of.site), of.site)
+    write: Write::Footprints(ShotFormat::Csv, |path, of| {
+        pds4_label::write(path, &path.with_extension("csv"), table(of.site), of.site)
     }),
     uses: &[],
 };
@@ -74,7 +77,9 @@ pub(super) static GEOJSON: Declaration = Declaration {
     rows: "shots",
     role: Role::Data,
     content: Content::Document(schema),
-    write: Write::Site(|path, of| geojson::write(path, features(of.site)).map(Some)),
+    write: Write::Footprints(ShotFormat::Geojson, |path, of| {
+        geojson::write(path, features(of.site))
+    }),
     uses: &[Use {
         program: Program::Gis,
         lines: "ogrinfo -al -so ../footprints.geojson            two-dimensional",

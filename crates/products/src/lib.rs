@@ -98,6 +98,7 @@ pub use site::{AdjustmentProducts, GeometricProducts, ImageProducts, Program, Si
 use rayon::prelude::*;
 
 use areograph_base::error::{Locate, Result};
+use areograph_config::ShotFormat;
 use product::{Context, Declaration, Scope, Write, Written};
 use registry::PRODUCTS;
 
@@ -147,6 +148,43 @@ pub fn write_products<'a>(
     Ok(written.into_iter().map(|(product, _)| product).collect())
 }
 
+/// Writes the footprints of `site` into `directory` in each of `formats`, under the names of the products without their
+/// folders, and reads them back. A site without footprints has none.
+///
+/// # Errors
+/// Those of [`write_products`].
+pub fn export_footprints(
+    directory: &Path,
+    site: &SiteProducts,
+    formats: &[ShotFormat],
+) -> Result<Vec<Product>> {
+    let context = Context {
+        site,
+        pages: Pages::from(""),
+        directory,
+        products: PRODUCTS,
+        written: &[],
+    };
+    let mut products = Vec::new();
+    for declaration in PRODUCTS {
+        match &declaration.write {
+            Write::Footprints(format, write)
+                if formats.contains(format) && !site.footprints.is_empty() =>
+            {
+                let name = declaration.path.trim_start_matches("exchange/");
+                let path = directory.join(name);
+                let rows = write(&path, &context).in_file(&path)?;
+                products.push(Product {
+                    path: name.into(),
+                    rows,
+                });
+            }
+            _ => {}
+        }
+    }
+    Ok(products)
+}
+
 /// Writes one product, for an image if the product is per image.
 fn write(
     declaration: &'static Declaration,
@@ -161,7 +199,10 @@ fn write(
     let rows = match (&declaration.write, image, &of.site.geometric) {
         (Write::Site(write), ..) => write(&path, of),
         (Write::OfPage(write), ..) => return write(of),
-        (Write::Footprints(write), ..) if !of.site.footprints.is_empty() => {
+        (Write::Footprints(format, write), ..)
+            if !of.site.footprints.is_empty()
+                && of.site.config.products.formats.contains(format) =>
+        {
             write(&path, of).map(Some)
         }
         (Write::Image(write) | Write::AdjustedImage(write), Some(image), _) => {

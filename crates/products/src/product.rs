@@ -10,6 +10,7 @@ use areograph_base::{
     error::{Locate as _, Result},
     schema::DocumentSchema,
 };
+use areograph_config::ShotFormat;
 use areograph_stages::map_surface::Surface;
 
 /// A file that was written.
@@ -94,8 +95,8 @@ pub(super) enum Content {
 pub(super) enum Write {
     /// For every site.
     Site(fn(&Path, &Context) -> Result<Option<u64>>),
-    /// For a site with footprints: GIS readers reject tables without a row, or guess their types.
-    Footprints(fn(&Path, &Context) -> Result<u64>),
+    /// In this format for a site with footprints: GIS readers reject tables without a row, or guess their types.
+    Footprints(ShotFormat, fn(&Path, &Context) -> Result<u64>),
     /// For every image.
     Image(fn(&Path, &Context, &ImageProducts) -> Result<u64>),
     /// For every image with pixels, by its index.
@@ -189,15 +190,17 @@ impl Declaration {
 
     /// Whether it is written only from the footprints, independent of other products.
     pub(super) const fn is_apart(&self) -> bool {
-        matches!(self.write, Write::Footprints(_))
+        matches!(self.write, Write::Footprints(..))
     }
 
     /// Condition for the file, in words.
-    pub(super) const fn when(&self) -> &'static str {
-        match self.write {
+    pub(super) fn when(&self) -> String {
+        let when = match self.write {
+            Write::Footprints(format, _) => {
+                return format!("a site with footprints, format `{}`", format.word());
+            }
             Write::Site(_) => "every site",
             Write::OfPage(_) => "every figure of the report",
-            Write::Footprints(_) => "a site with footprints",
             Write::Image(_) => "every image",
             Write::Overlay(_) => "every image with pixels",
             Write::Ties(_) => "a site with tie points",
@@ -207,7 +210,8 @@ impl Declaration {
             Write::AdjustedImage(_) | Write::WithAnother => {
                 "every image of a site with an adjustment"
             }
-        }
+        };
+        when.to_owned()
     }
 
     /// The path of an image's file.

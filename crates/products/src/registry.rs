@@ -12,8 +12,9 @@ use super::{
 /// lists the others.
 pub(super) static PRODUCTS: &[&Declaration] = &[
     &footprints::CSV,
-    &footprints::LABEL,
     &footprints::PARQUET,
+    // Products of footprints that follow each other are written at once, and the label describes the finished table.
+    &footprints::LABEL,
     &footprints::GEOJSON,
     &ranges::TABLE,
     &ranges::DOCUMENT,

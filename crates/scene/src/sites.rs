@@ -132,6 +132,8 @@ impl SiteFile<'_> {
                 ties.sigma_px,
             );
         }
+        text += "\n# All formats that other programs read; without this table there is footprints.parquet alone.\n\
+                 [products]\nformats = [\"csv\", \"geojson\", \"gpkg\", \"shp\", \"lola\", \"ode\"]\n";
         for window in &self.windows {
             let [west, east] = window.longitude_deg;
             let [south, north] = window.latitude_deg;

@@ -45,6 +45,7 @@ mod select;
 mod session;
 mod text_kernel;
 mod trajectory;
+mod utc_clock;
 mod view;
 mod write;
 
@@ -55,5 +56,6 @@ pub use kernels::{Kernel, KernelSet};
 pub use role::KernelRole;
 pub use session::{Attitude, Session, State};
 pub use trajectory::Trajectory;
+pub use utc_clock::UtcClock;
 pub use view::{KernelView, position_kernels};
 pub use write::{CkSegment, EncodedCkSegment, SpkSegment, write_ck, write_encoded_ck, write_spk};

@@ -7,14 +7,11 @@ use areograph_base::{
     error::{Result, Stopped},
     time::Et,
 };
-use areograph_spice::KernelView;
+use areograph_spice::{KernelView, UtcClock};
 use areograph_store::{
     stage::{Output, Stage},
     stage_inputs,
 };
-
-/// Digits of a second in the UTC of shots: programs read the time from it, and MGS flies 3 m in a millisecond.
-const SHOT_UTC_DECIMALS: u8 = 6;
 
 stage_inputs! {
     /// Footprints with their corrected times, and the leap seconds.
@@ -29,7 +26,7 @@ stage_inputs! {
 /// One string per footprint: ISO 8601 without a zone letter.
 impl Stage for TagUtc<'_> {
     const NAME: &'static str = "tag_utc";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     type Output = Vec<String>;
     stage_inputs!(fingerprint);
 
@@ -39,9 +36,10 @@ impl Stage for TagUtc<'_> {
         if let Some(last_s) = instants.clone().copied().reduce(f64::max) {
             session.require_published_utc(Et::from_seconds(last_s))?;
         }
+        let mut clock = UtcClock::new(&session);
         let utc = instants.map(|et_s| {
             Stopped::check(stop)?;
-            session.et_to_utc_with(Et::from_seconds(*et_s), SHOT_UTC_DECIMALS)
+            clock.utc(Et::from_seconds(*et_s))
         });
         utc.collect()
     }

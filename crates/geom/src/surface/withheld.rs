@@ -142,8 +142,12 @@ fn predicted(
             (distances_m.fold(f64::INFINITY, f64::min), index)
         })
         .collect();
-    by_distance.sort_unstable_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
-    by_distance.truncate(PREDICTING);
+    if by_distance.len() > PREDICTING {
+        by_distance.select_nth_unstable_by(PREDICTING, |one, other| {
+            one.0.total_cmp(&other.0).then(one.1.cmp(&other.1))
+        });
+        by_distance.truncate(PREDICTING);
+    }
     let mut nearest: Vec<usize> = by_distance.into_iter().map(|(_, index)| index).collect();
     // In their order along the profiles.
     nearest.sort_unstable();

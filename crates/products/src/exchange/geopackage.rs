@@ -18,6 +18,7 @@ use areograph_base::{
     body::Body,
     error::{Error, IoError, Locate, Result},
 };
+use areograph_config::ShotFormat;
 
 pub(crate) static GEOPACKAGE: Declaration = Declaration {
     path: "exchange/footprints.gpkg",
@@ -26,7 +27,7 @@ pub(crate) static GEOPACKAGE: Declaration = Declaration {
     rows: "shots",
     role: Role::Data,
     content: Content::Foreign,
-    write: Write::Footprints(|path, of| write(path, features(of.site))),
+    write: Write::Footprints(ShotFormat::Gpkg, |path, of| write(path, features(of.site))),
     uses: &[Use {
         program: Program::Gis,
         lines: "ogrinfo -al -so footprints.gpkg                  GeoPackage, all columns",

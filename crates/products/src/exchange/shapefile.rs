@@ -24,6 +24,7 @@ use crate::{
     table::{DbaseField, Kind, Table, Values},
 };
 use areograph_base::error::{Error, IoError, Locate, Result};
+use areograph_config::ShotFormat;
 
 pub(crate) static POINTS: Declaration = Declaration {
     path: "exchange/footprints.shp",
@@ -32,7 +33,7 @@ pub(crate) static POINTS: Declaration = Declaration {
     rows: "shots",
     role: Role::Data,
     content: Content::Foreign,
-    write: Write::Footprints(|path, of| {
+    write: Write::Footprints(ShotFormat::Shp, |path, of| {
         let points = points(&features(of.site));
         write_points(path, points.iter().copied())?;
         read_points(path, points.iter().copied()).in_file(path)?;
@@ -56,7 +57,7 @@ macro_rules! part {
             rows: "",
             role: Role::Data,
             content: Content::Foreign,
-            write: Write::Footprints(|path, of| {
+            write: Write::Footprints(ShotFormat::Shp, |path, of| {
                 let write: fn(&Path, &Context) -> Result<()> = $write;
                 write(path, of).map(|()| 0)
             }),

@@ -16,6 +16,7 @@ use crate::{
     text_table,
 };
 use areograph_base::{schema::DocumentSchema, units::METRES_PER_KM};
+use areograph_config::ShotFormat;
 
 pub(crate) static LOLA_LIKE: Declaration = Declaration {
     path: "exchange/lola_like.csv",
@@ -24,7 +25,9 @@ pub(crate) static LOLA_LIKE: Declaration = Declaration {
     rows: "shots",
     role: Role::Data,
     content: Content::Table(|| meanings(&lola_like())),
-    write: Write::Footprints(|path, of| text_table::write(path, table(of.site, lola_like()))),
+    write: Write::Footprints(ShotFormat::Lola, |path, of| {
+        text_table::write(path, table(of.site, lola_like()))
+    }),
     uses: &[
         Use {
             program: Program::StereoPipeline,
@@ -50,7 +53,7 @@ pub(crate) static LOLA_LIKE_SIDECAR: Declaration = Declaration {
     rows: "",
     role: Role::Metadata,
     content: Content::Document(schema),
-    write: Write::Footprints(|path, of| {
+    write: Write::Footprints(ShotFormat::Lola, |path, of| {
         let sidecar = Sidecar::new(
             of.site,
             "lola_like.csv",
@@ -70,7 +73,9 @@ pub(crate) static ODE: Declaration = Declaration {
     rows: "shots",
     role: Role::Data,
     content: Content::Table(|| meanings(&ode_points())),
-    write: Write::Footprints(|path, of| text_table::write(path, table(of.site, ode_points()))),
+    write: Write::Footprints(ShotFormat::Ode, |path, of| {
+        text_table::write(path, table(of.site, ode_points()))
+    }),
     uses: &[Use {
         program: Program::StereoPipeline,
         lines: "pc_align --max-displacement 1000 --csv-format '1:lon 2:lat 5:radius_m' --datum D_MARS \\\n  \
@@ -85,7 +90,7 @@ pub(crate) static ODE_SIDECAR: Declaration = Declaration {
     rows: "",
     role: Role::Metadata,
     content: Content::Document(schema),
-    write: Write::Footprints(|path, of| {
+    write: Write::Footprints(ShotFormat::Ode, |path, of| {
         let sidecar = Sidecar::new(
             of.site,
             "ode_pts.csv",

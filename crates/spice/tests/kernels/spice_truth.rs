@@ -20,7 +20,7 @@ use areograph_geom::{
     body_rotation::{body_matrix, body_rotation, convert_datum},
     ellipsoid::{AreocentricLatitude, AreographicLatitude, Spherical, spherical_to_xyz_m},
 };
-use areograph_spice::{KernelSet, Session};
+use areograph_spice::{KernelSet, Session, UtcClock};
 use common::{json, m0402852_files, number, real_data};
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
@@ -80,6 +80,43 @@ fn clock_strings_and_utc_become_the_same_instants() {
     assert_eq!(session.et_to_sclk(node).unwrap(), "1/0844996544.086");
     let start = session.sclk_to_et("619971158:28").unwrap();
     assert_eq!(session.et_to_utc(start).unwrap(), "1999-08-24T14:12:13.635");
+}
+
+#[test]
+fn utc_by_the_hour_is_that_of_cspice() {
+    let Some((set, _)) = image("UTC of many instants") else {
+        return;
+    };
+    let session = Session::open(&set).unwrap();
+    let mut clock = UtcClock::new(&session);
+    let mut differ = 0;
+    let mut compared = 0;
+    // Days in all seasons, the leap second of 1998 and its neighbours, full hours, and instants in no order.
+    for day in [
+        "1998-12-31T23:59:50",
+        "1999-04-02T13:59:59",
+        "2000-12-31T00:00:00",
+        "1994-01-01T10:11:12",
+    ] {
+        let from = session.utc_to_et(day).unwrap();
+        for k in 0..5_000_i32 {
+            let et = from.plus(f64::from(k) * 1.700_000_3 - f64::from(k % 7) * 900.0);
+            for et in [et, from.plus(f64::from(k) * 0.009)] {
+                let ours = clock.utc(et).unwrap();
+                let expected = session.et_to_utc_with(et, 6).unwrap();
+                compared += 1;
+                if ours != expected {
+                    differ += 1;
+                    let by_s = session.utc_to_et(&ours).unwrap().seconds()
+                        - session.utc_to_et(&expected).unwrap().seconds();
+                    // The last digit, where CSPICE and the hour round to both sides.
+                    assert!(by_s.abs() < 1.1e-6, "{ours}, not {expected}");
+                }
+            }
+        }
+    }
+    println!("{differ} of {compared} differ in the last digit");
+    assert!(differ * 1_000 < compared, "{differ} of {compared}");
 }
 
 #[test]

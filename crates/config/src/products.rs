@@ -1,0 +1,64 @@
+//! `[products]`.
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    declare::{declare_table, key},
+    forms::{list_or_none, words_of},
+};
+
+/// Formats of the footprints of a site beside Parquet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ShotFormat {
+    /// CSV with a PDS4 label.
+    Csv,
+    /// Two-dimensional points as GeoJSON.
+    Geojson,
+    /// GeoPackage.
+    Gpkg,
+    /// Shapefile with its companion files.
+    Shp,
+    /// LOLA's reduced data records.
+    Lola,
+    /// Points of the Orbital Data Explorer.
+    Ode,
+}
+
+impl ShotFormat {
+    /// Its names in site files and commands.
+    pub const WORDS: [(&'static str, Self); 6] = [
+        ("csv", Self::Csv),
+        ("geojson", Self::Geojson),
+        ("gpkg", Self::Gpkg),
+        ("shp", Self::Shp),
+        ("lola", Self::Lola),
+        ("ode", Self::Ode),
+    ];
+
+    /// Its name.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        let word = Self::WORDS.iter().find(|(_, format)| *format == self);
+        word.map_or("", |(word, _)| word)
+    }
+}
+
+declare_table! {
+    /// Products that only some users need.
+    pub struct ProductsConfig: Deserialize {
+        /// Formats of the footprints beside `footprints.parquet`, which every site has: each takes more time and space than
+        /// that file. `areograph export` writes the same files from the products at any time.
+        formats: Vec<ShotFormat> = key(list_or_none(words_of(
+            ShotFormat::WORDS,
+            [
+                "footprints.csv and its PDS4 label",
+                "footprints.geojson",
+                "GeoPackage",
+                "shapefile",
+                "table for lrolola2isis and pc_align",
+                "table for pc_align",
+            ],
+        )).each_once("each format once")).or(Vec::new()).unused(r#"["csv", "gpkg"]"#),
+    }
+}
