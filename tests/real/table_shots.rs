@@ -50,7 +50,7 @@ model = "samples"
 [orientation]
 intervals = 96
 [products]
-formats = ["geojson"]
+formats = ["geojson", "shp", "gpkg"]
 "#;
 
 /// The site of the pair, with copies of its files; none without the real data.

@@ -36,7 +36,7 @@ impl Stage for TagUtc<'_> {
         if let Some(last_s) = instants.clone().copied().reduce(f64::max) {
             session.require_published_utc(Et::from_seconds(last_s))?;
         }
-        let mut clock = UtcClock::new(&session);
+        let mut clock = UtcClock::new(session);
         let utc = instants.map(|et_s| {
             Stopped::check(stop)?;
             clock.utc(Et::from_seconds(*et_s))
