@@ -8,7 +8,7 @@ use clap::{
 };
 
 use super::output;
-use crate::{config::ShotFormat, error::Result, files::file_name, flow::export_site};
+use crate::{config::ShotFormat, error::Result, flow::export_site};
 
 /// Writes the footprints of a site in the formats of other programs, from its products.
 ///
@@ -26,7 +26,7 @@ pub(super) struct Arguments {
     /// Pipeline.
     #[arg(value_name = "FORMAT", required = true, value_parser = format_parser(), hide_possible_values = true)]
     formats: Vec<ShotFormat>,
-    /// Folder for the files, made where missing [default: `SITE_export`].
+    /// Folder for the files, created if missing [default: `SITE_export`].
     #[arg(long, value_name = "DIR")]
     to: Option<PathBuf>,
 }
@@ -39,16 +39,17 @@ fn format_parser() -> impl clap::builder::TypedValueParser<Value = ShotFormat> {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<()> {
-    let to = arguments.to.clone();
-    let to = to.unwrap_or_else(|| format!("{}_export", file_name(&arguments.folder)).into());
-    let exported = export_site(&arguments.folder, &arguments.formats, &to)?;
-    for file in &exported.files {
-        output::line(format_args!(
-            "{}: {} ({} shots)",
-            exported.site,
-            file.display(),
-            exported.shots
-        ));
+    let exported = export_site(
+        &arguments.folder,
+        &arguments.formats,
+        arguments.to.as_deref(),
+    )?;
+    for (file, shots) in &exported.files {
+        let shots = match shots {
+            0 => String::new(),
+            shots => format!(" ({shots} shots)"),
+        };
+        output::line(format_args!("{}: {}{shots}", exported.site, file.display()));
     }
     Ok(())
 }

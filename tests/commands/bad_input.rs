@@ -64,6 +64,17 @@ const CASES: &[(&str, Spoil)] = &[
         assert!(case.outcome(case.run()).starts_with("exit 0"));
         export(case, "gpkg", "out/case/exchange/more")
     }),
+    ("export_into_another_site", |case| {
+        assert!(case.outcome(case.run()).starts_with("exit 0"));
+        case.replace("site.toml", "site = \"case\"", "site = \"other\"");
+        assert!(case.outcome(case.run()).starts_with("exit 0"));
+        export(case, "gpkg", "out/new/../other/more")
+    }),
+    ("export_without_footprints", |case| {
+        case.replace("site.toml", "[4.0, 5.0]", "[44.0, 45.0]");
+        assert!(case.outcome(case.run()).starts_with("exit 5"));
+        export(case, "gpkg", "gis")
+    }),
     ("export_over_a_file", |case| {
         assert!(case.outcome(case.run()).starts_with("exit 0"));
         fs::create_dir(case.path("gis")).unwrap();

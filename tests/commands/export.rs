@@ -24,6 +24,7 @@ fn exported_files_are_those_of_a_run_with_these_formats() {
     command.args(["export", "out/case", "--to", "gis/here"]);
     command.args(["csv", "geojson", "gpkg", "shp", "lola", "ode"]);
     let printed = String::from_utf8(succeed(&mut command).stdout).unwrap();
+    assert!(printed.contains("gis/here/footprints.shp (") && printed.contains("footprints.prj\n"));
     let exported: Vec<_> = fs::read_dir(case.path("gis/here"))
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())

@@ -7,7 +7,7 @@ use super::{
     forms::{list_or_none, words_of},
 };
 
-/// Formats of the footprints of a site beside Parquet.
+/// Format of footprints in addition to Parquet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ShotFormat {
@@ -47,8 +47,8 @@ impl ShotFormat {
 declare_table! {
     /// Products that only some users need.
     pub struct ProductsConfig: Deserialize {
-        /// Formats of the footprints beside `footprints.parquet`, which every site has: each takes more time and space than
-        /// that file. `areograph export` writes the same files from the products at any time.
+        /// Formats of the footprints beside `footprints.parquet`, which every site has: each takes more time and disk
+        /// space. `areograph export` writes the same files from the products at any time.
         formats: Vec<ShotFormat> = key(list_or_none(words_of(
             ShotFormat::WORDS,
             [

@@ -41,7 +41,7 @@ declare_table! {
         /// Columns that are known: then no table `columns`.
         layout: Option<ShotLayout> = key(words([
             ("lola_rdr", ShotLayout::LolaRdr, "LOLA's reduced data records as the Orbital Data Explorer gives them, 29 columns"),
-            ("areograph", ShotLayout::Areograph, "footprints.csv of another site"),
+            ("areograph", ShotLayout::Areograph, "footprints.csv of another site (products.formats, or areograph export)"),
             ("ode_pedr", ShotLayout::OdePedr, "MOLA shots of the Orbital Data Explorer's PEDR query, ten columns, no spacecraft"),
         ])).unused(r#""lola_rdr""#),
         /// Datum of longitudes and latitudes; without it, that of the products.

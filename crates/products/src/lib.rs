@@ -148,8 +148,27 @@ pub fn write_products<'a>(
     Ok(written.into_iter().map(|(product, _)| product).collect())
 }
 
-/// Writes the footprints of `site` into `directory` in each of `formats`, under the names of the products without their
-/// folders, and reads them back. A site without footprints has none.
+/// Products of footprints in `formats`.
+fn in_formats(
+    formats: &[ShotFormat],
+) -> impl Iterator<Item = (&'static str, product::WriteFootprints)> {
+    PRODUCTS
+        .iter()
+        .filter_map(|declaration| match declaration.write {
+            Write::Footprints(format, write) if formats.contains(&format) => {
+                Some((declaration.path.trim_start_matches("exchange/"), write))
+            }
+            _ => None,
+        })
+}
+
+/// Names of the files of [`export_footprints`].
+pub fn exported_names(formats: &[ShotFormat]) -> impl Iterator<Item = &'static str> {
+    in_formats(formats).map(|(name, _)| name)
+}
+
+/// Writes the footprints of `site`, which has some, into `directory` in each of `formats`, under the names of the products
+/// without their folders, and reads them back.
 ///
 /// # Errors
 /// Those of [`write_products`].
@@ -165,24 +184,15 @@ pub fn export_footprints(
         products: PRODUCTS,
         written: &[],
     };
-    let mut products = Vec::new();
-    for declaration in PRODUCTS {
-        match &declaration.write {
-            Write::Footprints(format, write)
-                if formats.contains(format) && !site.footprints.is_empty() =>
-            {
-                let name = declaration.path.trim_start_matches("exchange/");
-                let path = directory.join(name);
-                let rows = write(&path, &context).in_file(&path)?;
-                products.push(Product {
-                    path: name.into(),
-                    rows,
-                });
-            }
-            _ => {}
-        }
-    }
-    Ok(products)
+    let products = in_formats(formats).map(|(name, write)| {
+        let path = directory.join(name);
+        let rows = write(&path, &context).in_file(&path)?;
+        Ok(Product {
+            path: name.into(),
+            rows,
+        })
+    });
+    products.collect()
 }
 
 /// Writes one product, for an image if the product is per image.

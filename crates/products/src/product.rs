@@ -96,7 +96,7 @@ pub(super) enum Write {
     /// For every site.
     Site(fn(&Path, &Context) -> Result<Option<u64>>),
     /// In this format for a site with footprints: GIS readers reject tables without a row, or guess their types.
-    Footprints(ShotFormat, fn(&Path, &Context) -> Result<u64>),
+    Footprints(ShotFormat, WriteFootprints),
     /// For every image.
     Image(fn(&Path, &Context, &ImageProducts) -> Result<u64>),
     /// For every image with pixels, by its index.
@@ -120,6 +120,9 @@ pub(super) enum Write {
     /// For a site with an adjustment, others with it.
     Several(fn(&Context, &AdjustmentProducts) -> Result<Vec<Written>>),
 }
+
+/// Writer of a table of footprints.
+pub(super) type WriteFootprints = fn(&Path, &Context) -> Result<u64>;
 
 /// Unit that has a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

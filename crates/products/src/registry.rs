@@ -13,7 +13,7 @@ use super::{
 pub(super) static PRODUCTS: &[&Declaration] = &[
     &footprints::CSV,
     &footprints::PARQUET,
-    // Products of footprints that follow each other are written at once, and the label describes the finished table.
+    // Tables of footprints that follow each other are written in parallel; the label describes the finished CSV.
     &footprints::LABEL,
     &footprints::GEOJSON,
     &ranges::TABLE,

@@ -132,7 +132,7 @@ impl SiteFile<'_> {
                 ties.sigma_px,
             );
         }
-        text += "\n# All formats that other programs read; without this table there is footprints.parquet alone.\n\
+        text += "\n# All formats of footprints; without this table a run writes footprints.parquet only.\n\
                  [products]\nformats = [\"csv\", \"geojson\", \"gpkg\", \"shp\", \"lola\", \"ode\"]\n";
         for window in &self.windows {
             let [west, east] = window.longitude_deg;

@@ -11,10 +11,11 @@ const SECOND_US: u32 = 1_000_000;
 /// Last second of an hour whose length no leap second changes.
 const LAST_S: u32 = 3_599;
 
-/// UTC as `et2utc` gives it, within an hour of the last instant without CSPICE, which takes 3 µs for each.
+/// UTC as `et2utc` gives it. CSPICE, which takes 3 µs, is asked once for each hour of UTC; the other instants of the hour
+/// are computed from it.
 ///
-/// Between full hour and its last regular second ET − UTC changes by TDB − TT alone, by 1.2 µs at most and linearly within
-/// 1e-10 s. A leap second follows that last second. Times are those of CSPICE but for the rounding of the last digit.
+/// From the full hour to its last regular second ET − UTC changes only by TDB − TT: by at most 1.2 µs, and linearly within
+/// 2e-10 s. A leap second follows that last second. Times differ from those of CSPICE only by the rounding of the last digit.
 #[derive(Debug)]
 pub struct UtcClock<'a> {
     session: &'a Session,

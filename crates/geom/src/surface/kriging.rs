@@ -20,8 +20,8 @@ pub(super) struct Kriging {
     strengths: DVector<f64>,
 }
 
-/// Rows of the factor that are solved at once: products of larger blocks do nearly all of the work, at the speed of a
-/// matrix product, which nalgebra's solution of triangular equations does not reach.
+/// Rows solved at once. Most of the work is then in matrix products, which nalgebra computes faster than it solves
+/// triangular equations.
 const BLOCK: usize = 64;
 
 /// Weights of shots, one column a point, with the multiplier that keeps their sum at 1.

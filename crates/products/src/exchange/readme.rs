@@ -52,6 +52,8 @@ fn text(of: &Context) -> String {
     }
     if site.footprints.is_empty() {
         text += "The site has no footprints, so there are no tables of footprints here.\n\n";
+    } else if site.config.products.formats.is_empty() {
+        text += "Footprints are in ../footprints.parquet; `areograph export` writes them in other formats.\n\n";
     }
     let files = files(of);
     for file in &files {

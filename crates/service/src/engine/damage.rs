@@ -25,7 +25,7 @@ pub struct Damage<'a> {
     pub run: &'a str,
     /// Their number, as far as known.
     pub products: i64,
-    /// The first of them, as in "`footprints.csv` does not match its manifest".
+    /// The first of them, as in "`footprints.parquet` does not match its manifest".
     pub what: &'a str,
 }
 

@@ -91,12 +91,13 @@ fn utc_by_the_hour_is_that_of_cspice() {
     let mut clock = UtcClock::new(&session);
     let mut differ = 0;
     let mut compared = 0;
-    // Days in all seasons, the leap second of 1998 and its neighbours, full hours, and instants in no order.
+    // Dates where TDB − TT is steepest and where it bends most, the leap second of 1998 and its neighbours, full hours, and instants in no order.
     for day in [
         "1998-12-31T23:59:50",
         "1999-04-02T13:59:59",
         "2000-12-31T00:00:00",
-        "1994-01-01T10:11:12",
+        "1999-07-04T11:59:58",
+        "1999-10-05T23:00:00",
     ] {
         let from = session.utc_to_et(day).unwrap();
         for k in 0..5_000_i32 {

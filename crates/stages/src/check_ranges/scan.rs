@@ -34,7 +34,7 @@ const SHOTS_MIN: usize = 10;
 const NODES: usize = 7;
 
 /// Largest half width of a scan whose residuals are interpolated, seconds.
-const NARROW_S: f64 = 5.0;
+const NARROW_S: f64 = 2.0;
 
 /// Half the time over which the rate of a line of sight is measured, seconds.
 const RATE_STEP_S: f64 = 0.01;
@@ -158,8 +158,8 @@ fn spreads_m(sighted: &[Sighted], trajectory: &Trajectory, corrections: &[f64]) 
 /// The same from residuals at [`NODES`] corrections: as a function of the correction the residual of a shot is a
 /// polynomial, and the variance of residuals at any correction follows from their covariances at the nodes.
 ///
-/// The orbit bends by `v c / R`, 0.04 radians within [`NARROW_S`] (v = 3.4 km/s, range R ≥ 365 km): the remainder of
-/// degree 7 is below 2e-6 m.
+/// The line of sight turns by `v c / R`, at most 0.06 radians within [`NARROW_S`] (4.7 km/s at a range of 170 km, the lowest
+/// periapsis): the remainder of degree 7 is below 1e-5 m.
 /// `None` for a wide scan, one of few steps, or kernels that do not cover every node.
 fn interpolated_spreads_m(
     sighted: &[Sighted],
@@ -189,7 +189,13 @@ fn interpolated_spreads_m(
     let at = |correction_s: &f64| {
         let weights = SVector::from(lagrange_weights(&nodes_s, *correction_s));
         let spread_m = |covariance_m2: &SMatrix<f64, NODES, NODES>| {
-            (weights.dot(&(covariance_m2 * weights))).max(0.0).sqrt()
+            let variance_m2 = weights.dot(&(covariance_m2 * weights));
+            // Rounding of a spread of zero; NaN stays.
+            if variance_m2 < 0.0 {
+                0.0
+            } else {
+                variance_m2.sqrt()
+            }
         };
         Some(covariances_m2.each_ref().map(spread_m))
     };
