@@ -17,16 +17,17 @@ use crate::{config::ShotFormat, error::Result, flow::export_site};
 ///
 /// Example: `areograph export out/gusev_crater gpkg csv --to gis`
 #[derive(Debug, Args)]
+#[allow(clippy::doc_markdown, reason = "help is printed as it is")]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
     /// Products of a site.
     #[arg(value_name = "OUT/SITE")]
     folder: PathBuf,
-    /// csv, with a PDS4 label; geojson; gpkg, a `GeoPackage`; shp, a shapefile; lola, ode: tables for ISIS and Ames Stereo
+    /// csv, with a PDS4 label; geojson; gpkg, a GeoPackage; shp, a shapefile; lola, ode: tables for ISIS and Ames Stereo
     /// Pipeline.
     #[arg(value_name = "FORMAT", required = true, value_parser = format_parser(), hide_possible_values = true)]
     formats: Vec<ShotFormat>,
-    /// Folder for the files, created if missing [default: `SITE_export`].
+    /// Folder for the files, created if missing [default: SITE_export].
     #[arg(long, value_name = "DIR")]
     to: Option<PathBuf>,
 }
