@@ -209,10 +209,7 @@ fn write(
     let rows = match (&declaration.write, image, &of.site.geometric) {
         (Write::Site(write), ..) => write(&path, of),
         (Write::OfPage(write), ..) => return write(of),
-        (Write::Footprints(format, write), ..)
-            if !of.site.footprints.is_empty()
-                && of.site.config.products.formats.contains(format) =>
-        {
+        (Write::Footprints(format, write), ..) if of.site.has_footprints_in(*format) => {
             write(&path, of).map(Some)
         }
         (Write::Image(write) | Write::AdjustedImage(write), Some(image), _) => {

@@ -75,9 +75,7 @@ fn has(site: &SiteProducts, declaration: &Declaration) -> bool {
             .surface
             .is_some_and(|surface| !surface.account.is_refused),
         Write::OfPage(_) => declaration.path != FIGURE.path,
-        Write::Footprints(format, _) => {
-            !site.footprints.is_empty() && site.config.products.formats.contains(&format)
-        }
+        Write::Footprints(format, _) => site.has_footprints_in(format),
         Write::Ties(_) => site.geometric.is_some(),
         Write::Adjustment(_) | Write::AdjustedImage(_) | Write::WithAnother | Write::Several(_) => {
             adjusted.is_some()

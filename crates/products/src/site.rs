@@ -11,7 +11,7 @@ use areograph_base::{
     footprints::Footprints,
     frames::BodyFixed,
 };
-use areograph_config::{SiteConfig, UsedBias};
+use areograph_config::{ShotFormat, SiteConfig, UsedBias};
 use areograph_spice::{KernelSet, RequiredCoverage};
 use areograph_stages::{
     adjust::{Adjusted, CorrectedPoint, PointKind, accuracy_withheld},
@@ -169,6 +169,11 @@ impl<'a> SiteProducts<'a> {
     pub fn adjustment(&self) -> Option<(GeometricProducts<'a>, AdjustmentProducts<'a>)> {
         let geometric = self.geometric?;
         Some((geometric, geometric.adjustment?))
+    }
+
+    /// Whether the footprints are written in `format`: there are some, and the site requests it.
+    pub(super) fn has_footprints_in(&self, format: ShotFormat) -> bool {
+        !self.footprints.is_empty() && self.config.products.formats.contains(&format)
     }
 
     /// Why absolute accuracies are withheld, if they are.

@@ -11,7 +11,7 @@ use super::{
     truth::TiesTruth,
 };
 use areograph_base::error::Result;
-use areograph_config::{usual_altimeter, usual_instrument};
+use areograph_config::{ShotFormat, usual_altimeter, usual_instrument};
 use areograph_spice::Session;
 
 /// Source stated in the products.
@@ -132,8 +132,12 @@ impl SiteFile<'_> {
                 ties.sigma_px,
             );
         }
-        text += "\n# All formats of footprints; without this table a run writes footprints.parquet only.\n\
-                 [products]\nformats = [\"csv\", \"geojson\", \"gpkg\", \"shp\", \"lola\", \"ode\"]\n";
+        let _infallible = write!(
+            text,
+            "\n# All formats of footprints; without this table a run writes footprints.parquet only.\n\
+             [products]\nformats = [{}]\n",
+            ShotFormat::WORDS.map(|(word, _)| quoted(word)).join(", "),
+        );
         for window in &self.windows {
             let [west, east] = window.longitude_deg;
             let [south, north] = window.latitude_deg;
