@@ -27,7 +27,7 @@ pub(super) struct Arguments {
     /// Folder of the products.
     #[arg(long, default_value = "out")]
     out: PathBuf,
-    /// Read every input file again, even if it did not change.
+    /// Read all input files, stored outputs and products again, even if unchanged.
     #[arg(long)]
     rehash: bool,
     /// Print JSON.

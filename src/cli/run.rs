@@ -61,7 +61,7 @@ pub(super) struct Arguments {
     /// Run every stage, even if its stored output is up to date.
     #[arg(long)]
     force: bool,
-    /// Read every input file again, even if it did not change.
+    /// Read all input files, stored outputs and products again, even if unchanged.
     #[arg(long)]
     rehash: bool,
     /// Show the stages that would run, with the reasons; write no products.

@@ -37,18 +37,26 @@ pub struct SitePlan {
 /// Input files or kernels that cannot be read.
 pub fn plan_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SitePlan> {
     let folder = options.out.join(&config.site);
-    let mut plan = Plan {
-        cache: StageCache::new(&folder.join(CACHE), options.force),
-        folder,
-        bounds: Bounds {
-            until: options.until,
-            stop: options.stop,
-            files: options.files(),
-        },
-        planned: Vec::new(),
-        ledger: Ledger::new(),
+    let drive = |cache| {
+        let mut plan = Plan {
+            cache,
+            folder: folder.clone(),
+            bounds: Bounds {
+                until: options.until,
+                stop: options.stop,
+                files: options.files(),
+            },
+            planned: Vec::new(),
+            ledger: Ledger::new(),
+        };
+        let driven = site(&mut plan, config);
+        (plan, driven)
     };
-    let driven = site(&mut plan, config);
+    let (mut plan, mut driven) = drive(options.stage_cache(&folder));
+    if plan.cache.has_lost_output() {
+        // As a run does.
+        (plan, driven) = drive(StageCache::new(&folder.join(CACHE), options.force));
+    }
     options.hashes.keep(plan.files());
     match driven {
         Ok(()) | Err(Exit::StageReached) => Ok(SitePlan {

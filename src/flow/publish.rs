@@ -77,7 +77,7 @@ pub(super) fn standing(
     if read_manifest(folder).as_ref() != Some(&manifest) {
         return Err(changed(MANIFEST));
     }
-    match damaged_product(folder, &manifest) {
+    match damaged_product(folder, &manifest, cache.own()) {
         Some(path) => Err(changed(&path)),
         None => Ok(manifest),
     }

@@ -1,6 +1,10 @@
 //! The flow that makes products: a stage runs when one of its inputs has changed.
 
-use std::{path::PathBuf, sync::atomic::AtomicBool, time::Instant};
+use std::{
+    path::{Path, PathBuf},
+    sync::atomic::AtomicBool,
+    time::Instant,
+};
 
 use super::{
     PUBLISH,
@@ -50,6 +54,13 @@ impl RunOptions<'_> {
     pub(super) fn files(&self) -> InputFiles {
         self.hashes.files().within(self.roots)
     }
+
+    /// The stored outputs of the site with products in `folder`.
+    pub(super) fn stage_cache(&self, folder: &Path) -> StageCache {
+        let folder = folder.join(CACHE);
+        let own = self.hashes.of_own(&folder).files();
+        StageCache::new(&folder, self.force).knowing(own)
+    }
 }
 
 /// Outcome of a run.
@@ -87,9 +98,44 @@ pub fn run_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOut
     let _entered = span.enter();
     let folder = options.out.join(&config.site);
     let _lock = SiteLock::take(&folder).in_site(&config.site)?;
+    let cache = options.stage_cache(&folder);
+    let (mut run, mut driven) = drive(config, options, &folder, cache);
+    if run.cache.has_lost_output() {
+        tracing::warn!("a stored output is damaged or cannot be read: the run begins again");
+        // Every stored output is read at once, and a damaged one is computed anew.
+        let at_once = StageCache::new(&folder.join(CACHE), options.force);
+        (run, driven) = drive(config, options, &folder, at_once);
+    }
+    run.hashes.keep(run.files());
+    let of_own = run.hashes.of_own(&folder.join(CACHE));
+    match run.ending {
+        Ending::Published(_) | Ending::Unchanged(_) => of_own.keep_only(run.cache.own()),
+        Ending::StoppedAfter(_) => of_own.keep(run.cache.own()),
+    }
+    let driven = driven.in_site(&config.site);
+    note_failure(
+        &run.folder,
+        driven.as_ref().err().map(ToString::to_string).as_deref(),
+    );
+    driven?;
+    Ok(SiteOutcome {
+        site: config.site.clone(),
+        folder: run.folder,
+        stages: run.passed,
+        ending: run.ending,
+    })
+}
+
+/// Drives the flow of the site once.
+fn drive<'a>(
+    config: &SiteConfig,
+    options: &'a RunOptions<'_>,
+    folder: &Path,
+    cache: StageCache,
+) -> (Run<'a>, Result<()>) {
     let mut run = Run {
-        cache: StageCache::new(&folder.join(CACHE), options.force),
-        folder,
+        cache,
+        folder: folder.to_owned(),
         bounds: Bounds {
             until: options.until,
             stop: options.stop,
@@ -110,19 +156,7 @@ pub fn run_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOut
             Err(failure)
         }
     };
-    run.hashes.keep(run.files());
-    let driven = driven.in_site(&config.site);
-    note_failure(
-        &run.folder,
-        driven.as_ref().err().map(ToString::to_string).as_deref(),
-    );
-    driven?;
-    Ok(SiteOutcome {
-        site: config.site.clone(),
-        folder: run.folder,
-        stages: run.passed,
-        ending: run.ending,
-    })
+    (run, driven)
 }
 
 struct Run<'a> {

@@ -7,9 +7,10 @@ use crate::common::traced;
 
 #[allow(dead_code, reason = "what kills programs is for other tests")]
 use std::{
-    collections::BTreeSet,
+    collections::{BTreeMap, BTreeSet},
     fs::{self, File},
     os::unix::fs::{FileExt, MetadataExt},
+    path::Path,
     process::Command,
     thread,
     time::Duration,
@@ -112,26 +113,102 @@ fn a_change_that_keeps_size_and_time_is_noticed() {
     assert!(line.ends_with("pedr ap19117l.b changed"), "{line}");
 }
 
-/// What no file system does: the content is another one, and all that is said of the file stays.
+/// Products that a command opens.
+fn products_opened(command: &Command) -> BTreeSet<String> {
+    let mut opened = BTreeSet::new();
+    let ended = traced(command, |call| {
+        let below = call.path.to_string_lossy().into_owned();
+        if let Some((_, product)) = below.split_once("out/case/")
+            && !product.starts_with('.')
+        {
+            opened.insert(product.to_owned());
+        }
+        Then::GoOn
+    });
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    opened
+}
+
 #[test]
-fn rehash_finds_what_the_file_system_hides() {
+fn products_that_did_not_change_are_not_opened_and_changed_ones_are_replaced() {
     let case = ran();
-    let cache = HashCache::in_folder(&case.path("out"), false);
-    let (was, _) = hash_file(&case.path(PEDR)).unwrap();
-    change_in_secret(&case);
-    let identity = Identity::of(&case.path(PEDR).metadata().unwrap());
-    let mut known = cache.known();
+    stand_still();
+    // The first run without changes reads them.
+    assert!(products_opened(&case.run()).contains("ranges.json"));
+    // The page over all sites reads the manifest, and would read an adjustment.
+    let opened = products_opened(&case.run());
+    let of_page = ["manifest.json", "adjustment.json"];
+    assert!(
+        opened.iter().all(|path| of_page.contains(&&**path)),
+        "{opened:?}"
+    );
+    assert!(products_opened(case.run().arg("--rehash")).contains("ranges.json"));
+    // A digit; size and time of modification stay.
+    let good = case.read("out/case/ranges.json");
+    let digit = good.iter().position(u8::is_ascii_digit).unwrap();
+    let path = case.path("out/case/ranges.json");
+    let file = File::options().write(true).open(&path).unwrap();
+    let modified = file.metadata().unwrap().modified().unwrap();
+    file.write_all_at(&[good[digit] ^ 1], digit as u64).unwrap();
+    file.set_modified(modified).unwrap();
+    assert_eq!(case.stages_run(), ["publish"]);
+    assert!(case.read("out/case/ranges.json") == good);
+}
+
+/// Stores in a folder of hashes that the file, as it is now, has this hash.
+fn hide(folder: &Path, file: &Path, blake3: &str) {
+    let mut known = HashCache::in_folder(folder, false).known();
     known.add(KnownFile {
-        identity,
-        blake3: *blake3::Hash::from_hex(&was).unwrap().as_bytes(),
+        identity: Identity::of(&file.metadata().unwrap()),
+        blake3: *blake3::Hash::from_hex(blake3).unwrap().as_bytes(),
         checked: 0,
         read_s: 0,
     });
     let entries: Vec<KnownFile> = known.iter().copied().collect();
     let entries = postcard::to_stdvec(&entries).unwrap();
     let hash = blake3::hash(&entries);
-    let file = [b"areograph hashes 1\n", &hash.as_bytes()[..], &entries[..]];
-    atomic::write(&case.path("out").join(HASHES), &file.concat()).unwrap();
+    let bytes = [b"areograph hashes 1\n", &hash.as_bytes()[..], &entries[..]];
+    atomic::write(&folder.join(HASHES), &bytes.concat()).unwrap();
+}
+
+/// Inputs by name, BLAKE3 and size of an output (`store::cache`).
+type Head = (BTreeMap<String, String>, String, u64);
+
+/// A large stored output is read only when a stage uses it.
+#[test]
+fn damage_that_the_file_system_hides_is_noticed_when_a_stored_output_is_used() {
+    let case = Case::new();
+    let small = "longitude_deg = [87.5, 88.5]\nlatitude_deg = [4.0, 5.0]";
+    let large = "longitude_deg = [0.0, 360.0]\nlatitude_deg = [-20.0, 20.0]";
+    case.replace("site.toml", small, large);
+    succeed(&mut case.run());
+    let stored = "out/case/.cache/convert_datum";
+    let mut bytes = case.read(stored);
+    assert!(bytes.len() > 1 << 20, "{}", bytes.len());
+    let ((_, blake3, _), _) = postcard::take_from_bytes::<Head>(&bytes).unwrap();
+    *bytes.last_mut().unwrap() ^= 1;
+    case.write(stored, &bytes);
+    hide(&case.path("out/case/.cache"), &case.path(stored), &blake3);
+    assert_eq!(case.stages_run(), [""; 0]);
+    let limit = "[range_check]\nmean_max_m = 9.0\n[[images]]";
+    case.replace("site.toml", "[[images]]", limit);
+    succeed(&mut plan(&case, &[]));
+    assert!(case.read(stored) == bytes, "a plan changes nothing");
+    let ran = case.stages_run();
+    for stage in ["convert_datum", "check_ranges", "publish"] {
+        assert!(ran.iter().any(|of| of == stage), "{ran:?}");
+    }
+    assert!(case.read(stored) != bytes);
+    assert_eq!(case.stages_run(), [""; 0]);
+}
+
+/// What no file system does: the content is another one, and all that is said of the file stays.
+#[test]
+fn rehash_finds_what_the_file_system_hides() {
+    let case = ran();
+    let (was, _) = hash_file(&case.path(PEDR)).unwrap();
+    change_in_secret(&case);
+    hide(&case.path("out"), &case.path(PEDR), &was);
     assert!(search(&case, &[]).starts_with("keep"));
     // Hashes of files that had not stood still are not kept.
     stand_still();

@@ -335,9 +335,8 @@ fn outputs_of_an_image_that_was_taken_out_are_forgotten() {
     let case = fresh();
     let stored = |case: &Case| {
         let names = std::fs::read_dir(case.path("out/case/.cache")).unwrap();
-        let mut names: Vec<String> = names
-            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-            .collect();
+        let names = names.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        let mut names: Vec<String> = names.filter(|name| !name.starts_with('.')).collect();
         names.sort();
         names
     };

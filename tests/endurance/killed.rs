@@ -54,7 +54,8 @@ fn changes_file(call: &Call, out: &Path) -> bool {
     let name = call.path.file_name().unwrap_or_default().to_string_lossy();
     let of_hashes = name.starts_with(".hashes") || name.starts_with(".partial-");
     // Each writing of them makes and flushes their folder as well.
-    let is_hashes = call.path == out || (call.path.parent() == Some(out) && of_hashes);
+    let of_own = call.path.ends_with(".cache/.hashes");
+    let is_hashes = call.path == out || of_own || (call.path.parent() == Some(out) && of_hashes);
     call.changes() && call.path.starts_with(out) && !is_hashes
 }
 

@@ -145,10 +145,11 @@ impl Region {
         latitude_rad: f64,
         margin_rad: f64,
     ) -> bool {
-        self.pieces.iter().any(|piece| {
-            let bounds = piece.bounds();
-            bounds.reach(longitude_rad, latitude_rad, margin_rad)
-        })
+        self.may_touch(&Cap::new(longitude_rad, latitude_rad, margin_rad))
+    }
+
+    fn may_touch(&self, cap: &Cap) -> bool {
+        self.pieces.iter().any(|piece| piece.bounds().reach(cap))
     }
 }
 
@@ -157,6 +158,28 @@ impl Piece {
         match self {
             Self::Box(bounds) => bounds,
             Self::Polygon { outer, .. } => &outer.bounds,
+        }
+    }
+}
+
+/// The directions within a margin of one, prepared for tests against many windows.
+struct Cap {
+    longitude_rad: f64,
+    south_rad: f64,
+    north_rad: f64,
+    /// See [`half_width_rad`].
+    half_width_rad: Option<f64>,
+}
+
+impl Cap {
+    fn new(longitude_rad: f64, latitude_rad: f64, margin_rad: f64) -> Self {
+        // Rounding of the tests, a nanoradian, is 3 mm on the ground.
+        let margin_rad = margin_rad + 1e-9;
+        Self {
+            longitude_rad,
+            south_rad: latitude_rad - margin_rad,
+            north_rad: latitude_rad + margin_rad,
+            half_width_rad: half_width_rad(latitude_rad, margin_rad),
         }
     }
 }
@@ -179,18 +202,16 @@ impl Bounds {
         between(longitude_rad) || between(longitude_rad + TAU)
     }
 
-    /// Whether a cap of radius `margin_rad` about the direction may touch the bounds.
-    fn reach(&self, longitude_rad: f64, latitude_rad: f64, margin_rad: f64) -> bool {
-        // Rounding of the tests below, a nanoradian, is 3 mm on the ground.
-        let margin_rad = margin_rad + 1e-9;
-        if latitude_rad + margin_rad < self.south || latitude_rad - margin_rad > self.north {
+    /// Whether the cap may touch the bounds.
+    fn reach(&self, cap: &Cap) -> bool {
+        if cap.north_rad < self.south || cap.south_rad > self.north {
             return false;
         }
-        let Some(half_width_rad) = half_width_rad(latitude_rad, margin_rad) else {
+        let Some(half_width_rad) = cap.half_width_rad else {
             return true;
         };
         let middle_rad = 0.5 * (self.west + self.east);
-        let from_middle_rad = wrap_pi(longitude_rad - middle_rad).abs();
+        let from_middle_rad = wrap_pi(cap.longitude_rad - middle_rad).abs();
         from_middle_rad <= 0.5 * (self.east - self.west) + half_width_rad + 1e-9
     }
 }

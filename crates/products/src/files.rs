@@ -12,6 +12,9 @@ use serde_json::Value;
 use super::error::ProductError;
 use areograph_base::error::{IoError, Locate, Result};
 
+/// Bytes that are written at once.
+const BUFFER_BYTES: usize = 1 << 17;
+
 /// Creates `path`, its folder made where missing, to be written piece by piece and [`finish`]ed.
 pub(super) fn create(path: &Path) -> Result<BufWriter<File>> {
     if let Some(folder) = path.parent() {
@@ -22,7 +25,7 @@ pub(super) fn create(path: &Path) -> Result<BufWriter<File>> {
     let file = File::create(path)
         .map_err(IoError::on("create"))
         .in_file(path)?;
-    Ok(BufWriter::new(file))
+    Ok(BufWriter::with_capacity(BUFFER_BYTES, file))
 }
 
 /// Writes the rest of the buffer through to the disk.

@@ -8,7 +8,7 @@
 use std::{
     borrow::Cow,
     collections::BTreeMap,
-    io::{self, Write},
+    io::{self, BufWriter, Write},
     path::{Path, PathBuf},
 };
 
@@ -49,6 +49,9 @@ use areograph_stages::{
     tag_times::ImageTimes,
 };
 use areograph_store::files::{file_name, hash_file};
+
+/// Bytes that are hashed at once.
+const PIECE_BYTES: usize = 1 << 17;
 
 /// Its path below a site's folder.
 pub const PAGE_DATA: &str = "report/page.postcard";
@@ -273,8 +276,13 @@ fn geometric<'a>(of: GeometricProducts<'a>, shown: &[usize]) -> Geometric<'a> {
 ///
 /// It is not decoded: of a million shots the decoded data would be the largest part of a run's memory.
 fn write(path: &Path, site: &SiteProducts) -> Result<()> {
-    let mut written = Hashed::new(create(path)?);
+    // Numbers are encoded one by one, and hashed in pieces.
+    let mut written = BufWriter::with_capacity(PIECE_BYTES, Hashed::new(create(path)?));
     encode(site, &mut written).in_file(path)?;
+    let written = written
+        .into_inner()
+        .map_err(|refusal| IoError::on("write")(refusal.into_error()))
+        .in_file(path)?;
     let (file, hash) = written.end();
     finish(path, file)?;
     if hash_file(path)?.0 == *hash.to_hex() {
@@ -287,13 +295,15 @@ fn write(path: &Path, site: &SiteProducts) -> Result<()> {
 }
 
 /// Writes data as they are encoded: a site with a million shots has half a gigabyte of them.
-fn encode(site: &SiteProducts, to: &mut Hashed<impl Write>) -> Result<()> {
+fn encode(site: &SiteProducts, to: &mut BufWriter<Hashed<impl Write>>) -> Result<()> {
     let data = PageData::of(site)?;
     let encoded = whole(|| postcard::to_io(&data, &mut *to).map(|_| ()));
-    match to.refusal.take() {
-        Some(refusal) => Err(IoError::on("write")(refusal).into()),
-        None => Ok(encoded.map_err(ProductError::refused("encode postcard"))?),
+    let flushed = to.flush();
+    if let Some(refusal) = to.get_mut().refusal.take() {
+        return Err(IoError::on("write")(refusal).into());
     }
+    encoded.map_err(ProductError::refused("encode postcard"))?;
+    Ok(flushed.map_err(IoError::on("write"))?)
 }
 
 /// A writer that hashes its data, and keeps the reason of an error, which postcard discards.

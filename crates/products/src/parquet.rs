@@ -1,8 +1,14 @@
 //! Tables as Parquet files, the same bytes for the same table.
 
-use std::{collections::HashMap, fs::File, io::Write, ops::Range, path::Path, sync::Arc};
+use std::{collections::HashMap, io::Write, ops::Range, path::Path, sync::Arc};
 
-use ::parquet::{arrow::arrow_reader::ParquetRecordBatchReaderBuilder, errors::ParquetError};
+use ::parquet::{
+    arrow::arrow_reader::{
+        ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader,
+        ParquetRecordBatchReaderBuilder,
+    },
+    errors::ParquetError,
+};
 use arrow_array::{
     ArrayRef, BinaryArray, BooleanArray, Float64Array, Int32Array, RecordBatch, StringArray,
     UInt32Array,
@@ -105,20 +111,60 @@ fn array(values: Values) -> ArrayRef {
     }
 }
 
+/// Compares the file with the table, group by group on all threads.
 fn read_back(path: &Path, table: &Table) -> Result<()> {
-    let file: File = open(path)?;
-    let builder =
-        ParquetRecordBatchReaderBuilder::try_new(file).map_err(ProductError::unreadable)?;
+    let metadata = ArrowReaderMetadata::load(&open(path)?, ArrowReaderOptions::default())
+        .map_err(ProductError::unreadable)?;
     let schema = schema(table);
-    if builder.schema().fields() != schema.fields() {
+    if metadata.schema().fields() != schema.fields() {
         let what = "names, types, units or descriptions of columns".to_owned();
         return Err(ProductError::ReadBack { what }.into());
     }
+    let groups = metadata.metadata().row_groups().iter();
     let mut rows = 0;
-    for batch in builder.build().map_err(ProductError::unreadable)? {
+    let ranges: Vec<Range<usize>> = groups
+        .map(|group| {
+            let start = rows;
+            rows += usize::try_from(group.num_rows()).unwrap_or(0);
+            start..rows
+        })
+        .collect();
+    require_rows(rows, table.rows())?;
+    let compared = ranges.par_iter().enumerate().map(|(group, rows)| {
+        // Each with its own position in the file.
+        let file = open(path)?;
+        let batches = ParquetRecordBatchReaderBuilder::new_with_metadata(file, metadata.clone())
+            .with_row_groups(vec![group])
+            .build()
+            .map_err(ProductError::unreadable)?;
+        compare(batches, rows, table, &schema)
+    });
+    let compared: Vec<Result<()>> = compared.collect();
+    compared.into_iter().collect()
+}
+
+fn require_rows(found: usize, expected: usize) -> Result<()> {
+    if found == expected {
+        return Ok(());
+    }
+    Err(ProductError::ReadBack {
+        what: format!("{found} rows of {expected}"),
+    }
+    .into())
+}
+
+/// Compares these rows of the table with those of a file.
+fn compare(
+    batches: ParquetRecordBatchReader,
+    range: &Range<usize>,
+    table: &Table,
+    schema: &SchemaRef,
+) -> Result<()> {
+    let mut rows = range.start;
+    for batch in batches {
         let batch = batch.map_err(ProductError::unreadable)?;
         let end = rows + batch.num_rows();
-        let expected = record_batch(table, &schema, rows..end.min(table.rows()))?;
+        let expected = record_batch(table, schema, rows..end.min(range.end))?;
         for (column, (found, expected)) in table
             .columns()
             .zip(batch.columns().iter().zip(expected.columns()))
@@ -132,11 +178,5 @@ fn read_back(path: &Path, table: &Table) -> Result<()> {
         }
         rows = end;
     }
-    if rows != table.rows() {
-        return Err(ProductError::ReadBack {
-            what: format!("{rows} rows of {}", table.rows()),
-        }
-        .into());
-    }
-    Ok(())
+    require_rows(rows, range.end)
 }

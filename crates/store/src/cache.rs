@@ -1,29 +1,48 @@
 //! Stage outputs on disk, each with its inputs.
 //!
 //! Outputs are in `<site>/.cache` (postcard) and are not read back from products: products serve external tools and
-//! are rounded where their formats are.
+//! are rounded where their formats are. Large ones are hashed when the file system reports a change, and read when a
+//! stage uses them.
 
 use std::{
     collections::BTreeSet,
-    fs,
-    io::ErrorKind,
+    fs::{self, File},
+    io::{ErrorKind, Read as _},
     path::{Path, PathBuf},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use super::atomic;
-use crate::stage::{Inputs, Output, Provenance, Reason};
+use crate::{
+    files::InputFiles,
+    stage::{Inputs, Output, Provenance, Reason},
+};
 use areograph_base::{
     error::{Cause, Locate, Result},
     stored::whole,
 };
+
+/// Largest output that is read at once, bytes: a larger one is read on demand.
+const READ_AT_ONCE: u64 = 1 << 20;
+/// Bytes of a file that usually contain its header.
+const HEAD_BYTES: u64 = 1 << 16;
 
 /// Outputs of a site's stages, in `<out>/<site>/.cache`.
 #[derive(Debug)]
 pub struct StageCache {
     folder: PathBuf,
     forced: bool,
+    /// Stored outputs and products, by hash.
+    own: InputFiles,
+    /// Whether large outputs are read on demand.
+    on_demand: bool,
+    /// Whether one of these could not be read.
+    lost: Arc<AtomicBool>,
 }
 
 /// Header of a stage output in its file, both in postcard: outputs are large, so they are not copied.
@@ -50,7 +69,33 @@ impl StageCache {
         Self {
             folder: folder.to_owned(),
             forced,
+            own: InputFiles::default(),
+            on_demand: false,
+            lost: Arc::default(),
         }
+    }
+
+    /// The same with the hashes of stored outputs and products from earlier runs, to which those of this run are added; large
+    /// outputs are read on demand.
+    #[must_use]
+    pub fn knowing(self, own: InputFiles) -> Self {
+        Self {
+            own,
+            on_demand: true,
+            ..self
+        }
+    }
+
+    /// Whether an output that was to be read on demand could not be read. What was made since is not reliable.
+    #[must_use]
+    pub fn has_lost_output(&self) -> bool {
+        self.lost.load(Ordering::Relaxed)
+    }
+
+    /// Hashes of stored outputs and products.
+    #[must_use]
+    pub const fn own(&self) -> &InputFiles {
+        &self.own
     }
 
     /// The stored output of the stage with this label for these inputs, or why the stage has to run.
@@ -65,27 +110,35 @@ impl StageCache {
         if self.forced {
             return Err(Reason::Forced);
         }
-        let bytes = fs::read(self.path(label)).map_err(|error| match error.kind() {
+        let path = self.path(label);
+        let mut file = File::open(&path).map_err(|error| match error.kind() {
             ErrorKind::NotFound => Reason::First,
             _ => Reason::Damaged,
         })?;
-        let (stored, payload): (Head, &[u8]) =
-            postcard::take_from_bytes(&bytes).map_err(|_| Reason::Damaged)?;
-        let changes = inputs.changed_since(&stored.inputs);
+        let (head, start) = read_head(&mut file).ok_or(Reason::Damaged)?;
+        let changes = inputs.changed_since(&head.inputs);
         if !changes.is_empty() {
             return Err(Reason::Changed(changes));
         }
-        let is_whole =
-            u64::try_from(payload.len()).is_ok_and(|bytes| bytes == stored.payload_bytes);
-        if !is_whole || *blake3::hash(payload).to_hex() != *stored.blake3 {
+        let bytes = file.metadata().map_err(|_| Reason::Damaged)?.len();
+        if bytes.checked_sub(start) != Some(head.payload_bytes) {
             return Err(Reason::Damaged);
         }
-        let value = read(payload).ok_or(Reason::Damaged)?;
         let provenance = Provenance {
-            blake3: stored.blake3,
+            blake3: head.blake3,
             fingerprint: inputs.fingerprint(),
         };
-        Ok(Output::known(label.to_owned(), value, provenance))
+        let label = label.to_owned();
+        if !self.on_demand || head.payload_bytes <= READ_AT_ONCE {
+            let value = read_output(&path, &provenance.blake3).ok_or(Reason::Damaged)?;
+            return Ok(Output::known(label, value, provenance));
+        }
+        let hashed = self.own.hash_from(&path, start);
+        if hashed.is_ok_and(|file| file.blake3 == provenance.blake3) {
+            let output = Output::stored(label, path, read_output, &self.lost, provenance);
+            return Ok(output);
+        }
+        Err(Reason::Damaged)
     }
 
     /// Stores the output of the stage with this label, with its inputs.
@@ -119,7 +172,8 @@ impl StageCache {
         };
         let head = postcard::to_stdvec(&head).map_err(unstorable)?;
         let path = self.path(label);
-        atomic::write_parts(&path, &[&head, &payload]).in_file(path)?;
+        atomic::write_parts(&path, &[&head, &payload]).in_file(&path)?;
+        self.own.forget(&path);
         Ok(Output::known(label.to_owned(), value, provenance))
     }
 
@@ -142,19 +196,47 @@ impl StageCache {
     }
 
     fn path(&self, stage: &str) -> PathBuf {
-        self.folder.join(stage.replace('/', "+"))
+        path_in(&self.folder, stage)
     }
+}
+
+fn path_in(folder: &Path, stage: &str) -> PathBuf {
+    folder.join(stage.replace('/', "+"))
 }
 
 /// Whether the file begins like a stored output; files of other programs are not those of areograph to remove.
 fn is_stage_output(path: &Path) -> bool {
-    let bytes = fs::read(path).unwrap_or_default();
-    postcard::take_from_bytes::<Head>(&bytes).is_ok_and(|(head, _)| head.blake3.len() == 64)
+    let head = File::open(path)
+        .ok()
+        .and_then(|mut file| read_head(&mut file));
+    head.is_some_and(|(head, _)| head.blake3.len() == 64)
+}
+
+/// The header at the start of the file and its size in bytes.
+fn read_head(file: &mut File) -> Option<(Head, u64)> {
+    let mut bytes = Vec::new();
+    loop {
+        let wanted = (bytes.len() as u64).max(HEAD_BYTES);
+        let read = file.by_ref().take(wanted).read_to_end(&mut bytes).ok()?;
+        match postcard::take_from_bytes::<Head>(&bytes) {
+            Ok((head, rest)) => return Some((head, (bytes.len() - rest.len()) as u64)),
+            Err(postcard::Error::DeserializeUnexpectedEnd) if read > 0 => {}
+            Err(_) => return None,
+        }
+    }
+}
+
+/// The output in the file `path` if its hash is `blake3`.
+fn read_output<T: DeserializeOwned>(path: &Path, blake3: &str) -> Option<T> {
+    let bytes = fs::read(path).ok()?;
+    let (_, payload): (Head, &[u8]) = postcard::take_from_bytes(&bytes).ok()?;
+    let intact = *blake3::hash(payload).to_hex() == *blake3;
+    intact.then(|| read(payload))?
 }
 
 /// The output of the stage with this label in the cache `folder`, whatever its inputs were.
 pub(super) fn stored<T: DeserializeOwned>(folder: &Path, label: &str) -> Option<T> {
-    let bytes = fs::read(StageCache::new(folder, false).path(label)).ok()?;
+    let bytes = fs::read(path_in(folder, label)).ok()?;
     let (_, payload): (Head, &[u8]) = postcard::take_from_bytes(&bytes).ok()?;
     read(payload)
 }
@@ -218,5 +300,53 @@ mod tests {
         // What exists and cannot be read.
         fs::create_dir(&path).unwrap();
         assert_eq!(why(&cache, 1), Some(Reason::Damaged));
+    }
+
+    #[test]
+    fn a_large_output_is_read_when_it_is_used_and_a_damaged_one_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = StageCache::new(folder.path(), false).knowing(InputFiles::default());
+        let heights: Vec<u32> = (0..1 << 20).collect();
+        let stored = cache
+            .store("search", Inputs::new(1), heights.clone())
+            .unwrap();
+        let load = || cache.load::<Vec<u32>>("search", &Inputs::new(1)).unwrap();
+        let loaded = load();
+        assert_eq!(loaded.provenance(), stored.provenance());
+        assert_eq!(loaded.value().unwrap(), &heights);
+        let fewer = load().without_rows(|heights| heights.truncate(3));
+        assert_eq!(fewer.value().unwrap(), &[0, 1, 2]);
+        // One bit, after the output was examined and before it is used.
+        let unread = load();
+        let path = folder.path().join("search");
+        let mut bytes = fs::read(&path).unwrap();
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 1;
+        atomic::write(&path, &bytes).unwrap();
+        assert!(!cache.has_lost_output());
+        let lost = unread.value().unwrap_err().to_string();
+        assert!(cache.has_lost_output() && unread.get().is_none());
+        assert!(
+            lost.contains("the stored output of search is damaged"),
+            "{lost}"
+        );
+        // The file remains; whoever reads all outputs at once identifies it.
+        let at_once = StageCache::new(folder.path(), false);
+        let damaged = at_once.load::<Vec<u32>>("search", &Inputs::new(1));
+        assert_eq!(damaged.err(), Some(Reason::Damaged));
+    }
+
+    #[test]
+    fn a_large_head_is_read_in_pieces() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = StageCache::new(folder.path(), false);
+        let mut inputs = Inputs::new(1);
+        for image in 0..10_000 {
+            inputs.setting(&format!("image {image}"), &image);
+        }
+        cache.store("publish", inputs.clone(), 7_u32).unwrap();
+        assert!(fs::metadata(folder.path().join("publish")).unwrap().len() > 2 * HEAD_BYTES);
+        let loaded = cache.load::<u32>("publish", &inputs).unwrap();
+        assert_eq!(loaded.value().unwrap(), &7);
     }
 }

@@ -10,6 +10,7 @@ mod staged;
 use std::{
     collections::{BTreeMap, BTreeSet},
     fs::File,
+    io::{Seek as _, SeekFrom},
     path::{Path, PathBuf},
     sync::{Mutex, PoisonError},
     time::{SystemTime, UNIX_EPOCH},
@@ -150,6 +151,14 @@ impl InputFiles {
     /// # Errors
     /// The file cannot be read, must not be read, or has changed.
     pub fn hash(&self, path: &Path) -> Result<HashedFile> {
+        self.hash_from(path, 0)
+    }
+
+    /// The same for a file that is always hashed from the same byte `start` on: known hashes do not contain it.
+    ///
+    /// # Errors
+    /// As [`Self::hash`].
+    pub fn hash_from(&self, path: &Path, start: u64) -> Result<HashedFile> {
         self.admit(path)?;
         let now = identity(path)?;
         let earlier = self.lock().files.get(path).cloned();
@@ -160,7 +169,7 @@ impl InputFiles {
         }
         let seen = match self.earlier.get(&now) {
             Some(known) => SeenFile::known(path, known),
-            None => SeenFile::read(path)?,
+            None => SeenFile::read(path, start)?,
         };
         if let Some(earlier) = earlier {
             unchanged(&earlier.file, &seen.file)?;
@@ -168,6 +177,11 @@ impl InputFiles {
         let file = seen.file.clone();
         self.lock().files.insert(path.to_owned(), seen);
         Ok(file)
+    }
+
+    /// Forgets a file that the run has replaced.
+    pub fn forget(&self, path: &Path) {
+        self.lock().files.remove(path);
     }
 
     /// Whether the run has hashed this file before.
@@ -197,8 +211,16 @@ impl InputFiles {
     /// Findings that later runs need not repeat, beyond those that were known.
     #[must_use]
     pub fn learnt(&self) -> Vec<KnownFile> {
+        let mut learnt = self.findings();
+        learnt.retain(|file| self.earlier.get(&file.identity) != Some(file));
+        learnt
+    }
+
+    /// Findings that later runs need not repeat.
+    #[must_use]
+    pub fn findings(&self) -> Vec<KnownFile> {
         let seen = self.lock();
-        let known = seen.files.values().filter_map(|known| {
+        let findings = seen.files.values().filter_map(|known| {
             let passed = seen.passed.iter();
             let checks = passed.filter(|(blake3, _)| *blake3 == known.file.blake3);
             Some(KnownFile {
@@ -208,8 +230,7 @@ impl InputFiles {
                 read_s: known.read_s?,
             })
         });
-        let new = known.filter(|file| self.earlier.get(&file.identity) != Some(file));
-        new.collect()
+        findings.collect()
     }
 
     /// Several files in their order; `watch` is checked before each, and counts those that were not known before.
@@ -276,11 +297,11 @@ impl SeenFile {
         }
     }
 
-    fn read(path: &Path) -> Result<Self> {
+    fn read(path: &Path, start: u64) -> Result<Self> {
         let begun = SystemTime::now();
         let file = open(path)?;
         let identity = identity_of(&file).in_file(path)?;
-        let (blake3, bytes) = hash_open(&file).in_file(path)?;
+        let (blake3, bytes) = hash_open(&file, start).in_file(path)?;
         let steady = identity.is_steady(begun) && identity_of(&file).in_file(path)? == identity;
         let read_s = begun.duration_since(UNIX_EPOCH).ok().filter(|_| steady);
         Ok(Self {
@@ -325,14 +346,16 @@ fn unchanged(earlier: &HashedFile, now: &HashedFile) -> Result<()> {
 /// # Errors
 /// The file cannot be read.
 pub fn hash_file(path: &Path) -> Result<(String, u64)> {
-    hash_open(&open(path)?).in_file(path)
+    hash_open(&open(path)?, 0).in_file(path)
 }
 
 fn open(path: &Path) -> Result<File> {
     File::open(path).map_err(IoError::on("open")).in_file(path)
 }
 
-fn hash_open(mut file: &File) -> std::result::Result<(String, u64), IoError> {
+fn hash_open(mut file: &File, start: u64) -> std::result::Result<(String, u64), IoError> {
+    let sought = file.seek(SeekFrom::Start(start));
+    sought.map_err(IoError::on("read"))?;
     let mut hasher = blake3::Hasher::new();
     let bytes = std::io::copy(&mut file, &mut hasher).map_err(IoError::on("read"))?;
     Ok((hasher.finalize().to_hex().to_string(), bytes))

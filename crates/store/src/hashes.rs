@@ -1,15 +1,17 @@
-//! Hashes of input files, kept between runs: an unchanged file is not read again.
+//! Hashes of files, kept between runs: an unchanged file is not read again.
 //!
 //! Stored hashes only save time. A file of hashes that is damaged, foreign or not writable is treated as absent.
 //!
 //! Kernels, labels, PEDR and tie point files are hashed once in a run (`files.rs`), and again in later runs only when
 //! the file system reports a change; `--rehash` reads all of them. Their identity (device, inode, size, times) is
 //! compared after each stage that read them and before publishing. A changed file ends the run, and everything made
-//! from it is discarded.
+//! from it is discarded. Hashes of the products and large stage outputs of a site are in a separate file among these outputs; a
+//! run makes a changed one again.
 
 use std::{
     ffi::OsString,
     fs::{self, File, TryLockError},
+    io::Write as _,
     path::{Path, PathBuf},
     thread,
     time::Duration,
@@ -63,6 +65,12 @@ impl HashCache {
         Self::new(&out.join(HASHES), rehash)
     }
 
+    /// Hashes of the products and stage outputs of a site, in the folder `cache` of these outputs.
+    #[must_use]
+    pub fn of_own(&self, cache: &Path) -> Self {
+        Self::in_folder(cache, self.rehash)
+    }
+
     /// Input files of a run that knows these hashes.
     #[must_use]
     pub fn files(&self) -> InputFiles {
@@ -89,6 +97,21 @@ impl HashCache {
         }
     }
 
+    /// Replaces the stored hashes by those of a run over all files, because files that were replaced do not return.
+    pub fn keep_only(&self, files: &InputFiles) {
+        if files.learnt().is_empty() || !self.folder().is_dir() {
+            return;
+        }
+        let Some(bytes) = encoded(files.findings()) else {
+            return;
+        };
+        // The folder belongs to areograph, and an incomplete file is treated as absent.
+        let written = File::create(&self.path).and_then(|mut file| file.write_all(&bytes));
+        if let Err(failure) = written {
+            tracing::warn!("hashes of products are not kept: {failure}");
+        }
+    }
+
     fn folder(&self) -> &Path {
         match self.path.parent() {
             Some(folder) if folder != Path::new("") => folder,
@@ -103,22 +126,24 @@ impl HashCache {
             // The holder of the lock is stopped. Reading files again costs less than waiting for it.
             return Ok(());
         };
-        let mut known: Vec<KnownFile> = {
-            let mut known = self.known();
-            for file in learnt {
-                known.add(*file);
-            }
-            known.iter().copied().collect()
-        };
-        known.sort_by_key(|file| std::cmp::Reverse(file.read_s));
-        known.truncate(FILES_MAX);
-        let Ok(entries) = postcard::to_stdvec(&known) else {
-            return Ok(());
-        };
-        let hash = blake3::hash(&entries);
-        let bytes = [HEADER, hash.as_bytes(), &entries].concat();
-        atomic::replace(&self.path, &bytes, MARK)
+        let mut known = self.known();
+        for file in learnt {
+            known.add(*file);
+        }
+        match encoded(known.iter().copied().collect()) {
+            Some(bytes) => atomic::replace(&self.path, &bytes, MARK),
+            None => Ok(()),
+        }
     }
+}
+
+/// The content of a file of these hashes.
+fn encoded(mut known: Vec<KnownFile>) -> Option<Vec<u8>> {
+    known.sort_by_key(|file| std::cmp::Reverse(file.read_s));
+    known.truncate(FILES_MAX);
+    let entries = postcard::to_stdvec(&known).ok()?;
+    let hash = blake3::hash(&entries);
+    Some([HEADER, hash.as_bytes(), &entries].concat())
 }
 
 fn read(path: &Path) -> Option<KnownFiles> {

@@ -20,7 +20,7 @@ use super::{
     cache::stored,
     manifest::{Manifest, ProductEntry},
 };
-use crate::files::{hash_file, short_hash};
+use crate::files::{InputFiles, hash_file, short_hash};
 use areograph_base::error::{Cause, IoError, Locate, Result};
 
 pub use super::manifest::MANIFEST;
@@ -368,9 +368,30 @@ pub(super) fn damaged<'a>(
     site_folder: &Path,
     manifest: &'a Manifest,
 ) -> impl Iterator<Item = (&'a ProductEntry, Result<String>)> {
+    let hash = |path: &Path| hash_file(path);
+    differing(site_folder, manifest, hash)
+}
+
+/// The first product that is missing or differs from the manifest; `files` knows those that are unchanged.
+#[must_use]
+pub fn damaged_product(
+    site_folder: &Path,
+    manifest: &Manifest,
+    files: &InputFiles,
+) -> Option<String> {
+    let hash = |path: &Path| files.hash(path).map(|file| (file.blake3, file.bytes));
+    let (product, _) = differing(site_folder, manifest, hash).next()?;
+    Some(product.path.clone())
+}
+
+fn differing<'a>(
+    site_folder: &Path,
+    manifest: &'a Manifest,
+    hash: impl Fn(&Path) -> Result<(String, u64)>,
+) -> impl Iterator<Item = (&'a ProductEntry, Result<String>)> {
     manifest.products.iter().filter_map(move |product| {
         let path = site_folder.join(&product.path);
-        let found = match hash_file(&path) {
+        let found = match hash(&path) {
             Ok((blake3, _)) if blake3 == product.blake3 => return None,
             Ok((blake3, bytes)) => Ok(format!(
                 "has {bytes} bytes with the hash {}",
@@ -381,11 +402,4 @@ pub(super) fn damaged<'a>(
         };
         Some((product, found))
     })
-}
-
-/// The first product that is missing or differs from the manifest.
-#[must_use]
-pub fn damaged_product(site_folder: &Path, manifest: &Manifest) -> Option<String> {
-    let (product, _) = damaged(site_folder, manifest).next()?;
-    Some(product.path.clone())
 }

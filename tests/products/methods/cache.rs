@@ -138,8 +138,7 @@ pub(crate) fn rows(
 ) -> Vec<Row> {
     let products = cache.parent().unwrap();
     let mut by_stage: BTreeMap<String, Vec<Stored>> = BTreeMap::new();
-    for entry in fs::read_dir(cache).unwrap() {
-        let stored = Stored::read(&entry.unwrap().path());
+    for stored in all(cache) {
         by_stage
             .entry(stored.stage.clone())
             .or_default()
@@ -176,8 +175,19 @@ pub(crate) fn rows(
 
 /// Names of the stages in `cache` with their inputs.
 pub(crate) fn inputs(cache: &Path) -> Vec<Stored> {
+    all(cache).collect()
+}
+
+fn all(cache: &Path) -> impl Iterator<Item = Stored> {
     let entries = fs::read_dir(cache).unwrap();
-    entries
-        .map(|entry| Stored::read(&entry.unwrap().path()))
-        .collect()
+    let paths = entries.map(|entry| entry.unwrap().path());
+    // Hashes of these files are hidden.
+    let outputs = paths.filter(|path| {
+        !path
+            .file_name()
+            .unwrap()
+            .as_encoded_bytes()
+            .starts_with(b".")
+    });
+    outputs.map(|path| Stored::read(&path))
 }

@@ -307,6 +307,16 @@ interval of 95 % counts sites, profiles and images, not single points. The three
 true interval is wider. The missions with further keys are the first 30. Invalid sites do not enter the tables: their
 products are published, but marked invalid.
 
+The intervals of the scene were chosen after a first trial with the missions of this page. Therefore 60 further missions were run once (seeds from
+60,001; 172 sites with correctly placed profiles, 4 of them invalid; in this run alone, the scatter of tie points was larger across the track, by
+√1.5). Most of their ratios are larger; the share beyond three standard deviations is in brackets:
+
+- with default values: mean height 1.09 (1.2 %), single height 1.15 (1.3 %), MOLA surface before the adjustment 1.44 (4.1 %), adjusted footprints east
+  1.02 (0.7 %) and north 1.27 (0.6 %); mean places of tie points east 0.97 and north 0.83 (0 %);
+- with `common_bus`: mean place of the tie points of a site, east 1.30 (2.3 %); adjusted footprints east 1.16 (1.7 %) and north 1.31 (0.6 %).
+
+Statements on mean heights and, with default values, on places therefore hold. The error east with `common_bus` is larger than stated.
+
 Below each table, the page lists the quantities that exceed their standard deviations. The causes:
 
 - *Heights of single tie points.* Jitter in roll changes heights but causes no residuals. The scatter of tie points is estimated from residuals

@@ -21,6 +21,9 @@ const PREDICTING: usize = 400;
 /// Every so many shots of a stretch, the distance of others is taken.
 const DISTANCE_STEP: usize = 5;
 
+/// Rounding of distances, metres.
+const ROUNDING_M: f64 = 0.001;
+
 /// A stretch of a profile, predicted from the other profiles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Withheld {
@@ -123,6 +126,36 @@ pub fn withheld(shots: &[SurfaceShot], options: &SurfaceOptions) -> Vec<Withheld
         .collect()
 }
 
+/// Shots of other profiles, among them the [`PREDICTING`] nearest to the sampled shots of a stretch.
+///
+/// A shot is at most as far from the samples as from their middle, and nearer by at most the reach of the samples: of a million
+/// shots few remain.
+fn candidates(shots: &[SurfaceShot], profile: usize, sampled: &[&Vector3<f64>]) -> Vec<usize> {
+    let middle = sampled[sampled.len() / 2];
+    let reach_m = sampled.iter().map(|of| (*of - middle).norm());
+    let reach_m = reach_m.fold(0.0, f64::max);
+    let from_middle_m = shots.iter().map(|shot| {
+        let from_m = (shot.ground_m - middle).norm();
+        if shot.profile != profile && from_m.is_finite() {
+            from_m
+        } else {
+            f64::INFINITY
+        }
+    });
+    let from_middle_m: Vec<f64> = from_middle_m.collect();
+    let far_m = if from_middle_m.len() > PREDICTING {
+        let mut sizes_m = from_middle_m.clone();
+        let (_, of_last, _) = sizes_m.select_nth_unstable_by(PREDICTING, f64::total_cmp);
+        (*of_last + reach_m + ROUNDING_M).min(f64::MAX)
+    } else {
+        f64::MAX
+    };
+    let near = from_middle_m.iter().enumerate();
+    near.filter(|(_, from_m)| **from_m <= far_m)
+        .map(|(index, _)| index)
+        .collect()
+}
+
 fn predicted(
     shots: &[SurfaceShot],
     from: usize,
@@ -131,14 +164,17 @@ fn predicted(
 ) -> Option<Withheld> {
     let stretch = &shots[from..to];
     let profile = stretch[0].profile;
-    let others = shots
+    let sampled: Vec<&Vector3<f64>> = stretch
         .iter()
-        .enumerate()
-        .filter(|(_, shot)| shot.profile != profile);
-    let mut by_distance: Vec<(f64, usize)> = others
-        .map(|(index, shot)| {
-            let to_shots = stretch.iter().step_by(DISTANCE_STEP);
-            let distances_m = to_shots.map(|of| (of.ground_m - shot.ground_m).norm());
+        .step_by(DISTANCE_STEP)
+        .map(|shot| &shot.ground_m)
+        .collect();
+    let mut by_distance: Vec<(f64, usize)> = candidates(shots, profile, &sampled)
+        .into_iter()
+        .map(|index| {
+            let distances_m = sampled
+                .iter()
+                .map(|of| (*of - shots[index].ground_m).norm());
             (distances_m.fold(f64::INFINITY, f64::min), index)
         })
         .collect();

@@ -3,7 +3,7 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use super::{Bounds, Extent, Region};
+use super::{Bounds, Cap, Extent, Region};
 use areograph_base::units::RADIANS_PER_DEGREE;
 
 /// Side of a cell, radians.
@@ -90,13 +90,17 @@ impl WindowGrid {
     /// Whether a window lies within `margin_rad` of the direction; see [`Region::may_contain_within`].
     #[must_use]
     pub fn any_within(&self, longitude_rad: f64, latitude_rad: f64, margin_rad: f64) -> bool {
-        let within =
-            |region: &Region| region.may_contain_within(longitude_rad, latitude_rad, margin_rad);
-        match self.cell(longitude_rad, latitude_rad, margin_rad) {
-            None => self.regions.iter().any(within),
+        let cell = self.cell(longitude_rad, latitude_rad, margin_rad);
+        // Most frames of an archive are far from all windows.
+        if cell.is_some_and(<[_]>::is_empty) && self.wide.is_empty() {
+            return false;
+        }
+        let cap = Cap::new(longitude_rad, latitude_rad, margin_rad);
+        match cell {
+            None => self.regions.iter().any(|region| region.may_touch(&cap)),
             Some(cell) => {
                 let mut windows = cell.iter().chain(&self.wide);
-                windows.any(|window| within(&self.regions[*window as usize]))
+                windows.any(|window| self.regions[*window as usize].may_touch(&cap))
             }
         }
     }
@@ -118,10 +122,11 @@ impl WindowGrid {
                 near.sort_unstable();
             }
         }
-        near.retain(|window| {
-            let region = &self.regions[*window as usize];
-            region.may_contain_within(longitude_rad, latitude_rad, margin_rad)
-        });
+        if near.is_empty() {
+            return;
+        }
+        let cap = Cap::new(longitude_rad, latitude_rad, margin_rad);
+        near.retain(|window| self.regions[*window as usize].may_touch(&cap));
     }
 
     /// Whether window `window` contains the direction.

@@ -269,47 +269,67 @@ pub fn check_ranges<'a>(
 ) -> Result<RangeCheck> {
     let watch = watch.into();
     watch.announce(profiles.iter().map(|profile| profile.rows.len()).sum());
+    let check = |(index, profile): (usize, &Profile)| {
+        watch.check()?;
+        let index = u32::try_from(index).unwrap_or(u32::MAX);
+        let found = check_profile(footprints, index, profile, trajectory, clock, limits)?;
+        watch.step(profile.rows.len() as u64, "shots");
+        Ok(found)
+    };
     let mut shots = ShotResiduals::default();
     let mut checked = Vec::with_capacity(profiles.len());
-    for (index, profile) in (0_u32..).zip(profiles) {
-        watch.check()?;
-        let first = shots.len();
-        let residuals = |row: &u32| {
-            let shot = footprints.row(*row as usize);
-            let at = clock.spacecraft_time(shot.et_tag_s);
-            let (position, velocity_m_s) = trajectory.state(at).ok_or(at)?;
-            let spacecraft = SpacecraftState::of(at, &position, &velocity_m_s);
-            Ok(RangeResiduals::of(&shot, &spacecraft))
-        };
-        let of_shots: Vec<std::result::Result<RangeResiduals, Et>> =
-            profile.rows.par_iter().map(residuals).collect();
-        for (row, residuals) in profile.rows.iter().zip(of_shots) {
-            let residuals = residuals.map_err(|at| OutsideTrajectory {
-                profile: profile.id.clone(),
-                at,
-            })?;
-            shots.push(index, *row, &residuals);
-        }
-        let flags = outliers(&shots.range_minus_distance_m[first..], limits.outlier_sigma);
-        shots.outlier.extend(flags);
-        let kept: Vec<Footprint> = (first..shots.len())
-            .filter(|shot| !shots.outlier[*shot])
-            .map(|shot| footprints.row(shots.row[shot] as usize))
-            .collect();
-        let scan = BiasScan::of(&kept, trajectory, limits);
-        let mut ranges = statistics(profile, &shots, first, scan, footprints);
-        let explain = || orbit::cause(footprints, profile, trajectory, clock, limits.orbit_max_m);
-        ranges.invalid_because = ranges
-            .figures()
-            .broken_limits(&ranges.limits(limits), explain);
+    let found: Vec<Result<(ShotResiduals, ProfileRanges)>> =
+        profiles.par_iter().enumerate().map(check).collect();
+    for found in found {
+        let (of_profile, ranges) = found?;
+        shots.append(of_profile);
         checked.push(ranges);
-        watch.step(profile.rows.len() as u64, "shots");
     }
     Ok(RangeCheck {
         shots,
         profiles: checked,
         trajectory_error_m: trajectory.max_error_m(),
     })
+}
+
+/// Residuals and statistics of a profile.
+fn check_profile(
+    footprints: &Footprints<BodyFixed>,
+    index: u32,
+    profile: &Profile,
+    trajectory: &Trajectory,
+    clock: &MolaClock,
+    limits: &RangeCheckConfig,
+) -> Result<(ShotResiduals, ProfileRanges)> {
+    let residuals = |row: &u32| {
+        let shot = footprints.row(*row as usize);
+        let at = clock.spacecraft_time(shot.et_tag_s);
+        let (position, velocity_m_s) = trajectory.state(at).ok_or(at)?;
+        let spacecraft = SpacecraftState::of(at, &position, &velocity_m_s);
+        Ok(RangeResiduals::of(&shot, &spacecraft))
+    };
+    let of_shots: Vec<std::result::Result<RangeResiduals, Et>> =
+        profile.rows.par_iter().map(residuals).collect();
+    let mut shots = ShotResiduals::default();
+    for (row, residuals) in profile.rows.iter().zip(of_shots) {
+        let residuals = residuals.map_err(|at| OutsideTrajectory {
+            profile: profile.id.clone(),
+            at,
+        })?;
+        shots.push(index, *row, &residuals);
+    }
+    shots.outlier = outliers(&shots.range_minus_distance_m, limits.outlier_sigma);
+    let kept: Vec<Footprint> = (0..shots.len())
+        .filter(|shot| !shots.outlier[*shot])
+        .map(|shot| footprints.row(shots.row[shot] as usize))
+        .collect();
+    let scan = BiasScan::of(&kept, trajectory, limits);
+    let mut ranges = statistics(profile, &shots, 0, scan, footprints);
+    let explain = || orbit::cause(footprints, profile, trajectory, clock, limits.orbit_max_m);
+    ranges.invalid_because = ranges
+        .figures()
+        .broken_limits(&ranges.limits(limits), explain);
+    Ok((shots, ranges))
 }
 
 /// Statistics of the profile whose shots begin at `first`, not judged yet.

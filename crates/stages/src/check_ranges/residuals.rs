@@ -40,6 +40,31 @@ impl ShotResiduals {
         self.row.is_empty()
     }
 
+    /// Appends the shots of another profile.
+    pub(super) fn append(&mut self, other: Self) {
+        let Self {
+            profile,
+            row,
+            range_minus_distance_m,
+            range_minus_distance_crossover_m,
+            decoding_m,
+            spacecraft_radial_m,
+            spacecraft_along_m,
+            spacecraft_cross_m,
+            outlier,
+        } = other;
+        self.profile.extend(profile);
+        self.row.extend(row);
+        self.range_minus_distance_m.extend(range_minus_distance_m);
+        self.range_minus_distance_crossover_m
+            .extend(range_minus_distance_crossover_m);
+        self.decoding_m.extend(decoding_m);
+        self.spacecraft_radial_m.extend(spacecraft_radial_m);
+        self.spacecraft_along_m.extend(spacecraft_along_m);
+        self.spacecraft_cross_m.extend(spacecraft_cross_m);
+        self.outlier.extend(outlier);
+    }
+
     pub(super) fn push(&mut self, profile: u32, row: u32, residuals: &RangeResiduals) {
         self.profile.push(profile);
         self.row.push(row);
