@@ -191,7 +191,8 @@ impl Declaration {
         }
     }
 
-    /// Whether it is written only from the footprints, independent of other products.
+    /// Whether it is written only from the footprints, independent of other products. Only such products are written in the
+    /// thread pool: adjusted kernels wait for CSPICE, whose holder may itself wait for the pool.
     pub(super) const fn is_apart(&self) -> bool {
         matches!(self.write, Write::Footprints(..))
     }

@@ -64,8 +64,6 @@ mod surface;
 mod timeline;
 mod uncertainty;
 
-use rayon::prelude::*;
-
 use areograph_base::error::Result;
 use areograph_products::SiteProducts;
 
@@ -115,10 +113,10 @@ const SECTIONS: &[Section] = &[
 /// # Errors
 /// A plot that cannot be drawn, which is a bug in areograph.
 pub fn page(site: &SiteProducts) -> Result<String> {
-    let sections = SECTIONS.par_iter().map(|section| section.of(site));
-    let sections: Vec<Result<Option<html::Section>>> = sections.collect();
-    let sections = sections.into_iter().filter_map(Result::transpose);
-    let sections: Vec<html::Section> = sections.collect::<Result<_>>()?;
+    let sections = SECTIONS.iter().map(|section| section.of(site));
+    let sections: Vec<html::Section> = sections
+        .filter_map(Result::transpose)
+        .collect::<Result<_>>()?;
     let page = html::page(&site.config.site, &summary::lead(site)?, &sections);
     Ok(plots::with_files(&page))
 }
