@@ -304,6 +304,9 @@ fn grid(craters: &[Crater]) -> HashMap<[i32; 2], Vec<usize>> {
 }
 
 #[cfg(test)]
+mod surface_tests;
+
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::terrain::REFERENCE_RADIUS_M;

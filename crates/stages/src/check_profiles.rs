@@ -139,7 +139,7 @@ stage_inputs! {
 
 impl Stage for CheckProfiles<'_> {
     const NAME: &'static str = "check_profiles";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     type Output = ProfileCheck;
     stage_inputs!(fingerprint);
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector2};
 
-use super::{Placed, SharedErrors, Variogram};
+use super::{Placed, SharedErrors, Variogram, shot::PROFILE_PLAN_M};
 
 /// The kriging equations of some shots, factorised.
 #[derive(Debug, Clone)]
@@ -41,6 +41,11 @@ impl Weights {
 
 impl Kriging {
     /// The noise of a shot has `shot_sigma_m`, the radial error that the shots of a profile share `profile_sigma_m`.
+    ///
+    /// A shot of a profile with a larger error in plan has the height of ground at that distance δ: an additional variance 2 γ(δ).
+    /// Errors of neighbouring shots are in truth correlated; independent noise is an approximation. Without it, kriging
+    /// continues the difference from a neighbouring profile as a slope, to where no shots are.
+    ///
     /// `None` when a number is not finite.
     pub(super) fn new(
         shots: Vec<Placed>,
@@ -58,7 +63,8 @@ impl Kriging {
                 noise_m2 += profile_sigma_m.powi(2) * shared;
             }
             if row == column {
-                noise_m2 += shot_sigma_m.powi(2);
+                noise_m2 +=
+                    shot_sigma_m.powi(2) + 2.0 * variogram.at(shots[row].shared.farther_m());
             }
             sill_m2 - variogram.between(&shots[row].plan_m, &shots[column].plan_m) + noise_m2
         });
@@ -140,9 +146,7 @@ impl Kriging {
 
     /// The same of the part of the errors in plan by which they exceed those of a profile at nadir of known attitude.
     pub(super) fn farther_of_profiles(&self, weights: &Weights) -> DMatrix<f64> {
-        self.weights_of_profiles(weights, |shared| {
-            (shared.plan.powi(2) - 1.0).max(0.0).sqrt()
-        })
+        self.weights_of_profiles(weights, |shared| shared.farther_m() / PROFILE_PLAN_M)
     }
 
     /// Sums of the weights of each profile, one row a profile.

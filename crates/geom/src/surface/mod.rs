@@ -274,7 +274,8 @@ impl LaserSurface {
             let slopes_matrix = DMatrix::from_fn(2, at.len(), |axis, place| slopes[place][axis]);
             covariance_m2 +=
                 slopes_matrix.tr_mul(&slopes_matrix) * self.options.plan_sigma_m.powi(2);
-            // Profiles that are farther from their place than others, each by itself.
+            // Profiles that are farther from their place than others, each by itself: the part of the shift that all shots of a
+            // profile share. The noise of these shots contains the same shift as independent errors.
             let farther = self.kriging.farther_of_profiles(&weights);
             for profile in farther
                 .row_iter()

@@ -77,6 +77,12 @@ impl SharedErrors {
         plan: 1.0,
     };
 
+    /// Standard deviation of the plan shift of a profile in addition to that of a profile at nadir of known attitude, metres:
+    /// √(σ² − σ₀²).
+    pub(super) fn farther_m(&self) -> f64 {
+        PROFILE_PLAN_M * (self.plan.powi(2) - 1.0).max(0.0).sqrt()
+    }
+
     /// The larger ones of two.
     pub(super) const fn or_larger(self, other: &Self) -> Self {
         Self {

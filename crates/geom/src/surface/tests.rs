@@ -88,7 +88,11 @@ fn a_constant_comes_back_and_so_does_what_is_added_to_all_shots() {
 #[test]
 fn the_covariance_is_the_full_expression_symmetric_and_positive_definite() {
     let mut shots = profile(&zigzag(40, 9.0), 305.0, 0.0, 0);
-    shots.extend(profile(&zigzag(40, 7.0), 311.0, 2_500.0, 1));
+    let second = profile(&zigzag(40, 7.0), 311.0, 2_500.0, 1).into_iter();
+    shots.extend(second.map(|shot| SurfaceShot {
+        attitude_known: false,
+        ..shot
+    }));
     let surface = LaserSurface::new(&shots, &[], &only_ground(4.0)).unwrap();
     let places: Vec<Vector3<f64>> = (0..12)
         .map(|tie| {
@@ -111,7 +115,8 @@ fn the_covariance_is_the_full_expression_symmetric_and_positive_definite() {
             for (k, shot) in kriging.shots.iter().enumerate() {
                 full += solved[(k, i)] * gamma.between(&shot.plan_m, other);
                 full += solved[(k, j)] * gamma.between(&shot.plan_m, one);
-                full += solved[(k, i)] * solved[(k, j)];
+                let noise_m2 = 1.0 + 2.0 * gamma.at(shot.shared.farther_m());
+                full += solved[(k, i)] * solved[(k, j)] * noise_m2;
                 for (l, second) in kriging.shots.iter().enumerate() {
                     full -= solved[(k, i)]
                         * solved[(l, j)]

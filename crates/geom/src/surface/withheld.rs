@@ -198,9 +198,11 @@ fn predicted(
     let above_m = measured
         .zip(&found.heights_m)
         .map(|(height_m, predicted_m)| height_m - predicted_m);
+    let shared = stretch[0].shared(options.profile_sigma_m);
+    let own_m2 = options.shot_sigma_m.powi(2) + 2.0 * surface.variogram().at(shared.farther_m());
     let variance_m2 = found.covariance_m2.sum() / (count * count)
-        + options.shot_sigma_m.powi(2) / count
-        + (options.profile_sigma_m * stretch[0].shared(options.profile_sigma_m).radial).powi(2);
+        + own_m2 / count
+        + (options.profile_sigma_m * shared.radial).powi(2);
     Some(Withheld {
         profile,
         first: from,
