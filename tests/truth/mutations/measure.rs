@@ -227,9 +227,9 @@ fn csv(path: &Path) -> Vec<BTreeMap<String, String>> {
 /// The largest difference of a time from those of a sound run, where the number of shots is the same.
 fn times_s(out: &Path) -> f64 {
     let [found, sound] = [out, &site_run("isidis")].map(|out| {
-        let rows = csv(&out.join("footprints.csv"));
-        let times = rows.iter().map(|row| row["et_s"].parse::<f64>().unwrap());
-        times.collect::<Vec<f64>>()
+        let rows = table(&out.join("footprints.parquet"));
+        let times = rows.column_by_name("et_s").unwrap();
+        times.as_primitive::<Float64Type>().values().to_vec()
     });
     if found.len() != sound.len() {
         return 0.0;
