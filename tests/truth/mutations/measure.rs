@@ -1,9 +1,10 @@
 //! The result of a run against the truth, and what is stated of it.
 
-use std::{collections::BTreeMap, path::Path};
+use std::{collections::BTreeMap, fs::File, path::Path};
 
 use arrow_array::{Array as _, RecordBatch, cast::AsArray as _, types::Float64Type};
 use nalgebra::Vector3;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::Value;
 
 use super::{
@@ -227,9 +228,14 @@ fn csv(path: &Path) -> Vec<BTreeMap<String, String>> {
 /// The largest difference of a time from those of a sound run, where the number of shots is the same.
 fn times_s(out: &Path) -> f64 {
     let [found, sound] = [out, &site_run("isidis")].map(|out| {
-        let rows = table(&out.join("footprints.parquet"));
-        let times = rows.column_by_name("et_s").unwrap();
-        times.as_primitive::<Float64Type>().values().to_vec()
+        let file = File::open(out.join("footprints.parquet")).unwrap();
+        let rows = ParquetRecordBatchReaderBuilder::try_new(file).unwrap();
+        let mut times = Vec::new();
+        for batch in rows.build().unwrap().map(Result::unwrap) {
+            let of_batch = batch.column_by_name("et_s").unwrap();
+            times.extend_from_slice(of_batch.as_primitive::<Float64Type>().values());
+        }
+        times
     });
     if found.len() != sound.len() {
         return 0.0;
