@@ -8,7 +8,12 @@
 
 use std::{fs, path::Path};
 
-use areograph::scene::{Roughness, SceneErrors, SceneOptions, TrueGround};
+use areograph::{
+    body::Body,
+    geom::ellipsoid::spherical_to_xyz_m,
+    pds::terrain_model::{HeightsAbove, read_terrain_model},
+    scene::{Roughness, SceneErrors, SceneOptions, TrueGround},
+};
 use arrow_array::{Array as _, cast::AsArray, types::Float64Type};
 use nalgebra::{Matrix3, Vector2, Vector3};
 
@@ -20,11 +25,13 @@ use crate::{
     truth::{local, scene, table},
 };
 
+/// Cells of a terrain model that are compared at most.
+const CELLS_MAX: usize = 4_000;
 const SITES: [&str; 3] = ["eos_chasma", "gusev_crater", "isidis"];
 /// Steps of the search for the place of a site, metres, and steps to each side.
 const SEARCH: [(f64, i32); 3] = [(40.0, 10), (8.0, 6), (1.5, 6)];
 
-/// Adjusted tie points of a site: positions, metres, and standard deviations of their heights against each other, metres.
+/// Places of a site by its images: positions, metres, and standard deviations of their heights against each other, metres.
 struct Points {
     places_m: Vec<Vector3<f64>>,
     sigmas_m: Vec<f64>,
@@ -47,6 +54,43 @@ impl Points {
             places_m: kept.iter().map(place).collect(),
             sigmas_m: kept.iter().map(|row| sigmas.value(*row)).collect(),
         }
+    }
+
+    /// Cells of the terrain model with a height, evenly chosen.
+    fn of_terrain_model(folder: &Path) -> Self {
+        let read = |name: &str| {
+            let above = HeightsAbove::default();
+            read_terrain_model(&folder.join(name), Body::Mars, above).unwrap()
+        };
+        let (model, sigmas) = (read("surface.tif"), read("surface_sigma.tif"));
+        let columns = model.size[1];
+        let cells = model.heights_m.iter().zip(&sigmas.heights_m).enumerate();
+        let known = cells.filter(|(_, (height_m, _))| !height_m.is_nan());
+        let known = known.map(|(at, (height_m, sigma_m))| {
+            let cell = [(at / columns) as f64, (at % columns) as f64];
+            let [longitude_rad, latitude_rad] = model.place_rad(cell);
+            let radius_m = model.radius_m + f64::from(*height_m);
+            let place_m = spherical_to_xyz_m(longitude_rad, latitude_rad, radius_m);
+            (place_m, f64::from(*sigma_m))
+        });
+        let (places_m, sigmas_m): (Vec<_>, Vec<_>) = known.unzip();
+        let every = places_m.len().div_ceil(CELLS_MAX);
+        Self {
+            places_m: places_m.into_iter().step_by(every).collect(),
+            sigmas_m: sigmas_m.into_iter().step_by(every).collect(),
+        }
+    }
+
+    /// Height errors over their standard deviations, and their root mean square, metres.
+    fn ratios(&self, ground: &TrueGround) -> (Vec<f64>, f64) {
+        let errors_m = self.height_errors_m(ground);
+        let square_m2: f64 = errors_m.iter().map(|error_m| error_m * error_m).sum();
+        let rms_m = (square_m2 / errors_m.len() as f64).sqrt();
+        let ratios = errors_m.iter().zip(&self.sigmas_m);
+        (
+            ratios.map(|(error_m, sigma_m)| error_m / sigma_m).collect(),
+            rms_m,
+        )
     }
 
     /// Heights above the true ground of a place that is `shift_m` farther east and north, without their mean, metres.
@@ -108,10 +152,24 @@ fn matched_sites(mission: &Path) -> Vec<std::path::PathBuf> {
                 &format!("site = \"{site}\""),
                 &format!("site = \"{site}_matched\""),
             );
+        let text = text + "\n[surface]\ncell_m = 30.0\n";
         fs::write(&file, text).unwrap();
         file
     };
     SITES.iter().map(matched).collect()
+}
+
+/// Cells of a terrain model.
+struct Model {
+    squares: f64,
+    far: usize,
+    cells: usize,
+}
+
+impl Model {
+    fn ratio(&self) -> f64 {
+        (self.squares / self.cells as f64).sqrt()
+    }
 }
 
 /// A short relative is `scatter_beyond_the_standard_deviations_is_no_blunder` of the stages.
@@ -121,6 +179,7 @@ fn matched_ties_of_realistic_images_are_kept_and_heights_scatter_as_stated() {
         return;
     }
     let (mut squares, mut far, mut points, mut lost) = (0.0, 0, 0, 0);
+    let mut models = Vec::new();
     for (seed, name, roughness) in [
         (24_001, "medium", Roughness::Medium),
         (24_002, "plains", Roughness::Plains),
@@ -149,18 +208,29 @@ fn matched_ties_of_realistic_images_are_kept_and_heights_scatter_as_stated() {
             let rejected = adjustment["rejected"].as_array().unwrap().len();
             let scatter_px = adjustment["summary"]["tie_scatter_px"].as_f64().unwrap();
             let of_site = Points::of(&folder);
-            let ratios: Vec<f64> = of_site
-                .height_errors_m(&ground)
-                .iter()
-                .zip(&of_site.sigmas_m)
-                .map(|(error_m, sigma_m)| error_m / sigma_m)
-                .collect();
+            let (ratios, _) = of_site.ratios(&ground);
             let of_ratios: f64 = ratios.iter().map(|ratio| ratio * ratio).sum();
             println!(
                 "seed {seed} {name} {site}: scatter {scatter_px:.2} px, {rejected} of {} rejected, heights {:.2} of their standard deviations",
                 ratios.len() + rejected,
                 (of_ratios / ratios.len() as f64).sqrt()
             );
+            let model = Points::of_terrain_model(&folder);
+            let (of_cells, rms_m) = model.ratios(&ground);
+            let stated_m2: f64 = model.sigmas_m.iter().map(|sigma_m| sigma_m * sigma_m).sum();
+            let of_model = Model {
+                squares: of_cells.iter().map(|ratio| ratio * ratio).sum(),
+                far: of_cells.iter().filter(|ratio| ratio.abs() > 3.0).count(),
+                cells: of_cells.len(),
+            };
+            println!(
+                "  terrain model: {} cells, {rms_m:.1} m rms, stated {:.1} m, {:.2} of their standard deviations, {} beyond three",
+                of_model.cells,
+                (stated_m2 / of_cells.len() as f64).sqrt(),
+                of_model.ratio(),
+                of_model.far
+            );
+            models.push(of_model);
             squares += of_ratios;
             far += ratios.iter().filter(|ratio| ratio.abs() > 3.0).count();
             points += ratios.len();

@@ -30,12 +30,8 @@ const POINTS: [[usize; 2]; 2] = [[206, 476], [80, 160]];
 const SWATH: f64 = 0.92;
 
 /// The true lines. Sample errors are those of the paper's synthetic case: 2e-7 and 1e-7 a pixel, 1e-11 a pixel squared.
-fn lines() -> [StereoLine; 2] {
-    let offset = |phi: f64, omega: f64, kappa: f64| Offset {
-        phi_rad: phi.to_radians(),
-        omega_rad: omega.to_radians(),
-        kappa_rad: kappa.to_radians(),
-    };
+fn lines(seed: u64) -> [StereoLine; 2] {
+    let offset = |line, angles_deg| drawn_offset(seed, line, angles_deg);
     let half = 0.5 * f64::from(LONG[1]);
     let errors = |sense: f64| {
         [
@@ -48,16 +44,28 @@ fn lines() -> [StereoLine; 2] {
         StereoLine {
             name: "s1",
             pitch_deg: 18.9,
-            offset: offset(0.055, 0.020, 0.030),
+            offset: offset("s1", [0.055, 0.020, 0.030]),
             errors: errors(1.0),
         },
         StereoLine {
             name: "s2",
             pitch_deg: -18.9,
-            offset: offset(-0.050, -0.015, -0.020),
+            offset: offset("s2", [-0.050, -0.015, -0.020]),
             errors: errors(-1.0),
         },
     ]
+}
+
+/// A mounting with these angles φ, ω and κ, each times a drawn factor from 0.5 to 1.5.
+pub(super) fn drawn_offset(seed: u64, line: &str, angles_deg: [f64; 3]) -> Offset {
+    let mut random = Random::new(seed, &format!("mounting of line {line}"));
+    let [phi_rad, omega_rad, kappa_rad] =
+        angles_deg.map(|angle_deg| (random.between(0.5, 1.5) * angle_deg).to_radians());
+    Offset {
+        phi_rad,
+        omega_rad,
+        kappa_rad,
+    }
 }
 
 /// The orbits: that of the calibration, and another one, whose error in its own axes differs from the first by a fifth.
@@ -119,7 +127,7 @@ struct Tables {
 pub fn write_calibration_scene(directory: &Path, seed: u64) -> Result<String> {
     let draft = Draft::begin(directory, README)?;
     let isd = draft.folder("isd")?;
-    let (lines, orbits) = (lines(), orbits());
+    let (lines, orbits) = (lines(seed), orbits());
     let mut truth = Truth {
         seed,
         angles_deg: lines

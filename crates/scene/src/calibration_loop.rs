@@ -6,6 +6,7 @@ use std::{collections::BTreeMap, path::Path};
 use serde::Serialize;
 
 use super::{
+    calibration::drawn_offset,
     error_sources::{Relief, Roughness},
     files::{Draft, put},
     line_images::LineImages,
@@ -17,7 +18,6 @@ use areograph_base::{
     error::{Locate as _, Result},
     units::RADIANS_PER_DEGREE,
 };
-use areograph_geom::calibration::Offset;
 
 const README: &str = "Three lines of a camera in one orbit: support data (isd/), pixels (images/), PEDR files of laser passes in two\n\
     directions over their ground (pedr/), a calibration file. The lines are mounted askew and the orbit is wrong by hundreds of\n\
@@ -81,16 +81,11 @@ impl LineScene {
     }
 }
 
-/// The true lines: offsets and errors of the paper's synthetic case, and a third line between them.
+/// The true lines: drawn offsets, the errors of the paper's synthetic case, and a third line between them.
 fn lines(scene: &LineScene) -> [StereoLine; 3] {
     let wrong = if scene.is_wrong { 1.0 } else { 0.0 };
-    let offset = |angles_deg: [f64; 3]| {
-        let [phi_rad, omega_rad, kappa_rad] = angles_deg.map(|of| (wrong * of).to_radians());
-        Offset {
-            phi_rad,
-            omega_rad,
-            kappa_rad,
-        }
+    let offset = |line, angles_deg: [f64; 3]| {
+        drawn_offset(scene.seed, line, angles_deg.map(|angle| wrong * angle))
     };
     let half = 0.5 * f64::from(scene.size[1]);
     let errors = |sense: f64| {
@@ -102,19 +97,19 @@ fn lines(scene: &LineScene) -> [StereoLine; 3] {
         StereoLine {
             name: "s1",
             pitch_deg: 18.9,
-            offset: offset([0.055, 0.020, 0.030]),
+            offset: offset("s1", [0.055, 0.020, 0.030]),
             errors: errors(1.0),
         },
         StereoLine {
             name: "nd",
             pitch_deg: 0.0,
-            offset: offset([0.010, -0.012, 0.015]),
+            offset: offset("nd", [0.010, -0.012, 0.015]),
             errors: errors(0.5),
         },
         StereoLine {
             name: "s2",
             pitch_deg: -18.9,
-            offset: offset([-0.050, -0.015, -0.020]),
+            offset: offset("s2", [-0.050, -0.015, -0.020]),
             errors: errors(-1.0),
         },
     ]

@@ -65,19 +65,7 @@ fn hold_where_everything_errs(seeds: Vec<u32>, grounds: &[Roughness]) {
         "{} lost",
         ties.lost
     );
-    // Where the surface is too uncertain to reveal a blunder, the stated standard deviation of the point contains it.
-    for site in &all {
-        let judged = &site.judged;
-        assert!(
-            judged.kept_blunder_sigmas < 3.0,
-            "{:?}",
-            judged.kept_blunders
-        );
-    }
-    // One in 60 of the blunders, which are one in twenty of all.
-    assert!(
-        1_200 * ties.kept_blunders <= ties.good.max(1_200),
-        "{} blunders kept",
-        ties.kept_blunders
-    );
+    let kept = all.iter().flat_map(|site| &site.judged.kept_blunders);
+    let kept: Vec<&String> = kept.collect();
+    assert!(kept.is_empty(), "{kept:?}");
 }

@@ -120,8 +120,8 @@ fn relief_tells_the_place_on_rough_ground_and_what_is_stated_of_it_holds() {
                 "{}: ±{:.0} m, relief alone ±{relief_m:.0} m, together ±{:.0} m",
                 used.name, known_m[axis], told_m[axis]
             );
-            // The report recommends relief below one half; these sites are near that limit, as only their profile at nadir
-            // determines the relief nearby.
+            // The report recommends relief below one half. Here it is 0.3 to 0.6, as only the profile at nadir determines the relief
+            // nearby, and the places below improve.
             assert!(relief_m < 0.7 * known_m[axis], "{}", used.name);
             // Relief is that of MOLA's profiles, which lie to 70 m each: two leave 50 m open.
             let expected_m = 1.0 / known_m[axis].recip().hypot(relief_m.hypot(50.0).recip());

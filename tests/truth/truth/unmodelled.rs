@@ -3,20 +3,19 @@
 //!
 //! Seeds begin at 50,000. The long run writes the page with `SNAPSHOTS=overwrite`.
 
-use std::{fmt::Write as _, path::Path};
+mod changes;
 
-use areograph::{
-    geom::random::Random,
-    scene::{Jitter, Misregistration, Roughness, SceneErrors},
-};
+use std::fmt::Write as _;
+
+use areograph::scene::{Jitter, Misregistration, Roughness, SceneErrors};
 
 use super::{
-    SITES, by_chance,
+    by_chance,
     common::{case::Case, kept, long},
     flown::{Pair, Plan, Site, Sizes, flown},
     root_mean_square,
 };
-use crate::mutations::make_changes;
+use changes::{in_sites, in_ties, noise_with_tails, of_shots, off_nadir, orbit, samples_scatter};
 
 const PAGE: &str = "docs/guide/src/unmodelled_errors.md";
 /// Missions of three sites for every error.
@@ -24,6 +23,8 @@ const MISSIONS: u32 = 4;
 const FIRST_SEED: u32 = 50_001;
 /// The first errors, of one mission, are in every run.
 const FEW: usize = 3;
+/// Middle column of an image of summed pixels.
+const MIDDLE_COLUMN: f64 = 512.0;
 /// Stated noise of tie points, pixels.
 const NOISE_PX: f64 = 0.5;
 
@@ -68,8 +69,6 @@ const SHOTS: &str = "errors that ranges and radii of the shots share";
 const ACROSS: &str = "errors of single tie points across the track";
 const RADII: &str = r#"["shot_radii", "mid_radius"]"#;
 const RANGES: &str = r#"["ranges"]"#;
-/// Files of the days of images off nadir.
-const OFF_NADIR: [&str; 3] = ["ap19019k.b", "ap19043k.b", "ap19802l.b"];
 
 const KINDS: &[Kind] = &[
     UNCHANGED,
@@ -91,6 +90,12 @@ const KINDS: &[Kind] = &[
             of_shots(case, RANGES, "add = 500", None);
         },
         answer: Answer::NotTested(SHOTS),
+        ..UNCHANGED
+    },
+    Kind {
+        words: "radii of shots 10 m too large, without their ranges",
+        files: |case, _| of_shots(case, RADII, "add = 1000", None),
+        answer: Answer::Invalid,
         ..UNCHANGED
     },
     Kind {
@@ -138,6 +143,32 @@ const KINDS: &[Kind] = &[
     Kind {
         words: "two thirds of the variance of the noise of tie points common to neighbours",
         errors: |of| of.tie_noise_common = 2.0 / 3.0,
+        ..UNCHANGED
+    },
+    Kind {
+        words: "noise of tie points of Student's distribution with three degrees of freedom, of the stated size",
+        errors: |of| of.tie_noise_factor = 0.0,
+        files: noise_with_tails,
+        ..UNCHANGED
+    },
+    Kind {
+        words: "lines and samples of tie points 0.5 pixels too large in one image of a pair",
+        files: |case, _| {
+            in_ties(
+                case,
+                |second, at| if second { at.map(|at| at + 0.5) } else { at },
+            )
+        },
+        ..UNCHANGED
+    },
+    Kind {
+        words: "samples of tie points off by up to 2 pixels with the square of the distance from the middle column",
+        files: |case, _| {
+            in_ties(case, |_, [line, sample]| {
+                let off = (sample - MIDDLE_COLUMN) / MIDDLE_COLUMN;
+                [line, sample + 2.0 * off * off]
+            });
+        },
         ..UNCHANGED
     },
     Kind {
@@ -206,69 +237,6 @@ const KINDS: &[Kind] = &[
         ..UNCHANGED
     },
 ];
-
-/// Changes a text of every site file.
-fn in_sites(case: &Case, from: &str, to: &str) {
-    for site in SITES {
-        case.replace(&format!("sites/{site}.toml"), from, to);
-    }
-}
-
-/// Changes fields of these PEDR files, centimetres; of one frame in `one_in` where it is given.
-fn of_files(case: &Case, files: &[String], fields: &str, number: &str, one_in: Option<u32>) {
-    let one_in = one_in.map_or_else(String::new, |frames| format!(", one_in = {frames}"));
-    make_changes(
-        case,
-        &format!(
-            "changes = [{{ pedr = {{ files = {files:?}, fields = {fields}, number = {{ {number} }}{one_in} }} }}]"
-        ),
-    );
-}
-
-/// The same of all PEDR files.
-fn of_shots(case: &Case, fields: &str, number: &str, one_in: Option<u32>) {
-    let folder = case.path("pedr").read_dir().unwrap();
-    let names = folder.map(|file| file.unwrap().file_name().display().to_string());
-    let mut files: Vec<String> = names
-        .filter(|name| Path::new(name).extension().is_some_and(|end| end == "b"))
-        .map(|name| format!("pedr/{name}"))
-        .collect();
-    files.sort_unstable();
-    of_files(case, &files, fields, number, one_in);
-}
-
-/// The same of the profiles off nadir.
-fn off_nadir(case: &Case, fields: &str, number: &str) {
-    let files = OFF_NADIR.map(|name| format!("pedr/{name}"));
-    of_files(case, &files, fields, number, None);
-}
-
-fn orbit(case: &Case, along_up_cross_m: &str) {
-    make_changes(
-        case,
-        &format!("changes = [{{ orbit = {{ along_up_cross_m = {along_up_cross_m} }} }}]"),
-    );
-}
-
-/// Adds noise to the samples of all tie points: three times the stated one with that of the scene.
-fn samples_scatter(case: &Case, seed: u32) {
-    for site in SITES {
-        let mut random = Random::new(seed.into(), site);
-        let file = format!("ties/{site}.csv");
-        let text = String::from_utf8(case.read(&file)).unwrap();
-        let (head, rows) = text.split_once('\n').unwrap();
-        assert_eq!(head, "point_id,serial_number,sample,line");
-        let mut changed = format!("{head}\n");
-        for row in rows.lines() {
-            let mut cells: Vec<String> = row.split(',').map(str::to_owned).collect();
-            let sample: f64 = cells[2].parse().unwrap();
-            let noisy = sample + 8.0_f64.sqrt() * NOISE_PX * random.normal();
-            cells[2] = format!("{noisy:.4}");
-            changed += &(cells.join(",") + "\n");
-        }
-        case.write(&file, changed);
-    }
-}
 
 /// The sites of one kind of error.
 struct Trial {

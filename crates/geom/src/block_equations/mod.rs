@@ -154,12 +154,19 @@ impl BlockMatrix {
         )
     }
 
-    /// Adds to an element on the diagonal.
-    pub fn add_to_diagonal(&mut self, column: usize, value: f64) {
-        let block = self.pattern.block_of(column);
-        let own = self.pattern.columns(block);
-        if let Some(values) = self.pattern.values_of(block, block) {
-            self.values[values.start + (column - own.start) * (own.len() + 1)] += value;
+    /// Adds to an element and to the one that mirrors it; blocks that do not meet have none.
+    pub fn add_to_element(&mut self, row: usize, column: usize, value: f64) {
+        let (row, column) = (row.min(column), row.max(column));
+        let [upper, right] = [row, column].map(|of| self.pattern.block_of(of));
+        let [rows, columns] = [upper, right].map(|of| self.pattern.columns(of));
+        if let Some(values) = self.pattern.values_of(upper, right) {
+            let at = |row: usize, column: usize| {
+                values.start + (column - columns.start) * rows.len() + (row - rows.start)
+            };
+            self.values[at(row, column)] += value;
+            if upper == right && row != column {
+                self.values[at(column, row)] += value;
+            }
         }
     }
 

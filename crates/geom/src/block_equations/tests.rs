@@ -50,7 +50,7 @@ fn ring() -> (BlockMatrix, DMatrix<f64>) {
     for column in 0..end {
         // Units far apart, as metres and radians are.
         let weight = 0.3 + column as f64;
-        sparse.add_to_diagonal(column, weight);
+        sparse.add_to_element(column, column, weight);
         dense[(column, column)] += weight;
     }
     (sparse, dense)
@@ -101,7 +101,7 @@ fn stored(columns: Vec<std::ops::Range<usize>>, cliques: &[Vec<usize>]) -> usize
     let pattern = BlockPattern::of(columns, cliques.iter().map(Vec::as_slice));
     let mut matrix = BlockMatrix::zeros(&pattern);
     for column in 0..pattern.unknowns() {
-        matrix.add_to_diagonal(column, 1.0);
+        matrix.add_to_element(column, column, 1.0);
     }
     let factor = BlockCholesky::new(&matrix).unwrap();
     factor.rows.iter().map(DMatrix::len).sum()

@@ -4,7 +4,8 @@
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::{
-    AttitudeClock, BundleOptions, CommonBus, HeightControl, Network, RecordedProfile, Spot, View,
+    AttitudeClock, BundleOptions, CommonBus, HeightControl, Network, RecordedProfile,
+    SharedRotation, Spot, View,
     height_tests::{CONTROLLED, are_those_of_the_dense_equations, surface_with},
     layout::Layout,
     solve,
@@ -52,6 +53,10 @@ fn with_spots() -> Network<EulerPolynomial> {
             surface_profile: 1,
             axes: local_axes(&network.points[0].ground_m),
             sigma_m: Vector3::new(70.0, 60.0, 1.0),
+            shared: Some(SharedRotation {
+                image: 0,
+                by_rotation_m: Vector3::new(9e4, -2e4, 3e3),
+            }),
         }],
         recorded: SHOTS.map(|point| (point, 0)).collect(),
         spots: spots.collect(),
@@ -216,6 +221,7 @@ fn a_profile_on_relief_lies_in_one_place() {
         bus.spots.clear();
         bus.recorded.clear();
         bus.profiles[0].sigma_m = Vector3::new(70.0, 70.0, 1.0);
+        bus.profiles[0].shared = None;
         if !with_bus {
             network.common_bus = None;
         }
@@ -285,6 +291,7 @@ fn spots_tell_a_roll_that_ties_do_not_know() {
     }
     let bus = network.common_bus.as_mut().unwrap();
     bus.profiles[0].sigma_m = Vector3::new(1.0, 1.0, 1.0);
+    bus.profiles[0].shared = None;
     bus.profiles[0].axes = Matrix3::identity();
     bus.boresight_sigma_rad = 1e-6;
     let adjusted = solve(&network, &BundleOptions::default()).unwrap();
@@ -298,4 +305,36 @@ fn spots_tell_a_roll_that_ties_do_not_know() {
     }
     let bus = adjusted.common_bus.unwrap();
     assert!(bus.spots.iter().all(Option::is_some));
+}
+
+/// Neither spots nor records determine the profile: its position is that of the rotation of its image, with the
+/// uncertainties of both.
+#[test]
+fn a_profile_follows_the_rotation_of_its_image() {
+    let mut network = with_spots();
+    let bus = network.common_bus.as_mut().unwrap();
+    bus.spots.clear();
+    bus.recorded.clear();
+    let RecordedProfile {
+        shared, sigma_m, ..
+    } = bus.profiles[0];
+    let adjusted = solve(&network, &BundleOptions::default()).unwrap();
+    let image = &adjusted.images[0];
+    let (roll_rad, by_roll_m) = (
+        image.correction.rotation_rad[0].x,
+        shared.unwrap().by_rotation_m,
+    );
+    let roll_sigma_rad = image.cofactors[(9, 9)].sqrt();
+    assert!(roll_rad.abs() > 1e-6, "{roll_rad}");
+    for (axis, found) in adjusted.common_bus.unwrap().profile_shifts_m[0]
+        .iter()
+        .enumerate()
+    {
+        // Metres: rounding of the equations' solution.
+        assert!((found.value - by_roll_m[axis] * roll_rad).abs() < 1e-6);
+        let expected_m = sigma_m[axis].hypot(by_roll_m[axis] * roll_sigma_rad);
+        assert!((found.root_cofactor / expected_m - 1.0).abs() < 1e-9);
+        // Nothing contradicts it.
+        assert!(found.prior.unwrap().redundancy < 1e-9);
+    }
 }

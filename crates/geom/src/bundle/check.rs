@@ -100,6 +100,13 @@ fn check_bus<M>(network: &Network<M>, bus: &CommonBus) -> Result<(), BundleError
             let what = "standard deviation of its position";
             deviation(Part::Profile(index), what, *sigma_m)?;
         }
+        if let Some(shared) = &profile.shared {
+            let part = Part::Profile(index);
+            matched(network, part, 0, shared.image)?;
+            for by_rotation_m in &shared.by_rotation_m {
+                finite(part, "offset by the rotation of its image", *by_rotation_m)?;
+            }
+        }
     }
     for (point, profile) in &bus.recorded {
         let part = Part::Point(*point);

@@ -38,6 +38,18 @@ pub struct RecordedProfile {
     pub axes: Matrix3<f64>,
     /// Standard deviations along these, metres.
     pub sigma_m: Vector3<f64>,
+    /// The rotation of an image that the recorded position contains a part of.
+    pub shared: Option<SharedRotation>,
+}
+
+/// Part of the attitude error of an image in the recorded position of a profile: both were computed from one attitude.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SharedRotation {
+    /// Index of the image.
+    pub image: usize,
+    /// Expected offset of the profile for a constant rotation about the camera's x axis by a radian, along the axes of the
+    /// profile, metres.
+    pub by_rotation_m: Vector3<f64>,
 }
 
 /// Position of a shot in an image that was exposed meanwhile.
@@ -62,7 +74,7 @@ pub struct AdjustedBus {
     pub spots: Vec<Option<[Residual; 2]>>,
 }
 
-/// An unknown whose expected value is 0.
+/// An unknown whose expected value is 0, or a multiple of another unknown.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Estimate {
     /// Its value.

@@ -23,9 +23,15 @@ pub(super) fn prior<M>(
     column: usize,
 ) -> Option<Residual> {
     let sigma = layout.columns.sigmas[column];
-    let share = variance(cofactors, column) / sigma.powi(2);
+    let terms = layout.columns.prior_terms(column);
+    let products = terms.clone().flat_map(|(row, factor)| {
+        terms.clone().map(move |(other, of_other)| {
+            factor * of_other * cofactors.element(row, other).unwrap_or_default()
+        })
+    });
+    let share = products.sum::<f64>() / sigma.powi(2);
     sigma.is_finite().then(|| Residual {
-        value: -(state.corrections[column] - layout.columns.expected[column]),
+        value: -layout.columns.off_prior(&state.corrections, column),
         sigma,
         redundancy: (1.0 - share).clamp(0.0, 1.0),
         weight_factor: 1.0,

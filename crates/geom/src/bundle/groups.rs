@@ -45,7 +45,9 @@ impl PointGroups {
                 }),
             }
         }
+        let connected: Vec<[usize; 2]> = layout.columns.connected_blocks().collect();
         let cliques = groups.iter().map(|group| group.blocks.as_slice());
+        let cliques = cliques.chain(connected.iter().map(<[_; 2]>::as_slice));
         Self {
             pattern: BlockPattern::of(layout.columns.blocks.clone(), cliques),
             points,

@@ -13,7 +13,7 @@ use super::{
     solve,
     solve::{Stop, settle},
     tests::{dense_rows, layout, network},
-    unknowns::State,
+    unknowns::{State, Unknown},
 };
 use crate::{
     ellipsoid::height_m,
@@ -94,6 +94,28 @@ struct Dense {
     step: DVector<f64>,
 }
 
+/// The row of an unknown minus its expected value, of `width` columns: the shift of a profile follows an image.
+fn prior_row(
+    layout: &super::layout::Layout<'_, EulerPolynomial>,
+    column: usize,
+    width: usize,
+) -> DVector<f64> {
+    let mut row = DVector::zeros(width);
+    row[column] = 1.0;
+    if let Unknown::ProfileShift { profile, axis } = layout.columns.unknowns[column] {
+        let bus = layout.network.common_bus.as_ref().unwrap();
+        if let Some(shared) = bus.profiles[profile].shared {
+            let roll = Unknown::Orientation {
+                image: shared.image,
+                coefficient: 9,
+            };
+            let roll = layout.columns.unknowns.iter().position(|of| *of == roll);
+            row[roll.unwrap()] = -shared.by_rotation_m[axis];
+        }
+    }
+    row
+}
+
 /// The equations of all unknowns at `state`, heights included, solved at once.
 fn dense(
     layout: &super::layout::Layout<'_, EulerPolynomial>,
@@ -111,8 +133,10 @@ fn dense(
         right += rows.tr_mul(&misclosures);
     }
     for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
-        normal[(column, column)] += sigma.powi(-2);
-        right[column] -= at.state.corrections[column] * sigma.powi(-2);
+        let row = prior_row(layout, column, unknowns);
+        let off = row.rows(0, shared).dot(&at.state.corrections);
+        normal += &row * row.transpose() * sigma.powi(-2);
+        right -= row * (off * sigma.powi(-2));
     }
     let mut rows = DMatrix::zeros(heights.points.len(), unknowns);
     let mut above_m = DVector::zeros(heights.points.len());
@@ -326,7 +350,14 @@ pub(super) fn are_those_of_the_dense_equations(
     // Redundancy numbers add up to observations minus unknowns.
     let mut sum = sum_of_redundancies(&adjustment);
     for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
-        sum += 1.0 - cofactors.element(column, column).unwrap() / sigma.powi(2);
+        let row = prior_row(&layout, column, layout.columns.len());
+        let variance = row.iter().enumerate().map(|(of, factor)| {
+            let cofactors = row.iter().enumerate().map(|(other, of_other)| {
+                of_other * cofactors.element(of, other).unwrap_or_default()
+            });
+            factor * cofactors.sum::<f64>()
+        });
+        sum += 1.0 - variance.sum::<f64>() / sigma.powi(2);
     }
     let spots = adjustment.common_bus.iter().flat_map(|bus| &bus.spots);
     let spots: Vec<_> = spots.flatten().flatten().collect();

@@ -141,7 +141,7 @@ pub(super) fn judge<M: ExteriorOrientation>(
         }));
     }
     for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
-        let off = state.corrections[column] - layout.columns.expected[column];
+        let off = layout.columns.off_prior(&state.corrections, column);
         adjustment.weighted_squares += (off / sigma).powi(2);
     }
     if let Some((of, reduced)) = heights {

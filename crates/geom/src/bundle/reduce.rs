@@ -111,10 +111,17 @@ pub(super) fn reduce<M: ExteriorOrientation>(
     for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
         // Infinite standard deviations have no weight.
         let weight = sigma.powi(-2);
-        let correction = at.state.corrections[column] - layout.columns.expected[column];
-        sum.matrix.add_to_diagonal(column, weight);
-        sum.right[column] -= weight * correction;
-        sum.cost += weight * correction * correction;
+        let off = layout.columns.off_prior(&at.state.corrections, column);
+        let terms = layout.columns.prior_terms(column);
+        for (row, factor) in terms.clone() {
+            sum.right[row] -= weight * factor * off;
+            let from_row = terms.clone().filter(|(other, _)| *other <= row);
+            for (other, of_other) in from_row {
+                sum.matrix
+                    .add_to_element(other, row, weight * factor * of_other);
+            }
+        }
+        sum.cost += weight * off * off;
     }
     if let Some(heights) = &layout.heights {
         let heights = ReducedHeights::of(layout, heights, at)?;

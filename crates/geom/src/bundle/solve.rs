@@ -260,7 +260,7 @@ fn factorise<M>(
     let damped = (damping > 0.0).then(|| {
         let mut matrix = reduced.matrix.clone();
         for (column, information) in reduced.matrix.diagonal().into_iter().enumerate() {
-            matrix.add_to_diagonal(column, damping * information);
+            matrix.add_to_element(column, column, damping * information);
         }
         matrix
     });

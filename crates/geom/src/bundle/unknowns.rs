@@ -4,7 +4,7 @@ use std::{fmt, ops::Range};
 
 use nalgebra::{DVector, Vector3};
 
-use super::{CommonBus, Network, ORIENTATION_UNKNOWNS, Part};
+use super::{CommonBus, Network, ORIENTATION_UNKNOWNS, Part, SharedRotation};
 use crate::pushbroom::OrientationCorrection;
 use areograph_base::units::METRES_PER_KM;
 
@@ -50,6 +50,8 @@ pub enum Unknown {
     },
 }
 
+/// Coefficient of the constant rotation about the camera's x axis.
+const CONSTANT_ROLL: usize = 9;
 /// Names of the corrected quantities of an orientation.
 const QUANTITIES: [&str; 6] = [
     "X position",
@@ -134,6 +136,8 @@ pub(super) struct Columns {
     pub(super) sigmas: Vec<f64>,
     /// Their expected values.
     pub(super) expected: Vec<f64>,
+    /// The unknown whose multiple is added to the expected value of each, by its column, and the factor.
+    pub(super) follows: Vec<Option<(usize, f64)>>,
     /// Column of each image's 18 coefficients and its time bias.
     pub(super) of_image: Vec<[Option<usize>; ORIENTATION_UNKNOWNS + 1]>,
     /// All columns of each image; they are adjacent.
@@ -160,6 +164,7 @@ impl Columns {
             unknowns: Vec::new(),
             sigmas: Vec::new(),
             expected: Vec::new(),
+            follows: Vec::new(),
             of_image: Vec::new(),
             images: Vec::new(),
             blocks: Vec::new(),
@@ -201,6 +206,8 @@ impl Columns {
             let sigma_m = bus.map_or_else(Vector3::zeros, |bus| bus.profiles[profile].sigma_m);
             let shift = |axis| Unknown::ProfileShift { profile, axis };
             let shift = [0, 1, 2].map(|axis| columns.add(shift(axis), sigma_m[axis]));
+            let shared = bus.and_then(|bus| bus.profiles[profile].shared);
+            columns.follow(&shift, shared);
             columns.shift_of_profile.push(shift);
             columns.profiles.push(first..columns.len());
         }
@@ -226,7 +233,48 @@ impl Columns {
             self.unknowns.push(unknown);
             self.sigmas.push(sigma);
             self.expected.push(0.0);
+            self.follows.push(None);
             self.unknowns.len() - 1
+        })
+    }
+
+    /// The shift of a profile with these columns follows the rotation of an image, where that is an unknown.
+    fn follow(&mut self, shift: &[Option<usize>; 3], shared: Option<SharedRotation>) {
+        let Some(shared) = shared else {
+            return;
+        };
+        let Some(rotation) = self.of_image[shared.image][CONSTANT_ROLL] else {
+            return;
+        };
+        for (column, by_rotation_m) in shift.iter().zip(&shared.by_rotation_m) {
+            if let Some(column) = column {
+                self.follows[*column] = Some((rotation, *by_rotation_m));
+            }
+        }
+    }
+
+    /// Terms of the difference between an unknown and its expected value: columns and their factors.
+    pub(super) fn prior_terms(&self, column: usize) -> impl Iterator<Item = (usize, f64)> + Clone {
+        let followed = self.follows[column].map(|(other, factor)| (other, -factor));
+        std::iter::once((column, 1.0)).chain(followed)
+    }
+
+    /// Difference between an unknown and its expected value.
+    pub(super) fn off_prior(&self, corrections: &DVector<f64>, column: usize) -> f64 {
+        let terms = self.prior_terms(column);
+        let sum: f64 = terms
+            .map(|(other, factor)| factor * corrections[other])
+            .sum();
+        sum - self.expected[column]
+    }
+
+    /// Pairs of blocks, ascending, that the expected value of an unknown of one connects with the other.
+    pub(super) fn connected_blocks(&self) -> impl Iterator<Item = [usize; 2]> {
+        let follows = self.follows.iter().enumerate();
+        follows.filter_map(|(column, follows)| {
+            let (other, _) = (*follows)?;
+            let blocks = [other, column].map(|column| self.block_of(column));
+            (blocks[0] < blocks[1]).then_some(blocks)
         })
     }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -15,8 +15,8 @@ use super::{
 use areograph_config::AdjustmentConfig;
 use areograph_geom::{
     bundle::{
-        AdjustedBus, Adjustment, CommonBus, Estimate, RecordedProfile, Residual, Spot, Unknown,
-        View,
+        AdjustedBus, Adjustment, CommonBus, Estimate, RecordedProfile, Residual, SharedRotation,
+        Spot, Unknown, View,
     },
     ellipsoid::local_axes,
     pushbroom::{ExteriorOrientation, Projector},
@@ -27,10 +27,11 @@ use areograph_geom::{
 /// Standard deviation of a single spot in its image beyond the errors that all spots share, focal-plane pixels: jitter
 /// and interpolation of attitudes. The recorded footprint has a separate error.
 const SPOT_SIGMA_PX: f64 = 0.5;
-/// Share of the attitude error of the bus that coordinates of PEDR files may contain: they are computed from telemetry of the
-/// same attitude, and crossovers remove an unknown part of its error. Half is a choice: synthetic missions with shares drawn up
-/// to 0.4 at nadir and to 1 off nadir hold it (`tests/truth/truth/stated.rs`).
-const ATTITUDE_IN_FILES: f64 = 0.5;
+/// Share of the attitude error of the bus that coordinates of PEDR files contain, and its standard deviation: they are computed
+/// from telemetry of the same attitude, and crossovers remove an unknown part of its error. Rolls have 160 m on the ground (0.4
+/// mrad), coordinates of files 100 m (Neumann et al. 2001), hence the share is below 0.6. The values are a choice: synthetic missions with shares drawn up to 0.4 at nadir
+/// and to 1 off nadir hold it (`tests/truth/truth/stated.rs`).
+const ATTITUDE_IN_FILES: [f64; 2] = [0.25, 0.25];
 /// Index of the constant rotation about the camera's x axis, which moves an image across its track.
 const ROLL: usize = 9;
 
@@ -110,10 +111,14 @@ pub(super) fn add_spots<M: ExteriorOrientation>(
         ));
     }
     let profiles = assembled.profiles.iter().zip(&middles_m);
-    let profiles = profiles.map(|(profile, middle_m)| RecordedProfile {
-        surface_profile: profile.index,
-        axes: local_axes(middle_m),
-        sigma_m: shift_sigmas_m(images, shots, profile.index),
+    let profiles = profiles.map(|(profile, middle_m)| {
+        let axes = local_axes(middle_m);
+        RecordedProfile {
+            surface_profile: profile.index,
+            axes,
+            sigma_m: shift_sigmas_m(images, shots, profile.index),
+            shared: shared_rotation(images, shots, profile.index, &axes),
+        }
     });
     assembled.network.common_bus = Some(CommonBus {
         boresight_sigma_rad: config.boresight_sigma_rad,
@@ -125,8 +130,8 @@ pub(super) fn add_spots<M: ExteriorOrientation>(
     Ok(Ok(()))
 }
 
-/// Standard deviations of the shift of a recorded profile towards east, north and up, metres, with the attitude error that it may
-/// share with the images.
+/// Standard deviations of the shift of a recorded profile towards east, north and up, metres, with the uncertainty of the attitude
+/// error that it shares with the images.
 fn shift_sigmas_m<M>(
     images: &[AdjustImage<M>],
     shots: &LaserShots,
@@ -147,7 +152,27 @@ fn shift_sigmas_m<M>(
         .filter(|shift_m| shift_m.is_finite())
         .fold(0.0, f64::max);
     let ends_m = [&first.ground.xyz_m, &last.ground.xyz_m];
-    with_across_track(own_m, ends_m, ATTITUDE_IN_FILES * of_attitude_m)
+    with_across_track(own_m, ends_m, ATTITUDE_IN_FILES[1] * of_attitude_m)
+}
+
+/// The part of a constant roll of its image by which a profile is recorded aside, along `axes`: a rotated bus meets ground farther
+/// along the y axis of the camera, where the telemetry places the shot without the correction.
+fn shared_rotation<M: ExteriorOrientation>(
+    images: &[AdjustImage<M>],
+    shots: &LaserShots,
+    profile: usize,
+    axes: &Matrix3<f64>,
+) -> Option<SharedRotation> {
+    let mut of_profile = shots.shots.iter().filter(|shot| shot.profile == profile);
+    let range = of_profile.find_map(|shot| shot.range.as_ref())?;
+    let image = &images[range.image];
+    let pose = image.oriented_camera.orientation.pose(range.x_lines);
+    let beam = image.laser_axes?.column(2).into_owned();
+    let by_roll_m = pose.mars_to_camera.tr_mul(&beam.cross(&Vector3::x())) * range.range_m;
+    Some(SharedRotation {
+        image: range.image,
+        by_rotation_m: axes * by_roll_m * -ATTITUDE_IN_FILES[0],
+    })
 }
 
 /// The spot of a shot in an image; `None` where it falls outside the image, as it may near an end.

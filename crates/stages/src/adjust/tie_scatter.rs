@@ -3,7 +3,9 @@
 //! Matching states how well two patches fit, to 0.04–0.12 pixels; attitude jitter of 1–5 µrad moves both by 0.2–0.4 pixels.
 //! Without a place for it, good tie points are rejected as blunders, and heights are stated too precisely. The scatter is the
 //! same for all measurements; residuals along the track determine it. Across the track nothing does, because heights absorb
-//! errors there; it is assumed to be the same.
+//! errors there; jitter in roll and pitch is independent, so that the expected variance there is larger than the one found.
+
+use nalgebra::Vector2;
 
 use super::network::Assembled;
 use areograph_geom::{
@@ -14,7 +16,10 @@ use areograph_geom::{
 /// Relative standard deviation of a standard deviation from such a median of n values, times √n.
 const OF_MEDIAN: f64 = 1.17;
 /// A scatter is significant beyond this many of these.
-const BY_CHANCE: f64 = 3.0;
+const BY_CHANCE: f64 = 2.0;
+/// Expected variance across the track over the one found along it. For sinusoids of roll and pitch with independent amplitudes,
+/// uniform in their logarithm from a to 5 a, E\[roll²\] E\[1/pitch²\] is 2.2; of several sinusoids it is smaller.
+const ACROSS: f64 = 2.0;
 /// Fewest residuals that determine a scatter.
 const RESIDUALS_MIN: usize = 40;
 /// Residuals with less redundancy hardly show an error.
@@ -64,8 +69,10 @@ pub(super) fn tie_scatter_px<M>(assembled: &Assembled<M>, adjustment: &Adjustmen
 }
 
 impl<M> Assembled<M> {
-    /// Adds a scatter, focal-plane pixels, to the standard deviations of all measurements of tie points; once.
+    /// Adds a scatter along the track, focal-plane pixels, and the one expected across it, to the standard deviations of all
+    /// measurements of tie points; once.
     pub(super) fn scatter_ties(&mut self, scatter_px: f64) {
+        let scatter_px_of_axes = Vector2::new(scatter_px, ACROSS.sqrt() * scatter_px);
         let shots = self.shots;
         let ties = self
             .network
@@ -73,7 +80,7 @@ impl<M> Assembled<M> {
             .iter_mut()
             .filter(|view| view.point >= shots);
         for view in ties {
-            view.sigma_px = view.sigma_px.map(|sigma_px| sigma_px.hypot(scatter_px));
+            view.sigma_px = view.sigma_px.zip_map(&scatter_px_of_axes, f64::hypot);
         }
         self.tie_scatter_px = scatter_px;
     }
