@@ -1,8 +1,8 @@
 //! areograph: Mars Global Surveyor data preparation, from SPICE kernels, MOLA shots and MOC images
 //! to validated, photogrammetry-ready products.
 //!
-//! [`flow::run_site`] runs a site; `flow/site.rs` shows how, read top to bottom; `ARCHITECTURE.md` is the map. What
-//! lies below the stages are crates of their own, under their names here.
+//! [`flow::run_site`] runs a site; `flow/site.rs` shows how, read top to bottom; `ARCHITECTURE.md` is the map. The
+//! layers below the stages are separate crates, under their names here.
 //!
 //! The root names these crates by their rooms: `crate::geom` is `areograph_geom`.
 

@@ -38,7 +38,7 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-/// Runs the calibration and prints the outcome.
+/// Runs the calibration and reports the outcome.
 pub(super) fn run(arguments: &Arguments) -> ExitCode {
     let loaded = match load_calibration(&arguments.calibration) {
         Ok(loaded) => loaded,

@@ -23,9 +23,10 @@ use crate::{
 /// Fetches the files that a site needs from the archives of the mission.
 ///
 /// A site file states what is needed: its images, and the folders and files that do not exist yet. Without one, options
-/// state it. Kernels are chosen by the coverage in the index of their archive, files of the laser by orbits, images by the
-/// cumulative index, tables of shots by the windows. Transfers are resumed, verified by size and checksum or by their rows,
-/// and appear whole or not at all; fetch.json records what every file is. Other files are never replaced without --replace.
+/// state it. Kernels are chosen by the coverage in the index of their archive, laser files by orbits, images by the
+/// cumulative index, tables of shots by the windows. Transfers are resumed, verified by size and checksum or by their
+/// rows, and appear whole or not at all; fetch.json records what every file is. Other files are never replaced without
+/// --replace.
 ///
 /// Examples:
 ///   areograph fetch gale.toml --index
@@ -42,23 +43,23 @@ pub(super) struct Arguments {
     /// Site files (TOML); their inputs may be missing.
     #[arg(value_name = "SITE.toml")]
     sites: Vec<PathBuf>,
-    /// Folder of fetch.json and of copies of the indexes; also of the files that no site file places. By default that of the
-    /// first site file, else the current one.
+    /// Folder of fetch.json and of copies of the indexes; also of the files that no site file places. By default the
+    /// folder of the first site file, else the current folder.
     #[arg(long, value_name = "DIR")]
     into: Option<PathBuf>,
     /// An image of the mission.
     #[arg(long = "image", value_name = "PRODUCT")]
     images: Vec<String>,
-    /// First and last day for kernels and files of the laser.
+    /// First and last day for kernels and laser files.
     #[arg(long, value_name = "DAY,DAY", value_parser = wish::days)]
     dates: Vec<[crate::fetch::Utc; 2]>,
-    /// West, east, south and north edge, degrees: a table of the shots in this box, by the Orbital Data Explorer.
+    /// West, east, south and north edge, degrees: a table of the shots in this box, from the Orbital Data Explorer.
     #[arg(long = "box", value_name = "W,E,S,N", value_parser = box_of_shots, allow_hyphen_values = true)]
     edges_deg: Option<[f64; 4]>,
-    /// The latest leap seconds of NAIF's generic kernels into this folder.
+    /// Fetch the latest leap seconds of NAIF's generic kernels into this folder.
     #[arg(long, value_name = "DIR")]
     generic_kernels: Option<PathBuf>,
-    /// First and last orbit of files of the laser.
+    /// First and last orbit of the laser files.
     #[arg(long, value_name = "FIRST,LAST", value_parser = wish::orbits)]
     orbits: Vec<[u32; 2]>,
     /// Only files of these kinds.
@@ -70,7 +71,7 @@ pub(super) struct Arguments {
     /// Bring the copies of the indexes up to date, and end.
     #[arg(long, conflicts_with_all = ["plan", "verify", "audit"])]
     index: bool,
-    /// List the files with sizes and reasons, by the copies of the indexes, and end; no archive is asked.
+    /// List the files with sizes and reasons, from the copies of the indexes, and end; no archive is asked.
     #[arg(long, conflicts_with_all = ["verify", "audit"])]
     plan: bool,
     /// Read every fetched file again and compare it with its record, and end.
@@ -82,7 +83,7 @@ pub(super) struct Arguments {
     /// Do not ask for new indexes first.
     #[arg(long)]
     offline_index: bool,
-    /// Replace files of other content.
+    /// Replace files with different content.
     #[arg(long)]
     replace: bool,
 }

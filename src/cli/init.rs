@@ -53,8 +53,8 @@ pub(super) struct Arguments {
     /// PEDR files, or globs of them.
     #[arg(long, value_name = "GLOB")]
     pedr: Vec<PathBuf>,
-    /// Tables of shots of the Orbital Data Explorer, or globs of them; with --place, the tables that `areograph fetch` requests,
-    /// in place of PEDR files.
+    /// Shot tables from the Orbital Data Explorer, or globs of them; with --place, the tables that `areograph fetch`
+    /// requests, in place of PEDR files.
     #[arg(long, value_name = "GLOB", conflicts_with = "pedr")]
     shots: Vec<PathBuf>,
     /// Label of an image.
@@ -67,7 +67,7 @@ pub(super) struct Arguments {
     place: place::PlaceArguments,
 }
 
-/// Why no site file is written.
+/// Reasons why no site file is written.
 #[derive(Debug, thiserror::Error, Cause)]
 #[cause(Configuration)]
 enum Refused {
@@ -90,14 +90,30 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     if file.exists() {
         return Err(Refused::Exists).in_file(file);
     }
-    fs::create_dir_all(&folder)
+    in_new_folder(&folder, || write(&answers, &folder, &file))
+}
+
+/// `work` in the folder, which is created; what was created is removed again if it fails and left nothing there.
+fn in_new_folder(folder: &Path, work: impl FnOnce() -> Result<(), Error>) -> Result<(), Error> {
+    let missing: Vec<&Path> = folder.ancestors().take_while(|of| !of.exists()).collect();
+    fs::create_dir_all(folder)
         .map_err(IoError::on("create the folder"))
-        .in_file(&folder)?;
-    let mut site = answers.new_site(&folder)?;
+        .in_file(folder)?;
+    let done = work();
+    if done.is_err() {
+        // Innermost first; a folder with files stays.
+        let _ = missing.into_iter().try_for_each(fs::remove_dir);
+    }
+    done
+}
+
+/// Checks and writes the site file.
+fn write(answers: &Answers, folder: &Path, file: &Path) -> Result<(), Error> {
+    let mut site = answers.new_site(folder)?;
     // Checked as the future file, so that paths are relative to its folder.
     if answers.is_placed_by_tables() {
         site.edges_deg = Some([0.0, 360.0, -90.0, 90.0]);
-        let anywhere = parse(&site.text(), &file)?.site;
+        let anywhere = parse(&site.text(), file)?.site;
         let read: Vec<PathBuf> = anywhere
             .shots
             .into_iter()
@@ -106,11 +122,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
         site.edges_deg = Some(tables::box_around_deg(&read)?);
     }
     let text = site.text();
-    let loaded = parse(&text, &file)?;
+    let loaded = parse(&text, file)?;
     for warning in loaded.warnings {
         tracing::warn!("{warning}");
     }
-    atomic::write(&file, text.as_bytes())?;
+    atomic::write(file, text.as_bytes())?;
     output::line(format_args!(
         "{}: written; next: areograph check {}",
         file.display(),
@@ -160,10 +176,10 @@ impl Answers {
             ),
             ("PEDR files or globs [none]", &mut answers.pedr),
             (
-                "Tables of shots of the Orbital Data Explorer, or globs [none]",
+                "Shot tables from the Orbital Data Explorer, or globs [none]",
                 &mut answers.shots,
             ),
-            ("Labels of images [none]", &mut answers.labels),
+            ("Image labels [none]", &mut answers.labels),
             ("Tie point files [none]", &mut answers.ties),
         ];
         for (question, paths) in questions {
@@ -198,7 +214,7 @@ impl Answers {
         }
         if !self.pedr.is_empty() && self.edges_deg.is_none() && self.labels.is_empty() {
             return Err(Refused::Missing(
-                "the window of the site (--box, or images by --label)",
+                "the window of the site (--box, or images with --label)",
             ));
         }
         Ok(())
@@ -209,7 +225,7 @@ impl Answers {
         !self.shots.is_empty() && self.edges_deg.is_none() && self.labels.is_empty()
     }
 
-    /// The same with paths relative to `folder`.
+    /// The new site with paths relative to `folder`.
     fn new_site(&self, folder: &Path) -> Result<NewSite, Error> {
         let seen = |paths: &[PathBuf]| seen(folder, paths);
         let mut images = Vec::with_capacity(self.labels.len());

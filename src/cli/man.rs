@@ -11,7 +11,7 @@ use crate::{
     store::atomic,
 };
 
-/// How an earlier page is recognised.
+/// Mark by which an earlier page is recognised.
 const PAGE: Mark = Mark {
     what: "a manual page of areograph",
     at: MarkAt::Head("\n.TH areograph", 512),

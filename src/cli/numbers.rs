@@ -1,4 +1,4 @@
-//! Range checks for numbers on the command line, as for those of a site file.
+//! Range checks for numbers on the command line, as for numbers of a site file.
 
 /// Reads a number above `low`, up to `high`.
 pub(super) fn above_to(

@@ -16,7 +16,8 @@ const OPENER: &str = if cfg!(target_os = "macos") {
 } else {
     "xdg-open"
 };
-/// How often, and how far apart, the opener is polled for failure; if it has not failed by then, the page is shown.
+/// Number of polls of the opener for failure, and the time between them; if it has not failed by then, the page is
+/// shown.
 const LOOKS: u32 = 40;
 const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
 
@@ -30,7 +31,7 @@ pub(super) fn page(page: &Path) {
     output::warning(format_args!("{why}; the page is {}", page.display()));
 }
 
-/// How the opener failed, if it did.
+/// The failure of the opener, if any.
 fn failure(page: &Path) -> Result<Option<ExitStatus>> {
     let mut opener = Command::new(OPENER);
     opener.arg(page).stdin(Stdio::null()).stdout(Stdio::null());

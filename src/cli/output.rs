@@ -11,7 +11,7 @@ use crate::error::{IoError, printable};
 /// Control characters of answers and messages themselves; others come from paths and files.
 const LAYOUT: &str = "\n\t";
 
-/// Why part of the output was lost.
+/// Reason why part of the output was lost.
 static LOST: OnceLock<Error> = OnceLock::new();
 
 /// Prints a line of the output. A closed pipe (`| head`) is not a failure.

@@ -28,7 +28,7 @@ const TOLD_EVERY: Duration = Duration::from_secs(10);
 /// Interval at which the time on a live line is redrawn.
 const TICK: Duration = Duration::from_millis(200);
 
-/// Standard error for the log: what is written goes above the live lines.
+/// Standard error for the log: text appears above the live lines.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Log;
 
@@ -127,7 +127,7 @@ impl Progress {
     fn count(&self, stage: &str, count: Count) {
         let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
         let now = Instant::now();
-        // Files are hashed for a stage before it counts what it does.
+        // Files are hashed for a stage before it counts its steps.
         let same = |before: &Counted| before.stage == stage && before.of == count.of;
         if !counted.as_ref().is_some_and(same) {
             *counted = Some(Counted {

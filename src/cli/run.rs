@@ -94,7 +94,7 @@ impl Arguments {
     }
 }
 
-/// Runs the sites and prints the outcome of each, in the order given.
+/// Runs the sites and reports the outcome of each, in the order given.
 pub(super) fn run(arguments: &Arguments) -> ExitCode {
     let sites = match load_sites(&arguments.sites) {
         Ok(sites) => sites,

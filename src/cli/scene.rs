@@ -75,7 +75,7 @@ pub(super) struct Arguments {
     /// `areograph pedr`.
     #[arg(long, value_name = "FILES", conflicts_with_all = ["along", "realistic", "day_s", "plane", "calibration", "terrain_model"])]
     days: Option<u32>,
-    /// The same, with a size of about this many gigabytes.
+    /// An archive of about this many gigabytes of PEDR files, with its kernels, instead of a mission.
     #[arg(long, value_name = "GB", conflicts_with_all = ["along", "realistic", "day_s", "plane", "calibration", "terrain_model", "days"])]
     gb: Option<f64>,
     /// With --along: labels of images to put into the site file.

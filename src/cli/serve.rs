@@ -197,7 +197,7 @@ async fn obey(shared: Arc<Shared>, listen: Option<SocketAddr>) {
     std::process::exit(0);
 }
 
-/// Reports to the service manager that work goes on, as a growing number shows.
+/// Notifies the service manager that work continues, as long as a counter increases.
 async fn tell_life(work: impl Fn() -> u64) {
     let Some(patience) = sd_notify::watchdog_enabled() else {
         return;

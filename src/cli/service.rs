@@ -144,7 +144,7 @@ fn database(config: &ServiceConfig) -> Result<Database, Error> {
     Database::open(&config.outputs.state)
 }
 
-/// The same, but no new one.
+/// The existing database; none is created.
 fn existing(config: &ServiceConfig) -> Result<Database, Error> {
     Database::open_existing(&config.outputs.state)
 }

@@ -65,7 +65,7 @@ pub(super) fn answer(
     }
 }
 
-/// Prints reasons, remarks, and what is not tested.
+/// Reports reasons, remarks, and errors that are not tested.
 fn tell(manifest: &Manifest) {
     for reason in &manifest.verdict.reasons {
         output::line(format_args!("  invalid: {reason}"));

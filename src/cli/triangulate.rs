@@ -35,7 +35,7 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-/// Runs the net and prints the outcome.
+/// Runs the net and reports the outcome.
 pub(super) fn run(arguments: &Arguments) -> ExitCode {
     let loaded = match load_net(&arguments.net) {
         Ok(loaded) => loaded,

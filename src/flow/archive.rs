@@ -13,7 +13,7 @@
 //! The result of a file is stored with the identity of the file, the hashes of the kernels and the rules, once the
 //! kernels are confirmed unchanged. The BLAKE3 of a file is computed from the checked bytes. `archive/gather.rs` counts
 //! every shot once: copies are recognised by hash, and files whose profiles overlap in time are a failure. Products,
-//! journal and manifest are those of a net.
+//! journal and manifest are handled as for a net.
 
 mod checker;
 mod gather;
@@ -72,7 +72,7 @@ const WORST: usize = 12;
 /// Step of the scan of clock biases, seconds: the parabola through the variances interpolates between steps.
 const SCAN_STEP_S: f64 = 0.05;
 
-/// What to check.
+/// The archive to check.
 #[derive(Debug)]
 pub struct ArchiveRequest<'a> {
     /// Folders of PEDR files, and single files.
@@ -98,7 +98,7 @@ pub struct ArchiveOutcome {
     pub manifest: Manifest,
     /// Whether the products already existed.
     pub unchanged: bool,
-    /// Why files could not be checked; all others were.
+    /// Reasons why files could not be checked; all others were.
     pub failures: Vec<Error>,
 }
 
@@ -108,7 +108,7 @@ pub struct ArchiveOutcome {
 #[cause(Input: "name the folder of the PEDR files, or files (AP#####v.B)")]
 struct NoFiles;
 
-/// The limits of a check: those of a site file, with a coarser scan.
+/// The limits of a check, as in a site file, with a coarser scan.
 #[must_use]
 pub fn archive_limits() -> RangeCheckConfig {
     RangeCheckConfig {
@@ -252,7 +252,8 @@ impl Archive<'_> {
         (format!("{NAME}/{}", &place[..32]), inputs)
     }
 
-    /// Checks the files without stored results: this thread loads, another one has all threads of the pool check.
+    /// Checks the files without stored results: this thread loads, while another one distributes the checks to all
+    /// threads of the pool.
     fn check_todo(
         &self,
         paths: &[PathBuf],
@@ -385,7 +386,7 @@ impl Archive<'_> {
         Ok(manifest)
     }
 
-    /// Writes the shots of a profile, or returns why its file does not provide them any more.
+    /// Writes the shots of a profile, or returns the reason why its file no longer provides them.
     fn shots_of(
         &self,
         file: &CheckedFile,

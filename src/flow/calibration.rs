@@ -1,7 +1,7 @@
 //! A calibration of the lines of a camera, from support data and tables to its products.
 //!
-//! `flow/single.rs` contains what this flow shares with that of a net; `flow/calibration_loop.rs` is the calibration
-//! from pixels.
+//! `flow/single.rs` contains the common part of this flow and the flow of a net; `flow/calibration_loop.rs` is the
+//! calibration from pixels.
 
 use std::path::Path;
 
@@ -22,7 +22,7 @@ use crate::{
 };
 
 /// Raised when the layout of the products of a calibration changes.
-const METHOD: u32 = 6;
+const METHOD: u32 = 7;
 
 /// Calibrates the lines of a camera and publishes the products in `<out>/<calibration>`, if an input has changed
 /// since the last run.

@@ -48,7 +48,7 @@ use crate::{
 const SHOTS: usize = 256;
 /// Search range, standard deviations.
 const SIGMAS: f64 = 3.0;
-/// Search range once the lines agree, pixels: errors of heights between tie points exceed those of the cameras.
+/// Search range once the lines agree, pixels: errors of heights between tie points exceed errors of the cameras.
 const LATER_PX: f64 = 20.0;
 /// Tie points that provide the height of the ground, and the common error of their heights, pixels.
 const PLACES: usize = 400;
@@ -62,7 +62,7 @@ pub(super) struct CalibrationLoop<'a> {
 
 impl Stage for CalibrationLoop<'_> {
     const NAME: &'static str = "calibration_loop";
-    const METHOD: u32 = 4;
+    const METHOD: u32 = 5;
     const CALLS: &'static [Called] = &[
         called::<MatchTies<'_>>(),
         called::<MapSurface<'_>>(),
@@ -118,14 +118,14 @@ struct Round {
 struct Lines<'a> {
     config: &'a CalibrationConfig,
     pixels: Vec<Pyramid>,
-    /// Their support data, and the path to which those of a round are written.
+    /// Their support data, and the path to which the support data of a round are written.
     isd: Vec<PathBuf>,
     folder: &'a Path,
     /// Ground points seen by the lines, before laser control exists; body-fixed, metres.
     ground_m: Vec<Vector3<f64>>,
     /// The two lines with the largest convergence.
     pair: [usize; 2],
-    /// Shots that form units: those of the first round, so that rounds can be compared.
+    /// Shots that form units, from the first round, so that rounds can be compared.
     units: Option<UnitShots>,
 }
 

@@ -27,7 +27,7 @@ use crate::{
 /// Outcome of a check.
 #[derive(Debug, Default)]
 pub struct Checked {
-    /// What is in order, one line each.
+    /// Results that are in order, one line each.
     pub findings: Vec<String>,
     /// All failures of a run, not only the first.
     pub failures: Vec<Error>,

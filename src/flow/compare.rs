@@ -38,7 +38,7 @@ pub struct Request<'a> {
     pub stage: &'static str,
     /// The instants of interest; without them all that every set covers.
     pub required: Option<&'a RequiredCoverage>,
-    /// How C-kernels are read.
+    /// Pointing bias with which C-kernels are read.
     pub bias: PointingBias,
     /// Whether attitudes are compared too, as far as the sets hold any.
     pub attitudes: bool,
@@ -62,7 +62,7 @@ pub struct Compared {
 }
 
 impl Request<'_> {
-    /// Where a failure of one set happened.
+    /// Place of a failure of one set.
     fn stage_of(&self, set: &RivalSet) -> String {
         format!("{}/{}", self.stage, set.id)
     }

@@ -13,7 +13,7 @@ use crate::{
     stages::{group_profiles::Profile, tag_times::ImageTimes},
 };
 
-/// Why the flow ends before its end.
+/// Reasons why the flow ends before its end.
 #[derive(Debug)]
 pub(super) enum Exit {
     /// The last requested stage is done.
@@ -48,7 +48,7 @@ pub(super) type Flow<T> = std::result::Result<T, Exit>;
 pub struct StageReason {
     /// Label of the stage, for example `register/E02-00665`.
     pub stage: String,
-    /// Why it runs, or that it is kept.
+    /// Reason why it runs, or the statement that it is kept.
     pub reason: Reason,
 }
 
@@ -63,7 +63,7 @@ pub(super) trait Driver {
     /// Set from outside to stop.
     fn stop(&self) -> &AtomicBool;
 
-    /// Before the stage with this name.
+    /// Called before the stage with this name.
     fn enter(&mut self, stage: &'static str) -> Flow<()>;
 
     /// The output of a stage, or a pending one.
@@ -75,7 +75,7 @@ pub(super) trait Driver {
         Ok(self.files().hash_all(paths, self.stop()).in_stage(stage)?)
     }
 
-    /// The same for files of a kind with a largest size; a larger one is not read.
+    /// Hashes files of a kind with a largest size; a larger one is not read.
     fn hash_sized(
         &mut self,
         stage: &'static str,

@@ -156,7 +156,8 @@ const fn has_angles(model: CameraModel) -> bool {
     }
 }
 
-/// Images whose angles ω and κ turn about nearly the same axis; `use_angles` – of those that use these, or of the others.
+/// Images whose angles ω and κ turn about nearly the same axis; `use_angles` – of images that use these angles, or of
+/// the others.
 fn gimbal_locks(images: &[SiteImage], use_angles: bool) -> Result<Vec<String>> {
     let mut locks = Vec::new();
     for image in images {
@@ -174,7 +175,7 @@ fn gimbal_locks(images: &[SiteImage], use_angles: bool) -> Result<Vec<String>> {
 /// Images that one camera took at one time with the same pixels: their labels may have been exchanged. A remark for each
 /// group of such images.
 fn same_exposures(images: &[SiteImage]) -> Result<Vec<String>> {
-    /// Images that a remark names; of more it states the number.
+    /// Images that a remark names; of more images, it states the number.
     const NAMED: usize = 5;
     let mut groups: Vec<Vec<&ImageTimes>> = Vec::new();
     for image in images {
@@ -211,8 +212,8 @@ fn same_exposures(images: &[SiteImage]) -> Result<Vec<String>> {
     Ok(groups.iter().filter_map(remark).collect())
 }
 
-/// PEDR files without a shot in the windows: each that the site file names, and those of patterns of which most files
-/// have shots. A pattern of which most have none searches an archive.
+/// PEDR files without a shot in the windows: every file that the site file names, and files of patterns most of whose
+/// files have shots. A pattern most of whose files have none searches an archive.
 fn empty_pedr_files(config: &SiteConfig, site: &Site) -> Result<Option<String>> {
     let footprints = &site.book.of::<Converted>()?.footprints;
     let with_shots: BTreeSet<u16> = footprints.file.iter().copied().collect();

@@ -16,7 +16,7 @@ use crate::{
     },
 };
 
-/// Why nothing is exported.
+/// Reasons why nothing is exported.
 #[derive(Debug, thiserror::Error, Cause)]
 enum ExportError {
     /// There is nothing to write.
@@ -24,7 +24,7 @@ enum ExportError {
     #[cause(Input: "name the products of a site with shots in its windows")]
     NoFootprints { site: String },
     /// Such a folder contains what its manifest lists, and nothing else.
-    #[error("this folder is among the products of a site; expected another one")]
+    #[error("this folder is among the products of a site; expected a different folder")]
     #[cause(Configuration: "give another folder with --to")]
     AmongProducts,
     /// The file may be another program's.
@@ -43,11 +43,11 @@ pub struct Exported {
 }
 
 /// Writes the footprints of the site whose products are in `folder` to the folder `to`, by default `SITE_export`, which is
-/// created if missing, in each of `formats`. The files are those that a run writes for `products.formats`.
+/// created if missing, in each of `formats`. A run writes the same files for `products.formats`.
 ///
 /// # Errors
-/// Products that are missing, damaged or of another version; a site without footprints; files of the same names; write
-/// errors.
+/// Products that are missing, damaged or of a different version; a site without footprints; files of the same names;
+/// write errors.
 pub fn export_site(folder: &Path, formats: &[ShotFormat], to: Option<&Path>) -> Result<Exported> {
     let manifest = read_published_by_this_version(folder, |_| false)?;
     let data = PageData::read(folder)?;

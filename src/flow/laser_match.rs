@@ -20,7 +20,7 @@ use crate::{
 };
 
 /// Raised when the layout of the products of a match changes.
-const METHOD: u32 = 5;
+const METHOD: u32 = 6;
 /// Stands for the name of a site in messages and in the manifest.
 const NAME: &str = "pedr_match";
 

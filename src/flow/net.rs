@@ -1,8 +1,8 @@
 //! A net from its tables to its products.
 //!
 //! A net of pictures is not a site: it has no images with times, no kernels and no `[plane]` table in a site file. One
-//! stage leads from its tables to the result. Declarations, store and journal are those of a site; since its folder has
-//! a manifest like that of a site, the page over all sites and the checks of published products apply to it too.
+//! stage leads from its tables to the result. Declarations, store and journal are shared with sites; since its folder
+//! has a manifest like a site's, the page over all sites and the checks of published products apply to it too.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ use crate::{
 };
 
 /// Raised when the layout of the products of a net changes.
-const METHOD: u32 = 4;
+const METHOD: u32 = 5;
 
 /// Triangulates a net and publishes its products in `<out>/<net>`, if an input has changed since the last run.
 ///

@@ -16,7 +16,7 @@ pub enum StageEvent<'a> {
 }
 
 /// Receives the events of stages, each by its label, in the order of the flow and on the thread of the run. Counts
-/// come on any thread; counts of files that are hashed for a stage come before it begins.
+/// arrive on any thread; counts of files that are hashed for a stage arrive before it begins.
 pub trait Observer: std::fmt::Debug + Sync {
     /// One event.
     fn hear(&self, stage: &str, event: &StageEvent<'_>);

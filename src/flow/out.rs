@@ -22,7 +22,7 @@ use crate::{
 /// Longest component of a path that common file systems accept, bytes.
 const PART_LENGTH_MAX: usize = 255;
 
-/// Why no products can be written into a folder.
+/// Reasons why no products can be written into a folder.
 #[derive(Debug, thiserror::Error, Cause)]
 #[cause(Configuration)]
 pub enum OutError {
@@ -44,7 +44,7 @@ pub enum OutError {
         "name a folder for the products (--out) that neither holds inputs nor lies in a folder of inputs"
     )]
     Overlap {
-        /// The folder of all products, or that of the site's.
+        /// The folder of all products, or of the site's products.
         out: PathBuf,
         /// A folder of inputs.
         input: PathBuf,
@@ -99,8 +99,8 @@ pub fn check_out(out: &Path, sites: &[SiteConfig]) -> Result<()> {
 /// Ensures that products and inputs of a site are in separate folders.
 ///
 /// A folder that is searched for kernels, with its subfolders, holds no products and is not among them. Products are
-/// not in the folder of a single input either, unless the site file is in or below it: then it is the folder of
-/// everything.
+/// not in the folder of a single input either, unless the site file is in or below it: then inputs and products share
+/// this folder.
 fn check_apart(out: &Path, site: &SiteConfig) -> std::result::Result<(), OutError> {
     let products = out.join(&site.site);
     let apart = |meet: bool, out: &Path, input: &Path| {

@@ -27,7 +27,7 @@ pub(super) struct Prepared {
 
 /// A site with the outputs of all its stages.
 pub(super) struct Site {
-    /// The outputs, but those of images.
+    /// The outputs, except outputs of images.
     pub(super) book: Book,
     /// Footprints and profiles again, inputs of most stages.
     pub(super) converted: Output<Converted>,
@@ -36,9 +36,9 @@ pub(super) struct Site {
     pub(super) kernels: Option<KernelSet>,
     /// In the order of the configuration.
     pub(super) images: Vec<SiteImage>,
-    /// The same images with their adjusted orientation; `None` without an adjustment.
+    /// The images with their adjusted orientation; `None` without an adjustment.
     pub(super) adjusted_images: Option<Vec<SiteImage>>,
-    /// Why a site with tie points has no adjustment.
+    /// Reason why a site with tie points has no adjustment.
     pub(super) adjustment_failure: Option<Error>,
 }
 
@@ -47,6 +47,6 @@ pub(super) struct Site {
 pub(super) struct Intersection {
     pub(super) intersected: Output<IntersectedTies>,
     pub(super) pairs: Output<Vec<PairComparison>>,
-    /// Heights of the intersected points, or of those of the adjustment.
+    /// Heights of the intersected points, or of the adjusted points.
     pub(super) heights: Output<HeightCheck>,
 }

@@ -1,6 +1,6 @@
 //! The page of a published site, rebuilt from its products.
 //!
-//! The content of the page is a product of its own, unrounded (`products/page_data.rs`), and the page depends only on
+//! The content of the page is a separate product, unrounded (`products/page_data.rs`), and the page depends only on
 //! it (decision 0023). New content of `SiteProducts` for a page belongs there too.
 
 use std::path::{Path, PathBuf};
@@ -38,7 +38,7 @@ pub struct PageAgain {
 /// Rebuilds the page of the site whose products are in `folder`: no site file, kernel or stored stage is read.
 ///
 /// # Errors
-/// Products that are missing, damaged or of another version; the page itself may be.
+/// Products that are missing, damaged or of a different version; the page itself may be.
 pub fn page_again(folder: &Path) -> Result<PageAgain> {
     let manifest = read_published_by_this_version(folder, |path| path == REPORT)?;
     let data = PageData::read(folder)?;
@@ -56,7 +56,7 @@ impl PageAgain {
     /// Writes the page to its place among the products, and returns its path.
     ///
     /// # Errors
-    /// A page that differs from that of the manifest; another run in progress; write errors.
+    /// A page that differs from the page of the manifest; another run in progress; write errors.
     pub fn put_back(&self) -> Result<PathBuf> {
         let path = self.folder.join(REPORT);
         let mut products = self.manifest.products.iter();

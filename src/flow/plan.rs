@@ -1,4 +1,4 @@
-//! The flow of a plan: which stages would run, and why; no product is written.
+//! The flow of a plan: the stages that would run, and the reasons; no product is written.
 
 use std::{path::PathBuf, sync::atomic::AtomicBool};
 
@@ -19,7 +19,7 @@ use crate::{
     store::{cache::StageCache, publish::CACHE},
 };
 
-/// What a run of a site would do.
+/// Plan of a run of a site.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SitePlan {
     /// Every stage with the reason why it would run, or that it would be kept.

@@ -34,7 +34,7 @@ use crate::{
 };
 
 /// Raised when the layout of products changes.
-const METHOD: u32 = 26;
+const METHOD: u32 = 27;
 
 /// The configuration as written, the outlines that it names, all kernels and their paths relative to `folder`, and
 /// the inputs of every stage.
@@ -62,7 +62,7 @@ pub(super) fn inputs(config: &SiteConfig, site: &Site, folder: &Path, ledger: &L
     inputs
 }
 
-/// The existing products of these inputs, or why they must be made.
+/// The existing products of these inputs, or the reason why they must be made.
 pub(super) fn standing(
     folder: &Path,
     cache: &StageCache,

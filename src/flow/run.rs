@@ -41,7 +41,7 @@ pub struct RunOptions<'a> {
     pub force: bool,
     /// Set from outside to stop between two stages, or inside the long ones.
     pub stop: &'a AtomicBool,
-    /// Hashes of input files from earlier runs; those of this run are added.
+    /// Hashes of input files from earlier runs; hashes of this run are added.
     pub hashes: &'a HashCache,
     /// Folders below which input files must lie, links resolved; empty for no restriction.
     pub roots: &'a [PathBuf],
@@ -72,11 +72,11 @@ pub struct SiteOutcome {
     pub folder: PathBuf,
     /// Every stage that the run passed, with the reason why it ran, or that it was kept.
     pub stages: Vec<StageReason>,
-    /// How the run ended.
+    /// End of the run.
     pub ending: Ending,
 }
 
-/// How a run ended.
+/// End of a run.
 #[derive(Debug)]
 pub enum Ending {
     /// Products were published.
@@ -196,7 +196,7 @@ impl Run<'_> {
     }
 
     /// Ensures that all stages have read the same files. Otherwise their outputs would be stored under the hashes of
-    /// other files: those that were just made are discarded.
+    /// other files: the new outputs are discarded.
     fn verify_inputs(&self) -> Result<()> {
         let unchanged = self.bounds.files.verify_all();
         if unchanged.is_err() {
@@ -261,7 +261,7 @@ impl Driver for Run<'_> {
         Ok(self.files().hash_all(paths, watch).in_stage(stage)?)
     }
 
-    /// Publishes the products unless those of an earlier run are current.
+    /// Publishes the products unless the products of an earlier run are current.
     fn publish(&mut self, config: &SiteConfig, site: &Site) -> Flow<()> {
         self.enter(PUBLISH)?;
         let inputs = inputs(config, site, &self.folder, &self.ledger);

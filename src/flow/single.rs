@@ -1,4 +1,4 @@
-//! A flow of one stage: from files to the output of the stage, and from that to products in a separate folder.
+//! A flow of one stage: from files to the output of the stage, and from this output to products in a separate folder.
 
 use std::{
     collections::BTreeMap,
@@ -64,8 +64,8 @@ pub(super) struct ManifestEntry<'a> {
 }
 
 impl Single<'_> {
-    /// Runs the stage that `stage` makes of the hashed `files`, and publishes what `write` and `tell` make of its
-    /// output, if an input has changed since the last run.
+    /// Runs the stage that `stage` makes of the hashed `files`, and publishes the results of `write` and `tell` from
+    /// its output, if an input has changed since the last run.
     ///
     /// # Errors
     /// Files that cannot be read, refusals of the stage, write errors; earlier products then remain.

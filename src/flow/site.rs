@@ -118,7 +118,7 @@ pub(super) fn prepare<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Prep
     })?;
     Ok(Prepared {
         required: flow.required(config, &images, &profiles),
-        // Shots as in their files are not needed any more: a million of them occupy a fifth of a gigabyte.
+        // Shots as in their files are no longer needed: a million of them occupy a fifth of a gigabyte.
         found: found.without_rows(|found| found.footprints = Footprints::new(Vec::new())),
         converted,
         utc,
@@ -237,7 +237,7 @@ pub(super) fn orient<D: Driver>(
         profiles: &profiles,
         laser_surface: &config.laser_surface,
     })?;
-    // One session at a time: that of the positions ends here.
+    // One session at a time: the session of the positions ends here.
     let ranges = {
         let view = KernelView::positions(kernels.as_ref());
         let view = flow.attempt(CheckRanges::NAME, view)?;
@@ -302,7 +302,7 @@ pub(super) fn orient<D: Driver>(
     })
 }
 
-/// Orientation of every image by the kernels, or by its support data.
+/// Orientation of every image from the kernels, or from its support data.
 fn orientations<D: Driver>(
     flow: &mut D,
     config: &SiteConfig,

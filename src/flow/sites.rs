@@ -25,7 +25,7 @@ use crate::{
     },
 };
 
-/// Writes the page over the sites whose folders are in `out`, and the one that it links to; returns the path of the
+/// Writes the page over the sites whose folders are in `out`, and the page that it links to; returns the path of the
 /// former.
 ///
 /// # Errors
@@ -66,8 +66,8 @@ pub fn publish_sites(out: &Path) -> Result<PathBuf> {
     Ok(page)
 }
 
-/// The budgets of the pairs before the adjustment by the products in `folder`; those of an earlier version, or without an
-/// adjustment, have none.
+/// The budgets of the pairs before the adjustment by the products in `folder`; products of an earlier version, or
+/// without an adjustment, have none.
 fn budgets(folder: &Path) -> Vec<UncertaintyBudget> {
     let document = fs::read(folder.join(ADJUSTMENT)).ok();
     let document: Option<serde_json::Value> =

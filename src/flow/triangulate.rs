@@ -119,7 +119,7 @@ fn matched<D: Driver>(
     match_ties(flow, config, Round::Adjusted, &images, shots, read)
 }
 
-/// Tie points that are matched with one orientation, following those of files.
+/// Tie points that are matched with one orientation, following the tie points of files.
 pub(super) fn match_ties<D: Driver>(
     flow: &mut D,
     config: &SiteConfig,

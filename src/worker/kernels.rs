@@ -55,8 +55,8 @@ impl Worker {
         Ok(probed)
     }
 
-    /// Leap seconds and the spacecraft clock, without which CSPICE cannot convert the times of a C-kernel: those of
-    /// the task, or the latest ones of the folder that contains the C-kernel.
+    /// Leap seconds and the spacecraft clock, without which CSPICE cannot convert the times of a C-kernel: the kernels
+    /// of the task, or the latest ones of the folder that contains the C-kernel.
     fn clocks(&self, kernel: &Path, files: &[PathBuf], run: &InputFiles) -> KernelSet {
         let is_clock = |role| matches!(role, KernelRole::Lsk | KernelRole::Sclk);
         let given = files

@@ -26,8 +26,8 @@ pub(super) fn end_with(parent: Option<u32>) -> bool {
     now.and_then(|pid| u32::try_from(pid).ok()) == Some(parent)
 }
 
-/// Limits the resources of the worker to those of its task. Refusals of the system are reported; the task can be done
-/// without the limits.
+/// Limits the resources of the worker to the limits of its task. Refusals of the system are reported; the task can be
+/// done without the limits.
 ///
 /// # Errors
 /// The limit of memory does not admit the threads of the task.

@@ -28,7 +28,7 @@ pub(super) struct Reporter {
 }
 
 impl Reporter {
-    /// Reserves standard output for the service; from now on, C code prints to standard error.
+    /// Reserves standard output for the service; from now on, C code writes to standard error.
     pub(super) fn take() -> io::Result<Self> {
         let pipe = fcntl_dupfd_cloexec(stdout(), BEYOND_STANDARD)?;
         dup2_stdout(stderr())?;

@@ -25,10 +25,10 @@ use crate::{
 const FOOTPRINTS: &str = "footprints.parquet";
 /// Columns with the position of a shot on the ground.
 const PLACE: [&str; 2] = ["longitude_deg", "latitude_deg"];
-/// Column before those of the product: the site.
+/// Column before the columns of the product: the site.
 const SITE: &str = "site";
 
-/// Why shots cannot be searched.
+/// Reasons why shots cannot be searched.
 #[derive(Debug, thiserror::Error, Cause)]
 enum ShotsError {
     /// Unknown format.
@@ -177,7 +177,7 @@ fn inside(batch: &RecordBatch, region: &Region) -> Result<RecordBatch> {
     filter_record_batch(batch, &mask).map_err(refused("searched"))
 }
 
-/// The same rows with a leading column that names their site.
+/// The rows with a leading column that names their site.
 fn with_site(batch: &RecordBatch, site: &str) -> Result<RecordBatch> {
     let field = Field::new(SITE, DataType::Utf8, false);
     let fields = batch.schema();

@@ -83,7 +83,7 @@ impl Worker {
         })
     }
 
-    /// Reports what a run would do, and what it reads.
+    /// Reports the plan of a run, and its inputs.
     pub(super) fn plan(&self, site_file: &Path, out: &Path) -> Result<PlanAnswer> {
         let Loaded { site, files, .. } = self.load(site_file)?;
         let plan = plan_site(&site, &self.options(out, false))?;

@@ -70,7 +70,7 @@ fn kind_and_advice_are_those_of_the_attributes() {
                 code: 301,
             }),
             Kind::Input,
-            "leave the image out, or set body to that of its support data; the configuration expects Mars \
+            "leave the image out, or set body to the body of its support data; the configuration expects Mars \
              (body = \"mars\")",
         ),
         (

@@ -374,13 +374,13 @@ const MISTAKES: &[Mistake] = &[
         "orbit_300_m_up",
         |case| move_orbit(case, [0.0, 300.0, 0.0]),
         End::Invalid,
-        "the kernels contain an orbit other than that of the file",
+        "the kernels contain an orbit other than the file's",
     ),
     (
         "orbit_300_m_aside",
         |case| move_orbit(case, [0.0, 0.0, 300.0]),
         End::Invalid,
-        "the kernels contain an orbit other than that of the file",
+        "the kernels contain an orbit other than the file's",
     ),
     (
         "datum_against_the_label",

@@ -451,9 +451,13 @@ fn lasting_faults_are_named_and_leave_no_file() {
         (
             Fault::Longer { is_announced: true },
             3,
-            "232900 bytes; expected 232800 by the index",
+            "232900 bytes; expected 232800 according to the index",
         ),
-        (Fault::Page, 3, "57 bytes; expected 232800 by the index"),
+        (
+            Fault::Page,
+            3,
+            "57 bytes; expected 232800 according to the index",
+        ),
         (
             Fault::Redirect("http://archive.example.org/x".to_owned()),
             6,
@@ -553,7 +557,7 @@ fn wrong_bytes_are_found_by_their_checksum() {
     archive.server.always(PEDR_PATH, Fault::NoLength);
     let told = archive.refused(&ORBIT).1;
     assert!(
-        told.contains("whether it is whole cannot be known"),
+        told.contains("its completeness cannot be verified"),
         "{told}"
     );
 }
@@ -644,7 +648,7 @@ fn files_of_others_are_never_replaced_unasked() {
     let (code, told) = archive.refused(&kernels);
     assert_eq!(code, 3);
     assert!(
-        told.contains("exists with other content: MD5 is ") && told.contains("--replace"),
+        told.contains("exists with different content: MD5 is ") && told.contains("--replace"),
         "{told}"
     );
     assert!(fs::read(&path).unwrap() == mine);

@@ -125,7 +125,7 @@ fn tables_of_shots_become_a_site() {
 }
 
 #[test]
-fn what_cannot_be_a_site_is_refused_and_leaves_no_file() {
+fn what_cannot_be_a_site_is_refused_and_leaves_no_folder() {
     let case = Case::pair();
     let kernels = ["--kernels", "kernels/nav.tm"];
     let cases: [(&str, Vec<&str>); 7] = [
@@ -163,7 +163,7 @@ fn what_cannot_be_a_site_is_refused_and_leaves_no_file() {
     let mut told = Vec::new();
     for (what, arguments) in cases {
         told.push((what, case.outcome(init(&case, &arguments))));
-        assert!(!case.path("new/new.toml").exists(), "{what}");
+        assert!(!case.path("new").exists(), "{what}");
     }
     let again = |case: &Case| case.outcome(init(case, &PAIR));
     assert!(again(&case).starts_with("exit 0\n"));

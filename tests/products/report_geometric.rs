@@ -418,7 +418,7 @@ fn what_cannot_be_trusted_is_said() {
 fn budgets_are_told_by_both_readings() {
     let site = Site::gusev();
     let page = site.page();
-    let rows = table(&page, "How far apart the two footprints");
+    let rows = table(&page, "Distance between the two footprints");
     let budgets = [&site.pairs[0], &site.adjusted_pairs[0]].map(|pair| pair.budget.clone());
     assert_eq!(rows.len(), 2);
     for (row, of) in rows.iter().zip(budgets.iter().flatten()) {
@@ -599,7 +599,7 @@ fn budgets_that_cannot_be_are_told_in_words() {
     let page = site.page();
     let text = section(&page, SECTIONS[2]);
     assert!(text.contains(&format!("has no budget after the adjustment: {fault}.")));
-    let rows = table(&page, "How far apart the two footprints");
+    let rows = table(&page, "Distance between the two footprints");
     assert_eq!(rows.len(), 1);
     assert!(rows[0][4].contains("orientation explains more than is observed"));
 }

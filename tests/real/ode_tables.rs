@@ -283,7 +283,7 @@ const DAMAGED: [Damage; 8] = [
     (
         1,
         |row| row[..30].to_owned(),
-        "line 3: the row has 3 columns; expected 10, those of the heading",
+        "line 3: the row has 3 columns; expected 10, as in the heading",
     ),
     (
         2,

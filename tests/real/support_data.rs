@@ -290,7 +290,7 @@ const DAMAGES: [Damage; 16] = [
     (
         "the Moon",
         |isd| isd["radii"] = json!({"semimajor": 1737.4, "semiminor": 1737.4, "unit": "km"}),
-        "radii are 1737.40 and 1737.40 km; expected 3396.19 and 3376.20 km, those of Mars",
+        "radii are 1737.40 and 1737.40 km; expected 3396.19 and 3376.20 km, the radii of Mars",
     ),
     (
         "another body",
@@ -316,7 +316,7 @@ const DAMAGES: [Damage; 16] = [
     (
         "a quaternion that is none",
         |isd| isd["body_rotation"]["quaternions"][1] = json!([1.0, 1.0, 0.0, 0.0]),
-        "expected unit quaternions (w, x, y, z); that of row 1 has length 1.414",
+        "expected unit quaternions (w, x, y, z); the quaternion of row 1 has length 1.414",
     ),
     (
         "a number in words",

@@ -231,7 +231,7 @@ const REFUSED: [(&str, &str, &str, &str); 6] = [
         "support data of another body",
         "body = \"moon\"\naltimeter = \"lola\"",
         "body = \"mars\"",
-        "radii are 1737.40 and 1737.40 km; expected 3396.19 and 3376.20 km, those of Mars",
+        "radii are 1737.40 and 1737.40 km; expected 3396.19 and 3376.20 km, the radii of Mars",
     ),
     (
         "a pointing bias at the Moon",

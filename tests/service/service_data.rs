@@ -255,7 +255,7 @@ fn a_database_that_cannot_be_used_is_refused_in_words() {
     refused(
         3,
         &[
-            "tables are those of another program",
+            "tables belong to another program",
             "areograph service rebuild",
         ],
     );

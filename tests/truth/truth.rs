@@ -75,6 +75,8 @@ struct Judged {
     other_m: Option<[Vector3<f64>; 2]>,
     lost: Vec<String>,
     kept_blunders: Vec<String>,
+    /// Largest height error of these in stated standard deviations.
+    kept_blunder_sigmas: f64,
 }
 
 pub(crate) fn table(path: &Path) -> RecordBatch {
@@ -156,6 +158,7 @@ impl Judged {
                 .map(|other| [vector(&other["moved_m"]), vector(&other["mean_sigma_m"])]),
             lost: Vec::new(),
             kept_blunders: Vec::new(),
+            kept_blunder_sigmas: 0.0,
         };
         let heights = table(&folder.join("height_check.parquet"));
         let above = heights.column_by_name("above_surface_m").unwrap();
@@ -178,6 +181,8 @@ impl Judged {
                     let sigma_m = numbers("sigma_up_m", row).unwrap();
                     let kept = format!("{name}: {up_m:.1} m in height, stated {sigma_m:.1} m");
                     judged.kept_blunders.push(kept);
+                    let sigmas = (up_m / sigma_m).abs();
+                    judged.kept_blunder_sigmas = judged.kept_blunder_sigmas.max(sigmas);
                 }
                 (None, true) => judged.lost.push(name.to_owned()),
                 (None, false) => {}

@@ -82,7 +82,7 @@ impl MolaClock {
     }
 }
 
-/// How the datum of a PEDR file is determined.
+/// Way in which the datum of a PEDR file is determined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DatumChoice {
@@ -149,7 +149,7 @@ impl ShotFilter {
     /// Upper limit of the largest off-nadir angle, degrees; the lower limit is above 0.
     pub const OFF_NADIR_LIMIT_DEG: f64 = 90.0;
 
-    /// The whole year of Mars.
+    /// The full year of Mars.
     pub const ALL_SEASONS: [f64; 2] = [0.0, std::f64::consts::TAU];
 
     /// Whether the filter selects a season.

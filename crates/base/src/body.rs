@@ -1,9 +1,9 @@
 //! The observed bodies: rotation, shape and names, from their files under `config/bodies`.
 //!
-//! Frame, ellipsoid, maps, names and numbers of products are those of the body of the site. Footprints, image times and
+//! Frame, ellipsoid, maps, names and numbers of products belong to the body of the site. Footprints, image times and
 //! orientations carry it through the stages; `Body::Mars` is written where something belongs to Mars Global Surveyor.
-//! Mars is in IAU 2000 of our own constants, not of the loaded PCK (a difference is noted); the Moon rotates as its
-//! support data state, which its formula checks.
+//! Mars is in IAU 2000 by areograph's own constants, not by the loaded PCK (a difference is noted); the Moon rotates as
+//! its support data state; its formula checks this rotation.
 //!
 //! ```
 //! use areograph_base::body::Body;
@@ -16,7 +16,7 @@ use std::{collections::BTreeMap, fmt, sync::LazyLock};
 
 use serde::{Deserialize, Serialize};
 
-/// The body of a site. A site has one: frames, heights, maps and words of its products are those of this body.
+/// The body of a site. A site has one: frames, heights, maps and words of its products belong to this body.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Body {
@@ -27,7 +27,7 @@ pub enum Body {
     Moon,
 }
 
-/// Which report a file's body-fixed coordinates follow, known only when the file is read.
+/// Report that a file's body-fixed coordinates follow, known only when the file is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Datum {
@@ -81,11 +81,11 @@ pub struct Nutation {
     pub angle_deg: f64,
     /// Rate of the angle, degrees per Julian century.
     pub angle_deg_per_century: f64,
-    /// Of the right ascension of the pole, times the sine, degrees.
+    /// Coefficient of the right ascension of the pole, times the sine, degrees.
     pub pole_ra_deg: f64,
-    /// Of its declination, times the cosine, degrees.
+    /// Coefficient of its declination, times the cosine, degrees.
     pub pole_dec_deg: f64,
-    /// Of the prime meridian, times the sine, degrees.
+    /// Coefficient of the prime meridian, times the sine, degrees.
     pub meridian_deg: f64,
 }
 

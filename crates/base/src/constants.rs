@@ -1,5 +1,5 @@
-//! Constants of the mission, each with its source and sign; those of the spacecraft are in `config/spacecraft`, those
-//! of bodies in [`crate::body`].
+//! Constants of the mission, each with its source and sign; constants of the spacecraft are in `config/spacecraft`, of
+//! bodies in [`crate::body`].
 
 use std::sync::LazyLock;
 

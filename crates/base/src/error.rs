@@ -88,7 +88,7 @@ pub trait Cause: std::error::Error + Send + Sync + 'static {
     /// The advice to the user, one sentence.
     fn advice(&self) -> String;
 
-    /// The same for a failure that concerns an entry of a configuration.
+    /// The advice for a failure that concerns an entry of a configuration.
     fn advice_on_configured(&self) -> String {
         self.advice()
     }
@@ -118,21 +118,21 @@ impl Error {
         }
     }
 
-    /// The same failure, which concerns `file` (an inner file is kept).
+    /// The failure, which concerns `file` (an inner file is kept).
     #[must_use]
     pub fn in_file(mut self, file: impl Into<PathBuf>) -> Self {
         self.file.get_or_insert_with(|| file.into());
         self
     }
 
-    /// The same failure, which comes from `stage`.
+    /// The failure, which comes from `stage`.
     #[must_use]
     pub fn in_stage(mut self, stage: &str) -> Self {
         self.stage.get_or_insert_with(|| stage.to_owned());
         self
     }
 
-    /// The same failure, which concerns `site`.
+    /// The failure, which concerns `site`.
     #[must_use]
     pub fn in_site(mut self, site: &str) -> Self {
         self.site.get_or_insert_with(|| site.to_owned());

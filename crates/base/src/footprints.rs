@@ -8,7 +8,7 @@
 //! assert!(footprints.topography_m().is_empty());
 //! ```
 //!
-//! Footprints with the coordinates of their files are a type of their own, and not accepted as footprints in the
+//! Footprints with the coordinates of their files are a separate type, and not accepted as footprints in the
 //! frame of the products:
 //!
 //! ```compile_fail,E0308
@@ -123,7 +123,7 @@ macro_rules! columns {
             pub files: Vec<SourceFile>,
             /// The body of the footprints.
             pub body: Body,
-            /// Which radius is that of the ground.
+            /// Which radius represents the ground.
             pub ground: GroundRadius,
             $($(#[$doc])* pub $column: Vec<$kind>,)*
             datum: PhantomData<D>,
@@ -176,7 +176,7 @@ macro_rules! columns {
                 Footprint { $($column: self.$column[row],)* }
             }
 
-            /// The same columns, with coordinates declared to belong to `E`.
+            /// The columns, with coordinates declared to belong to `E`.
             ///
             /// For the stage that converts the coordinates, and for the reader of its product.
             #[must_use]
@@ -261,7 +261,7 @@ impl<D> Footprints<D> {
         }
     }
 
-    /// Which of two radii is that of the ground; `None` without a PEDR file, since tables of shots have one radius.
+    /// Which of two radii represents the ground; `None` without a PEDR file, since tables of shots have one radius.
     #[must_use]
     pub fn ground_choice(&self) -> Option<GroundRadius> {
         let has_both = self.files.iter().any(|file| !file.is_table);

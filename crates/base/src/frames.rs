@@ -72,7 +72,7 @@ macro_rules! frames {
 frames! {
     /// Inertial, Earth mean equator and equinox of J2000.
     J2000 = "J2000";
-    /// Fixed to the body of the site, in the frame of its products: for Mars that of the IAU 2000 report (W₀ =
+    /// Fixed to the body of the site, in the frame of its products: for Mars the frame of the IAU 2000 report (W₀ =
     /// 176.630°), for the Moon mean Earth/polar axis. The body is given by the accompanying [`crate::body::Body`].
     BodyFixed = "body-fixed";
     /// Bus of the spacecraft: +Z towards nadir, flight along −X.

@@ -54,12 +54,12 @@ pub fn is_clock_string(text: &str) -> bool {
             .is_some_and(|(seconds, ticks)| below(seconds, 1 << 32) && below(ticks, 256))
 }
 
-/// Labels print exposures and periods to 0.0001 ms; half of this is their rounding error, seconds.
+/// Labels state exposures and periods to 0.0001 ms; half of this is their rounding error, seconds.
 const EXPOSURE_ROUNDING_S: f64 = 0.5e-7;
 
-/// Whether a line period is exposure × downtrack summing, within the rounding of printed values.
+/// Whether a line period is exposure × downtrack summing, within the rounding of stated values.
 ///
-/// The rounding of the exposure counts once for every summed line, that of the period once.
+/// The rounding of the exposure counts once for every summed line, the rounding of the period once.
 #[must_use]
 pub fn line_period_agrees(line_period_s: f64, exposure_s: f64, downtrack_summing: u32) -> bool {
     let summing = f64::from(downtrack_summing);

@@ -2,8 +2,8 @@
 //!
 //! `config/instruments` holds cameras, the pointing bias included; an image carries its camera through all stages
 //! (`ImageTimes::instrument`). `config/altimeters` has the clock of the altimeter, `config/spacecraft` the identifiers
-//! of spacecraft: that of the laser (`constants::SPACECRAFT`), and others that carry cameras. An instrument names its
-//! spacecraft, and a stage queries `Session::of` this spacecraft for clock, orbit and attitude of an image; shots
+//! of spacecraft: the one with the laser (`constants::SPACECRAFT`), and others that carry cameras. An instrument names
+//! its spacecraft, and a stage queries `Session::of` this spacecraft for clock, orbit and attitude of an image; shots
 //! belong to the spacecraft of the laser.
 //!
 //! In code, only readers of labels and files, the synthetic mission and examples of keys name any of them: a test
@@ -72,7 +72,7 @@ fn spacecraft_of_id<'de, D: Deserializer<'de>>(
     Spacecraft::of_id(&id).ok_or_else(|| D::Error::custom(format!("no spacecraft {id} is known")))
 }
 
-/// How labels and image identifiers of ISIS name an instrument.
+/// Names of an instrument in labels and ISIS image identifiers.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LabelNames {
     /// Instrument keyword.
@@ -100,7 +100,7 @@ pub struct NaifNames {
     pub instrument: i32,
     /// Frame of the camera.
     pub frame: String,
-    /// Number of that frame, usually that of the instrument.
+    /// Number of that frame, usually the instrument's.
     pub frame_id: i32,
     /// From that frame to the camera axes, about their common +Z, radians.
     pub turn_rad: f64,

@@ -1,4 +1,4 @@
-//! What the names of kernels state: orbit solution, quality of the attitude, version.
+//! Contents of kernel names: orbit solution, quality of the attitude, version.
 
 use std::path::{Path, PathBuf};
 

@@ -42,7 +42,7 @@ pub struct RivalKernels {
     pub list: KernelList,
 }
 
-/// How kernels are chosen from a folder.
+/// Rules by which kernels are chosen from a folder.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct KernelSelection {
     /// The folder, searched with its subfolders.

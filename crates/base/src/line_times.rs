@@ -1,8 +1,8 @@
 //! Exposure times of the lines of an image: a table of pieces, each with its line period.
 //!
 //! A line coordinate counts lines from the top edge of the first line, so that the centre of line `i` (from 0) is at
-//! `i + 0.5`. The sensor models of Shan et al. measure time in another unit: [`LineTimes::offset`], seconds from the
-//! middle of the exposure over the mean line period. In an image of one piece this is the line coordinate less half
+//! `i + 0.5`. The sensor models of Shan et al. measure time in a different unit: [`LineTimes::offset`], seconds from
+//! the middle of the exposure over the mean line period. In an image of one piece this is the line coordinate less half
 //! the number of lines. If the exposure changes inside an image the two differ, but positions and attitudes are as
 //! smooth over the offset as over time.
 //!
@@ -278,8 +278,8 @@ impl LineTimes {
         piece.after_s + (line - piece.first()) * piece.period_s
     }
 
-    /// The line coordinate that is exposed `after_s` seconds after the start; within a gap, that of its ends. The
-    /// inverse of [`Self::seconds`] to 1e-9 lines.
+    /// The line coordinate that is exposed `after_s` seconds after the start; within a gap, the coordinate of its ends.
+    /// The inverse of [`Self::seconds`] to 1e-9 lines.
     #[must_use]
     pub fn line_at(&self, after_s: f64) -> f64 {
         let piece = self.piece(|piece| piece.after_s <= after_s);
@@ -310,14 +310,14 @@ impl LineTimes {
         instant.since(self.middle()) / self.mean_period_s
     }
 
-    /// The same for a line coordinate, without the rounding of ET.
+    /// The offset of a line coordinate, without the rounding of ET.
     #[must_use]
     pub fn offset_of_line(&self, line: f64) -> f64 {
         let piece = self.piece(|piece| piece.first() <= line);
         self.first_offset(piece) + (line - piece.first()) * (piece.period_s / self.mean_period_s)
     }
 
-    /// The line coordinate of a time in the unit of the sensor models; within a gap, that of its ends.
+    /// The line coordinate of a time in the unit of the sensor models; within a gap, the coordinate of its ends.
     #[must_use]
     pub fn line_of_offset(&self, offset: f64) -> f64 {
         let piece = self.piece(|piece| self.first_offset(piece) <= offset);

@@ -16,7 +16,7 @@ pub fn is_left_out<T>(value: &Option<T>) -> bool {
     value.is_none() && !WHOLE.get()
 }
 
-/// The same for a list, which has no value if it is empty.
+/// Whether a list is omitted: it has no value if it is empty.
 #[must_use]
 pub fn is_list_left_out<T>(list: &[T]) -> bool {
     list.is_empty() && !WHOLE.get()

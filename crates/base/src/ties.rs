@@ -39,7 +39,7 @@ pub struct KnownGround {
 pub struct TieMeasure<I = usize> {
     /// The image as the file names it (an identifier, or an ISIS serial number), or its index.
     pub image: I,
-    /// Line in the whole image, 0 at the outer edge of the first line and 0.5 at its middle.
+    /// Line in the complete image, 0 at the outer edge of the first line and 0.5 at its middle.
     pub line: f64,
     /// Sample, 0 at the outer edge of the first pixel and 0.5 at its middle.
     pub sample: f64,

@@ -218,7 +218,7 @@ impl Intervals {
         Self::union_of(self.0.iter().flat_map(|own| other.gaps_in(*own)))
     }
 
-    /// The same instants, `seconds` later.
+    /// The instants, `seconds` later.
     #[must_use]
     pub fn shifted(&self, seconds: f64) -> Self {
         Self(self.0.iter().map(|one| one.shifted(seconds)).collect())

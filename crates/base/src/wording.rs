@@ -1,10 +1,10 @@
-//! Texts for readers: the words of another body and altimeter, and the minus sign of their numbers.
+//! Texts for readers: the words of other bodies and altimeters, and the minus sign of their numbers.
 //!
 //! Texts are written for MOLA at Mars; [`Wording`] adapts them to the site. Numbers that programs read keep their
 //! hyphen.
 //!
 //! `judge` adapts reasons, remarks and checks, `Table::in_words` the descriptions of columns, and the page its
-//! sections. Text from a user or a file stays as it is.
+//! sections. Text from a user or a file is unchanged.
 //!
 //! ```
 //! use areograph_base::{body::Body, wording::{Wording, with_minus}};

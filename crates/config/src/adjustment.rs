@@ -37,14 +37,15 @@ declare_table! {
     /// the paper gives one.
     pub struct AdjustmentConfig: Deserialize {
         /// Control of the adjustment. In the published model, image coordinates of footprints are computed from the
-        /// orientations under adjustment and hold them fixed; it is provided for comparison. Along the track it is that
-        /// of the paper. Across the track it is not: residuals refer to the line that sees the point, where the paper
-        /// uses the measured line. Its mean corrections of MOLA across the track, 2.7 to 3.3 px, are then 0, and its
-        /// unit-weight standard deviation is about half of the printed one.
+        /// orientations under adjustment and hold them fixed; it is provided for comparison. Along the track it is the
+        /// paper's model. Across the track it differs: residuals refer to the line that sees the point, where the paper
+        /// uses the measured line. The mean corrections of MOLA across the track, 2.7 to 3.3 px in the paper, are then
+        /// 0, and the unit-weight standard deviation is about half of the published one.
         model: AdjustmentModel = key(words_of(
             AdjustmentModel::WORDS,
             [
-                "heights of tie points by the MOLA surface, orientations by a priori orbit and attitude",
+                "the MOLA surface controls the heights of tie points, the a priori orbit and attitude control the \
+                orientations",
                 "image coordinates of footprints as observations, one standard deviation per image (Yoon & Shan 2004)",
             ],
         )).or(AdjustmentModel::MolaSurface),
@@ -55,8 +56,9 @@ declare_table! {
         /// the image and 1 at its end; inf leaves free, 0 holds fixed. Orbits of three families differ by up to 50 m
         /// (Shan et al. 2005), and errors vary with the revolution.
         position_sigma_m: [f64; 3] = key(SIGMAS_OF_TIME).or([25.0, 0.2, 0.0]),
-        /// Standard deviations of the rotations about the camera's axes, likewise: 0.4 mrad, 150 m on the ground, as
-        /// required by the distances between images of a pair; drifts have the size of the attitude residuals.
+        /// Standard deviations of the rotations about the camera's axes for the same powers of t: 0.4 mrad, 150 m on
+        /// the ground, as required by the distances between images of a pair; drifts have the size of the attitude
+        /// residuals.
         rotation_sigma_rad as "rotation_sigma_arcsec": [f64; 3] = key(SIGMAS_OF_TIME)
             .or([82.5, 2.0, 2.0])
             .map(|sigmas| sigmas.map(|sigma| sigma * RADIANS_PER_ARCSECOND)),
@@ -66,16 +68,16 @@ declare_table! {
             PositionUnknowns::WORDS,
             ["", "a constant", "and a linear term in t", "and a quadratic term"],
         )).or(PositionUnknowns::Acceleration),
-        /// The same for rotations, as jigsaw's camsolve.
+        /// Powers of t that are unknowns of the rotations of every image, as jigsaw's camsolve.
         rotation_unknowns: RotationUnknowns = key(words_of(
             RotationUnknowns::WORDS,
             ["", "constants", "and linear terms in t", "and quadratic terms"],
         )).or(RotationUnknowns::Acceleration),
-        /// Standard deviation of a delay of all lines of an image, which `rotation_sigma_arcsec` allows for together with
-        /// pitch: tie points separate neither from the other, so it is no unknown. What is stated of the position of a
-        /// camera along its track contains it. 45 ms are half the disagreement of the images of a pair (Shan et al. 2005,
-        /// Table 5); 0 assumes exact line times. With `time_bias_sigma_ms`, `attitude_clock` or
-        /// `boresight_line_time_sigma_ms` these apply instead.
+        /// Standard deviation of a delay of all lines of an image, which `rotation_sigma_arcsec` allows for together
+        /// with pitch: tie points cannot separate the two, so the delay is not an unknown. The stated standard
+        /// deviation of a camera's position along its track contains it. 45 ms are half the disagreement of the images
+        /// of a pair (Shan et al. 2005, Table 5); 0 assumes exact line times. With `time_bias_sigma_ms`,
+        /// `attitude_clock` or `boresight_line_time_sigma_ms` these apply instead.
         line_time_sigma_s as "line_time_sigma_ms": f64 = key(SIGMA_OR_NONE)
             .or(45.0)
             .map(|milliseconds| milliseconds * SECONDS_PER_MS),
@@ -95,9 +97,8 @@ declare_table! {
         attitude_clock_rotation_sigma_rad as "attitude_clock_rotation_sigma_arcsec": f64 = key(SIGMA)
             .or(20.6)
             .map(|sigma| sigma * RADIANS_PER_ARCSECOND),
-        /// Whether the a priori position of an image exposed during a profile is that of the spacecraft in the PEDR
-        /// file, not that of the kernels: camera and altimeter then share one orbit. The range check reports the
-        /// distance between the two.
+        /// Whether the a priori position of an image exposed during a profile is taken from the PEDR file, not from the
+        /// kernels: camera and altimeter then share one orbit. The range check reports the distance between the two.
         orbit_of_pedr: bool = key(yes_or_no(
             "the orbit of the kernels",
             "the orbit of the kernels, moved by the mean distance over the profile",
@@ -159,7 +160,7 @@ declare_table! {
         /// Published model: standard deviation of the position unknowns of images that look to nadir (within 5
         /// degrees); inf leaves free, 0 holds fixed. Rotations get the equivalent on the ground (the paper).
         position_sigma_nadir_m: Option<f64> = key(SIGMA_OR_FREE).unused("100.0").was("nadir_sigma_m"),
-        /// The same for all other images (the paper).
+        /// Published model: standard deviation of the position unknowns of all other images (the paper).
         position_sigma_off_nadir_m: Option<f64> =
             key(SIGMA_OR_FREE).unused("200.0").was("off_nadir_sigma_m"),
         /// Weights of image coordinates that fall with their residual.
@@ -277,14 +278,14 @@ declare_table! {
         /// X, Y, Z; inf leaves free, 0 holds fixed.
         position_m: Option<[f64; 9]> = key(SIGMAS_OF_POWERS)
             .unused("[100.0, 100.0, 100.0, 100.0, 100.0, 100.0, 100.0, 100.0, 100.0]"),
-        /// Rotations, likewise.
+        /// Rotations about the camera's x, y and z; inf leaves free, 0 holds fixed.
         rotation_rad as "rotation_arcsec": Option<[f64; 9]> = key(SIGMAS_OF_POWERS)
             .unused("[54.0, 54.0, 54.0, 54.0, 54.0, 54.0, 54.0, 54.0, 54.0]")
             .map(|sigmas| sigmas.map(|sigmas| sigmas.map(|sigma| sigma * RADIANS_PER_ARCSECOND))),
-        /// Unknown powers of t of its position; those of `[adjustment]` where it is left out.
+        /// Unknown powers of t of the image's position; without this key, those of `[adjustment]`.
         position_unknowns: Option<PositionUnknowns> =
             key(words_of(PositionUnknowns::WORDS, [""; 4])).unused(r#""acceleration""#),
-        /// And of its rotation.
+        /// Unknown powers of t of the image's rotations; without this key, those of `[adjustment]`.
         rotation_unknowns: Option<RotationUnknowns> =
             key(words_of(RotationUnknowns::WORDS, [""; 4])).unused(r#""acceleration""#),
     }

@@ -59,7 +59,7 @@ declare_table! {
         calibration: String = key(lower_case_identifier()).required().example(r#""hrsc_i864""#),
         /// Free text for the report.
         description: String = key(any_text()).or(String::new()).example(r#""Stereo lines over orbit I864""#),
-        /// The body; support data of another one are refused.
+        /// The body; support data of a different body are refused.
         body: Body = key(words([
             ("mars", Body::Mars, "in IAU 2000"),
             ("moon", Body::Moon, "in the mean Earth/polar axis frame"),
@@ -109,7 +109,7 @@ fn across_tables(written: &CalibrationConfig, keys: &mut Keys<'_, '_>) {
     }
 }
 
-/// Either tables of points or pixels and laser passes.
+/// Either tables of points, or pixels and laser passes.
 fn from_pixels(written: &CalibrationConfig, keys: &mut Keys<'_, '_>) {
     if !written.ties.matched {
         if keys.span_of("laser").is_some() {
@@ -156,11 +156,11 @@ fn from_pixels(written: &CalibrationConfig, keys: &mut Keys<'_, '_>) {
 declare_table! {
     /// 2 to 9 lines of one camera, which fly together.
     pub struct CameraConfig {
-        /// Its name in tables of points.
+        /// Name of the line in tables of points.
         id: String = key(identifier()).required().example(r#""s1""#),
-        /// Image support data (ISD) of its image, as ALE writes them: mounting, focal length and pixels are where the
-        /// calibration begins. `instrument_pointing` of all cameras must end in one frame, that of the spacecraft, before
-        /// `constant_rotation` leads to each of them.
+        /// Image support data (ISD) of its image, as ALE writes them: the calibration starts from their mounting, focal
+        /// length and pixels. `instrument_pointing` of all cameras must end in one frame, that of the spacecraft,
+        /// before `constant_rotation` leads to each of them.
         #[serde(skip)]
         isd: PathBuf = key(FILE).required().example(r#""isd/s1.json""#),
         /// The pixels of the whole image: TIFF or PNG of one band of grey, or a cube. Only for ties.match.
@@ -182,8 +182,8 @@ declare_table! {
         matched as "match": bool = key(Switch).or(false),
         /// Standard deviation of lines and samples, where the table has none.
         sigma_px: f64 = key(from_to(SIGMA_MIN, 100.0)).or(0.2),
-        /// Distance of the images of a tie point from the projections of one point by the uncalibrated cameras,
-        /// beyond which it is left out.
+        /// Distance between the images of a tie point and the projections of one ground point by the uncalibrated
+        /// cameras, beyond which the tie point is left out.
         limit_px: f64 = key(from_to(1.0, 1e4)).or(100.0),
     }
     check something_measures
@@ -212,7 +212,7 @@ declare_table! {
         /// Paths or globs of PEDR files.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs).or(Vec::new()).unused(r#"["pedr/*.b"]"#),
-        /// Edge of a cell of the terrain model, metres. It is a pixel at least.
+        /// Edge of a cell of the terrain model, metres. It is at least one pixel.
         cell_m: Option<f64> = key(above_to(0.0, 1e5)).unused("100.0"),
         /// Search radius of the shifts of a unit of shots, cells: the possible error of orbit and mounting.
         search_cells: u32 = key(whole_from_to(1, 500)).or(70),
@@ -222,13 +222,14 @@ declare_table! {
         least_variance_m2: f64 = key(above_to(0.0, 1e9)).or(1_000.0),
         /// Similarity that a unit must exceed.
         least_score: f64 = key(from_to(0.01, 0.999)).or(0.9),
-        /// Largest root mean square of model minus laser at shots that take no part in the search, bias removed, metres.
+        /// Largest root mean square of model minus laser at shots withheld from the search, bias removed, metres.
         limit_m: f64 = key(above_to(0.0, 1e5)).or(60.0),
         /// Seed of the clusters of shots and of the withheld ground.
         seed: u32 = key(whole_from_to(0, u32::MAX)).or(1),
         /// Maximum number of rounds; a calibration that has not converged by then is invalid.
         rounds_max: u32 = key(whole_from_to(1, 100)).or(10),
-        /// Radius of the shots that is that of the ground: corrected by the crossover residuals of the files, or raw.
+        /// Shot radius that counts as the radius of the ground: corrected by the crossover residuals of the files, or
+        /// raw.
         crossover: GroundRadius = key(ground_radius()).or(GroundRadius::Corrected),
         /// Shots to keep.
         filter: ShotFilter = table(),
@@ -262,12 +263,13 @@ declare_table! {
         /// MOLA. With `ties.match` the uncertainty of matching is added to it. Beyond the permitted range, the ground
         /// departs from the plane in which errors are computed.
         sigma_horizontal_m: f64 = key(from_to(SIGMA_MIN, CONTROL_SIGMA_MAX_M)).or(100.0),
-        /// Standard deviation of its radius, likewise.
+        /// Standard deviation of the radius of a laser point, under the same conditions.
         sigma_vertical_m: f64 = key(from_to(SIGMA_MIN, CONTROL_SIGMA_MAX_M)).or(10.0),
-        /// Every n-th control point along the flight is withheld for validation; with ties.match every n-th rectangle
-        /// of 5 by 10 km of the ground, with all of its shots.
+        /// Every n-th control point along the flight is withheld for validation; with `ties.match`, every n-th 5 km by
+        /// 10 km rectangle on the ground, with all of its shots.
         held_back_every: u32 = key(whole_from_to(2, 100)).or(4),
-        /// Distance of a control point from its projection by the uncalibrated cameras, beyond which it is left out.
+        /// Distance between a control point and its projection by the uncalibrated cameras, beyond which the point is
+        /// left out.
         limit_px: f64 = key(from_to(1.0, 1e4)).or(300.0),
     }
 }
@@ -275,20 +277,21 @@ declare_table! {
 declare_table! {
     /// A priori values, one standard deviation each. The first three are those of Li et al. 2023, table 2.
     pub struct APrioriConfig {
-        /// Of a coordinate of the orbit. It is not estimated, since offsets of the camera absorb it; with `angle_deg`
-        /// it determines how far a calibration may move the image.
+        /// Standard deviation of an orbit coordinate. It is not estimated, since offsets of the camera absorb it; with
+        /// `angle_deg` it determines how far a calibration may move the image.
         orbit_bias_m: f64 = key(from_to(1e-3, 1e5)).or(1_000.0),
-        /// Of its drift from line to line.
+        /// Standard deviation of the drift of an orbit coordinate from line to line.
         orbit_drift_m_per_line: f64 = key(from_to(1e-6, 10.0)).or(0.01),
-        /// Of an offset angle, in the solution by tie points only.
+        /// Standard deviation of an offset angle in the solution by tie points only.
         angle_rad as "angle_deg": f64 =
             key(from_to(1e-4, 10.0)).or(0.025).map(|degrees| degrees * RADIANS_PER_DEGREE),
-        /// Of an offset angle, in the solution with control: wide, since it absorbs the remaining error of the orbit.
+        /// Standard deviation of an offset angle in the solution with control: wide, since it absorbs the remaining
+        /// error of the orbit.
         control_angle_rad as "control_angle_deg": f64 =
             key(from_to(1e-3, 10.0)).or(1.0).map(|degrees| degrees * RADIANS_PER_DEGREE),
-        /// Of constant and slope of the look angles, at the edge of the image.
+        /// Standard deviation of the constant and the slope of the look angles, at the edge of the image.
         look_px: f64 = key(from_to(1e-3, 1e4)).or(50.0),
-        /// Of their bending, the higher coefficients, at the edge of the image.
+        /// Standard deviation of the bending of the look angles (the higher coefficients), at the edge of the image.
         bend_px: f64 = key(from_to(1e-4, 1e4)).or(0.5),
     }
 }
@@ -313,15 +316,15 @@ declare_table! {
 declare_table! {
     /// Another orbit of the same camera, to which the result is applied unchanged.
     pub struct ValidationConfig {
-        /// Its name.
+        /// Name of the orbit.
         id: String = key(identifier()).required().example(r#""i818""#),
         /// Paths or globs of its image support data, one file per camera, identified by `name_sensor`.
         #[serde(skip)]
         isd: Vec<PathBuf> = key(Globs).required_as("paths or globs of image support data").example(r#"["isd/i818_*.json"]"#),
-        /// Tables of its tie points.
+        /// Tables of the tie points of this orbit.
         #[serde(skip)]
         ties: Vec<PathBuf> = key(Globs).required_as("paths or globs of tables of tie points").example(r#"["i818_ties.csv"]"#),
-        /// Tables of its laser points.
+        /// Tables of the laser points of this orbit.
         #[serde(skip)]
         control: Vec<PathBuf> = key(Globs).required_as("paths or globs of tables of laser points")
             .example(r#"["i818_control.csv"]"#),

@@ -242,7 +242,7 @@ impl<'i> DataTable<'i> {
         })
     }
 
-    /// The whole numbers of `key` from 1 to `high`; none without the key.
+    /// The whole numbers of `key` from 1 to `high`; empty without the key.
     pub(super) fn optional_counts(
         &mut self,
         review: &mut Review<'_>,

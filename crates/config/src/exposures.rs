@@ -23,7 +23,7 @@ const ROW: Several<Number, 3> = several(
 );
 /// More lines than any image has; it limits the duration of a run.
 pub(super) const LINES_MAX: u32 = 1_000_000;
-/// Longest exposure or line period, milliseconds: a hundred times those of the cameras.
+/// Longest exposure or line period, milliseconds: a hundred times the cameras' values.
 pub(super) const MILLISECONDS_MAX: f64 = 1_000.0;
 
 /// Lines of an image that follow each other with one period.

@@ -139,7 +139,7 @@ pub(super) const fn yes_or_no(no: &'static str, yes: &'static str) -> Words<bool
     words([("no", false, no), ("yes", true, yes)])
 }
 
-/// The same for words that are defined elsewhere.
+/// Words that are defined elsewhere.
 pub(super) fn words_of<T: Copy, const N: usize>(
     words: [(&'static str, T); N],
     meanings: [&'static str; N],

@@ -195,7 +195,7 @@ fn ambiguous_edge(positions: &[Vec<f64>]) -> Option<(usize, f64, f64)> {
 
 /// Positions, counted from 1, at which two edges of a closed ring begin that cross each other.
 ///
-/// Edges that only touch or lie along each other enclose what they enclose without them.
+/// Edges that only touch or lie along each other do not change the enclosed area.
 fn crossing(vertices: &[[f64; 2]]) -> Option<(usize, usize)> {
     let mut longitude = vertices[0][0];
     let mut path = vec![vertices[0]];

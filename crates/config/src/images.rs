@@ -53,43 +53,41 @@ declare_table! {
         #[serde(skip)]
         label: Option<PathBuf> = key(FILE).example(r#""../labels/e0202855.lbl""#),
         /// The image itself (.imq, .img, .cub, TIFF, PNG), which may be the file of the label. The report shows
-        /// footprints and tie points on it, and with `ties.match` tie points are matched in it. A file without a
-        /// label must contain all lines, and two such files that are matched must differ in size, by which they are
-        /// distinguished.
+        /// footprints and tie points on it, and with `ties.match` tie points are matched in it. A file without a label
+        /// must contain all lines. If two such files are matched, they must differ in size, which distinguishes them.
         #[serde(skip)]
         pixels: Option<PathBuf> = key(FILE).unused(r#""../images/e0202855.imq""#),
         /// Or image support data (ISD) of the Community Sensor Model, as ALE writes them: camera, line times and
         /// orientation of a line scanner, without a label and without the keys below. The orientation is used
-        /// unchanged: pointing bias, `light_time` and the kernels of orbit and attitude do not apply to such an
-        /// image.
+        /// unchanged: pointing bias, `light_time` and the orbit and attitude kernels do not apply to such an image.
         #[serde(skip)]
         isd: Option<PathBuf> = key(FILE).unused(r#""../isd/m0402852.json""#),
-        /// Or an ISIS cube of a MOC image after `spiceinit`: its label and tables give line times, camera and orientation,
-        /// without kernels of orbit and attitude, and without the keys below. Or a cube of a line scanner after `csminit`, by
-        /// the state of its camera model. The orientation is used unchanged, as that of
-        /// support data; it contains the pointing bias of ISIS. A cropped or reduced cube is the image of its own lines and
-        /// samples (group `AlphaCube`); of a map-projected cube the image before the projection is described, and its pixels
-        /// are no samples of it. Pixels of an unprojected cube need its name in `pixels` as well.
+        /// Or an ISIS cube of a MOC image after `spiceinit`: its label and tables give line times, camera and
+        /// orientation, without orbit and attitude kernels, and without the keys below. Or a cube of a line scanner
+        /// after `csminit`, whose camera model state gives them. The orientation is used unchanged, as with support
+        /// data; it contains the pointing bias of ISIS. A cropped or reduced cube is the image of its own lines and
+        /// samples (group `AlphaCube`); for a map-projected cube the image before the projection is described; the
+        /// cube's pixels are not its samples. Pixels of an unprojected cube need its name in `pixels` as well.
         #[serde(skip)]
         cube: Option<PathBuf> = key(FILE).unused(r#""../cubes/E0201461.cub""#),
-        /// Whether the laser is on the spacecraft of these support data, and their positions are geometric: then they
-        /// are used for the ranges of shots that were fired while the image was exposed. Only with support data.
+        /// Whether the laser is on the spacecraft of these support data, and their positions are geometric: these
+        /// positions are then used for the ranges of shots fired while the image was exposed. Only with support data.
         has_laser: bool = key(Switch).or(false).unused("true"),
         /// The camera: `moc_na`, `moc_wa_red`, `moc_wa_blue`; a line of HRSC on Mars Express: `hrsc_nd`, `hrsc_s1`,
         /// `hrsc_s2`, `hrsc_p1`, `hrsc_p2`, `hrsc_ir`, `hrsc_gr`, `hrsc_bl`, `hrsc_re`, required with its labels; or
-        /// the path of an instrument file like those in `config/instruments`. Without it, the camera of MOC that the
-        /// label names, and without a label `moc_na`. Clock, orbit and attitude are those of its spacecraft.
+        /// the path of an instrument file like those in `config/instruments`. Without it, the MOC camera that the label
+        /// names, and without a label `moc_na`. Clock, orbit and attitude are those of its spacecraft.
         instrument: Option<Instrument> = key(CAMERA).example(r#""moc_na""#),
-        /// Its name in tie point files and in files for ISIS, if that is not the identifier: for a control network
-        /// the ISIS serial number, whose clock must be that of the image. Without it, the identifier.
+        /// Name of the image in tie point files and in files for ISIS, if it is not the identifier: for a control
+        /// network the ISIS serial number, whose clock must be that of the image. Without it, the identifier.
         serial_number: Option<String> =
             key(text()).example(r#""MGS/651158134:116/MOC-NA""#),
-        /// When its lines were exposed, if their exposure changes inside the image, as for HRSC: for every piece its
-        /// first line, counted from 0, the start of that line in ephemeris time (TDB seconds past J2000), and the
-        /// line period in milliseconds. ISIS stores them in the table `LineScanTimes` (lines counted from 1), ALE in
-        /// `line_scan_rate` (seconds from `center_ephemeris_time`). Requires `lines_header`; excludes `exposure_ms`
-        /// and `line_period_ms`. A separate start time must agree, and a gap of more than half a line between two
-        /// pieces is reported.
+        /// Line times of an image whose exposure changes inside the image, as for HRSC: for every piece its first line,
+        /// counted from 0, the start of that line in ephemeris time (TDB seconds past J2000), and the line period in
+        /// milliseconds. ISIS stores them in the table `LineScanTimes` (lines counted from 1), ALE in `line_scan_rate`
+        /// (seconds from `center_ephemeris_time`). Requires `lines_header`; excludes `exposure_ms` and
+        /// `line_period_ms`. A separate start time must agree, and a gap of more than half a line between two pieces is
+        /// reported.
         exposures: Option<Vec<ExposurePiece>> = key(ExposureRows)
             .unused("[[0, 255744599.027482, 12.800791], [6665, 255744684.345045, 13.227428]]"),
         /// Keys written in the configuration.
@@ -149,7 +147,7 @@ declare_table! {
         /// Exposed lines, as in the image header; the time model counts these, less than 600 s in
         /// all.
         lines_header = key(whole_from_to(IMAGE_LINES_MIN, LINES_MAX)).example_in(1, "1536"),
-        /// Lines in the delivered file, when fewer.
+        /// Lines in the delivered file, if fewer than were exposed.
         lines_delivered = key(whole_from_to(1, LINES_MAX)).example_in(1, "1536"),
         /// Samples per line.
         samples = key(whole_from_to(1, DETECTORS_MAX)).example_in(1, "256"),
@@ -199,15 +197,12 @@ fn is_complete(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
     let support = ["isd", "cube"].map(|key| keys.span_of(key).is_some());
     if support.contains(&true) {
         if support == [true; 2] {
-            keys.refuse(
-                "cube",
-                "no cube beside support data (isd), or no isd beside it",
-            );
+            keys.refuse("cube", "either support data (isd) or a cube, not both");
         }
         let why = if support[0] {
             "the support data of images.isd give all of these"
         } else {
-            "label and tables of images.cube give all of these"
+            "the label and tables of images.cube give all of these"
         };
         let of_label = ["label", "instrument"].into_iter();
         for key in of_label.chain(OF_FIELDS) {
@@ -217,7 +212,7 @@ fn is_complete(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
     }
     keys.unused(
         "has_laser",
-        "positions of kernels are those of the spacecraft with the laser",
+        "the kernels give the positions of the spacecraft with the laser",
     );
     of_spacecraft(image, keys);
     of_pieces(image, keys);
@@ -228,14 +223,14 @@ fn is_complete(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
         .collect();
     if keys.span_of("label").is_none() && !lacking.is_empty() {
         let expected = format!(
-            "a label, support data (isd), an oriented cube, or also {}",
+            "a label, support data (isd) or an oriented cube, or else {}",
             lacking.join(", ")
         );
         keys.missing("label", &expected);
     }
 }
 
-/// The clock is that of the spacecraft that carries the camera.
+/// The clock belongs to the spacecraft that carries the camera.
 fn of_spacecraft(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
     let named = image.instrument.as_ref().map(|camera| camera.spacecraft);
     let spacecraft = named.unwrap_or(&SPACECRAFT);
@@ -259,7 +254,7 @@ fn of_pieces(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
             "no such key beside images.exposures, which state it for every piece",
         );
     }
-    // Those of a label are compared with them when it is read.
+    // The values of a label are compared with them when it is read.
     let Some(lines) = image.fields.lines_header else {
         return;
     };

@@ -1,4 +1,4 @@
-//! Instrument files: those of the program, and those that a site names.
+//! Instrument files of the program, and instrument files that a site names.
 
 use std::{path::Path, sync::LazyLock};
 
@@ -105,7 +105,7 @@ pub(super) struct DataFile<T: 'static> {
     known: fn() -> &'static [T],
     /// The identifier of one.
     id: fn(&T) -> &str,
-    /// What the text of a file describes.
+    /// Reader of the text of a file.
     read: fn(&str, &Path) -> Result<T, Problems>,
 }
 
@@ -216,7 +216,7 @@ fn camera(top: &mut DataTable<'_>, review: &mut Review<'_>) -> Instrument {
     }
 }
 
-/// Names and numbers of NAIF; the bus is that of the spacecraft.
+/// Names and numbers of NAIF; the bus belongs to the spacecraft.
 fn naif(
     table: &mut DataTable<'_>,
     spacecraft: &'static Spacecraft,
@@ -245,7 +245,7 @@ fn naif(
     names
 }
 
-/// The time correction of the attitude, which is that of the kernels of one spacecraft.
+/// The time correction of the attitude, which applies to the kernels of one spacecraft.
 fn ck_bias_s(
     table: &mut DataTable<'_>,
     spacecraft: &'static Spacecraft,

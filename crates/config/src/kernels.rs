@@ -38,9 +38,9 @@ declare_table! {
         /// are reported. (The ISIS addendum for MOC uses 1 s.) Beyond the intervals the nearest attitude is used
         /// although the bus rotates: this is noted, and invalid beyond 4 s.
         ck_tolerance_s: f64 = key(from_to(0.0, 60.0)).or(0.0),
-        /// Margin that kernel coverage must have beyond the first and last instant used. The default is more
-        /// than the rounding of label times (10 ms) and clock ticks (4 ms), well below the 4 s between attitude
-        /// samples, so that no image is refused which the kernels can orient.
+        /// Margin that kernel coverage must have beyond the first and last instant used. The default is more than the
+        /// rounding of label times (10 ms) and clock ticks (4 ms), well below the 4 s between attitude samples, so that
+        /// no image that the kernels can orient is refused.
         padding_s: f64 = key(from_to(0.0, 3600.0)).or(1.0),
     }
 }
@@ -53,7 +53,7 @@ declare_table! {
         /// Or kernels in load order, plain paths without wildcards; later ones win.
         files: Option<Vec<PathBuf>> = key(list(FILE).each_once("each kernel once"))
             .unused(r#"["../kernels/naif0012.tls", "../kernels/mgs_ext1.bsp"]"#),
-        /// Or a folder, searched with its subfolders; then also the three keys that follow.
+        /// Or a folder, searched with its subfolders; the three keys that follow then apply too.
         root: Option<PathBuf> = key(FOLDER).unused(r#""../kernels""#),
         /// Or rival sets, each complete with the same clocks.
         sets: Option<Vec<RivalKernels>> = tables(SETS).then(|sets, keys: &mut Keys<'_, '_>| {
@@ -129,10 +129,10 @@ fn listed(metakernel: Option<PathBuf>, files: Option<Vec<PathBuf>>) -> KernelLis
 }
 
 declare_table! {
-    /// Or 2 to 16 rival sets instead of the source above, each complete with the same clocks: the set whose
-    /// trajectory is closest to the mean of all (root mean square distance over the positions that the site needs) is
-    /// used, the rule by which Shan et al. 2005 chose; the manifest states the distances. Two sets are equally far
-    /// from their mean: the first is used. Each has either `metakernel` or `files`.
+    /// Or 2 to 16 rival sets instead of the source above, each complete with the same clocks: the set whose trajectory
+    /// is closest to the mean of all (root mean square distance over the positions that the site needs) is used, as in
+    /// Shan et al. 2005; the manifest states the distances. Two sets are equally far from their mean: the first is
+    /// used. Each has either `metakernel` or `files`.
     fill RivalKernels {
         /// Identifier, unique in the site.
         id = key(lower_case_identifier()).required().unused(r#""nav""#).unused_in(1, r#""ipng""#),
@@ -144,9 +144,9 @@ declare_table! {
 declare_table! {
     /// Kernels of a set.
     struct ListKeys {
-        /// A SPICE metakernel, as above.
+        /// A SPICE metakernel; relative paths in it are relative to its folder.
         metakernel: Option<PathBuf> = key(FILE).unused(r#""../kernels/nav.tm""#),
-        /// Or kernels in load order, as above.
+        /// Or kernels in load order, plain paths without wildcards; later ones win.
         files: Option<Vec<PathBuf>> = key(list(FILE).each_once("each kernel once"))
             .unused_in(1, r#"["../kernels/naif0012.tls", "../kernels/mgs_ipng.bsp"]"#),
     }

@@ -18,7 +18,7 @@ declare_table! {
         shot_sigma_m: f64 = key(from_to(0.01, 1e4)).or(SurfaceOptions::default().shot_sigma_m),
         /// Radial error that all shots of a profile share (1 m after crossovers, Neumann et al. 2001).
         profile_sigma_m: f64 = key(zero_or(1e-3, 1e4)).or(SurfaceOptions::default().profile_sigma_m),
-        /// Error in plan between images and shots, shared by all tie points; on a slope it becomes one of height. The
+        /// Error in plan between images and shots, shared by all tie points; on a slope it becomes a height error. The
         /// default combines 110 m of the images and 70 m of MOLA.
         plan_sigma_m: f64 = key(zero_or(1e-3, 1e5)).or(SurfaceOptions::default().plan_sigma_m),
         /// Standard deviation of the position of a profile in plan, per axis (MOLA's 100 m in the horizontal, Neumann

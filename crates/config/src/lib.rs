@@ -1,4 +1,4 @@
-//! Site configuration: a TOML file, checked whole, turned into [`SiteConfig`].
+//! Site configuration: a TOML file, checked completely, converted into [`SiteConfig`].
 //!
 //! The file uses degrees and milliseconds, the valid form radians and seconds. All problems of a file are reported
 //! together, each as `file:line:column: key is value; expected …`.
@@ -101,7 +101,7 @@ use declare::{Keys, Table, described};
 use problems::Review;
 use written::Written;
 
-/// How the example of a site begins.
+/// Beginning of the example of a site.
 const HEADER: &str = "\
 # Site configuration of areograph, every key with its unit, range and default.
 #
@@ -137,7 +137,7 @@ pub fn load(path: &Path) -> Result<Loaded, Error> {
 /// As [`load`], for a configuration that may refer only to files below `roots`, links followed.
 ///
 /// # Errors
-/// Those of [`load`].
+/// As [`load`].
 pub fn load_within(path: &Path, roots: &[PathBuf]) -> Result<Loaded, Error> {
     let text = read(path)?;
     Ok(parse_within(&text, path, roots)?)
@@ -146,7 +146,7 @@ pub fn load_within(path: &Path, roots: &[PathBuf]) -> Result<Loaded, Error> {
 /// A configuration whose inputs may be missing, checked in all else.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unfilled {
-    /// The valid form, with the paths and globs of what is missing.
+    /// The valid form, with the paths and globs of missing files.
     pub site: SiteConfig,
     /// Files, folders and globs that lead nowhere yet.
     pub absent: Vec<PathBuf>,
@@ -166,7 +166,7 @@ pub struct ShotGlob {
 /// As [`load`], for a configuration whose files, folders and globs need not exist yet.
 ///
 /// # Errors
-/// Those of [`load`], missing files excepted.
+/// As [`load`], missing files excepted.
 pub fn load_unfilled(path: &Path) -> Result<Unfilled, Error> {
     let text = read(path)?;
     Ok(parse_unfilled(&text, path)?)
@@ -236,11 +236,11 @@ fn read(path: &Path) -> Result<String, Error> {
 }
 
 /// Checks the configuration `text` of `file`.
-/// Besides the text it examines only what the text names: whether files exist, which files globs match, and the
+/// Besides the text it examines only files that the text names: whether they exist, which files globs match, and the
 /// polygons of windows.
 ///
 /// # Errors
-/// [`Problems`] with everything that is wrong.
+/// [`Problems`] with all faults.
 pub fn parse(text: &str, file: &Path) -> Result<Loaded, Problems> {
     parse_within(text, file, &[])
 }
@@ -263,10 +263,10 @@ fn parse_within(text: &str, file: &Path, roots: &[PathBuf]) -> Result<Loaded, Pr
     })
 }
 
-/// What was read, with the keys as written, and warnings.
+/// The result of reading, with the keys as written, and warnings.
 type Parsed<T> = ((T, Written), Vec<String>);
 
-/// Checks the `text` of `file`, whose keys are those of `T` and are documented in `documentation`.
+/// Checks the `text` of `file`, whose keys `T` declares and `documentation` documents.
 fn parse_file<T: Table>(
     text: &str,
     file: &Path,

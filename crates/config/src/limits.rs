@@ -9,7 +9,7 @@ use super::{
 
 declare_table! {
     /// Limits on tie points, their adjustment and a terrain model that make a site valid or invalid. Independent data
-    /// are checked first: heights by MOLA, then the agreement of images with each other.
+    /// are checked first: heights against MOLA, then the agreement of images with each other.
     pub struct LimitsConfig: Deserialize {
         /// Largest |median| height of tie points above the MOLA surface before the adjustment. A priori the height of a
         /// pair is known to some 500 m; the default is five times that.
@@ -27,13 +27,14 @@ declare_table! {
         /// Largest distance along the flight between two images at their tie points before the adjustment. Shan et
         /// al. 2005 find 225 to 271 m; the default corresponds to the rotation of the attitude in 3 s.
         parallax_before_max_m: f64 = key(above_to(0.0, 1e6)).or(1000.0),
-        /// The same after the adjustment: six lines of MOC's usual 4 m.
+        /// Largest distance along the flight between two images at their tie points after the adjustment: six lines of
+        /// MOC's usual 4 m.
         parallax_after_max_m: f64 = key(above_to(0.0, 1e6)).or(25.0),
         /// Largest standard deviation of unit weight of the tie points along and across the track.
         sigma0_max: f64 = key(above_to(0.0, 1000.0)).or(1.5),
         /// Fewest tie points of a sound adjustment.
         ties_min: u32 = key(whole_from_to(0, 1_000_000)).or(10),
-        /// Least share of the common ground that a terrain model must have heights of.
+        /// Least share of the common ground for which a terrain model must have heights.
         surface_filled_min: f64 = key(from_to(0.0, 1.0)).or(0.2),
         /// Largest robust spread of the altimeter's shots about a terrain model, in their standard deviations.
         surface_spread_max_sigma: f64 = key(above_to(0.0, 1000.0)).or(3.0),

@@ -78,8 +78,8 @@ fn across_tables(net: &NetConfig, keys: &mut Keys<'_, '_>) {
 declare_table! {
     /// Points in pictures.
     pub struct MeasurementsConfig {
-        /// Paths or globs of tables (.csv), one row per measurement: `picture`, `point`, `x`, `y`, y upwards as in a
-        /// map (turned over where it counts lines downwards). A crater boxed by two settings of a cross has
+        /// Paths or globs of tables (.csv), one row per measurement: `picture`, `point`, `x`, `y`, y upwards as on a
+        /// map (inverted where it counts lines downwards). A crater boxed by two settings of a cross has
         /// `x_upper_right`, `y_upper_right`, `x_lower_left`, `y_lower_left` instead of `x`, `y`. Units are the
         /// picture's own.
         #[serde(skip)]
@@ -127,8 +127,8 @@ declare_table! {
     /// A priori data of the pictures. Without this table the pictures are those of the measurements.
     pub struct PicturesConfig {
         /// Paths or globs of tables (.csv), one row per picture: `picture`, and where known `brick`, the name of its
-        /// brick, and `metres_per_unit`, the size of a unit of its coordinates on the ground, which tests the scale
-        /// of the controls: where the adjusted one differs by more than 2 %, the net is invalid.
+        /// brick, and `metres_per_unit`, the size of a unit of its coordinates on the ground, which tests the scale of
+        /// the controls: where the adjusted size differs by more than 2 %, the net is invalid.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs).or(Vec::new()).unused(r#"["pictures.csv"]"#),
     }
@@ -159,7 +159,7 @@ declare_table! {
     struct MapKeys {
         /// The projection.
         projection: Projection = key(words([
-            ("mercator", Projection::Mercator, "the paper's; away from poles"),
+            ("mercator", Projection::Mercator, "as in the paper; away from the poles"),
             ("stereographic", Projection::Stereographic, "about any place"),
         ])).or(Projection::Mercator),
         /// East longitude of the central meridian, or of the centre.

@@ -10,7 +10,7 @@ use toml::Value;
 
 use super::keys;
 
-/// How such a file begins.
+/// Beginning of such a file.
 const HEADER: &str = "\
 # Written by `areograph init`. Keys that are left out have their defaults; relative paths are relative to its folder.
 # `areograph check` reports everything that would stop a run.

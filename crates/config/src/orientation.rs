@@ -19,15 +19,16 @@ declare_table! {
         /// Origin of straight rays to the ground: one convention for all positions of the camera in all products. The
         /// distances of the other conventions from it are reported for every image. Ranges are always geometric.
         light_time: LightTime = key(words_of(LightTime::WORDS, [
-            "where the camera was when the light left the ground: light time to the surface and aberration",
-            "where it was at the exposure, as for papers that do not state a convention",
-            "where it seems to be from the centre of Mars (LT+S): to match ISIS and ALE",
+            "position of the camera when the light left the ground: light time to the surface and aberration",
+            "position of the camera at the exposure, as for papers that do not state a convention",
+            "apparent position of the camera from the centre of Mars (LT+S): to match ISIS and ALE",
         ])).or(LightTime::Surface),
         /// Largest position RMSE of the model in use, norm of x, y, z: of polynomials of second order at the samples, of
         /// an interpolation between the samples halfway between them. The default is about twice the largest in Table 4
         /// of Shan et al. 2005 (2.3 m).
         position_rmse_max_m: f64 = key(above_to(0.0, 1e6)).or(5.0),
-        /// Largest pointing RMSE of each angle, likewise. The default is twice the largest there (5.0″).
+        /// Largest pointing RMSE of the model in use, for each angle, at the same places. The default is twice the
+        /// largest in Table 4 of Shan et al. 2005 (5.0″).
         pointing_rmse_max_rad as "pointing_rmse_max_arcsec": f64 =
             key(above_to(0.0, 3600.0)).or(10.0).map(|arcsec| arcsec * RADIANS_PER_ARCSECOND),
     }
@@ -41,15 +42,15 @@ declare_table! {
         /// one in use are reported in `registration.json` and in the report.
         model: Option<CameraModel> = key(words_of(CameraModel::WORDS, [
             "positions and angles as polynomials of first order (Shan, Lee & Yoon 2002)",
-            "of second order (Shan et al. 2005); angles are poorly determined near the equator",
-            "second order with a rotation vector, which is well determined at every latitude",
+            "positions and angles of second order (Shan et al. 2005); angles are poorly determined near the equator",
+            "polynomials of second order with a rotation vector, which is well determined at every latitude",
             "interpolation between the samples, no polynomial over the whole image",
         ])).unused(r#""samples""#),
-        /// Convergence limit of the two published iterations. The default is that of the papers. They run beside
-        /// Newton's method, which computes the product.
+        /// Convergence limit of the two published iterations. The default is the papers' limit. The iterations run
+        /// beside Newton's method, which computes the product.
         // Below, steps drown in the rounding of coordinates: 1e-9 m of 4e6 m, lines of metres.
         tolerance_lines: f64 = key(from_to(1e-6, 100.0)).or(0.1),
-        /// Maximum number of their steps. The default is our choice.
+        /// Maximum number of steps of these iterations. The default is not from a publication.
         steps_max: u32 = key(whole_from_to(1, 10_000)).or(100),
     }
 }

@@ -77,7 +77,7 @@ impl Form for Place {
     }
 }
 
-/// What a path leads to, for messages.
+/// Kind of the entry at a path, for messages.
 fn what_is_at(path: &Path) -> &'static str {
     match path.metadata() {
         Ok(found) if found.is_dir() => "a folder",
@@ -162,11 +162,11 @@ impl Form for Globs {
     }
 }
 
-/// Why a glob gives no files.
+/// Reasons why a glob gives no files.
 enum Unmatched {
     /// No file matches this pattern.
     Absent(PathBuf),
-    /// What was expected of it.
+    /// The expectation.
     Other(String),
 }
 
@@ -202,7 +202,7 @@ pub(super) fn below(folder: &Path, glob: &str) -> String {
 
 /// Files that one glob matches below `folder`, or what was expected of it.
 fn matches(folder: &Path, glob: &str) -> Result<Vec<PathBuf>, Unmatched> {
-    // `**` and long rows of wildcards could walk a whole disk.
+    // `**` and long rows of wildcards could walk an entire disk.
     let wild_parts = glob
         .split('/')
         .filter(|part| part.contains(['*', '?', '[']))
@@ -230,7 +230,7 @@ fn matches(folder: &Path, glob: &str) -> Result<Vec<PathBuf>, Unmatched> {
         match path.metadata() {
             Ok(found) if found.is_file() => files.push(path),
             Ok(_) => {}
-            // A skipped file would go unnoticed.
+            // A skipped file would remain undetected.
             Err(error) => {
                 return Err(Unmatched::Other(format!(
                     "existing files: {} cannot be accessed: {error}",

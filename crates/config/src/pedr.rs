@@ -19,18 +19,18 @@ use super::{
 declare_table! {
     /// PEDR files. Without this table images are oriented, but there are no footprints and no range check.
     pub struct PedrConfig: Deserialize {
-        /// PEDR files: paths or globs with `*`, `?`, `[..]`, in at most three parts of the path, `**` not
-        /// taken; letter case counts. A glob that matches no file is a problem. Every shot counts once: a copy
-        /// of a file is read once, two versions of one orbit are refused.
+        /// PEDR files: paths or globs with `*`, `?`, `[..]`, in at most three parts of the path; `**` is not accepted;
+        /// letter case counts. A glob that matches no file is a problem. Every shot counts once: a copy of a file is
+        /// read once, two versions of one orbit are refused.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs)
             .required_as("paths or globs of PEDR files (or no table pedr at all)")
             .example(r#"["../pedr/*.b"]"#),
-        /// Datum of their coordinates; a stated one must not contradict version letter or label. IAU 1991 and
-        /// 1994 differ by 0.033 degrees of longitude, 1.96 km at the equator; pck00006, which Shan et al. 2005
-        /// calls IAU 1991, holds the 1994 constants.
+        /// Datum of their coordinates; a stated one must not contradict version letter or label. IAU 1991 and 1994
+        /// differ by 0.033 degrees of longitude, 1.96 km at the equator; pck00006, which Shan et al. 2005 call IAU
+        /// 1991, holds the 1994 constants.
         datum: DatumChoice = key(words([
-            ("auto", DatumChoice::Auto, "by version letter and label: L is IAU 2000, older versions IAU 1991"),
+            ("auto", DatumChoice::Auto, "from version letter and label: L is IAU 2000, older versions IAU 1991"),
             ("iau1991", DatumChoice::Stated(Datum::Iau1991), ""),
             ("iau1994", DatumChoice::Stated(Datum::Iau1994), ""),
             ("iau2000", DatumChoice::Stated(Datum::Iau2000), ""),
@@ -59,14 +59,14 @@ declare_table! {
         /// et al. 2005, Table 2, has emission angles of up to 22.1 degrees. (The MOLA team's grids stop at 1.0 or 1.2.)
         off_nadir_max_rad as "off_nadir_max_deg" =
             key(above_to(0.0, ShotFilter::OFF_NADIR_LIMIT_DEG)).or(90.0).map(|degrees| degrees * RADIANS_PER_DEGREE),
-        /// First and last areocentric longitude of the Sun: the season of Mars, 0 at the northward equinox; first above last
-        /// is over 0. The default is all seasons.
+        /// First and last areocentric longitude of the Sun: the season of Mars, 0 at the northward equinox; if the
+        /// first exceeds the last, the interval contains 0. The default is all seasons.
         solar_longitude_rad as "solar_longitude_deg" =
             key(several(from_to(0.0, 360.0), "two numbers [first, last]")).or([0.0, 360.0]).map(|season| season.map(|degrees| degrees * RADIANS_PER_DEGREE)),
     }
 }
 
-/// The radius of a shot that is that of the ground.
+/// The radius of a shot that represents the ground.
 pub(super) const fn ground_radius() -> Words<GroundRadius, 2> {
     words([
         (

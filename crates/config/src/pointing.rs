@@ -23,19 +23,19 @@ const KNOWN_S: f64 = 0.0005;
 const NADIR_TURN_M_S: f64 = 330.0;
 
 declare_table! {
-    /// Pointing bias, if it is not that of the cameras. Every instrument file contains the bias of its camera and its
-    /// source; a value here applies to all images of the site instead.
+    /// Pointing bias, if it differs from the biases of the cameras. Every instrument file contains the bias of its
+    /// camera and its source; a value here applies to all images of the site instead.
     pub struct PointingConfig: Deserialize {
-        /// Time correction of attitude kernels: the attitude of an exposure at t is read at t + `ck_bias_s`.
-        /// Position, Mars rotation and mounting stay at t. Without it, that of the instrument file.
-        /// Known: value and sign for MOC, from ISIS and ALE (`INS-94031_CK_TIME_BIAS`) and Shan et al. 2005.
-        /// The known value with its sign reversed is refused; any other value is reported in a remark.
-        /// Unknown: whether the same value holds for kernels before the mapping phase (before April 1999).
+        /// Time correction of attitude kernels: the attitude of an exposure at t is read at t + `ck_bias_s`. Position,
+        /// Mars rotation and mounting stay at t. Without this key, the bias of the instrument file. Known: value and
+        /// sign for MOC, from ISIS and ALE (`INS-94031_CK_TIME_BIAS`) and Shan et al. 2005. The known value with its
+        /// sign reversed is refused; any other value is reported in a remark. Unknown: whether the same value holds for
+        /// kernels before the mapping phase (before April 1999).
         ck_bias as "ck_bias_s": Option<PointingBias> = key(from_to(-10.0, 10.0))
             .unused("-1.15")
             .map(|bias_s| bias_s.map(PointingBias::from_seconds)),
-        /// Citation that products repeat; change it together with the value. Without it, that of the instrument file,
-        /// or for another bias this key's name.
+        /// Citation that products repeat; change it together with the value. Without it, the citation of the instrument
+        /// file, or for a different bias the name of the key `ck_bias_s`.
         source: Option<String> = key(text()).unused(r#""mocAddendum004.ti; Shan et al. 2005, p. 98""#),
     }
 }
@@ -50,7 +50,7 @@ pub(super) fn has_turned_sign(bias_s: f64, known_s: f64) -> bool {
 pub struct UsedBias<'a> {
     /// The bias.
     pub bias: PointingBias,
-    /// Where it comes from.
+    /// Its source.
     pub source: &'a str,
     /// Name of the first camera that it holds for.
     pub camera: &'a str,
@@ -69,7 +69,7 @@ impl PointingConfig {
         self.ck_bias.unwrap_or(camera.pointing_bias())
     }
 
-    /// Where the bias that holds for `camera` comes from.
+    /// Source of the bias that holds for `camera`.
     #[must_use]
     pub fn source_of<'a>(&'a self, camera: &'a Instrument) -> &'a str {
         let own = &camera.pointing;
@@ -80,7 +80,7 @@ impl PointingConfig {
         }
     }
 
-    /// The biases that hold for `cameras`, each once; for none, that of the usual camera.
+    /// The biases that hold for `cameras`, each once; without cameras, the bias of the usual camera.
     #[must_use]
     pub fn used<'a>(
         &'a self,
@@ -107,15 +107,15 @@ impl PointingConfig {
         (self.bias_of(camera).seconds() - camera.pointing.ck_bias_s).abs()
     }
 
-    /// How far the bias is from the known one of `camera`, in a sentence; `None` for the known one.
+    /// Distance of the bias from the known one of `camera`, in a sentence; `None` for the known one.
     #[must_use]
     pub fn departure(&self, camera: &Instrument) -> Option<String> {
         let (bias_s, known_s) = (self.bias_of(camera).seconds(), camera.pointing.ck_bias_s);
         let apart_s = self.departure_s(camera);
         (apart_s > KNOWN_S).then(|| {
             format!(
-                "pointing.ck_bias_s is {bias_s} s, the known bias of {} {known_s} s: {apart_s:.3} s more or less are up \
-                 to {:.0} m on the ground",
+                "pointing.ck_bias_s is {bias_s} s, the known bias of {} {known_s} s: the difference of {apart_s:.3} s \
+                 is up to {:.0} m on the ground",
                 camera.name,
                 apart_s * NADIR_TURN_M_S
             )
@@ -130,24 +130,24 @@ declare_table! {
     /// bias scan of the range check shows which one a profile supports. Size: about one shot spacing
     /// (353 to 398 m) along the track, 28 m of Mars rotation at the equator, at most 3.2 m of height.
     fill MolaClock {
-        /// Size of the bias. Without it, that of the altimeter file.
+        /// Size of the bias. Without it, the bias of the altimeter file.
         bias_s = key(from_to(0.0, 10.0)).or(usual_altimeter().clock_bias_s),
-        /// On which side of the true time a tag lies.
+        /// Side of the true time on which a tag lies.
         sign = key(words([
             ("late", TagSign::Late, "true time = tag - bias"),
             ("early", TagSign::Early, "true time = tag + bias"),
         ])).or(TagSign::Late),
-        /// What the corrected time is used for. Shan et al. 2005 correct the bias in the datum conversion, and look the
+        /// Use of the corrected time. Shan et al. 2005 correct the bias in the datum conversion, and look the
         /// spacecraft up at the corrected time; they give no formula. Three readings: one corrected time serves both
-        /// rotations and the look-up, then footprints stay (0.3 mm) and only the look-up counts ("spk_lookup", our
-        /// choice); the rotation into IAU 2000 has it and the one out of the file's datum has not ("both", 28 m);
-        /// that rotation alone ("rotation") contradicts their look-up.
+        /// rotations and the look-up, then footprints stay (0.3 mm) and only the look-up changes ("spk_lookup", a
+        /// choice of areograph); the rotation into IAU 2000 uses it and the rotation out of the file's datum does not
+        /// ("both", 28 m); the rotation alone ("rotation") contradicts their look-up.
         scope = key(words([
             ("spk_lookup", BiasScope::SpkLookup, "the spacecraft's position in the range check"),
             (
                 "rotation",
                 BiasScope::Rotation,
-                "the rotation into IAU 2000 (the one out of the file's datum stays at the tag)",
+                "the rotation into IAU 2000 (the rotation out of the file's datum stays at the tag)",
             ),
             ("both", BiasScope::Both, "both"),
             ("none", BiasScope::None, "nothing: tags are used unchanged"),

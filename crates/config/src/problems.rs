@@ -99,7 +99,7 @@ impl<'a> Review<'a> {
         }
     }
 
-    /// The same of a file whose inputs may be missing.
+    /// The review of a file whose inputs may be missing.
     pub(super) fn unfilled(self) -> Self {
         Self {
             absent: Some(Vec::new()),
@@ -121,7 +121,7 @@ impl<'a> Review<'a> {
         self.absent.take().unwrap_or_default()
     }
 
-    /// The same of a file that may lead only below these folders.
+    /// The review of a file that may lead only below these folders.
     pub(super) fn within(self, roots: &'a [PathBuf]) -> Self {
         Self { roots, ..self }
     }
@@ -146,7 +146,7 @@ impl<'a> Review<'a> {
         std::mem::take(&mut self.files)
     }
 
-    /// The same for a file whose keys another example documents.
+    /// The review of a file whose keys a different example documents.
     pub(super) fn documented_in(self, documentation: &'static str) -> Self {
         Self {
             documentation,

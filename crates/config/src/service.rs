@@ -100,7 +100,7 @@ declare_table! {
 declare_table! {
     /// Folders that are written; they are created if missing.
     pub struct ServiceOutputs {
-        /// Products: `<products>/<site>/current` leads to those of the newest valid run.
+        /// Products: `<products>/<site>/current` leads to the products of the newest valid run.
         products: PathBuf = key(text()).or("products".to_owned()).then(|path, keys: &mut Keys<'_, '_>| keys.review().resolve(&path)),
         /// Database, logs and copies of the database; on a local disk, for one service only.
         state: PathBuf = key(text()).or("state".to_owned()).then(|path, keys: &mut Keys<'_, '_>| keys.review().resolve(&path)),
@@ -130,13 +130,13 @@ declare_table! {
 }
 
 declare_table! {
-    /// How changes are found: files are listed, not watched, since network file systems do not report changes.
+    /// Detection of changes: files are listed, not watched, since network file systems do not report changes.
     pub struct ChangesConfig {
         /// Time between two polls of all folders.
         scan_interval_s: f64 = key(from_to(0.05, 86_400.0)).or(60.0),
         /// A folder is used when nothing below it has changed for this time: mirrors copy slowly.
         quiet_period_s: f64 = key(from_to(0.0, 86_400.0)).or(600.0),
-        /// A folder that has lost a larger share of its files is taken for unavailable, and its sites are held.
+        /// A folder that has lost a larger share of its files is treated as unavailable, and its sites are held.
         max_loss: f64 = key(from_to(0.0, 1.0)).or(0.2),
         /// Longest time that listing a folder may take; a dead mount does not answer.
         sweep_limit_s: f64 = key(from_to(0.1, 3600.0)).or(30.0),
@@ -152,9 +152,9 @@ declare_table! {
     pub struct WorkersConfig {
         /// Number of processes that run at the same time.
         count: u16 = key(whole_from_to(1, 256)).or(2),
-        /// Threads of each.
+        /// Threads of each process.
         threads: u16 = key(whole_from_to(1, 1024)).or(2),
-        /// Memory that each may take, mebibytes. A worker takes about 106 before it reads a site.
+        /// Memory that each process may take, mebibytes. A worker takes about 106 before it reads a site.
         memory_mib: u32 = key(whole_from_to(512, 1 << 24)).or(8192),
         /// Longest time for a site.
         deadline_s: f64 = key(from_to(1.0, 2_592_000.0)).or(21_600.0),
@@ -170,7 +170,7 @@ declare_table! {
 }
 
 declare_table! {
-    /// What is kept. The current run, its predecessor and pinned runs always are.
+    /// Retention. The current run, its predecessor and pinned runs are always kept.
     pub struct RetentionConfig {
         /// Newest runs of each site.
         runs: u32 = key(whole_from_to(1, 100_000)).or(14),
@@ -188,7 +188,7 @@ declare_table! {
 }
 
 declare_table! {
-    /// When a site counts as stale. A site whose inputs did not change is fresh, however old its run.
+    /// Limits beyond which a site counts as stale. A site whose inputs did not change is fresh, however old its run.
     pub struct FreshnessConfig {
         /// Longest time from a change of its inputs to a run with them.
         stale_after_h: f64 = key(from_to(0.0, 87_840.0)).or(48.0),
@@ -198,11 +198,11 @@ declare_table! {
 }
 
 declare_table! {
-    /// How far a site may move between two runs before an alert is sent, as for `areograph report diff`.
+    /// Largest movement of a site between two runs without an alert, as for `areograph report diff`.
     pub struct MovedConfig {
-        /// How far a footprint, a camera or a boresight on the ground may move.
+        /// Largest movement of a footprint, a camera or a boresight on the ground.
         limit_m: f64 = key(from_to(0.0, 1e7)).or(50.0),
-        /// How far a camera may turn.
+        /// Largest rotation of a camera.
         limit_arcsec: f64 = key(from_to(0.0, 1_296_000.0)).or(60.0),
     }
 }
@@ -231,8 +231,8 @@ declare_table! {
             r"^[0-9a-fA-F.:]+$",
             |text| text.parse::<IpAddr>().is_ok(),
         ))).or(Vec::new()).unused(r#"["127.0.0.1"]"#).then(|texts, _: &mut Keys<'_, '_>| addresses(&texts)),
-        /// Who may read on a loopback address: everybody on this machine, or holders of a token. Other addresses, and
-        /// all changes, always require a token.
+        /// Readers on a loopback address: all users of this machine, or holders of a token. Other addresses, and all
+        /// changes, always require a token.
         open_reading: bool = key(words([
             ("yes", true, "reading from this machine needs no token"),
             ("no", false, "reading needs a token"),
@@ -301,7 +301,7 @@ pub enum AlertKind {
     RootUnavailable,
     /// A folder of inputs is back.
     RootBack,
-    /// Files of archives could not be fetched.
+    /// Archive files could not be fetched.
     FetchFailed,
     /// The disk is nearly full.
     DiskLow,
@@ -341,7 +341,7 @@ impl AlertKind {
         (
             "fetch_failed",
             Self::FetchFailed,
-            "files of archives could not be fetched",
+            "archive files could not be fetched",
         ),
         ("disk_low", Self::DiskLow, "the disk is nearly full"),
         (

@@ -44,12 +44,12 @@ declare_table! {
             ("areograph", ShotLayout::Areograph, "footprints.csv of another site (products.formats, or areograph export)"),
             ("ode_pedr", ShotLayout::OdePedr, "MOLA shots of the Orbital Data Explorer's PEDR query, ten columns, no spacecraft"),
         ])).unused(r#""lola_rdr""#),
-        /// Datum of longitudes and latitudes; without it, that of the products.
+        /// Datum of longitudes and latitudes; without it, the datum of the products.
         datum: Option<Datum> = key(words([
             ("iau1991", Datum::Iau1991, ""),
             ("iau1994", Datum::Iau1994, ""),
-            ("iau2000", Datum::Iau2000, "that of the products at Mars"),
-            ("moon_me", Datum::MoonMe, "the Moon's mean Earth/polar axis, that of the products there"),
+            ("iau2000", Datum::Iau2000, "the datum of the products at Mars"),
+            ("moon_me", Datum::MoonMe, "the Moon's mean Earth/polar axis, the datum of the products there"),
         ])).unused(r#""moon_me""#),
         /// Assignment of columns.
         columns: ShotColumns = table(),
@@ -70,21 +70,22 @@ declare_table! {
         latitude_deg: Option<String> = key(text()).unused(r#""3""#),
         /// Distance of the footprint from the centre of the body. Or `radius_m`, or `height_m`.
         radius_km: Option<String> = key(text()).unused(r#""4""#),
-        /// The same in metres.
+        /// Distance of the footprint from the centre of the body, metres.
         radius_m: Option<String> = key(text()).unused(r#""planet_rad""#),
-        /// Or its height above the ellipsoid of the products, along the radius: at the Moon above 1737.4 km.
+        /// Or the height of the footprint above the ellipsoid of the products, along the radius: at the Moon above
+        /// 1737.4 km.
         height_m: Option<String> = key(text()).unused(r#""height""#),
         /// One-way range from the spacecraft. Or `range_m`.
         range_km: Option<String> = key(text()).unused(r#""5""#),
-        /// The same in metres.
+        /// One-way range from the spacecraft, metres.
         range_m: Option<String> = key(text()).unused(r#""range""#),
         /// East longitude of the spacecraft in the table's own orbit solution.
         spacecraft_longitude_deg: Option<String> = key(text()).unused(r#""19""#),
-        /// Its latitude.
+        /// Latitude of the direction from the centre of the body to the spacecraft.
         spacecraft_latitude_deg: Option<String> = key(text()).unused(r#""20""#),
-        /// Its distance from the centre of the body. Or `spacecraft_radius_m`.
+        /// Distance of the spacecraft from the centre of the body. Or `spacecraft_radius_m`.
         spacecraft_radius_km: Option<String> = key(text()).unused(r#""21""#),
-        /// The same in metres.
+        /// Distance of the spacecraft from the centre of the body, metres.
         spacecraft_radius_m: Option<String> = key(text()).unused(r#""sc_rad""#),
         /// Number of the orbit; without it 0, and only pauses separate profiles.
         orbit: Option<String> = key(text()).unused(r#""orbit""#),

@@ -47,8 +47,8 @@ declare_table! {
         description: String = key(any_text())
             .or(String::new())
             .example(r#""Eos Chasma, one of the three study sites of Shan et al. 2005""#),
-        /// The body: its rotation and shape are those of `config/bodies`, and so are frame, heights and maps of all products.
-        /// At another body than Mars, images come with support data and shots from tables.
+        /// The body: its rotation and shape, and so the frame, heights and maps of all products, are those of
+        /// `config/bodies`. At a body other than Mars, images come with support data and shots from tables.
         body: Body = key(words([
             ("mars", Body::Mars, "in IAU 2000"),
             ("moon", Body::Moon, "in the mean Earth/polar axis frame, radius 1737.4 km"),
@@ -129,7 +129,7 @@ impl SiteConfig {
     }
 }
 
-/// The clock bias is that of the altimeter where the site gives no other.
+/// The clock bias is the altimeter's where the site gives no other.
 fn clock_of_altimeter(mut site: SiteConfig, keys: &Keys<'_, '_>) -> SiteConfig {
     let (clock, altimeter) = (&mut site.altimeter_clock, &site.altimeter);
     if !keys.writes("altimeter_clock", "bias_s") {
@@ -244,7 +244,7 @@ fn something_to_do(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     }
 }
 
-/// PEDR files are those of MOLA; a file that describes MOLA with other numbers may be named.
+/// PEDR files belong to MOLA; a file that describes MOLA with other numbers may be named.
 fn altimeter_of_pedr(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     let usual = usual_altimeter();
     let is_other = |known: &Altimeter| {
@@ -255,7 +255,7 @@ fn altimeter_of_pedr(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         let name = &usual.name;
         keys.refuse(
             "altimeter",
-            format!("{}, whose shots PEDR files hold; shots of others than {name} come in tables [[shots]]", usual.id),
+            format!("{}, whose shots PEDR files hold; shots of altimeters other than {name} come in tables [[shots]]", usual.id),
         );
     }
 }
@@ -291,7 +291,7 @@ fn other_bodies(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     }
     if site.images.iter().any(|image| image.isd.is_none()) {
         let text = format!(
-            "images on {body} need support data (images.isd): labels and kernels are read only of spacecraft at Mars"
+            "images on {body} need support data (images.isd): labels and kernels are read only for spacecraft at Mars"
         );
         let span = keys.span_of("images");
         keys.review().problem(span, text);
@@ -315,7 +315,7 @@ fn pointing_of_instruments(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         if used_s.abs() > spacecraft.ck_bias_max_s {
             let expected = format!(
                 "no such key: it holds for all images of the site, and attitude kernels of {}, which carries {}, need no \
-                 time correction; that of another camera belongs in a separate instrument file",
+                 time correction; the bias of a different camera belongs in a separate instrument file",
                 spacecraft.full_name, camera.name
             );
             keys.refuse_below("pointing", "ck_bias_s", expected);

@@ -9,12 +9,13 @@ use super::{
 };
 
 declare_table! {
-    /// A terrain model that areograph makes of a pair of images with `pixels`, with the adjusted orientation if there
-    /// is one: `surface.tif`, its standard deviations, and its comparison with the altimeter. Without `cell_m` none
-    /// is made.
+    /// A terrain model that areograph computes from a pair of images with `pixels`, with the adjusted orientation if
+    /// there is one: `surface.tif`, its standard deviations, and its comparison with the altimeter. Without `cell_m` no
+    /// model is made.
     pub struct SurfaceConfig: Deserialize {
-        /// Edge of a cell. Three pixels of the coarser image are usual: a height is that of a square of 17 pixels. Cells finer
-        /// than a pixel are refused; for cells above six pixels images are compared at a coarser size, which is quick.
+        /// Edge of a cell. Three pixels of the coarser image are usual: a height refers to a square of 17 pixels. Cells
+        /// finer than a pixel are refused; for cells larger than six pixels, images are compared at a coarser size,
+        /// which is quick.
         cell_m: Option<f64> = key(above_to(0.0, 1e5)).unused("15.0"),
         /// Identifiers of the two images, where more than two of the site have pixels.
         images: Option<[String; 2]> = key(several(identifier(), "identifiers of two images")).unused(r#"["m0402852", "m0403104"]"#),

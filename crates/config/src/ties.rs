@@ -19,19 +19,19 @@ use super::{
 declare_table! {
     /// Tie points between the images. Without this table nothing is intersected or adjusted.
     pub struct TiesConfig: Deserialize {
-        /// Paths or globs as in `[pedr]`: tables (.csv) with the columns `point_id`, `serial_number`, `sample`,
-        /// `line`, one row per measurement, and where known `line_sigma_px` and `sample_sigma_px`, its standard
-        /// deviations; or ISIS control networks in PVL (a binary one: cnetbin2pvl), whose fixed or constrained points
-        /// provide their coordinates, IAU 2000. Lines and samples count as in ISIS, the middle of the first pixel is
-        /// 1. `serial_number` is an image's `serial_number` above, or its `id`; measurements in other images are
-        /// counted and left out.
+        /// Paths or globs as in `[pedr]`: tables (.csv) with the columns `point_id`, `serial_number`, `sample`, `line`,
+        /// one row per measurement, and where known `line_sigma_px` and `sample_sigma_px`, its standard deviations; or
+        /// ISIS control networks in PVL (a binary one: cnetbin2pvl), whose fixed or constrained points provide their
+        /// coordinates, IAU 2000. Lines and samples are counted as in ISIS: the middle of the first pixel is 1.
+        /// `serial_number` is an image's `serial_number` above, or its `id`; measurements in other images are counted
+        /// and left out.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs)
             .or(Vec::new())
             .example(r#"["../ties/*.csv"]"#),
-        /// Whether areograph measures tie points itself, beside those of files: every pair of images that have
-        /// `pixels` is matched where both show the same ground with enough texture, and again with the orientation
-        /// that these tie points adjust. Each measurement has the standard deviations of its match.
+        /// Whether areograph measures tie points itself, in addition to those of files: every pair of images that have
+        /// `pixels` is matched where both show the same ground with enough texture, and again with the orientation that
+        /// these tie points adjust. Each measurement has the standard deviations of its match.
         matched as "match": bool = key(Switch).or(false),
     }
     check something_measures
@@ -81,7 +81,7 @@ declare_table! {
             (
                 "line",
                 ErrorUnit::Line,
-                "lines along the track, pixels across it; it changes how images share a disagreement",
+                "lines along the track, pixels across it; this changes how images share a disagreement",
             ),
         ])).or(ErrorUnit::Focal),
         /// Standard deviation of measurements; with "line" only across the track.

@@ -55,9 +55,9 @@ declare_table! {
 declare_table! {
     /// Outline of a window.
     struct ShapeKeys {
-        /// West and east edge. West above east crosses 0 (or 180) degrees: `[350, 10]` is 20 degrees wide.
-        /// `[0, 360]` or `[-180, 180]` is all longitudes; then a window that reaches 90 or -90 degrees of
-        /// latitude holds the pole.
+        /// West and east edge. West above east crosses 0 (or 180) degrees: `[350, 10]` is 20 degrees wide. `[0, 360]`
+        /// or `[-180, 180]` means all longitudes; then a window that reaches 90 or -90 degrees of latitude holds the
+        /// pole.
         longitude_deg: Option<[f64; 2]> =
             key(several(from_to(-180.0, 360.0), "two numbers [west, east]")).example("[318.0, 318.7]"),
         /// South and north edge, areocentric.
@@ -65,8 +65,8 @@ declare_table! {
             key(several(from_to(-90.0, 90.0), "two numbers [south, north]")).example("[-14.0, -12.9]"),
         /// GeoJSON file.
         polygon: Option<PathBuf> = key(FILE).example_in(1, r#""outline.geojson""#),
-        /// Identifier of an image of the site: the window is its outline, by its times and the kernels (of rival
-        /// sets, the first).
+        /// Identifier of an image of the site: the window is its outline, computed from its times and the kernels (of
+        /// rival sets, the first).
         image: Option<String> = key(identifier()).example_in(2, r#""E02-02855""#),
         /// Least margin of the window beyond the outline of the image.
         margin_km: Option<f64> = key(from_to(0.0, 1_000.0)).example_in(2, "5.0"),

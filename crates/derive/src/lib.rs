@@ -3,8 +3,8 @@
 //! `#[cause(Kind: "advice")]` stands below `#[error("message")]`. On an enum it holds for each variant that does not
 //! state its own; kind and advice may stand apart. A variant without either does not compile.
 //!
-//! `areograph_base::error`, which passes the macro on, has examples: dependencies of examples here would be built once more, as
-//! those of a compiler plug-in.
+//! `areograph_base::error`, which passes the macro on, has examples: dependencies of examples here would be built once
+//! more, as dependencies of a compiler plug-in.
 //!
 //! - The advice is a format string. Fields are in scope by reference, under their names or as `_0`, `_1`; `{0}` is the
 //!   first field, as with thiserror. Further arguments are those of [`format!`].
@@ -32,7 +32,7 @@ pub fn derive_cause(input: proc_macro::TokenStream) -> proc_macro::TokenStream {
         .into()
 }
 
-/// What a `#[cause(…)]` states.
+/// Content of a `#[cause(…)]`.
 #[derive(Default)]
 struct Statement {
     kind: Option<Expr>,
@@ -99,7 +99,7 @@ struct Case<'input> {
     path: TokenStream,
     fields: &'input Fields,
     statement: Statement,
-    /// Where a missing statement is reported.
+    /// Place at which a missing statement is reported.
     span: Span,
 }
 

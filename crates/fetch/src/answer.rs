@@ -1,4 +1,4 @@
-//! Answers of the service that makes tables of shots: the address of a table, or why there is none.
+//! Answers of the service that makes tables of shots: the address of a table, or the reason why there is none.
 //!
 //! # Source
 //! Programs that read these answers: `ode_get_laser_alt.py` of USGS Astrogeology's `APPL-Tools` (`GDSResults` with `Status`,
@@ -21,7 +21,7 @@ use areograph_store::atomic;
 pub(crate) struct Made {
     /// The query.
     pub(crate) query: String,
-    /// Where the table is, for some weeks.
+    /// Address of the table, valid for a few weeks.
     pub(crate) url: String,
     /// Number of its rows, where the answer states it.
     pub(crate) rows: Option<u64>,
@@ -80,7 +80,7 @@ impl Made {
         })
     }
 
-    /// What an earlier attempt kept for the same query.
+    /// The answer that an earlier attempt kept for the same query.
     pub(crate) fn kept(path: &Path, query: &str) -> Option<Self> {
         let kept: Self = serde_json::from_slice(&std::fs::read(path).ok()?).ok()?;
         (kept.query == query).then_some(kept)

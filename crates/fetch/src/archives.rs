@@ -15,7 +15,7 @@ const BUILT_IN: &str = include_str!("../../../config/archives/mgs.toml");
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Archives {
-    /// How a host can reach the user; may be empty.
+    /// Contact by which a host can reach the user; may be empty.
     pub contact: String,
     /// Limits of transfers.
     pub network: Network,
@@ -120,8 +120,8 @@ pub struct PedrArchive {
 }
 
 impl PedrArchive {
-    /// First and last orbit that may have shots in an interval: those of [`Self::orbits`] interpolated, and two more
-    /// on both sides. `None` before the first and after the last one.
+    /// First and last orbit that may have shots in an interval: interpolated in [`Self::orbits`], and two more on both
+    /// sides. `None` before the first and after the last one.
     #[must_use]
     pub fn orbits_of(&self, [start, stop]: [Utc; 2]) -> Option<[u32; 2]> {
         /// The period is constant between the entries within one orbit; an entry is somewhere in its orbit.
@@ -224,7 +224,7 @@ impl ShotService {
         }
     }
 
-    /// How long an answer may take.
+    /// Longest time of an answer.
     #[must_use]
     pub fn limit(&self) -> Duration {
         Duration::from_secs_f64(self.answer_s)
@@ -241,7 +241,7 @@ impl ShotService {
 }
 
 impl Archives {
-    /// Those of the mission.
+    /// The archives of the mission.
     ///
     /// # Errors
     /// The table in the program is malformed.
@@ -249,7 +249,7 @@ impl Archives {
         Ok(Self::of(Table::new())?)
     }
 
-    /// Those of the mission, with the keys of a file in place of theirs.
+    /// The archives of the mission, with the keys of a file in place of the built-in ones.
     ///
     /// # Errors
     /// The file cannot be read; an unknown key, or a value that cannot be used.
@@ -340,7 +340,7 @@ impl Archives {
     }
 }
 
-/// Replaces the keys of `table` by those of `own`, table by table.
+/// Replaces the keys of `table` by the keys of `own`, table by table.
 fn replace(table: &mut Table, own: Table) {
     for (key, value) in own {
         match (table.get_mut(&key), value) {

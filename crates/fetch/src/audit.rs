@@ -45,7 +45,7 @@ pub fn verify(filling: &Filling<'_>) -> Result<(usize, Vec<Damaged>)> {
     Ok((state.files.len(), damaged))
 }
 
-/// A folder beside what the archives have for it.
+/// A folder against the contents of the archives for it.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Audit {
     /// Planned, and not in the folder.
@@ -54,7 +54,7 @@ pub struct Audit {
     pub differ: Vec<String>,
     /// Recorded files that the plan does not need.
     pub not_needed: Vec<String>,
-    /// Files beside those of the plan that no fetch brought.
+    /// Files beside the plan that no fetch retrieved.
     pub foreign: Vec<String>,
     /// Needed, and in no index.
     pub in_no_index: Vec<String>,
@@ -145,6 +145,6 @@ fn difference(path: &Path, name: &str, state: &State, md5: Option<&str>) -> Stri
                 record.md5
             )
         }
-        _ => format!("{size} bytes, another size than the index of the archive states"),
+        _ => format!("{size} bytes, a size other than the index of the archive states"),
     }
 }

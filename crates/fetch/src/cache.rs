@@ -13,7 +13,7 @@ use crate::{
 use areograph_base::error::{IoError, Locate as _, Result};
 use areograph_pds::image_index::{ImageIndex, read_index};
 
-/// Which indexes are wanted.
+/// Requested indexes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[allow(clippy::struct_excessive_bools, reason = "one for each index")]
 pub struct Indexes {
@@ -146,7 +146,7 @@ impl Cache<'_> {
     /// Brings the copies up to date; the number of those that have changed.
     ///
     /// # Errors
-    /// Those of [`Receiver::receive`].
+    /// As [`Receiver::receive`].
     pub(crate) fn refresh(&self, indexes: Indexes, receiver: &Receiver<'_>) -> Result<usize> {
         let mut changed = 0;
         for copy in indexes.copies(self.archives) {

@@ -31,7 +31,7 @@ pub(crate) struct Client {
     agent: Agent,
 }
 
-/// What to ask for.
+/// The request.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Ask<'a> {
     /// First byte; only with the validator.
@@ -40,7 +40,7 @@ pub(crate) struct Ask<'a> {
     pub(crate) validator: Option<&'a str>,
     /// The file is wanted only if it is not this one.
     pub(crate) known: Option<&'a Meta>,
-    /// Longest time without a byte, where it is not that of files.
+    /// Longest time without a byte, where it differs from the limit for files.
     pub(crate) limit: Option<Duration>,
 }
 
@@ -48,7 +48,7 @@ pub(crate) struct Ask<'a> {
 pub(crate) struct Answer {
     /// Whether the body is the rest from the wanted byte on.
     pub(crate) is_rest: bool,
-    /// What it states of the whole file; the length is absent if unknown.
+    /// Its statements on the complete file; the length is absent if unknown.
     pub(crate) meta: Meta,
     /// Whether the end of the body marks itself.
     pub(crate) is_delimited: bool,
@@ -64,12 +64,12 @@ pub(crate) enum Reply {
     OtherFile,
 }
 
-/// Why there is no answer.
+/// Reasons why there is no answer.
 #[derive(Debug)]
 pub(crate) enum Fault {
     /// Another attempt would end the same way.
     Lasting(Error),
-    /// The problem, and how long the host asks to wait.
+    /// The problem, and the waiting time that the host requests.
     Passing(String, Option<Duration>),
 }
 
@@ -261,7 +261,7 @@ fn permitted(url: &str) -> Result<Uri, FetchError> {
     }
 }
 
-/// Where a redirection leads: to https, or to the same scheme and host.
+/// Target of a redirection: https, or the same scheme and host.
 fn redirected(from: &str, uri: &Uri, location: &str) -> Result<String, FetchError> {
     let refused = |why| FetchError::Redirect {
         url: from.to_owned(),
@@ -333,7 +333,7 @@ fn of_response(url: &str, response: Response<ureq::Body>, ask: Ask<'_>) -> Resul
         .is_some_and(|coding| coding.to_ascii_lowercase().contains("chunked"));
     let meta = Meta {
         url: url.to_owned(),
-        // A weak validator is that of similar files.
+        // A weak validator is shared by similar files.
         etag: text("etag").filter(|etag| etag.starts_with('"')),
         last_modified: text("last-modified"),
         length,
@@ -351,7 +351,7 @@ fn of_response(url: &str, response: Response<ureq::Body>, ask: Ask<'_>) -> Resul
     }))
 }
 
-/// First byte and length of the whole file of `bytes 5-9/10`; the length of `bytes 5-9/*` is unknown.
+/// First byte and length of the complete file of `bytes 5-9/10`; the length of `bytes 5-9/*` is unknown.
 fn range_of(text: &str) -> Option<(u64, Option<u64>)> {
     let (range, length) = text.strip_prefix("bytes ")?.split_once('/')?;
     let (first, last) = range.split_once('-')?;

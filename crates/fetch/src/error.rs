@@ -2,7 +2,7 @@
 
 use areograph_base::error::Cause;
 
-/// Why a file was not planned or not fetched.
+/// Reasons why a file was not planned or not fetched.
 #[derive(Debug, thiserror::Error, Cause)]
 pub enum FetchError {
     /// A row or a label of an index is malformed.
@@ -57,7 +57,7 @@ pub enum FetchError {
     Redirect {
         /// Address.
         url: String,
-        /// Where it leads.
+        /// Its target.
         to: String,
         /// The rule.
         why: &'static str,
@@ -69,7 +69,7 @@ pub enum FetchError {
         /// Address.
         url: String,
     },
-    /// What arrived is not the file.
+    /// The received data are not the file.
     #[error("{url}: {problem}")]
     #[cause(Input: "run `areograph fetch --index` first: the index may be older than the file; else report it to the archive")]
     Content {
@@ -110,13 +110,13 @@ pub enum FetchError {
     #[error("{url}: this is not the table of the query: {problem}")]
     #[cause(Input: "run again: the service makes the table anew; else open the query of `areograph fetch --plan` in a browser")]
     Table {
-        /// Where the service has the table.
+        /// Address of the table at the service.
         url: String,
         /// The difference.
         problem: String,
     },
     /// Another file has the name.
-    #[error("exists with other content: {problem}")]
+    #[error("exists with different content: {problem}")]
     #[cause(Input: "move the file away, or give --replace")]
     Conflict {
         /// The difference.
@@ -135,7 +135,7 @@ pub enum FetchError {
     #[error("all planned files are complete, but no index lists the remaining ones: {lacks}")]
     #[cause(Coverage: "see the lines `in_no_index` above; other archives may have it (--archives)")]
     Lacks {
-        /// How many things are missing.
+        /// Number of missing items.
         lacks: usize,
     },
     /// Recorded files have changed or are missing.

@@ -41,7 +41,7 @@ pub(crate) fn examined(
             let record = Record::of(&file.url, hashed, Verified::Md5, &file.why);
             return Ok(Some((Done::Adopted, record)));
         }
-        // The archive has a new version of a file that areograph fetched and nobody has changed.
+        // The archive has a new version of a file that areograph fetched and that is unchanged since.
         if known.is_some_and(|record| record.is(&hashed)) {
             return Err(conflict(format!(
                 "fetched earlier with MD5 {}; the archive now has {md5}",
@@ -49,7 +49,7 @@ pub(crate) fn examined(
             )));
         }
         return Err(conflict(format!(
-            "MD5 is {}; expected {md5} by the archive",
+            "MD5 is {}; expected {md5} according to the archive",
             hashed.md5
         )));
     }
@@ -70,7 +70,7 @@ pub(crate) fn examined(
     }
     if file.kind == FileKind::Shots {
         let bytes = hashed.bytes;
-        return Err(conflict(format!("{bytes} bytes, which no fetch brought")));
+        return Err(conflict(format!("{bytes} bytes, which no fetch retrieved")));
     }
     let exact = file.bytes.filter(|_| file.is_exact);
     let length = match exact {
@@ -90,7 +90,7 @@ pub(crate) fn examined(
     }
 }
 
-/// What a transferred file was compared with.
+/// Basis on which a transferred file was verified.
 pub(crate) fn verified_by(file: &PlannedFile, part: &Part) -> Verified {
     match file.kind {
         FileKind::Shots => Verified::Rows,

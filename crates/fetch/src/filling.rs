@@ -70,7 +70,7 @@ impl<'a> Filling<'a> {
         }
     }
 
-    /// Which indexes a wish is planned with.
+    /// Indexes with which a wish is planned.
     #[must_use]
     pub fn indexes_of(wish: &Wish) -> Indexes {
         Indexes {
@@ -119,7 +119,7 @@ impl<'a> Filling<'a> {
         if let Some(folder) = &wish.pedr {
             if spans.is_empty() && wish.orbits.is_empty() {
                 plan.notes.push(
-                    "pedr: no image, dates or orbits: give --dates or --orbits for files of the laser"
+                    "pedr: no image, dates or orbits: give --dates or --orbits for laser files"
                         .to_owned(),
                 );
             }
@@ -143,7 +143,7 @@ impl<'a> Filling<'a> {
         Ok(plan.in_order())
     }
 
-    /// Where the files of a plan are, without reading them.
+    /// States of the files of a plan, without reading them.
     ///
     /// # Errors
     /// The state is malformed.
@@ -160,7 +160,7 @@ impl<'a> Filling<'a> {
         self.folder.part(&file.url, &file.path)
     }
 
-    /// What an earlier attempt left of a file.
+    /// The part of a file that an earlier attempt left.
     fn part_of(&self, file: &PlannedFile) -> Part {
         let path = self.part_path(file);
         let made = match file.kind {
@@ -190,9 +190,9 @@ impl<'a> Filling<'a> {
         }
     }
 
-    /// Fetches the files of a plan, some side by side; `told` hears of each. Other files go on after a failure.
+    /// Fetches the files of a plan, some side by side; `told` is called for each. Other files continue after a failure.
     ///
-    /// * `replace` – whether a file of other content is replaced
+    /// * `replace` – whether a file with different content is replaced
     ///
     /// # Errors
     /// [`FetchError::Busy`]; the folder or its state cannot be read or written. Failures of

@@ -1,4 +1,4 @@
-//! The folder of a fetch: its lock, the parts of files that have not arrived whole, copies of indexes.
+//! The folder of a fetch: its lock, partial downloads, copies of indexes.
 
 use std::{
     fs::{self, File, OpenOptions, TryLockError},
@@ -76,7 +76,7 @@ impl Folder {
         self.root.join(FETCH_FOLDER).join("parts")
     }
 
-    /// Where the part of a file is collected, by its address and its place.
+    /// Path at which the part of a file is collected, by its address and its place.
     pub(crate) fn part(&self, url: &str, path: &Path) -> PathBuf {
         let of = format!("{url}\n{}", path.display());
         self.parts().join(format!("{}.part", &sha256_of(&of)[..32]))

@@ -1,4 +1,4 @@
-//! Files of archives: which ones a site needs, and their transfer, whole or not at all.
+//! Files of archives: which ones a site needs, and their transfer, complete or not at all.
 //!
 //! | to | use |
 //! |---|---|
@@ -8,8 +8,8 @@
 //! | transfer them, resumed and verified | [`Filling`] |
 //! | examine a filled folder | [`audit`] |
 //!
-//! A file is identified by size and hash, never by a date or a similar name. Instants are UTC as indexes print them: what
-//! covers what is decided before any leap seconds or clocks are at hand.
+//! A file is identified by size and hash, never by a date or a similar name. Instants are UTC as indexes state them:
+//! coverage is determined before any leap seconds or clocks are available.
 //!
 //! ```
 //! use areograph_fetch::{Archives, Utc};

@@ -1,9 +1,9 @@
-//! Where planned files are, and what became of them.
+//! States of planned files, and the outcomes of their transfer.
 
 use crate::{plan::PlannedFile, state::Record};
 use areograph_base::error::Result;
 
-/// Where a planned file is.
+/// State of a planned file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Standing {
     /// In the folder, with the recorded size.
@@ -18,7 +18,7 @@ pub enum Standing {
     Missing,
 }
 
-/// How a file came to be complete.
+/// Way in which a file became complete.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Done {
     /// It was in the folder, as recorded.
@@ -34,7 +34,7 @@ pub enum Done {
     Empty,
 }
 
-/// What became of a planned file.
+/// Outcome of a planned file.
 #[derive(Debug)]
 pub struct Outcome {
     /// The file.

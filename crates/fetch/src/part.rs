@@ -1,4 +1,4 @@
-//! A file that has not arrived whole, and what is known of it.
+//! A partial download, and the known properties of its file.
 
 use std::{
     fs::{self, File, OpenOptions},
@@ -11,23 +11,23 @@ use serde::{Deserialize, Serialize};
 use areograph_base::error::{IoError, Locate as _, Result};
 use areograph_store::atomic;
 
-/// What the server stated of the file when its first byte came.
+/// The server's statements on the file at its first byte.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Meta {
     pub(crate) url: String,
     /// Strong validator.
     pub(crate) etag: Option<String>,
     pub(crate) last_modified: Option<String>,
-    /// Length of the whole file.
+    /// Length of the complete file.
     pub(crate) length: Option<u64>,
     /// MD5 by the server, hexadecimal.
     pub(crate) md5: Option<String>,
-    /// Of the whole file, once it was verified and is about to receive its name.
+    /// SHA-256 of the complete file, once it was verified and is about to receive its name.
     pub(crate) sha256: Option<String>,
 }
 
 impl Meta {
-    /// What a server must still have for the rest to belong to the part.
+    /// Validator that a server must still have for the rest to belong to the part.
     pub(crate) fn validator(&self) -> Option<&str> {
         self.etag.as_deref().or(self.last_modified.as_deref())
     }
@@ -42,7 +42,7 @@ pub(crate) struct Part {
 }
 
 impl Part {
-    /// What an earlier attempt left; empty if it was of another address.
+    /// The part that an earlier attempt left; empty if it was from a different address.
     pub(crate) fn at(path: PathBuf, url: &str) -> Self {
         let meta_path = path.with_extension("meta");
         let meta = fs::read(&meta_path)
@@ -69,7 +69,7 @@ impl Part {
         self.path.metadata().map_or(0, |found| found.len())
     }
 
-    /// Begins anew, with what the server states now.
+    /// Begins anew, with the server's current statements.
     ///
     /// # Errors
     /// The folder cannot be written.
@@ -84,7 +84,7 @@ impl Part {
             .in_file(&self.path)
     }
 
-    /// Notes the hash of the whole file.
+    /// Notes the hash of the complete file.
     ///
     /// # Errors
     /// The folder cannot be written.

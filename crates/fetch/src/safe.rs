@@ -1,6 +1,6 @@
 //! Names and paths that come from outside.
 
-/// Whether a name may become that of a file: it leads nowhere else, and is not hidden.
+/// Whether a name may become a file name: it leads nowhere else, and is not hidden.
 #[must_use]
 pub(crate) fn is_name(name: &str) -> bool {
     let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"._-+".contains(&byte);

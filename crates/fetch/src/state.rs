@@ -11,13 +11,13 @@ use areograph_store::atomic;
 /// Form of the file.
 const FORMAT: u32 = 1;
 
-/// What is known of a fetched file.
+/// Known properties of a fetched file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
-    /// Where it came from; of a table of shots the query.
+    /// Its source; for a table of shots, the query.
     pub url: String,
-    /// Where a service had the table that it made for the query.
+    /// Address of the table that a service made for the query.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub made_url: Option<String>,
     /// Size.
@@ -26,15 +26,15 @@ pub struct Record {
     pub md5: String,
     /// SHA-256, hexadecimal.
     pub sha256: String,
-    /// What it was compared with.
+    /// Basis of its verification.
     pub verified_by: Verified,
     /// UTC when it was complete.
     pub complete_utc: String,
-    /// Why it was fetched.
+    /// Reason why it was fetched.
     pub why: String,
 }
 
-/// What a file was compared with.
+/// Basis on which a file was verified.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verified {
@@ -97,7 +97,7 @@ impl State {
         Ok(state)
     }
 
-    /// Writes the state, whole or not at all.
+    /// Writes the state, completely or not at all.
     ///
     /// # Errors
     /// The folder cannot be written.

@@ -21,7 +21,7 @@ use areograph_base::{
 };
 use areograph_pds::shot_table::{TableColumns, read_shot_table};
 
-/// How far shots may be beyond the box of a query, degrees: a hundred times the last digit of the tables.
+/// Largest distance of shots beyond the box of a query, degrees: a hundred times the last digit of the tables.
 const BESIDE_DEG: f64 = 1e-3;
 
 /// A table that has arrived; it does not have its name yet.
@@ -30,7 +30,7 @@ pub(crate) struct Received {
     pub(crate) part: Part,
     /// Bytes that had arrived earlier.
     pub(crate) resumed: u64,
-    /// Where the service had it.
+    /// Its address at the service.
     pub(crate) url: String,
 }
 
@@ -39,14 +39,14 @@ pub(crate) struct Wish<'a> {
     pub(crate) file: &'a PlannedFile,
     /// West, east, south and north edge, degrees.
     pub(crate) box_deg: [f64; 4],
-    /// Where its part is collected.
+    /// Path of its partial download.
     pub(crate) part: PathBuf,
     /// Longest time for the answer of the service.
     pub(crate) limit: Duration,
     pub(crate) replace: bool,
 }
 
-/// Where the answer for a part is kept.
+/// Path of the answer for a part.
 pub(crate) fn answer_of(part: &Path) -> PathBuf {
     part.with_extension("answer")
 }
@@ -148,7 +148,7 @@ fn is_lasting(failure: &Error) -> bool {
     })
 }
 
-/// Rows of a table, and those of them that count.
+/// Rows of a table, and the rows that count.
 #[derive(Debug, Default)]
 struct Rows {
     all: u64,
@@ -160,7 +160,7 @@ struct Rows {
     last: Option<String>,
 }
 
-/// Why a file is not the table that was asked for.
+/// Reason why a file is not the requested table.
 ///
 /// * `stated` – number of rows by the service
 ///

@@ -28,7 +28,7 @@ use areograph_store::{
 
 /// Bytes that are read at a time.
 const CHUNK: usize = 1 << 16;
-/// How often a wait looks whether the user stops it.
+/// Time between checks for an interrupt by the user during a wait.
 const LOOK: Duration = Duration::from_millis(50);
 /// Longest answer of a service, bytes: it names a few files.
 const ANSWER_MAX: u64 = 1 << 20;
@@ -48,7 +48,7 @@ pub(crate) struct Wanted<'a> {
     pub(crate) replace: bool,
 }
 
-/// How a file is received.
+/// Receiver of files.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Receiver<'a> {
     pub(crate) client: &'a Client,
@@ -57,7 +57,7 @@ pub(crate) struct Receiver<'a> {
 }
 
 impl Receiver<'_> {
-    /// Receives the whole file into its part and verifies it; it does not have its name yet.
+    /// Receives the complete file into its part and verifies it; it does not have its name yet.
     ///
     /// # Errors
     /// [`FetchError`]; [`Stopped`]; the folder cannot be written. The part is kept where its bytes may be continued.
@@ -134,7 +134,7 @@ impl Receiver<'_> {
         }
     }
 
-    /// One request for a text. A user who stops it does not wait for the service.
+    /// One request for a text. An interrupt by the user does not wait for the service.
     fn answer(
         &self,
         url: &str,
@@ -225,11 +225,11 @@ impl Receiver<'_> {
         match (length, wanted.bytes) {
             (Some(length), Some(expected)) if length != expected => {
                 return Err(content(format!(
-                    "{length} bytes; expected {expected} by the index"
+                    "{length} bytes; expected {expected} according to the index"
                 )));
             }
             (None, None) if !is_delimited && wanted.md5.is_none() => {
-                let problem = "neither server nor archive states size or checksum: whether it is whole cannot be known";
+                let problem = "neither server nor archive states size or checksum: its completeness cannot be verified";
                 return Err(content(problem.to_owned()));
             }
             _ => {}
@@ -278,7 +278,7 @@ impl Receiver<'_> {
     }
 }
 
-/// The whole body of an answer as a text.
+/// The complete body of an answer as a text.
 fn text_of(reply: Reply) -> std::result::Result<String, Fault> {
     let Reply::Body(answer) = reply else {
         return Err(Fault::Passing("an answer without a text".to_owned(), None));
@@ -305,7 +305,7 @@ fn text_of(reply: Reply) -> std::result::Result<String, Fault> {
     Err(Fault::Passing(problem, None))
 }
 
-/// The identity of the part, if it is that of the wanted file.
+/// The identity of the part, if it matches the wanted file.
 fn verified(wanted: &Wanted<'_>, part: &mut Part) -> Result<Hashed> {
     let hashed = Hashed::of(part.path())?;
     let wrong = |problem: String| {
@@ -372,7 +372,7 @@ fn copied(from: &Path, path: &Path) -> Result<()> {
 /// Brings the copy of an index up to date.
 ///
 /// # Errors
-/// Those of [`Receiver::receive`].
+/// As [`Receiver::receive`].
 pub(crate) fn refresh(
     receiver: &Receiver<'_>,
     url: &str,

@@ -4,7 +4,7 @@ use std::fmt;
 
 use chrono::{DateTime, NaiveDate, NaiveDateTime, TimeDelta};
 
-/// An instant as indexes print it: UTC by the calendar, without leap seconds, to the millisecond.
+/// An instant as indexes state it: UTC by the calendar, without leap seconds, to the millisecond.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Utc(i64);
 

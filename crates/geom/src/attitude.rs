@@ -46,7 +46,7 @@ impl OmegaPhiKappa {
     }
 }
 
-/// Adds whole turns so that neighbouring angles, radians, differ by at most π.
+/// Adds full turns so that neighbouring angles, radians, differ by at most π.
 pub fn unwrap_angles(angles_rad: &mut [f64]) {
     for index in 1..angles_rad.len() {
         let previous = angles_rad[index - 1];

@@ -72,9 +72,9 @@ pub fn body_rotation(body: Body, et: Et) -> Rotation<J2000, BodyFixed> {
     Rotation::new(body_matrix(body.model(), et), et)
 }
 
-/// Takes a position out of the body-fixed frame of `datum` at `out_at` and into that of the products of `body` at `into_at`.
+/// Converts a position from the body-fixed frame of `datum` at `out_at` to the products' frame of `body` at `into_at`.
 ///
-/// Both instants are the same unless a clock correction is meant to turn the body in between.
+/// Both instants are equal unless a clock correction is to rotate the body in between.
 #[must_use]
 pub fn convert_datum(
     body: Body,

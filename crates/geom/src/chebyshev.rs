@@ -11,7 +11,7 @@ use areograph_base::time::{Et, Interval};
 const DEGREE: usize = 12;
 /// Samples of a fit: the roots of the next Chebyshev polynomial.
 const NODES: usize = DEGREE + 1;
-/// How near to its ends a polynomial is checked, as a share of half its length.
+/// Outermost point at which a polynomial is checked, as a share of half its length.
 const CHECK_END: f64 = 1.0 - 1e-6;
 /// Fraction of the golden ratio: its multiples spread evenly and never meet the nodes.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;

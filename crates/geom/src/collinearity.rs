@@ -1,8 +1,8 @@
 //! Collinearity of one ground point and one exterior orientation, with its partial derivatives.
 //!
-//! With `d = P − C` and `q = M d`, `M` from Mars-fixed to camera components:
-//! `x = −f q₁/q₃` along the track and `y = −f q₂/q₃` across it. A pushbroom line sees the points of its
-//! own plane only: with the orientation of that line `x = 0`.
+//! With `d = P − C` and `q = M d`, `M` from Mars-fixed to camera components: `x = −f q₁/q₃` along the track and
+//! `y = −f q₂/q₃` across it. A pushbroom line sees only the points of its plane: with the orientation of that line
+//! `x = 0`.
 
 use nalgebra::{Matrix2x3, Vector2, Vector3};
 

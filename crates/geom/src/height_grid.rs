@@ -80,7 +80,7 @@ impl HeightGrid {
         self.probed_m(&probe, [0, 0])
     }
 
-    /// The same at a probe shifted by whole rows and columns.
+    /// The height at a probe shifted by whole rows and columns.
     #[must_use]
     pub fn probed_m(&self, probe: &Probe, shift: [i64; 2]) -> Option<f64> {
         let [row, column] = [0, 1].map(|axis| usize::try_from(probe.first[axis] + shift[axis]));

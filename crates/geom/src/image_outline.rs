@@ -127,7 +127,7 @@ fn in_polar_plane([longitude, latitude]: [f64; 2], north: bool) -> [f64; 2] {
 
 /// The ground within a ring of points (longitude, latitude; radians) with great circles between them, and around it: by
 /// `latitude_rad` in latitude, by a cap of radius `longitude_rad` at the farthest latitude in longitude. The result is
-/// a convex outline in the plane of longitude and latitude that contains all of it, or a whole cap where the ring goes
+/// a convex outline in the plane of longitude and latitude that contains all of it, or a full cap where the ring goes
 /// round a pole or close to it.
 #[must_use]
 pub fn widened(ring_rad: &[[f64; 2]], latitude_rad: f64, longitude_rad: f64) -> WindowShape {

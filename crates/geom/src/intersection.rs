@@ -82,7 +82,7 @@ pub struct IntersectionLimits {
 }
 
 impl Default for IntersectionLimits {
-    /// Those on Mars.
+    /// Limits on Mars.
     fn default() -> Self {
         Self::on(Body::Mars)
     }
@@ -110,7 +110,7 @@ impl IntersectionLimits {
     }
 }
 
-/// Why a point was not intersected; counted, never a value in a product.
+/// Reasons why a point was not intersected; counted, never a value in a product.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[serde(rename_all = "snake_case")]
 pub enum Unintersected {
@@ -120,7 +120,7 @@ pub enum Unintersected {
         /// Number of rays.
         rays: usize,
     },
-    /// The rays are too close to parallel, as those of an image with itself.
+    /// The rays are too close to parallel, as the rays of an image with itself.
     #[error("rays meet at {angle_deg:.3} degrees at most")]
     NearParallel {
         /// Largest angle between two rays, degrees.
@@ -182,7 +182,7 @@ impl Intersection {
 /// Intersects two or more rays by least squares.
 ///
 /// # Errors
-/// Why the rays give no point.
+/// The reason why the rays give no point.
 /// # Source
 /// Shan et al. 2005, ground point determination: exterior orientation held fixed, focal coordinates
 /// observed, X, Y, Z unknown; the start is the point nearest to all rays.

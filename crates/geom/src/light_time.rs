@@ -41,8 +41,8 @@ impl LightTime {
         ("centre", Self::Centre),
     ];
 
-    /// By how much positions may be read earlier than exposures, seconds: light from the highest point of the orbits
-    /// that MGS flew, 54 000 km, takes 0.18 s.
+    /// Largest time by which positions may be read earlier than exposures, seconds: light from the highest point of the
+    /// orbits that MGS flew, 54 000 km, takes 0.18 s.
     pub const REACH_S: f64 = 0.2;
 
     /// Its word in configuration and products.
@@ -92,7 +92,7 @@ pub fn light_time_s(distance_m: f64) -> f64 {
     distance_m / SPEED_OF_LIGHT_M_S
 }
 
-/// The apparent position for an observer who moves with `velocity_m_s`: turned towards the velocity, at the same
+/// The apparent position for an observer that moves with `velocity_m_s`: turned towards the velocity, at the same
 /// distance.
 ///
 /// # Source

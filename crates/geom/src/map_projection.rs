@@ -28,7 +28,7 @@ impl MapProjection {
 
     /// A map about the middle of `points` (longitude, latitude), radians.
     ///
-    /// Points spread evenly over the whole globe have no middle: then 0° N 0° E.
+    /// Points spread evenly over the globe have no middle: then 0° N 0° E.
     #[must_use]
     pub fn of_points(points: impl Iterator<Item = (f64, f64)>, radius_m: f64) -> Self {
         let sum: Vector3<f64> = points
@@ -74,7 +74,7 @@ impl MapProjection {
     }
 
     /// East longitude and areocentric latitude, radians, of a map point in metres; `None` outside the disc that
-    /// contains the whole sphere.
+    /// contains the entire sphere.
     #[must_use]
     pub fn unproject(&self, (x_m, y_m): (f64, f64)) -> Option<(f64, f64)> {
         let distance_m = x_m.hypot(y_m);
@@ -106,7 +106,7 @@ mod tests {
         // Snyder 1987, p. 332: R = 3, centre 40° N 100° W, point 20° S 100° E: x -4.2339303, y 4.0257775.
         let map = MapProjection::about(-100.0 * DEGREE, 40.0 * DEGREE, 3.0);
         let (x, y) = map.project(100.0 * DEGREE, -20.0 * DEGREE).unwrap();
-        assert!((x + 4.233_930_3).abs() < 5e-8, "{x}"); // the printed digits
+        assert!((x + 4.233_930_3).abs() < 5e-8, "{x}"); // the published digits
         assert!((y - 4.025_777_5).abs() < 5e-8, "{y}");
     }
 

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::statistics::{Summary, outliers};
 
-/// The same feature in two images: line and sample in each.
+/// A feature in two images: line and sample in each.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pair {
     /// Line and sample in the first image.
@@ -141,8 +141,7 @@ impl ImageToImage {
             mean += DVector::from_vec(fit.frame.terms(pair.first, fit.order)) / pairs.len() as f64;
         }
         let scatter = self.tie_lines.standard_deviation;
-        // The summary divides by one less than the number; the fit has used as many degrees of freedom as it has
-        // coefficients.
+        // The summary divides by n − 1; the fit uses one degree of freedom per coefficient.
         let spare = (self.ties - 1) as f64 / (self.ties - mean.len()) as f64;
         scatter * (spare * mean.dot(&(&fit.cofactors * &mean))).sqrt()
     }

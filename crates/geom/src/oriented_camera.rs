@@ -17,12 +17,12 @@ pub struct OrientedCamera<M> {
     pub orientation: M,
     /// Detector line.
     pub detector: Detector,
-    /// Times of the lines of the whole image.
+    /// Times of the lines of the complete image.
     pub line_times: LineTimes,
 }
 
 impl<M> OrientedCamera<M> {
-    /// Lines of the whole image.
+    /// Lines of the complete image.
     #[must_use]
     pub fn lines(&self) -> f64 {
         f64::from(self.line_times.lines())
@@ -62,7 +62,7 @@ impl<M: ExteriorOrientation> OrientedCamera<M> {
         (0.0..=self.lines()).contains(&line) && (0.0..=self.detector.samples).contains(&sample)
     }
 
-    /// How far a ground point moves along the focal plane during a mean line period at `x_lines`, pixels.
+    /// Displacement of a ground point along the focal plane during a mean line period at `x_lines`, pixels.
     #[must_use]
     pub fn focal_px_per_line(&self, x_lines: f64, ground_m: &Vector3<f64>) -> f64 {
         let (pose, motion) = self.orientation.pose_and_rate(x_lines);

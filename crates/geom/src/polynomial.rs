@@ -115,7 +115,7 @@ mod tests {
         let x: Vec<f64> = (0..=30).map(|k| f64::from(k) / 15.0 - 1.0).collect();
         let y: Vec<f64> = x.iter().map(|x| x * x).collect();
         let fit = Polynomial::fit(&x, &y, 1).unwrap();
-        assert!((fit.rmse - 0.31752).abs() < 5e-6); // five printed digits
+        assert!((fit.rmse - 0.31752).abs() < 5e-6); // five published digits
     }
 
     #[test]

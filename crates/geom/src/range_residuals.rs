@@ -14,7 +14,7 @@ use areograph_base::{
     time::Et,
 };
 
-/// Position of the spacecraft by the kernels at one instant, and the axes of its orbit.
+/// Position of the spacecraft according to the kernels at one instant, and the axes of its orbit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpacecraftState {
     /// Position.
@@ -77,7 +77,7 @@ impl RangeResiduals {
 
 /// Measured range minus the geometric distance of spacecraft and footprint, metres.
 ///
-/// Any frame common to both positions serves; the sign is that of Shan et al. 2005, Table 3.
+/// Any frame common to both positions serves; the sign follows Shan et al. 2005, Table 3.
 #[must_use]
 pub fn range_residual_m<F: Frame>(
     range_m: f64,
@@ -145,7 +145,7 @@ mod tests {
     fn is_stated(is_table: bool, beside_m: f64) -> bool {
         let mut footprints = Footprints::<BodyFixed>::new(vec![SourceFile {
             name: "shots".to_owned(),
-            // The letter is in the name of a file, and says nothing of its content.
+            // The letter is in the name of a file, and states nothing about its content.
             version: None,
             datum: Datum::Iau2000,
             blake3: String::new(),

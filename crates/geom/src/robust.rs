@@ -39,7 +39,7 @@ impl RobustWeight {
         }
     }
 
-    /// The function that these weights minimise in sum, `z²/2` near zero.
+    /// Loss function whose sum these weights minimise; `z²/2` near zero.
     #[must_use]
     pub fn cost(self, z: f64) -> f64 {
         match self {
@@ -66,7 +66,7 @@ mod tests {
         ] {
             assert!((function.factor(0.0) - 1.0).abs() < 1e-15);
             assert!((function.factor(-1.345) - at_limit).abs() < 1e-15);
-            assert!((function.factor(10.0) - at_ten).abs() < 1e-5); // five printed digits
+            assert!((function.factor(10.0) - at_ten).abs() < 1e-5); // five published digits
             for z in [0.5, 1.3, 1.4, 10.0] {
                 // The weight is the slope of the cost over z.
                 let slope = (function.cost(z + 1e-5) - function.cost(z - 1e-5)) / 2e-5;

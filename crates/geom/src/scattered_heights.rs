@@ -3,7 +3,7 @@
 //!
 //! The smoothness of the ground is not known beforehand. Every point is predicted from its neighbours, for some powers
 //! of the generalised covariance `|h|^β` and some shares of noise; those with the smallest errors are used. The errors
-//! at the points are then those to expect between them, and their tail is that of this ground.
+//! at the points then represent the errors between them, with the tail of this ground.
 //!
 //! # Source
 //! Generalised covariances: Matheron 1973, "The intrinsic random functions and their applications", Adv. Appl. Probab.
@@ -21,7 +21,7 @@ const NEIGHBOURS: usize = 20;
 const TESTED_MAX: usize = 250;
 /// Powers of distance: rough ground, and smooth.
 const POWERS: [f64; 4] = [1.0, 1.5, 2.5, 3.0];
-/// Variance of noise over that of the ground at the usual distance of neighbours.
+/// Variance of noise over the variance of the ground at the usual distance of neighbours.
 const NOISES: [f64; 4] = [1e-3, 1e-2, 1e-1, 1.0];
 /// Smallest product of the variances of neighbours along their principal axes, over the square of the sum of both: a
 /// tenth in width.
@@ -59,7 +59,7 @@ struct Model {
 }
 
 impl Model {
-    /// Of two points at a distance, in usual distances.
+    /// Covariance of two points at a distance, in usual distances.
     fn between(self, distance: f64) -> f64 {
         let sign = if self.power < 2.0 { -1.0 } else { 1.0 };
         sign * distance.powf(self.power)
@@ -121,7 +121,7 @@ impl ScatteredHeights {
         for (index, near) in tested.iter().zip(neighbours) {
             let place_m = &self.points_m[*index];
             if let Some((radius_m, variance)) = self.krige(place_m, near) {
-                // The point has noise of its own.
+                // The point has its own noise.
                 let sigma = (variance + self.model.noise).sqrt();
                 normalised.push((place_m.norm() - radius_m) / sigma);
                 logarithms += sigma.ln();
@@ -279,7 +279,7 @@ mod tests {
 
     #[test]
     fn standard_deviations_hold_on_smooth_and_on_rough_ground() {
-        // Points lie 7 km apart: waves of 80 km are smooth, those of 10 km hardly sampled.
+        // Points lie 7 km apart: waves of 80 km are smooth, waves of 10 km hardly sampled.
         for (wave_m, sigmas_m) in [(80_000.0, 5.0..30.0), (10_000.0, 80.0..400.0)] {
             let all = strip(700, wave_m, 5.0);
             let (known, others) = all.split_at(400);
@@ -299,7 +299,8 @@ mod tests {
                 "{wave_m} m: {sigma_m:.1} m, {z:.2}, tail {:.1}",
                 surface.tail
             );
-            // Noise of 5 m beside what the ground does between the points; 300 points, and one draw of the others.
+            // Noise of 5 m in addition to the variation of the ground between the points; 300 points, and one draw of
+            // the others.
             assert!(sigmas_m.contains(&sigma_m), "{wave_m}: {sigma_m} m");
             // The kernel of the errors; tests of single points take the tail.
             assert!((0.7..1.6).contains(&z), "{wave_m}: {z}");

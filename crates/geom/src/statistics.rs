@@ -320,7 +320,7 @@ mod tests {
         assert!(Trend::of(&[1.0, 1.0, 1.0], &[1.0, 2.0, 3.0]).is_none());
     }
 
-    /// Normal numbers by Box and Muller from a linear congruential generator, the same in every run.
+    /// Normal numbers by Box and Muller from a linear congruential generator, identical in every run.
     fn normals() -> impl Iterator<Item = f64> {
         let mut state = 1_u64;
         std::iter::repeat_with(move || {
@@ -336,7 +336,7 @@ mod tests {
 
     #[test]
     fn limits_of_unit_weight_are_those_of_chi_square() {
-        // χ² at 0.005 and 0.995 from printed tables, over its degrees of freedom.
+        // χ² at 0.005 and 0.995 from published tables, over its degrees of freedom.
         for (freedom, least, most) in [(10.0, 2.156, 25.188), (100.0, 67.328, 140.169)] {
             let [low, high] = unit_weight_limits(freedom).unwrap();
             let exact = [least, most].map(|square: f64| (square / freedom).sqrt());

@@ -5,8 +5,8 @@
 //! across the track it takes their average, which reduces height uncertainties by √2. Both readings are given.
 //!
 //! Equation 7 adds the means of both images in quadrature, although by equation 5 (`Δ = Δ1 − Δ2`) means of opposite
-//! sign add up. Equation 6 then assigns to the footprints what is left of their misregistration. The budget by
-//! equation 5 stands beside that of the paper.
+//! sign add up. Equation 6 then assigns the remaining misregistration to the footprints. The budget by equation
+//! 5 stands beside the paper's.
 
 #[cfg(feature = "schema")]
 use schemars::JsonSchema;
@@ -47,7 +47,7 @@ impl ResidualMoments {
 pub struct PairResiduals {
     /// In the two images.
     pub images: [ResidualMoments; 2],
-    /// Of the first minus those of the second, point by point (eq. 5).
+    /// Residuals of the first minus residuals of the second image, point by point (eq. 5).
     pub apart: ResidualMoments,
 }
 
@@ -117,7 +117,7 @@ pub enum GroundPart {
         /// Pixels.
         along_px: f64,
     },
-    /// Orientation explains more than the whole discrepancy.
+    /// Orientation explains more than the entire discrepancy.
     NotResolvable,
     /// No footprint is in both images.
     NotObserved,
@@ -231,7 +231,7 @@ pub enum BudgetError {
     #[error("{what} is {value}, expected {expected}")]
     #[cause("check the geometry and the residuals of the stereo pairs")]
     Value {
-        /// Which number.
+        /// The number.
         what: &'static str,
         /// Its value.
         value: f64,
@@ -286,7 +286,7 @@ pub fn uncertainty_budget(input: &BudgetInput) -> Result<UncertaintyBudget, Budg
         equation_7: point(along_px, summed(ResidualMoments::size_y)),
         equation_5: SignedBudget {
             along_px: signed_px,
-            // The misregistration is that of the second image against the first.
+            // The misregistration refers to the second image against the first.
             unexplained_px: input
                 .misregistration
                 .map(|misregistration| of_pixel(misregistration.mean_m) + mean_x),

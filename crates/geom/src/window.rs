@@ -78,8 +78,8 @@ impl Region {
     /// The region of a window's outline.
     ///
     /// Edges of polygons are straight in longitude and latitude (RFC 7946) and go the shorter way round Mars; an edge
-    /// along a whole turn keeps it. A ring that winds once round Mars is closed along the pole nearer to its vertices.
-    /// A ring of fewer than three vertices is empty.
+    /// along a full turn keeps it. A ring that winds once round Mars is closed along the pole nearer to its vertices. A
+    /// ring of fewer than three vertices is empty.
     #[must_use]
     pub fn new(shape: &WindowShape) -> Self {
         let pieces = match shape {
@@ -114,7 +114,7 @@ impl Region {
 
     /// Whether the direction lies inside; longitude in radians of any turn, areocentric latitude in radians.
     ///
-    /// The boundary of a box or of an outer ring is inside, that of a hole outside.
+    /// The boundary of a box or of an outer ring is inside, the boundary of a hole outside.
     #[must_use]
     pub fn contains(&self, longitude_rad: f64, latitude_rad: f64) -> bool {
         self.pieces.iter().any(|piece| match piece {

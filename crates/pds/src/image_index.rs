@@ -1,7 +1,7 @@
 //! The cumulative index of the camera: one row for every image of the mission, with corners and angles.
 //!
-//! Rows are quoted CSV. Names and positions of the columns come from the label beside the table (`.lbl`); without one
-//! they are those of the mapping mission.
+//! Rows are quoted CSV. Names and positions of the columns come from the label beside the table (`.lbl`); without a
+//! label, they follow the mapping mission.
 
 use std::{
     fs::File,
@@ -147,7 +147,7 @@ impl IndexedImage {
 pub struct BadRow {
     /// Line of the file, counted from 1.
     pub line: u64,
-    /// What is wrong.
+    /// The fault.
     pub text: String,
 }
 
@@ -174,7 +174,7 @@ enum NoIndex {
     Empty,
 }
 
-/// Longest accepted row; those of the archive have about 520 bytes.
+/// Longest accepted row; rows of the archive have about 520 bytes.
 const ROW_BYTES_MAX: u64 = 1 << 16;
 
 /// Reads an index, with the label beside it if one exists.

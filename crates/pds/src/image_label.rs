@@ -21,7 +21,7 @@ pub struct ImageLabel {
     pub utc_stop: Option<String>,
     /// Line times, where each row of the file has its own.
     pub lines: Option<RowTimes>,
-    /// Text that is no statement, and a keyword that only resembles that of the clock, one sentence each.
+    /// Text that is no statement, and a keyword that only resembles the clock's, one sentence each.
     pub remarks: Vec<String>,
 }
 
@@ -48,8 +48,8 @@ pub(super) fn damage(label: &Label, has_clock: bool) -> Vec<String> {
     if !has_clock && (resembling.is_some() || !remarks.is_empty()) {
         let instead = resembling.map_or_else(String::new, |entry| format!(", but {}", entry.key));
         remarks.push(format!(
-            "the damaged label states no {CLOCK_KEY}{instead}: without the key sclk_start the start is that of START_TIME, which \
-             is truncated to 10 ms"
+            "the damaged label states no {CLOCK_KEY}{instead}: without the key sclk_start the start is taken from \
+             START_TIME, which is truncated to 10 ms"
         ));
     }
     remarks

@@ -57,7 +57,7 @@ pub fn of_label(label: &Label) -> Vec<Column> {
 /// one.
 ///
 /// # Errors
-/// What is wrong with the row.
+/// The fault of the row.
 pub fn fields<'a>(row: &'a [u8], columns: &'a [Column]) -> Result<Fields<'a>, String> {
     let row = std::str::from_utf8(row).map_err(|_| "not ASCII text".to_owned())?;
     let separated = separated(row);

@@ -152,7 +152,7 @@ pub fn parse(bytes: &[u8]) -> Result<Label, LabelError> {
     parse_whole(&bytes[..bytes.len().min(LABEL_BYTES_MAX)])
 }
 
-/// The same for text of any length, as that of control networks.
+/// Parses text of any length, as control networks have.
 ///
 /// # Errors
 /// [`LabelError::NoLabel`] when there is no assignment.
@@ -235,7 +235,7 @@ impl Label {
         only(self.entries.iter().filter(|entry| entry.key == key))
     }
 
-    /// The same directly in objects or groups of this name (upper case too).
+    /// The only entry of a keyword directly in objects or groups of this name (upper case too).
     ///
     /// # Errors
     /// [`LabelError::Twice`] for another value under the same keyword.

@@ -27,7 +27,8 @@
 //! }
 //! ```
 //!
-//! A sound frame has up to 20 shots: `examples/shots.rs` prints those of a file, `examples/decode.rs` decodes an image.
+//! A sound frame has up to 20 shots: `examples/shots.rs` lists the shots of a file, `examples/decode.rs` decodes an
+//! image.
 
 pub mod archive;
 pub mod calibration_tables;

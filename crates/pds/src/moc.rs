@@ -27,7 +27,7 @@ pub fn image_label(label: &Label, cameras: &[Instrument]) -> Result<ImageLabel, 
     Ok(read)
 }
 
-/// The same for the label of an image that may be map-projected.
+/// Reads the label of an image that may be map-projected.
 pub(super) fn label_of_camera(
     label: &Label,
     cameras: &[Instrument],

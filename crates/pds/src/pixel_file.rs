@@ -82,7 +82,7 @@ pub enum PixelFileError {
         /// Bytes by the label.
         expected: u64,
     },
-    /// A picture that its library rejects, or of another kind.
+    /// A picture that its library rejects, or of a different kind.
     #[error("{format}: {reason}")]
     #[cause(
         "give a whole picture of one band of grey with 8, 16 or 32 bits a pixel, a TIFF without compression, with LZW \
@@ -91,7 +91,7 @@ pub enum PixelFileError {
     Picture {
         /// Its format.
         format: &'static str,
-        /// What is wrong.
+        /// The fault.
         reason: String,
     },
 }

@@ -50,7 +50,7 @@ impl Labelled {
     /// The label and the rows of a file of HRSC.
     ///
     /// # Errors
-    /// Those of [`HrscFile::of`].
+    /// As [`HrscFile::of`].
     pub(super) fn hrsc(&self, label: &Label, cameras: &[Instrument]) -> Result<HrscFile> {
         let read = HrscFile::of(&self.path, &self.file, &self.start, label, cameras);
         read.in_file(&self.path)
@@ -61,9 +61,9 @@ impl Labelled {
 /// file whose rows contain them.
 ///
 /// # Errors
-/// The file cannot be read; no label, or a cut one; an instrument that is not among `cameras`, or none; an image of
-/// another spacecraft or target, or one that is map-projected; a value that is not of its kind, or two values under one
-/// keyword; rows that are not those of the label, or whose times contradict each other.
+/// The file cannot be read; no label, or a cut one; an instrument that is not among `cameras`, or none; an image of a
+/// different spacecraft or target, or one that is map-projected; a value that is not of its kind, or two values under
+/// one keyword; rows that do not belong to the label, or whose times contradict each other.
 pub fn read_label(path: &Path, cameras: &[Instrument]) -> Result<ImageLabel> {
     let labelled = Labelled::open(path)?;
     let label = parse(&labelled.start).in_file(path)?;

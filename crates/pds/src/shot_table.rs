@@ -46,7 +46,7 @@ pub type Utc<'a> = &'a dyn Fn(&str) -> Result<Et>;
 pub enum TableColumns {
     /// As assigned.
     Assigned(ShotColumns),
-    /// Those of the PEDR query of the Orbital Data Explorer, without the position of the spacecraft.
+    /// Columns of the PEDR query of the Orbital Data Explorer, without the position of the spacecraft.
     OdePedr,
 }
 
@@ -81,10 +81,10 @@ pub struct ShotRow {
 }
 
 impl ShotRow {
-    /// The columns of the shot; values that a table lacks are those of a ground return of one laser.
+    /// The columns of the shot; values that a table lacks are set for a ground return of one laser.
     ///
     /// Without its position, the spacecraft is put on the radius through the footprint, at the range ("nadir by range").
-    /// Of the two radii, the one in the table is both: no table has the crossover correction itself.
+    /// The radius in the table serves as both radii: no table has the crossover correction itself.
     ///
     /// * `file` – index of the table
     /// * `correction_s` – seconds to add to its time

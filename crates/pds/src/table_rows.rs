@@ -36,7 +36,7 @@ pub(super) enum TableError {
     },
 }
 
-/// The same, with the file that describes the columns.
+/// The error with the file that describes the columns.
 #[derive(Debug, thiserror::Error)]
 #[error("{error}")]
 struct Refused {

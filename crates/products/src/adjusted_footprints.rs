@@ -68,13 +68,13 @@ fn shot_columns<'a>() -> Vec<Column<Shot<'a>>> {
         columns.push(column(
             initial,
             Unit::Metre,
-            "footprint, IAU 2000, metres",
+            "coordinate of the footprint, IAU 2000, metres",
             move |shot: &Shot| shot.0.initial.xyz_m[axis],
         ));
         columns.push(column(
             adjusted,
             Unit::Metre,
-            "adjusted footprint, IAU 2000, metres",
+            "coordinate of the adjusted footprint, IAU 2000, metres",
             move |shot: &Shot| shot.0.ground.xyz_m[axis],
         ));
         columns.push(column(
@@ -120,7 +120,7 @@ fn local_columns<'a>() -> Vec<Column<Shot<'a>>> {
     let kinds: [([&'static str; 3], &'static str, Sigmas); 3] = [
         (
             ["sigma_east_m", "sigma_north_m", "sigma_up_m"],
-            "the same towards east, north or up, metres",
+            "standard deviation towards east, north or up, metres, with the shift of the profile",
             |point| Some(point.local_sigmas_m()),
         ),
         (
@@ -129,7 +129,7 @@ fn local_columns<'a>() -> Vec<Column<Shot<'a>>> {
                 "shared_sigma_north_m",
                 "shared_sigma_up_m",
             ],
-            "part of it: standard deviation of the shift that all footprints of the profile share, metres; it does not average out",
+            "standard deviation of the shift that all footprints of the profile share, metres; it does not average out",
             |point| Some(point.shared?.sigma_m),
         ),
         (
@@ -138,7 +138,7 @@ fn local_columns<'a>() -> Vec<Column<Shot<'a>>> {
                 "relative_sigma_north_m",
                 "relative_sigma_up_m",
             ],
-            "the rest: standard deviation without that shift, metres, for differences of footprints of one profile",
+            "standard deviation without the shift of the profile, metres, for differences of footprints of one profile",
             CorrectedPoint::relative_sigmas_m,
         ),
     ];

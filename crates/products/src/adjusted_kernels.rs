@@ -48,7 +48,7 @@ pub struct AdjustedKernels<'a> {
     pub site_folder: &'a Path,
     /// The original kernels.
     pub originals: &'a KernelSet,
-    /// The pointing bias that readers of the kernels will apply, if it is not that of the camera.
+    /// The pointing bias that readers of the kernels will apply, if it replaces the camera's.
     pub pointing: &'a PointingConfig,
 }
 
@@ -255,7 +255,7 @@ const fn positions(light_time: LightTime) -> &'static str {
     }
 }
 
-/// The original kernels, followed by those of all images.
+/// The original kernels, followed by the kernels of all images.
 fn metakernel(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<String> {
     let names = images.iter().flat_map(|image| {
         [

@@ -61,7 +61,8 @@ struct Definition {
 
 #[derive(Serialize, JsonSchema)]
 struct Configured<'a> {
-    /// The form of orientation that the configuration requires; otherwise `registration.json` states that of each image.
+    /// The form of orientation that the configuration requires; otherwise `registration.json` states the form of each
+    /// image.
     #[serde(skip_serializing_if = "Option::is_none")]
     model: Option<CameraModel>,
     light_time: LightTime,

@@ -4,9 +4,8 @@ use areograph_base::{body::Body, units::RADIANS_PER_DEGREE};
 
 /// Statement of products beside the CRS code, since no code exists for the frame of the products.
 ///
-/// For Mars the differences are those of `pck00011.tpc` (IAU 2015, CSPICE N0067) from
-/// [`MARS_IAU2000`](areograph_base::body::MARS_IAU2000), sampled daily over 1999 to 2001: −0.00184° to −0.00136° on the equator,
-/// 0.00048° at most between the poles.
+/// For Mars, `pck00011.tpc` (IAU 2015, CSPICE N0067) differs from [`MARS_IAU2000`](areograph_base::body::MARS_IAU2000),
+/// sampled daily over 1999 to 2001, by −0.00184° to −0.00136° on the equator and by 0.00048° at most between the poles.
 pub(super) fn frame(body: Body) -> &'static str {
     &body.names().frame
 }
@@ -32,7 +31,7 @@ const POLAR_DEG: f64 = 60.0;
 
 /// West, south, east and north of points in degrees; `None` without points.
 ///
-/// `west > east` when the shortest box crosses the antimeridian, as RFC 7946 (5.2) and GeoParquet say. Points
+/// `west > east` when the shortest box crosses the antimeridian, as RFC 7946 (5.2) and GeoParquet state. Points
 /// that surround a pole have all longitudes and reach to the pole (5.3).
 pub(super) fn bounding_box_deg(points: &[[f64; 2]]) -> Option<[f64; 4]> {
     let mut longitudes: Vec<f64> = points.iter().map(|point| point[0]).collect();

@@ -15,11 +15,11 @@ pub enum ProductError {
     /// Inputs that do not belong together.
     #[error("{what}: {found}; expected {expected}")]
     Inconsistent {
-        /// What is counted.
+        /// The counted items.
         what: String,
         /// Their number.
         found: usize,
-        /// The number of what they belong to.
+        /// The number of items to which they belong.
         expected: usize,
     },
     /// The file differs from what was written.
@@ -34,7 +34,7 @@ pub enum ProductError {
     /// A library refused to encode or draw.
     #[error("cannot {action}: {reason}")]
     Refused {
-        /// What was attempted.
+        /// The attempted action.
         action: &'static str,
         /// The library's own words.
         reason: String,

@@ -13,7 +13,7 @@ const FOLDER: &str = "report/figures";
 /// Height of a line of text below a drawing, and size of its letters, units of the drawing.
 const LINE: f64 = 36.0;
 const LETTERS: f64 = 26.0;
-/// Mean width of a letter of a sans-serif font as a share of its size; wide enough for digits and capitals.
+/// Mean width of a letter of a sans-serif font as a fraction of the font size; wide enough for digits and capitals.
 const LETTER_SHARE: f64 = 0.54;
 /// Room at either side of the text, units of the drawing.
 const MARGIN: f64 = 20.0;

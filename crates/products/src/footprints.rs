@@ -46,7 +46,7 @@ pub(super) static LABEL: Declaration = Declaration {
 
 pub(super) static PARQUET: Declaration = Declaration {
     path: "footprints.parquet",
-    what: "the same shots as GeoParquet 1.1",
+    what: "laser shots inside the windows as GeoParquet 1.1",
     readers: "scripts, GIS",
     rows: "shots",
     role: Role::Data,
@@ -72,7 +72,7 @@ pub(super) static PARQUET: Declaration = Declaration {
 
 pub(super) static GEOJSON: Declaration = Declaration {
     path: "footprints.geojson",
-    what: "the same shots as two-dimensional points",
+    what: "laser shots inside the windows as two-dimensional points",
     readers: "GIS, web maps",
     rows: "shots",
     role: Role::Data,
@@ -255,7 +255,7 @@ fn identity<'a>() -> Vec<Column<Shot<'a>>> {
         )
         .in_gis()
         .in_dbase("et_s", 20, 6),
-        column("utc", Unit::None, "the same as UTC, ISO 8601", Shot::utc)
+        column("utc", Unit::None, "et_s as UTC, ISO 8601", Shot::utc)
             .only_in_gis()
             .in_dbase("utc", 0, 0),
         column(
@@ -274,7 +274,7 @@ fn identity<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "record",
             Unit::None,
-            "record of that file, counted from 1 with its label records",
+            "record of the PEDR file, counted from 1 with its label records",
             |shot: &Shot| shot.get(|footprints| &footprints.record),
         )
         .in_gis()
@@ -282,7 +282,7 @@ fn identity<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "shot",
             Unit::None,
-            "shot in the frame, 1 to 20",
+            "number of the shot in its frame, 1 to 20",
             |shot: &Shot| u32::from(shot.get(|footprints| &footprints.shot)),
         )
         .between(1, 20)

@@ -216,7 +216,7 @@ fn beside(path: &Path) -> PathBuf {
     PathBuf::from(beside)
 }
 
-/// How an earlier such file is recognised.
+/// Mark by which an earlier such file is recognised.
 const REQUEST: Mark = Mark {
     what: "the request of an earlier search",
     at: MarkAt::Content(is_request),

@@ -1,6 +1,6 @@
-//! Numbers on a grid as a cloud-optimised `GeoTIFF`: tables of all sizes first, then tiles of the smallest size to
-//! those of the whole, so that a viewer needs only the beginning and the tiles that it shows. Without compression, for
-//! readers that require it.
+//! Numbers on a grid as a cloud-optimised `GeoTIFF`: tables of all sizes first, then tiles from the smallest size to
+//! full size, so that a viewer needs only the beginning and the tiles that it shows. Without compression, for readers
+//! that require it.
 //!
 //! The TIFF library writes tables after their data; here they precede them and are therefore written by this module.
 

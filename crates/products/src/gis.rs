@@ -31,9 +31,9 @@ pub(super) fn point_z_height(body: Body) -> String {
 
 /// Points with attributes.
 pub(super) struct Features<'a> {
-    /// Name of the whole.
+    /// Name of the set of points.
     pub(super) name: &'a str,
-    /// What a point is, in the plural: the table of a GeoPackage.
+    /// Name of the points, in the plural: the table of a GeoPackage.
     pub(super) table: &'static str,
     /// UTC of the newest, for formats that hold a date: a clock would give different bytes each time.
     pub(super) newest_utc: &'a str,

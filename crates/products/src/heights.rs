@@ -177,7 +177,7 @@ fn columns() -> Vec<Column<Compared>> {
         column(
             "rejected",
             Unit::None,
-            "why the adjustment rejected the tie point; empty when it did not",
+            "reason why the adjustment rejected the tie point; empty otherwise",
             |row: &Compared| row.rejected.clone(),
         ),
         column(
@@ -189,7 +189,7 @@ fn columns() -> Vec<Column<Compared>> {
         column(
             "latitude_deg",
             Unit::Degree,
-            "areocentric latitude likewise, degrees",
+            "areocentric latitude, degrees: of the adjusted point, or else of the intersected point",
             |row: &Compared| Some(degrees(row.place()?.latitude.0)),
         ),
         column(
@@ -213,7 +213,7 @@ fn columns() -> Vec<Column<Compared>> {
         column(
             "above_surface_m",
             Unit::Metre,
-            "the same above the MOLA surface, or above the footprint, metres",
+            "height of the intersected point above the MOLA surface, or above the footprint, metres",
             |row: &Compared| Some(row.before?.above_m),
         ),
         column(
@@ -225,7 +225,7 @@ fn columns() -> Vec<Column<Compared>> {
         column(
             "adjusted_above_surface_m",
             Unit::Metre,
-            "the same above the MOLA surface, metres",
+            "height of the adjusted point above the MOLA surface, or above the footprint, metres",
             |row: &Compared| Some(row.after?.above_m),
         ),
     ]

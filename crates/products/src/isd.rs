@@ -1,7 +1,7 @@
 //! Image support data of an image for the Community Sensor Model, as `usgscsm` reads it.
 //!
-//! Keys and nesting are those of ALE's image support data. Where ALE's file for MOC does not describe
-//! the camera, the numbers here are those that make `usgscsm` see the right pixel at the right time:
+//! Keys and nesting follow ALE's image support data. Where ALE's file for MOC does not describe the camera, the numbers
+//! here make `usgscsm` see the right pixel at the right time:
 //!
 //! * `line_scan_rate` holds the period of an *image* line, in a row for every piece of the image. `usgscsm` computes
 //!   `t = start + rate · (line − 0.5 + 0.5)` with image lines and never multiplies by the summing
@@ -12,8 +12,8 @@
 //!   pixels.
 //! * The line of the detector is taken at coordinate 0 (`losToEcf`), so its centre is 0, or the value that places a
 //!   line off the boresight there.
-//! * `usgscsm` corrects no light time itself: positions follow the convention of the run. ALE's are those seen from the
-//!   centre of Mars; they are available with `light_time = "centre"`.
+//! * `usgscsm` corrects no light time itself: positions follow the convention of the run. ALE's positions are seen from
+//!   the centre of Mars; they are available with `light_time = "centre"`.
 //! * Pointing is sampled from before the first line to after the last; ALE's table starts 1.15 s late. Nodes are
 //!   as dense as an interpolation error below 0.01 pixels requires, which is measured and stated.
 //! * Distortion of the narrow angle is zero, as the instrument kernel states. ALE repeats the pixel pitch in these
@@ -90,7 +90,7 @@ fn isd<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>, round: Round) -> 
     let times = image.times;
     let tables = &image.orientation.tables;
     let start_s = times.line_times.start().seconds();
-    // Of the delivered lines: camera models know no others.
+    // Half the time of the delivered lines: camera models know no other lines.
     let half_s = 0.5 * times.line_times.seconds(f64::from(times.lines_delivered));
     let Instrument {
         naif,
@@ -157,7 +157,7 @@ fn isd<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>, round: Round) -> 
 /// Line, time from the middle of the delivered lines and line period, for every piece of them.
 ///
 /// `usgscsm` takes the last row whose line is not above the line coordinate, and there
-/// `t = time + period · (coordinate − line + 0.5)`. The first row has the place that ALE gives it; those of further
+/// `t = time + period · (coordinate − line + 0.5)`. The first row has the place that ALE gives it; rows of further
 /// pieces begin at the top edge of their first line, so that the upper half of that line has its own period too.
 fn line_scan_rate(times: &ImageTimes, half_s: f64) -> Vec<[f64; 3]> {
     let pieces = times.line_times.pieces();
@@ -297,7 +297,7 @@ fn naif_keywords(site: &SiteProducts, times: &ImageTimes) -> BTreeMap<String, Ke
 /// Source of attitudes, as a clause for readers.
 fn attitude_source(times: &ImageTimes) -> String {
     match &times.support {
-        Some(support) => format!("that of the support data {}", support.name),
+        Some(support) => format!("from the support data {}", support.name),
         None => format!(
             "read from the C-kernel at epoch + INS{}_CK_TIME_BIAS",
             times.instrument.naif.instrument

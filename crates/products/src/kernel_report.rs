@@ -67,7 +67,7 @@ fn qualities(site: &SiteProducts) -> BTreeMap<String, &'static str> {
             "noquality"
         }
     };
-    // Alphabetic order is that of quality, the least first.
+    // Alphabetic order is the order of quality, the least first.
     let least = |required: &str| {
         let of_type = site.kernels.iter().filter(|line| type_of(line) == required);
         of_type.map(|kernel| quality(&kernel)).min()

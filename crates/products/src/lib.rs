@@ -1,9 +1,9 @@
 //! Writes rows to the files of other tools; every file is read back before it is accepted.
 //!
-//! A product is a `Declaration` in its file and a line of the registry; the
-//! files, the manifest's entries, the STAC item, `exchange/README.txt` and `docs/products.md` follow from it.
+//! A product is a `Declaration` in its file and a line of the registry; files, manifest entries, the STAC item,
+//! `exchange/README.txt` and `docs/products.md` follow from it.
 //!
-//! The same site gives the same bytes; no clock is read here.
+//! No clock is read here.
 //!
 //! A `Declaration` has the path, the content, the readers, the sites it applies to, its columns or schema, the function
 //! that writes it, and the commands that read it. A table is a list of `column(name, unit, meaning, value of a row)`
@@ -13,7 +13,7 @@
 //! `struct` (`schema.rs`). `tests/products/generated.rs` fails when `docs/products.md` is stale.
 //!
 //! The same input gives the same bytes, for any number of threads; `finished_utc` in the manifest is the
-//! exception. Formats that hold a date (`GeoPackage`, dBASE) carry that of the newest shot.
+//! exception. Formats that hold a date (`GeoPackage`, dBASE) carry the date of the newest shot.
 
 mod adjusted_footprints;
 mod adjusted_kernels;

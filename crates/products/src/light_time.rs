@@ -3,7 +3,7 @@
 use super::site::{ImageProducts, SiteProducts};
 use areograph_geom::light_time::LightTime;
 
-/// The convention of the site as a sentence; images of support data have positions of their own.
+/// The convention of the site as a sentence; images of support data have their own positions.
 pub(super) fn convention(site: &SiteProducts) -> String {
     let light_time = site.config.orientation.light_time;
     let (supported, others): (Vec<&ImageProducts>, Vec<&ImageProducts>) = site

@@ -188,7 +188,7 @@ pub(super) static ADJUSTED_TABLE: Declaration = declared!(
 
 pub(super) static ADJUSTED_DOCUMENT: Declaration = declared!(
     "images/<image>/adjusted_orientation.json",
-    "the sensor models fitted to them",
+    "sensor models fitted to the adjusted positions and rotations",
     Content::Document(schema),
     Write::AdjustedImage(write_document)
 );
@@ -305,7 +305,7 @@ fn columns<'a>() -> Vec<Column<Sample<'a>>> {
         boresight(
             "boresight_range_m",
             Unit::Metre,
-            "distance of that point, metres",
+            "distance of this point from the camera, metres",
             |ground| ground.range_m,
         ),
         boresight(
@@ -343,7 +343,7 @@ fn outline_deg(orientation: &Orientation) -> Option<Vec<[f64; 2]>> {
     Some(outline.iter().map(corner).collect())
 }
 
-/// The pieces of an image with several.
+/// The line-time pieces of an image that has more than one.
 fn line_pieces(line_times: &LineTimes) -> Vec<LinePieceDocument> {
     let pieces = line_times.pieces();
     if pieces.len() == 1 {

@@ -21,7 +21,8 @@ pub(super) static PAGE: Declaration = Declaration {
 
 pub(super) static OVERLAYS: Declaration = Declaration {
     path: "report/overlays.html",
-    what: "images with footprints and tie points on them, before and after the adjustment, and pairs of images at the same ground (of a site whose images have pixels)",
+    what: "images with footprints and tie points on them, before and after the adjustment, and pairs of images of the \
+        same ground (for a site whose images have pixels)",
     readers: "people",
     rows: "",
     role: Role::Overview,
@@ -36,7 +37,7 @@ pub(super) static OVERLAYS: Declaration = Declaration {
 
 pub(super) static METAKERNEL: Declaration = Declaration {
     path: "kernels.tm",
-    what: "the same kernels in the same order",
+    what: "the kernels of the site in their load order, as a metakernel",
     readers: "SPICE",
     rows: "",
     role: Role::Metadata,

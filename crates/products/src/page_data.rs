@@ -1,9 +1,9 @@
 //! All data of a site's page, unrounded, as a product: the page can be regenerated from it without other files.
 //!
 //! Tables and documents are written for their readers, with the digits and the selection that these need. The page
-//! shows more: surfaces, histograms, spans of kernels. Its data are therefore kept whole. Tables for camera models, which
-//! no page shows, are left out, and of many images the points of those without plots: a site of a thousand images had a
-//! quarter of a gigabyte of them.
+//! shows more: surfaces, histograms, spans of kernels. Its data are therefore kept completely. Tables for camera
+//! models, which no page shows, are left out, and of many images the points of those without plots: a site of a
+//! thousand images had a quarter of a gigabyte of them.
 
 use std::{
     borrow::Cow,
@@ -230,7 +230,7 @@ impl<'a> PageData<'a> {
     }
 }
 
-/// Images as the page needs them, `shown` those with plots of their own.
+/// Images as the page needs them; `shown` are the images with separate plots.
 fn images<'a>(images: &[ImageProducts<'a>], shown: &[usize]) -> Vec<Image<'a>> {
     let images = images.iter().enumerate().map(|(index, image)| Image {
         times: Cow::Borrowed(image.times),

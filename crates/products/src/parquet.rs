@@ -153,7 +153,7 @@ fn require_rows(found: usize, expected: usize) -> Result<()> {
     .into())
 }
 
-/// Compares these rows of the table with those of a file.
+/// Compares these rows of the table with the rows of a file.
 fn compare(
     batches: ParquetRecordBatchReader,
     range: &Range<usize>,

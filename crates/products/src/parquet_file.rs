@@ -33,7 +33,7 @@ pub(super) struct ParquetFile<W: Write + Send> {
     schema: SchemaRef,
     file: SerializedFileWriter<W>,
     factory: ArrowRowGroupWriterFactory,
-    /// Those of the current group, leaf by leaf.
+    /// Writers of the current group, leaf by leaf.
     columns: Vec<ArrowColumnWriter>,
     /// Rows of the group so far.
     rows: usize,

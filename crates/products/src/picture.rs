@@ -24,7 +24,7 @@ pub enum PictureFormat {
 const SOFTWARE: &str = "Software";
 
 impl PictureFormat {
-    /// How an earlier picture is recognised.
+    /// Mark by which an earlier picture is recognised.
     const fn mark(self) -> Mark {
         Mark {
             what: "a picture that this command wrote",
@@ -160,7 +160,7 @@ impl PictureFile {
         Ok(Self { file, head, writer })
     }
 
-    /// Adds whole lines.
+    /// Adds complete lines.
     ///
     /// # Errors
     /// The system's error on writing.

@@ -176,7 +176,7 @@ pub(super) enum Program {
     Catalogue,
 }
 
-/// How a program reads a product: lines for `exchange/README.txt`, the same for every image but for [`IMAGE`].
+/// Use of a product by a program: lines for `exchange/README.txt`, equal for every image but for [`IMAGE`].
 pub(super) struct Use {
     pub(super) program: Program,
     pub(super) lines: &'static str,

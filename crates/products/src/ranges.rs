@@ -35,7 +35,7 @@ const DEFINITIONS: [(&str, &str); 7] = [
     ),
     (
         "range_minus_distance_crossover",
-        "the same with the crossover-corrected radius",
+        "measured range minus |spacecraft in the kernels - footprint with the crossover-corrected radius|",
     ),
     (
         "decoding",
@@ -62,7 +62,7 @@ const DEFINITIONS: [(&str, &str); 7] = [
     (
         "summary",
         "all shots of the site, each counted once, even if it lies in several windows; the standard deviation \
-         includes differences between profiles, which those of single profiles do not",
+         includes differences between profiles, which the standard deviations of single profiles do not",
     ),
 ];
 
@@ -144,15 +144,15 @@ struct ProfileDocument<'a> {
     judged: bool,
     valid: bool,
     invalid_because: &'a [String],
-    /// Shots of tables without a position of the spacecraft: put on the radius through the footprint at the range, it tests
-    /// nothing.
+    /// Shots of tables without a position of the spacecraft: it is placed on the radius through the footprint at the
+    /// range, so that the test does not apply.
     shots_nadir_by_range: u32,
     range_minus_distance_m: Summary,
-    /// Mean without outliers: the one compared with the limit.
+    /// Mean without outliers, compared with the limit.
     mean_without_outliers_m: f64,
     range_minus_distance_crossover_m: Summary,
     decoding_m: Summary,
-    /// Its mean without the same shots: the one compared with the limit.
+    /// Its mean without the same shots, compared with the limit.
     decoding_without_outliers_m: f64,
     spacecraft_radial_m: Summary,
     spacecraft_along_m: Summary,
@@ -239,7 +239,7 @@ fn columns<'a>() -> Vec<Column<RangedShot<'a>>> {
             of(&shot.site.ranges.shots)[shot.at]
         })
     }
-    /// The same where the file has a spacecraft.
+    /// A column whose values exist where the file has a spacecraft.
     fn own<'a>(
         name: &'static str,
         description: &'static str,
@@ -390,7 +390,7 @@ fn profile_document<'a>(
     }
 }
 
-/// Shots whose file does not state the position of the spacecraft: those of tables, never of a PEDR file.
+/// Shots whose file does not state the position of the spacecraft: shots of tables, never of a PEDR file.
 fn nadir_by_range(site: &SiteProducts, profile: &Profile) -> u32 {
     let rows = profile.rows.iter();
     let without = rows

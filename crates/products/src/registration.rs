@@ -54,7 +54,7 @@ const DEFINITIONS: [(&str, &str); 7] = [
     ),
     (
         "difference_lines",
-        "line found by the iteration minus the one of Newton's method with the same model",
+        "line found by the iteration minus the line of Newton's method with the same model",
     ),
 ];
 
@@ -84,7 +84,7 @@ struct Configured {
     model: Option<CameraModel>,
     /// Convergence limit of the published iterations.
     tolerance_lines: f64,
-    /// Maximum number of their steps.
+    /// Maximum number of steps of these iterations.
     steps_max: u32,
 }
 
@@ -281,7 +281,8 @@ fn columns<'a>() -> Vec<Column<Registered<'a>>> {
         column(
             "evaluations_fixed_point",
             Unit::None,
-            "the same of eq. 4 of Shan et al. 2005",
+            "evaluations of the iteration of eq. 4 of Shan et al. 2005 with the second-order model; 0 outside the \
+            image's lines, and where it does not converge",
             |point: &Registered| point.get(|points| &points.evaluations_fixed_point),
         ),
         column(
@@ -293,7 +294,7 @@ fn columns<'a>() -> Vec<Column<Registered<'a>>> {
         column(
             "extrapolated",
             Unit::None,
-            "whether it lies beyond the first or last header line, where the orientation is extrapolated",
+            "whether the footprint lies beyond the first or last header line, where the orientation is extrapolated",
             |point: &Registered| point.get(|points| &points.extrapolated),
         ),
     ]

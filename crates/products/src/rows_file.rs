@@ -30,9 +30,9 @@ use areograph_store::files::{Mark, MarkAt, StagedFile};
 /// The column of points in well-known binary.
 pub(super) const GEOMETRY: &str = "geometry";
 
-/// Keys of the metadata of Parquet files by which an answer is recognised: that of a search, and of an SQL query.
+/// Keys of the metadata of Parquet files by which an answer is recognised: of a search, and of an SQL query.
 pub(super) const SEARCH: &str = "areograph_search";
-/// Likewise for an answer of SQL.
+/// Key of an answer of SQL.
 pub const SQL: &str = "areograph_sql";
 
 /// Format of rows.
@@ -40,14 +40,14 @@ pub const SQL: &str = "areograph_sql";
 pub enum RowsFormat {
     /// Parquet; units and descriptions of columns are the metadata of its fields.
     Parquet,
-    /// Comma-separated values, of all columns except those of bytes.
+    /// Comma-separated values, of all columns except columns of bytes.
     Csv,
-    /// GeoJSON points on Mars: those of the column `geometry` with all columns except those of bytes.
+    /// GeoJSON points on Mars: the column `geometry` with all columns except columns of bytes.
     GeoJson,
 }
 
 impl RowsFormat {
-    /// How an earlier answer in this format is recognised.
+    /// Mark by which an earlier answer in this format is recognised.
     const fn mark(self) -> Mark {
         Mark {
             what: "an earlier answer of this command",
@@ -124,7 +124,7 @@ impl RowsWriter {
         Self::staged(StagedFile::create(path)?, format, schema)
     }
 
-    /// The same at a path of the user, where only an earlier answer in this format is replaced.
+    /// Begins a file at a path of the user, where only an earlier answer in this format is replaced.
     ///
     /// # Errors
     /// Errors of the disk; a file that is no such answer.

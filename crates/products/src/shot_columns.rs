@@ -1,4 +1,4 @@
-//! Shots of an archive as columns of a table that is queried: those of `footprints.parquet` that need neither windows
+//! Shots of an archive as columns of a table that is queried: columns of `footprints.parquet` that need neither windows
 //! nor kernels.
 
 use std::sync::Arc;

@@ -1,18 +1,18 @@
-//! Images with rows and plots of their own on the page of a site: all of a few, and of many those that matter most.
+//! Images with separate rows and plots on the page of a site: all of a few, and of many the most significant ones.
 //!
-//! The page of a site grows with the images that it shows, not with those that the site has. The files of each image
-//! have the same numbers, and more of them.
+//! The page of a site grows with the images that it shows, not with the number of images of the site. The files of each
+//! image have the same numbers, and more of them.
 
 use std::cmp::Ordering;
 
 use super::site::{ImageProducts, SiteProducts};
 use areograph_stages::adjust::PointKind;
 
-/// Largest number of images with rows and plots of their own: with tie points each has about 0.15 MB on the page, which stays
+/// Largest number of images with separate rows and plots: with tie points each has about 0.15 MB on the page, which stays
 /// below 2 MB for any number of images.
 pub const IMAGES_SHOWN: usize = 6;
 
-/// What decides whether an image of many is shown.
+/// Criteria for showing an image of many.
 struct Rank {
     index: usize,
     is_invalid: bool,
@@ -23,9 +23,9 @@ struct Rank {
 }
 
 impl<'a> SiteProducts<'a> {
-    /// Indices of the images with rows and plots of their own, in the order of the site: all of at most
-    /// [`IMAGES_SHOWN`]; of more, first those that are not valid, then those with the largest residuals of their tie
-    /// points, then those that use most of the limits of their polynomials.
+    /// Indices of the images with separate rows and plots, in the order of the site: all of at most [`IMAGES_SHOWN`];
+    /// of more, first invalid images, then images with the largest tie point residuals, then images that use most of
+    /// the limits of their polynomials.
     #[must_use]
     pub fn shown_images(&self) -> Vec<usize> {
         if self.images.len() <= IMAGES_SHOWN {
@@ -116,7 +116,7 @@ mod tests {
         ];
         ranks.sort_by(Rank::compare);
         let order: Vec<usize> = ranks.iter().map(|rank| rank.index).collect();
-        // What is not a number counts as the largest.
+        // NaN counts as the largest.
         assert_eq!(order, [3, 5, 2, 4, 0, 1]);
     }
 }

@@ -94,7 +94,7 @@ pub struct GeometricProducts<'a> {
     pub ties: &'a Ties,
     /// Their ground points with the orientation of the kernels.
     pub intersected: &'a IntersectedTies,
-    /// Every pair of images with tie points in both, likewise.
+    /// Every pair of images with tie points in both, with the orientation of the kernels.
     pub pairs: &'a [PairComparison],
     /// Heights of these points against the MOLA surface.
     pub heights: &'a HeightCheck,
@@ -176,7 +176,7 @@ impl<'a> SiteProducts<'a> {
         !self.footprints.is_empty() && self.config.products.formats.contains(&format)
     }
 
-    /// Why absolute accuracies are withheld, if they are.
+    /// Reason why absolute accuracies are withheld, if they are.
     #[must_use]
     pub fn accuracy_withheld(&self) -> Option<String> {
         accuracy_withheld(self.config, self.images.iter().map(|image| image.times))
@@ -194,7 +194,8 @@ impl<'a> SiteProducts<'a> {
         ids.join(";")
     }
 
-    /// The spacecraft whose kernels are read: that of the laser, unless only those of another are needed, and others.
+    /// The spacecraft whose kernels are read: the one with the laser, unless only kernels of another are needed, and
+    /// others.
     #[must_use]
     pub fn spacecraft_of_kernels(&self) -> Vec<&'static Spacecraft> {
         let required = self.required;

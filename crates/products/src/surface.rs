@@ -36,8 +36,8 @@ pub(super) static HEIGHTS: Declaration = Declaration {
 
 pub(super) static SIGMAS: Declaration = Declaration {
     path: "surface_sigma.tif",
-    what: "standard deviations of these heights about the offset common to all, metres, in the same cells: by the match, jitter and \
-           relief inside the compared square; surface.json has that of the offset",
+    what: "standard deviations of these heights about the offset common to all, metres, in the same cells: from the \
+           match, jitter and relief inside the compared square; surface.json has the standard deviation of the offset",
     readers: "GIS, Ames Stereo Pipeline",
     rows: "cells with a height",
     role: Role::Data,

@@ -14,8 +14,8 @@ use areograph_base::wording::Wording;
 
 /// Rows whose values are in memory at once.
 const ROWS_AT_ONCE: usize = 65_536;
-/// Rows that a thread turns into text at once, and how often in a wave: the text of a wave, 3 MB per thread, is kept in
-/// memory.
+/// Rows that a thread converts into text at once, and number of such tasks in a wave: the text of a wave, 3 MB per
+/// thread, is kept in memory.
 pub(super) const ROWS_OF_A_TASK: usize = 2_048;
 const TASKS_OF_A_THREAD: usize = 4;
 
@@ -117,7 +117,7 @@ pub(super) struct Column<R> {
     values: Box<Gather<R>>,
 }
 
-/// The column `name`, whose value in a row is that of `of`.
+/// The column `name`, whose value in a row is given by `of`.
 pub(super) fn column<R, T: Cell>(
     name: &'static str,
     unit: Unit,
@@ -159,7 +159,7 @@ impl<R> Column<R> {
         self
     }
 
-    /// The same, after the others.
+    /// An attribute of points in GeoJSON and GeoPackage, after the others.
     pub(super) const fn last_in_gis(mut self) -> Self {
         self.meaning.gis = Gis::Last;
         self

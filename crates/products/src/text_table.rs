@@ -12,7 +12,7 @@ use super::{
 };
 use areograph_base::error::{Error, IoError, Locate, Result};
 
-/// Writes the columns of `table` except those of bytes, and reads them back.
+/// Writes the columns of `table` except columns of bytes, and reads them back.
 ///
 /// # Errors
 /// Numbers that are not finite; errors of the disk; values that are read back differently.
@@ -273,7 +273,7 @@ mod tests {
             put_shortest(&mut text, value);
             let text = String::from_utf8(text).unwrap();
             assert_eq!(text.parse::<f64>().unwrap().to_bits(), value.to_bits());
-            // Of two that are as short and as near, either will do.
+            // Either of two that are equally short and near is acceptable.
             let display = value.to_string();
             assert_eq!(text.len(), display.len(), "{text} {display}");
             assert!(!text.contains('e'));

@@ -168,7 +168,7 @@ fn measured_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "sigma_sample",
             Unit::Pixel,
-            "the same of the sample",
+            "standard deviation of the measured sample, where its file states it",
             |row: &Measurement| Some(row.sigma_px?[1]),
         ),
         column(
@@ -185,15 +185,21 @@ fn intersected_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "x_m",
             Unit::Metre,
-            "intersected point with the orientation of the kernels, IAU 2000, metres",
+            "X of the point intersected with the orientation of the kernels, IAU 2000, metres",
             |row: &Measurement| Some(row.before?.0.ground.xyz_m[0]),
         ),
-        column("y_m", Unit::Metre, "likewise", |row: &Measurement| {
-            Some(row.before?.0.ground.xyz_m[1])
-        }),
-        column("z_m", Unit::Metre, "likewise", |row: &Measurement| {
-            Some(row.before?.0.ground.xyz_m[2])
-        }),
+        column(
+            "y_m",
+            Unit::Metre,
+            "Y of the point intersected with the orientation of the kernels, IAU 2000, metres",
+            |row: &Measurement| Some(row.before?.0.ground.xyz_m[1]),
+        ),
+        column(
+            "z_m",
+            Unit::Metre,
+            "Z of the point intersected with the orientation of the kernels, IAU 2000, metres",
+            |row: &Measurement| Some(row.before?.0.ground.xyz_m[2]),
+        ),
         column(
             "convergence_deg",
             Unit::Degree,
@@ -209,7 +215,7 @@ fn intersected_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "focal_across_px",
             Unit::Pixel,
-            "the same across the track",
+            "residual of the intersection in the focal plane across the track, image pixels",
             |row: &Measurement| Some(row.before?.1.focal_across_px),
         ),
         column(
@@ -232,19 +238,19 @@ fn adjusted_point_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "adjusted_x_m",
             Unit::Metre,
-            "adjusted point, IAU 2000, metres",
+            "X of the adjusted point, IAU 2000, metres",
             |row: &Measurement| Some(row.adjusted?.0.ground.xyz_m[0]),
         ),
         column(
             "adjusted_y_m",
             Unit::Metre,
-            "likewise",
+            "Y of the adjusted point, IAU 2000, metres",
             |row: &Measurement| Some(row.adjusted?.0.ground.xyz_m[1]),
         ),
         column(
             "adjusted_z_m",
             Unit::Metre,
-            "likewise",
+            "Z of the adjusted point, IAU 2000, metres",
             |row: &Measurement| Some(row.adjusted?.0.ground.xyz_m[2]),
         ),
         column(
@@ -276,28 +282,39 @@ fn adjusted_sigma_columns<'a>() -> Vec<Column<Measurement<'a>>> {
             "standard deviation of adjusted_x_m, metres; in the published model only of the agreement between the images",
             |row: &Measurement| Some(sigma_m(row.adjusted?.0, 0)),
         ),
-        column("sigma_y_m", Unit::Metre, "likewise", |row: &Measurement| {
-            Some(sigma_m(row.adjusted?.0, 1))
-        }),
-        column("sigma_z_m", Unit::Metre, "likewise", |row: &Measurement| {
-            Some(sigma_m(row.adjusted?.0, 2))
-        }),
+        column(
+            "sigma_y_m",
+            Unit::Metre,
+            "standard deviation of adjusted_y_m, metres; in the published model only of the \
+            agreement between the images",
+            |row: &Measurement| Some(sigma_m(row.adjusted?.0, 1)),
+        ),
+        column(
+            "sigma_z_m",
+            Unit::Metre,
+            "standard deviation of adjusted_z_m, metres; in the published model only of the \
+            agreement between the images",
+            |row: &Measurement| Some(sigma_m(row.adjusted?.0, 2)),
+        ),
         column(
             "sigma_east_m",
             Unit::Metre,
-            "the same towards east, metres",
+            "standard deviation of the adjusted point towards east, metres; in the published model only of the agreement \
+             between the images",
             |row: &Measurement| Some(row.adjusted?.0.local_sigmas_m()[0]),
         ),
         column(
             "sigma_north_m",
             Unit::Metre,
-            "the same towards north, metres",
+            "standard deviation of the adjusted point towards north, metres; in the published model only of the agreement \
+             between the images",
             |row: &Measurement| Some(row.adjusted?.0.local_sigmas_m()[1]),
         ),
         column(
             "sigma_up_m",
             Unit::Metre,
-            "the same of the height, metres",
+            "standard deviation of the height of the adjusted point, metres; in the published model only of the agreement \
+             between the images",
             |row: &Measurement| Some(row.adjusted?.0.local_sigmas_m()[2]),
         ),
         column(
@@ -310,13 +327,13 @@ fn adjusted_sigma_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "relative_sigma_north_m",
             Unit::Metre,
-            "the same towards north, metres",
+            "standard deviation towards north without the error that all tie points share, metres; see relative_sigma_east_m",
             |row: &Measurement| Some(row.adjusted?.0.relative_sigmas_m()?[1]),
         ),
         column(
             "relative_sigma_up_m",
             Unit::Metre,
-            "the same of the height, metres",
+            "standard deviation of the height without the error that all tie points share, metres; see relative_sigma_east_m",
             |row: &Measurement| Some(row.adjusted?.0.relative_sigmas_m()?[2]),
         ),
         column(
@@ -328,13 +345,13 @@ fn adjusted_sigma_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "correlation_east_up",
             Unit::None,
-            "the same towards east and up",
+            "correlation of the adjusted point's errors towards east and up, -1 to 1",
             |row: &Measurement| Some(local_correlation(row.adjusted?.0, 0, 2)),
         ),
         column(
             "correlation_north_up",
             Unit::None,
-            "the same towards north and up",
+            "correlation of the adjusted point's errors towards north and up, -1 to 1",
             |row: &Measurement| Some(local_correlation(row.adjusted?.0, 1, 2)),
         ),
     ]
@@ -351,7 +368,7 @@ fn residual_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "residual_across_px",
             Unit::Pixel,
-            "the same across the track",
+            "observed minus adjusted across the track, focal plane, image pixels",
             |row: &Measurement| Some(row.adjusted?.1.across_px.value),
         ),
         column(
@@ -363,7 +380,7 @@ fn residual_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "redundancy_across",
             Unit::None,
-            "the same across the track",
+            "fraction of an error of the measurement across the track that appears in its residual, 0 to 1",
             |row: &Measurement| Some(row.adjusted?.1.across_px.redundancy),
         ),
         column(
@@ -375,19 +392,19 @@ fn residual_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "standardised_across",
             Unit::None,
-            "the same across the track",
+            "residual across the track over its own standard deviation; missing where it is uncontrolled",
             |row: &Measurement| row.adjusted?.1.across_px.standardised,
         ),
         column(
             "adjusted_reprojection_lines",
             Unit::Line,
-            "as reprojection_lines, with the adjusted orientation",
+            "measured minus projected line of the point intersected with the adjusted orientation",
             |row: &Measurement| Some(row.after?.1.reprojection_lines),
         ),
         column(
             "adjusted_reprojection_px",
             Unit::Pixel,
-            "as reprojection_px, with the adjusted orientation",
+            "measured minus projected focal coordinate across the track with the adjusted orientation, image pixels",
             |row: &Measurement| Some(row.after?.1.reprojection_px),
         ),
     ]

@@ -15,7 +15,7 @@ use areograph_geom::statistics::BAARDA_LIMIT;
 use areograph_products::{AdjustmentProducts, GeometricProducts, SiteProducts};
 use areograph_stages::adjust::{Adjusted, AdjustmentSummary, TypeSummary, WORSE_THAN_CONFIGURED};
 
-/// Iterations that the axis of the convergence has room for at least, so that its labels are whole numbers.
+/// Minimum number of iterations on the axis of the convergence, so that its labels are whole numbers.
 const STEPS_SHOWN_MIN: f64 = 8.0;
 
 pub(super) const SECTION: Section = Section {
@@ -113,7 +113,8 @@ fn overview(adjusted: &Adjusted) -> String {
     );
     if summary.tie_scatter_px > 0.0 {
         html += &sentence(
-            "Tie points scatter by {} px along the track in addition to their stated σ, as jitter of the images causes. The σ of the adjustment \
+            "Tie points scatter by {} px along the track in addition to their stated σ, as expected from attitude \
+            jitter. The σ of the adjustment \
              include this scatter, and 1.4 times as much across the track, where residuals do not show it.",
             &[(label(summary.tie_scatter_px, 2), &*at("/tie_scatter_px"))],
         );

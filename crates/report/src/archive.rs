@@ -59,8 +59,8 @@ fn lead(ranges: &ArchiveRanges, judgement: &Judgement) -> String {
         counted(ranges.files.len(), "file"),
     );
     let words = format!(
-        "{} shots were checked: measured range minus distance from the kernels' spacecraft to the footprint, time tags corrected \
-         by {} s. A profile is the shots of one file in one revolution.",
+        "{} shots were checked: measured range minus distance from the spacecraft (kernels) to the footprint, time tags \
+         corrected by {} s. A profile is the shots of one file in one revolution.",
         grouped(ranges.sum(|file| file.shots)),
         label(ranges.clock.correction_s(), 3),
     );
@@ -134,7 +134,7 @@ fn over_time(ranges: &ArchiveRanges) -> Result<String> {
     );
     let orbits_plot = Plot::of(
         "Orbits over time".to_owned(),
-        "Mean of the file's own spacecraft minus that of the kernels.".to_owned(),
+        "Mean spacecraft position of the file minus the position in the kernels.".to_owned(),
         "days since the first profile",
         vec![
             panel("up, m", |of| of.spacecraft_m[0], Some(limits.orbit_max_m)),
@@ -156,8 +156,9 @@ fn over_time(ranges: &ArchiveRanges) -> Result<String> {
     let scan_plot = Plot::of(
         "Clock correction over time".to_owned(),
         format!(
-            "Correction of time tags that minimises the spread of a profile's ranges, with raw radii or with those corrected by \
-             crossovers, where it is known to {KNOWN_S} s; the horizontal line is the correction used, {} s.",
+            "Correction of time tags that minimises the spread of a profile's ranges, with raw radii or with radii \
+             corrected by crossovers, where the correction is known to {KNOWN_S} s; the horizontal line is the correction \
+             used, {} s.",
             label(used_s, 3)
         ),
         "days since the first profile",

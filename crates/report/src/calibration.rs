@@ -322,7 +322,7 @@ fn validation(of: &Calibration) -> String {
     table.finish() + &offsets(of)
 }
 
-/// Mean offsets of control, and what they leave untested.
+/// Mean offsets of control, and the errors that they leave untested.
 fn offsets(of: &Calibration) -> String {
     let mut table = Table::new(
         "Mean offset of control with the calibration",

@@ -168,7 +168,7 @@ const fn section(kind: CheckKind) -> Option<&'static Section> {
         CheckKind::Attitude | CheckKind::BeamAlong | CheckKind::BeamAcross => &timeline::SECTION,
         CheckKind::FootprintsInside | CheckKind::SupportPosition => &registration::SECTION,
         CheckKind::SkippedRecords => &notes::SECTION,
-        // Of the whole, or of nets, calibrations and matches, whose pages have no such sections.
+        // Checks of the site in general, or of nets, calibrations and matches, whose pages have no such sections.
         CheckKind::AdjustmentMade
         | CheckKind::Contradiction
         | CheckKind::HeldBackPlane

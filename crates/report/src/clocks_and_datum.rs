@@ -104,8 +104,8 @@ fn datum(site: &SiteProducts) -> String {
         return String::new();
     }
     let decided = match site.config.pedr.datum {
-        _ if !site.config.shots.is_empty() => "by the configuration of the tables".to_owned(),
-        DatumChoice::Auto => "by version letter and label".to_owned(),
+        _ if !site.config.shots.is_empty() => "from the configuration of the tables".to_owned(),
+        DatumChoice::Auto => "from version letter and label".to_owned(),
         DatumChoice::Stated(datum) => format!("stated in the configuration: {datum}"),
     };
     let (sort, columns) = if site.config.shots.is_empty() {

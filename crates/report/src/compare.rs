@@ -110,7 +110,7 @@ fn lead(comparison: &KernelComparison) -> String {
     });
     let words = format!(
         "{pulls}{} epochs from {} to {} UTC, equally spaced over the time that all sets cover. Geometric positions of {} \
-         relative to Mars, each set minus the mean of all, in the axes of the mean orbit. The rule is that of Shan et al. \
+         relative to Mars, each set minus the mean of all, in the axes of the mean orbit. The rule follows Shan et al. \
          2005: least root mean square distance.",
         whole(orbit.epochs.len()),
         comparison.utc[0],
@@ -173,8 +173,9 @@ fn attitude(attitude: &AttitudeComparison) -> Result<String> {
     let labels = ["radial, ″", "along, ″", "cross, ″"];
     let turns = &attitude.turns;
     let words = paragraph(
-        "Rotations from the mean attitude to that of each set, read with the pointing bias. On the ground: the angle \
-         between its boresight and that of the mean attitude, times the distance along it to the ellipsoid.",
+        "Rotations from the mean attitude to the attitude of each set, read with the pointing bias. On the ground: the \
+         angle between the boresights of the set and of the mean attitude, times the distance along the boresight to \
+         the ellipsoid.",
     );
     let title = "Attitudes against their mean";
     Ok([

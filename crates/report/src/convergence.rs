@@ -99,7 +99,7 @@ fn converges(image: &ImageProducts) -> bool {
 
 /// Figure 4: the mean step of every iteration.
 fn convergence_plot(image: &ImageProducts) -> Plot {
-    // The curves of first order coincide with those of second.
+    // The first-order curves coincide with the second-order curves.
     let runs = image.registration.methods.iter();
     let second_order = runs.filter(|run| run.model == CameraModel::SecondOrder);
     let series = second_order.enumerate().map(|(colour, run)| {

@@ -38,7 +38,7 @@ fn with_sigma((value, sigma): (f64, f64), decimals: usize) -> Cell {
     format!("{} ± {}", label(value, decimals), label(sigma, decimals)).into()
 }
 
-/// Place in the products of the coefficient of power 0 of a quantity, and its standard deviation, in another unit.
+/// Place in the products of the coefficient of power 0 of a quantity, and its standard deviation, in a different unit.
 fn place(quantity: usize, unit: &str) -> String {
     let index = 3 * quantity;
     format!("/correction/{index}{unit} /sigmas/{index}{unit}")
@@ -82,21 +82,21 @@ fn positions(site: &SiteProducts, adjusted: &Adjusted) -> String {
     let mut words = line_times(adjusted);
     if starts_at_pedr {
         words += &paragraph(
-            "Relative to the orbit of the kernels; with a simultaneous profile the expected orbit is that of the PEDR \
+            "Relative to the orbit of the kernels; with a simultaneous profile the expected orbit is from the PEDR \
              (adjustment.orbit_of_pedr).",
         );
     }
     table.finish() + &words
 }
 
-/// What the standard deviations of positions contain of line times.
+/// Contribution of line times to the standard deviations of positions.
 fn line_times(adjusted: &Adjusted) -> String {
     let largest_s = adjusted.images.iter().map(|image| image.line_time_sigma_s);
     let largest_s = largest_s.fold(0.0, f64::max);
     if largest_s > 0.0 {
         paragraph(&format!(
-            "±: of the camera when a line was exposed. Line times are known to ±{} ms; along the track they cannot be separated from \
-             position and rotation, which are to be used together.",
+            "±: for the camera at the exposure of a line. Line times are known to ±{} ms; along the track they cannot be \
+             separated from position and rotation, which are to be used together.",
             label(largest_s / SECONDS_PER_MS, 0)
         ))
     } else {

@@ -110,7 +110,7 @@ impl<'a> Matrix<'a> {
         (WIDTH as i32 - LEFT - 20) / self.count() as i32
     }
 
-    /// Height of a row: that of a cell, or of its name.
+    /// Height of a row: of a cell, or of its name.
     fn row(&self) -> i32 {
         self.cell().clamp(LETTERS + 4, 60)
     }
@@ -167,8 +167,8 @@ impl<'a> Matrix<'a> {
             )
         });
         let of = if self.has_line_times {
-            "Orientation of the camera at the exposure of its lines: line times, which are no unknowns of the adjustment, \
-             correlate coefficients of position; columns in the order of rows."
+            "Orientation of the camera at the exposure of its lines: line times, which are not unknowns of the \
+             adjustment, correlate coefficients of position; columns in the order of rows."
         } else {
             "Adjusted orientation unknowns; columns in the order of rows."
         };

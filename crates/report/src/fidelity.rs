@@ -2,7 +2,7 @@
 
 use super::html::{Cell, Column, STYLE, Section, Table, escape, page, paragraph};
 
-/// The page of this version, which `tests/products/fidelity.rs` makes and checks; its style is that of all pages, by a
+/// The page of this version, which `tests/products/fidelity.rs` makes and checks; it has the style of all pages, by a
 /// link.
 const FIDELITY_PAGE: &str = include_str!("../../../docs/fidelity.html");
 /// From `docs/` to the style of all pages.
@@ -30,7 +30,7 @@ pub struct FidelityKind {
     pub meaning: &'static str,
     /// The word for agreement in a row of this kind; only evidence is met.
     pub agrees: &'static str,
-    /// Rows that agree, that agree in part, that are explained, and without a number of ours.
+    /// Rows that agree, that agree in part, that are explained, and without an areograph number.
     pub counts: [usize; 4],
 }
 
@@ -49,26 +49,26 @@ pub struct FidelityPaper {
     pub name: &'static str,
     /// Subject and reference.
     pub citation: &'static str,
-    /// Its printed numbers, in its order.
+    /// Its published numbers, in its order.
     pub rows: Vec<FidelityRow>,
 }
 
-/// Numbers that a paper prints in one place.
+/// Numbers that a paper publishes in one place.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FidelityRow {
     /// Identifier.
     pub id: &'static str,
-    /// The kind: what stands beside the print.
+    /// The kind of number that stands beside the published ones.
     pub kind: &'static str,
     /// Section or table of the paper.
     pub place: &'static str,
-    /// Description of the printed numbers.
+    /// Description of the published numbers.
     pub what: &'static str,
-    /// Its numbers, each with the printed one, ours and the tolerance in a line.
+    /// Its numbers, each with the published one, areograph's and the tolerance in a line.
     pub numbers: Vec<String>,
-    /// The same of numbers that the paper does not print.
+    /// Numbers that the paper does not publish, in the same form.
     pub derived: Vec<String>,
-    /// Source of ours.
+    /// Source of areograph's numbers.
     pub from: String,
     /// The verdict.
     pub verdict: &'static str,

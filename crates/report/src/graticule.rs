@@ -59,7 +59,7 @@ impl View {
         self.north_m - self.south_m
     }
 
-    /// The same centre, wider or higher so that height is `ratio` times width.
+    /// A view with the same centre, wider or higher so that height is `ratio` times width.
     pub(super) fn with_ratio(self, ratio: f64) -> Self {
         let more_width_m = (self.height_m() / ratio - self.width_m()).max(0.0) / 2.0;
         let more_height_m = (self.width_m() * ratio - self.height_m()).max(0.0) / 2.0;
@@ -129,7 +129,7 @@ pub(super) fn graticule(map: &MapProjection, view: &View) -> Vec<GridLine> {
 /// The range of coordinates of a view.
 struct Shown {
     latitude_rad: (f64, f64),
-    /// East longitudes from that of the centre.
+    /// East longitudes from the centre.
     turn_rad: (f64, f64),
     /// Whether a pole is among them.
     pole: bool,
@@ -258,7 +258,7 @@ fn longitude_name(longitude_rad: f64, step_rad: f64) -> String {
         "{:.decimals$}",
         wrap_two_pi(longitude_rad) / RADIANS_PER_DEGREE
     );
-    // Just below a whole turn rounds up to it.
+    // An angle just below a full turn rounds up to it.
     if text.parse() == Ok(360.0) {
         format!("{:.decimals$}° E", 0.0)
     } else {

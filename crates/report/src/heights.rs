@@ -51,9 +51,9 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
     Ok(html)
 }
 
-/// Why absolute accuracies are withheld.
+/// Reason why absolute accuracies are withheld.
 pub(super) const WITHHELD_BECAUSE: &str =
-    "the a priori accuracy of orbit and attitude is that of another spacecraft";
+    "the a priori accuracy of orbit and attitude belongs to another spacecraft";
 
 /// The three statements of accuracy, and their basis.
 fn statements(
@@ -90,7 +90,7 @@ fn statements(
             after.map_or_else(nothing, |after| {
                 format!("{after}; residuals {} σ", label(along, 2))
             }),
-            "how well the images agree along track; not a measure of height or position".to_owned(),
+            "agreement of the images along track; not a measure of height or position".to_owned(),
         ],
         [
             "agreement with MOLA, height".to_owned(),

@@ -41,7 +41,7 @@ pub(super) enum Tone {
 }
 
 impl Tone {
-    /// That of a verdict, and the word for it.
+    /// The rating of a verdict, and the word for it.
     pub(super) const fn of(is_valid: bool, has_remarks: bool) -> (Self, &'static str) {
         match (is_valid, has_remarks) {
             (false, _) => (Self::Bad, "Invalid"),
@@ -73,7 +73,7 @@ impl Section {
         Self::named(&slug(heading), heading, body)
     }
 
-    /// A section with a name of its own in links.
+    /// A section with its own name in links.
     pub(super) fn named(anchor: &str, heading: impl Into<Cow<'static, str>>, body: String) -> Self {
         Self {
             anchor: anchor.to_owned(),
@@ -83,7 +83,7 @@ impl Section {
     }
 }
 
-/// The whole page: title, lead (HTML), then the sections that are not empty.
+/// The page: title, lead (HTML), then the sections that are not empty.
 pub(super) fn page(title: &str, lead: &str, sections: &[Section]) -> String {
     let title = escape(title);
     let version = env!("CARGO_PKG_VERSION");
@@ -141,7 +141,7 @@ pub(super) fn folded(title: &str, html: &str) -> String {
     folded_unless(false, title, html)
 }
 
-/// The same, unfolded from the start where it `matters`.
+/// A folded section, unfolded from the start where it `matters`.
 pub(super) fn folded_unless(matters: bool, title: &str, html: &str) -> String {
     if html.is_empty() {
         return String::new();
@@ -211,7 +211,7 @@ pub(super) enum Cell {
 }
 
 impl Cell {
-    /// The cell with the places of its numbers in the products, below that of its row.
+    /// The cell with the places of its numbers in the products, below the place of its row.
     pub(super) fn traced(self, places: impl Into<String>) -> Self {
         Self::Traced(Box::new(self), places.into())
     }

@@ -198,7 +198,7 @@ fn models(site: &SiteProducts) -> String {
         table.row_of(&first, valid, row(id, "1", &model.first_order, judged));
         let rmse_rad = model.rotation_vector.rmse_rad();
         let position_m = model.second_order.position_rmse_m();
-        // The limits are those of the form in use.
+        // The limits apply to the form in use.
         let limited = |text: String, share: f64| match model.model {
             CameraModel::Samples => Cell::Plain(text),
             CameraModel::FirstOrder | CameraModel::SecondOrder | CameraModel::RotationVector => {

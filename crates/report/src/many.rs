@@ -1,6 +1,6 @@
-//! Sites of many images: which of them have rows and plots of their own, and a summary of all.
+//! Sites of many images: the selection with separate rows and plots, and a summary of all.
 //!
-//! Which these are is decided with the products ([`SiteProducts::shown_images`]), because the data of the page contain
+//! The selection is made with the products ([`SiteProducts::shown_images`]), because the data of the page contain
 //! the points of no others.
 
 use super::{
@@ -18,7 +18,7 @@ const OUTLINES: usize = 100;
 /// Largest number of points of the plot over all images.
 const POINTS: usize = 500;
 
-/// The images with rows and plots of their own, with their indices: all of a few.
+/// The images with separate rows and plots, with their indices: all of a few.
 pub(super) fn shown<'a>(site: &SiteProducts<'a>) -> Vec<(usize, &'a ImageProducts<'a>)> {
     let shown = site.shown_images().into_iter();
     shown.map(|index| (index, &site.images[index])).collect()
@@ -53,13 +53,13 @@ pub(super) fn drawn<'a>(site: &SiteProducts<'a>) -> Vec<DrawnImage<'a>> {
     drawn.collect()
 }
 
-/// Which images a drawing has; empty where it has all.
+/// Images that a drawing shows; empty where it shows all.
 pub(super) fn drawn_in_words(site: &SiteProducts) -> String {
     if !are_many(site) {
         return String::new();
     }
     format!(
-        " Of {} images {} are drawn, and those with plots of their own are named.",
+        " Of {} images {} are drawn, and those with individual plots are named.",
         whole(site.images.len()),
         whole(drawn(site).len())
     )
@@ -78,7 +78,7 @@ pub(super) fn some_of_all(site: &SiteProducts) -> String {
     )
 }
 
-/// Of many images: how those shown are chosen, a table and a plot over all, and links to the files of each; empty for a
+/// For many images: the choice of those shown, a table and a plot over all, and links to the files of each; empty for a
 /// few.
 ///
 /// # Errors
@@ -111,7 +111,7 @@ struct Quantity {
     name: &'static str,
     values: Vec<f64>,
     decimals: usize,
-    /// Its place in the products below those of an image, if they have it.
+    /// Its place in the products of an image, if they contain it.
     place: &'static str,
 }
 
@@ -213,7 +213,7 @@ fn plot(site: &SiteProducts, quantities: &[Quantity]) -> Plot {
         let series = vec![
             Series::line("all images", GREY, thinned(&all, POINTS)),
             Series {
-                label: "images with plots of their own".to_owned(),
+                label: "images with individual plots".to_owned(),
                 style: Style::Crosses,
                 colour: 0,
                 points: own,
@@ -226,7 +226,10 @@ fn plot(site: &SiteProducts, quantities: &[Quantity]) -> Plot {
     });
     let mut words = "Every image of the site, in the order of its configuration.".to_owned();
     if site.images.len() > POINTS {
-        words += &format!(" The line has 1 in {}.", site.images.len().div_ceil(POINTS));
+        words += &format!(
+            " The line shows 1 in {}.",
+            site.images.len().div_ceil(POINTS)
+        );
     }
     Plot::of(
         "All images of the site".to_owned(),

@@ -34,7 +34,7 @@ use areograph_products::SiteProducts;
 
 /// Largest number of shots of a map, drawn and listed; about 140 bytes each.
 const MAP_SHOTS: usize = 2_500;
-/// Tie points likewise.
+/// Largest number of tie points on a map.
 const MAP_TIES: usize = 400;
 /// Least and greatest height of the picture against its width.
 const RATIO: (f64, f64) = (0.5, 0.78);
@@ -65,7 +65,7 @@ pub(super) const SECTION: Section = Section {
 /// The map of the lead; empty for a site without windows, shots and images.
 ///
 /// # Errors
-/// A drawing that cannot be made.
+/// The map cannot be drawn.
 pub(super) fn first(site: &SiteProducts) -> Result<String> {
     let mut all = sheets(site).into_iter();
     let shown = all.next().filter(|shown| {
@@ -170,7 +170,7 @@ impl Sheet {
         );
         let view = view.with_ratio(ratio);
         let adjustment = site.adjustment();
-        // Ellipses by the a priori accuracy of another spacecraft would state what is withheld elsewhere.
+        // Ellipses by the a priori accuracy of another spacecraft would state an accuracy that is withheld elsewhere.
         let stated = adjustment
             .iter()
             .filter(|_| site.accuracy_withheld().is_none());

@@ -87,7 +87,7 @@ fn write(site: &SiteProducts, ties: &Ties) -> String {
     paragraph(
         "In each cell of common ground the point with the strongest texture was matched to the other image and back. \
          σ: medians of \
-         single matches, in the second image. The table is of the second pass, which starts from the adjusted orientation.",
+         single matches, in the second image. The table shows the second pass, which starts from the adjusted orientation.",
     ) + &some_of_all(&ties.matched, &matched)
         + &table.finish()
 }

@@ -316,7 +316,7 @@ fn not_counted(found: &FootprintsByTies) -> String {
 /// Place of a number of a profile in the products, and its format on a page.
 type Quantity = (&'static str, fn(&ProfileByTies) -> Option<String>);
 
-/// A profile by its place among those of the pair, before and after.
+/// A profile by its place among the profiles of the pair, before and after.
 fn profile_cells(
     pair: &BeforeAfter,
     before: (usize, &ProfileByTies),

@@ -56,7 +56,7 @@ fn lead(config: &NetConfig, net: &Triangulation) -> String {
     let [east, north] = totals.control_rms_m;
     let mut words = format!(
         "{} Images of the ties lie {x:.1} m (east) and {y:.1} m (north) from their means, root mean square; controls \
-         {east:.1} m and {north:.1} m from where they are given.",
+         {east:.1} m and {north:.1} m from their given positions.",
         way(config)
     );
     if !config.description.is_empty() {
@@ -142,9 +142,8 @@ fn deviations(net: &Triangulation) -> Result<String> {
         .map(|picture| km(picture.centre_m))
         .collect();
     let places: Vec<(f64, f64)> = net.points.iter().map(|point| km(point.place_m)).collect();
-    let caption = "Deviations of images of ties from the mean of their point within the brick, drawn at the point on \
-                   the map. \
-        Thinned for display.";
+    let caption = "Deviations of tie-point images from their mean within the brick, drawn at the map position of the \
+                   point. Thinned for display.";
     map(
         "Vectors of deviations",
         caption,
@@ -304,9 +303,9 @@ fn blunders(net: &Triangulation) -> String {
     } else {
         ""
     };
-    let words = "Flagged measurements are beyond 3.5 robust standard deviations (by the median) of their brick. One is rejected \
-        when its deviation in the adjustment of the whole net, divided by its own standard deviation, is larger than the largest \
-        by chance in one net of a hundred.";
+    let words = "Flagged measurements are beyond 3.5 robust standard deviations (by the median) of their brick. One is \
+        rejected when its deviation in the adjustment of the whole net, divided by its own standard deviation, exceeds the \
+        largest expected by chance in one net of a hundred.";
     table.finish() + &paragraph(&format!("{words}{both_go}"))
 }
 
@@ -400,7 +399,7 @@ fn precision(config: &NetConfig, net: &Triangulation) -> String {
     let sigmas = if config.triangulation.method == Method::OneShot {
         ""
     } else {
-        " Standard deviations of points are those of the adjustment of all pictures and kept controls at once, by their weights."
+        " Standard deviations of points come from the adjustment of all pictures and kept controls at once, by their weights."
     };
     [
         paragraph(&(sigma + &scale + sigmas)),

@@ -19,7 +19,7 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
     sign + &spaced(&text)
 }
 
-/// The same with a sign on positive values too.
+/// A number with a sign on positive values too.
 pub(super) fn signed(value: f64, decimals: usize) -> String {
     let text = number(value, decimals);
     let zero = !text.contains(|digit| matches!(digit, '1'..='9'));

@@ -17,7 +17,7 @@ pub(super) struct Outline {
     pub(super) ring: Vec<(f64, f64)>,
 }
 
-/// Outlines of the images on maps, if their whole edge is on the ground.
+/// Outlines of the images on maps, if their complete edge is on the ground.
 pub(super) fn images(site: &SiteProducts) -> Vec<Outline> {
     let outline = |drawn: &DrawnImage| {
         let image = drawn.image;
@@ -64,7 +64,7 @@ pub(super) fn windows(site: &SiteProducts) -> Vec<Outline> {
     rings.collect()
 }
 
-/// The edges of a box, bent as the parallels are; around the whole globe they are two circles.
+/// The edges of a box, bent as the parallels are; around the globe they are two circles.
 fn box_rings(west: f64, east: f64, south: f64, north: f64) -> Vec<Vec<(f64, f64)>> {
     let width = if east < west {
         east + TAU - west

@@ -17,7 +17,7 @@ use areograph_stages::lay_overlays::{
     CHIP_EDGE, Mark, Overlays, Place, PlaceView, ShownImage, Subject,
 };
 
-/// Pixels of all whole images on the page: with the pieces it stays below 5 MB for any contents.
+/// Pixels of all complete images on the page: with the pieces, the page stays below 5 MB for any contents.
 const STRIP_PIXELS: u64 = 2_300_000;
 
 pub(super) const SECTION: Section = Section {
@@ -93,9 +93,9 @@ fn lead(site: &SiteProducts) -> String {
         "<p class=\"about\">{}</p>\n",
         link("index.html", "Report of the site")
     );
-    let mut keys = vec!["blue circle: the point by the orientation of the kernels"];
+    let mut keys = vec!["blue circle: the point from the orientation of the kernels"];
     if site.adjustment().is_some() {
-        keys.push("orange upright cross: the point by the adjusted orientation");
+        keys.push("orange upright cross: the point from the adjusted orientation");
         keys.push("yellow diagonal cross: a measured tie point");
     } else if site.geometric.is_some() {
         keys.push("yellow diagonal cross: a measured tie point");
@@ -125,7 +125,8 @@ fn strip_figure(site: &SiteProducts, shown: &ShownImage, picture: &Picture) -> S
     let id = &image.times.id;
     let inside = image.registration.points.inside_count();
     let mut words = format!(
-        "{id}, {} lines of {} samples, {} × {} of them one pixel; line 0 is at the top. {} in it by the kernels",
+        "{id}, {} lines of {} samples, {} × {} of them one pixel; line 0 is at the top. {} in it according to the \
+        kernels",
         whole(image.times.line_times.lines()),
         whole(image.times.samples),
         picture.reduction,

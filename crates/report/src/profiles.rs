@@ -114,7 +114,7 @@ fn crossovers(check: &ProfileCheck) -> String {
     let differences = &check.differences_m;
     if differences.n == 0 {
         return paragraph(
-            "No profiles cross: the radial error that the shots of a profile share is that of the configuration.",
+            "No profiles cross: the radial error that the shots of a profile share is taken from the configuration.",
         );
     }
     let mut table = Table::new(

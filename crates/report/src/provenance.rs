@@ -162,10 +162,10 @@ fn many_have_the_same(site: &SiteProducts) -> String {
     if !many::are_many(site) {
         return String::new();
     }
-    paragraph("Only images with their own plots are listed; manifest.json lists all images.")
+    paragraph("Only images with individual plots are listed; manifest.json lists all images.")
 }
 
-/// Names of the images without rows of their own.
+/// Names of the images without separate rows.
 fn hidden<'a>(site: &SiteProducts<'a>) -> HashSet<&'a str> {
     let shown = site.shown_images();
     let images = site.images.iter().enumerate();

@@ -22,13 +22,13 @@ pub(super) const SECTION: Section = Section {
     },
 };
 
-/// What Table 3 of the paper has, and these models do not.
+/// Elements of Table 3 of the paper that these models do not have.
 fn departure(summary: &AdjustmentSummary) -> &'static str {
     match summary.model {
         AdjustmentModel::Published => {
-            "Across track this is not the published model: residuals refer to the line that sees the point, where the paper \
-             takes the measured line. Its means of MOLA across track, −2.711 to 3.286 px at Gusev and Isidis, are the skew of \
-             the flight in the measured line and vanish here; its σ0 of 1.01 to 1.06 is not comparable."
+            "Across track this is not the published model: residuals refer to the line that sees the point, where the \
+             paper uses the measured line. The paper's means of MOLA across track, −2.711 to 3.286 px at Gusev and Isidis, \
+             are the skew of the flight in the measured line and vanish here; its σ0 of 1.01 to 1.06 is not comparable."
         }
         AdjustmentModel::MolaSurface => {
             "In this model image coordinates of MOLA are not observations; their rows are empty. The published model \

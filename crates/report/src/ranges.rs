@@ -53,7 +53,7 @@ fn write(site: &SiteProducts) -> Result<String> {
     Ok(statistics(site) + &ways + &heading("Along the profiles") + &figures)
 }
 
-/// What is stated where no range is compared with anything.
+/// Statement where no range is compared with anything.
 fn untested(site: &SiteProducts) -> String {
     let mut table = Table::new(
         "Profiles whose ranges are not tested",
@@ -68,9 +68,8 @@ fn untested(site: &SiteProducts) -> String {
         [whole(site.profiles.len()).into(), whole(shots).into()],
     );
     paragraph(
-        "The ranges are not tested: the tables contain no position of the spacecraft, and no kernels cover the \
-         shots. The \
-         spacecraft is put on the radius through the footprint at the range (nadir by range); its distance from the \
+        "The ranges are not tested: the tables contain no position of the spacecraft, and no kernels cover the shots. The \
+         spacecraft is placed on the radius through the footprint at the range (nadir by range); its distance from the \
          footprint is the range.",
     ) + &table.finish()
 }
@@ -339,7 +338,7 @@ fn three_ways(site: &SiteProducts) -> String {
             "ranges.json#/limits/orbit_max_m",
         )],
     );
-    // A table's own spacecraft and that of support data are not tabulated.
+    // A table's own spacecraft and the spacecraft of support data are not tabulated.
     if site.ranges.trajectory_error_m > 0.0 {
         orbits += &filled(
             " Trajectory tabulated to {} mm.",

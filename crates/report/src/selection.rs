@@ -55,7 +55,7 @@ fn write(site: &SiteProducts) -> String {
 
 fn filter(site: &SiteProducts) -> String {
     if !site.config.shots.is_empty() {
-        return "Shots of tables are kept where they lie in a window; duplicate rows are counted once.".to_owned();
+        return "Shots of tables are kept if they lie in a window; duplicate rows are counted once.".to_owned();
     }
     let filter = &site.config.pedr.filter;
     let join = |values: Vec<String>| values.join(", ");

@@ -29,7 +29,7 @@ pub struct SiteLine {
 pub struct SiteSummary {
     /// The verdict in words, the same throughout the program.
     pub verdict: &'static str,
-    /// Why the site is invalid; empty when it is valid.
+    /// Reasons why the site is invalid; empty when it is valid.
     pub reasons: Vec<String>,
     /// Remarks for the reader.
     pub remarks: Vec<String>,
@@ -50,7 +50,7 @@ pub struct SiteSummary {
     pub budgets: Vec<UncertaintyBudget>,
     /// Results of the previous products.
     pub earlier: Option<Earlier>,
-    /// When the products were published.
+    /// Time at which the products were published.
     pub finished_utc: String,
     /// Version of the program that made them.
     pub version: String,
@@ -63,7 +63,7 @@ pub struct Earlier {
     pub verdict: &'static str,
     /// Heights off the laser surface, images apart, both adjusted, and range − distance, as in [`SiteSummary`].
     pub figures_m: [Option<f64>; 3],
-    /// When they were published.
+    /// Time at which they were published.
     pub finished_utc: String,
     /// Path of their manifest, from the page.
     pub manifest: String,
@@ -95,7 +95,7 @@ pub fn sites_page(sites: &[SiteLine]) -> Result<String> {
         Tone::Good
     };
     let fidelity = format!(
-        "<p>{}: numbers that the papers print, with areograph's beside them, by kind of evidence.</p>\n",
+        "<p>{}: published numbers with the results of areograph, by kind of evidence.</p>\n",
         link(FIDELITY_FILE, "Fidelity to the papers")
     );
     let words = paragraph(
@@ -404,7 +404,7 @@ mod tests {
         older.finished_utc = "2025-12-29T21:00:00Z".to_owned();
         let newest = summary("valid", &[]).finished();
         assert_eq!(older.age(newest), "2 days before the newest");
-        // Of the three with products, on the map too.
+        // The three sites with products are on the map too.
         let map = page
             .split("<svg")
             .nth(1)

@@ -17,7 +17,7 @@ pub(super) fn sentence(words: &str, numbers: &[(String, &str)]) -> String {
     format!("<p>{}</p>\n", filled(words, numbers))
 }
 
-/// The same as a part of a text, in HTML.
+/// A sentence as a part of a text, in HTML.
 pub(super) fn filled(words: &str, numbers: &[(String, &str)]) -> String {
     let mut pieces = words.split("{}");
     let mut html = escape(pieces.next().unwrap_or_default());

@@ -41,7 +41,7 @@ fn write(site: &SiteProducts) -> String {
     let apart: Vec<&str> = apart.map(|(times, _)| &*times.id).collect();
     if !apart.is_empty() {
         words += &format!(
-            " Positions by ALE usually include light time and aberration, which amount to hundreds of metres: \
+            " Positions from ALE usually include light time and aberration, which amount to hundreds of metres: \
              neither ranges nor the mounting of the laser are used with {}.",
             named(&apart)
         );

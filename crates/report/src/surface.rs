@@ -93,10 +93,10 @@ fn made(site: &SiteProducts, account: &SurfaceAccount) -> String {
     );
     table.finish()
         + &paragraph(
-            "σ of a cell: of one height against the others, by the residuals of its match, by jitter of the images (the scatter of \
-             their shifts across the parallax, where no height moves them), and by the relief inside the compared square. Errors that \
-             all heights share are stated separately (σ, common, by the adjustment). Neighbouring heights within the compared square \
-             are correlated.",
+            "σ of a cell: of one height against the others, from the residuals of its match, from jitter of the images \
+             (the scatter of their shifts across the parallax, where no height moves them), and from the relief inside the \
+             compared square. Errors that all heights share are stated separately (σ, common, from the adjustment). \
+             Neighbouring heights within the compared square are correlated.",
         )
 }
 
@@ -109,25 +109,40 @@ fn compared(account: &SurfaceAccount) -> String {
         profiles,
         ..
     } = &account.shots;
-    if above_m.n == 0 {
+    if profiles.is_empty() {
         return paragraph(
             "No footprint of MOLA lies on the model, so that its heights have no independent test.",
         );
+    }
+    let mut single = shots_table("MOLA minus the terrain model by profile, metres");
+    for (index, profile) in profiles.iter().enumerate() {
+        let name = if profile.is_at_nadir {
+            profile.profile.clone()
+        } else {
+            format!("{} (off nadir)", profile.profile)
+        };
+        single.row_of(
+            &format!("surface.json#/mola_minus_surface/profiles/{index}/above_m"),
+            true,
+            summary_row(&name, &profile.above_m),
+        );
+    }
+    let single = folded_unless(
+        profiles.len() <= PROFILES_SHOWN,
+        "Single profiles",
+        &single.finish(),
+    );
+    if above_m.n == 0 {
+        let only = "Only profiles off nadir lie on the model. Attitude errors change their heights, so that they do not \
+            test those of the model.";
+        return paragraph(only) + &single;
     }
     let mut all = shots_table("MOLA minus the terrain model, metres");
     all.row_of(
         "surface.json#/mola_minus_surface/all",
         true,
-        summary_row("all", above_m),
+        summary_row("all at nadir", above_m),
     );
-    let mut single = shots_table("MOLA minus the terrain model by profile, metres");
-    for (index, profile) in profiles.iter().enumerate() {
-        single.row_of(
-            &format!("surface.json#/mola_minus_surface/profiles/{index}/above_m"),
-            true,
-            summary_row(&profile.profile, &profile.above_m),
-        );
-    }
     let words = if account.shots_take_part {
         "MOLA controlled heights of the adjustment: the mean shows how well that control was met; the scatter about it is \
          an independent test."
@@ -139,13 +154,7 @@ fn compared(account: &SurfaceAccount) -> String {
         label(*sigma_m, 1),
         label(*spread_sigmas, 2)
     );
-    all.finish()
-        + &paragraph(&format!("{words} {spread}"))
-        + &folded_unless(
-            profiles.len() <= PROFILES_SHOWN,
-            "Single profiles",
-            &single.finish(),
-        )
+    all.finish() + &paragraph(&format!("{words} {spread}")) + &single
 }
 
 fn shots_table(caption: &str) -> Table {

@@ -95,7 +95,7 @@ struct Row {
     sum: bool,
 }
 
-/// Rows of one stretch: position and attitude as a whole, then every kernel that covers some of it.
+/// Rows of one stretch: position and attitude in total, then every kernel that covers some of it.
 fn rows(site: &SiteProducts, stretch: Interval) -> Vec<Row> {
     let mut rows = Vec::new();
     let [positions, attitudes] = site.required.of_all();

@@ -1,4 +1,4 @@
-//! The budget of eq. 5 to 9 of Shan et al. 2005: how far apart the two footprints of one point lie.
+//! The budget of eq. 5 to 9 of Shan et al. 2005: the distance between the two footprints of one point.
 
 use super::{
     html::{Cell, Column, Table, counted, folded, paragraph},
@@ -46,7 +46,7 @@ fn write(geometric: &GeometricProducts) -> String {
 
 /// The equations as the paper computes with them.
 const TITLE: &str =
-    "How far apart the two footprints of a point lie (eq. 5 to 9 of Shan et al. 2005)";
+    "Distance between the two footprints of a point (eq. 5 to 9 of Shan et al. 2005)";
 const COLUMNS: &[Column] = &[
     Column::Text("pair"),
     Column::Text("adjustment"),
@@ -62,7 +62,7 @@ const WORDS: &str = "As the paper computes: D = √(M² + σ²) of the reproject
                      means of opposite sign add up by eq. 5, and eq. 6 assigns the remainder to the footprints. \
                      Error-free shots leave such a remainder as well; it is not the accuracy of the altimeter.";
 
-/// The same by eq. 5.
+/// Title of the budget by eq. 5.
 const SIGNED_TITLE: &str = "The same with Δ = Δ1 − Δ2 of every tie point (eq. 5)";
 const SIGNED_COLUMNS: &[Column] = &[
     Column::Text("pair"),

@@ -38,7 +38,7 @@ pub(super) struct Beam {
     pub position_error_m: Vector3<f64>,
     /// Direction of the laser (+Z of the bus plus its boresight error), J2000, unit length.
     pub direction: Vector3<f64>,
-    /// The same without jitter, as in the altimeter's products.
+    /// The direction without jitter, as in the altimeter's products.
     pub steady_direction: Vector3<f64>,
 }
 
@@ -51,12 +51,12 @@ pub(super) trait Flight {
     fn beam(&self, et: Et) -> Result<Beam>;
 }
 
-/// The flight of one image day by its kernels.
+/// The flight of one image day according to its kernels.
 #[derive(Debug)]
 pub(super) struct Arc {
     /// The image.
     pub image: &'static PlannedImage,
-    /// When it is exposed.
+    /// Time of its exposure.
     pub exposed: Interval,
     /// Interval that contains the frames of the day's PEDR file.
     pub frames: Interval,
@@ -94,7 +94,7 @@ impl Arc {
         })
     }
 
-    /// Matrix from the camera to Mars (IAU 2000) at `et`, by the kernels.
+    /// Matrix from the camera to Mars (IAU 2000) at `et`, according to the kernels.
     pub(super) fn camera_to_mars(&self, et: Et) -> Matrix3<f64> {
         let j2000_to_camera = bus_to_camera(usual_instrument()) * self.attitude.j2000_to_bus(et);
         body_matrix(&MARS_IAU2000, et) * j2000_to_camera.transpose()

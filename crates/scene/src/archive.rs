@@ -39,7 +39,7 @@ const APART_S: f64 = 16.0;
 /// Lost packets: share of revolutions with a gap, and shortest and longest gap, seconds.
 const GAP_SHARE: f64 = 0.3;
 const GAP_S: [f64; 2] = [14.0, 420.0];
-/// In each group of this many files, three have a bad revolution, each of another kind.
+/// In each group of this many files, three have a bad revolution, each of a different kind.
 const BAD_EVERY: u32 = 5;
 
 /// Options of a synthetic archive.
@@ -325,7 +325,7 @@ impl PlannedFile {
     }
 }
 
-/// When a revolution begins.
+/// Start of a revolution.
 fn start_of(orbit_number: u32) -> Et {
     Et::from_seconds(START_S + f64::from(orbit_number.saturating_sub(1)) * Orbit::period_s())
 }

@@ -1,9 +1,8 @@
-//! Frames of a synthetic archive: one orbit for the whole mission, a laser near nadir, the file's own orbit and ground
-//! a crossover residual too high.
+//! Frames of a synthetic archive: one orbit for the complete mission, a laser near nadir, the file's own orbit and
+//! ground a crossover residual too high.
 //!
-//! The true ground is that of the file; ranges are measured to it from the position of the spacecraft in the kernels at
-//! the true time. A check of ranges therefore finds the drawn errors: noise, the residual, and the errors of bad
-//! orbits.
+//! The true ground is the file's; ranges are measured to it from the position of the spacecraft in the kernels at the
+//! true time. A check of ranges therefore finds the drawn errors: noise, the residual, and the errors of bad orbits.
 
 use std::f64::consts::TAU;
 
@@ -33,7 +32,7 @@ use areograph_geom::{
 };
 use areograph_pds::pedr::{FrameValues, Record, SHOTS};
 
-/// Standard deviation of a range, metres, and its step: those of [`super::SceneErrors::realistic`].
+/// Standard deviation of a range, metres, and its step, as in [`super::SceneErrors::realistic`].
 pub(super) const RANGE_NOISE_M: f64 = 1.0;
 pub(super) const RANGE_STEP_M: f64 = 0.375;
 /// One of this many revolutions has an off-nadir look, by at most this angle, for this duration, this long after its
@@ -52,12 +51,12 @@ const UNKNOWN_S: [f64; 2] = [5_000.0, 5_060.0];
 const NO_ATTITUDE: u16 = 3;
 /// The laser looks this far ahead of nadir.
 const AHEAD_RAD: f64 = 0.1 * RADIANS_PER_DEGREE;
-/// Small relief along the track: shots over which it changes, and its size in metres.
+/// Small-scale relief along the track: length scale in shots, and amplitude in metres.
 const ROUGHNESS: [(u64, f64); 3] = [(64, 25.0), (12, 8.0), (1, 1.0)];
 /// Half the height interval of the parallax, metres.
 const PARALLAX_STEP_M: f64 = 500.0;
 
-/// Error of a whole revolution in its file.
+/// Error of a complete revolution in its file.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Badness {

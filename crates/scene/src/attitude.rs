@@ -40,7 +40,7 @@ pub(super) fn rolled_attitude(state: &OrbitState, roll_rad: f64) -> Matrix3<f64>
 /// An attitude that is held inertially around an image.
 #[derive(Debug, Clone)]
 pub(super) struct Hold {
-    /// When the image is exposed.
+    /// Time of exposure of the image.
     pub image: Interval,
     /// From J2000 to the bus.
     pub attitude: Matrix3<f64>,
@@ -166,7 +166,7 @@ mod tests {
             -0.002_000_668_0,
             0.999_997_217_4,
         );
-        assert!((bus_to_camera(usual_instrument()) - published).abs().max() < 1e-10); // ten printed digits
+        assert!((bus_to_camera(usual_instrument()) - published).abs().max() < 1e-10); // ten published digits
     }
 
     #[test]

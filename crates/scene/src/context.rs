@@ -1,4 +1,4 @@
-//! Wide-angle images around two of the narrow-angle ones, with a site of their own.
+//! Wide-angle images around two of the narrow-angle images, with their own site.
 //!
 //! Look directions of samples follow the formula of the instrument kernel word for word, and image coordinates of
 //! points are solved for with it, independently of the camera models of the program.
@@ -191,7 +191,7 @@ impl<'a> ContextImage<'a> {
         self.flown.camera_pose(self.camera, et, 0.0)
     }
 
-    /// Origin of the straight rays for ground at a distance.
+    /// Origin of the straight rays to ground at distance `range_m`.
     fn seen_from(&self, et: Et, range_m: f64) -> Pose {
         self.flown
             .camera_pose(self.camera, et, light_time_s(range_m))

@@ -27,12 +27,11 @@ const POLYNOMIAL_REACH: f64 = 4.0;
 pub(super) struct DayErrors {
     /// Lines by which all lines were exposed later than in the label.
     pub time_bias_lines: f64,
-    /// Seconds by which the attitude of the C-kernel is late: the true attitude at `t` is that of the C-kernel at `t` +
-    /// this.
+    /// Seconds by which the attitude of the C-kernel is late: the true attitude at `t` is the C-kernel's at `t` + this.
     pub attitude_clock_s: f64,
     /// Position of bus, camera and laser minus the orbit `gsfc`, IAU 2000, metres.
     pub bus_position_m: Vector3<f64>,
-    /// Position of the camera minus that of the bus, IAU 2000, metres.
+    /// Position of the camera minus position of the bus, IAU 2000, metres.
     pub camera_position_m: Vector3<f64>,
     /// Rotation of the bus.
     pub attitude: Option<AttitudeError>,
@@ -49,7 +48,7 @@ pub(super) struct DayErrors {
 pub(super) struct CameraError {
     /// Pixels of the detector by which the ends of its line lie before the middle, along the track.
     pub bend_px: f64,
-    /// True focal length over that of the calibration.
+    /// True focal length over the focal length of the calibration.
     pub focal_length_ratio: f64,
 }
 
@@ -66,9 +65,9 @@ impl CameraError {
 /// Rotation of the bus against the C-kernel: its true matrix from J2000 was `exp([e]×)` times the C-kernel's.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct AttitudeError {
-    /// Where `x` is 0.
+    /// Instant at which `x` is 0.
     middle_et_s: f64,
-    /// Where `x` is 1, seconds later.
+    /// Time from there to `x` = 1, seconds.
     half_image_s: f64,
     /// Terms of `e` in `x`, about the axes of the bus (roll, pitch, yaw), radians.
     constant_rad: Vector3<f64>,
@@ -371,7 +370,7 @@ mod tests {
         }
     }
 
-    /// A photon is followed from the ground to the camera in axes that neither rotate nor move with Mars; in those of
+    /// A photon is followed from the ground to the camera in axes that neither rotate nor move with Mars; in axes of
     /// the camera, the camera's velocity is subtracted from its own.
     #[test]
     fn rays_are_straight_from_where_the_camera_stood_when_the_light_left() {

@@ -34,14 +34,14 @@ pub struct SceneErrors {
 #[serde(rename_all = "snake_case")]
 pub enum Misregistration {
     /// Lines were exposed later than stated by the labels, by the residuals of Shan et al. 2005, Table 5, to half a
-    /// line and with the opposite sign: the same in every mission.
+    /// line and with the opposite sign: constant over all missions.
     Published,
     /// Lines of each image were exposed later by an individual number of lines.
     LineTimes {
         /// Standard deviation, lines.
         sigma_lines: f64,
     },
-    /// The attitude was read with a time offset that is the same in all images. A bus that points at nadir turns by
+    /// The attitude was read with a time offset common to all images. A bus that points at nadir turns by
     /// 0.05 degrees a second, 0.3 km on the ground; one that is held inertially does not turn.
     AttitudeClock {
         /// Standard deviation, seconds.
@@ -77,7 +77,7 @@ pub struct AttitudeErrors {
     pub quadratic_sigma_rad: f64,
     /// Jitter about the first two axes, roll and pitch.
     pub jitter: Jitter,
-    /// The same with periods of seconds.
+    /// Jitter with periods of seconds.
     pub slow_jitter: Jitter,
 }
 
@@ -104,8 +104,8 @@ impl Jitter {
 /// Errors of the laser altimeter and of its products.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AltimeterErrors {
-    /// Standard deviation of a profile's shift to the east and to the north, metres, without that by the attitude. Off nadir the
-    /// height of the profile follows, as that of a beam that is turned at the same range.
+    /// Standard deviation of a profile's shift to the east and to the north, metres, without the shift by the attitude.
+    /// Off nadir the height of the profile follows, as for a beam that is rotated at constant range.
     pub plan_sigma_m: f64,
     /// Share of the bus's attitude error that the coordinates of files contain, because they were computed from the same
     /// attitude: drawn evenly from 0 to these for every profile at nadir, and off nadir.
@@ -120,7 +120,7 @@ pub struct AltimeterErrors {
     pub range_step_m: f64,
     /// Diameter of the spot over which a range is averaged, metres.
     pub spot_m: f64,
-    /// Standard deviation of each of the two angles between the laser and +Z of the bus, radians: the same in the whole
+    /// Standard deviation of each of the two angles between the laser and +Z of the bus, radians: constant over the
     /// mission.
     pub boresight_sigma_rad: f64,
     /// Whether files contain the instrument's echo data: channel 4, energies, pulse widths, thresholds.
@@ -191,7 +191,7 @@ impl Roughness {
 }
 
 impl SceneErrors {
-    /// Those of the worked example: exact shots over gentle ground, attitudes without error, line times that reproduce
+    /// Errors of the worked example: exact shots over gentle ground, attitudes without error, line times that reproduce
     /// Shan et al. 2005, Table 5, and cameras displaced by 20 m along each axis.
     #[must_use]
     pub const fn demo() -> Self {
@@ -241,7 +241,8 @@ impl SceneErrors {
     /// * shot noise 1 m: roughness within a spot on plains (Garvin et al. 1999; Neumann et al. 2003), which also
     ///   give the 75 m of the spot; ranges in steps of 0.375 m, 2.5 ns of the clock (Shan et al. 2005, Table 1);
     /// * boresight of the laser 0.1 mrad on each axis: a choice, 38 m on the ground. No alignment angles are published;
-    ///   corrections by crossovers in 1999 (Lemoine et al., AAS 99-328) were 0.05 and 0.15 mrad, if printed in degrees.
+    ///   corrections by crossovers in 1999 (Lemoine et al., AAS 99-328) were 0.05 and 0.15 mrad, if published in
+    ///   degrees.
     #[must_use]
     pub const fn realistic(roughness: Roughness) -> Self {
         Self {
@@ -284,7 +285,7 @@ impl SceneErrors {
     /// model.
     ///
     /// # Source
-    /// Beside those of [`realistic`](Self::realistic):
+    /// In addition to the sources of [`realistic`](Self::realistic):
     /// * attitude 0.26 to 0.5 mrad, the two values there; pitch in proportion. Line times 20 to 40 lines;
     /// * orbit a fifth to three fifths of the differences of the first months: the nadir profiles of Shan et al. 2005, Table 3,
     ///   agree with it to 2 m in radius;

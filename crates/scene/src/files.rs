@@ -21,8 +21,8 @@ const LIST: &str = ".scene";
 
 /// A scene being written in a temporary folder beside its final location.
 ///
-/// Dropped unfinished, it leaves nothing; the next scene beside it removes what a killed process left, and puts an older
-/// scene back that it had moved aside.
+/// Dropped unfinished, it leaves nothing; the next scene beside it removes the remains of a killed process, and
+/// restores an older scene that the process had moved aside.
 pub(super) struct Draft {
     final_place: PathBuf,
     /// Contains the new scene and, during the exchange, the older one.

@@ -67,10 +67,10 @@ const TEXT_KERNELS: [(&str, &str); 7] = [
         include_str!("../../../kernels.example/moc_wa.ti"),
     ),
 ];
-/// How many of them a metakernel loads; the other Mars models would replace the first.
+/// Number of them that a metakernel loads; the other Mars models would replace the first.
 const LOADED: usize = 4;
 
-/// How many of them an archive's metakernel loads: it has no images.
+/// Number of them that an archive's metakernel loads: an archive has no images.
 const ARCHIVE_LOADED: usize = 3;
 /// Its name.
 pub(super) const ARCHIVE_METAKERNEL: &str = "archive.tm";
@@ -137,7 +137,7 @@ pub(super) fn clock_session(folder: &Path) -> Result<Session> {
     Session::open(&KernelSet::from_files(&files)?)
 }
 
-/// When the first line of a planned image begins, by its clock string.
+/// Start of the first line of a planned image, by its clock string.
 pub(super) fn image_start(session: &Session, image: &PlannedImage) -> Result<Et> {
     session.sclk_to_et(image.sclk_start)
 }

@@ -112,7 +112,7 @@ pub(super) struct Frame {
 /// Errors of the shots of a file.
 #[derive(Debug, Clone)]
 pub(super) struct LaserErrors {
-    /// Sizes of those of a single shot.
+    /// Sizes of the errors of a single shot.
     pub altimeter: AltimeterErrors,
     /// Shift of the file's coordinates.
     pub shift: ProfileShift,
@@ -221,7 +221,7 @@ impl Look {
 
 /// Computes one frame.
 ///
-/// The frame's straight track is that of the beam, without jitter, on the sphere of the mid-point's radius; each shot
+/// The frame's straight track follows the beam, without jitter, on the sphere of the mid-point's radius; each shot
 /// is displaced along the beam by the parallax times the difference of its radius from the mid-point's.
 ///
 /// # Errors

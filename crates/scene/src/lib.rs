@@ -94,7 +94,7 @@ pub use terrain_model::write_terrain_model_scene;
 pub struct SceneOptions {
     /// Seed of terrain, clouds, orbit differences and all drawn errors.
     pub seed: u64,
-    /// Seconds of frames in the files of whole days, 600 to 90 000; other files hold at most one revolution.
+    /// Seconds of frames in the files of full days, 600 to 90 000; other files hold at most one revolution.
     pub day_s: f64,
     /// Errors of the data, and the relief.
     pub errors: SceneErrors,

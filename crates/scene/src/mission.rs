@@ -1,4 +1,4 @@
-//! The whole synthetic mission, from plan to folder.
+//! The synthetic mission, from plan to folder.
 
 use std::path::Path;
 
@@ -49,10 +49,11 @@ pub fn write_scene(directory: &Path, options: &SceneOptions) -> Result<SceneSumm
     write(directory, options, None)
 }
 
-/// The same with the pixels of the narrow-angle images (`images/*.imq`, named in the site files), which takes minutes.
+/// Writes a scene with the pixels of the narrow-angle images (`images/*.imq`, named in the site files), which takes
+/// minutes.
 ///
 /// # Errors
-/// Those of [`write_scene`].
+/// As [`write_scene`].
 pub fn write_scene_with_images(
     directory: &Path,
     options: &SceneOptions,

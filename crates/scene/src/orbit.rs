@@ -1,4 +1,4 @@
-//! The synthetic orbit: an unperturbed ellipse like that of the mapping mission.
+//! The synthetic orbit: an unperturbed ellipse like the mapping orbit.
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -78,9 +78,9 @@ pub struct PlannedImage {
     pub id: &'static str,
     /// The site it shows.
     pub site: &'static Site,
-    /// UTC of the first line as printed in Shan et al. 2005, Table 2.
+    /// UTC of the first line as published in Shan et al. 2005, Table 2.
     pub utc_start: &'static str,
-    /// The same as a clock string, rounded down to 1/256 s; this is the truth.
+    /// The first line as a clock string, rounded down to 1/256 s; this is the truth.
     pub sclk_start: &'static str,
     /// Exposure of a detector line, milliseconds.
     pub exposure_ms: f64,
@@ -98,7 +98,7 @@ pub struct PlannedImage {
     pub pedr_number: u32,
     /// Version letter of that file.
     pub pedr_version: char,
-    /// Whether that file holds a whole day rather than one revolution.
+    /// Whether that file holds a full day rather than one revolution.
     pub whole_day: bool,
 }
 
@@ -148,7 +148,7 @@ impl PlannedImage {
         )
     }
 
-    /// Seconds of frames in that file, when whole days have `day_s`.
+    /// Seconds of frames in that file, when full days have `day_s`.
     #[must_use]
     pub fn pedr_duration_s(&self, day_s: f64) -> f64 {
         const ONE_REVOLUTION_S: f64 = 7_056.0;
@@ -192,9 +192,9 @@ pub static SITES: [&Site; 3] = [&EOS_CHASMA, &GUSEV_CRATER, &ISIDIS];
 
 /// The six images in order of time.
 ///
-/// Ids, dates, summing, lines, line periods and emission angles are those of Shan et al. 2005, Table 2. For E04-01275
-/// the table prints 7 424 header lines, with which the first-order RMSE in their Table 4 would be 9.7 m instead of the
-/// 11.45 m printed: 8 064 are exposed, 7 424 delivered. The table does not state at which end of the ray the emission
+/// Ids, dates, summing, lines, line periods and emission angles follow Shan et al. 2005, Table 2. For E04-01275 the
+/// table gives 7 424 header lines, with which the first-order RMSE in their Table 4 would be 9.7 m instead of the
+/// published 11.45 m: 8 064 are exposed, 7 424 delivered. The table does not state at which end of the ray the emission
 /// angle is; it is taken at the ground, as in the archive. Line spacing over line period is 3.04 km/s for the three
 /// nadir images and 3.39 to 3.42 km/s for the three that are held inertially. Exposures are line periods divided by the
 /// summing. Time biases are the mean residuals of their Table 5 along the track, to half a line and with the opposite
@@ -331,13 +331,13 @@ mod tests {
                 (image.line_period_s() * 1e3 - printed).abs() < 2e-6,
                 "{}",
                 image.id
-            ); // ms, 4 printed digits
+            ); // ms, 4 published digits
         }
     }
 
     #[test]
     fn line_spacing_tells_which_images_are_off_nadir() {
-        // Metres per line as printed in Table 2; ground track 3.05 km/s, inertially held 3.40 km/s.
+        // Metres per line as published in Table 2; ground track 3.05 km/s, inertially held 3.40 km/s.
         let printed_m = [4.4, 3.3, 4.9, 4.4, 5.5, 4.1];
         for (image, spacing_m) in IMAGES.iter().zip(printed_m) {
             let speed_m_s = spacing_m / image.line_period_s();

@@ -1,4 +1,4 @@
-//! Where a PEDR file has the profile of a day.
+//! Recorded position of the profile of a day in a PEDR file.
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use serde::Serialize;
@@ -93,7 +93,7 @@ impl ProfileShift {
         self.east_north_radial_m[2]
     }
 
-    /// The rotation from true directions to those of the file, both IAU 2000.
+    /// The rotation from true directions to directions of the file, both IAU 2000.
     pub(super) const fn rotation(&self) -> &Matrix3<f64> {
         &self.rotation
     }
@@ -105,7 +105,7 @@ impl ProfileShift {
     }
 }
 
-/// The beam in the middle of an image, by the kernels.
+/// The beam in the middle of an image, according to the kernels.
 struct MiddleBeam {
     /// From the bus to IAU 2000.
     bus_to_mars: Matrix3<f64>,
@@ -131,9 +131,9 @@ impl MiddleBeam {
         }
     }
 
-    /// How far a rotation of the bus, radians about its axes, moves the end of the beam on the ground, metres.
+    /// Displacement of the end of the beam on the ground by a rotation of the bus, radians about its axes; metres.
     fn moved_m(&self, turn_rad: Vector3<f64>) -> Vector3<f64> {
-        // The true matrix to the bus is exp([e]×) times that of the kernels.
+        // The true matrix to the bus is exp([e]×) times the kernels' matrix.
         let by_turn = self.bus_to_mars * (Vector3::z().cross(&turn_rad)) * self.range_m;
         let along = self.bus_to_mars * Vector3::z();
         // Along the beam down to level ground.

@@ -10,9 +10,9 @@ use areograph_geom::{
     calibration::{LineCamera, Offset},
 };
 
-/// Lines of a long image, and samples of a whole line.
+/// Lines of a long image, and samples of a full line.
 pub(super) const LONG: [u32; 2] = [20_000, 2_584];
-/// Focal length and pixel, millimetres: those of the HRSC, pixels summed by two.
+/// Focal length and pixel of the HRSC, millimetres, pixels summed by two.
 const FOCAL_MM: f64 = 175.0;
 const PIXEL_MM: f64 = 0.014;
 /// Line on the ground, metres.
@@ -24,7 +24,7 @@ const SPHERE_M: f64 = 3_396_000.0;
 const GRAVITY_M3_S2: f64 = 4.282_837e13;
 /// Waves of the ground: height and length, metres.
 const WAVES: [[f64; 2]; 2] = [[600.0, 83_000.0], [300.0, 31_000.0]];
-/// Nodes of the tables: a second apart, some seconds before and after the image.
+/// Nodes of the tables: a second apart, from a few seconds before to a few seconds after the image.
 const NODE_S: f64 = 1.0;
 const AROUND_S: f64 = 5.0;
 /// Distance of the Sun, which has no effect here, metres.

@@ -40,8 +40,8 @@ const STRUCTURE_AT_300_M: [f64; OCTAVES as usize] = [
 ];
 /// Hurst exponents of varied ground; fits to MOLA shots in windows of a degree give 0.38 at Gusev and 0.94 at Gale.
 const VARIED_HURST: [f64; 2] = [0.4, 0.95];
-/// Least roughness of varied ground at 300 m, metres. The largest is that whose shortest waves are, where the ground is
-/// roughest, as steep as those of [`Roughness::Rough`]: on steeper ground a beam would meet several places.
+/// Least roughness of varied ground at 300 m, metres. At the largest, the shortest waves are, where the ground is
+/// roughest, as steep as the waves of [`Roughness::Rough`]: on steeper ground a beam would meet several places.
 const VARIED_MIN_M: f64 = 3.0;
 const SHORTEST_M: f64 = 2.0 * FINEST_M;
 /// Lattice on which the roughness of varied ground changes, metres, and the natural logarithm by which a node changes it:
@@ -150,7 +150,7 @@ impl RoughPatch {
     }
 }
 
-/// How heights differ with distance around a site.
+/// Differences of heights with distance around a site.
 struct Law {
     /// Difference 300 m apart, metres.
     at_300_m: f64,
@@ -359,12 +359,12 @@ mod tests {
                 [low.min(value), high.max(value)]
             })
         };
-        // Of two hundred drawn ones the outermost lie within a twentieth of the range of the limits.
+        // The outermost of two hundred drawn laws lie within a twentieth of the range of the limits.
         let [low, high] = spread(|law| law.hurst);
         assert!(low < 0.43 && high > 0.92, "{low} {high}");
         let [low, high] = spread(|law| law.at_300_m);
         assert!(low < 3.4 && (12.0..25.0).contains(&high), "{low} {high}");
-        // By the table an octave share is that of the constant where the exponent is, to 1 %.
+        // By the table, an octave share equals the constant where the exponent does, to 1 %.
         let usual = laws
             .iter()
             .map(|law| ((law.hurst - HURST).abs(), law.share));

@@ -168,7 +168,7 @@ impl SiteFile<'_> {
 /// The window of this half width and height around a site.
 pub(super) fn window(site: &Site, [east_deg, north_deg]: [f64; 2]) -> Window {
     let around = |centre: f64, half: f64| {
-        // Whole hundredths of a degree print without rounding noise.
+        // Whole hundredths of a degree are written without rounding noise.
         [centre - half, centre + half].map(|edge| (edge * 100.0).round() / 100.0)
     };
     Window {

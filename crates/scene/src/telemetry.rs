@@ -1,6 +1,6 @@
 //! Echo data of the instrument: channels, energies, pulse widths, thresholds, background, range gate.
 //!
-//! No mission file was available: the fields are those that `pedr2tab` prints; sizes are plausible choices for an
+//! No mission file was available: the fields are those that `pedr2tab` writes; sizes are plausible choices for an
 //! altimeter, with consistent physics. A weak echo has little energy, a slope widens the pulse, the Sun contributes
 //! background. None of these moves a footprint.
 

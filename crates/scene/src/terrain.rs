@@ -183,7 +183,7 @@ impl Terrain {
         self.range_near_m(origin_m, direction, start_m, 1e-5)
     }
 
-    /// The same by steps from `range_m`, the last of which corrects a height error below `tolerance_m`.
+    /// The range by steps from `range_m`, the last of which corrects a height error below `tolerance_m`.
     pub(super) fn range_near_m(
         &self,
         origin_m: &Vector3<f64>,

@@ -40,7 +40,7 @@ const BLUNDER_PX: [f64; 2] = [20.0, 100.0];
 /// Intervals between poses of an image, a tenth of a second each: where the rate of the bus changes, interpolation is
 /// in error by 0.1 mm on the ground.
 const INTERVALS: u32 = 160;
-/// The same for an image with jitter, 2 to 5 ms each: a twentieth of the shortest period, for 2 mm on the ground.
+/// Intervals of an image with jitter, 2 to 5 ms each: a twentieth of the shortest period, for 2 mm on the ground.
 const INTERVALS_OF_JITTER: u32 = 3_600;
 /// Height tolerance for ranges of neighbouring pixels, metres: a thousandth of a pixel.
 const NEIGHBOUR_M: f64 = 1e-3;
@@ -163,7 +163,8 @@ impl<'a> TrueImage<'a> {
         ground.collect()
     }
 
-    /// When the bent line sees a point, lines from the middle; `x_lines` is when a straight line sees it.
+    /// Line at which the bent detector sees a point, from the middle; `x_lines` is the line at which a straight
+    /// detector sees it.
     fn bent_line(&self, x_lines: f64, sample: f64, ground_m: &Vector3<f64>) -> f64 {
         let ahead = |x_lines: f64| {
             let camera_m = self.oriented_camera.orientation.pose(x_lines);
@@ -291,7 +292,7 @@ pub(super) struct TieNoise {
 }
 
 impl TieNoise {
-    /// That of a mission.
+    /// Noise of a mission.
     pub(super) fn of(errors: &SceneErrors) -> Self {
         Self {
             sigma_px: errors.tie_noise_factor * errors.tie_noise_px,

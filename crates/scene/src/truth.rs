@@ -312,7 +312,7 @@ impl Truth {
 }
 
 impl ImageTruth {
-    /// Orientation of the arc's image by the kernels, and the differences of the rival orbits.
+    /// Orientation of the arc's image according to the kernels, and the differences of the rival orbits.
     pub(super) fn of(arc: &Arc, versions: &[Version]) -> Self {
         let image = arc.image;
         let step_s = arc.exposed.duration_s() / f64::from(EPOCHS - 1);

@@ -73,7 +73,7 @@ impl Contents {
         }
     }
 
-    /// The same for a file that is read in any case; `step` receives the number of bytes of each step, and stops the
+    /// The content of a file that is read in any case; `step` receives the number of bytes of each step, and stops the
     /// reading by `false`.
     ///
     /// # Errors
@@ -146,7 +146,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 /// Opens the file `path` below `folder`: no component may be a symbolic link or lead outside.
 ///
 /// # Errors
-/// Errors of the system, except those of a missing file or an invalid path.
+/// Errors of the system, except for a missing file or an invalid path.
 pub fn open_below(folder: &Path, path: &Path) -> io::Result<Option<File>> {
     let plain = |part: Component<'_>| matches!(part, Component::Normal(_));
     if path.as_os_str().is_empty() || !path.components().all(plain) {
@@ -249,7 +249,7 @@ mod tests {
         assert_eq!(contents.of(&file).unwrap().blake3, whole);
         let known = |contents: &Contents| lock(&contents.known).iter().len();
         assert_eq!(known(&contents), 1);
-        // Damage that restores the time of the content changes that of the file.
+        // Damage that restores the time of the content changes the time of the file.
         let modified = file.metadata().unwrap().modified().unwrap();
         file.write_all_at(b"d", 0).unwrap();
         file.set_modified(modified).unwrap();

@@ -38,7 +38,7 @@ pub struct Owner {
     pub command: String,
     /// Address of its pages; empty without pages.
     pub address: String,
-    /// When it began, milliseconds of UTC since 1970.
+    /// Time at which it began, milliseconds of UTC since 1970.
     pub started_ms: i64,
 }
 

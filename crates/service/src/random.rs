@@ -8,7 +8,7 @@ pub struct Random {
 }
 
 impl Random {
-    /// The same number every time.
+    /// A constant number.
     #[must_use]
     pub const fn always(number: f64) -> Self {
         Self {

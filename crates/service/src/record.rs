@@ -44,8 +44,8 @@ impl Rebuilt {
 }
 
 /// Records the runs of every site below `products`; `None` if `stops` stopped it between two sites. Only their
-/// manifests are read: products are compared with them when they are read, and by the scrub. A run of another site than
-/// that of its folder is left out.
+/// manifests are read: products are compared with them when they are read, and by the scrub. A run of a site other than
+/// the folder's is left out.
 ///
 /// # Errors
 /// A disk error.
@@ -58,7 +58,7 @@ pub fn record_all(
     record(database, products, now_ms, |_| true, stops)
 }
 
-/// The same for the folders of sites for which `wanted` holds.
+/// Records the runs in the folders of sites for which `wanted` holds.
 ///
 /// # Errors
 /// A disk error.
@@ -119,7 +119,7 @@ fn site_folders(products: &Path) -> Result<Vec<PathBuf>> {
     Ok(folders)
 }
 
-/// Folders of published runs of a site, by name. Nothing is removed: the folder may be that of another program.
+/// Folders of published runs of a site, by name. Nothing is removed: the folder may belong to another program.
 fn runs_in(folder: &Path) -> Result<Vec<PathBuf>> {
     let folder = folder.join("runs");
     let entries = fs::read_dir(&folder)

@@ -53,7 +53,7 @@ pub fn examine(database: &Database, products: &Path) -> Result<()> {
 }
 
 fn foreign() -> DatabaseError {
-    let why = "its identity is not that of the products: it may belong to another service";
+    let why = "its identity does not match the products: it may belong to another service";
     DatabaseError::Foreign(why.to_owned())
 }
 
@@ -98,7 +98,8 @@ fn owner(products: &Path) -> Result<Option<String>> {
     Ok(is_id.then(|| id.to_owned()))
 }
 
-/// Whether the folder of products is marked as that of the service with this database, or the database has no mark.
+/// Whether the folder of products is marked as belonging to the service with this database, or the database has no
+/// mark.
 ///
 /// # Errors
 /// SQLite errors.

@@ -80,7 +80,7 @@ impl Shared {
         self.set_problem(None);
     }
 
-    /// The reason for which the configuration in force differs from that of the file.
+    /// The reason for which the configuration in force differs from the configuration in the file.
     #[must_use]
     pub fn problem(&self) -> Option<String> {
         let problem = self.problem.read().unwrap_or_else(PoisonError::into_inner);
@@ -134,7 +134,7 @@ impl Shared {
         self.database.read(look)
     }
 
-    /// Performs `work` as one transaction and notifies those who follow the events.
+    /// Performs `work` as one transaction and notifies the subscribers of events.
     ///
     /// # Errors
     /// An error of `work`, in which case nothing is written; or an SQLite error.

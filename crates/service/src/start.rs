@@ -78,7 +78,7 @@ pub fn configuration(
 /// Starts a service; `command` is the name shown to other processes.
 ///
 /// # Errors
-/// Another service uses the same state folder; the database is damaged, newer, or that of another service; a disk
+/// Another service uses the same state folder; the database is damaged, newer, or belongs to another service; a disk
 /// error.
 pub fn start(config: ServiceConfig, command: &str, clock: Clock) -> Result<Started> {
     let state = config.outputs.state.clone();

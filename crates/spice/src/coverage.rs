@@ -20,7 +20,7 @@ use areograph_base::{
 /// Positions of one body relative to each centre that some segment uses.
 type ByCentre = BTreeMap<i32, Vec<Interval>>;
 
-/// Coverage of one spacecraft by the kernels of a session.
+/// Coverage of one spacecraft in the kernels of a session.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Coverage {
     /// Intervals of known position of the spacecraft relative to Mars.
@@ -108,7 +108,7 @@ pub struct RequiredCoverage {
     pub positions: Intervals,
     /// Instants that attitudes must cover, in the time of the C-kernels: exposures with the pointing bias.
     pub attitudes: Intervals,
-    /// The same of other spacecraft, by their identifiers.
+    /// Required coverage of other spacecraft, by their identifiers.
     pub others: BTreeMap<String, RequiredCoverage>,
 }
 

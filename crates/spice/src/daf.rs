@@ -227,7 +227,7 @@ impl Reader {
         let mut found = Vec::new();
         let mut next = f64::from(first);
         let mut records_left = self.size / RECORD_SIZE as u64;
-        // Zero ends the chain; every other number must be that of a record.
+        // Zero ends the chain; every other number must be a record's.
         while next.abs() > 0.0 || next.is_nan() {
             if !(next >= 1.0 && next.fract().abs() < f64::EPSILON) {
                 return Err(damaged(format!(

@@ -35,9 +35,9 @@ pub enum SpiceError {
     #[error("is {found}; expected {expected}")]
     #[cause("fetch the kernel again from NAIF, or correct the list of kernels")]
     NotAKernel {
-        /// What the file is.
+        /// The kind of the file.
         found: String,
-        /// What was expected.
+        /// The expected kind.
         expected: &'static str,
     },
     /// A binary kernel is shorter than its own file record states, or its segment list is broken.
@@ -71,7 +71,7 @@ pub enum SpiceError {
     #[error("no kernel in this folder {what}")]
     #[cause("put the missing kernel under kernels.root, or name the kernels one by one")]
     NothingToSelect {
-        /// What is missing, for example `defines the MGS clock (SCLK_DATA_TYPE_94)`.
+        /// The missing text, for example `defines the MGS clock (SCLK_DATA_TYPE_94)`.
         what: String,
     },
     /// A set of kernels lacks a text kernel that a call needs.
@@ -106,7 +106,7 @@ pub enum SpiceError {
         of: String,
         /// The gap.
         gap: Interval,
-        /// The same in UTC.
+        /// The gap in UTC.
         gap_utc: String,
         /// The required interval.
         required: Interval,
@@ -124,9 +124,9 @@ pub enum SpiceError {
                    one (de*.bsp)"
     )]
     NoSun {
-        /// When its light arrives at Mars.
+        /// Instant at which its light arrives at Mars.
         seen: Et,
-        /// The same in UTC.
+        /// This instant in UTC.
         utc: String,
     },
     /// No attitude sample within the tolerance.
@@ -150,7 +150,7 @@ pub enum SpiceError {
         what: String,
         /// The instant, in the time of the kernel.
         instant: Et,
-        /// The same in UTC.
+        /// This instant in UTC.
         utc: String,
         /// The part of the kernel that holds it, as the end of the sentence.
         part: String,
@@ -166,7 +166,7 @@ pub enum SpiceError {
     OtherUtc {
         /// The first day that shows it.
         day: String,
-        /// Instant by the kernels minus the published one, seconds.
+        /// Instant according to the kernels minus the published one, seconds.
         off_s: f64,
     },
     /// The kernels' motion cannot be tabulated to the tolerance.
@@ -176,7 +176,7 @@ pub enum SpiceError {
     )]
     #[cause(Coverage: "check the SPK for jumps there, and that its positions are in kilometres and its velocities in kilometres per second")]
     NoConvergence {
-        /// Where.
+        /// The instant.
         near: Et,
         /// Largest distance from CSPICE in the piece, metres.
         error_m: f64,
@@ -241,7 +241,7 @@ impl SpiceError {
         matches!(self, Self::Spice { short, .. } if kind_of(short) == Kind::Coverage)
     }
 
-    /// The same error of CSPICE, with the `value` that caused it.
+    /// The error of CSPICE, with the `value` that caused it.
     pub(super) fn of(mut self, value: &str) -> Self {
         if let Self::Spice { call, .. } = &mut self {
             *call = format!("{call}(\"{value}\")");

@@ -352,7 +352,7 @@ fn text_of(bytes: &[u8]) -> String {
         .unwrap_or_default()
 }
 
-/// A zero-ended copy; rejected when CSPICE could not accept it whole.
+/// A zero-ended copy; rejected when CSPICE could not accept all of it.
 fn c_text(what: &'static str, text: &str) -> Called<CString> {
     if text.len() > PATH_LENGTH_MAX {
         let problem = format!(
@@ -371,7 +371,7 @@ fn c_text(what: &'static str, text: &str) -> Called<CString> {
     })
 }
 
-/// The path for CSPICE; rejected when it could not be accepted whole.
+/// The path for CSPICE; rejected when CSPICE could not accept all of it.
 pub(super) fn c_path(path: &Path) -> Called<CString> {
     let text = path.to_str().ok_or_else(|| SpiceError::Unusable {
         what: "a path",

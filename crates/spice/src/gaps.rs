@@ -10,7 +10,7 @@ impl Session {
     /// For each kernel that holds the spacecraft: its index in the set, and the required instants for which CSPICE
     /// reads it, because no later kernel of its role covers them.
     ///
-    /// * `tolerance_s` – how far outside its intervals a C-kernel may be read, seconds
+    /// * `tolerance_s` – largest distance from its intervals at which a C-kernel may be read, seconds
     ///
     /// # Errors
     /// As [`Self::coverage`].
@@ -147,7 +147,7 @@ impl Session {
             }));
         }
         if sentences.is_empty() {
-            sentences.push("no kernel with it is loaded".to_owned());
+            sentences.push("no loaded kernel contains it".to_owned());
         }
         Ok(sentences.join(", "))
     }

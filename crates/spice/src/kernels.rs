@@ -14,7 +14,7 @@ use areograph_store::files::{InputFiles, file_name};
 
 /// Largest text kernel that is read, bytes; the archive's largest is below 2 MB.
 const TEXT_SIZE_MAX: u64 = 64 << 20;
-/// What a file is expected to be, for messages.
+/// Expected kinds of a file, for messages.
 const EXPECTED: &str =
     "a binary SPK, CK or PCK (DAF/...) or a text kernel with a \\begindata block";
 
@@ -94,14 +94,14 @@ impl KernelSet {
         Ok(set)
     }
 
-    /// The same kernels followed by an inspected one.
+    /// The kernels followed by an inspected one.
     #[must_use]
     pub fn with(mut self, kernel: Kernel) -> Self {
         self.kernels.push(kernel);
         self
     }
 
-    /// The same kernels followed by `files`, which therefore win.
+    /// The kernels followed by `files`, which therefore take precedence.
     ///
     /// # Errors
     /// As [`Self::from_files`].
@@ -183,7 +183,7 @@ pub(super) fn role_of(path: &Path) -> Result<KernelRole> {
             return not_a_kernel(path, "a transfer file (make it binary with NAIF's tobin)");
         }
         bytes if bytes.starts_with(b"NAIF/DA") || bytes.starts_with(b"DAS/") => {
-            return not_a_kernel(path, "a binary NAIF file of another kind");
+            return not_a_kernel(path, "a binary NAIF file of a different kind");
         }
         _ => return text_role(path),
     };
@@ -225,7 +225,7 @@ pub(super) fn read_text(path: &Path) -> Result<String> {
         .map_err(IoError::on("read kernel"))
         .in_file(path)?;
     if bytes.contains(&0) {
-        return not_a_kernel(path, "a binary file of another kind");
+        return not_a_kernel(path, "a binary file of a different kind");
     }
     if bytes.len() as u64 > TEXT_SIZE_MAX {
         return not_a_kernel(path, "too long for a text kernel");

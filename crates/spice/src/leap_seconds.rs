@@ -7,8 +7,8 @@ use areograph_base::{
 
 use super::{error::SpiceError, role::KernelRole, session::Session};
 
-/// Modified Julian date of each leap second's day, and TAI − UTC from then on, seconds (IERS, Bulletin C; the last one that
-/// was announced is that of 2017).
+/// Modified Julian date of each leap second's day, and TAI − UTC from then on, seconds (IERS, Bulletin C; the last
+/// announced leap second is the one of 2017).
 const LEAP_SECONDS: [(i32, f64); 28] = [
     (41_317, 10.0),
     (41_499, 11.0),
@@ -41,8 +41,8 @@ const LEAP_SECONDS: [(i32, f64); 28] = [
 ];
 /// First and last year in which TAI − UTC is known.
 const YEARS: std::ops::RangeInclusive<i32> = 1972..=2026;
-/// First days of the quarters of a year, and how many days of a common year precede them. Leap seconds begin on such a day;
-/// in April and October TDB − TT is largest.
+/// First days of the quarters of a year, and the numbers of days of a common year that precede them. Leap seconds begin
+/// on such a day; in April and October TDB − TT is largest.
 const QUARTERS: [(&str, i32); 4] = [("01-01", 0), ("04-01", 90), ("07-01", 181), ("10-01", 273)];
 /// Largest difference, seconds: 3 m of flight. Rounding of the constants leaves 1e-6 s.
 const TOLERANCE_S: f64 = 1e-3;
@@ -77,8 +77,8 @@ impl Session {
     /// Requires that UTC of the kernels is the published one up to `until`, within 1 ms. Dates after 2026 are not checked.
     ///
     /// # Errors
-    /// [`SpiceError::OtherUtc`] with the leap-second kernel: it is older than the data, or its constants are not those of
-    /// NAIF. [`SpiceError::MissingText`] without a leap-second kernel.
+    /// [`SpiceError::OtherUtc`] with the leap-second kernel: it is older than the data, or its constants are not
+    /// NAIF's. [`SpiceError::MissingText`] without a leap-second kernel.
     pub fn require_published_utc(&self, until: Et) -> Result<()> {
         let relevant = quarters()
             .map(|(day, date)| (day, published_s(date)))

@@ -28,7 +28,7 @@
 //! # }
 //! ```
 //!
-//! `examples/state.rs` prints the state of the spacecraft at an instant.
+//! `examples/state.rs` shows the state of the spacecraft at an instant.
 
 mod coverage;
 mod daf;

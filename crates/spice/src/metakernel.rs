@@ -28,7 +28,7 @@ impl KernelSet {
     ///
     /// # Errors
     /// [`SpiceError::NotAKernel`] for a file that is not a metakernel, [`SpiceError::TextKernel`] for a malformed line,
-    /// [`SpiceError::MissingKernel`], and those of [`KernelSet::from_files`].
+    /// [`SpiceError::MissingKernel`], and errors of [`KernelSet::from_files`].
     pub fn from_metakernel(metakernel: &Path) -> Result<Self> {
         Self::from_metakernel_of(&InputFiles::default(), metakernel)
     }
@@ -76,7 +76,7 @@ impl KernelSet {
         self.metakernel_text_before(relative_to, &[])
     }
 
-    /// A metakernel that loads the same kernels in the same order, and then those of `later`.
+    /// A metakernel that loads the same kernels in the same order, and then the kernels of `later`.
     ///
     /// * `relative_to` – as for [`Self::metakernel_text`]
     /// * `later` – their paths are written unchanged, relative to the metakernel's folder

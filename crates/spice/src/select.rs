@@ -135,7 +135,7 @@ impl Found {
     }
 }
 
-/// All regular files below `root`, sorted; links to folders are not followed, and files that have not arrived whole are left.
+/// All regular files below `root`, sorted; links to folders are not followed, and incomplete transfers are omitted.
 fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     let mut folders = vec![(root.to_owned(), 0)];
@@ -223,7 +223,7 @@ fn mars_fits(variable: &str, assignments: &[Assignment]) -> bool {
             .is_some_and(|meridian_deg| (meridian_deg - MARS_IAU2000.meridian_deg).abs() < 1e-6)
 }
 
-/// Ephemerides without MGS, then those of MGS in the chosen orbit solution.
+/// Ephemerides without MGS, then MGS ephemerides in the chosen orbit solution.
 fn select_ephemerides(
     selection: &KernelSelection,
     ephemerides: &[(PathBuf, Vec<Segment>)],
@@ -265,7 +265,8 @@ fn select_ephemerides(
         let held = held_by(segments, |target| target == NAIF_SUN);
         held.as_slice().to_vec()
     });
-    // Slices of an orbit may hold the Sun themselves: that of its light may be one that ends before the first image.
+    // Slices of an orbit may hold the Sun themselves: the slice at the departure of its light may end before the first
+    // image.
     let no_sun = sun.without(&Intervals::union_of(sun_of_chosen));
     for (path, segments) in ordered {
         let own = holds_spacecraft(segments);
@@ -308,7 +309,7 @@ fn meets(held: &Intervals, required: &Intervals) -> bool {
     !held.intersection(required).as_slice().is_empty()
 }
 
-/// When the light of the Sun that is seen from Mars at `required` left it.
+/// Intervals at which the light of the Sun that is seen from Mars at `required` left the Sun.
 fn when_light_left_sun(required: &Intervals) -> Intervals {
     let [late_s, early_s] = SUN_LIGHT_S;
     let left = required

@@ -67,7 +67,7 @@ pub struct Attitude {
 /// The only access to CSPICE: holds the process-wide lock and one set of loaded kernels.
 ///
 /// A second session on another thread waits for this one to end; on the same thread it is rejected. Kernels are
-/// unloaded when the session is dropped. Clock, orbit and attitude are those of one spacecraft, that of the laser
+/// unloaded when the session is dropped. Clock, orbit and attitude belong to one spacecraft, the one with the laser
 /// unless [`Session::of`] selects another.
 ///
 /// ```
@@ -119,7 +119,7 @@ impl Session {
         })
     }
 
-    /// The same session for the clock, orbit and attitude of `spacecraft`.
+    /// The session for the clock, orbit and attitude of `spacecraft`.
     #[must_use]
     pub fn of(&self, spacecraft: &'static Spacecraft) -> Self {
         Self {
@@ -309,7 +309,7 @@ impl Session {
     /// Attitude of the bus at `exposure`, read from the C-kernel at `lookup`.
     ///
     /// * `lookup` – made by [`areograph_base::time::PointingBias::lookup`] from the same exposure
-    /// * `tolerance_s` – how far outside its intervals the C-kernel may be read, seconds
+    /// * `tolerance_s` – largest distance from its intervals at which the C-kernel may be read, seconds
     ///
     /// # Errors
     /// [`SpiceError::NoAttitude`] when there is no attitude with rates within the tolerance;

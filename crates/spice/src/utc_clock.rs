@@ -15,7 +15,7 @@ const LAST_S: u32 = 3_599;
 /// are computed from it.
 ///
 /// From the full hour to its last regular second ET − UTC changes only by TDB − TT: by at most 1.2 µs, and linearly within
-/// 2e-10 s. A leap second follows that last second. Times differ from those of CSPICE only by the rounding of the last digit.
+/// 2e-10 s. A leap second follows that last second. Times differ from CSPICE's only by the rounding of the last digit.
 #[derive(Debug)]
 pub struct UtcClock<'a> {
     session: &'a Session,

@@ -57,7 +57,7 @@ pub struct CkSegment<'a> {
     pub interval_starts: &'a [Et],
 }
 
-/// The same with instants encoded by the spacecraft clock; writing it needs no kernel.
+/// Attitudes with instants encoded by the spacecraft clock; writing them needs no kernel.
 #[derive(Debug, Clone, Copy)]
 pub struct EncodedCkSegment<'a> {
     /// NAIF id of the bus.
@@ -205,7 +205,7 @@ fn fill(
         .in_file(path)
 }
 
-/// Why the system cannot write at `path`: CSPICE's messages do not state it.
+/// Reason why the system cannot write at `path`: CSPICE's messages do not state it.
 fn refusal(path: &Path) -> Option<IoError> {
     let probe = || -> io::Result<()> {
         let mut file = OpenOptions::new().append(true).create(true).open(path)?;

@@ -30,7 +30,7 @@ pub fn as_text_schema(schema: &SchemaRef) -> SchemaRef {
 /// Rows whose columns are text, as formatted by Arrow; empty where there is no value. Lists and groups are unchanged.
 ///
 /// # Errors
-/// A value that Arrow cannot print.
+/// A value that Arrow cannot format.
 pub fn as_text(batch: &RecordBatch) -> Result<RecordBatch, ArrowError> {
     let options = FormatOptions::default();
     let text = |column: &ArrayRef| -> Result<ArrayRef, ArrowError> {
@@ -50,7 +50,7 @@ pub fn as_text(batch: &RecordBatch) -> Result<RecordBatch, ArrowError> {
 /// Rows as a table with borders.
 ///
 /// # Errors
-/// A value that Arrow cannot print.
+/// A value that Arrow cannot format.
 pub fn as_table(schema: SchemaRef, batches: &[RecordBatch]) -> Result<String, ArrowError> {
     Ok(pretty_format_batches_with_schema(schema, batches)?.to_string())
 }

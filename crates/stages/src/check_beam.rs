@@ -2,10 +2,10 @@
 //!
 //! The altimeter's file states spacecraft and footprint of every shot, hence the direction of its beam, without the
 //! C-kernel of the images. Rotated into the bus by the attitude of an image that was exposed at that instant, this
-//! direction must be that of the laser's mounting. The nominal mountings of laser and camera also place the footprint in
-//! the image, whatever the attitude: footprints that the orientation places elsewhere contradict it.
+//! direction must agree with the laser's mounting. The nominal mountings of laser and camera also place the footprint
+//! in the image, whatever the attitude: footprints that the orientation places elsewhere contradict it.
 //!
-//! This tests what tie points cannot show: a rotation common to all images.
+//! This tests an error that tie points cannot show: a rotation common to all images.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -49,7 +49,8 @@ use areograph_store::{
 /// the attitude, the boresight and the position of footprints together. The spot in a full line of the narrow-angle
 /// camera is 1.8 mrad from its edge.
 const EDGE_RAD: f64 = 1.7e-3;
-/// The same for the ends of the exposure, seconds: 3.8 times 0.45 mrad are 0.3 s along the track.
+/// A footprint is expected only this far from the ends of the exposure, seconds: 3.8 times 0.45 mrad are 0.3 s along
+/// the track.
 const END_S: f64 = 0.5;
 
 /// The beam of the laser by the attitude of one image.
@@ -83,11 +84,11 @@ pub struct Beam {
     pub clock_s: f64,
     /// Shots whose footprints the mountings of camera and laser place in the delivered image.
     pub expected_inside: u32,
-    /// Those of them that the orientation places there as well.
+    /// Number of these that the orientation also places there.
     pub inside: u32,
 }
 
-/// Why the attitude of an image is not compared with a beam.
+/// Reasons why the attitude of an image is not compared with a beam.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BeamGap {
@@ -99,7 +100,7 @@ pub enum BeamGap {
     NoBeam,
     /// No shot of the site falls within its exposure.
     NoShot,
-    /// Shots of tables without positions of the spacecraft have no direction of their own.
+    /// Shots of tables without spacecraft positions have no beam direction.
     NoPosition,
 }
 
@@ -253,7 +254,7 @@ impl Placed<'_> {
     /// Angles of the beam of a shot from its mounting, along and across the track, by the attitude at its instant.
     ///
     /// # Accuracy
-    /// Both positions come from the altimeter's file, so that its orbit cancels. Its body-fixed axes are those of the
+    /// Both positions come from the altimeter's file, so that its orbit cancels. Its body-fixed axes belong to the
     /// corrected instant: within the bias of the clock they rotate by 8e-6 rad.
     fn angles_rad(&self, shot: &Footprint, axes: &Matrix3<f64>) -> [f64; 2] {
         let beam_m = footprint(shot, shot.radius_m).xyz_m - own_spacecraft(shot).xyz_m;

@@ -42,7 +42,7 @@ const IN_COMMON_MAX: usize = 1_000;
 /// Heights of the tie points of a site with one orientation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct HeightCheck {
-    /// Figures of the surface, or why there is none.
+    /// Figures of the surface, or the reason why there is none.
     pub surface: std::result::Result<SurfaceFigures, String>,
     /// Every tie point that is compared, in the order of the tie points.
     pub ties: Vec<TieHeight>,
@@ -75,13 +75,13 @@ pub struct SurfaceFigures {
 pub struct TieHeight {
     /// Index of the tie point.
     pub tie: usize,
-    /// Where it lies.
+    /// Its position.
     pub ground: Position<BodyFixed>,
     /// Its height above the ellipsoid along the radius, metres.
     pub height_m: f64,
     /// Height of the surface there, metres.
     pub surface_m: f64,
-    /// Standard deviation of that, metres.
+    /// Standard deviation of the surface height, metres.
     pub surface_sigma_m: f64,
     /// Distance of the nearest shot in plan, metres.
     pub nearest_shot_m: f64,
@@ -162,7 +162,7 @@ impl CheckedPoints<'_> {
 stage_inputs! {
     /// Tie points on the ground, and the shots.
     pub struct CheckHeights<'a> {
-        /// Which orientation the points come from.
+        /// Orientation from which the points come.
         pub round: Round,
         /// The points.
         pub points: CheckedPoints<'a>,
@@ -276,14 +276,14 @@ fn mean_variance_m2(covariance_m2: &DMatrix<f64>) -> f64 {
     covariance_m2.sum() / (covariance_m2.nrows().max(1) as f64).powi(2)
 }
 
-/// The surface of one profile at the tie points: its mean height, and the variance of that.
+/// The surface of one profile at the tie points: its mean height, and the variance of this mean.
 struct OneProfile<'a> {
     id: &'a str,
     mean_m: f64,
     variance_m2: f64,
 }
 
-/// Of the separate surfaces of all profiles, the two that contradict each other most.
+/// The two of the separate profile surfaces that contradict each other most.
 fn apart(
     shots: &MolaShots,
     places_m: &[Vector3<f64>],
@@ -313,7 +313,7 @@ fn apart(
             pairs: count,
         })
     });
-    // Of equal ones the first: profiles with most shots.
+    // Of equal pairs the first: profiles with most shots.
     pairs.reduce(|worst, pair| {
         if pair.sigmas().total_cmp(&worst.sigmas()).is_gt() {
             pair

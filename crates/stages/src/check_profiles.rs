@@ -1,6 +1,6 @@
 //! Profiles of the altimeter against each other: crossovers, shifts, and the surface tested on withheld profiles.
 //!
-//! Whoever uses the surface between the shots states a height and its standard deviation. Here every profile in turn is
+//! The surface between the shots gives a height and its standard deviation. To test both, every profile in turn is
 //! withheld, predicted from the others, and compared.
 
 use std::sync::atomic::AtomicBool;
@@ -47,7 +47,7 @@ pub struct ProfileCheck {
     pub left_out: Vec<LeftOutProfile>,
     /// Stretches of profiles, predicted from the other profiles.
     pub stretches: Vec<WithheldStretch>,
-    /// How well they are predicted; `None` without any.
+    /// Quality of their prediction; `None` without any stretch.
     pub score: Option<WithheldScore>,
 }
 
@@ -56,11 +56,11 @@ pub struct ProfileCheck {
 pub struct ProfileCrossover {
     /// Indices of the profiles.
     pub profiles: [usize; 2],
-    /// Where, at the mean of both heights.
+    /// Position of the crossing, at the mean of both heights.
     pub ground: Position<BodyFixed>,
     /// Height by the first minus height by the second, metres.
     pub difference_m: f64,
-    /// Standard deviation of that by noise and interpolation, metres.
+    /// Standard deviation of the difference by noise and interpolation, metres.
     pub sigma_m: f64,
 }
 
@@ -71,9 +71,9 @@ pub struct ShiftedProfile {
     pub profile: String,
     /// Crossovers.
     pub crossovers: usize,
-    /// How far it is recorded to the east, to the north and above its true position, metres.
+    /// Offset of its recorded from its true position to the east, to the north and upwards, metres.
     pub shift_m: [f64; 3],
-    /// Covariance of that, m².
+    /// Covariance of this offset, m².
     pub covariance_m2: [[f64; 3]; 3],
 }
 
@@ -126,7 +126,7 @@ pub struct WithheldStretch {
 }
 
 stage_inputs! {
-    /// The shots, and what is known of their errors a priori.
+    /// The shots, and their a priori uncertainties.
     pub struct CheckProfiles<'a> {
         /// Footprints in IAU 2000.
         pub converted: &'a Output<Converted>,

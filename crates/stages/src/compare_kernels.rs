@@ -47,7 +47,7 @@ const FAR_BEYOND: f64 = 1.5;
 pub struct Deviation {
     /// The set.
     pub set: String,
-    /// Radial, along-track and cross-track component (of a turn: the rotation vector about these axes
+    /// Radial, along-track and cross-track components (for a rotation, the rotation vector about these axes
     /// of the mean orbit), one entry per epoch.
     pub radial_along_cross: Vec<[f64; 3]>,
     /// Size of all components together.
@@ -68,12 +68,12 @@ pub struct Size {
 /// Differences of attitudes, also on the ground.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AttitudeComparison {
-    /// Turns from the mean attitude to that of each set, radians.
+    /// Rotations from the mean attitude to the attitude of each set, radians.
     pub turns: Comparison,
-    /// Those epochs at which the mean boresight meets Mars.
+    /// Epochs at which the mean boresight meets Mars.
     pub on_ground: Vec<Et>,
-    /// For each set and each epoch of `on_ground`: angle between its boresight and that of the mean
-    /// attitude, times the distance to the ellipsoid, metres.
+    /// For each set and each epoch of `on_ground`: angle between its boresight and the boresight of the mean attitude,
+    /// times the distance to the ellipsoid, metres.
     pub ground_m: Vec<Vec<f64>>,
 }
 
@@ -139,7 +139,7 @@ impl Comparison {
             .filter(move |of| of.size.rms <= limit)
     }
 
-    /// The set that pulls the mean towards itself: of three or more the one far beyond all others.
+    /// The set that pulls the mean towards itself: of three or more sets, the one far beyond all others.
     #[must_use]
     pub fn pulls_the_mean(&self) -> Option<&Deviation> {
         let mut sets: Vec<&Deviation> = self.deviations.iter().collect();
@@ -172,8 +172,8 @@ impl Comparison {
         (closest != Some(&self.closest)).then_some(far)
     }
 
-    /// The set that is closest to the mean within a part of the time, with its root mean square distance and that of
-    /// the set that is closest over all; `None` where they are the same.
+    /// The set that is closest to the mean within a part of the time, with its root mean square distance and the
+    /// distance of the set that is closest over all; `None` where they are the same.
     #[must_use]
     pub fn closer_within(&self, span: Interval) -> Option<(&Deviation, [f64; 2])> {
         let within = |of: &Deviation| {
@@ -187,7 +187,7 @@ impl Comparison {
         (least_rms < (1.0 - TIE_SHARE) * own).then_some((least, [least_rms, own]))
     }
 
-    /// Each two sets once, by index, the earlier first.
+    /// Every pair of sets once, by index, the earlier first.
     pub fn pairs(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
         let count = self.deviations.len();
         (0..count).flat_map(move |first| (first + 1..count).map(move |second| (first, second)))
@@ -236,8 +236,8 @@ impl Size {
 ///   one set
 ///
 /// # Source
-/// Shan et al. 2005, data preparation: of the orbit solutions, that of the navigation team was chosen, which lies
-/// closest to the mean of all.
+/// Shan et al. 2005, data preparation: of the orbit solutions, the navigation team's was chosen, which lies closest to
+/// the mean of all.
 #[must_use]
 pub fn compare_orbits(epochs: &[Et], orbits: &[(String, Vec<State>)]) -> Comparison {
     let means: Vec<State> = (0..epochs.len())

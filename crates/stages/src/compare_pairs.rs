@@ -58,7 +58,7 @@ pub struct PairComparison {
     pub footprints: Option<FootprintsByTies>,
     /// Median distance of successive footprints, metres; `None` without any.
     pub mola_spacing_m: Option<f64>,
-    /// The budget of Shan et al. 2005, or why there is none.
+    /// The budget of Shan et al. 2005, or the reason why there is none.
     pub budget: std::result::Result<UncertaintyBudget, String>,
 }
 
@@ -78,7 +78,7 @@ pub struct FootprintsByTies {
     /// Along-track misregistration of the footprints, metres: the size of `along_m`, averaged over the footprints of
     /// all profiles. `None` without any.
     pub apart_m: Option<f64>,
-    /// Its standard deviation by the scatter of the tie points, metres; that of all profiles is one error.
+    /// Its standard deviation by the scatter of the tie points, metres; the error is common to all profiles.
     pub apart_sigma_m: Option<f64>,
     /// Profiles with footprints that both images show.
     pub profiles: Vec<ProfileByTies>,
@@ -95,17 +95,17 @@ pub struct ProfileByTies {
     pub lines: Summary,
     /// Transformed minus projected sample in the second image.
     pub samples: Summary,
-    /// The mean in lines on the ground, metres.
+    /// The mean of `lines` on the ground, metres.
     pub along_m: f64,
     /// Its standard deviation by the scatter of the tie points, metres.
     pub along_sigma_m: f64,
-    /// The same in units of the distance of successive footprints of the profile; `None` for a single one.
+    /// `along_m` in units of the distance of successive footprints of the profile; `None` for a single one.
     pub along_spacings: Option<f64>,
     /// Footprints beyond the tie points.
     pub beyond_ties: u32,
     /// Heights of the others by the rays that the transformation through tie points assigns to them.
     pub heights: Vec<FootprintHeight>,
-    /// These above the altimeter's, metres.
+    /// These heights above the altimeter's, metres.
     pub above_m: Summary,
 }
 
@@ -115,7 +115,7 @@ const TIES_MIN: usize = 2;
 stage_inputs! {
     /// The images with one orientation, tie points and their ground points, and the footprints.
     pub struct ComparePairs<'a> {
-        /// Which orientation.
+        /// Round of the orientation.
         pub round: Round,
         /// The images.
         pub images: SiteImages<'a>,

@@ -1,4 +1,4 @@
-//! Footprints and the file's own spacecraft positions go from the file's datum to the frame of the products.
+//! Conversion of footprints and the file's own spacecraft positions from the file's datum to the frame of the products.
 
 use std::sync::atomic::AtomicBool;
 
@@ -41,7 +41,7 @@ pub struct Converted {
 pub struct FileConversion {
     /// Shots of the file in the windows.
     pub shots: u32,
-    /// How far they moved on the ground, metres; all 0 for a file that was not converted.
+    /// Their shift on the ground, metres; all 0 for a file that was not converted.
     pub shift_m: Summary,
     /// Change of east longitude, degrees.
     pub longitude_shift_deg: Summary,
@@ -81,7 +81,7 @@ impl Stage for ConvertDatum<'_> {
 ///
 /// Both rotations hold at the shot's tag, unless the clock correction is configured to reach the rotation (`scope`
 /// `rotation` or `both`): then Mars is taken into IAU 2000 at the corrected time, which moves longitudes by 4.752e-4°
-/// for 117 ms. Radii stay as they are. In the first case, files that are already in IAU 2000 are not altered, bit for
+/// for 117 ms. Radii are unchanged. In the first case, files that are already in IAU 2000 are not altered, bit for
 /// bit.
 ///
 /// # Source
@@ -116,7 +116,7 @@ pub fn convert_datum(footprints: Footprints<AsRead>, clock: &MolaClock) -> Conve
     }
 }
 
-/// The footprints, every shot out of its file's datum.
+/// The footprints, with every shot converted from its file's datum.
 fn turned(footprints: Footprints<AsRead>, clock: &MolaClock) -> Footprints<BodyFixed> {
     let datums = footprints.files.iter();
     let datums: Vec<DatumTurn> = datums
@@ -220,7 +220,7 @@ impl DatumTurn {
     }
 }
 
-/// The same for shots of an archive that is searched: turned at their time tags, without a clock correction.
+/// Converts shots of a searched archive: rotated at their time tags, without a clock correction.
 ///
 /// * `files` – the files that the column `file` indexes
 #[must_use]

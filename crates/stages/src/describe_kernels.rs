@@ -44,9 +44,10 @@ pub struct KernelLine {
     pub bytes: u64,
     /// BLAKE3 of its bytes, hexadecimal.
     pub blake3: String,
-    /// When it covers a spacecraft of the site: its position in an SPK, its attitude in a CK; `None` for other kernels.
+    /// Times at which it covers a spacecraft of the site: its position in an SPK, its attitude in a CK; `None` for
+    /// other kernels.
     pub held: Option<Intervals>,
-    /// Which of the required intervals are read from this kernel: where several hold an instant, the last one is.
+    /// Required intervals that are read from this kernel; where several kernels hold an instant, the last one is read.
     pub used: Vec<Interval>,
 }
 
@@ -59,7 +60,7 @@ stage_inputs! {
         pub kernels: &'a KernelView,
         /// Times at which they are read.
         pub required: Required<'a>,
-        /// How far outside its intervals a C-kernel may be read, seconds.
+        /// Largest distance from its intervals at which a C-kernel may be read, seconds.
         pub ck_tolerance_s: &'a f64,
     }
 }
@@ -101,7 +102,7 @@ impl Stage for DescribeKernels<'_> {
 
 /// Describes the kernels of `session`.
 ///
-/// * `ck_tolerance_s` – how far outside its intervals a C-kernel may be read, seconds
+/// * `ck_tolerance_s` – largest distance from its intervals at which a C-kernel may be read, seconds
 ///
 /// # Errors
 /// As [`Session::coverage`].
@@ -157,7 +158,7 @@ fn rates_note(session: &Session, without: &BTreeSet<usize>) -> Option<String> {
     })
 }
 
-/// The times that the site reads for each spacecraft; that of the laser comes first, even if it is not read.
+/// The times that the site reads for each spacecraft; the spacecraft of the laser comes first, even if it is not read.
 fn by_spacecraft(
     required: &RequiredCoverage,
 ) -> impl Iterator<Item = (&'static Spacecraft, &RequiredCoverage)> {

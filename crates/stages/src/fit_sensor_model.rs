@@ -1,7 +1,8 @@
 //! Exterior orientation as polynomials in the image line, of first and second order, and the choice of the form in use.
 //!
-//! The orbit departs from a polynomial of second order with the third power of the time: an image of minutes keeps no
-//! limit. Unless the configuration requires a form, such an image is interpolated between its samples.
+//! The departure of the orbit from a second-order polynomial grows with the third power of time: an image of several
+//! minutes exceeds every limit. Unless the configuration requires a form, such an image is interpolated between its
+//! samples.
 
 use std::sync::atomic::AtomicBool;
 
@@ -51,9 +52,9 @@ pub struct SensorModel {
     pub model: CameraModel,
     /// Its distances from the orientation.
     pub misfit: Misfit,
-    /// Why polynomials are not in use although the configuration does not exclude them.
+    /// Reason why polynomials are not in use although the configuration does not exclude them.
     pub remark: Option<String>,
-    /// Why the form in use breaks the limits of the configuration; empty when it is valid.
+    /// Reasons why the form in use breaks the limits of the configuration; empty when it is valid.
     pub invalid_because: Vec<String>,
 }
 
@@ -72,7 +73,7 @@ pub struct EulerModel {
     pub pointing_ground_m: Option<Vec<f64>>,
 }
 
-/// Rotation without angles; the position polynomials are those of [`EulerModel`].
+/// Rotation without angles; the position polynomials are shared with [`EulerModel`].
 ///
 /// `M(x) = exp([r(x)]×) · M_ref`, `M` from Mars-fixed to camera components.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -155,7 +156,7 @@ stage_inputs! {
     pub struct FitSensorModel<'a> {
         /// Identifier of the image.
         pub image: &'a str,
-        /// Which orientation.
+        /// Round of the orientation.
         pub round: Round,
         /// Its samples.
         pub samples: &'a Output<Orientation>,
@@ -289,7 +290,8 @@ fn euler_model(orientation: &Orientation, order: usize) -> Result<EulerModel> {
     })
 }
 
-/// Distance on the ellipsoid between the boresight of each sample and that of the polynomials from the same position.
+/// Distance on the ellipsoid between the boresight of each sample and the boresight of the polynomials from the same
+/// position.
 fn pointing_ground_m(orientation: &Orientation, angles_rad: &[Fit; 3]) -> Option<Vec<f64>> {
     let distance_m = |sample: &OrientationSample| {
         let [omega_rad, phi_rad, kappa_rad] =
@@ -350,7 +352,8 @@ pub struct Misfit {
 }
 
 impl Misfit {
-    /// The interpolation between samples against that of the tables, whose nodes are as dense as the kernels require.
+    /// The interpolation between samples against the interpolation of the tables, whose nodes are as dense as the
+    /// kernels require.
     fn between_samples(orientation: &Orientation) -> Self {
         let unknown = Self {
             position_rmse_m: f64::NAN,
@@ -405,7 +408,7 @@ impl Misfit {
     }
 }
 
-/// What to do about polynomials that do not fit; empty for an image short enough for them.
+/// Advice on polynomials that do not fit; empty for an image short enough for them.
 fn advice(orientation: &Orientation) -> String {
     let ends = [orientation.samples.first(), orientation.samples.last()];
     let exposed_s = match ends {

@@ -1,4 +1,5 @@
-//! Footprints of one orbit inside one window become a profile, marked where an image was exposed at the same time.
+//! Grouping of the footprints of one orbit inside one window into profiles, marked where an image was exposed at the
+//! same time.
 //!
 //! This is a separate stage, because profiles need footprints and image times, and two stages need profiles.
 
@@ -142,7 +143,7 @@ fn profile(
     let simultaneous = images
         .iter()
         .enumerate()
-        // Images by the kernels of another spacecraft have no laser.
+        // Images oriented by the kernels of another spacecraft have no laser.
         .filter(|(_, image)| image.support.is_some() || image.has_laser())
         .filter_map(|(index, image)| {
             let exposures = image.exposures();

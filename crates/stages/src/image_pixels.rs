@@ -42,7 +42,7 @@ impl PixelFiles<'_> {
     /// The files, opened, of the images with these times.
     ///
     /// # Errors
-    /// Read errors; a file whose pixels cannot be read, or are those of another image.
+    /// Read errors; a file whose pixels cannot be read, or belong to another image.
     pub fn opened(&self, times: &[&ImageTimes]) -> Result<Vec<Option<PixelFile>>> {
         let files = self.0.iter().zip(times);
         let opened = files.map(|(file, times)| {
@@ -52,10 +52,11 @@ impl PixelFiles<'_> {
         opened.collect()
     }
 
-    /// The same where exchanged files would otherwise go unnoticed: two files without a label must differ in size.
+    /// The opened files where exchanged files would otherwise remain undetected: two files without a label must differ
+    /// in size.
     ///
     /// # Errors
-    /// Those of [`Self::opened`]; two such files.
+    /// As [`Self::opened`]; two such files.
     pub fn of_distinct_images(&self, times: &[&ImageTimes]) -> Result<Vec<Option<PixelFile>>> {
         let opened = self.opened(times)?;
         let without_label = || {
@@ -79,7 +80,7 @@ impl PixelFiles<'_> {
     /// The decoded pixels of all images that have some, from which windows are read.
     ///
     /// # Errors
-    /// Those of [`Self::of_distinct_images`]; errors in writing temporary files.
+    /// As [`Self::of_distinct_images`]; errors in writing temporary files.
     pub fn decoded(&self, times: &[&ImageTimes]) -> Result<Vec<Option<Pyramid>>> {
         let opened = self.of_distinct_images(times)?;
         let decode = |file: &Option<PixelFile>| file.as_ref().map(Pyramid::of).transpose();
@@ -244,7 +245,7 @@ fn belongs(file: &PixelFile, times: &ImageTimes) -> std::result::Result<(), Pixe
     Ok(())
 }
 
-/// Whether the fragments of a file are of the image that its label describes.
+/// Whether the fragments of a file belong to the image that its label describes.
 fn of_one_image(file: &ImageFile, times: &ImageTimes) -> std::result::Result<(), PixelsError> {
     match file.contradictions() {
         [] => Ok(()),

@@ -1,4 +1,5 @@
-//! One image through its orientation: ground of a place, place of the ground, and where another image shows a place.
+//! One image through its orientation: from a place to the ground, from the ground to a place, and to the place in
+//! another image.
 
 use nalgebra::{Matrix2, Matrix3x2, Vector2, Vector3};
 
@@ -33,7 +34,7 @@ pub(crate) struct Prediction {
     pub(crate) height_px: Vector2<f64>,
     /// Metres on the ground of a line and a sample of the image, and of the other.
     pub(crate) spacing_m: [Vector2<f64>; 2],
-    /// Where the place lies, metres Mars-fixed.
+    /// Ground position of the place, Mars-fixed, metres.
     pub(crate) ground_m: Vector3<f64>,
 }
 
@@ -66,7 +67,7 @@ impl<'a> View<'a> {
         (0.0..size.x).contains(&place.x) && (0.0..size.y).contains(&place.y)
     }
 
-    /// Where the ray of a place meets a sphere, metres; `None` where it misses it.
+    /// Point where the ray of a place meets a sphere, metres; `None` where the ray misses the sphere.
     fn on_sphere_m(&self, place: &Vector2<f64>, radius_m: f64) -> Option<Vector3<f64>> {
         let (x_lines, _) = self.camera.focal_plane_coordinates(place.x, place.y);
         let pose = self.camera.orientation.pose(x_lines);

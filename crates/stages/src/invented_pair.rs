@@ -23,7 +23,7 @@ pub(crate) const RADIUS_M: f64 = 3_390_000.0;
 pub(crate) const HEIGHT_M: f64 = 380_000.0;
 pub(crate) const LINES: u32 = 1_280;
 pub(crate) const SAMPLES: u32 = 256;
-/// Of the first camera and of the second, metres.
+/// Line spacing of the first camera and of the second, metres.
 pub(crate) const LINE_SPACING_M: [f64; 2] = [4.4, 4.0];
 /// Distance of their tracks east of the ground, metres.
 pub(crate) const EAST_M: [f64; 2] = [0.0, 120_000.0];

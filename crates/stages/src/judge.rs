@@ -6,6 +6,7 @@
 mod adjustment;
 mod beam;
 mod checks;
+mod corrections;
 mod ranges;
 mod surface;
 mod untested;
@@ -44,7 +45,7 @@ pub struct Evidence<'a> {
     pub footprints: Option<usize>,
     /// Shots in the windows that were left out, by reason.
     pub rejected: &'a BTreeMap<ShotRejection, u64>,
-    /// Which of two radii of the shots is that of the ground; `None` where they have one.
+    /// Which of two radii of the shots represents the ground; `None` where they have one radius.
     pub ground: Option<GroundRadius>,
     /// The limits of the configuration.
     pub limits: &'a LimitsConfig,
@@ -70,7 +71,7 @@ pub struct Evidence<'a> {
     pub adjustment: Option<AdjustmentEvidence<'a>>,
     /// The terrain model of a pair; `None` where it is not requested.
     pub surface: Option<&'a SurfaceAccount>,
-    /// Why there is no adjustment although there are tie points.
+    /// Reason why there is no adjustment although there are tie points.
     pub adjustment_failure: Option<&'a str>,
 }
 
@@ -135,10 +136,11 @@ pub fn judge(evidence: &Evidence<'_>) -> Verdict {
 }
 
 impl Evidence<'_> {
-    /// Why no footprint is in a window, and what to check.
+    /// States why no footprint is in a window, and what to check.
     fn no_footprint(&self) -> String {
         if self.rejected.is_empty() {
-            return "no footprint in any window: check windows, and that the files of shots (pedr.files or shots.files) are those of the site's orbits".to_owned();
+            return "no footprint in any window: check windows, and that the shot files (pedr.files or shots.files) \
+                belong to the site's orbits".to_owned();
         }
         let counts = self
             .rejected
@@ -156,7 +158,7 @@ impl Evidence<'_> {
         )
     }
 
-    /// Why the site is invalid, one sentence per reason; empty when it is valid.
+    /// Reasons why the site is invalid, one sentence each; empty when it is valid.
     fn invalid_because(&self) -> Vec<String> {
         let mut reasons = Vec::new();
         if self.footprints == Some(0) {
@@ -231,7 +233,7 @@ const CLOCK_DOUBT_S: f64 = 0.02;
 /// The same limit in standard uncertainties; the larger of the two applies.
 const CLOCK_DOUBT_SIGMA: f64 = 5.0;
 
-/// How far a scan with this uncertainty may be from the configured correction, seconds.
+/// Largest accepted distance of a scan with this uncertainty from the configured correction, seconds.
 const fn clock_limit_s(uncertainty_s: f64) -> f64 {
     CLOCK_DOUBT_S.max(CLOCK_DOUBT_SIGMA * uncertainty_s)
 }

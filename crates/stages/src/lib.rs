@@ -1,6 +1,7 @@
 //! The stages of the flow: plain functions from typed input to typed output.
 //!
-//! No stage calls another, prints, or knows another's files. The flow of the program puts them in order.
+//! No stage calls another, writes to the terminal, or knows another's files. The flow of the program puts them in
+//! order.
 //!
 //! `read_ties` and `group_profiles` find the images of measurements and profiles once. From there on, images, profiles,
 //! tie points and footprints are indices in the order of the site; identifiers are for messages and products.

@@ -58,7 +58,7 @@ impl LineCamera {
         self.ray([0.5, 0.5]).position_m.norm() - radius_m
     }
 
-    /// Where corners and middle of the image meet a sphere: east longitudes and latitudes, radians.
+    /// Points where the corners and the middle of the image meet a sphere: east longitudes and latitudes, radians.
     #[must_use]
     pub fn corners_rad(&self, radius_m: f64) -> Vec<[f64; 2]> {
         let shares = [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0], [0.5, 0.5]];
@@ -80,7 +80,7 @@ impl LineCamera {
         camera.ray(line * camera.lines(), sample * f64::from(self.samples))
     }
 
-    /// The same, borrowed.
+    /// The camera, borrowed.
     pub(crate) fn seen(&self) -> OrientedCamera<&(dyn ExteriorOrientation + 'static)> {
         OrientedCamera {
             id: self.camera.id.clone(),

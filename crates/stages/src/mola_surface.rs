@@ -31,8 +31,8 @@ pub(super) struct CrossedProfiles {
 }
 
 impl MolaShots {
-    /// Standard deviations of the shift of each profile as recorded, towards east, north and up, metres: those of all profiles,
-    /// and off nadir the attitude error that crossovers leave there.
+    /// Standard deviations of the shift of each profile as recorded, towards east, north and up, metres: the values for
+    /// all profiles and, off nadir, the attitude error that crossovers leave there.
     #[must_use]
     pub fn profile_sigmas_m(
         footprints: &Footprints<BodyFixed>,
@@ -58,7 +58,7 @@ impl MolaShots {
         profiles.iter().map(of_profile).collect()
     }
 
-    /// The shots of `profiles` without those that do not belong by their crossovers; a shot in two windows belongs to
+    /// The shots of those `profiles` that belong to each other by their crossovers; a shot in two windows belongs to
     /// the first.
     #[must_use]
     pub fn of(
@@ -69,7 +69,7 @@ impl MolaShots {
         Self::crossed(footprints, profiles, options).0
     }
 
-    /// The same, with the crossovers.
+    /// These shots, with the crossovers.
     pub(super) fn crossed(
         footprints: &Footprints<BodyFixed>,
         profiles: &[Profile],

@@ -1,4 +1,4 @@
-//! Windows defined by the view of an image: their outlines by the image's times and the kernels, before shots are
+//! Windows defined by the view of an image: their outlines from the image's times and the kernels, before shots are
 //! searched.
 
 use std::sync::atomic::AtomicBool;
@@ -36,7 +36,7 @@ stage_inputs! {
         pub kernels: &'a KernelView,
         /// Tolerance and padding.
         pub coverage: &'a KernelsConfig,
-        /// A pointing bias that is not that of the camera.
+        /// A pointing bias that replaces the camera's.
         pub pointing: &'a PointingConfig,
         /// The convention for light time.
         pub orientation: &'a OrientationConfig,
@@ -63,7 +63,7 @@ impl Stage for OutlineWindows<'_> {
 }
 
 impl OutlineWindows<'_> {
-    /// Outline of the view of an image, by its support data or by the kernels.
+    /// Outline of the view of an image, from its support data or from the kernels.
     fn seen(&self, times: &ImageTimes) -> Result<Option<Vec<GroundPoint>>> {
         if let Some(support) = &times.support {
             let nodes = Nodes::new(&CameraTables::of_support(&support.tables));
@@ -98,7 +98,7 @@ impl OutlineWindows<'_> {
     }
 }
 
-/// The windows of a site, those of images by their outlines.
+/// The windows of a site, with the outlines of images.
 #[derive(Debug, Clone, Copy)]
 pub struct Windows<'a> {
     /// As they are written.

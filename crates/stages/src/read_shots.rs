@@ -71,7 +71,7 @@ impl Input for ShotFiles<'_> {
 
 impl Stage for ReadShots<'_> {
     const NAME: &'static str = "search_footprints";
-    const METHOD: u32 = 5;
+    const METHOD: u32 = 6;
     const CHECKED: bool = true;
     type Output = SearchResult;
     stage_inputs!(fingerprint);
@@ -216,7 +216,7 @@ fn passes_off_nadir(footprints: &mut Footprints<AsRead>) -> Option<String> {
     let passes: Vec<String> = passes.collect();
     (!passes.is_empty()).then(|| {
         format!(
-            "passes off nadir, by ranges that are too long for the orbit of the others: {}; their spacecraft was not above \
+            "passes off nadir, with ranges too long for the orbit of the others: {}; their spacecraft was not above \
              the footprint",
             passes.join(", ")
         )
@@ -232,9 +232,9 @@ struct Gathered<'a> {
     seen: TableRows,
     /// Rows that repeat another one.
     repeated: u64,
-    /// Whether tables are of the Orbital Data Explorer: of the tables so far.
+    /// Whether tables are from the Orbital Data Explorer, for the tables so far.
     layouts: BTreeSet<bool>,
-    /// Names of tables that are a heading alone.
+    /// Names of tables that contain only a heading.
     without_rows: Vec<String>,
     result: SearchResult,
 }
@@ -327,9 +327,9 @@ impl Gathered<'_> {
         )];
         if self.layouts.contains(&true) {
             notes.push(
-                "Tables of the Orbital Data Explorer: planet_rad, corrected by crossovers, is both radii, and topography is \
-                 that of the table; the spacecraft is put on the radius through the footprint at the range (nadir by \
-                 range), because the tables have no position of it"
+                "Tables of the Orbital Data Explorer: planet_rad, corrected by crossovers, serves as both radii, and \
+                 topography is taken from the table; the spacecraft is placed on the radius through the footprint at \
+                 the range (nadir by range), because the tables do not state its position"
                     .to_owned(),
             );
             if !self.layouts.contains(&false) {

@@ -48,7 +48,7 @@ pub struct Ties {
     pub remarks: Vec<String>,
     /// Number of points that come from files.
     pub read: usize,
-    /// Pairs of images in which areograph measured tie points itself; these follow those of files.
+    /// Pairs of images in which areograph measured tie points itself; these follow the tie points of files.
     pub matched: Vec<MatchedPair>,
 }
 
@@ -57,7 +57,7 @@ stage_inputs! {
     pub struct ReadTies<'a> {
         /// Paths of the files.
         pub ties: &'a TiesConfig,
-        /// The same files with their hashes.
+        /// These files with their hashes.
         pub files: TieFiles<'a>,
         /// The images.
         pub images: ImageNames<'a>,

@@ -80,11 +80,11 @@ stage_inputs! {
         pub round: Round,
         /// Identifier of the image.
         pub image: &'a str,
-        /// Its place among the images of the adjustment.
+        /// Its index among the images of the adjustment.
         pub index: &'a usize,
         /// Its line times.
         pub times: &'a Output<ImageTimes>,
-        /// Its orientation by the kernels.
+        /// Its orientation from the kernels.
         pub orientation: &'a Output<Orientation>,
         /// The adjustment.
         pub adjusted: &'a Output<Adjusted>,
@@ -116,22 +116,22 @@ impl Stage for Reorient<'_> {
 /// The orientation of `image` after a correction.
 ///
 /// * `orientation` – as sampled from the kernels
-/// * `time_shift_lines` – `s`, by how many lines later than its tag a line was exposed
+/// * `time_shift_lines` – `s`, the number of lines by which a line was exposed later than its tag
 /// * `correction` – the correction at a line offset `x`, lines from the middle of the header image
 ///
 /// The line with the tag `x` gets the camera of `x + s`: `C(x) = C₀(x + s) + Δ(x)` and `M(x) = exp([θ(x)]×) M₀(x + s)`,
-/// all relative to Mars, as [`CorrectedOrientation`](areograph_geom::pushbroom::CorrectedOrientation) has it. Samples keep
-/// their epochs. Tables keep their nodes, except those that the shift moves beyond the known span. Positions are
-/// corrected in the same way in every convention for light time: light time and aberration remain those of the kernels'
-/// positions, which a correction of 100 m would change by 1 mm for `surface` and 1 cm for `centre`.
+/// all relative to Mars, as [`CorrectedOrientation`](areograph_geom::pushbroom::CorrectedOrientation) has it. Samples
+/// keep their epochs. Tables keep their nodes, except those that the shift moves beyond the known span. Positions are
+/// corrected in the same way in every convention for light time: light time and aberration remain the values for the
+/// kernels' positions, which a correction of 100 m would change by 1 mm for `surface` and 1 cm for `centre`.
 ///
 /// # Errors
 /// [`Kind::Input`](areograph_base::error::Kind::Input) for a shift beyond the camera tables; [`Kind::Bug`](areograph_base::error::Kind::Bug) for a correction that is not finite.
 /// # Accuracy
-/// Without a shift the samples are those of the kernels to rounding. With one they are read from the
+/// Without a shift, the samples agree with the kernels to rounding. With one they are read from the
 /// tables; [`CameraTables::interpolation`] then bounds the error of both steps together.
 /// # Source
-/// Shan et al. 2005 for the orientation; the time shift is our own, see `geom::bundle`.
+/// Shan et al. 2005 for the orientation; the time shift is not from a publication, see `geom::bundle`.
 pub fn reorient(
     orientation: &Orientation,
     image: &ImageTimes,
@@ -244,7 +244,7 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
         }
     }
 
-    /// Where rays start in IAU 2000 and the rotation from the camera to it, for the line with the tag `tag`.
+    /// Start of the rays in IAU 2000 and the rotation from the camera to this frame, for the line with the tag `tag`.
     fn camera(&self, tag: Et) -> Result<Camera> {
         let et = tag.plus(self.shift_s());
         let camera = self.nodes.camera(et);
@@ -253,7 +253,7 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
         self.corrected(tag, camera.position.xyz_m + missed.position_m, to_mars)
     }
 
-    /// The same by the tables.
+    /// The camera by the tables.
     fn tabulated(&self, tag: Et) -> Result<Camera> {
         let camera = self.nodes.camera(tag.plus(self.shift_s()));
         self.corrected(tag, camera.position.xyz_m, *camera.to_mars.matrix())

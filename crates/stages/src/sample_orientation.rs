@@ -42,7 +42,7 @@ stage_inputs! {
         pub kernels: &'a KernelView,
         /// Tolerance and padding.
         pub coverage: &'a KernelsConfig,
-        /// A pointing bias that is not that of the camera.
+        /// A pointing bias that replaces the camera's.
         pub pointing: &'a PointingConfig,
         /// Number of samples, and the convention for light time.
         pub orientation: &'a OrientationConfig,
@@ -131,7 +131,7 @@ fn finding(times: &ImageTimes, invalid_because: &[String]) -> String {
 
 /// Samples the orientation of `image`.
 ///
-/// Position and Mars rotation are those of the exposure, or of the instant that the convention for light time requires;
+/// Position and Mars rotation belong to the exposure, or to the instant that the convention for light time requires;
 /// attitude is read at the exposure plus the pointing bias.
 /// `R(camera → Mars) = R(J2000 → Mars) · R(J2000 → bus)ᵀ · R(bus → camera)ᵀ`.
 ///
@@ -176,11 +176,11 @@ pub fn sample_orientation(
     })
 }
 
-/// Makes sure, with as few readings as possible, that [`sample_orientation`] succeeds; returns why its orientation
-/// would be invalid.
+/// Makes sure, with as few readings as possible, that [`sample_orientation`] succeeds; returns the reasons why its
+/// orientation would be invalid.
 ///
-/// Positions and attitudes are read at the samples, more often where the samples are farther apart than those of the
-/// C-kernels, and at the ends of the camera tables. How far attitudes are extrapolated depends on every reading: where
+/// Positions and attitudes are read at the samples, more often where the samples are farther apart than the C-kernels'
+/// samples, and at the ends of the camera tables. How far attitudes are extrapolated depends on every reading: where
 /// the tolerance permits them to be extrapolated too far, all are made.
 fn require_orientation(
     session: &Session,
@@ -213,7 +213,7 @@ fn require_orientation(
     Ok(Vec::new())
 }
 
-/// Equally spaced epochs over the whole header image, both ends included.
+/// Equally spaced epochs over the complete header image, both ends included.
 fn epochs(image: &ImageTimes, intervals: u32) -> Vec<Et> {
     let step_s = image.duration_s() / f64::from(intervals);
     let epochs = (0..=intervals).map(|k| image.line_times.start().plus(f64::from(k) * step_s));
@@ -253,7 +253,7 @@ impl fmt::Display for HeldAttitudes {
     }
 }
 
-/// How many of the attitudes at `exposures` lie outside the C-kernels' intervals, if any do.
+/// Attitudes at `exposures` that lie outside the C-kernels' intervals, if there are any.
 fn held_attitudes<'e>(
     reader: &CameraReader<'_>,
     exposures: impl Iterator<Item = &'e Et>,

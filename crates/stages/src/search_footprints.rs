@@ -50,9 +50,9 @@ pub struct SearchResult {
     pub rejected: BTreeMap<ShotRejection, u64>,
     /// Records read.
     pub frames_read: u64,
-    /// Shots whose own position was tested, those of frames near a window.
+    /// Shots whose own position was tested, in frames near a window.
     pub shots_read: u64,
-    /// How files were interpreted, one sentence for each way, and which were copies of others.
+    /// Interpretation of the files, one sentence for each way, and the copies among them.
     pub notes: Vec<String>,
 }
 
@@ -67,7 +67,7 @@ stage_inputs! {
     pub struct SearchFootprints<'a> {
         /// Datum, filter, and the paths of the files.
         pub pedr: &'a PedrConfig,
-        /// The same files with their hashes.
+        /// These files with their hashes.
         pub files: PedrFiles<'a>,
         /// Indexes of their records.
         pub index: KnownPlaces<'a>,
@@ -98,7 +98,7 @@ impl Input for KnownPlaces<'_> {
 
 impl Stage for SearchFootprints<'_> {
     const NAME: &'static str = STAGE;
-    const METHOD: u32 = 5;
+    const METHOD: u32 = 6;
     const CHECKED: bool = true;
     type Output = SearchResult;
     stage_inputs!(fingerprint);
@@ -151,12 +151,12 @@ fn examine_file(path: &Path, choice: DatumChoice) -> Result<String> {
 ///
 /// Every shot is judged by its own position, in IAU 2000 at its time tag. `correction_s` is added to tags to give
 /// `et_s`. The result depends neither on the number of threads nor on `indexes`. A file with the bytes of an earlier
-/// one is not read again; a note says so. `watch` is checked before every piece of a file, and counts records.
+/// one is not read again; a note states this. `watch` is checked before every piece of a file, and counts records.
 ///
 /// # Errors
 /// A file that cannot be opened, holds no valid record, changes while it is read, or whose datum cannot be determined;
-/// two files that hold the same shot in a window; [`Stopped`](areograph_base::error::Stopped). Anything else wrong inside a file is a complaint; its
-/// good records are kept.
+/// two files that hold the same shot in a window; [`Stopped`](areograph_base::error::Stopped). Any other fault inside a
+/// file is a complaint; its good records are kept.
 pub fn search_footprints<'a>(
     pedr: &PedrConfig,
     files: &[HashedFile],
@@ -178,7 +178,7 @@ pub fn search_footprints<'a>(
         .collect();
     let mut gathered = Gathered::new(watch);
     let mut sources = Vec::with_capacity(files.len());
-    // In the order of the files, so that of several failures always the same one is reported.
+    // In the order of the files, so that one and the same of several failures is always reported.
     for (opened, file) in opened.into_iter().zip(files) {
         let source = opened.in_stage(STAGE)?;
         if gathered.enlist(&source, file) {
@@ -199,7 +199,7 @@ struct Gathered<'a> {
     watch: Watch<'a>,
     result: SearchResult,
     files: Vec<SourceFile>,
-    /// Which files are searched: others are copies.
+    /// Files that are searched: others are copies.
     searched: Vec<u16>,
     copies: Copies,
     understood: BTreeMap<String, u32>,
@@ -296,7 +296,7 @@ impl Sink for Gathered<'_> {
     }
 }
 
-/// How a file was interpreted.
+/// Interpretation of a file.
 fn understood(source: &Source) -> String {
     let software = source.software_version().map_or_else(
         || "unknown, treated as new".to_owned(),

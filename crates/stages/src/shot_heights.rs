@@ -28,7 +28,7 @@ pub(crate) struct Height {
 }
 
 impl Heights {
-    /// Of shots at these places, body-fixed, metres.
+    /// Heights from shots at these places, body-fixed, metres.
     pub(crate) const fn at(body: Body, shots_m: Vec<Vector3<f64>>) -> Self {
         Self { body, shots_m }
     }

@@ -38,7 +38,7 @@ use areograph_pds::{ImageLabel, read_label};
 use areograph_spice::{KernelView, Session};
 use areograph_store::{files::HashedFile, stage::Stage, stage_inputs};
 
-/// When and how the lines of an image were exposed.
+/// Times and settings of the exposure of an image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ImageTimes {
     /// Image identifier.
@@ -47,9 +47,9 @@ pub struct ImageTimes {
     pub body: Body,
     /// The camera.
     pub instrument: Instrument,
-    /// When its lines were exposed: all of the header image.
+    /// Exposure times of its lines: all of the header image.
     pub line_times: LineTimes,
-    /// Where their start comes from.
+    /// Source of their start.
     pub start_from: StartFrom,
     /// Clock string of the start, where the label has one.
     pub sclk_start: Option<String>,
@@ -69,7 +69,7 @@ pub struct ImageTimes {
     pub first_detector: u32,
     /// Whether its label states the end of its lines, with which their period was compared.
     pub has_stop_time: bool,
-    /// What the reader should know, one sentence each.
+    /// Notes for the reader, one sentence each.
     pub notes: Vec<String>,
     /// Disagreements that must be weighed, one sentence each.
     pub remarks: Vec<Disagreement>,
@@ -94,7 +94,7 @@ pub enum StartFrom {
 }
 
 impl ImageTimes {
-    /// Whether its positions are those of the spacecraft with the laser, so that ranges are measured from them.
+    /// Whether its positions belong to the spacecraft with the laser, so that ranges are measured from them.
     #[must_use]
     pub fn has_laser(&self) -> bool {
         match &self.support {
@@ -114,7 +114,7 @@ impl ImageTimes {
         )
     }
 
-    /// Exposure of the whole header image, seconds.
+    /// Exposure of the complete header image, seconds.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.line_times.duration_s()
@@ -145,8 +145,8 @@ impl ImageTimes {
     }
 }
 
-/// The pointing biases with which kernels are read for `images`: without images that of the usual camera, and none for
-/// images of support data only.
+/// The pointing biases with which kernels are read for `images`: without images the bias of the usual camera, and none
+/// for images of support data only.
 pub fn used_biases<'a>(
     pointing: &'a PointingConfig,
     images: impl IntoIterator<Item = &'a ImageTimes>,
@@ -180,7 +180,7 @@ stage_inputs! {
 
 impl Stage for TagTimes<'_> {
     const NAME: &'static str = "tag_times";
-    const METHOD: u32 = 10;
+    const METHOD: u32 = 11;
     const CHECKED: bool = true;
     type Output = ImageTimes;
     stage_inputs!(fingerprint);
@@ -301,7 +301,7 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
     }
     Ok(ImageTimes {
         id: image.id.clone(),
-        // Labels, clocks and kernels are those of a spacecraft at Mars.
+        // Labels, clocks and kernels belong to a spacecraft at Mars.
         body: Body::Mars,
         instrument,
         line_times,
@@ -345,7 +345,7 @@ fn lines_delivered(
     Ok(delivered)
 }
 
-/// The camera that the configuration names, else that of the label, else the first known one; and the label.
+/// The camera that the configuration names, else the label's, else the first known one; and the label.
 fn labelled(image: &ImageConfig) -> Result<(Instrument, Option<ImageLabel>)> {
     let Some(path) = &image.label else {
         let named = image.instrument.as_ref();

@@ -1,7 +1,7 @@
 //! Files appear under their final names complete or not at all.
 //!
-//! Files are written under another name, read back, flushed and renamed. The next command that writes into a folder
-//! removes what a killed one left there.
+//! Files are written under a temporary name, read back, flushed and renamed. The next command that writes into a folder
+//! removes the remains of a killed one.
 
 use std::{fs::File, io::Write as _, path::Path};
 
@@ -16,18 +16,18 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     write_parts(path, &[bytes])
 }
 
-/// The same for bytes in several consecutive parts.
+/// Writes bytes in several consecutive parts.
 ///
 /// # Errors
-/// Those of [`write()`].
+/// As [`write()`].
 pub fn write_parts(path: &Path, parts: &[&[u8]]) -> Result<()> {
     finish(StagedFile::create(path)?, parts)
 }
 
-/// The same at a path of the user, where an existing file is replaced only if it has this mark.
+/// Writes at a path of the user, where an existing file is replaced only if it has this mark.
 ///
 /// # Errors
-/// Those of [`write()`]; an existing file that areograph did not write.
+/// As [`write()`]; an existing file that areograph did not write.
 pub fn replace(path: &Path, bytes: &[u8], mark: Mark) -> Result<()> {
     finish(StagedFile::replacing(path, mark)?, &[bytes])
 }

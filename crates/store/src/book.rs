@@ -13,7 +13,7 @@ use std::{
 use super::stage::{Output, Round};
 use areograph_base::error::{Cause, Result};
 
-/// Outputs by type and round; those of a stage that runs once per image are a list in the order of the site.
+/// Outputs by type and round; outputs of a stage that runs once per image are a list in the order of the site.
 #[derive(Default)]
 pub struct Book {
     entries: BTreeMap<(TypeId, Round), Entry>,

@@ -75,8 +75,8 @@ impl StageCache {
         }
     }
 
-    /// The same with the hashes of stored outputs and products from earlier runs, to which those of this run are added; large
-    /// outputs are read on demand.
+    /// The cache with the hashes of stored outputs and products from earlier runs, to which hashes of this run are
+    /// added; large outputs are read on demand.
     #[must_use]
     pub fn knowing(self, own: InputFiles) -> Self {
         Self {
@@ -86,7 +86,7 @@ impl StageCache {
         }
     }
 
-    /// Whether an output that was to be read on demand could not be read. What was made since is not reliable.
+    /// Whether an output that was to be read on demand could not be read. Later results are not reliable.
     #[must_use]
     pub fn has_lost_output(&self) -> bool {
         self.lost.load(Ordering::Relaxed)
@@ -183,7 +183,7 @@ impl StageCache {
         let _ = fs::remove_file(self.path(stage));
     }
 
-    /// Discards all stages but these, such as those of an image that is no longer configured.
+    /// Discards all stages but these, such as stages of an image that is no longer configured.
     pub fn keep_only<'s>(&self, stages: impl IntoIterator<Item = &'s str>) {
         let kept: BTreeSet<PathBuf> = stages.into_iter().map(|stage| self.path(stage)).collect();
         let entries = fs::read_dir(&self.folder).into_iter().flatten().flatten();
@@ -204,7 +204,7 @@ fn path_in(folder: &Path, stage: &str) -> PathBuf {
     folder.join(stage.replace('/', "+"))
 }
 
-/// Whether the file begins like a stored output; files of other programs are not those of areograph to remove.
+/// Whether the file begins like a stored output; areograph does not remove files of other programs.
 fn is_stage_output(path: &Path) -> bool {
     let head = File::open(path)
         .ok()
@@ -297,7 +297,7 @@ mod tests {
         assert_eq!(why(&forced, 1), Some(Reason::Forced));
         cache.forget("search");
         assert_eq!(why(&cache, 1), Some(Reason::First));
-        // What exists and cannot be read.
+        // An entry that exists and cannot be read.
         fs::create_dir(&path).unwrap();
         assert_eq!(why(&cache, 1), Some(Reason::Damaged));
     }

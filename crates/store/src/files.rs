@@ -60,7 +60,7 @@ struct Seen {
 struct SeenFile {
     identity: Identity,
     file: HashedFile,
-    /// When it was read, seconds of UTC since 1970; `None` for a file that changed just before, or meanwhile.
+    /// Time at which it was read, seconds of UTC since 1970; `None` for a file that changed just before, or meanwhile.
     read_s: Option<u64>,
 }
 
@@ -87,8 +87,8 @@ pub struct Outside {
 #[cause(Configuration: "move the file below one of these folders, or have its folder added to them")]
 struct NotAdmitted(Outside);
 
-/// Why the file must not be read, if it lies below none of the folders `roots`, links followed. Without folders there
-/// is no restriction.
+/// Reason why the file must not be read, if it lies below none of the folders `roots`, links followed. Without folders
+/// there is no restriction.
 ///
 /// * `roots` – without links
 #[must_use]
@@ -111,7 +111,7 @@ fn listed(folders: &[PathBuf]) -> String {
 }
 
 impl InputFiles {
-    /// Those of a run that does not read known files of earlier runs again.
+    /// Input files of a run that does not read known files of earlier runs again.
     #[must_use]
     pub fn knowing(earlier: KnownFiles) -> Self {
         let checked = earlier.iter().filter(|file| file.checked > 0);
@@ -126,7 +126,7 @@ impl InputFiles {
         }
     }
 
-    /// The same for a run that may read only below the folders `roots`; see [`outside`].
+    /// Input files of a run that may read only below the folders `roots`; see [`outside`].
     #[must_use]
     pub fn within(self, roots: &[PathBuf]) -> Self {
         Self {
@@ -154,7 +154,7 @@ impl InputFiles {
         self.hash_from(path, 0)
     }
 
-    /// The same for a file that is always hashed from the same byte `start` on: known hashes do not contain it.
+    /// Hashes a file that is always hashed from the same byte `start` on: known hashes do not contain it.
     ///
     /// # Errors
     /// As [`Self::hash`].

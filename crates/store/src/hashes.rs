@@ -27,7 +27,7 @@ pub const HASHES: &str = ".hashes";
 /// Header of the file: its kind, and the form of its entries. BLAKE3 of the rest follows, then the entries in
 /// postcard.
 const HEADER: &[u8] = b"areograph hashes 1\n";
-/// How an earlier file of hashes is recognised.
+/// Mark by which an earlier file of hashes is recognised.
 const MARK: Mark = Mark {
     what: "a file of hashes that areograph wrote",
     at: MarkAt::Start(HEADER),
@@ -97,7 +97,8 @@ impl HashCache {
         }
     }
 
-    /// Replaces the stored hashes by those of a run over all files, because files that were replaced do not return.
+    /// Replaces the stored hashes by the hashes of a run over all files, because files that were replaced do not
+    /// return.
     pub fn keep_only(&self, files: &InputFiles) {
         if files.learnt().is_empty() || !self.folder().is_dir() {
             return;

@@ -41,7 +41,7 @@ impl SiteLock {
             .map_err(IoError::on("create the folder"))
             .in_file(folder)?;
         let path: PathBuf = folder.join(".lock");
-        // Its content, if any, is not that of areograph.
+        // Its content, if any, does not belong to areograph.
         let file = OpenOptions::new()
             .write(true)
             .create(true)

@@ -74,16 +74,16 @@ pub mod figures {
     pub const POINTING_RMSE_RAD: &str = "pointing_rmse_rad";
     /// Largest along-track parallax of two images at their tie points, metres.
     pub const ALONG_TRACK_PARALLAX_M: &str = "along_track_parallax_m";
-    /// The same with the adjusted orientation, metres.
+    /// Largest along-track parallax of two images at their tie points, adjusted orientation, metres.
     pub const ADJUSTED_ALONG_TRACK_PARALLAX_M: &str = "adjusted_along_track_parallax_m";
     /// |Median| height of tie points above the MOLA surface, metres.
     pub const HEIGHT_OFF_SURFACE_M: &str = "height_off_surface_m";
-    /// The same with the adjusted orientation, metres.
+    /// |Median| height of tie points above the MOLA surface, adjusted orientation, metres.
     pub const ADJUSTED_HEIGHT_OFF_SURFACE_M: &str = "adjusted_height_off_surface_m";
     /// A posteriori standard deviation of unit weight of the adjustment.
     pub const ADJUSTMENT_SIGMA0: &str = "adjustment_sigma0";
 
-    /// Root mean square deviation of images of ties in a net of pictures, the larger coordinate, metres.
+    /// Root mean square deviation of tie-point images in a net of pictures, the larger coordinate, metres.
     pub const TIE_DEVIATION_RMS_M: &str = "tie_deviation_rms_m";
     /// Root mean square residual of the kept controls of a net, the larger coordinate, metres.
     pub const CONTROL_RESIDUAL_RMS_M: &str = "control_residual_rms_m";
@@ -120,7 +120,7 @@ pub mod figures {
         ),
         (
             ADJUSTED_ALONG_TRACK_PARALLAX_M,
-            "The same with the adjusted orientation, metres.",
+            "Largest along-track parallax of two images at their tie points, adjusted orientation, metres.",
         ),
         (
             HEIGHT_OFF_SURFACE_M,
@@ -128,7 +128,7 @@ pub mod figures {
         ),
         (
             ADJUSTED_HEIGHT_OFF_SURFACE_M,
-            "The same with the adjusted orientation, metres.",
+            "|Median| height of tie points above the MOLA surface, adjusted orientation, metres.",
         ),
         (
             ADJUSTMENT_SIGMA0,
@@ -136,7 +136,7 @@ pub mod figures {
         ),
         (
             TIE_DEVIATION_RMS_M,
-            "Root mean square deviation of images of ties in a net of pictures, the larger coordinate, metres.",
+            "Root mean square deviation of tie-point images in a net of pictures, the larger coordinate, metres.",
         ),
         (
             CONTROL_RESIDUAL_RMS_M,

@@ -16,13 +16,13 @@ use areograph_base::error::{Cause, IoError, Locate, Result};
 /// File of the page over all sites, in the folder that holds the sites' folders.
 pub const SITES_PAGE: &str = "index.html";
 
-/// Pages of areograph: those of products, differences and comparisons end with the same line.
+/// Pages of areograph: pages of products, differences and comparisons end with the same line.
 pub const PAGE: Mark = Mark {
     what: "a page that areograph wrote",
     at: MarkAt::Tail("<footer>Made by areograph ", 200),
 };
 
-/// Why a page must not be written to a path.
+/// Reasons why a page must not be written to a path.
 #[derive(Debug, thiserror::Error, Cause)]
 #[cause(Configuration)]
 pub enum PageError {

@@ -43,7 +43,7 @@ pub(super) const JOURNAL: &str = ".publishing";
 /// The manifest of the products that preceded the present ones.
 pub const PREVIOUS: &str = ".previous.json";
 
-/// Why the last run of the site failed; absent after a successful run.
+/// Reason why the last run of the site failed; absent after a successful run.
 const FAILED: &str = ".failed";
 
 /// Stores why a run of the site failed, for the page over all sites; `None` if it succeeded.
@@ -58,7 +58,7 @@ pub fn note_failure(site_folder: &Path, failure: Option<&str>) {
     }
 }
 
-/// Why the last run of the site failed.
+/// Reason why the last run of the site failed.
 #[must_use]
 pub fn last_failure(site_folder: &Path) -> Option<String> {
     fs::read_to_string(site_folder.join(FAILED)).ok()
@@ -166,7 +166,7 @@ pub fn entries(staging: &Path, files: &[(PathBuf, u64)]) -> Result<Vec<ProductEn
         .collect()
 }
 
-/// Products of another kind in the folder, which a publication would remove.
+/// Products of a different kind in the folder, which a publication would remove.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("the folder contains other products: {name}, made by {stage}")]
 #[cause(Configuration: "give it another name, or its products another folder (--out)")]
@@ -252,7 +252,7 @@ fn paths_of_damaged(manifest: &Path) -> Vec<String> {
 /// Renames staged products into place, removes earlier ones that are no longer made, writes the manifest last.
 ///
 /// # Errors
-/// Products of another kind; a file in the place of a product that areograph did not write; a file that cannot be
+/// Products of a different kind; a file in the place of a product that areograph did not write; a file that cannot be
 /// renamed or removed: publishing again repairs the folder.
 pub fn publish(site_folder: &Path, staging: &Path, manifest: &Manifest) -> Result<()> {
     require_same_kind(site_folder, manifest)?;
@@ -301,7 +301,7 @@ pub fn publish(site_folder: &Path, staging: &Path, manifest: &Manifest) -> Resul
         .in_file(staging)
 }
 
-/// Keeps the manifest of the folder, if its products differ from those of `next`.
+/// Keeps the manifest of the folder, if its products differ from the products of `next`.
 fn keep_previous(site_folder: &Path, next: &Manifest) -> Result<()> {
     match read_manifest(site_folder) {
         Some(standing) if standing.products != next.products => {
@@ -318,7 +318,7 @@ pub fn read_previous(site_folder: &Path) -> Option<Manifest> {
     serde_json::from_str(&text).ok()
 }
 
-/// Products that earlier runs may have left: those of the manifest and of an unfinished journal.
+/// Products that earlier runs may have left, from the manifest and an unfinished journal.
 ///
 /// Paths that lead out of the site's folder, which areograph never writes, are left out.
 fn earlier_products(site_folder: &Path) -> BTreeSet<String> {

@@ -9,7 +9,7 @@ use super::{
 use crate::files::short_hash;
 use areograph_base::error::{Cause, IoError, Locate, Result};
 
-/// Why products in a folder are not to be used.
+/// Reasons why products in a folder are not to be used.
 #[derive(Debug, thiserror::Error, Cause)]
 #[cause(Input)]
 pub enum PublishedError {
@@ -32,7 +32,7 @@ pub enum PublishedError {
     #[error("these are products of areograph {found}; expected {}, the running version", env!("CARGO_PKG_VERSION"))]
     #[cause("run the site again with this version, or use the other version")]
     OtherVersion {
-        /// That version.
+        /// The version of the products.
         found: String,
     },
     /// A product differs from the published one.
@@ -54,7 +54,7 @@ pub enum PublishedError {
     Replaced,
 }
 
-/// Whether the folder is, or was meant to be, that of a site's products.
+/// Whether the folder contains, or was meant to contain, a site's products.
 #[must_use]
 pub fn is_site_folder(folder: &Path) -> bool {
     folder.join(MANIFEST).exists() || has_work(folder)
@@ -68,7 +68,7 @@ pub fn read_published(folder: &Path) -> Result<Manifest> {
     read_published_but(folder, |_| false)
 }
 
-/// The same without the products, by their path, that will be made again; only of this version of areograph.
+/// Reads them without the products, by their path, that will be made again; only of this version of areograph.
 ///
 /// # Errors
 /// As [`read_published`], and [`PublishedError::OtherVersion`].

@@ -1,4 +1,4 @@
-//! Orientation and points of the Eos pair as Shan, Lee & Yoon 2002 print them.
+//! Orientation and points of the Eos pair as Shan, Lee & Yoon 2002 publish them.
 
 use areograph_base::units::RADIANS_PER_DEGREE;
 use areograph_geom::pushbroom::{EulerPolynomial, VectorPolynomial};
@@ -23,7 +23,7 @@ pub const RIGHT: Ends = Ends {
     lines: 9_856.0,
     line_period_s: 1.807_8e-3,
 };
-/// The start Y of "right" as printed.
+/// The start Y of "right" as published.
 const MISPRINTED_Y_KM: f64 = -2_453.358;
 /// "Left": E04-01275.
 pub const LEFT: Ends = Ends {
@@ -69,7 +69,7 @@ impl Ends {
         }
     }
 
-    /// The same with the start Y as printed.
+    /// The pair with the start Y as published.
     pub fn misprinted(&self) -> Self {
         let [x, _, z] = self.start_km;
         Self {

@@ -1,4 +1,4 @@
-//! What tests of several crates share: real data, expected texts, recipes of published simulations.
+//! Resources shared by tests of several crates: real data, expected texts, recipes of published simulations.
 //!
 //! Real data are in `AREOGRAPH_DATA`, or beside the checkout in `shared/data`. A test whose external input is missing
 //! records that it was skipped; `scripts/test` counts these records.

@@ -152,7 +152,7 @@ pub fn pair([latitude_deg, longitude_deg]: [f64; 2]) -> [Scene; 2] {
     [nadir, aimed(&nadir, -2.45)]
 }
 
-/// An image from an orbit `east_deg` beside that of `nadir`, aimed at the same ground.
+/// An image from an orbit `east_deg` beside the orbit of `nadir`, aimed at the same ground.
 pub fn aimed(nadir: &Scene, east_deg: f64) -> Scene {
     let oblique = Scene {
         longitude_deg: nadir.longitude_deg + east_deg,

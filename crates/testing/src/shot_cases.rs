@@ -7,7 +7,7 @@ use areograph_base::{
     footprints::{AsRead, Footprint, Footprints, SourceFile},
 };
 
-/// Successive shots 0.1 s apart: microseconds from the start to the first one, and how many.
+/// Successive shots 0.1 s apart: microseconds from the start to the first one, and their number.
 pub type Run = (i64, u32);
 
 /// Some files, in the order in which they are searched.

@@ -13,7 +13,7 @@ use crate::{
     geom::window::{Region, WindowShape},
 };
 
-/// What the names of tables leave open.
+/// Ambiguities of the names of tables.
 #[derive(Debug, thiserror::Error, Cause)]
 #[cause(Configuration)]
 enum Unclear {
@@ -36,7 +36,7 @@ struct Piece {
     of: ShotBox,
 }
 
-/// What a site needs, and notes for the reader of the plan.
+/// Needs of a site, and notes for the reader of the plan.
 pub(super) fn wishes(
     site: &SiteConfig,
     globs: &[Vec<ShotGlob>],
@@ -134,7 +134,7 @@ fn boxes_deg(shape: &WindowShape) -> Vec<[f64; 4]> {
 
 /// The tables behind a path or glob.
 ///
-/// A glob has one for each box, `*` being its name. A path is that of the only box, or of the box of its name.
+/// A glob has one for each box, `*` being its name. A path belongs to the only box, or to the box of its name.
 fn tables(glob: &ShotGlob, pieces: &[Piece]) -> std::result::Result<Vec<ShotTable>, Unclear> {
     let is_wild = |text: &str| text.contains(['*', '?', '[']);
     let shown = || glob.path.display().to_string();

@@ -1,4 +1,4 @@
-//! What a fetch prints.
+//! Output of a fetch.
 
 use crate::{
     cli::output,
@@ -32,7 +32,7 @@ pub(super) fn plan(plan: &Plan, standing: &[Standing]) {
         let standing = match standing {
             Standing::Present => "present".to_owned(),
             Standing::Unknown => "present, to be compared".to_owned(),
-            Standing::Other => "present, but another file".to_owned(),
+            Standing::Other => "present, but a different file".to_owned(),
             Standing::Begun(bytes) => format!("{} have arrived", size(*bytes)),
             Standing::Missing => "missing".to_owned(),
         };

@@ -1,4 +1,4 @@
-//! What is wanted, by site files and options.
+//! Requested files, by site files and options.
 
 use std::path::{Path, PathBuf};
 
@@ -17,7 +17,7 @@ use crate::{
 /// Seconds of a day.
 const DAY_S: f64 = 86_400.0;
 
-/// What the site file leaves open.
+/// Ambiguities of the site file.
 #[derive(Debug, thiserror::Error, Cause)]
 #[cause(Configuration)]
 enum Unclear {
@@ -26,7 +26,7 @@ enum Unclear {
     PedrFolder(String),
 }
 
-/// What is wanted, and notes for the reader of the plan.
+/// The request, and notes for the reader of the plan.
 pub(super) struct Wanted {
     pub(super) wish: Wish,
     pub(super) notes: Vec<String>,
@@ -41,7 +41,7 @@ pub(super) fn days(text: &str) -> std::result::Result<[Utc; 2], String> {
     let (first, last) = days
         .filter(|(first, last)| first <= last)
         .ok_or_else(expected)?;
-    // The last day is meant as a whole.
+    // The last day is included completely.
     Ok([first, last.plus(DAY_S)])
 }
 
@@ -121,7 +121,7 @@ impl Wanted {
         Ok(wanted)
     }
 
-    /// Adds the needs of a site; what no archive has is a note.
+    /// Adds the needs of a site; a need that no archive meets becomes a note.
     fn add(&mut self, unfilled: Unfilled) -> Result<()> {
         let Unfilled {
             site,

@@ -31,9 +31,9 @@ pub(super) struct Arguments {
     /// File to write; its extension (.png, .tif, .tiff) determines the format.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// 16 bits: relative radiance by gain, offset and exposure, and the offset between odd and even detectors removed
-    /// (narrow angle without summing). The values do not suit geometry, and are not reflectance, whose constants are not
-    /// public. The command refuses images whose gain changes from line to line.
+    /// 16 bits: relative radiance from gain, offset and exposure, with the offset between odd and even detectors
+    /// removed (narrow angle without summing). The values do not suit geometry, and are not reflectance, whose
+    /// constants are not public. The command refuses images whose gain changes from line to line.
     #[arg(long)]
     calibrate: bool,
     /// Also write a mask of good (255), suspect (128) and missing (0) lines, in one of the same formats.

@@ -22,11 +22,12 @@ use crate::{
 /// Cubes and pictures may replace images of the archive. Values other than bytes are scaled, the least to 1 and the
 /// largest to 255, and statistics refer to the scaled values.
 ///
-/// Statistics and the hash are those of the decoded 8-bit pixels in the order of the file; missing lines are excluded.
-/// A line is suspect if it comes from damaged data, or if its place in the image is unknown. A damaged file is not a
-/// failure as long as part of it can be read. Of an ISIS cube, `cube` states the part of the camera's image, the map projection,
-/// and whether its tables or the state of its camera model orient the image (`images.cube`), or why not. `exposures` are the line
-/// times in a file of HRSC, in the form of `images.exposures`: first line, its start in ET seconds, line period in milliseconds.
+/// Statistics and the hash refer to the decoded 8-bit pixels in the order of the file; missing lines are excluded. A
+/// line is suspect if it comes from damaged data, or if its place in the image is unknown. A damaged file is not a
+/// failure as long as part of it can be read. Of an ISIS cube, `cube` states the part of the camera's image, the map
+/// projection, and whether its tables or the state of its camera model orient the image (`images.cube`), or why not.
+/// `exposures` are the line times in an HRSC file, in the form of `images.exposures`: first line, its start in ET
+/// seconds, line period in milliseconds.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: areograph image info e0202855.imq --json")]
 pub(super) struct Arguments {
@@ -38,7 +39,7 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-/// Complaints printed for a file; all are counted.
+/// Complaints shown for a file; all are counted.
 const COMPLAINTS_PRINTED: usize = 20;
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
@@ -122,7 +123,7 @@ fn info(path: &Path) -> Result<Value, Error> {
     }))
 }
 
-/// What a cube is; `None` for another file.
+/// Description of a cube; `None` for a different file.
 fn cube(path: &Path) -> Result<Option<Value>, Error> {
     if !is_cube_file(path)? {
         return Ok(None);

@@ -33,7 +33,7 @@ struct Found {
     outline: ImageOutline,
     /// Identifiers of the windows that it intersects.
     windows: Vec<String>,
-    /// Largest distance of a corner from its position by the kernels, metres; `None` if unknown.
+    /// Largest distance of a corner from its position according to the kernels, metres; `None` if unknown.
     off_kernels_m: Option<f64>,
 }
 
@@ -88,7 +88,7 @@ pub(in crate::cli) struct Proposed {
     pub(in crate::cli) id: String,
     /// Name of its file in the archive, lower case.
     pub(in crate::cli) file: String,
-    /// Why it is proposed.
+    /// Reason why it is proposed.
     pub(in crate::cli) why: String,
 }
 

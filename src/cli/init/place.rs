@@ -3,18 +3,17 @@
 use std::{
     collections::BTreeMap,
     f64::consts::PI,
-    fs,
     path::{Path, PathBuf},
 };
 
 use clap::Args;
 use serde::Deserialize;
 
-use super::{Arguments, Refused, identifier, seen};
+use super::{Arguments, Refused, identifier, in_new_folder, seen};
 use crate::{
     cli::{image::propose, output},
     config::{NewSite, parse_unfilled, window_of_box},
-    error::{Cause, Error, IoError, Locate as _},
+    error::{Cause, Error, Locate as _},
     files::file_name,
     store::atomic,
     units::METRES_PER_KM,
@@ -47,7 +46,7 @@ impl PlaceArguments {
     }
 }
 
-/// Why no site is proposed.
+/// Reasons why no site is proposed.
 #[derive(Debug, thiserror::Error, Cause)]
 enum NoPlace {
     #[error("unknown place {name:?}; expected {known}")]
@@ -155,11 +154,10 @@ pub(super) fn run(arguments: &Arguments, folder: &Path) -> Result<(), Error> {
         ..NewSite::default()
     };
     let text = new.text();
-    fs::create_dir_all(folder)
-        .map_err(IoError::on("create the folder"))
-        .in_file(folder)?;
-    parse_unfilled(&text, &file)?;
-    atomic::write(&file, text.as_bytes())?;
+    in_new_folder(folder, || {
+        parse_unfilled(&text, &file)?;
+        atomic::write(&file, text.as_bytes())
+    })?;
     for image in &proposed {
         output::line(format_args!("image {}: {}", image.id, image.why));
     }

@@ -23,10 +23,10 @@ use crate::{
 
 /// Compares rival kernel sets: how far the orbit and the attitude of each are from the mean of all.
 ///
-/// Orbits are positions of MGS from Mars (geometric, J2000) along the radial, along-track and cross-track
-/// axes of the mean orbit. The set with the least root mean square distance from the mean is closest: the
-/// rule by which Shan et al. 2005 chose. Epochs are equally spaced over the time that all sets cover, 1 s
-/// apart or, beyond 10000 epochs, far enough apart to keep that number; gaps of each set are listed.
+/// Orbits are positions of MGS from Mars (geometric, J2000) along the radial, along-track and cross-track axes of the
+/// mean orbit. The set with the least root mean square distance from the mean is closest, as in Shan et al. 2005.
+/// Epochs are equally spaced over the time that all sets cover, 1 s apart or, beyond 10000 epochs, far enough apart to
+/// keep that number; gaps of each set are listed.
 ///
 /// Example: `areograph kernels compare nav.tm gsfc.tm ipng.tm --site gusev_crater.toml`
 #[derive(Debug, Args)]
@@ -142,7 +142,7 @@ fn named(paths: &[PathBuf]) -> Result<Vec<RivalSet>, Error> {
     sets.collect()
 }
 
-/// The same interval for positions and attitudes; `kernels` convert its ends.
+/// One interval for positions and attitudes; `kernels` convert its ends.
 fn wanted_by_time(
     written: &str,
     bias: PointingBias,

@@ -24,11 +24,11 @@ use crate::{
     units::RADIANS_PER_DEGREE,
 };
 
-/// Finds the crossovers of the profiles of an archive in windows, and estimates how far each profile is shifted.
+/// Finds the crossovers of the profiles of an archive in windows, and estimates the shift of each profile.
 ///
-/// The answer is JSON: every crossover with its position, the difference of the two heights and the standard deviation of
-/// that; for each profile its shift to the east, to the north and along the radius with covariance; and profiles that do
-/// not belong to the others. Profiles are named by window and orbit. Shifts are relative: what all profiles share is not
+/// The answer is JSON: every crossover with its position, the difference of the two heights and its standard deviation;
+/// for each profile its shift to the east, to the north and along the radius with covariance; and profiles that do not
+/// belong to the others. Profiles are named by window and orbit. Shifts are relative: what all profiles share is not
 /// determined.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("where").required(true).multiple(true).args(["boxes", "polygons", "windows"]))]

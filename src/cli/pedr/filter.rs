@@ -23,7 +23,8 @@ pub(super) struct FilterArguments {
     /// Largest off-nadir angle of the laser, degrees.
     #[arg(long, value_name = "DEGREES", default_value = "90", value_parser = above_to(0.0, ShotFilter::OFF_NADIR_LIMIT_DEG), allow_negative_numbers = true)]
     off_nadir_max_deg: f64,
-    /// First and last areocentric longitude of the Sun, degrees: the season of Mars; first above last is over 0.
+    /// First and last areocentric longitude of the Sun, degrees: the season of Mars; if the first exceeds the last, the
+    /// interval contains 0.
     #[arg(long, value_name = "FIRST,LAST", default_value = "0,360", value_parser = season)]
     solar_longitude_deg: [f64; 2],
 }

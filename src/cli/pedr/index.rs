@@ -138,7 +138,7 @@ impl Outcome {
     }
 }
 
-/// How the file differs from the indexed one.
+/// Difference of the file from the indexed one.
 fn altered(path: &Path, known: &IndexedFile) -> Result<Option<Altered>, Error> {
     let (is, _) = hash_file(path)?;
     let was = known.blake3();

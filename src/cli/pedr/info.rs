@@ -41,7 +41,7 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-/// Complaints printed for a file; all are counted.
+/// Complaints shown for a file; all are counted.
 const COMPLAINTS_PRINTED: usize = 20;
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
@@ -143,7 +143,7 @@ fn add_utc(
 
 /// The answer as a table; counts and statistics are on separate lines.
 ///
-/// * `counts` – those of a PEDR file
+/// * `counts` – counts of a PEDR file
 fn print(counts: Option<&Counts>, answer: &Value) {
     for (key, value) in answer.as_object().into_iter().flatten() {
         let counted = match (key.as_str(), counts) {

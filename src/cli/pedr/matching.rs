@@ -39,10 +39,10 @@ pub(super) struct Arguments {
     /// An image of the stereo model, by its support data; give two or more, with the names of the cameras of the calibration.
     #[arg(long, value_name = "NAME=FILE", value_parser = image)]
     isd: Vec<(String, PathBuf)>,
-    /// Radius of the sphere to which heights of the model refer; the default is that of the map in the file.
+    /// Radius of the sphere to which heights of the model refer; the default is the radius of the map in the file.
     #[arg(long, value_name = "METRES")]
     radius_m: Option<f64>,
-    /// Heights refer to the sphere of --radius-m, not to that of the map in the file.
+    /// Heights refer to the sphere of --radius-m, not to the sphere of the map in the file.
     #[arg(long, requires = "radius_m")]
     heights_apart: bool,
     /// Maximum number of shots in a segment.
@@ -61,7 +61,7 @@ pub(super) struct Arguments {
     /// Similarity that a unit must exceed, below 1.
     #[arg(long, default_value_t = 0.9, value_parser = share)]
     least_score: f64,
-    /// Ratio of the best similarity to the mean of those above 0 that a unit must exceed.
+    /// Ratio of the best similarity to the mean of all similarities above 0; a unit must exceed it.
     #[arg(long, default_value_t = 1.0, value_parser = above_zero)]
     least_contrast: f64,
     /// Largest root mean square of model minus laser at all withheld shots, bias removed, metres.
@@ -154,7 +154,7 @@ impl Arguments {
     }
 }
 
-/// Matches and prints the outcome.
+/// Matches and reports the outcome.
 pub(super) fn run(arguments: &Arguments) -> ExitCode {
     let request = match arguments.request() {
         Ok(request) => request,

@@ -39,7 +39,7 @@ struct NotInOrder {
     before: String,
 }
 
-/// Complaints that are printed and kept with their text; all are counted.
+/// Complaints that are shown and kept with their text; all are counted.
 const COMPLAINTS_MAX: usize = 20;
 
 pub(super) fn run(arguments: &Arguments) -> Result<()> {
@@ -118,7 +118,7 @@ fn tell_of(source: &Source) -> Value {
 struct Answer {
     file: Option<ShotsFile>,
     files: Vec<SourceFile>,
-    /// The same for readers of the answer.
+    /// The files for readers of the answer.
     told_files: Vec<Value>,
     /// Rows of tables that repeat others; `None` in a search of PEDR files.
     repeated: Option<u64>,
@@ -143,7 +143,7 @@ struct Answer {
 }
 
 impl Answer {
-    /// Creates the file of the shots, if one is requested.
+    /// Creates the shot file if one is requested.
     fn create(&mut self, arguments: &Arguments, format: Option<RowsFormat>) -> Result<()> {
         if let (Some(format), Some(out)) = (format, &arguments.out) {
             let (sources, window_ids) = (self.files.clone(), self.window_ids.clone());

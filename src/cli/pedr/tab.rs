@@ -91,7 +91,7 @@ const TABLE: Mark = Mark {
     what: "a table that areograph wrote",
     at: MarkAt::List,
 };
-/// Complaints printed of a file; all are counted.
+/// Complaints shown for a file; all are counted.
 const COMPLAINTS_PRINTED: usize = 20;
 
 pub(super) fn run(arguments: &Arguments) -> Result<()> {

@@ -94,15 +94,15 @@ pub(super) fn described(table: &SearchedTable) -> Value {
 pub(super) fn state_nadir_by_range(answer: &mut Value) {
     answer["nadir_by_range"] = true.into();
     answer["range_minus_distance_m"] = Value::Null;
-    answer["remark"] = "a table has no position of the spacecraft: the position is taken on the radius through the footprint, \
-        at the range, so that a comparison of range and distance tests nothing"
+    answer["remark"] = "a table has no position of the spacecraft: the position is taken on the radius through the \
+        footprint, at the range, so that a comparison of range and distance does not apply"
         .into();
 }
 
 /// Passes off nadir in an answer.
 pub(super) fn passes(passes: &[OffNadirPass]) -> Value {
     let passes = passes.iter().map(|pass| {
-        // A hundredth of a degree: the orbit of the others is known to some kilometres.
+        // A hundredth of a degree: the orbit of the others is known to a few kilometres.
         let off_nadir_deg = (pass.angle_rad.to_degrees() * 100.0).round() / 100.0;
         json!({"orbit": pass.orbit, "off_nadir_deg": off_nadir_deg})
     });

@@ -18,7 +18,7 @@ use crate::{
 pub struct ArchiveProgress {
     /// Files that are done, those whose result was stored included.
     pub files_done: usize,
-    /// Of them, those whose result was stored.
+    /// Number of these whose result was stored.
     pub files_stored: usize,
     /// All files.
     pub files: usize,
@@ -36,7 +36,7 @@ pub(super) struct Part {
     pub(super) file: usize,
     /// Its size.
     pub(super) bytes: u64,
-    /// The part, or why it is missing; then no further part follows.
+    /// The part, or the reason why it is missing; then no further part follows.
     pub(super) loaded: Result<(Arc<ArchiveSource>, Load)>,
 }
 

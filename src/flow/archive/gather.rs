@@ -19,7 +19,7 @@ pub(super) struct Gathered {
     pub(super) files: Vec<CheckedFile>,
     /// Copies of other files.
     pub(super) copies: Vec<FileCopy>,
-    /// Why files are left out.
+    /// Reasons why files are left out.
     pub(super) failures: Vec<Error>,
 }
 

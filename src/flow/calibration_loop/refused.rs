@@ -67,7 +67,7 @@ impl FewUnits {
     }
 }
 
-/// The pixels of a camera, which must be those of its whole image.
+/// The pixels of a camera, which must cover its complete image.
 pub(super) fn pixels_of(camera: &CameraConfig, line: &LineCamera) -> Result<Pyramid> {
     let id = || camera.id.clone();
     let Some(path) = &camera.pixels else {

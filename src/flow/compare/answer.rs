@@ -22,7 +22,7 @@ pub fn comparison_schema() -> DocumentSchema {
 #[schemars(
     title = "Comparison of rival kernel sets",
     description = "Answer of `areograph kernels compare --json`: how far the orbit and the attitude of each set are \
-                   from the mean of all. Members end in their unit; what is unknown is left out."
+                   from the mean of all. Members end in their unit; unknown values are omitted."
 )]
 pub struct Answer<'a> {
     #[schemars(extend("const" = "areograph kernel comparison 1"))]
@@ -198,7 +198,7 @@ impl Moments {
 }
 
 impl<'a> Answer<'a> {
-    /// What was found.
+    /// The findings.
     #[must_use]
     pub fn of(compared: &'a Compared) -> Self {
         Self {

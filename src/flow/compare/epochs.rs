@@ -18,7 +18,7 @@ pub(super) fn turn_epochs(
     request: &Request<'_>,
     notes: &mut Vec<String>,
 ) -> (Vec<Et>, Vec<Gap>) {
-    // The time of C-kernels is shifted against that of exposures.
+    // The time of C-kernels is shifted against the time of exposures.
     let shift_s = -request.bias.seconds();
     let turned: Vec<Intervals> = held
         .iter()

@@ -14,7 +14,7 @@ pub struct Uncovered {
     pub what: &'static str,
     /// The interval.
     pub interval: Interval,
-    /// The same in UTC.
+    /// The interval in UTC.
     pub utc: [String; 2],
 }
 

@@ -65,7 +65,20 @@ fn hold_where_everything_errs(seeds: Vec<u32>, grounds: &[Roughness]) {
         "{} lost",
         ties.lost
     );
-    let kept = all.iter().flat_map(|site| &site.judged.kept_blunders);
-    let kept: Vec<&String> = kept.collect();
-    assert!(kept.is_empty(), "{kept:?}");
+    // A tie point farther from the surface than 3.29 but not `adjustment.height_blunder_limit` standard deviations is kept, and the
+    // distance is in its standard deviation.
+    for site in &all {
+        let judged = &site.judged;
+        assert!(
+            judged.kept_blunder_sigmas < 3.0,
+            "{:?}",
+            judged.kept_blunders
+        );
+    }
+    // One in 60 of the blunders, which are one in twenty of all.
+    assert!(
+        1_200 * ties.kept_blunders <= ties.good.max(1_200),
+        "{} blunders kept",
+        ties.kept_blunders
+    );
 }

@@ -65,6 +65,7 @@ const UNCHANGED: Kind = Kind {
 
 const ATTITUDE: &str = "an attitude error that all images share";
 const LINE_TIMES: &str = "an error that the start times of all images";
+const DISTORTION: &str = "a distortion of the camera across the track";
 const SHOTS: &str = "errors that ranges and radii of the shots share";
 const ACROSS: &str = "errors of single tie points across the track";
 const RADII: &str = r#"["shot_radii", "mid_radius"]"#;
@@ -157,7 +158,7 @@ const KINDS: &[Kind] = &[
             in_ties(
                 case,
                 |second, at| if second { at.map(|at| at + 0.5) } else { at },
-            )
+            );
         },
         ..UNCHANGED
     },
@@ -169,6 +170,7 @@ const KINDS: &[Kind] = &[
                 [line, sample + 2.0 * off * off]
             });
         },
+        answer: Answer::NotTested(DISTORTION),
         ..UNCHANGED
     },
     Kind {
@@ -370,7 +372,7 @@ Sites that are valid with remarks count as valid. *Answer*:
 - *stated as not tested*: a ratio exceeds these limits. Terminal, page and manifest list errors of this kind as not tested; larger ones can
   make a site invalid.
 
-A drift of 0.08 mrad is eight times the standard deviation that areograph assumes. Tie points determine this drift, but two thirds of the sites
+A drift of 0.08 mrad is eight times the standard deviation that areograph assumes. Tie points determine this drift, but 7 of 12 sites
 are invalid, because their corrections exceed `limits.correction_max_sigma`. The limit is kept: no other check detects a wrong
 `CROSSTRACK_SUMMING` in both labels, which moves the ground by 707 m.
 

@@ -1,4 +1,4 @@
-//! What was declared, as data: for the example, the schema, and tests that walk all keys.
+//! The declarations, as data: for the example, the schema, and tests that walk all keys.
 
 use std::fmt;
 
@@ -43,7 +43,7 @@ impl fmt::Display for Accept {
     }
 }
 
-/// One of the words that a key takes.
+/// One of the words that a key accepts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Word {
     /// As written in the file.
@@ -64,7 +64,7 @@ pub enum ValueKind {
     Form {
         /// In words.
         expected: String,
-        /// The same, or less, as a regular expression (ECMA 262).
+        /// The expected form, or part of it, as a regular expression (ECMA 262).
         pattern: &'static str,
     },
     /// The path of an existing file.

@@ -75,7 +75,7 @@ impl<F, P> Key<F, P> {
         self.unused_in(0, toml)
     }
 
-    /// The same for entry `entry` of a list of tables.
+    /// The commented-out value for entry `entry` of a list of tables.
     pub(crate) fn unused_in(mut self, entry: usize, toml: &'static str) -> Self {
         self.examples.push(Example {
             entry,
@@ -122,7 +122,7 @@ impl<F: Form, P: Presence<F::Value>> Declare for Key<F, P> {
 
 /// Whether a key may be absent, and its value then.
 pub(crate) trait Presence<V> {
-    /// What the field holds.
+    /// The type of the field.
     type Value;
 
     fn settle(self, value: Option<V>) -> Self::Value;

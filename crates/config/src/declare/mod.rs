@@ -34,7 +34,7 @@ pub(super) use key::{group, key, of_the_file, table, tables};
 pub(super) use reader::{Keys, described, no_repeats, suggestion};
 pub(super) use schema::schema;
 
-/// What is read from one table of the configuration.
+/// The content of one table of the configuration.
 pub(super) trait Table: Sized {
     /// Documentation of the table, line by line.
     const ABOUT: &'static [&'static str];
@@ -70,7 +70,7 @@ pub(super) trait Form {
     /// The valid form of the written value, or `None` after a problem was reported.
     fn read(&self, found: &Found<'_>, review: &mut Review<'_>) -> Option<Self::Value>;
 
-    /// How `value` is written in a file; for defaults.
+    /// Form of `value` in a file; for defaults.
     fn written(&self, value: &Self::Value) -> Value;
 }
 
@@ -79,7 +79,7 @@ pub(super) trait Declare: Sized {
     /// The resulting value.
     type Value;
 
-    /// Declares the keys to `keys`; `name` and `about` are those of the field in the valid form.
+    /// Declares the keys to `keys`; `name` and `about` belong to the field in the valid form.
     fn declare(
         self,
         name: &'static str,
@@ -87,12 +87,12 @@ pub(super) trait Declare: Sized {
         keys: &mut Keys<'_, '_>,
     ) -> Self::Value;
 
-    /// The same with its value changed, for example from degrees to radians.
+    /// The declaration with its value changed, for example from degrees to radians.
     fn map<V>(self, change: fn(Self::Value) -> V) -> impl Declare<Value = V> {
         self.then(move |value, _: &mut Keys<'_, '_>| change(value))
     }
 
-    /// The same with its value changed by something that may find more problems.
+    /// The declaration with its value changed by a function that may find more problems.
     fn then<V, F>(self, change: F) -> impl Declare<Value = V>
     where
         F: FnOnce(Self::Value, &mut Keys<'_, '_>) -> V,
@@ -131,10 +131,10 @@ where
 /// elsewhere (`fill Name`).
 ///
 /// Each entry is `field: Type = declaration`; a key that is named differently from its field, for its
-/// unit, is given by `field as "key"`. The documentation of an entry is that of the field and of the key.
-/// `#[serde(skip)]` keeps a path out of what stages are distinguished by: files enter by their content.
+/// unit, is given by `field as "key"`. The documentation of an entry applies to the field and to the key.
+/// `#[serde(skip)]` keeps a path out of the inputs that distinguish stages: files enter by their content.
 /// `struct Name: Trait` derives `Trait`. `settle function` completes defaults that follow from other keys:
-/// `fn(Name, &Keys) -> Name`; `check function` names what must hold between keys: `fn(&Name, &mut Keys)`.
+/// `fn(Name, &Keys) -> Name`; `check function` names conditions between keys: `fn(&Name, &mut Keys)`.
 macro_rules! declare_table {
     (
         $(#[doc = $about:literal])+

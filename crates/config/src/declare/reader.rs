@@ -24,14 +24,14 @@ pub(crate) struct Keys<'a, 'r> {
     span: Option<Range<usize>>,
     /// Keys and tables declared so far.
     declared: Vec<&'static str>,
-    /// Former names found, and those of today.
+    /// Former names found, and the current names.
     former: Vec<(&'static str, &'static str)>,
     /// The declarations, if requested.
     description: Option<Description>,
     review: &'a mut Review<'r>,
 }
 
-/// What `T` declares, as the file as a whole.
+/// The declarations of `T`, as the file.
 pub(crate) fn described<T: Table>() -> DescribedTable {
     let mut review = Review::new(Path::new(""), "");
     let mut keys = Keys {
@@ -189,7 +189,7 @@ impl<'a, 'r> Keys<'a, 'r> {
         }
     }
 
-    /// The same for a key of the table `table` below this one.
+    /// Refuses a key of the table `table` below this one.
     pub(crate) fn refuse_below(
         &mut self,
         table: &str,

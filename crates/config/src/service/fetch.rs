@@ -9,10 +9,10 @@ use crate::{
 };
 
 declare_table! {
-    /// Files of archives, as `areograph fetch` retrieves them: copies of the indexes, and the files that sites name and that
-    /// are missing. Files of other content are never replaced. Failures are alerts; the night continues.
+    /// Archive files, as `areograph fetch` retrieves them: copies of the indexes, and the files that sites name and
+    /// that are missing. Files with different content are never replaced. Failures are alerts; the night continues.
     pub struct FetchConfig {
-        /// Whether every night begins with it.
+        /// Whether every night begins with the retrieval of archive files.
         nightly: bool = key(yes_or_no("", "")).or(false),
         /// Folder of copies of the indexes and of `fetch.json`; created if missing. Site files state where their files lie.
         folder: PathBuf = key(text()).or("fetch".to_owned()).then(|path, keys: &mut Keys<'_, '_>| keys.review().resolve(&path)),

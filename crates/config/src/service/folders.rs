@@ -9,7 +9,7 @@ use super::{Keys, ServiceConfig};
 /// Whether a folder of inputs and one of outputs meet.
 type Meet = fn(&Path, &Path) -> bool;
 
-/// What the service writes must not come back as an input: a run would cause the next one.
+/// Outputs of the service must not become inputs: a run would cause the next one.
 pub(super) fn outputs_apart(service: &ServiceConfig, keys: &mut Keys<'_, '_>) {
     let (inputs, outputs) = (&service.inputs, &service.outputs);
     // Folders of site files are read without their subfolders.

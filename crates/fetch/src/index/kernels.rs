@@ -10,13 +10,13 @@ use crate::{error::FetchError, safe::is_path, utc::Utc};
 /// A kernel of the archive.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct KernelRow {
-    /// What it covers, as a whole; `None` for text kernels.
+    /// Its overall coverage; `None` for text kernels.
     pub span: Option<[Utc; 2]>,
     /// Path below the volume.
     pub path: String,
     /// Type: `SPK`, `CK`, `LSK`, …
     pub kind: String,
-    /// When it was made, as the index prints it.
+    /// Time at which it was made, as the index states it.
     pub created: String,
     /// Line of the index, from 1.
     pub line: usize,

@@ -35,7 +35,7 @@ pub(crate) fn plan_kernels(
         sums,
         archive,
     };
-    // Of a kernel that the index has twice, the later row.
+    // The later row of a kernel that the index has twice.
     let by_path: BTreeMap<&str, &KernelRow> = rows.iter().map(|row| (&*row.path, row)).collect();
     let rows: Vec<&KernelRow> = by_path.into_values().collect();
     if !wish.listed.is_empty() {
@@ -60,7 +60,7 @@ fn padded(span: &Span) -> [Utc; 2] {
     [span.utc[0].plus(-MARGIN_S), span.utc[1].plus(MARGIN_S)]
 }
 
-/// The same from when the light of the Sun left that Mars then saw.
+/// The padded span, from the departure of the sunlight that reaches Mars at its start.
 fn with_sun(span: &Span) -> [Utc; 2] {
     let [start, stop] = padded(span);
     [start.plus(-SUN_DISTANCE_M[1] / SPEED_OF_LIGHT_M_S), stop]

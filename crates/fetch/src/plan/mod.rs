@@ -1,4 +1,4 @@
-//! Which files of the archives times, orbits, images and windows need, and why.
+//! Archive files that times, orbits, images and windows need, and the reasons.
 
 mod generic;
 mod images;
@@ -17,7 +17,7 @@ pub(crate) use self::{
     shots::plan_shots,
 };
 
-/// What a site needs.
+/// Needs of a site.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Wish {
     /// Kernels, by the times of images and [`Self::spans`]; `None` for no kernels.
@@ -50,7 +50,7 @@ impl Wish {
     }
 }
 
-/// A time, and what it is needed for.
+/// A time, and its purpose.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Span {
     /// Start and stop.
@@ -59,10 +59,10 @@ pub struct Span {
     pub what: String,
 }
 
-/// Which kernels are wanted, and where.
+/// Requested kernels, and their folder.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KernelWish {
-    /// Where they are put.
+    /// Their folder.
     pub folder: PathBuf,
     /// Orbit solution.
     pub spk_family: String,
@@ -79,11 +79,11 @@ pub struct KernelWish {
 pub struct ImageWish {
     /// Product, in any spelling: `E02/00665`, `e0200665`.
     pub product: String,
-    /// Where its file is put.
+    /// Destination of its file.
     pub place: ImagePlace,
 }
 
-/// Where the file of an image is put.
+/// Destination of the file of an image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ImagePlace {
     /// Nowhere: only its time is wanted.
@@ -106,7 +106,7 @@ pub struct ShotWish {
 /// A table of shots.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShotTable {
-    /// Where it is put.
+    /// Its destination.
     pub path: PathBuf,
     /// Its ground.
     pub of: ShotBox,
@@ -122,7 +122,7 @@ pub struct ShotBox {
 }
 
 impl ShotBox {
-    /// Why its table is needed.
+    /// Reason why its table is needed.
     pub(crate) fn why(&self) -> String {
         let [west, east, south, north] = self.edges_deg;
         format!(
@@ -163,9 +163,9 @@ impl FileKind {
 pub struct PlannedFile {
     /// Kind.
     pub kind: FileKind,
-    /// Where it comes from; of a table of shots the query.
+    /// Its source; for a table of shots, the query.
     pub url: String,
-    /// Where it is put.
+    /// Its destination.
     pub path: PathBuf,
     /// Size, where an index states it.
     pub bytes: Option<u64>,
@@ -173,20 +173,20 @@ pub struct PlannedFile {
     pub is_exact: bool,
     /// MD5 by the archive, hexadecimal.
     pub md5: Option<String>,
-    /// Why it is needed.
+    /// Reason why it is needed.
     pub why: String,
     /// Box of a table of shots.
     pub shot_box: Option<ShotBox>,
 }
 
-/// Files to fetch, and what no archive has.
+/// Files to fetch, and needs that no archive meets.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Plan {
     /// Files in order of kind and path.
     pub files: Vec<PlannedFile>,
-    /// What is needed and in no index.
+    /// Needs that no index contains.
     pub lacks: Vec<String>,
-    /// What a reader of the plan should know.
+    /// Notes for the reader of the plan.
     pub notes: Vec<String>,
 }
 

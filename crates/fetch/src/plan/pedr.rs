@@ -21,7 +21,7 @@ pub(crate) fn plan_pedr(
         .collect();
     files.sort_by_key(|(orbit, ..)| *orbit);
     if files.is_empty() {
-        let lack = "pedr: no listing of the archive has a file of the laser".to_owned();
+        let lack = "pedr: no listing of the archive has a laser file".to_owned();
         plan.lacks.push(lack);
         return plan;
     }

@@ -24,7 +24,7 @@ pub struct Singular {
 
 /// The factor `L` of a symmetric positive definite matrix `S = L Lᵀ`, in blocks.
 ///
-/// "Rows" are those of the matrix in the order of the factor.
+/// "Rows" are rows of the matrix in the order of the factor.
 #[derive(Debug, Clone)]
 pub struct BlockCholesky {
     /// First row of each block in the order of the factor, and the number of all.

@@ -21,7 +21,7 @@ use nalgebra::{DMatrix, DMatrixView};
 
 pub use factor::{BlockCholesky, Singular};
 
-/// Which blocks of unknowns occur together.
+/// Pattern of the blocks of unknowns that occur together.
 #[derive(Debug, PartialEq, Eq)]
 pub struct BlockPattern {
     /// Columns of each block.

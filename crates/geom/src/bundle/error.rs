@@ -11,9 +11,9 @@ pub enum BundleError {
     /// An invalid standard deviation, coordinate or number.
     #[error("{what} of {part} is {value}, expected {expected}")]
     Value {
-        /// What it belongs to.
+        /// The part to which it belongs.
         part: Part,
-        /// Which quantity.
+        /// The quantity.
         what: &'static str,
         /// The value.
         value: f64,
@@ -25,7 +25,7 @@ pub enum BundleError {
     Unmatched {
         /// View or range.
         part: Part,
-        /// What is missing.
+        /// The missing part.
         missing: Part,
     },
     /// Unknowns that the observations do not separate.

@@ -20,9 +20,9 @@ pub(super) struct Group {
 pub(super) struct PointGroups {
     /// All of them, ascending.
     pub(super) points: Vec<usize>,
-    /// The same by groups.
+    /// All points by groups.
     pub(super) groups: Vec<Group>,
-    /// Which blocks occur together.
+    /// Pattern of the blocks that occur together.
     pub(super) pattern: Arc<BlockPattern>,
 }
 

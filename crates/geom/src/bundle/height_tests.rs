@@ -8,12 +8,13 @@ use super::{
     groups::PointGroups,
     heights::Heights,
     layout::Linearised,
+    prior_tests::{prior_row, prior_variance},
     quality::judge,
     reduce::Settled,
     solve,
     solve::{Stop, settle},
     tests::{dense_rows, layout, network},
-    unknowns::{State, Unknown},
+    unknowns::State,
 };
 use crate::{
     ellipsoid::height_m,
@@ -92,28 +93,6 @@ struct Dense {
     /// Inverse of the normal matrix of all unknowns, and its solution there.
     cofactors: DMatrix<f64>,
     step: DVector<f64>,
-}
-
-/// The row of an unknown minus its expected value, of `width` columns: the shift of a profile follows an image.
-fn prior_row(
-    layout: &super::layout::Layout<'_, EulerPolynomial>,
-    column: usize,
-    width: usize,
-) -> DVector<f64> {
-    let mut row = DVector::zeros(width);
-    row[column] = 1.0;
-    if let Unknown::ProfileShift { profile, axis } = layout.columns.unknowns[column] {
-        let bus = layout.network.common_bus.as_ref().unwrap();
-        if let Some(shared) = bus.profiles[profile].shared {
-            let roll = Unknown::Orientation {
-                image: shared.image,
-                coefficient: 9,
-            };
-            let roll = layout.columns.unknowns.iter().position(|of| *of == roll);
-            row[roll.unwrap()] = -shared.by_rotation_m[axis];
-        }
-    }
-    row
 }
 
 /// The equations of all unknowns at `state`, heights included, solved at once.
@@ -350,14 +329,8 @@ pub(super) fn are_those_of_the_dense_equations(
     // Redundancy numbers add up to observations minus unknowns.
     let mut sum = sum_of_redundancies(&adjustment);
     for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
-        let row = prior_row(&layout, column, layout.columns.len());
-        let variance = row.iter().enumerate().map(|(of, factor)| {
-            let cofactors = row.iter().enumerate().map(|(other, of_other)| {
-                of_other * cofactors.element(of, other).unwrap_or_default()
-            });
-            factor * cofactors.sum::<f64>()
-        });
-        sum += 1.0 - variance.sum::<f64>() / sigma.powi(2);
+        let variance = prior_variance(&layout, &cofactors, column);
+        sum += 1.0 - variance / sigma.powi(2);
     }
     let spots = adjustment.common_bus.iter().flat_map(|bus| &bus.spots);
     let spots: Vec<_> = spots.flatten().flatten().collect();

@@ -16,8 +16,7 @@ pub(super) struct Heights {
     /// Positions of the points then.
     places_m: Vec<Vector3<f64>>,
     pub(super) surface: SurfaceHeights,
-    /// Where heights depend on planimetry: profiles of the surface whose shift is an unknown of its own, and its
-    /// columns.
+    /// Profiles of the surface with their own unknown shift and its columns, where heights depend on planimetry.
     pub(super) shared: Vec<(usize, [Option<usize>; 3])>,
     /// Inflation of each variance because its residual is too large for it.
     pub(super) inflation_m2: DVector<f64>,
@@ -30,8 +29,8 @@ const MOVED_M: f64 = 1.0;
 const STUDENT_FREEDOM: f64 = 4.0;
 
 impl Heights {
-    /// The surface under the `points` that take part; where heights depend on planimetry, `shared` profiles have
-    /// unknowns of their own.
+    /// The surface under the `points` that take part; where heights depend on planimetry, `shared` profiles have their
+    /// own unknowns.
     pub(super) fn at(
         surface: &LaserSurface,
         points: Vec<usize>,
@@ -91,8 +90,8 @@ impl Heights {
         }
     }
 
-    /// Change of the height at `index`, as measured minus predicted, with shifts of profiles that are unknowns of their
-    /// own, and the columns of these.
+    /// Change of the height at `index`, as measured minus predicted, with profile shifts that are separate unknowns,
+    /// and the columns of these.
     pub(super) fn by_shared(&self, index: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let profiles = self
             .surface
@@ -109,7 +108,7 @@ impl Heights {
         })
     }
 
-    /// The same heights without the information of slopes about planimetry, and without its uncertainty.
+    /// The heights without the planimetric information of slopes, and without its uncertainty.
     pub(super) fn without_plan(&self) -> Self {
         let mut heights = self.clone();
         heights.surface.relief = None;

@@ -48,7 +48,7 @@ mod tests {
 
     #[test]
     fn a_covariance_becomes_axes_and_one_that_is_none_is_refused() {
-        // Well known in height, poorly in planimetry: the axes are those of the ground, not of Mars.
+        // Well known in height, poorly in planimetry: the axes belong to the ground, not to Mars.
         let up = Vector3::new(1.0, 2.0, -2.0) / 3.0;
         let covariance_m2 = Matrix3::identity() * 1e6 - up * up.transpose() * (1e6 - 4.0);
         let known = KnownCoordinates::of_covariance(&covariance_m2).unwrap();

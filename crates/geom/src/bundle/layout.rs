@@ -43,7 +43,7 @@ pub(super) struct Layout<'a, M> {
     pub(super) heights: Option<Heights>,
     /// Focal pixels per line of each view, initially: the unit of its residual along the track.
     px_per_line: Vec<f64>,
-    /// The same of each spot.
+    /// Focal pixels per line of each spot, initially.
     spot_px_per_line: Vec<f64>,
     /// Motion of each spot with the boresight angles; a spot whose point is not seen is not used.
     spot_by_boresight: Vec<[Vector2<f64>; 2]>,
@@ -358,7 +358,7 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
         }
     }
 
-    /// Why `point` cannot be adjusted, from its rows at the start.
+    /// Reason why `point` cannot be adjusted, from its rows at the start.
     pub(super) fn fitness(
         &self,
         rows: &mut PointRows,

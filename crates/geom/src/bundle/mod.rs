@@ -20,12 +20,11 @@
 //! grows with the number of images. `quasi_newton` supplies the curvature that Gauss–Newton omits.
 //!
 //! # Source
-//! Yoon & Shan 2004. They adjust the coefficients of ω, φ and κ, which near the equator cannot be
-//! separated; here a rotation about the camera's own axes is added to them. They state one standard deviation
-//! an image for 18 unknowns, in metres; here each unknown has its own.
-//! Their along-track residual is the point's position in the focal plane of the measured line. An error of the line
-//! then counts as more pixels the faster the image flies over the ground, and noisy lines bias the adjustment towards a
-//! slow flight: a bias of errors in variables.
+//! Yoon & Shan 2004. They adjust the coefficients of ω, φ and κ, which near the equator cannot be separated; here a
+//! rotation about the camera's own axes is added to them. They state one standard deviation per image for 18 unknowns,
+//! in metres; here each unknown has its own. Their along-track residual is the point's position in the focal plane of
+//! the measured line. An error of the line then counts as more pixels the faster the image flies over the ground, and
+//! noisy lines bias the adjustment towards a slow flight: a bias of errors in variables.
 //!
 //! ```
 //! use areograph_geom::{
@@ -48,7 +47,7 @@
 //!         ],
 //!     },
 //! };
-//! // In truth the second flew 20 m further north than its orbit says.
+//! // In truth the second flew 20 m farther north than its orbit states.
 //! let truth = [camera(0.0, 0.0, 0.0), camera(-150e3, 20.0, 0.39)];
 //! let orbit = [truth[0], camera(-150e3, 0.0, 0.39)];
 //!
@@ -119,6 +118,8 @@ mod unknowns;
 mod bus_tests;
 #[cfg(test)]
 mod height_tests;
+#[cfg(test)]
+mod prior_tests;
 #[cfg(test)]
 mod tests;
 
@@ -205,7 +206,7 @@ pub struct Range {
     pub profile: usize,
 }
 
-/// An offset of the time at which attitudes were read, the same for all images.
+/// An offset of the time at which attitudes were read, common to all images.
 ///
 /// An image whose camera rotates inertially, as one that follows nadir does, was rotated by an amount proportional to
 /// the offset against its attitude; one that is held towards a star was not.
@@ -224,7 +225,7 @@ pub struct HeightControl {
     pub surface: LaserSurface,
     /// Indices of the points whose height is compared with it.
     pub compared: Vec<usize>,
-    /// Indices of those whose height is an observation; their covariance is full.
+    /// Indices of the points whose height is an observation; the covariance of the heights is full.
     pub observed: Vec<usize>,
 }
 
@@ -289,10 +290,10 @@ impl Default for BundleOptions {
     }
 }
 
-/// Why a point is not adjusted.
+/// Reasons why a point is not adjusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum PointRejection {
-    /// It is observed in fewer than two images and has no coordinates of its own.
+    /// It is observed in fewer than two images and has no a priori coordinates.
     #[error("too few rays to determine the point")]
     Undetermined,
     /// It lies behind a camera that has measured it.
@@ -375,8 +376,8 @@ pub struct AdjustedPoint {
     pub ground_m: Vector3<f64>,
     /// Cofactors, m²; σ0² times these is the covariance.
     pub cofactor_m2: Matrix3<f64>,
-    /// Cofactors without an error that it shares, m²: of a point that is recorded with a profile those against the shift of
-    /// the profile, of others those against the mean of the points with an observed height; `None` without either.
+    /// Cofactors without an error that it shares, m²: for a point that is recorded with a profile, against the shift of
+    /// the profile; for others, against the mean of the points with an observed height; `None` without either.
     pub relative_m2: Option<Matrix3<f64>>,
     /// Residuals of the initial coordinates along their principal axes, when they were observed.
     pub priors: Option<[Residual; 3]>,
@@ -396,7 +397,7 @@ pub struct Adjustment {
     /// Range bias of each profile with the square root of its cofactor, metres, when it is unknown.
     pub range_biases_m: Vec<Option<(f64, f64)>>,
     /// Attitude clock offset with the square root of its cofactor, seconds, when it is unknown: the attitudes read are
-    /// those that the images had this much later.
+    /// the attitudes of the images this much later.
     pub attitude_clock_s: Option<(f64, f64)>,
     /// Estimates from spots of a laser on the same bus, where they are observations.
     pub common_bus: Option<AdjustedBus>,
@@ -408,8 +409,7 @@ pub struct Adjustment {
     pub compared: Vec<HeightResidual>,
     /// Weighted sum of squares of the observed heights, with their full covariance.
     pub height_squares: f64,
-    /// What the relief under the points with an observed height determines about planimetry, where the ground has
-    /// relief.
+    /// Planimetric information from the relief under the points with an observed height, where the ground has relief.
     pub relief: Option<ReliefOfSite>,
     /// Cofactors of the mean of the points with an observed height, m²: common errors do not average out.
     pub mean_cofactor_m2: Option<Matrix3<f64>>,

@@ -20,7 +20,7 @@ pub(super) struct Run {
 /// It is reused for one point after another, so that its memory is allocated only once.
 #[derive(Debug, Clone, Default)]
 pub(super) struct PointRows {
-    /// Which shared unknowns the rows contain.
+    /// Shared unknowns that the rows contain.
     pub(super) runs: Vec<Run>,
     /// Numbers in a row of `beside`: partial derivatives by these unknowns, then the misclosure.
     pub(super) width: usize,

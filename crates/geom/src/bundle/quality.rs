@@ -220,8 +220,8 @@ fn judge_point<M: ExteriorOrientation>(
         let cofactors = column_of(cofactors, place);
         Vector3::from(coupling.map(|coupling| dot(cofactors, coupling)))
     }));
-    // Cofactors of the point transformed by its triangle: the part its rays leave undetermined, plus that of the shared
-    // unknowns, minus that of an observed height.
+    // Cofactors of the point transformed by its triangle: the part that its rays leave undetermined, plus the part of
+    // the shared unknowns, minus the part of an observed height.
     let mut transformed_cofactor = Matrix3::identity();
     for (place, between) in between.iter().enumerate() {
         transformed_cofactor += between * Vector3::from(coupling.map(|row| row[place])).transpose();
@@ -242,7 +242,7 @@ fn judge_point<M: ExteriorOrientation>(
     }
     let residuals: Vec<Residual> = (0..rows.weights.len())
         .map(|row| {
-            // The effect of the point on the row, that of the shared unknowns, and that of both together.
+            // The effects on the row of the point, of the shared unknowns, and of both together.
             let own = inverse.tr_mul(&rows.by_point[row]);
             let mut leverage = own.dot(&(transformed_cofactor * own));
             let partials = rows.row(row);

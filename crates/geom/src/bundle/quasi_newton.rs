@@ -14,7 +14,7 @@ use super::{factor::Factor, reduce::Settled};
 
 /// Steps that are remembered.
 const REMEMBERED: usize = 8;
-/// A remembered step counts if the curvature along it is at least this share of that of Gauss–Newton.
+/// A remembered step counts if the curvature along it is at least this share of the Gauss–Newton curvature.
 const CURVATURE_MIN: f64 = 1e-3;
 /// Steps are remembered where Gauss–Newton expects less than this relative decrease of the sum of squares: farther
 /// away, the equations themselves change.
@@ -28,7 +28,7 @@ pub(super) struct QuasiNewton {
 }
 
 impl QuasiNewton {
-    /// The step from `now`, and whether it differs from that of Gauss–Newton.
+    /// The step from `now`, and whether it differs from the Gauss–Newton step.
     pub(super) fn step(&mut self, now: &Settled, factor: &Factor) -> (DVector<f64>, bool) {
         let right = &now.reduced.right;
         let step = factor.solve(right);

@@ -3,7 +3,7 @@
 //! Points are still eliminated one by one. With the triangle `R` that remains of their own rows, the change of a height
 //! by the point is `u = R⁻ᵀ ∂h/∂P`; the variance that the rays leave in it is `u·u`, and the shared unknowns see it
 //! through `G = −uᵀC`, `C` their part of the transformed rows. The heights are then observations of the shared unknowns
-//! with the covariance `Σ` = that of the surface + diag(u·u), and after that of the points.
+//! with the covariance `Σ` = surface covariance + diag(u·u), and afterwards observations of the points.
 //!
 //! # Source
 //! The partitioned inverse (Woodbury 1950) of normal equations with additional observations of the points.
@@ -112,7 +112,7 @@ impl ReducedHeights {
         self.factor.inverse()
     }
 
-    /// How far each height moves its point, in addition to its rays, with a step of the shared unknowns.
+    /// Shift of each point by its height, in addition to its rays, with a step of the shared unknowns.
     pub(super) fn moves_m(&self, shared: &DVector<f64>) -> Vec<Vector3<f64>> {
         let pull = self
             .factor

@@ -1,9 +1,9 @@
-//! Points against the error that they share: the shift of their profile, or that of the mean of the points with an observed
-//! height.
+//! Points against the error that they share: the shift of their profile, or the error of the mean of the points with an
+//! observed height.
 //!
 //! Positions have common errors that averaging does not reduce. The variance of a difference from the mean is
-//! `var(P) + var(mean) − 2 cov(P, mean)`; it is not that of the point less that of the mean, since the orientation moves
-//! points at one end of an image otherwise than those at the other.
+//! `var(P) + var(mean) − 2 cov(P, mean)`; it is not the variance of the point less the variance of the mean, since the
+//! orientation moves points at the two ends of an image differently.
 
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, MatrixXx3, Vector3};
 use rayon::prelude::*;
@@ -81,7 +81,7 @@ impl Mean {
         })
     }
 
-    /// States of all points that no profile records how well they are known against the mean.
+    /// States the accuracy of all points that no profile records, relative to the mean.
     pub(super) fn compare<M: ExteriorOrientation>(
         &self,
         layout: &Layout<'_, M>,
@@ -131,8 +131,8 @@ fn coupling(rows: &PointRows, place: usize) -> Vector3<f64> {
     Vector3::from_fn(|axis, _| rows.row(axis)[place])
 }
 
-/// What the cofactors of a point change by when they are taken against the shift of its profile, m²; `None` for a point
-/// that none with an unknown shift records.
+/// Change of the cofactors of a point when they refer to the shift of its profile, m²; `None` for a point that no
+/// profile with an unknown shift records.
 ///
 /// * `cofactors` – of the shared unknowns in `rows`, whose order they have
 /// * `between` – cofactors of the point and one of these

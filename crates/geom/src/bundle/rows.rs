@@ -51,7 +51,7 @@ impl Row {
 /// line are exact to 1e-7.
 const LAST_STEP_LINES: f64 = 1e-3;
 
-/// How far a point at its initial coordinates moves along the focal plane from the measured line to the next,
+/// Displacement of a point at its initial coordinates along the focal plane from the measured line to the next,
 /// with the initial orientation, focal-plane pixels.
 ///
 /// The unit of the along-track residuals must not depend on the unknowns: a model that flies more slowly would make
@@ -98,7 +98,7 @@ pub(super) fn of_view<M: ExteriorOrientation>(
     )?;
     let (x_lines, camera_m) = (seen.solution.x, seen.solution.camera_m);
     let focal_y_px = -image.focal_length_px * camera_m.y / camera_m.z;
-    // The sign is that of the point's position in the focal plane of the measured line.
+    // The sign follows the point's position in the focal plane of the measured line.
     let misclosures = [
         px_per_line * (x_lines - view.x_lines),
         view.y_px - focal_y_px,

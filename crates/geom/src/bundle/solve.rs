@@ -26,10 +26,11 @@ use areograph_base::units::METRES_PER_KM;
 const STEP: f64 = 1e-8;
 /// A relative change of the weighted sum of squares below this ends it too.
 const CHANGE: f64 = 1e-8;
-/// The same with robust weights: the division of a blunder between the two rays of a tie hardly changes the sum, so
-/// that the point creeps long after everything else has converged.
+/// The relative change with robust weights: the division of a blunder between the two rays of a tie hardly changes the
+/// sum, so that the point creeps long after everything else has converged.
 const CHANGE_ROBUST: f64 = 1e-6;
-/// The same before robust weights are applied: where blunders dominate the sum, it need not reach its minimum.
+/// The relative change before robust weights are applied: where blunders dominate the sum, it need not reach its
+/// minimum.
 const CHANGE_ROUGH: f64 = 0.1;
 /// A relative increase of the sum below this is rounding, mainly of positions of 4e6 m.
 const ROUNDING: f64 = 1e-10;
@@ -274,7 +275,7 @@ fn factorise<M>(
     })
 }
 
-/// The state after a step of the shared unknowns, and the length of the whole step.
+/// The state after a step of the shared unknowns, and the length of the complete step.
 fn advance<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
     Settled { at, reduced }: &Settled,

@@ -1,5 +1,5 @@
-//! Observation equations of spots: the position of a shot in an image by the mounting against the projection of its
-//! footprint.
+//! Observation equations of spots: the position of a shot in an image according to the mounting against the projection
+//! of its footprint.
 
 use nalgebra::{Vector2, Vector3};
 

@@ -11,7 +11,7 @@ pub enum Parameter {
     Angle {
         /// The camera.
         camera: usize,
-        /// Which angle.
+        /// The angle.
         axis: usize,
     },
     /// A coefficient of `tan ψx`.
@@ -123,7 +123,7 @@ impl CalibrationState {
         }
     }
 
-    /// The same with an increment added to its parameters, in their order.
+    /// The state with an increment added to its parameters, in their order.
     #[must_use]
     pub fn moved(&self, by: &DVector<f64>) -> Self {
         let mut moved = self.clone();
@@ -228,7 +228,7 @@ impl Freedom {
         by_parameters * &self.directions
     }
 
-    /// Covariance of all parameters from that of the free combinations.
+    /// Covariance of all parameters from the covariance of the free combinations.
     pub(super) fn covariance(&self, of_components: &DMatrix<f64>) -> DMatrix<f64> {
         let mut full = &self.directions * of_components * self.directions.transpose();
         for (row, scale) in self.scale.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! Offset angles and look angles of the lines of one camera, from tie points of several lines and from control points.
 //!
-//! The model is that of Li et al. 2023, its misprints corrected: `P = S + m · R · R_u · (tan ψx, tan ψy, 1)ᵀ`, with the
-//! position `S` of the spacecraft, the rotation `R` from its axes to body-fixed ones, an offset rotation
+//! The model follows Li et al. 2023, with its misprints corrected: `P = S + m · R · R_u · (tan ψx, tan ψy, 1)ᵀ`, with
+//! the position `S` of the spacecraft, the rotation `R` from its axes to body-fixed ones, an offset rotation
 //! `R_u = R_φ R_ω R_κ` and polynomials `tan ψx(s)`, `tan ψy(s)` of every line. Axes of the spacecraft: x across the
 //! flight, y along it, z down. Residuals are tangents, `V = (XX/ZZ − tan ψx, YY/ZZ − tan ψy)` with
 //! `(XX, YY, ZZ)ᵀ = R_uᵀ Rᵀ (P − S)`.
@@ -10,8 +10,8 @@
 //! which normal equations would lose in rounding.
 //!
 //! Free parameters are a matrix of combinations in units of their a priori standard deviations (`freedom`). Adjustment
-//! by ties only can therefore free the two differences that they determine and no others (decision 0025). Of the orbit,
-//! the drift is unknown together with the camera; offsets absorb the constant part of its error.
+//! by ties only can therefore free the two differences that they determine and no others (decision 0025). The orbit
+//! drift is an unknown together with the camera; offsets absorb the constant part of the orbit error.
 
 mod camera;
 mod elimination;

@@ -53,7 +53,7 @@ pub enum Combination {
 pub struct AngleCombination {
     /// Common or differential.
     pub combination: Combination,
-    /// Which angle.
+    /// The angle.
     pub axis: Axis,
 }
 

@@ -42,7 +42,7 @@ pub struct GroundPoint {
     pub known: Option<KnownPlace>,
 }
 
-/// Why a point has no position.
+/// Reasons why a point has no position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum SightError {
     /// Its rays are parallel, or it has only one.

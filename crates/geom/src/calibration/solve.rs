@@ -14,7 +14,7 @@ const STEPS_MAX: u32 = 40;
 /// A step below this ends the iteration, in standard deviations of the estimates.
 const STEP: f64 = 1e-3;
 
-/// Why the calibration failed.
+/// Reasons why the calibration failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum CalibrationError {
     /// A point has no position.
@@ -33,7 +33,7 @@ pub enum CalibrationError {
     Singular,
 }
 
-/// Where an adjustment begins.
+/// Start of an adjustment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Start<'a> {
     /// The a priori values: the laboratory geometry.

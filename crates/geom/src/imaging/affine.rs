@@ -20,7 +20,7 @@ impl Affine {
         self.to + self.matrix * (place - self.from)
     }
 
-    /// The same between reduced images, of which one pixel is `here` and `there` pixels of these.
+    /// The map between reduced images, of which one pixel is `here` and `there` pixels of these.
     #[must_use]
     pub fn reduced(&self, here: f64, there: f64) -> Self {
         Self {

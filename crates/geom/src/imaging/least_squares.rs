@@ -28,7 +28,7 @@ pub struct LeastSquaresMatch {
     pub correlation: f64,
 }
 
-/// Why a patch is not matched.
+/// Reasons why a patch is not matched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LeastSquaresFailure {
     /// It lies outside the available part of the other image.
@@ -50,12 +50,12 @@ struct Equations {
     correlation: f64,
 }
 
-/// Moves `start` until the pixels of `template` agree best with those of `other`; brightness may differ by an offset
-/// and a gain, and the surface may be inclined differently.
+/// Moves `start` until the pixels of `template` agree best with the pixels of `other`; brightness may differ by an
+/// offset and a gain, and the surface may be inclined differently.
 ///
-/// The covariance takes residuals as they are: neighbours are correlated, and residuals may be larger where texture is
-/// strong. It is the sum over all pairs of near pixels of the effect of their residuals on the position (Newey & West
-/// 1987, in two dimensions), or the result for independent residuals where that is larger.
+/// The covariance uses residuals without a model: neighbours are correlated, and residuals may be larger where texture
+/// is strong. It is the sum over all pairs of near pixels of the effect of their residuals on the position (Newey &
+/// West 1987, in two dimensions), or the result for independent residuals where that is larger.
 ///
 /// # Errors
 /// [`LeastSquaresFailure`].

@@ -1,4 +1,4 @@
-//! Blunders: measurements that contradict the adjustment of the whole net more than chance explains.
+//! Blunders: measurements that contradict the adjustment of the complete net more than chance explains.
 //!
 //! A deviation is judged by its own standard deviation, which is small where a measurement alone holds a picture.
 //! Compared with the deviations of others only, the far ties of a picture that hangs on points close together would look
@@ -40,10 +40,10 @@ pub fn robust_sigma(deviations: impl Iterator<Item = Place>) -> f64 {
 /// The measurements of a net that are blunders, ascending, by their deviations in the adjustment of all pictures without
 /// controls.
 ///
-/// The largest standardised deviations are removed, those of different pictures at once, and the net is adjusted again,
-/// until none exceeds what chance leaves in one net of a hundred. A removed measurement that agrees with the others at the end
-/// is restored. Of a point on two pictures both measurements go: the deviation does not identify which is wrong. A
-/// measurement without which a picture would be free stays.
+/// The largest standardised deviations are removed, deviations of different pictures at once, and the net is adjusted
+/// again, until none exceeds what chance leaves in one net of a hundred. A removed measurement that agrees with the
+/// others at the end is restored. Both measurements of a point on two pictures are removed: the deviation does not
+/// identify which is wrong. A measurement without which a picture would be free stays.
 ///
 /// # Errors
 /// [`PlaneError`] for a net without a solution.
@@ -179,10 +179,10 @@ impl Search<'_> {
     }
 }
 
-/// The adjustment of a net without some measurements, in a figure of its own.
+/// The adjustment of a net without some measurements, in its own figure.
 struct Adjusted {
     net: Net,
-    /// Its measurements in the whole net.
+    /// Its measurements in the complete net.
     indices: Vec<usize>,
     of_point: Vec<Vec<usize>>,
     solution: Solution,
@@ -224,7 +224,7 @@ impl Adjusted {
         (limit * sigma).max(ROUNDING * extent)
     }
 
-    /// The kept measurements of a point, in the whole net.
+    /// The kept measurements of a point, in the complete net.
     fn of_point(&self, point: usize) -> Vec<usize> {
         let of = self.of_point[point].iter();
         of.map(|at| self.indices[*at]).collect()

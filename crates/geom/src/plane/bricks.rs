@@ -137,7 +137,7 @@ pub(super) fn rough_guesses(part: &Net) -> Vec<Control> {
 }
 
 impl PlaneError {
-    /// The error of a part with the indices of the whole net; missing guesses are reported as missing ties.
+    /// The error of a part with the indices of the complete net; missing guesses are reported as missing ties.
     pub(super) fn of_part(self, points: &[usize], pictures: &[usize]) -> Self {
         match self {
             Self::TooFewControls { found } => Self::UnderconnectedPicture {
@@ -178,7 +178,7 @@ impl Figure {
         distances.fold(0.0, f64::max)
     }
 
-    /// The figure of a part with the indices of the whole net.
+    /// The figure of a part with the indices of the complete net.
     pub(super) fn in_net(
         self,
         pictures: &[usize],
@@ -204,8 +204,8 @@ impl Figure {
     }
 }
 
-/// EXTEND: ties bricks by their common points on two controls, those farthest apart, and corrects the shrinkage: a
-/// figure that is free except for its place, size and direction.
+/// EXTEND: ties bricks by their common points on the two controls that are farthest apart, and corrects the shrinkage:
+/// a figure that is free except for its place, size and direction.
 ///
 /// # Errors
 /// [`PlaneError`]; its pictures are bricks.

@@ -6,11 +6,11 @@ use super::{
     rigid::rigid_parts,
 };
 
-/// Points closer than this share of the whole extent are coincident.
+/// Points closer than this share of the total extent are coincident.
 const EQUAL: f64 = 1e-9;
 
 /// Checks that every picture is tied to the net, every part of the net to two controls, and that no two points
-/// coincide. Parts that hang on one point are those of `loose_picture`.
+/// coincide. `loose_picture` finds parts that hang on one point.
 ///
 /// # Errors
 /// [`PlaneError`]; for a part without controls its first picture.

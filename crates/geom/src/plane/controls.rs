@@ -62,7 +62,7 @@ pub fn fit_similarity(from: &[Place], to: &[Place]) -> Option<Similarity> {
     fit_weighted(from, to, |_| 1.0)
 }
 
-/// The same with a weight of each pair of points, by its index, above 0.
+/// The similarity that fits best with a weight of each pair of points, by its index, above 0.
 #[must_use]
 pub fn fit_weighted(
     from: &[Place],

@@ -1,6 +1,6 @@
 //! Sparse orthogonal decomposition: pictures are eliminated one by one, each by reflections of the rows that touch it.
 //!
-//! The order is that of least degree, so that in a net of many pictures a front stays small. The remaining rows of a
+//! The order is by least degree, so that in a net of many pictures a front stays small. The remaining rows of a
 //! picture are a triangle over its neighbours, which is kept until the first of them is eliminated: no row is squared,
 //! as in normal equations, and the triangular factor is available for the covariances.
 

@@ -7,7 +7,7 @@ use super::Place;
 /// Corners that lie no closer to a line than this share of their distance determine a mapping.
 const FLAT: f64 = 1e-9;
 
-/// Why ticks do not determine a correction.
+/// Reasons why ticks do not determine a correction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum FilmError {
     /// Three of the corners are collinear, or two coincide.
@@ -30,7 +30,7 @@ pub fn box_centre(upper_right: Place, lower_left: Place) -> Place {
 pub struct FourCorners {
     origin: Place,
     size: f64,
-    /// Of 1, x, y and xy.
+    /// Coefficients of 1, x, y and xy.
     coefficients: [Place; 4],
 }
 

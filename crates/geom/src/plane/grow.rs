@@ -81,7 +81,7 @@ fn numbered(brick_of: &[Option<usize>]) -> Vec<usize> {
     numbered.collect()
 }
 
-/// How many points every two pictures share.
+/// Number of points that every pair of pictures shares.
 fn shared_points(net: &Net) -> Vec<BTreeMap<usize, usize>> {
     let mut shared = vec![BTreeMap::new(); net.pictures];
     for measured in net.by_point().iter() {

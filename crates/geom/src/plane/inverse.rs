@@ -26,7 +26,7 @@ impl Cofactors {
                 sums[index] += factor * own;
                 let mut across = across.iter();
                 for (further, (third, of_third)) in step.later.iter().enumerate().skip(index + 1) {
-                    // Both lists ascend, and what follows in this row follows in that of `other` too.
+                    // Both lists ascend, and blocks that follow in this row follow in the row of `other` too.
                     if let Some((_, block)) = across.find(|(of, _)| of == third) {
                         sums[further] += factor * block;
                         sums[index] += of_third * block.adjoint();

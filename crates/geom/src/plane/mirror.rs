@@ -16,12 +16,12 @@ const CERTAIN: f64 = 7.0;
 /// Below this share of the squares of the coordinates, a residual is rounding.
 const EXACT: f64 = 1e-18;
 
-/// Finds a picture, or the whole figure, of the wrong handedness.
+/// Finds a picture, or the complete figure, of the wrong handedness.
 ///
 /// Each pair of pictures with three points in common is compared by a similarity and by a mirrored one. The logarithm
-/// of the ratio of their likelihoods is the evidence of the pair. The handedness of all pictures is that on which the
-/// evidence of all pairs agrees best; among connected pictures the minority is mirrored, where the evidence against it
-/// is certain. A pair with a wrong point is thus outvoted by the others.
+/// of the ratio of their likelihoods is the evidence of the pair. The adopted handedness of all pictures is the one
+/// that agrees best with the evidence of all pairs; among connected pictures the minority is mirrored, where the
+/// evidence against it is certain. A pair with a wrong point is thus outvoted by the others.
 ///
 /// # Errors
 /// [`PlaneError::MirroredPicture`].
@@ -33,7 +33,7 @@ pub fn find_mirrored(net: &Net) -> Result<(), PlaneError> {
         let turned = part.iter().filter(|picture| hands.turned[**picture]);
         let wrong = 2 * turned.count() <= part.len();
         let is_wrong = |picture: &usize| hands.turned[*picture] == wrong;
-        // What the labels gain over a part of one hand.
+        // Gain of the labels over a part of one handedness.
         let against = evidence.iter().filter(|((one, two), _)| {
             hands.part[*one] == hands.part[part[0]] && hands.turned[*one] != hands.turned[*two]
         });

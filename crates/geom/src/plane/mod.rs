@@ -18,7 +18,7 @@
 //! the triangular factor gives the covariances of neighbours by the recursion of Takahashi (`inverse`), which libraries
 //! of sparse decompositions do not expose. These also standardise the deviations by which blunders are found: a single
 //! adjustment spreads a blunder over its neighbours, and its own standardised deviation remains the largest.
-//! The standard deviations of points are those of the one adjustment, regardless of how the block was georeferenced.
+//! The standard deviations of points result from the one adjustment, regardless of how the block was georeferenced.
 //!
 //! # Source
 //! Arthur & McMacken 1977; equations by their numbers there.

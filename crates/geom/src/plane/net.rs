@@ -38,7 +38,7 @@ pub struct Net {
     pub controls: Vec<Control>,
 }
 
-/// Why a net has no solution. Pictures and points are indices.
+/// Reasons why a net has no solution. Pictures and points are indices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum PlaneError {
     /// Fewer than two controls that a picture shows.
@@ -168,9 +168,9 @@ impl Net {
 /// A part of a net.
 pub(super) struct Part {
     pub(super) net: Net,
-    /// Its points in the whole net.
+    /// Its points in the complete net.
     pub(super) points: Vec<usize>,
-    /// Its measurements in the whole net.
+    /// Its measurements in the complete net.
     pub(super) measurements: Vec<usize>,
 }
 

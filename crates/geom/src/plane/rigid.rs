@@ -50,7 +50,7 @@ fn root(part: &mut [usize], mut of: usize) -> usize {
     of
 }
 
-/// A picture that was tied in another brick than its own.
+/// A picture that was tied in a brick other than its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Moved {
     /// The picture.

@@ -20,7 +20,8 @@ pub struct Shrinkage {
 /// controls move inward along their line, each by `(L − L')/2`.
 ///
 /// # Source
-/// The effect: Arthur & McMacken 1977, who saw it; the law follows from the ties being homogeneous in the unknowns.
+/// The effect: Arthur & McMacken 1977, who observed it; the law follows from the ties being homogeneous in the
+/// unknowns.
 #[must_use]
 pub fn shrinkage_factor(tie_squares: f64, distance: f64, weight: f64) -> f64 {
     1.0 / (1.0 + 2.0 * tie_squares / (weight * distance * distance))
@@ -51,7 +52,7 @@ impl Shrinkage {
 }
 
 impl Solution {
-    /// The same figure with its two controls at their given positions: the solution that holds them exactly. A net with
+    /// The figure with its two controls at their given positions: the solution that holds them exactly. A net with
     /// any other number of controls is unchanged.
     #[must_use]
     pub fn unshrunk(mut self, net: &Net) -> Self {

@@ -87,7 +87,8 @@ mod tests {
     #[test]
     fn the_floor_of_viking_pictures() {
         let half_m = 12_500.0;
-        // 25 km at 22.5° latitude: 9.5 m against Mercator's projection, 0.12 m against an azimuthal one; printed digits.
+        // 25 km at 22.5° latitude: 9.5 m against Mercator's projection, 0.12 m against an azimuthal one; published
+        // digits.
         let mercator = 22.5_f64.to_radians().tan() / RADIUS_M;
         let azimuthal_m = projection_floor_m(half_m, 0.0, RADIUS_M);
         assert!((azimuthal_m - 0.12).abs() < 0.005, "{azimuthal_m}");

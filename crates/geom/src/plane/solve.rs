@@ -331,7 +331,7 @@ impl Solution {
     }
 }
 
-/// Cofactors of the adjusted net: variances of a coordinate where that of an image of a tie is 1.
+/// Cofactors of the adjusted net: variances of a coordinate where the variance of an image of a tie is 1.
 pub struct Precision<'a> {
     solution: &'a Solution,
     cofactors: Cofactors,
@@ -353,12 +353,12 @@ impl Precision<'_> {
         self.form(&[self.row(of, 1.0)])
     }
 
-    /// For the adjusted position of a point, the mean of its images; `of` are its measurements, `weight` is that of its
-    /// control, if it is one.
+    /// For the adjusted position of a point, the mean of its images; `of` are its measurements, `weight` is the weight
+    /// of its control, if the point is one.
     ///
     /// The errors of the images are part of the error of a control: the contribution `h` of the control to the net is
     /// subtracted from the mean. A weight above the number of images implies that the images are known too; then the
-    /// position is that of the control.
+    /// position is the control's.
     #[must_use]
     pub fn place(&self, net: &Net, of: &[usize], weight: Option<f64>) -> f64 {
         let count = of.len() as f64;

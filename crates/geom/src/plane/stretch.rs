@@ -20,7 +20,7 @@ const TRIPLES_MAX: usize = 4_096;
 const SPREAD_MIN: f64 = 0.05;
 const SPREAD_OF_THREE: f64 = 1e-6;
 
-/// What an affinity of the controls has beyond a similarity: `Z = a z + b z̄ + c`.
+/// The part of an affinity of the controls beyond a similarity: `Z = a z + b z̄ + c`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stretch {
     /// `2|b| / |a|`: the relative difference of the largest and the smallest scale.
@@ -49,7 +49,7 @@ struct Affinity {
     a: Place,
     b: Place,
     c: Place,
-    /// Variance of a coordinate of `b` where that of a control is 1.
+    /// Variance of a coordinate of `b` where the variance of a control is 1.
     of_b: f64,
 }
 

@@ -180,7 +180,7 @@ impl Distortion {
         Some(line.at(line.coordinate(across)).across_by_c * line.per_sample)
     }
 
-    /// Tangent along the track where the line has the tangent `across`, and its change with that.
+    /// Tangent along the track where the line has the tangent `across`, and its change with `across`.
     pub(crate) fn curve(&self, across: f64) -> [f64; 2] {
         let Some(line) = &self.line else {
             return [0.0; 2];
@@ -246,7 +246,7 @@ impl DistortedLine {
         }
     }
 
-    /// The same, extended straight beyond the ends.
+    /// The point of the curve, extended straight beyond the ends.
     fn at(&self, c: f64) -> CurvePoint {
         let [first, last] = &self.ends;
         let end = if c < first.c {

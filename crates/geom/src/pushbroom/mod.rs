@@ -1,9 +1,8 @@
 //! A pushbroom camera: its pose as a function of the image line, and the line that sees a point.
 //!
-//! The image line is `x`, in lines from the middle of the header image. `M` takes Mars-fixed components
-//! to camera components; the camera looks along +Z. A ground point `P` has the camera vector
-//! `q = M (P − C)`, and is seen by the line where `q1 = 0`, or where `q1/q3` is that of the distorted
-//! detector at `q2/q3`.
+//! The image line is `x`, in lines from the middle of the header image. `M` takes Mars-fixed components to camera
+//! components; the camera looks along +Z. A ground point `P` has the camera vector `q = M (P − C)`, and is seen by the
+//! line where `q1 = 0`, or where `q1/q3` equals the value of the distorted detector at `q2/q3`.
 //!
 //! ```
 //! use areograph_geom::pushbroom::{Distortion, EulerPolynomial, ExteriorOrientation, Sighting, VectorPolynomial};
@@ -53,7 +52,7 @@ pub struct Pose {
     pub mars_to_camera: Matrix3<f64>,
 }
 
-/// How a [`Pose`] changes from line to line.
+/// Change of a [`Pose`] from line to line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PoseRate {
     /// `dC/dx`, Mars-fixed, metres per line.
@@ -87,7 +86,7 @@ pub trait PolynomialPath: ExteriorOrientation {
     fn path_m(&self) -> &VectorPolynomial;
 }
 
-/// Why an image has no line for a point.
+/// Reasons why an image has no line for a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum Unseen {
     /// The point lies behind the camera.

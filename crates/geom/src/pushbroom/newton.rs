@@ -26,7 +26,7 @@ pub struct Sighting {
 
 impl Sighting {
     /// Finds the line of `model` that sees `point_m` (Mars-fixed) through `distortion` by steps from line `x`; a step
-    /// of at most `last_step_lines` ends the iteration. The change per line is that before the last step.
+    /// of at most `last_step_lines` ends the iteration. The change per line is the change before the last step.
     ///
     /// # Errors
     /// [`Unseen::BehindCamera`], [`Unseen::NotConverged`], [`Unseen::NotFinite`].
@@ -154,7 +154,7 @@ impl<'a, M: ExteriorOrientation + ?Sized> Projector<'a, M> {
         })
     }
 
-    /// The same image, seen through `distortion`.
+    /// The image, seen through `distortion`.
     #[must_use]
     pub fn through(self, distortion: Distortion) -> Self {
         Self { distortion, ..self }

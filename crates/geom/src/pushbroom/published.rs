@@ -69,7 +69,7 @@ impl<'a, M: ExteriorOrientation> FrameFirst<'a, M> {
         })
     }
 
-    /// The same for a camera with distortion.
+    /// The iteration for a camera with distortion.
     #[must_use]
     pub const fn through(self, distortion: Distortion) -> Self {
         Self { distortion, ..self }
@@ -91,7 +91,7 @@ impl<'a, M: ExteriorOrientation> FrameFirst<'a, M> {
     /// Finds the line of `point_m` from the middle of the image; `on_step` receives every step, lines.
     ///
     /// # Errors
-    /// Why no line was found.
+    /// The reason why no line was found.
     pub fn solve(
         &self,
         point_m: &Vector3<f64>,
@@ -101,10 +101,10 @@ impl<'a, M: ExteriorOrientation> FrameFirst<'a, M> {
         self.solve_from(0.0, point_m, limits, on_step)
     }
 
-    /// The same from another line.
+    /// Finds the line of `point_m`, starting from another line.
     ///
     /// # Errors
-    /// Why no line was found.
+    /// The reason why no line was found.
     pub fn solve_from(
         &self,
         start: f64,
@@ -142,7 +142,7 @@ impl<'a, M: PolynomialPath> FixedPoint<'a, M> {
         })
     }
 
-    /// The same for a camera with distortion: the plane of the line is that of the point's sample.
+    /// The iteration for a camera with distortion: the plane of the line belongs to the point's sample.
     #[must_use]
     pub const fn through(self, distortion: Distortion) -> Self {
         Self {
@@ -154,7 +154,7 @@ impl<'a, M: PolynomialPath> FixedPoint<'a, M> {
     /// Finds the line of `point_m` from its frame coordinate; `on_step` receives every step, lines.
     ///
     /// # Errors
-    /// Why no line was found.
+    /// The reason why no line was found.
     pub fn solve(
         &self,
         point_m: &Vector3<f64>,
@@ -165,10 +165,10 @@ impl<'a, M: PolynomialPath> FixedPoint<'a, M> {
         self.solve_from(start, point_m, limits, on_step)
     }
 
-    /// The same from another line.
+    /// Finds the line of `point_m`, starting from another line.
     ///
     /// # Errors
-    /// Why no line was found.
+    /// The reason why no line was found.
     pub fn solve_from(
         &self,
         start: f64,

@@ -1,5 +1,5 @@
-//! Orientation through its samples, without a polynomial over the whole image, so that the effect of one can be
-//! measured.
+//! Orientation through its samples, without a polynomial over the whole image, so that the effect of a polynomial can
+//! be measured.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -8,7 +8,7 @@ use crate::attitude::{left_jacobian_product, matrix_of_rotation_vector, rotation
 
 /// Orientation that interpolates every one of its samples.
 ///
-/// Between two samples positions and rotation vectors are cubics whose slopes at the samples are those of the parabola
+/// Between two samples positions and rotation vectors are cubics whose slopes at the samples follow the parabola
 /// through three neighbours (exact for quadratic motion); before the first and after the last they are extended
 /// straight.
 #[derive(Debug, Clone, PartialEq)]

@@ -23,12 +23,12 @@ pub struct Crossover {
     pub profiles: [usize; 2],
     /// Factors of the errors that the shots of each share.
     pub shared: [SharedErrors; 2],
-    /// Where, Mars-fixed, at the mean of both heights, metres.
+    /// Position, Mars-fixed, at the mean of both heights, metres.
     pub place_m: Vector3<f64>,
     /// Height by the first profile minus height by the second, each interpolated between two shots, metres.
     pub difference_m: f64,
-    /// Standard deviation of that by the noise of four shots and by the ground between them, metres: without the errors
-    /// that the shots of a profile share.
+    /// Standard deviation of this difference by the noise of four shots and by the ground between them, metres: without
+    /// the errors that the shots of a profile share.
     pub sigma_m: f64,
     /// Slope of the ground towards east and north, metres per metre; zero for profiles that are almost parallel.
     pub slope: Vector2<f64>,
@@ -120,7 +120,7 @@ fn segments(placed: &[Placed], shot_sigma_m: f64) -> Vec<Segment<'_>> {
     segments
 }
 
-/// Shares of two segments of different profiles at which they cross, and where.
+/// Shares of two segments of different profiles at which they cross, and the place.
 fn crossing(first: &Segment, second: &Segment) -> Option<([f64; 2], Vector2<f64>)> {
     if first.from.profile == second.from.profile {
         return None;

@@ -9,8 +9,8 @@ use super::{Placed, SharedErrors, Variogram, shot::PROFILE_PLAN_M};
 pub(super) struct Kriging {
     pub(super) shots: Vec<Placed>,
     pub(super) variogram: Variogram,
-    /// A variance above that of any two points: with it the equations are positive definite, and as weights sum up to 1
-    /// it has no effect.
+    /// A variance above the variance of any two points: with it the equations are positive definite, and as weights sum
+    /// up to 1 it has no effect.
     sill_m2: f64,
     factor: Cholesky<f64, Dyn>,
     /// The equations' solution for ones, and its sum.
@@ -144,7 +144,8 @@ impl Kriging {
         self.weights_of_profiles(weights, |shared| shared.radial)
     }
 
-    /// The same of the part of the errors in plan by which they exceed those of a profile at nadir of known attitude.
+    /// Sums of the weights of each profile, times the part of the errors in plan by which they exceed a profile at
+    /// nadir of known attitude.
     pub(super) fn farther_of_profiles(&self, weights: &Weights) -> DMatrix<f64> {
         self.weights_of_profiles(weights, |shared| shared.farther_m() / PROFILE_PLAN_M)
     }

@@ -27,8 +27,8 @@
 //!     .collect();
 //! let surface = LaserSurface::new(&shots, &[], &SurfaceOptions::default())?;
 //! let beside = surface.predict(&[shots[20].ground_m + Vector3::new(0.0, 300.0, 0.0)]);
-//! assert!((beside.heights_m[0] - 50.0).abs() < 1e-6); // metres; a constant comes back
-//! // Beside the profile the ground may be anything like what it is along it.
+//! assert!((beside.heights_m[0] - 50.0).abs() < 1e-6); // metres; a constant is reproduced
+//! // Beside the profile the ground may vary as it does along the profile.
 //! assert!((2.0..3.0).contains(&beside.sigma_m(0)));
 //! # Ok::<(), areograph_geom::surface::SurfaceError>(())
 //! ```
@@ -65,7 +65,7 @@ const SHOTS_MAX: usize = 1500;
 const NEAR_M: f64 = 3_000.0;
 /// Minimum number of shots of a surface.
 const SHOTS_MIN: usize = 10;
-/// Half the baseline of gradients, metres: less than a spot of the laser.
+/// Half the baseline of gradients, metres: less than a footprint of the laser.
 const GRADIENT_STEP_M: f64 = 30.0;
 
 /// Uncertainties of a surface of laser shots.
@@ -80,7 +80,7 @@ pub struct SurfaceOptions {
     pub plan_sigma_m: f64,
     /// Minimum roughness, metres at 300 m, see [`Variogram`].
     pub roughness_min_m: f64,
-    /// Where relief determines planimetry: planimetric standard deviation of a profile on each axis, metres. The
+    /// Planimetric standard deviation of a profile on each axis where relief determines planimetry, metres. The
     /// planimetric error between images and shots is then estimated from heights, and is not part of their own errors.
     pub relief_sigma_m: Option<f64>,
     /// The body whose ellipsoid heights refer to.
@@ -102,7 +102,7 @@ impl Default for SurfaceOptions {
     }
 }
 
-/// Why a surface cannot be computed.
+/// Reasons why a surface cannot be computed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SurfaceError {
     /// Too few shots.
@@ -138,11 +138,11 @@ pub struct SurfaceHeights {
     pub nearest_m: Vec<f64>,
     /// Covariance of the errors of the heights, m²: one standard deviation contains 68 % of them; see [`tails`].
     pub covariance_m2: DMatrix<f64>,
-    /// The same without the effect of planimetric errors on a slope.
+    /// Covariance without the effect of planimetric errors on a slope, m².
     pub without_plan_m2: DMatrix<f64>,
     /// The body whose ellipsoid they refer to.
     pub body: Body,
-    /// Where relief determines planimetry.
+    /// Planimetric information, where relief determines planimetry.
     pub relief: Option<Relief>,
 }
 
@@ -176,8 +176,8 @@ impl SurfaceHeights {
 }
 
 impl LaserSurface {
-    /// The surface of `shots` for heights near the points `around`, Mars-fixed, metres: with very many shots those near
-    /// them are used.
+    /// The surface of `shots` for heights near the points `around`, Mars-fixed, metres: with very many shots, the ones
+    /// near these points are used.
     ///
     /// # Errors
     /// Too few shots, a coordinate or standard deviation that is not finite.
@@ -335,8 +335,8 @@ impl LaserSurface {
             .collect()
     }
 
-    /// Covariance of the errors of the surface at the possible true positions, without those that shots of a profile share: a
-    /// planimetric error moves a point away from a profile, where the ground is known, as well as towards one.
+    /// Covariance of the errors of the surface at the possible true positions, without errors that shots of a profile
+    /// share: a planimetric error moves a point away from a profile, where the ground is known, as well as towards one.
     fn errors_m2(&self, at: &[Vector2<f64>]) -> DMatrix<f64> {
         let shift_m = std::f64::consts::SQRT_2 * self.options.plan_sigma_m;
         let all_around = [

@@ -11,7 +11,7 @@ use crate::statistics::{NORMAL_MAD, median};
 const EVIDENCE_MIN: usize = 3;
 /// A profile that lies farther from all others than this many standard deviations is left out.
 const LEFT_OUT_SIGMAS: f64 = 5.0;
-/// Weight of the standard deviation a priori in the estimated one, in profiles.
+/// Weight of the a priori standard deviation in the estimated one, in profiles.
 const PRIOR_PROFILES: f64 = 3.0;
 /// Steps of the estimate; it changes by less than 1 % after half of them.
 const STEPS: usize = 40;
@@ -20,7 +20,7 @@ const SHIFT_MAX_SIGMAS: f64 = 3.0;
 /// Degrees of freedom of Student's distribution for the weights of crossovers.
 const FREEDOM: f64 = 4.0;
 
-/// Standard deviations of the shift of a profile a priori, metres.
+/// A priori standard deviations of the shift of a profile, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ProfilePriors {
     /// Along the radius.
@@ -40,7 +40,7 @@ pub struct LeftOut {
     pub crossovers: usize,
     /// Its height above theirs, metres.
     pub above_m: f64,
-    /// Standard deviation of that, metres.
+    /// Standard deviation of this height, metres.
     pub sigma_m: f64,
 }
 
@@ -51,25 +51,25 @@ pub struct ProfileShift {
     pub profile: usize,
     /// Its crossovers with profiles that are not left out.
     pub crossovers: usize,
-    /// How far it is recorded to the east, to the north and above its true position, metres.
+    /// Offset of the record to the east, to the north and above its true position, metres.
     pub shift_m: Vector3<f64>,
-    /// Covariance of that, m².
+    /// Covariance of this offset, m².
     pub covariance_m2: Matrix3<f64>,
 }
 
-/// The profiles of a site, held against each other.
+/// The profiles of a site, compared with each other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProfileNet {
     /// Profiles that do not belong, the worst first.
     pub left_out: Vec<LeftOut>,
-    /// Standard deviation of the radial shift of the other profiles, from their crossovers and the one a priori, metres.
+    /// Standard deviation of the radial shift of the other profiles, from crossovers and a priori value, metres.
     pub radial_sigma_m: f64,
 }
 
 impl ProfileNet {
-    /// Finds the profiles that do not belong, one after the other, and estimates how far the others are shifted.
+    /// Finds the profiles that do not belong, one after the other, and estimates the shifts of the others.
     ///
-    /// The estimate is that of expectation and maximisation for a variance component (Dempster et al. 1977).
+    /// The estimate uses expectation and maximisation for a variance component (Dempster et al. 1977).
     #[must_use]
     pub fn of(crossovers: &[Crossover], priors: &ProfilePriors) -> Self {
         let mut used: Vec<Crossover> = crossovers.to_vec();
@@ -218,7 +218,7 @@ struct Net<'a> {
     crossovers: &'a [Crossover],
     /// Each with the number of its crossovers.
     profiles: BTreeMap<usize, usize>,
-    /// Of each profile, the factors of the errors that its shots share.
+    /// Factors of the errors that the shots of each profile share.
     shared: Vec<SharedErrors>,
     /// Indices of the profiles of each crossover.
     columns: Vec<[usize; 2]>,
@@ -259,7 +259,7 @@ impl<'a> Net<'a> {
         }
     }
 
-    /// Change of a difference with each unknown of the first profile; with those of the second it is the opposite.
+    /// Change of a difference with each unknown of the first profile; of the second it has the opposite sign.
     fn by_shift(&self, crossover: &Crossover) -> Vec<f64> {
         let slope = crossover.slope;
         if self.unknowns == 1 {

@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 
 use crate::ellipsoid::local_axes;
 
-/// Errors that a profile of unknown attitude shares, over those of others: robust spread of their crossovers at a real window
-/// near the south pole, 2.9 against 0.7 m.
+/// Errors that a profile of unknown attitude shares, over the errors of others: robust spread of their crossovers at a
+/// real window near the south pole, 2.9 against 0.7 m.
 const UNKNOWN_ATTITUDE: f64 = 4.0;
 /// Height error of a profile off nadir over the tangent of its angle, metres: five passes of 11 to 28° in three real windows
 /// differ by 7 to 153 m from the profiles that they cross after the crossover correction, by 206 m times the tangent (root mean
@@ -61,7 +61,7 @@ pub fn with_across_track(
     )
 }
 
-/// Errors that the shots of a profile share, over those of a profile at nadir of known attitude.
+/// Errors that the shots of a profile share, relative to a profile at nadir of known attitude.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SharedErrors {
     /// Along the radius.
@@ -71,14 +71,14 @@ pub struct SharedErrors {
 }
 
 impl SharedErrors {
-    /// Those of a profile at nadir of known attitude.
+    /// Shared errors of a profile at nadir of known attitude.
     pub(super) const LEAST: Self = Self {
         radial: 1.0,
         plan: 1.0,
     };
 
-    /// Standard deviation of the plan shift of a profile in addition to that of a profile at nadir of known attitude, metres:
-    /// √(σ² − σ₀²).
+    /// Standard deviation of the plan shift of a profile in addition to the shift of a profile at nadir of known
+    /// attitude, metres: √(σ² − σ₀²).
     pub(super) fn farther_m(&self) -> f64 {
         PROFILE_PLAN_M * (self.plan.powi(2) - 1.0).max(0.0).sqrt()
     }

@@ -16,13 +16,13 @@ pub(super) const GAP: f64 = 1.5;
 const CELL_M: f64 = 2_000.0;
 /// Pairs farther from a place than this have no weight in its roughness, metres.
 const REACH_M: f64 = 10_000.0;
-/// Weight of the roughness of all shots in that of a place, in pairs of shots.
+/// Weight of the roughness of all shots in the roughness of a place, in pairs of shots.
 const PRIOR_PAIRS: f64 = 20.0;
 
 /// Half the mean square difference of heights at a distance: `½ ν² (d / 300 m)^(2H)`, `H = 0.7`.
 ///
 /// The exponent is not estimated. On six windows of real MOLA shots exponents fitted along the profiles (0.35 to 0.95)
-/// predict withheld profiles worse than this one does: what lies between the profiles, craters above all, does not
+/// predict withheld profiles worse than this one does: the ground between the profiles, craters above all, does not
 /// follow the exponent along them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Variogram {
@@ -40,7 +40,7 @@ impl Variogram {
         0.5 * self.roughness_m.powi(2) * (distance_m / REFERENCE_M).powf(2.0 * Self::HURST)
     }
 
-    /// The same at a distance.
+    /// The variogram at a distance.
     pub(super) fn at(self, distance_m: f64) -> f64 {
         self.between(&Vector2::zeros(), &Vector2::new(distance_m, 0.0))
     }
@@ -54,7 +54,7 @@ type Sums = [Sum; LAGS];
 struct Sum {
     pairs: f64,
     distances_m: f64,
-    /// Of differences of heights, without the noise of the shots.
+    /// Squares of height differences, without the noise of the shots.
     squares_m2: f64,
 }
 
@@ -73,10 +73,10 @@ impl Sum {
     }
 }
 
-/// Roughness of the ground of a surface, and how it changes from place to place.
+/// Roughness of the ground of a surface, and its change from place to place.
 #[derive(Debug, Clone)]
 pub(super) struct Roughness {
-    /// Of all shots.
+    /// Variogram of all shots.
     pub(super) all: Variogram,
     sums: Sums,
     cells: BTreeMap<[i64; 2], Sums>,

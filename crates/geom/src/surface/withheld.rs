@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::{LaserSurface, SurfaceOptions, SurfaceShot, tails};
 use crate::{ellipsoid::height_m, statistics::median};
 
-/// Shots of a withheld stretch, at most: 18 km of MOLA's.
+/// Maximum number of shots of a withheld stretch: 18 km with MOLA.
 const STRETCH_SHOTS: usize = 60;
 /// Shorter stretches are not tested.
 const STRETCH_MIN: usize = 20;
@@ -18,7 +18,7 @@ const STRETCH_MIN: usize = 20;
 const STRETCHES_MAX: usize = 60;
 /// Shots of other profiles that predict a stretch: the nearest.
 const PREDICTING: usize = 400;
-/// Every so many shots of a stretch, the distance of others is taken.
+/// Step, in shots of a stretch, at which the distance of others is taken.
 const DISTANCE_STEP: usize = 5;
 
 /// Rounding of distances, metres.

@@ -30,7 +30,7 @@ pub struct WindowGrid {
     regions: Vec<Region>,
     /// Largest cap that cells of a row cover, radians.
     caps_rad: Vec<f64>,
-    /// Where the windows of each cell begin in `windows`, row by row, and where those of the last end.
+    /// Start of the windows of each cell in `windows`, row by row, and end of the windows of the last cell.
     starts: Vec<u32>,
     windows: Vec<u32>,
     /// Windows of very many cells.

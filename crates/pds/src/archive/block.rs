@@ -16,7 +16,7 @@ const POLE: i32 = 90_000_000;
 /// Extent of the mid-points of some records, microdegrees, in the coordinates of their file.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Block {
-    /// Western edge, and the width from there eastwards; a whole turn is all longitudes.
+    /// Western edge, and the width from there eastwards; a full turn is all longitudes.
     west: u32,
     width: u32,
     south: i32,

@@ -135,7 +135,7 @@ pub struct Found {
     pub rejected: BTreeMap<ShotRejection, u64>,
     /// Records examined, including those decided by an index.
     pub frames_read: u64,
-    /// Shots whose own position was tested, those of frames near a window.
+    /// Shots whose own position was tested, in frames near a window.
     pub shots_read: u64,
 }
 

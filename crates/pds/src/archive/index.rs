@@ -2,7 +2,7 @@
 //! candidate records.
 //!
 //! An index only saves time. An entry is trusted as long as the file system reports the file as unchanged; an index of
-//! another version, or a damaged one, is ignored.
+//! a different version, or a damaged one, is ignored.
 
 use std::{
     collections::BTreeMap,
@@ -27,7 +27,7 @@ pub const INDEX: &str = "areograph-pedr.index";
 /// Start of the index file: type and format version. The BLAKE3 of the remainder follows, then the remainder in
 /// postcard.
 const HEADER: &[u8] = b"areograph pedr index 1\n";
-/// How an earlier index is recognised.
+/// Mark by which an earlier index is recognised.
 pub const INDEX_MARK: Mark = Mark {
     what: "an index that areograph wrote",
     at: MarkAt::Start(HEADER),
@@ -126,7 +126,7 @@ impl FromIterator<IndexedFile> for Index {
 }
 
 impl Index {
-    /// Decodes the index; `None` if the bytes are damaged or of another version.
+    /// Decodes the index; `None` if the bytes are damaged or of a different version.
     #[must_use]
     pub fn decode(bytes: &[u8]) -> Option<Self> {
         let (hash, rest) = bytes.strip_prefix(HEADER)?.split_at_checked(HASH_SIZE)?;

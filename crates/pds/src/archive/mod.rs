@@ -7,7 +7,7 @@
 //! Files are read by `pread`, at most 51 MB at a time, with all threads on one file, and never mapped: a file that
 //! shrinks, changes or vanishes is a failure of that file (decision 0020). `pedr/mid_point.rs` skips records in cells
 //! of `geom/window/grid.rs` without a window. The position of a shot is its own, in the frame of the products, never
-//! that of its PEDR frame.
+//! the position of its PEDR frame.
 //!
 //! The index (`index.rs`) holds the extents of blocks of 128 records, complaints, and identity and hash of each file.
 //! It is trusted only for unchanged files, and for records checked by the same rules (`pedr::RULES`), so that results

@@ -14,12 +14,12 @@ const DATUM_MARGIN_RAD: f64 = 0.3 * RADIANS_PER_DEGREE;
 /// Largest time from a shot to its frame's mid-point, seconds: 9.5 shots with a clock error of one per cent.
 const FRAME_MARGIN_S: f64 = 1.0;
 
-/// Which records are checked and reported when invalid.
+/// Records that are checked and reported when invalid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Judged {
     /// All of them.
     All,
-    /// Those that may contain a shot in a window; of the others only the mid-point is examined.
+    /// Records that may contain a shot in a window; of the others only the mid-point is examined.
     Near,
 }
 
@@ -58,7 +58,7 @@ impl<'a> Query<'a> {
         }
     }
 
-    /// The same with `correction_s` added to time tags.
+    /// The query with `correction_s` added to time tags.
     #[must_use]
     pub fn corrected(self, correction_s: f64) -> Self {
         Self {
@@ -67,7 +67,7 @@ impl<'a> Query<'a> {
         }
     }
 
-    /// The same query, limited to shots within an interval of corrected time.
+    /// The query, limited to shots within an interval of corrected time.
     #[must_use]
     pub fn within(self, time: Option<Interval>) -> Self {
         Self { time, ..self }

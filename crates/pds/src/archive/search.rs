@@ -285,7 +285,7 @@ impl Search<'_> {
         failures
     }
 
-    /// Reads the pieces; `None` for those of failed files.
+    /// Reads the pieces; `None` for pieces of failed files.
     fn read(
         &mut self,
         pieces: &[Piece],

@@ -4,7 +4,7 @@
 //! A line begins when the exposure of the preceding one ends, except after lines that were not transmitted and have no
 //! row. The time of a row that contradicts both its neighbours, which agree with each other, is replaced; any other
 //! contradiction is an error. Exposures define where pieces begin, but times define the line period: a line in which
-//! the exposure changes has neither the period in its prefix nor that of its neighbours.
+//! the exposure changes has neither the period in its prefix nor the period of its neighbours.
 
 use super::{error::HrscError, prefixes::Prefix};
 use crate::image_label::RowTimes;
@@ -60,7 +60,8 @@ struct Rows {
 }
 
 impl Rows {
-    /// Times as they are; an invalid exposure is replaced by that of the preceding row, or by the first valid one.
+    /// Times unchanged; an invalid exposure is replaced by the exposure of the preceding row, or by the first valid
+    /// one.
     fn of(prefixes: &[Prefix]) -> Result<Self, HrscError> {
         let whole = |prefix: &&Prefix| prefix.start_s.is_some() && prefix.period_s.is_some();
         let (known, lines) = (prefixes.iter().filter(whole).count(), prefixes.len());
@@ -73,7 +74,7 @@ impl Rows {
         let period_s = prefixes.iter().enumerate().map(|(row, prefix)| {
             if prefix.period_s.is_none() && prefix.start_s.is_some() {
                 damaged.push(format!(
-                    "line {row}: no exposure in its prefix; that of an adjacent line is used"
+                    "line {row}: no exposure in its prefix; the exposure of an adjacent line is used"
                 ));
             }
             before_s = prefix.period_s.unwrap_or(before_s);
@@ -305,7 +306,7 @@ mod tests {
         rows.collect()
     }
 
-    /// Largest distance of line times from those of the good prefixes, seconds.
+    /// Largest distance of line times from the times of the good prefixes, seconds.
     fn apart_s(times: &RowTimes, prefixes: &[Prefix]) -> f64 {
         let table = LineTimes::of_pieces(times.lines, &times.pieces).unwrap();
         let start_s = times.pieces[0].start.seconds();
@@ -376,7 +377,7 @@ mod tests {
                 );
             }
         }
-        // Of 64 bits the last eleven are each worth less than 5e-5 s.
+        // The last eleven of 64 bits are each worth less than 5e-5 s.
         assert!(silent <= 9 * 11, "{silent}");
     }
 
@@ -408,7 +409,7 @@ mod tests {
             assert!(apart_s(&times, &prefixes()) < 1e-6); // seconds: of exposures alone
             assert_eq!(times.remarks.len(), 1);
         }
-        // Where the exposure changes within the gap.
+        // The exposure changes within the gap.
         let mut damaged = prefixes();
         damaged[55..64].fill(nothing);
         let failure = row_times(&damaged).unwrap_err();

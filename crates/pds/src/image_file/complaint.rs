@@ -44,7 +44,7 @@ pub enum Fault {
     },
     /// Fragments missing in the file.
     Lost {
-        /// How many.
+        /// Number of fragments.
         fragments: u16,
     },
     /// A duplicate of an earlier fragment.

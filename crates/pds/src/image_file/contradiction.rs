@@ -11,7 +11,7 @@ use crate::{image_label::ImageLabel, moc::product_named};
 const NARROW_ANGLE: &str = "MOC-NA";
 /// Unit of that line clock, seconds.
 const LINE_CLOCK_S: f64 = 1e-7;
-/// Tolerance between line clock and label, units: labels print exposures to a unit, and either may be rounded or
+/// Tolerance between line clock and label, units: labels state exposures to a unit, and either may be rounded or
 /// truncated.
 const LINE_CLOCKS_APART_MAX: f64 = 1.0;
 

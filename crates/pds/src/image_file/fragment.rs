@@ -11,8 +11,8 @@ use super::{
 
 /// Data bytes of a full fragment, the size of the on-board buffer.
 pub(super) const FULL: u64 = 245_760;
-/// Largest accepted ratio of the size of an image to that of its remaining data: an archived image has at most about 50
-/// fragments.
+/// Largest accepted ratio of the size of an image to the size of its remaining data: an archived image has at most
+/// about 50 fragments.
 const LOST_MAX: u64 = 64;
 /// Fragments that their 16-bit numbers can count.
 const MOST: usize = 1 << 16;
@@ -22,8 +22,8 @@ const DATA_BYTES_MAX: u64 = 1 << 22;
 /// Size and coding of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
-    /// Exposed lines, as stated in the first header if its data can belong to that many; for a plain raster those of
-    /// the label.
+    /// Exposed lines, as stated in the first header if its data can belong to that many; for a plain raster the lines
+    /// of the label.
     pub lines: u32,
     /// Samples of a line.
     pub samples: u32,

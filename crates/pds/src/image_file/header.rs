@@ -68,7 +68,7 @@ impl Header {
         self.two(55)
     }
 
-    /// Lines of the whole image.
+    /// Lines of the complete image.
     pub(super) fn total_lines(&self) -> u32 {
         u32::from(self.two(40)) * 16
     }

@@ -46,7 +46,7 @@ pub enum ImageFileError {
         /// Size of the file.
         bytes: u64,
     },
-    /// A raster of another kind.
+    /// A raster of a different kind.
     #[error("{key} is {value:?}; expected {expected}")]
     #[cause("give an .imq or .img file of the archive, with 8 bits a pixel")]
     Raster {

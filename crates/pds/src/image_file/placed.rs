@@ -49,7 +49,7 @@ impl Placed {
         Ok(placed)
     }
 
-    /// Decodes the whole image once to locate missing lines.
+    /// Decodes the complete image once to locate missing lines.
     ///
     /// The last fragment gives the number of lines; missing ones can be located if there is one gap.
     fn find_places(

@@ -1,6 +1,6 @@
 //! Conversion of numbers to relative radiance, and the noise of odd and even detectors.
 //!
-//! The model is that of the camera's calibration report of 1997 (M. Malin et al., as ISIS applies it):
+//! The model follows the camera's calibration report of 1997 (M. Malin et al., as ISIS applies it):
 //! `dn = a (r t + dc t + g) + z − offset`, with gain `a`, exposure `t` and radiance `r`. Neither `z`, `dc` nor `g` of
 //! the narrow-angle and the blue wide-angle camera is public: with 0 in their place radiance is known up to a constant.
 
@@ -75,7 +75,7 @@ enum NotCalibrated {
         expected: &'static str,
     },
     #[error(
-        "gain and offset change {changes} times within the image; the label has only those of its first line"
+        "gain and offset change {changes} times within the image; the label has only the values of its first line"
     )]
     Changes { changes: u16 },
 }

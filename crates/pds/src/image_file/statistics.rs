@@ -11,7 +11,7 @@ pub struct Statistics {
     lines: [u32; 3],
 }
 
-/// Statistics of the decoded pixels, without those of missing lines.
+/// Statistics of the decoded pixels, without missing lines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PixelStatistics {
     /// Lines as transmitted.

@@ -107,7 +107,7 @@ impl Stream {
         pieces.iter().take_while(within)
     }
 
-    /// Where the bytes of a fragment begin.
+    /// Start of the bytes of a fragment.
     pub(super) fn start_of(&self, fragment: u16) -> u64 {
         let before = |(_, piece): &(u64, Piece)| piece.fragment < Some(fragment);
         let number = self.pieces.partition_point(before);

@@ -46,7 +46,7 @@ static WALSH: LazyLock<[[i32; EDGE]; EDGE]> = LazyLock::new(|| {
     functions
 });
 
-/// How the fragments of an image are coded.
+/// Coding of the fragments of an image.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TransformCoder {
     pub(super) transform: Transform,

@@ -71,7 +71,7 @@ impl FocalLine {
     }
 }
 
-/// The same line along Y of the camera frame.
+/// The line along Y of the camera frame.
 struct PlacedLine {
     /// About the boresight, from the sensor's axes to the camera's.
     turn_rad: f64,
@@ -82,7 +82,7 @@ struct PlacedLine {
 }
 
 impl PlacedLine {
-    /// Of the two rotations of a line into the Y axis, the smaller one.
+    /// The smaller of the two rotations of a line into the Y axis.
     fn of(line: &FocalLine) -> Self {
         let pitch_mm = line.step_mm.norm();
         let (samples_along, up_mm) = if line.step_mm.y < 0.0 {

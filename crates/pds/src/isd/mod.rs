@@ -103,8 +103,8 @@ pub struct SupportTables {
 /// Reads the support data of a line scanner.
 ///
 /// # Errors
-/// The file cannot be read; invalid JSON; another kind of camera, or an unknown distortion; a key that is missing or
-/// has an invalid value; tables that do not cover the image.
+/// The file cannot be read; invalid JSON; a different kind of camera, or an unknown distortion; a key that is missing
+/// or has an invalid value; tables that do not cover the image.
 pub fn read_isd(path: &Path) -> Result<ImageSupport> {
     let bytes = fs::metadata(path)
         .map_err(IoError::on("read"))
@@ -161,7 +161,7 @@ fn support_of(document: &Object<'_>) -> Result<ImageSupport> {
         radii_m,
         target: target(document)?,
         platform: document.text("name_platform")?.to_owned(),
-        // An identifier of another kind, as a number, names no product.
+        // An identifier of a different kind, as a number, names no product.
         identifier: document.text("image_identifier").ok().map(str::to_owned),
         tables,
     })

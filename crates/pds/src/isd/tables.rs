@@ -13,7 +13,7 @@ use areograph_geom::attitude::{
 const NAIF_J2000: i64 = 1;
 /// Tolerance of the length of a unit quaternion: files have fifteen digits, and damaged values differ widely.
 const UNIT_TOLERANCE: f64 = 1e-6;
-/// The same for the rows of a rotation matrix.
+/// Tolerance of the length of the rows of a rotation matrix.
 const ROTATION_TOLERANCE: f64 = 1e-6;
 
 /// Positions and velocities of a body relative to the centre of the target, J2000.
@@ -120,8 +120,9 @@ impl Rotations {
                 .sqrt();
             // Written so that NaN is rejected too.
             if !((length - 1.0).abs() <= UNIT_TOLERANCE) {
-                let expected =
-                    format!("unit quaternions (w, x, y, z); that of row {row} has length {length}");
+                let expected = format!(
+                    "unit quaternions (w, x, y, z); the quaternion of row {row} has length {length}"
+                );
                 return Err(table.refused("quaternions", expected));
             }
         }

@@ -4,12 +4,12 @@ use super::{ImageSupport, SupportTables};
 use areograph_base::{body::Body, error::Cause, time::Et, units::METRES_PER_KM};
 use areograph_geom::{attitude::rotation_vector, body_rotation::body_rotation};
 
-/// Tolerance of radii against those of the products' frame, metres: files round them to ten metres.
+/// Tolerance of radii against the radii of the products' frame, metres: files round them to ten metres.
 pub(super) const RADIUS_TOLERANCE_M: f64 = 10.0;
 
-/// Support data of another body.
+/// Support data of a different body.
 #[derive(Debug, thiserror::Error, Cause)]
-#[cause(Input: "leave the image out, or set body to that of its support data; the configuration expects {body} \
+#[cause(Input: "leave the image out, or set body to the body of its support data; the configuration expects {body} \
     (body = \"{}\")", body.word())]
 pub enum ForeignBody {
     /// Identified by its code.
@@ -28,7 +28,7 @@ pub enum ForeignBody {
     },
     /// Identified by its radii.
     #[error(
-        "image {image}: radii are {:.2} and {:.2} km; expected {:.2} and {:.2} km, those of {body} in {}",
+        "image {image}: radii are {:.2} and {:.2} km; expected {:.2} and {:.2} km, the radii of {body} in {}",
         .radii_m[0] / METRES_PER_KM,
         .radii_m[1] / METRES_PER_KM,
         .body.model().equatorial_radius_m / METRES_PER_KM,

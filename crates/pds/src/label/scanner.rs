@@ -7,7 +7,7 @@ const UNREAD_CHARACTERS: usize = 80;
 pub(super) struct Scanner<'a> {
     bytes: &'a [u8],
     pub(super) at: usize,
-    /// Where the latest word begins.
+    /// Start of the latest word.
     pub(super) word_at: usize,
 }
 

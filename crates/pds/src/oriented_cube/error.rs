@@ -33,7 +33,8 @@ pub(super) enum CubeError {
     },
     #[error("group {group} of the cube: {key} is {value:?}; expected {expected}")]
     #[cause(
-        "make the cube again from the archive's image: its label is damaged, or was written by another program than ISIS"
+        "make the cube again from the archive's image: its label is damaged, or was written by a program other than \
+        ISIS"
     )]
     Label {
         group: &'static str,
@@ -61,7 +62,7 @@ pub(super) enum CubeError {
         stop_s: f64,
     },
     #[error(
-        "the state of the camera model is that of {} lines and {} samples; expected {} and {}, those of the cube before any map \
+        "the state of the camera model has {} lines and {} samples; expected {} and {}, as in the cube before any map \
          projection",
         state[0], state[1], cube[0], cube[1]
     )]
@@ -70,7 +71,7 @@ pub(super) enum CubeError {
     )]
     StateSize { state: [u32; 2], cube: [u32; 2] },
     #[error(
-        "the state of the camera model is that of product {state}; expected {label}, which the label names"
+        "the state of the camera model belongs to product {state}; expected {label}, which the label names"
     )]
     #[cause("run csminit on the cube again, with the support data of its own image")]
     StateOfOther { state: String, label: String },

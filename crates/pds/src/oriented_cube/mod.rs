@@ -1,19 +1,21 @@
 //! ISIS cubes after `spiceinit`: label, and tables of position, attitude, rotation of the target and Sun, as a source of line
 //! times and orientation of MOC images without kernels; and cubes after `csminit`, by the state of their camera model.
 //!
-//! `spiceinit` writes the same tables whether ISIS or ALE computed them. A state is read as the support data that it was made
-//! of (module `state`). What follows is about tables.
+//! `spiceinit` writes the same tables whether ISIS or ALE computed them. A state is read as the support data that it
+//! was made of (module `state`). The following applies to tables.
 //!
-//! The result is an [`ImageSupport`], as of image support data: no later stage distinguishes them, and nothing is applied to
-//! positions and attitudes; those of ISIS contain the pointing bias of the camera. Differences are:
+//! The result is an [`ImageSupport`], as of image support data: no later stage distinguishes them, and nothing is
+//! applied to positions and attitudes; ISIS positions and attitudes contain the pointing bias of the camera.
+//! Differences are:
 //!
 //! - the camera is the built-in one that the label names, with areograph's optics;
-//! - a cube may show a part of the camera's image (`AlphaCube`: crop, reduce). Line times and samples are those of the part;
+//! - a cube may show a part of the camera's image (`AlphaCube`: crop, reduce). Line times and samples belong to the
+//!   part;
 //! - of a map-projected cube, tables and `AlphaCube` belong to the image before the projection, and so do line times;
 //!   its pixels do not.
 //!
 //! The first line begins with the clock of `NaifKeywords`, where ISIS kept it as ET, else with the position table, which ISIS
-//! makes from the first to the last line of the image that `spiceinit` was given: the whole one, or the part.
+//! makes from the first to the last line of the image that `spiceinit` was given: the complete image, or the part.
 //!
 //! # Source
 //! `Cube`, `Table`, `AlphaCube`, `SpicePosition`, `SpiceRotation`, `Spice::getClockTime` and `MocNarrowAngleCamera` of ISIS.
@@ -53,8 +55,8 @@ use areograph_base::{
     time::Et,
 };
 
-/// Durations that differ by less than this share are of the same lines: ISIS writes epochs with all digits, and a line is
-/// more than that of most images.
+/// Durations that differ by less than this share are of the same lines: ISIS writes epochs with all digits, and in most
+/// images a line is more than this share.
 const SAME_SPAN: f64 = 1e-6;
 /// Keywords of clock counts that ISIS converted to ET.
 const CLOCK_PREFIX: &str = "CLOCK_ET_";
@@ -71,11 +73,11 @@ pub struct OrientedCube {
     pub part: Part,
     /// Name of its map projection, if it has one.
     pub projection: Option<String>,
-    /// What orients it.
+    /// Source of its orientation.
     pub orientation: Orientation,
 }
 
-/// What orients a cube.
+/// Source of a cube's orientation.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Orientation {
     /// Tables of `spiceinit`.
@@ -103,7 +105,7 @@ pub fn is_cube_file(path: &Path) -> Result<bool> {
 ///
 /// # Errors
 /// The file cannot be read; another file; a cube without tables of `spiceinit` and without a state; an invalid label, part, table
-/// or state; tables that do not cover the image; a state of another model, of another size or of another image.
+/// or state; tables that do not cover the image; a state of a different model, size or image.
 pub fn read_oriented_cube(path: &Path, cameras: &[Instrument]) -> Result<OrientedCube> {
     let labelled = Labelled::open(path)?;
     let label = super::label::parse(&labelled.start)
@@ -325,7 +327,7 @@ fn reach(tables: &SupportTables, times: &LineTimes) -> std::result::Result<(), C
 }
 
 impl OrientedCube {
-    /// Notes on what the cube is, one sentence each.
+    /// Notes on the kind of the cube, one sentence each.
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
@@ -356,14 +358,14 @@ impl OrientedCube {
         }
         if let Orientation::State { model, plugin } = &self.orientation {
             notes.push(format!(
-                "the cube has the state of a camera model by csminit ({model}, {plugin}), in the frame of the body: the rotation of the \
-                 body is that of the products"
+                "the cube has the state of a camera model by csminit ({model}, {plugin}), in the frame of the body: \
+                 the rotation of the body is taken from the products"
             ));
         }
         notes.extend(self.projection.as_ref().map(|name| {
             format!(
-                "the cube is map-projected ({name}): times and orientation are those of the image before the projection, of which its \
-                 pixels are no samples"
+                "the cube is map-projected ({name}): times and orientation belong to the image before the projection, \
+                 and the cube's pixels are not its samples"
             )
         }));
         notes

@@ -234,7 +234,8 @@ pub(super) fn rotations(table: &Table) -> Result<Rotations, CubeError> {
                 if (length - 1.0).abs() <= UNIT_TOLERANCE {
                     return Ok(matrix_of_spice_quaternion(quaternion));
                 }
-                let expected = format!("unit quaternions; that of record {at} has length {length}");
+                let expected =
+                    format!("unit quaternions; the quaternion of record {at} has length {length}");
                 Err(table.refused("J2000Q0 to J2000Q3", format!("{quaternion:?}"), expected))
             });
             (epochs(table)?, turning.collect::<Result<Vec<_>, _>>()?)
@@ -261,7 +262,7 @@ pub(super) fn rotations(table: &Table) -> Result<Rotations, CubeError> {
     }))
 }
 
-/// The same rotations with further rows on the arcs between sparse ones: interpolations of a higher order would overshoot where
+/// The rotations with further rows on the arcs between sparse ones: interpolations of a higher order would overshoot where
 /// one arc ends and another begins.
 fn subdivided(rows: &Rotations) -> Rotations {
     let mut et_s = vec![rows.et_s[0]];

@@ -1,6 +1,6 @@
-//! Which part of the camera's image a cube shows: group `AlphaCube`.
+//! The part of the camera's image that a cube shows: group `AlphaCube`.
 //!
-//! Alpha lines and samples are those of the image as the camera took it, beta ones those of this cube before any map
+//! Alpha lines and samples count in the image as the camera took it, beta lines and samples in this cube before any map
 //! projection. Both count from 1 at the centre of the first one; edges lie at 0.5.
 //!
 //! # Source
@@ -18,13 +18,13 @@ const SIZE_MAX: f64 = 1e7;
 /// One axis of a part, lines or samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PartOfAxis {
-    /// Of the image as taken.
+    /// Number in the image as taken.
     pub whole: u32,
     /// The first one of the part, counted from 0.
     pub first: u32,
-    /// How many of the image become one of the part.
+    /// Number of the image that become one of the part.
     pub factor: u32,
-    /// Of the part.
+    /// Number in the part.
     pub count: u32,
 }
 
@@ -38,7 +38,7 @@ pub struct Part {
 }
 
 impl PartOfAxis {
-    /// The whole of an axis.
+    /// A complete axis.
     const fn all(count: u32) -> Self {
         Self {
             whole: count,
@@ -48,7 +48,7 @@ impl PartOfAxis {
         }
     }
 
-    /// Whether it is the whole, at full size.
+    /// Whether it is complete, at full size.
     #[must_use]
     pub const fn is_whole(&self) -> bool {
         self.first == 0 && self.factor == 1 && self.count == self.whole
@@ -114,7 +114,7 @@ impl PartOfAxis {
 }
 
 impl Part {
-    /// The whole of `[lines, samples]`.
+    /// All of `[lines, samples]`.
     pub(super) const fn all([lines, samples]: [u32; 2]) -> Self {
         Self {
             lines: PartOfAxis::all(lines),
@@ -122,7 +122,7 @@ impl Part {
         }
     }
 
-    /// The part that a label states; without the group, the whole of `[lines, samples]`.
+    /// The part that a label states; without the group, all of `[lines, samples]`.
     pub(super) fn of(label: &Label, size: [u32; 2]) -> Result<Self, CubeError> {
         if !label.entries.iter().any(|entry| entry.group == GROUP) {
             return Ok(Self::all(size));

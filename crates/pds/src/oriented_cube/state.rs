@@ -1,6 +1,6 @@
 //! The state of a camera model in a cube: the string `CSMState` of `csminit`.
 //!
-//! Camera, line times and orientation are those of the state; the label only names the image. ISIS takes the state where a cube
+//! Camera, line times and orientation come from the state; the label only names the image. ISIS takes the state where a cube
 //! has tables as well, and so does areograph.
 //!
 //! # Source
@@ -122,7 +122,7 @@ fn label_of_image(label: &Label, cameras: &[Instrument]) -> Result<Option<ImageL
     Ok(None)
 }
 
-/// The state must be that of the cube's own lines and samples, which a map projection replaces by others.
+/// The state must have the cube's own lines and samples, which a map projection replaces by others.
 fn of_this_size(label: &Label, state: [u32; 2]) -> std::result::Result<(), CubeError> {
     let (group, keys) = if projection_name(label).is_some() {
         ("ALPHACUBE", ["BETALINES", "BETASAMPLES"])

@@ -257,7 +257,7 @@ fn a_projected_cube_has_the_size_of_its_state_before_the_projection() {
     );
     refused(
         &cropped,
-        "that of 1000 lines and 1024 samples; expected 300 and 200",
+        "has 1000 lines and 1024 samples; expected 300 and 200",
     );
 }
 
@@ -330,7 +330,7 @@ const CHANGES: [Change; 19] = [
     ),
     (
         |state| state["m_quaternions"][7] = json!(2.0),
-        "expected unit quaternions (x, y, z, w); that of epoch 1 has length",
+        "expected unit quaternions (x, y, z, w); the quaternion of epoch 1 has length",
     ),
     (
         |state| state["m_positions"] = json!(vec![1.0; 75]),
@@ -354,7 +354,7 @@ const CHANGES: [Change; 19] = [
     ),
     (
         |state| state["m_imageIdentifier"] = json!("E02-02016"),
-        "the state of the camera model is that of product E0202016; expected E0201461, which the label names",
+        "the state of the camera model belongs to product E0202016; expected E0201461, which the label names",
     ),
 ];
 

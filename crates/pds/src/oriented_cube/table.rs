@@ -75,7 +75,7 @@ impl Table {
         Ok(Some(table))
     }
 
-    /// What it is in messages.
+    /// Its description in messages.
     fn object(&self) -> String {
         format!("table {}", self.name)
     }

@@ -271,7 +271,7 @@ fn invalid_tables_are_refused_with_the_reason() {
         (
             1,
             |table| table.rows[0][0] = 0.7,
-            "expected unit quaternions; that of record 0 has length 0.70",
+            "expected unit quaternions; the quaternion of record 0 has length 0.70",
         ),
         (
             1,

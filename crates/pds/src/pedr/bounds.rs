@@ -14,7 +14,7 @@ pub(super) const RADIUS_CM: RangeInclusive<i32> = 330_000_000..=345_000_000;
 pub(super) const RELIEF_MAX_M: f64 = (*RADIUS_CM.end() - *RADIUS_CM.start()) as f64 * METRES_PER_CM;
 /// Distance of the spacecraft from the centre of Mars in mapping orbit, centimetres.
 pub(super) const MAPPING_ORBIT_CM: RangeInclusive<u32> = 340_000_000..=420_000_000;
-/// The same before mapping, when the orbit was elliptical.
+/// Distance of the spacecraft from the centre of Mars before mapping, when the orbit was elliptical, centimetres.
 pub(super) const EARLIER_ORBIT_CM: RangeInclusive<u32> = 340_000_000..=2_200_000_000;
 /// Largest change of that distance over a frame, centimetres: 3 km/s, more than the radial part of the 4.7 km/s at the
 /// periapsis of the first, longest orbits.
@@ -44,7 +44,7 @@ pub(super) const OFF_NADIR: RangeInclusive<i32> = -90_000_000..=90_000_000;
 /// Largest difference between the two times of a record, seconds: the last digit of the integers, and
 /// room for the rounding of the double.
 pub(super) const TIMES_AGREE_S: f64 = 1.1e-6;
-/// Largest difference between the radius of the mid-point and that of the nearest return, metres: more than any slope
+/// Largest difference between the radii of the mid-point and of the nearest return, metres: more than any slope
 /// of Mars over the 6 km of a frame.
 pub(super) const MID_RADIUS_M: f64 = 10_000.0;
 /// Frames whose mid-points are closer than this share a shot, seconds: a frame is 20 shots of 0.1 s, less one.

@@ -31,7 +31,7 @@ impl Record {
             .all(|radius_cm| RADIUS_CM.contains(&radius_cm.get()))
     }
 
-    /// Checks values that make the whole frame unusable if wrong.
+    /// Checks values that make the entire frame unusable if wrong.
     ///
     /// # Errors
     /// The first impossible value.

@@ -11,7 +11,7 @@ use super::Reason;
 pub struct Complaint {
     /// Name of the file, without folders.
     pub file: String,
-    /// Record, counted from 1 with the label records, or line of a table; `None` when it concerns the whole file.
+    /// Record, counted from 1 with the label records, or line of a table; `None` when it concerns the file in general.
     pub record: Option<u32>,
     /// Reason code, for counts.
     pub reason: Reason,

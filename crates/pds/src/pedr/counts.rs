@@ -36,7 +36,7 @@ pub struct Counts {
     /// Measured range minus the distance from the file's own spacecraft to the footprint, metres: ground returns with
     /// known attitude.
     pub ground_range_minus_distance_m: Summary,
-    /// The same of all other returns with known attitude.
+    /// Measured range minus this distance of all other returns with known attitude.
     pub other_range_minus_distance_m: Summary,
 }
 

@@ -12,7 +12,7 @@ pub enum Reason {
     TruncatedLabel,
     /// The label cannot be read.
     UnreadableLabel,
-    /// A keyword of the label is missing, or differs from that of every PEDR.
+    /// A keyword of the label is missing, or differs from every PEDR.
     LabelKeyword,
     /// The label states a number of records that differs from the file's.
     RecordCount,
@@ -46,7 +46,7 @@ pub enum Reason {
     Areoid,
     /// The off-nadir angle points away from Mars.
     OffNadir,
-    /// The orbit or its model differs from that of the neighbouring records.
+    /// The orbit or its model differs from the neighbouring records.
     Orbit,
     /// The record does not fit between its neighbours.
     Neighbours,
@@ -145,7 +145,7 @@ pub enum RecordError {
     },
     /// The radius to which parallax refers differs widely from every return.
     #[error(
-        "radius of the mid-point is {centimetres} cm, {apart_m:.0} m from that of the nearest return; expected at most \
+        "radius of the mid-point is {centimetres} cm, {apart_m:.0} m from the radius of the nearest return; expected at most \
          {} m",
         bounds::MID_RADIUS_M
     )]
@@ -213,10 +213,10 @@ pub enum RecordError {
         what: &'static str,
         /// The value of the record.
         found: u32,
-        /// That of its neighbours.
+        /// The value of its neighbours.
         expected: u32,
     },
-    /// A value that is not continuous with that of a neighbour.
+    /// A value that is not continuous with a neighbour's.
     #[error(
         "{} is {value} {}, {apart:.1} {} from the extrapolation of record {record}; expected at most {limit:.1} {}",
         .quantity.name(), .quantity.unit(), .quantity.step_unit(), .quantity.step_unit()

@@ -21,9 +21,9 @@ use areograph_store::files::file_name;
 #[derive(Debug)]
 pub struct File {
     path: PathBuf,
-    /// The bytes of the label, followed by those of records.
+    /// The bytes of the label, followed by the bytes of records.
     bytes: Vec<u8>,
-    /// Length of the whole file, bytes.
+    /// Length of the complete file, bytes.
     length: u64,
     /// Row of the file that is the first one in memory.
     first_row: usize,
@@ -32,7 +32,7 @@ pub struct File {
     /// Records that the label takes.
     label_records: usize,
     label_complaints: Vec<Complaint>,
-    /// Rows that do not fit into the chronology of the whole file.
+    /// Rows that do not fit into the chronology of the complete file.
     misplaced: OnceLock<Chronology>,
 }
 
@@ -90,7 +90,7 @@ impl File {
         Self::of_length(bytes, length, name.to_owned())
     }
 
-    /// A file of `length` bytes whose first bytes are given: at least those of the label, or all.
+    /// A file of `length` bytes whose first bytes are given: at least the bytes of the label, or all.
     pub(super) fn of_length(bytes: Vec<u8>, length: u64, path: PathBuf) -> Self {
         let mut file = Self {
             name: FileName::parse(&path),
@@ -107,8 +107,8 @@ impl File {
         file
     }
 
-    /// The same file with the records from row `first_row` on in memory: `bytes` contains them after as many bytes as
-    /// the label has. The chronology is `misplaced`, or else that of the records in memory.
+    /// The file with the records from row `first_row` on in memory: `bytes` contains them after as many bytes as
+    /// the label has. The chronology is `misplaced`, or else follows from the records in memory.
     pub(super) fn with_records(
         &self,
         first_row: usize,
@@ -208,14 +208,14 @@ impl File {
         &self.path
     }
 
-    /// Number of data records of the whole file by its size, independent of the label.
+    /// Number of data records of the complete file by its size, independent of the label.
     #[must_use]
     pub fn record_count(&self) -> usize {
         let data = self.length.saturating_sub(self.label_length() as u64);
         usize::try_from(data / RECORD_BYTES as u64).unwrap_or(usize::MAX)
     }
 
-    /// The complaint about bytes after the last whole record, if any.
+    /// The complaint about bytes after the last complete record, if any.
     #[must_use]
     pub fn trailing_complaint(&self) -> Option<Complaint> {
         let data = self.length.checked_sub(self.label_length() as u64)?;
@@ -258,7 +258,7 @@ impl File {
         &self.records()[row - self.first_row]
     }
 
-    /// Checks that at least one valid record is in memory; a file of another kind contains none.
+    /// Checks that at least one valid record is in memory; a file of a different kind contains none.
     ///
     /// # Errors
     /// The actual kind of the file, or the fault of the label, or else of the first record.
@@ -339,7 +339,7 @@ impl File {
         self.label_records * RECORD_BYTES
     }
 
-    /// Which fields the file's software wrote.
+    /// Fields that the file's software wrote.
     pub(super) fn guard(&self) -> FieldGuard {
         FieldGuard::new(self.label.software_version)
     }

@@ -86,8 +86,8 @@ impl<'a> Frame<'a> {
     ///
     /// A frame without a residual is not corrected, whatever precedes it.
     ///
-    /// * `crossover_before_m` – residual of the preceding frame, metres; for the first frame of a file that of the
-    ///   mirrored next one; `None` if there is none, in which case the residual is constant
+    /// * `crossover_before_m` – residual of the preceding frame, metres; for the first frame of a file the residual of
+    ///   the mirrored next one; `None` if there is none, in which case the residual is constant
     #[must_use]
     pub fn new(record: &'a Record, guard: FieldGuard, crossover_before_m: Option<f64>) -> Self {
         let parallax = |field: I32| {
@@ -232,7 +232,7 @@ fn metres(centimetres: I32) -> f64 {
     f64::from(centimetres.get()) * METRES_PER_CM
 }
 
-/// The same direction with longitude in `0..2π`; a latitude beyond a pole is folded back.
+/// The direction with longitude in `0..2π`; a latitude beyond a pole is folded back.
 fn on_the_sphere(longitude_rad: f64, latitude_rad: f64) -> (f64, f64) {
     if latitude_rad.abs() <= FRAC_PI_2 {
         return (wrap_two_pi(longitude_rad), latitude_rad);

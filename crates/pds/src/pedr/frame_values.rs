@@ -18,7 +18,7 @@ pub struct EncodeError {
 
 /// A frame in metres, radians and seconds, for [`super::Record::from_frame`].
 ///
-/// `*_change*` is the change over the whole frame of 20 shots; arrays run over shots 1 to 20.
+/// `*_change*` is the change over the full frame of 20 shots; arrays run over shots 1 to 20.
 /// Fields left at their defaults become zero in the record.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FrameValues {

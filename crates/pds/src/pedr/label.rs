@@ -16,7 +16,7 @@ pub struct FileName {
 }
 
 impl FileName {
-    /// The parts of the file name of `path`; `None` when it has another form.
+    /// The parts of the file name of `path`; `None` when it has a different form.
     #[must_use]
     pub fn parse(path: &Path) -> Option<Self> {
         let name = path.file_name()?.to_str()?.to_ascii_uppercase();
@@ -52,7 +52,7 @@ pub struct PedrLabel {
     pub data_set_id: Option<String>,
     /// The datum named in the label, if it names only one.
     pub datum: Option<Datum>,
-    /// Records of the file including those of the label; the archive often writes `UNK`.
+    /// Records of the file including the label records; the archive often writes `UNK`.
     pub file_records: Option<u64>,
     /// Records of the label, as the label states.
     pub label_records: Option<usize>,

@@ -26,7 +26,7 @@ const ELLIPSE_DEG: f64 = 2.5;
 const DEGREES_PER_REVOLUTION: f64 = 0.5;
 /// Frames nearer to a pole than this are not compared by longitude, microdegrees.
 const POLE: i32 = 89_500_000;
-/// Microdegrees of half and a whole turn.
+/// Microdegrees of half and a full turn.
 const HALF_TURN: f64 = 180e6;
 
 /// Relation between two records.

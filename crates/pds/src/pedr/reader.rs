@@ -70,7 +70,7 @@ enum Changed {
 }
 
 impl File {
-    /// Reads a file as a whole; a [`Reader`] reads one piece by piece.
+    /// Reads a complete file; a [`Reader`] reads one piece by piece.
     ///
     /// # Errors
     /// The file cannot be read; not a regular file; one that changes meanwhile. Faults of its content are reported as
@@ -142,7 +142,7 @@ impl Reader {
         rows.start <= NEIGHBOURS && rows.end.saturating_add(NEIGHBOURS) >= self.head.record_count()
     }
 
-    /// The same for records that are not checked: the rest of the file is not read.
+    /// A stretch of records that are not checked: the rest of the file is not read.
     ///
     /// # Errors
     /// As [`stretch`](Self::stretch).
@@ -150,7 +150,7 @@ impl Reader {
         self.stretch_in(rows, buffer, Some(Chronology::default()))
     }
 
-    /// The same for a known chronology; without one, the rows in memory determine it.
+    /// A stretch with a known chronology; without one, the rows in memory determine it.
     fn stretch_in(
         &self,
         rows: Range<usize>,
@@ -274,7 +274,7 @@ impl Reader {
         Err(Changed::Young).in_file(self.head.path())
     }
 
-    /// The bytes after the last whole record.
+    /// The bytes after the last complete record.
     ///
     /// # Errors
     /// A read error; a file that has become shorter.
@@ -286,7 +286,7 @@ impl Reader {
         Ok(bytes)
     }
 
-    /// Time tag of the first valid record, ET seconds; a file of another kind contains none.
+    /// Time tag of the first valid record, ET seconds; a file of a different kind contains none.
     ///
     /// # Errors
     /// The fault of the label, otherwise of the first record; a read error.
@@ -339,7 +339,7 @@ impl Stretch {
         in_order(self.file.records().iter().map(|record| record.time_s.get()))
     }
 
-    /// Those of the rows that belong to the stretch itself.
+    /// The rows that belong to the stretch itself.
     fn about(&self, rows: Range<usize>) -> Range<usize> {
         let start = rows.start.clamp(self.inner.start, self.inner.end);
         start..rows.end.clamp(start, self.inner.end)

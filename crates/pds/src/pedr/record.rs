@@ -14,7 +14,7 @@ pub const RECORD_BYTES: usize = 776;
 ///
 /// Bytes of unpublished meaning are kept, so that reading and writing preserve them.
 /// "Over the frame" means from its first edge to its last: shot `k` of 1 to 20 lies at `(k − 10.5)/20` of it.
-/// The layout is that of SIS 2.7 and later; before, `parallax_*`, `crossover_residual_cm` and the
+/// The layout follows SIS 2.7 and later; before, `parallax_*`, `crossover_residual_cm` and the
 /// spacecraft's changes were Cartesian coordinates.
 #[derive(
     Debug, Clone, Copy, PartialEq, FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned,
@@ -91,7 +91,7 @@ pub struct Record {
     pub orbit_quality: U16,
     /// 3: no attitude for the frame, 2: none for part of it; the footprint then assumes nadir.
     pub attitude_flag: U16,
-    /// Longitude of the frame minus that of the subsolar point, 1e-4 rad.
+    /// Longitude of the frame minus longitude of the subsolar point, 1e-4 rad.
     pub local_time: I16,
     /// Angle at the centre of Mars between spacecraft and Sun, 1e-4 rad.
     pub phase_angle: U16,
@@ -148,10 +148,10 @@ impl Record {
         zerocopy::transmute!(*self)
     }
 
-    /// The records in `bytes`, without a copy; bytes after the last whole record are ignored.
+    /// The records in `bytes`, without a copy; bytes after the last complete record are ignored.
     #[must_use]
     pub fn slice_of(bytes: &[u8]) -> &[Self] {
-        // Any bytes form a record and records need no alignment, so the prefix of whole records always exists.
+        // Any bytes form a record and records need no alignment, so the prefix of complete records always exists.
         let whole = bytes.len() - bytes.len() % RECORD_BYTES;
         <[Self]>::ref_from_bytes(&bytes[..whole]).unwrap_or_default()
     }

@@ -79,7 +79,8 @@ impl Frame<'_> {
         self.spoiled_by(|shot| self.range_minus_distance_m(shot))
     }
 
-    /// The same with a known [`range_minus_distance_m`](Self::range_minus_distance_m) of each shot.
+    /// The returned shots with contradictory values, for a known
+    /// [`range_minus_distance_m`](Self::range_minus_distance_m) of each shot.
     #[must_use]
     pub fn spoiled_by(&self, range_minus_distance_m: impl Fn(u8) -> Option<f64>) -> SpoiledShots {
         let record = self.record();

@@ -24,7 +24,7 @@ pub struct LabelInfo {
     pub software_version: f64,
     /// Datum of longitudes and latitudes.
     pub datum: Datum,
-    /// What the file is and that it is synthetic, in one line of ASCII without quotes.
+    /// Description of the file as synthetic, in one line of ASCII without quotes.
     pub note: String,
 }
 

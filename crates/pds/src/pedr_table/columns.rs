@@ -7,7 +7,7 @@ use super::edit::{fixed, integer};
 pub enum Variant {
     /// The MOLA team's: off-nadir angle in 7 columns, packet and orbit in 6.
     Team,
-    /// The port of the USGS: 8, and 7 and 8 columns; times from the integers, some sums in another order.
+    /// The port of the USGS: 8, and 7 and 8 columns; times from the integers, some sums in a different order.
     Usgs,
 }
 

@@ -1,4 +1,4 @@
-//! Fortran's edit descriptors `Iw` and `Fw.d`, as compilers on IEEE machines print them.
+//! Fortran's edit descriptors `Iw` and `Fw.d`, as compilers on IEEE machines write them.
 
 /// Appends an integer right-justified in `width`; stars when it does not fit.
 pub(super) fn integer(line: &mut String, value: i64, width: usize) {
@@ -47,7 +47,7 @@ fn justify(line: &mut String, text: &str, width: usize) {
 mod tests {
     use super::*;
 
-    /// Lines that gfortran 12.2 printed for these values with (f7.0,f8.2,f5.1,f4.3,f3.2,f2.1,f1.0).
+    /// Lines that gfortran 12.2 wrote for these values with (f7.0,f8.2,f5.1,f4.3,f3.2,f2.1,f1.0).
     #[test]
     fn numbers_are_printed_as_fortran_prints_them() {
         let printed = [

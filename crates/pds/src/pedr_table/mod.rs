@@ -1,4 +1,4 @@
-//! Text tables of shots as `pedr2tab` prints them, to the byte.
+//! Text tables of shots as `pedr2tab` writes them, to the byte.
 //!
 //! # Source
 //! The MOLA team's program `pedr2tab` (G. Neumann), version 2.71828, and the variant of the USGS: columns, edit

@@ -1,4 +1,4 @@
-//! `PEDR2TAB.PRM`: columns and shots to print, read like Fortran lists.
+//! `PEDR2TAB.PRM`: columns and shots to write, read like Fortran lists.
 
 /// Preferences of a table, with the program's defaults.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,7 +21,7 @@ pub struct Preferences {
     pub crossover: bool,
     /// One table of all files.
     pub one_table: bool,
-    /// Name of that table; else its extension is that of each file's own.
+    /// Name of that table; else the extension of each file's own table.
     pub table_name: String,
     /// East longitudes of mid-points, degrees.
     pub longitude_deg: [f64; 2],
@@ -179,7 +179,7 @@ impl<'a> Lines<'a> {
         Ok(())
     }
 
-    /// The next value, `None` for an empty one; an error at the end of the file or for one of another kind.
+    /// The next value, `None` for an empty one; an error at the end of the file or for a value of a different kind.
     fn value<T>(
         &mut self,
         expected: &'static str,

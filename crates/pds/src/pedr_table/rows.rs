@@ -11,9 +11,9 @@ use crate::pedr::{Complaint, FieldGuard, File, Record};
 /// Rules of selection and correction of shots.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Rules {
-    /// Those of `pedr2tab`, errors included.
+    /// Rules of `pedr2tab`, errors included.
     Program,
-    /// Those of areograph: every shot is checked individually, nothing is carried over from another frame or file,
+    /// Rules of areograph: every shot is checked individually, nothing is carried over from another frame or file,
     /// invalid records are left out.
     PerShot,
 }

@@ -212,7 +212,7 @@ impl Rows for CubeRows {
     }
 
     fn is_bytes(&self) -> bool {
-        // Of base and multiplier only the usual ones are written as they are.
+        // Only the usual values of base and multiplier are written unchanged.
         #[allow(clippy::float_cmp, reason = "numbers as they are written")]
         let is_plain = self.cube.base == 0.0 && self.cube.multiplier == 1.0;
         self.cube.number == Number::UnsignedByte && is_plain

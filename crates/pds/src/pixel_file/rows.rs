@@ -4,10 +4,10 @@ use areograph_base::error::Result;
 
 /// Largest accepted size of a line, samples: the largest line of any camera here has 5184.
 pub(super) const SAMPLES_MAX: u32 = 65_536;
-/// The same of an image, lines.
+/// Largest accepted size of an image, lines.
 pub(super) const LINES_MAX: u32 = 10_000_000;
 
-/// Largest number of values read at a time: those of a row of tiles.
+/// Largest number of values read at a time: a row of tiles.
 const NUMBERS_MAX: u64 = 1 << 24;
 
 /// Whether this many lines can be read at a time.
@@ -23,7 +23,7 @@ pub(crate) trait Rows: std::fmt::Debug {
     /// Whether all numbers are whole, from 0 to 255.
     fn is_bytes(&self) -> bool;
 
-    /// The next whole lines; NaN for missing numbers. `None` after the last line.
+    /// The next complete lines; NaN for missing numbers. `None` after the last line.
     ///
     /// # Errors
     /// The file cannot be read; a picture that its library rejects.

@@ -295,7 +295,7 @@ impl Field {
         self.written_within(record, limits)
     }
 
-    /// The same within these limits, metres or radians.
+    /// The number of a row within these limits, metres or radians.
     pub(super) fn within(
         &self,
         record: &StringRecord,
@@ -304,7 +304,7 @@ impl Field {
         self.written_within(record, limits.map(|limit| limit / self.scale))
     }
 
-    /// The same within these limits, as written.
+    /// The number of a row within these limits, as written.
     fn written_within(
         &self,
         record: &StringRecord,

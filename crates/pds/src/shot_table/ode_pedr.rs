@@ -133,7 +133,7 @@ pub(super) fn shot(
 ) -> std::result::Result<ShotRow, String> {
     if record.len() != COLUMNS.len() {
         return Err(format!(
-            "the row has {} columns; expected {}, those of the heading",
+            "the row has {} columns; expected {}, as in the heading",
             record.len(),
             COLUMNS.len()
         ));

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use areograph_base::footprints::Footprint;
 use areograph_geom::statistics::median;
 
-/// Radius of the ground plus range may exceed that of the usual pass by this much, metres: orbits of passes at nadir over six
-/// windows differ by up to 4.3 km, those of the seven slanted passes by 8.4 km or more.
+/// Radius of the ground plus range may exceed the usual pass by this much, metres: orbits of passes at nadir over six
+/// windows differ by up to 4.3 km, orbits of the seven slanted passes by 8.4 km or more.
 const EXCESS_MAX_M: f64 = 6_000.0;
 /// Fewest orbits in which one is unusual.
 const ORBITS_MIN: usize = 5;
@@ -163,7 +163,7 @@ mod tests {
         let orbits = 10_100..10_110;
         let mut shots: Vec<Footprint> = orbits
             .flat_map(|orbit| {
-                // Each orbit is clipped by the window in another way.
+                // Each orbit is clipped by the window in a different way.
                 let first = (orbit % 7) * 3;
                 (first..40).map(move |step| shot(orbit, 0.5 * f64::from(step), 0.0))
             })
@@ -177,7 +177,7 @@ mod tests {
         let found = OffNadir::of(&shots);
         assert_eq!(found.passes.len(), 1);
         assert_eq!(found.passes[0].orbit, 18_563);
-        // The orbit is that of the mean of a belt: 200 m of 390 km.
+        // The orbit is the mean of a belt: 200 m of 390 km.
         assert!((found.passes[0].angle_rad - 0.25).abs() < 0.001);
         let angles = found.angles_rad.iter().zip(&shots);
         for (angle_rad, shot) in angles {

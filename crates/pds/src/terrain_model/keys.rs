@@ -44,7 +44,7 @@ pub(super) struct GeoKeys(BTreeMap<u16, f64>);
 /// Conversion of map coordinates to longitude and latitude.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Map {
-    /// Of x and y.
+    /// Radians per unit of x and y.
     pub(super) rad_per_unit: [f64; 2],
     /// Coordinates of the origin and its place.
     origin: [f64; 2],
@@ -119,7 +119,7 @@ impl GeoKeys {
         Ok(Some(major_m))
     }
 
-    /// Conversion of coordinates to places; `radius_m` is that of the map.
+    /// Conversion of coordinates to places; `radius_m` is the radius of the map.
     pub(super) fn map(&self, radius_m: f64) -> std::result::Result<Map, TerrainModelError> {
         if self.one_of(&[MERIDIAN]).abs() > 0.0 {
             let found = format!("{} degrees", self.one_of(&[MERIDIAN]));

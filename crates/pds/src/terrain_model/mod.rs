@@ -18,7 +18,7 @@ use areograph_geom::height_grid::HeightGrid;
 const CELLS_MAX: u64 = 1 << 27;
 /// Largest distance of heights from the sphere, metres: Olympus Mons is 21 km high, and −32768 stands for no height.
 const HEIGHT_MAX_M: f64 = 30_000.0;
-/// Tolerance of a radius against that of the body, as a share.
+/// Tolerance of a radius against the body's radius, as a share.
 const RADIUS_SHARE: f64 = 0.02;
 /// Tolerance of equal radii, metres: files round them.
 const SAME_RADIUS_M: f64 = 0.5;
@@ -50,7 +50,7 @@ pub enum TerrainModelError {
          gdalwarp -t_srs '+proj=eqc +R=3396190 +units=m'"
     )]
     Georeference {
-        /// Which tag or key.
+        /// The tag or key.
         what: &'static str,
         /// Value found.
         found: String,
@@ -75,7 +75,7 @@ pub enum TerrainModelError {
         "the sphere of its map has a radius of {of_file} m; the stated radius of the heights is {given} m"
     )]
     #[cause(
-        "leave --radius-m out, or add --heights-apart if heights refer to another sphere than the map"
+        "leave --radius-m out, or add --heights-apart if heights refer to a sphere other than the map's"
     )]
     TwoRadii {
         /// By the file.
@@ -83,9 +83,9 @@ pub enum TerrainModelError {
         /// As stated.
         given: f64,
     },
-    /// The sphere of another body.
+    /// The sphere of a different body.
     #[error(
-        "the sphere has a radius of {found} m; expected that of {body}, {expected} m, within 2 %"
+        "the sphere has a radius of {found} m; expected the radius of {body}, {expected} m, within 2 %"
     )]
     #[cause("give a model of this body, its radius in metres")]
     OtherBody {

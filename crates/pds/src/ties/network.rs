@@ -90,7 +90,8 @@ impl<'a> Point<'a> {
     }
 }
 
-/// Ground coordinates of a fixed or constrained point; those of a free one are initial values of its last adjustment.
+/// Ground coordinates of a fixed or constrained point; coordinates of a free point are initial values of its last
+/// adjustment.
 ///
 /// # Errors
 /// The missing value of such a point, which then becomes free.

@@ -19,7 +19,7 @@ pub(super) struct BoresightDocument<'a> {
     profile_shifts: &'a [ProfileOffset],
     /// Images without a simultaneous profile.
     without: &'a [String],
-    /// The unknown farthest from its a priori value, and how far, in standard deviations of the contradiction.
+    /// The unknown farthest from its a priori value, and its distance in standard deviations of the contradiction.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
     farthest: Option<&'a (String, f64)>,
@@ -33,7 +33,7 @@ struct SpotsDocument<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
     line_time_s: Option<(f64, f64)>,
-    /// Footprints by the initial orientation minus the laser by the mounting: along the track in lines,
+    /// Footprints from the initial orientation minus the laser from the mounting: along the track in lines,
     /// across it in focal-plane pixels.
     footprints_off: &'a [Summary; 2],
 }

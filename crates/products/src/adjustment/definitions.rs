@@ -26,16 +26,16 @@ pub(super) const DEFINITIONS: [(&str, &str); 15] = [
     ),
     (
         "footprints",
-        "position of a footprint of the first image in the second by the tie points, minus its projected position: \
-         lines and samples of the second image, metres on the ground, and distances of successive footprints. Only \
-         footprints count that both images show, on a line between those of the tie points; outside are those within the \
-         lines of both images that lie outside one of them. above_mola_m: heights at which the rays of these places meet, minus \
-         those of the footprints",
+        "position of a footprint of the first image in the second by the tie points, minus its projected position: lines \
+         and samples of the second image, metres on the ground, and distances of successive footprints. Only footprints \
+         count that both images show, on a line between the lines of the tie points; outside are the footprints within the \
+         lines of both images that lie outside one of them. above_mola_m: heights at which the rays of these places meet, \
+         minus the heights of the footprints",
     ),
     (
         "budget",
         "eq. 5 to 9 of Shan et al. 2005; pixels are the mean line spacing of the pair. paper_average takes the average of \
-         the images' across-track residuals as the paper computes, equation_7 their sum of squares as its eq. 7 states; \
+         the images' across-track residuals as the paper computes it, equation_7 their sum of squares as its eq. 7 states; \
          both add the means of the images in quadrature. equation_5 has the differences of the images tie point by tie \
          point, where means of opposite sign add up, and the mean misregistration that they leave unexplained",
     ),
@@ -52,9 +52,10 @@ pub(super) const DEFINITIONS: [(&str, &str); 15] = [
     ),
     (
         "sigmas of images",
-        "of the camera at the exposure of a line. Position, pitch and line times are not separated along the track: the position \
-         of a line's tag may be as many metres from that of its exposure as are flown in line_time_sigma_s, and the rotation \
-         makes up for it on the ground. Use position and rotation together. A time bias (time_bias_s) is not contained",
+        "of the camera at the exposure of a line. Position, pitch and line times are not separated along the track: the \
+         position at a line's tag may differ from the position at its exposure by the distance flown in line_time_sigma_s, \
+         and the rotation compensates for this on the ground. Use position and rotation together. A time bias \
+         (time_bias_s) is not contained",
     ),
     (
         "sigmas_m of shots",
@@ -63,21 +64,21 @@ pub(super) const DEFINITIONS: [(&str, &str); 15] = [
     ),
     (
         "mean_sigma_m",
-        "of the error that all tie points share; standard deviations of single points contain it. Those without it are \
-         relative_sigma_east_m, relative_sigma_north_m and relative_sigma_up_m of ties.parquet",
+        "of the error that all tie points share; standard deviations of single points contain it. The standard \
+         deviations without it are relative_sigma_east_m, relative_sigma_north_m and relative_sigma_up_m of ties.parquet",
     ),
     (
         "other_reading",
         "where a pair disagrees by more than 100 m along the flight: the mean of the tie points by the other of two \
          readings (all images equally likely to be in error, or one offset of the attitude clock, attitude_clock_s), \
-         minus that of the adjustment. No measurement decides between them: standard deviations hold for their own \
+         minus the mean in the adjustment. No measurement decides between them: standard deviations hold for their own \
          reading",
     ),
     (
         "boresight",
-        "where adjustment.common_bus is yes: angles of the laser from the direction by mounting and altimeter file \
-         (towards X of the bus, and at right angles to that and the beam), the offset of each recorded profile from its adjusted position, \
-         and the unknown farthest from its a priori value, in standard deviations of the contradiction",
+        "where adjustment.common_bus is yes: angles of the laser from the direction that mounting and altimeter file give \
+         (towards X of the bus, and at right angles to that and the beam), the offset of each recorded profile from its \
+         adjusted position, and the unknown farthest from its a priori value, in standard deviations of the contradiction",
     ),
     (
         "configured",

@@ -26,7 +26,7 @@ pub(super) static TABLE: Declaration<WriteArchive> = Declaration {
 
 pub(super) static CSV: Declaration<WriteArchive> = Declaration {
     path: "profiles.csv",
-    what: "the same as CSV",
+    what: "statistics of ranges against the kernels per profile, as CSV",
     readers: "spreadsheets, scripts",
     rows: "profiles",
     role: Role::Data,
@@ -77,7 +77,7 @@ fn times<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         column(
             "part",
             Unit::None,
-            "1, and higher after pauses of more than 300 s",
+            "number of the part: 1, and higher after pauses of more than 300 s",
             |row: &Row| row.part,
         ),
         column(
@@ -86,9 +86,12 @@ fn times<'a>() -> Vec<Column<&'a ArchiveProfile>> {
             "first record with a selected shot, counted from 1 with the label",
             |row: &Row| row.first_record,
         ),
-        column("last_record", Unit::None, "the last one", |row: &Row| {
-            row.last_record
-        }),
+        column(
+            "last_record",
+            Unit::None,
+            "last record with a selected shot, counted from 1 with the label",
+            |row: &Row| row.last_record,
+        ),
         column(
             "start_et_s",
             Unit::Second,
@@ -98,7 +101,7 @@ fn times<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         column(
             "stop_et_s",
             Unit::Second,
-            "that of the last one",
+            "corrected time of the last shot, ET seconds past J2000",
             |row: &Row| row.stop_et_s,
         ),
         column(
@@ -122,7 +125,7 @@ fn times<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         column(
             "off_nadir_max_deg",
             Unit::Degree,
-            "the largest",
+            "largest off-nadir angle of the laser",
             move |row: &Row| degrees(row.off_nadir_rad[1]),
         ),
     ]
@@ -140,7 +143,7 @@ fn ranges<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         checked(
             "mean_without_outliers_m",
             Unit::Metre,
-            "the same without outliers: compared with the limit",
+            "mean of range minus distance without outliers: compared with the limit",
             |row| row.mean_without_outliers_m,
         ),
         checked(
@@ -149,21 +152,30 @@ fn ranges<'a>() -> Vec<Column<&'a ArchiveProfile>> {
             "standard deviation of range minus distance",
             |row| row.range_minus_distance_m.standard_deviation,
         ),
-        checked("median_m", Unit::Metre, "median", |row| {
-            row.range_minus_distance_m.median
-        }),
+        checked(
+            "median_m",
+            Unit::Metre,
+            "median of range minus distance",
+            |row| row.range_minus_distance_m.median,
+        ),
         checked(
             "nmad_m",
             Unit::Metre,
-            "normalised median absolute deviation",
+            "normalised median absolute deviation of range minus distance",
             |row| row.range_minus_distance_m.nmad,
         ),
-        checked("min_m", Unit::Metre, "smallest", |row| {
-            row.range_minus_distance_m.min
-        }),
-        checked("max_m", Unit::Metre, "largest", |row| {
-            row.range_minus_distance_m.max
-        }),
+        checked(
+            "min_m",
+            Unit::Metre,
+            "smallest range minus distance",
+            |row| row.range_minus_distance_m.min,
+        ),
+        checked(
+            "max_m",
+            Unit::Metre,
+            "largest range minus distance",
+            |row| row.range_minus_distance_m.max,
+        ),
         column(
             "outliers",
             Unit::None,
@@ -185,7 +197,7 @@ fn ranges<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         checked(
             "decoding_without_outliers_m",
             Unit::Metre,
-            "the same without outliers: compared with the limit",
+            "decoding_mean_m without outliers: compared with the limit",
             |row| row.decoding_without_outliers_m,
         ),
     ]
@@ -197,19 +209,20 @@ fn orbits<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         checked(
             "spacecraft_radial_m",
             Unit::Metre,
-            "mean of the file's own spacecraft minus that of the kernels, away from Mars",
+            "mean position of the spacecraft in the file minus its position in the kernels, away from Mars",
             |row| row.spacecraft_m[0],
         ),
         checked(
             "spacecraft_along_m",
             Unit::Metre,
-            "likewise along the flight",
+            "mean position of the spacecraft in the file minus its position in the kernels, along the flight",
             |row| row.spacecraft_m[1],
         ),
         checked(
             "spacecraft_cross_m",
             Unit::Metre,
-            "likewise along the orbit's angular momentum",
+            "mean position of the spacecraft in the file minus its position in the kernels, along the orbit's angular \
+             momentum",
             |row| row.spacecraft_m[2],
         ),
         column(
@@ -221,7 +234,7 @@ fn orbits<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         column(
             "best_correction_sigma_s",
             Unit::Second,
-            "its standard uncertainty",
+            "standard uncertainty of best_correction_s",
             |row: &Row| row.correction_uncertainty_s,
         ),
         column(

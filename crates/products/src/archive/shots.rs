@@ -82,7 +82,7 @@ fn columns() -> Vec<Column<CheckedShot>> {
         column(
             "shot",
             Unit::None,
-            "shot in the frame, 1 to 20",
+            "number of the shot in its frame, 1 to 20",
             |row: &Row| u32::from(row.shot),
         ),
         column(
@@ -124,7 +124,8 @@ fn columns() -> Vec<Column<CheckedShot>> {
         column(
             "range_minus_distance_crossover_m",
             Unit::Metre,
-            "the same to the crossover-corrected footprint",
+            "range minus distance from the kernels' spacecraft to the crossover-corrected footprint; missing where the \
+             kernels have no position",
             |row: &Row| Some(row.residuals?.range_minus_distance_crossover_m),
         ),
         column(
@@ -136,19 +137,19 @@ fn columns() -> Vec<Column<CheckedShot>> {
         column(
             "spacecraft_radial_m",
             Unit::Metre,
-            "the file's own spacecraft minus that of the kernels, away from Mars",
+            "position of the spacecraft in the file minus its position in the kernels, away from Mars",
             |row: &Row| Some(row.residuals?.spacecraft_m.x),
         ),
         column(
             "spacecraft_along_m",
             Unit::Metre,
-            "likewise along the flight",
+            "position of the spacecraft in the file minus its position in the kernels, along the flight",
             |row: &Row| Some(row.residuals?.spacecraft_m.y),
         ),
         column(
             "spacecraft_cross_m",
             Unit::Metre,
-            "likewise along the orbit's angular momentum",
+            "position of the spacecraft in the file minus its position in the kernels, along the orbit's angular momentum",
             |row: &Row| Some(row.residuals?.spacecraft_m.z),
         ),
     ]

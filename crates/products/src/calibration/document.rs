@@ -101,11 +101,10 @@ struct RoundDocument {
     round: u32,
     /// Tie points.
     ties: u64,
-    /// Their residuals in the worst line, root mean square, pixels, with the cameras that the terrain model was made
-    /// with.
+    /// Residuals of ties in the worst line, root mean square, pixels, with the cameras of the terrain model.
     #[serde(skip_serializing_if = "Option::is_none")]
     model_tie_rms_px: Option<f64>,
-    /// The same with the cameras of this round.
+    /// Residuals of ties in the worst line, root mean square, pixels, with the cameras of this round.
     #[serde(skip_serializing_if = "Option::is_none")]
     tie_rms_px: Option<f64>,
     /// Share of the cells of the terrain model that have a height.
@@ -126,7 +125,7 @@ struct RoundDocument {
     bias_m: Option<f64>,
     /// Residuals of control, root mean square over all lines.
     control: PixelsAndMetres,
-    /// The same of withheld control.
+    /// Residuals of withheld control, root mean square over all lines.
     held_back: PixelsAndMetres,
     /// Residuals of withheld control, over their expected size.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -151,9 +150,9 @@ struct CameraDocument<'a> {
     /// Tangent across the flight: coefficients of the powers of s′, which is −1 at the first edge of the image and 1 at
     /// the last.
     m: &'a [Value],
-    /// Tangent along the flight, likewise.
+    /// Tangent along the flight: coefficients of the powers of s′.
     n: &'a [Value],
-    /// The same of the support data that were given, across and along.
+    /// Both tangents in the given support data, across and along the flight.
     laboratory: &'a [Vec<f64>; 2],
     /// Largest residual of these against the look directions of the given support data, pixels.
     #[schemars(range(min = 0.0))]

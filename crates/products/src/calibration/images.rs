@@ -20,7 +20,7 @@ pub(super) static TABLE: Declaration<WriteCalibration> = Declaration {
 
 pub(super) static CSV: Declaration<WriteCalibration> = Declaration {
     path: "residuals.csv",
-    what: "the same as CSV",
+    what: "image positions with their residuals, as CSV",
     readers: "spreadsheets, scripts",
     rows: "image positions",
     role: Role::Data,
@@ -57,7 +57,7 @@ fn columns<'a>() -> Vec<Column<&'a ImageResult>> {
         column(
             "sample",
             Unit::Pixel,
-            "measured sample, likewise",
+            "measured sample, 0 at the outer edge of the first",
             |row: &Row| row.place[1],
         ),
         column(
@@ -76,19 +76,22 @@ fn columns<'a>() -> Vec<Column<&'a ImageResult>> {
         column(
             "before_along_px",
             Unit::Pixel,
-            "likewise along the flight",
+            "position by the uncalibrated camera (of a laser point: of its given coordinates) minus the measured position, \
+             along the flight, pixels",
             |row: &Row| row.before_px.map(|before_px| before_px[1]),
         ),
         column(
             "after_across_px",
             Unit::Pixel,
-            "the same by the calibrated camera and orbit, across the flight",
+            "position by the calibrated camera and orbit (of a laser point: of its given coordinates) minus the measured \
+             position, across the flight, pixels",
             |row: &Row| row.after_px.map(|after_px| after_px[0]),
         ),
         column(
             "after_along_px",
             Unit::Pixel,
-            "likewise along the flight",
+            "position by the calibrated camera and orbit (of a laser point: of its given coordinates) minus the measured \
+             position, along the flight, pixels",
             |row: &Row| row.after_px.map(|after_px| after_px[1]),
         ),
     ]

@@ -34,7 +34,7 @@ pub struct CalibrationProducts<'a> {
 /// Writer of a product of a calibration; returns its number of rows.
 pub(super) type WriteCalibration = fn(&Path, &CalibrationProducts) -> Result<u64>;
 
-/// The products of a calibration, in the order in which they are written; those of cameras come first.
+/// The products of a calibration, in the order in which they are written; products of cameras come first.
 pub(super) static CALIBRATION_PRODUCTS: &[&Declaration<WriteCalibration>] = &[
     &points::TABLE,
     &points::CSV,

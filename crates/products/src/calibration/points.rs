@@ -21,7 +21,7 @@ pub(super) static TABLE: Declaration<WriteCalibration> = Declaration {
 
 pub(super) static CSV: Declaration<WriteCalibration> = Declaration {
     path: "points.csv",
-    what: "the same as CSV",
+    what: "tie and laser points as located by the calibrated cameras, as CSV",
     readers: "spreadsheets, scripts",
     rows: "points",
     role: Role::Data,
@@ -56,19 +56,19 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "longitude_deg",
             Unit::Degree,
-            "east longitude where its images intersect, -180 to 180 degrees",
+            "east longitude of the intersection of its images, -180 to 180 degrees",
             |row: &Row| row.place.map(|place| degrees(place[0])),
         ),
         column(
             "latitude_deg",
             Unit::Degree,
-            "areocentric latitude of that, degrees",
+            "areocentric latitude of the intersection, degrees",
             |row: &Row| row.place.map(|place| degrees(place[1])),
         ),
         column(
             "radius_m",
             Unit::Metre,
-            "distance of this point from the centre of the body, metres",
+            "distance of the intersection from the centre of the body, metres",
             |row: &Row| row.place.map(|place| place[2]),
         ),
     ];
@@ -90,12 +90,16 @@ fn sigmas<'a>() -> [Column<Row<'a>>; 3] {
         column(
             "sigma_north_m",
             Unit::Metre,
-            "likewise north",
+            "standard deviation north, of the measurement and of the calibration, metres; empty where sigma_east_m is",
             |row: &Row| row.sigma_m.map(|sigma_m| sigma_m[1]),
         ),
-        column("sigma_up_m", Unit::Metre, "likewise up", |row: &Row| {
-            row.sigma_m.map(|sigma_m| sigma_m[2])
-        }),
+        column(
+            "sigma_up_m",
+            Unit::Metre,
+            "standard deviation up, of the measurement and of the calibration, metres; empty \
+            where sigma_east_m is",
+            |row: &Row| row.sigma_m.map(|sigma_m| sigma_m[2]),
+        ),
     ]
 }
 
@@ -108,11 +112,17 @@ fn offs<'a>() -> [Column<Row<'a>>; 3] {
             "of a laser point: intersected minus the laser's position, east, metres",
             |row: &Row| row.off_m.map(|off_m| off_m[0]),
         ),
-        column("off_north_m", Unit::Metre, "likewise north", |row: &Row| {
-            row.off_m.map(|off_m| off_m[1])
-        }),
-        column("off_up_m", Unit::Metre, "likewise up", |row: &Row| {
-            row.off_m.map(|off_m| off_m[2])
-        }),
+        column(
+            "off_north_m",
+            Unit::Metre,
+            "of a laser point: intersected minus the laser's position, north, metres",
+            |row: &Row| row.off_m.map(|off_m| off_m[1]),
+        ),
+        column(
+            "off_up_m",
+            Unit::Metre,
+            "of a laser point: intersected minus the laser's position, up, metres",
+            |row: &Row| row.off_m.map(|off_m| off_m[2]),
+        ),
     ]
 }

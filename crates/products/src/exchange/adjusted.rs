@@ -98,7 +98,7 @@ pub(super) fn shared_sigma_m(adjustment: &AdjustmentProducts) -> Option<[f64; 3]
     heights.map(|heights| heights.mean_sigma_m)
 }
 
-/// What is known of the shift of each profile with a range, in their order.
+/// A priori knowledge of the shift of each profile with a range, in their order.
 fn profile_shifts<'a>(
     site: &'a SiteProducts<'a>,
     adjustment: &AdjustmentProducts,
@@ -119,8 +119,8 @@ fn profile_shifts<'a>(
     by_profile.into_iter().map(shift).collect()
 }
 
-/// Shots with a range and their coordinates in the adjusted images: others have no observation equation of
-/// their own in ISIS.
+/// Shots with a range and their coordinates in the adjusted images: others have no separate observation equation in
+/// ISIS.
 fn lidar_points<'a>(
     site: &SiteProducts<'a>,
     adjustment: &AdjustmentProducts<'a>,

@@ -1,4 +1,5 @@
-//! Tables in jigsaw's format: residuals, points, images. Its columns and their head lines come first, ours follow.
+//! Tables in jigsaw's format: residuals, points, images. Its columns and their head lines come first, areograph's
+//! follow.
 //!
 //! Source: `BundleSolutionInfo.cpp` of ISIS.
 

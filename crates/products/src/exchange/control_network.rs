@@ -61,7 +61,7 @@ pub struct NetworkMeasure<'a> {
     pub measure: ImageMeasure<'a>,
     /// Standard deviations of line and sample, lines and pixels of the image, if stated.
     pub sigma_px: Option<[f64; 2]>,
-    /// Measured minus adjusted line and sample, likewise.
+    /// Measured minus adjusted line and sample, lines and pixels of the image, if stated.
     pub residual_px: Option<[f64; 2]>,
 }
 

@@ -230,7 +230,8 @@ impl<'a> Joined<'a> {
                 point: &self.ties[tie].id,
                 file: &self.files[image],
                 serial: &self.serials[image],
-                // Our coordinate runs against the samples where their sense is negative; that of ISIS never does.
+                // Areograph's coordinate runs against the samples where their sense is negative; the coordinate of ISIS
+                // never does.
                 focal_mm: [
                     pixel_mm * place_px.x,
                     pixel_mm * detector.sample_sense * place_px.y,
@@ -274,7 +275,7 @@ impl<'a> Joined<'a> {
 
     fn images(&self) -> Vec<ImageRow<'_>> {
         let images = self.adjustment.adjusted.images.iter().enumerate();
-        // Lines and samples apart, and how many measurements there are, by image.
+        // Lines and samples separately, and the number of measurements, by image.
         let mut residuals = vec![[Vec::new(), Vec::new()]; self.site.images.len()];
         for ((_, image), view) in &self.views {
             let [lines, samples] = &mut residuals[*image];

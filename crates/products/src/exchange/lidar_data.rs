@@ -58,7 +58,7 @@ pub struct ProfileShift<'a> {
     pub profile: &'a str,
     /// Standard deviations towards east, north and up before the adjustment, metres.
     pub apriori_sigma_m: [f64; 3],
-    /// The same after it.
+    /// Standard deviations towards east, north and up after the adjustment, metres.
     pub adjusted_sigma_m: [f64; 3],
 }
 
@@ -81,7 +81,7 @@ struct SharedError<'a> {
 
 const SHARED: &str = "metres; all points of the profile share this shift: their matrices contain it, and it does not average out";
 
-/// Members in the order of ISIS, which is that of the alphabet.
+/// Members in the order of ISIS, which is alphabetical.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 struct Point<'a> {
@@ -113,8 +113,8 @@ struct Measure<'a> {
     serial_number: &'a str,
 }
 
-/// Serial number that ISIS composes for an image; `None` when its label has no clock string, or where
-/// ISIS names images of its camera in another way.
+/// Serial number that ISIS composes for an image; `None` when its label has no clock string, or where ISIS names images
+/// of its camera differently.
 ///
 /// # Source
 /// `MgsMocSerialNumber.trn` of ISIS (spacecraft, clock, instrument, filter) and the network of M01/00115, which names
@@ -127,8 +127,8 @@ pub fn isis_serial_number(image: &ImageTimes) -> Option<String> {
     Some(format!("{spacecraft}/{}/{camera}", clock.trim()))
 }
 
-/// Writes `points` to `path`, which must end in `.json` for ISIS to take it, and reads it back; `shifts` are those of their
-/// profiles.
+/// Writes `points` to `path`, which must end in `.json` for ISIS to take it, and reads it back; `shifts` are the shifts
+/// of their profiles.
 ///
 /// # Errors
 /// [`Kind::Bug`](areograph_base::error::Kind::Bug) for values that ISIS would reject or misread: ranges,

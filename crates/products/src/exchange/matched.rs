@@ -42,7 +42,7 @@ pub(crate) static TABLE: Declaration = Declaration {
 
 pub(crate) static NETWORK: Declaration = Declaration {
     path: "exchange/matched_ties.pvl",
-    what: "the same as a control network, as text",
+    what: "matched tie points as a control network, as text",
     readers: "ISIS",
     rows: "tie points",
     role: Role::Data,
@@ -57,7 +57,7 @@ pub(crate) static NETWORK: Declaration = Declaration {
     }],
 };
 
-/// The points after those of files.
+/// The points that follow the points of files.
 fn matched(ties: &Ties) -> impl Iterator<Item = &TiePoint> {
     let count: usize = ties.matched_points();
     ties.points.iter().skip(ties.points.len() - count)

@@ -20,7 +20,7 @@ pub struct GroundEstimate {
 pub struct ImageMeasure<'a> {
     /// Name of the image for the reader of the file: a serial number for ISIS, a file for Ames Stereo Pipeline.
     pub image: &'a str,
-    /// Line in the whole image, 0 at the outer edge of the first line and 0.5 at its middle.
+    /// Line in the complete image, 0 at the outer edge of the first line and 0.5 at its middle.
     pub line: f64,
     /// Sample, 0 at the outer edge of the first pixel and 0.5 at its middle.
     pub sample: f64,

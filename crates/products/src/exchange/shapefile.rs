@@ -347,7 +347,7 @@ mod tests {
         );
     }
 
-    /// The library would report a full disk as an error of its own.
+    /// The library would report a full disk as its own error.
     #[test]
     fn a_full_disk_is_reported_as_such() {
         let full = Path::new("/dev/full");

@@ -31,7 +31,7 @@ const MARGIN_DEG: f64 = 1e-6;
 
 pub(crate) static ITEM: Declaration = Declaration {
     path: "exchange/stac_item.json",
-    what: "the site for STAC catalogues: location, time, files with sizes and hashes; not written without a known location",
+    what: "STAC item of the site: location, time, files with sizes and hashes; not written if the location is unknown",
     readers: "STAC catalogues",
     rows: "",
     role: Role::Metadata,

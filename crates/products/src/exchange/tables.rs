@@ -103,11 +103,11 @@ pub(crate) static ODE_SIDECAR: Declaration = Declaration {
     uses: &[],
 };
 
-const LOLA_LIKE_RADIUS: &str = "column 4 is the distance from the centre of Mars after the crossover correction, kilometres: for heights; \
-     the range of column 5 belongs to the radius before it, column 6: for range constraints; \
-     column 6 the same before it; no column is a height";
+const LOLA_LIKE_RADIUS: &str = "column 4 is the distance from the centre of Mars after the crossover correction, kilometres: \
+     for heights; column 6 is the distance before this correction, to which the range of column 5 belongs: for range \
+     constraints; no column is a height";
 const ODE_RADIUS: &str = "column 5 is the distance from the centre of Mars after the crossover correction, metres; \
-     column 3 is that minus the radius of the areoid, not a height above a sphere";
+     column 3 is this distance minus the radius of the areoid, not a height above a sphere";
 
 /// Description of a CSV file for its readers.
 #[derive(Serialize, JsonSchema)]

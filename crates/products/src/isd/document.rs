@@ -1,4 +1,4 @@
-//! Keys and nesting of image support data, those of ALE.
+//! Keys and nesting of image support data, as in ALE.
 
 use std::collections::BTreeMap;
 

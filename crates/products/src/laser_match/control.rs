@@ -56,9 +56,12 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
             "image line of the position in the model, 0 at the outer edge of the first",
             |row: &Row| row.place[0],
         ),
-        column("sample", Unit::Pixel, "sample, likewise", |row: &Row| {
-            row.place[1]
-        }),
+        column(
+            "sample",
+            Unit::Pixel,
+            "image sample of the position in the model, 0 at the outer edge of the first",
+            |row: &Row| row.place[1],
+        ),
         column(
             "longitude_deg",
             Unit::Degree,
@@ -86,7 +89,7 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "sigma_matching_vertical_m",
             Unit::Metre,
-            "likewise of the radius",
+            "standard deviation of the radius by the matching, metres; calibrations add it to the laser's own",
             |row: &Row| row.point.sigma_m[2],
         ),
     ]

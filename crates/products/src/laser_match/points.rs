@@ -23,7 +23,7 @@ pub(super) static TABLE: Declaration<WriteMatch> = Declaration {
 
 pub(super) static CSV: Declaration<WriteMatch> = Declaration {
     path: "control_points.csv",
-    what: "the same as CSV",
+    what: "laser control points of the units, as CSV",
     readers: "spreadsheets, scripts",
     rows: "points",
     role: Role::Data,
@@ -46,7 +46,7 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
             "PEDR file, record and shot of the used shot of the unit that is nearest to the bias",
             |row: &Row| row.name.clone(),
         ),
-        column("unit", Unit::None, "number of its unit", |row: &Row| {
+        column("unit", Unit::None, "number of the unit", |row: &Row| {
             natural(row.unit)
         }),
         column(
@@ -70,19 +70,19 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "model_longitude_deg",
             Unit::Degree,
-            "east longitude of the same ground in the model: the laser's position and the shift of the unit",
+            "east longitude of the same ground in the model: the laser's position plus the shift of the unit",
             |row: &Row| signed_longitude_deg(wrap_two_pi(row.model[0])),
         ),
         column(
             "model_latitude_deg",
             Unit::Degree,
-            "likewise the latitude",
+            "areocentric latitude of the same ground in the model: the laser's position plus the shift of the unit",
             |row: &Row| degrees(row.model[1]),
         ),
         column(
             "model_radius_m",
             Unit::Metre,
-            "distance of the model surface from the centre of Mars at this point, metres",
+            "distance of the terrain model from the centre of Mars at this point, metres",
             |row: &Row| row.model[2],
         ),
         column(
@@ -94,13 +94,13 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "sigma_north_m",
             Unit::Metre,
-            "likewise towards the north",
+            "standard deviation of model minus laser towards the north, by the matching only, metres",
             |row: &Row| row.sigma_m[1],
         ),
         column(
             "sigma_up_m",
             Unit::Metre,
-            "likewise in height",
+            "standard deviation of model minus laser in height, by the matching only, metres",
             |row: &Row| row.sigma_m[2],
         ),
     ]

@@ -12,7 +12,8 @@ use areograph_stages::match_laser::UnitResult;
 
 pub(super) static TABLE: Declaration<WriteMatch> = Declaration {
     path: "units.parquet",
-    what: "every unit of laser shots: its shift, its validation by withheld shots, whether it is kept and why not",
+    what: "every unit of laser shots: its shift, its validation by withheld shots, and whether it is kept, else the \
+        reason",
     readers: "scripts",
     rows: "units",
     role: Role::Data,
@@ -23,7 +24,7 @@ pub(super) static TABLE: Declaration<WriteMatch> = Declaration {
 
 pub(super) static CSV: Declaration<WriteMatch> = Declaration {
     path: "units.csv",
-    what: "the same as CSV",
+    what: "units of laser shots, as CSV",
     readers: "spreadsheets, scripts",
     rows: "units",
     role: Role::Data,
@@ -46,19 +47,19 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "kept",
             Unit::None,
-            "whether it is kept: it has a control point",
+            "whether the unit is kept: it then has a control point",
             |row: &Row| row.is_kept(),
         ),
         column(
             "longitude_deg",
             Unit::Degree,
-            "east longitude of its middle, -180 to 180 degrees",
+            "east longitude of the middle of the unit, -180 to 180 degrees",
             |row: &Row| signed_longitude_deg(wrap_two_pi(row.place_rad[0])),
         ),
         column(
             "latitude_deg",
             Unit::Degree,
-            "areocentric latitude of that, degrees",
+            "areocentric latitude of the middle of the unit, degrees",
             |row: &Row| degrees(row.place_rad[1]),
         ),
         column("shots", Unit::None, "number of shots", |row: &Row| {
@@ -101,31 +102,31 @@ fn shifts<'a>() -> [Column<Row<'a>>; 6] {
         column(
             "shift_north_cells",
             Unit::None,
-            "likewise to the north",
+            "northward offset of the model from the laser, cells",
             |row: &Row| row.found.map(|found| found.shift_cells[1]),
         ),
         column(
             "shift_east_m",
             Unit::Metre,
-            "the same, metres in the middle of the model",
+            "eastward offset of the model from the laser, metres in the middle of the model",
             |row: &Row| row.found.map(|found| found.shift_m[0]),
         ),
         column(
             "shift_north_m",
             Unit::Metre,
-            "likewise to the north",
+            "northward offset of the model from the laser, metres in the middle of the model",
             |row: &Row| row.found.map(|found| found.shift_m[1]),
         ),
         column(
             "shift_longitude_deg",
             Unit::Degree,
-            "the same in longitude, degrees",
+            "offset of the model from the laser in longitude, degrees",
             |row: &Row| row.found.map(|found| degrees(found.shift_rad[0])),
         ),
         column(
             "shift_latitude_deg",
             Unit::Degree,
-            "the same in latitude, degrees",
+            "offset of the model from the laser in latitude, degrees",
             |row: &Row| row.found.map(|found| degrees(found.shift_rad[1])),
         ),
     ]
@@ -143,13 +144,14 @@ fn deviations<'a>() -> [Column<Row<'a>>; 3] {
         column(
             "sigma_north_m",
             Unit::Metre,
-            "likewise to the north",
+            "standard deviation of the shift to the north, by leaving out single shots and by the scatter of all units, \
+             metres",
             |row: &Row| row.found.and_then(|found| Some(found.sigma?.shift_m[1])),
         ),
         column(
             "sigma_bias_m",
             Unit::Metre,
-            "likewise of `bias_m`",
+            "standard deviation of `bias_m`, by leaving out single shots and by the scatter of all units, metres",
             |row: &Row| row.found.and_then(|found| Some(found.sigma?.bias_m)),
         ),
     ]
@@ -184,19 +186,21 @@ fn judged<'a>() -> [Column<Row<'a>>; 7] {
         column(
             "held_out_before_m",
             Unit::Metre,
-            "root mean square of model minus laser at them without the shift, about the bias of the shots that were used, metres",
+            "root mean square of model minus laser at the withheld shots without the shift, about the bias of the shots that \
+             were used, metres",
             |row: &Row| row.held_out.map(|held_out| held_out.before_m),
         ),
         column(
             "held_out_after_m",
             Unit::Metre,
-            "the same with the shift",
+            "root mean square of model minus laser at the withheld shots with the shift, about the bias of the shots that \
+             were used, metres",
             |row: &Row| row.held_out.map(|held_out| held_out.after_m),
         ),
         column(
             "refused_because",
             Unit::None,
-            "why it is not kept; empty if it is",
+            "reason why the unit is not kept; empty if it is kept",
             |row: &Row| row.refused_because.clone(),
         ),
     ]

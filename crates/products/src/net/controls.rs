@@ -20,7 +20,7 @@ pub(super) static TABLE: Declaration<WriteNet> = Declaration {
 
 pub(super) static CSV: Declaration<WriteNet> = Declaration {
     path: "controls.csv",
-    what: "the same as CSV",
+    what: "controls with their residuals, as CSV",
     readers: "spreadsheets, scripts",
     rows: "controls",
     role: Role::Data,
@@ -45,35 +45,48 @@ fn columns<'a>() -> Vec<Column<&'a ControlResult>> {
             "east as given, metres on the map",
             |row: &Row| row.given_m[0],
         ),
-        column("y_m", Unit::Metre, "likewise north", |row: &Row| {
-            row.given_m[1]
-        }),
+        column(
+            "y_m",
+            Unit::Metre,
+            "north as given, metres on the map",
+            |row: &Row| row.given_m[1],
+        ),
         column(
             "dx_m",
             Unit::Metre,
             "given minus computed, east, metres",
             |row: &Row| row.residual_m[0],
         ),
-        column("dy_m", Unit::Metre, "likewise north", |row: &Row| {
-            row.residual_m[1]
-        }),
+        column(
+            "dy_m",
+            Unit::Metre,
+            "given minus computed, north, metres",
+            |row: &Row| row.residual_m[1],
+        ),
         column(
             "scale_dx_m",
             Unit::Metre,
             "given minus computed by SCALE of the free figure, east, metres: gross errors are detected from these",
             |row: &Row| row.scale_residual_m[0],
         ),
-        column("scale_dy_m", Unit::Metre, "likewise north", |row: &Row| {
-            row.scale_residual_m[1]
-        }),
+        column(
+            "scale_dy_m",
+            Unit::Metre,
+            "given minus computed by SCALE of the free figure, north, metres: gross errors \
+            are detected from these",
+            |row: &Row| row.scale_residual_m[1],
+        ),
         column(
             "sigma_m",
             Unit::Metre,
             "a priori standard deviation of a coordinate, metres",
             |row: &Row| row.sigma_m,
         ),
-        column("kept", Unit::None, "whether it was kept", |row: &Row| {
-            row.kept
-        }),
+        column(
+            "kept",
+            Unit::None,
+            "whether the control was kept",
+            |row: &Row| row.kept,
+        ),
     ]
 }

@@ -20,7 +20,7 @@ pub(super) static TABLE: Declaration<WriteNet> = Declaration {
 
 pub(super) static CSV: Declaration<WriteNet> = Declaration {
     path: "deviations.csv",
-    what: "the same as CSV",
+    what: "measurements with their deviations, as CSV",
     readers: "spreadsheets, scripts",
     rows: "measurements",
     role: Role::Data,
@@ -50,18 +50,25 @@ fn columns<'a>() -> Vec<Column<&'a MeasurementResult>> {
             "image minus mean of the point within its brick, east, metres; missing where the brick has one image",
             |row: &Row| Some(row.in_brick?.x_m),
         ),
-        column("brick_dy_m", Unit::Metre, "likewise north", |row: &Row| {
-            Some(row.in_brick?.y_m)
-        }),
+        column(
+            "brick_dy_m",
+            Unit::Metre,
+            "image minus mean of the point within its brick, north, metres; missing where \
+            the brick has one image",
+            |row: &Row| Some(row.in_brick?.y_m),
+        ),
         column(
             "dx_m",
             Unit::Metre,
             "image minus mean of the point in the whole net, east, metres",
             |row: &Row| row.deviation.x_m,
         ),
-        column("dy_m", Unit::Metre, "likewise north", |row: &Row| {
-            row.deviation.y_m
-        }),
+        column(
+            "dy_m",
+            Unit::Metre,
+            "image minus mean of the point in the whole net, north, metres",
+            |row: &Row| row.deviation.y_m,
+        ),
         column(
             "redundancy",
             Unit::None,
@@ -71,13 +78,13 @@ fn columns<'a>() -> Vec<Column<&'a MeasurementResult>> {
         column(
             "flagged",
             Unit::None,
-            "whether it is beyond 3.5 robust standard deviations of its brick",
+            "whether the deviation is beyond 3.5 robust standard deviations of its brick",
             |row: &Row| row.flagged,
         ),
         column(
             "removed",
             Unit::None,
-            "whether it was rejected as a blunder",
+            "whether the measurement was rejected as a blunder",
             |row: &Row| row.removed,
         ),
         column(
@@ -86,17 +93,23 @@ fn columns<'a>() -> Vec<Column<&'a MeasurementResult>> {
             "the point on the map, east, metres",
             |row: &Row| row.place_m[0],
         ),
-        column("y_m", Unit::Metre, "likewise north", |row: &Row| {
-            row.place_m[1]
-        }),
+        column(
+            "y_m",
+            Unit::Metre,
+            "the point on the map, north, metres",
+            |row: &Row| row.place_m[1],
+        ),
         column(
             "picture_x",
             Unit::None,
-            "measured position, film corrected, units of the picture",
+            "measured x, film corrected, units of the picture",
             |row: &Row| row.at[0],
         ),
-        column("picture_y", Unit::None, "likewise upwards", |row: &Row| {
-            row.at[1]
-        }),
+        column(
+            "picture_y",
+            Unit::None,
+            "measured y (upwards), film corrected, units of the picture",
+            |row: &Row| row.at[1],
+        ),
     ]
 }

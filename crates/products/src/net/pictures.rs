@@ -21,7 +21,7 @@ pub(super) static TABLE: Declaration<WriteNet> = Declaration {
 
 pub(super) static CSV: Declaration<WriteNet> = Declaration {
     path: "pictures.csv",
-    what: "the same as CSV",
+    what: "coefficients, scale, angle and place of every picture, as CSV",
     readers: "spreadsheets, scripts",
     rows: "pictures",
     role: Role::Data,
@@ -73,18 +73,21 @@ fn columns<'a>() -> Vec<Column<&'a PictureResult>> {
         column(
             "sigma_scale",
             Unit::None,
-            "standard deviation of the scale relative to it, and of the angle in radians",
+            "standard deviation of the scale, as a fraction of it, and of the angle, in radians",
             |row: &Row| row.sigma_scale,
         ),
         column(
             "x_m",
             Unit::Metre,
-            "middle of its measured points, east on the map, metres",
+            "middle of the measured points, east on the map, metres",
             |row: &Row| row.centre_m[0],
         ),
-        column("y_m", Unit::Metre, "likewise north, metres", |row: &Row| {
-            row.centre_m[1]
-        }),
+        column(
+            "y_m",
+            Unit::Metre,
+            "middle of the measured points, north on the map, metres",
+            |row: &Row| row.centre_m[1],
+        ),
         column(
             "longitude_deg",
             Unit::Degree,
@@ -106,13 +109,13 @@ fn columns<'a>() -> Vec<Column<&'a PictureResult>> {
         column(
             "ties",
             Unit::None,
-            "points that it shares with other pictures",
+            "points that the picture shares with other pictures",
             |row: &Row| row.ties,
         ),
         column(
             "deviation_rms_m",
             Unit::Metre,
-            "root mean square of a coordinate of its images from the means of these points, metres",
+            "root mean square of a coordinate of the picture's points from their means, metres",
             |row: &Row| row.deviation_rms_m,
         ),
         column(

@@ -25,7 +25,7 @@ pub(super) static TABLE: Declaration<WriteNet> = Declaration {
 
 pub(super) static CSV: Declaration<WriteNet> = Declaration {
     path: "points.csv",
-    what: "the same as CSV",
+    what: "adjusted coordinates of all points, as CSV",
     readers: "spreadsheets, scripts",
     rows: "points",
     role: Role::Data,
@@ -101,14 +101,14 @@ fn columns<'a>() -> Vec<Column<&'a PointResult>> {
         column(
             "pictures",
             Unit::None,
-            "pictures that determine its position",
+            "pictures that determine the position of the point",
             |row: &&PointResult| row.pictures,
         )
         .in_gis(),
         column(
             "is_control",
             Unit::None,
-            "whether it is a control that was kept",
+            "whether the point is a control that was kept",
             |row: &&PointResult| row.is_control,
         )
         .in_gis(),

@@ -57,8 +57,8 @@ impl Canvas {
         }
     }
 
-    /// Draws a mark at a column and row, 0.5 at the centre of the first pixel. Its middle stays free, so that it hides
-    /// nothing of what it marks.
+    /// Draws a mark at a column and row, 0.5 at the centre of the first pixel. Its middle stays free, so that the mark
+    /// does not hide its subject.
     pub(super) fn mark(&mut self, mark: Mark, [column, row]: [f64; 2]) {
         let ink = match mark {
             Mark::Before => GREYS + 1,

@@ -21,7 +21,7 @@ use areograph_stages::adjust::PointKind;
 
 pub(super) static PICTURE: Declaration = Declaration {
     path: "images/<image>/overlay.png",
-    what: "the image, reduced, with its footprints before and after the adjustment",
+    what: "the image at reduced resolution with its footprints before and after the adjustment",
     readers: "people",
     rows: "footprints in the image",
     role: Role::Overview,
@@ -42,8 +42,8 @@ pub(super) static PICTURE: Declaration = Declaration {
 
 pub(super) static MARKS: Declaration = Declaration {
     path: "images/<image>/overlay.geojson",
-    what: "its footprints and tie points in image coordinates (x is the sample, y minus the line), as a layer over the picture \
-           that `areograph image extract` writes",
+    what: "footprints and tie points of the image in image coordinates (x is the sample, y = −line), as a layer over the \
+           picture that `areograph image extract` writes",
     readers: "GIS",
     rows: "marks",
     role: Role::Data,

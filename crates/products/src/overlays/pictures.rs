@@ -34,7 +34,7 @@ pub struct Picture {
     pub png: Vec<u8>,
 }
 
-/// A whole image with its footprints, of limited size; `None` for an image without known pixels.
+/// A complete image with its footprints, of limited size; `None` for an image without known pixels.
 ///
 /// # Errors
 /// A picture that the library rejects, which is a bug in areograph.

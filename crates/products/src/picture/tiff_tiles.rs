@@ -1,4 +1,4 @@
-//! TIFF with tiles, and overviews that viewers use to show the whole of a long image.
+//! TIFF with tiles, and overviews that viewers use to show all of a long image.
 //!
 //! Lines are kept in an unnamed file until all of them are there; each overview is made from the one before it, so that
 //! memory holds a row of tiles only.
@@ -135,7 +135,7 @@ fn write_level(
         Tag::BitsPerSample,
         if level.bytes_of_pixel == 2 { 16_u16 } else { 8 },
     )?;
-    // None; the least value is black; one sample of a pixel; whole numbers without a sign.
+    // No compression; the least value is black; one sample of a pixel; whole numbers without a sign.
     directory.write_tag(Tag::Compression, 1_u16)?;
     directory.write_tag(Tag::PhotometricInterpretation, 1_u16)?;
     directory.write_tag(Tag::SamplesPerPixel, 1_u16)?;

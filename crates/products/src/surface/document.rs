@@ -20,28 +20,31 @@ const DEFINITIONS: [(&str, &str); 7] = [
     ),
     (
         "sigma_m",
-        "root mean square of the standard deviations in surface_sigma.tif, of one cell against the others: by its match, by \
-         jitter_m and by smoothing_m",
+        "root mean square of the standard deviations in surface_sigma.tif, of one cell against the others: from its \
+         match, jitter_m and smoothing_m",
     ),
     (
         "jitter_m",
-        "standard deviation by jitter of the images against each other: the scatter of their shifts across the parallax, where no \
-         height moves them, without that of the matches",
+        "standard deviation from jitter of the images against each other: the scatter of their shifts across the \
+         parallax, where no height moves them, without the scatter of the matches",
     ),
     (
         "smoothing_m",
-        "standard deviation of the height of a place against the mean of the compared square, by the relief of the model over two \
+        "standard deviation of the height of a place against the mean of the compared square, from the relief of the \
+        model over two \
          and four squares",
     ),
     (
         "common_sigma_m",
-        "standard deviation of the offset common to all heights, by the adjustment of the images; missing where not determined",
+        "standard deviation of the offset common to all heights, from the adjustment of the images; missing where not \
+         determined",
     ),
     (
         "mola_minus_surface",
-        "radius of a footprint minus that of the model at its place, between the four nearest cells, metres; spread_sigmas is \
-         its robust spread about the median in its standard deviations: of the height, the shot, the profile, and of the slope \
-         times the uncertainty of the position",
+        "radius of a footprint minus the radius of the model at its place, between the four nearest cells, metres; \
+         all: of profiles at nadir, because attitude errors change the heights of the others; \
+         spread_sigmas is its robust spread about the median in its standard deviations: of the height, the shot, the \
+         profile, and of the slope times the uncertainty of the position",
     ),
     (
         "mola_takes_part",

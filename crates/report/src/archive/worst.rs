@@ -51,10 +51,10 @@ pub(super) fn worst_profiles(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>])
         ];
         table.row(profile.invalid_because.is_empty(), cells);
     }
-    let words = "Mean and distance to the file's own spacecraft are without outliers. Orbits apart is the mean \
-                 position of the file's own spacecraft minus that of the kernels; it reveals another orbit, clock or \
-                 datum. The best correction of time tags is the \
-        one that minimises the spread of ranges, with raw radii or with those corrected by crossovers. All profiles are in profiles.parquet and profiles.csv.";
+    let words = "Mean and distance to the file's own spacecraft are without outliers. Orbits apart is the mean spacecraft \
+                 position of the file minus the position in the kernels; it reveals a different orbit, clock or datum. The \
+                 best correction of time tags is the one that minimises the spread of ranges, with raw radii or with radii \
+                 corrected by crossovers. All profiles are in profiles.parquet and profiles.csv.";
     table.finish() + &paragraph(words) + &commands(worst)
 }
 

@@ -1,4 +1,4 @@
-//! Why two outputs cannot be compared.
+//! Reasons why two outputs cannot be compared.
 
 use areograph_base::error::Cause;
 
@@ -14,7 +14,9 @@ pub(super) enum DifferenceError {
     #[cause("copy the first products elsewhere before running again, or run into another --out")]
     SameFolder,
     /// A site's folder beside a folder of sites.
-    #[error("this folder contains the products of one site, the other one those of several sites")]
+    #[error(
+        "this folder contains the products of one site, the other the products of several sites"
+    )]
     #[cause("name two folders of one site, or two output folders with sites")]
     OneAndSeveral,
     /// Products of two sites.

@@ -102,7 +102,7 @@ fn movement(a: &FootprintRows, b: &FootprintRows, pairs: &[Pair]) -> Option<Foot
     let change = |a: &[f64], b: &[f64]| {
         Component::of(pairs.iter().map(|(first, second)| b[*second] - a[*first]))
     };
-    // Of several equal movements, the first.
+    // The first of several equal movements.
     let (mut farthest, mut farthest_m) = (None, ROUNDING);
     for pair in pairs {
         if distance_m(pair) > farthest_m {

@@ -31,14 +31,14 @@ pub struct ImageDifference {
     /// Whether its model is within the limits in the first run; missing if the image is absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub valid_in_a: Option<bool>,
-    /// The same in the second run.
+    /// Whether its model is within the limits in the second run; missing if the image is absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub valid_in_b: Option<bool>,
     /// Times and keys of the camera that differ.
     pub times: Vec<Change>,
     /// Statistics of the polynomial models that differ.
     pub models: Vec<Change>,
-    /// Samples only in the first run; those of both are in the movement.
+    /// Samples only in the first run; samples of both runs are in the movement.
     pub samples_only_in_a: usize,
     /// Samples only in the second run.
     pub samples_only_in_b: usize,
@@ -61,9 +61,9 @@ impl ImageDifference {
 
 /// Movement of the camera over the samples that both runs have, matched by image line.
 ///
-/// Radial, along and cross are the axes of the first run: away from Mars, along the flight in inertial
-/// space, along the orbit's angular momentum. Turns about x, y and z are those of the camera's own axes,
-/// right-handed; a turn about z, the boresight, moves nothing in the middle of the image.
+/// Radial, along and cross are the axes of the first run: away from Mars, along the flight in inertial space, along the
+/// orbit's angular momentum. Turns about x, y and z refer to the camera's own axes, right-handed; a turn about z, the
+/// boresight, moves nothing in the middle of the image.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ImageMovement {
     /// Epoch of a line.
@@ -283,7 +283,7 @@ fn of_sample(a: &SampleRow, b: &SampleRow, axes: &Matrix3<f64>) -> SampleMovemen
     }
 }
 
-/// Where a matrix takes the camera's z axis.
+/// Direction of the camera's z axis under a matrix.
 fn boresight(from_camera: &Matrix3<f64>) -> Vector3<f64> {
     from_camera.column(2).into_owned()
 }

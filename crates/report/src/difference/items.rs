@@ -46,7 +46,7 @@ pub struct Items {
     pub changed: Vec<ChangedItem>,
     /// Number that are the same in both.
     pub unchanged: usize,
-    /// Whether those in both are in another order: of kernels with the same data, the last one wins.
+    /// Whether items of both runs are in a different order: of kernels with the same data, the last one wins.
     pub reordered: bool,
 }
 

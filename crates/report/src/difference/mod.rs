@@ -78,7 +78,7 @@ pub struct RunDifference {
     pub rejected: Vec<Change>,
     /// Problems in the input of one run only; manifests quote the first ones.
     pub complaints: Texts,
-    /// Notes of one run only; without those of kernels named by a list, which the kernels show.
+    /// Notes of one run only; without notes on kernels named by a list, which the kernels show.
     pub notes: Texts,
     /// Stages by their fingerprints: of their inputs, not their outputs.
     pub stages: Items,
@@ -86,9 +86,9 @@ pub struct RunDifference {
     pub products: Items,
     /// Range statistics of every profile.
     pub profiles: Vec<ProfileDifference>,
-    /// Where shots hit the ground.
+    /// Places at which shots hit the ground.
     pub footprints: FootprintsDifference,
-    /// Orientation of every image by the kernels, then the adjusted ones.
+    /// Orientation of every image from the kernels, then the adjusted orientations.
     pub images: Vec<ImageDifference>,
     /// Some of the adjusted tie points that both runs have.
     #[serde(skip)]

@@ -11,7 +11,7 @@ use areograph_geom::statistics::largest;
 /// 1e-8 s; no SPICE kernel is good to a micrometre.
 pub(super) const ROUNDING: f64 = 1e-6;
 
-/// Statistics of sizes, none negative; the unit is that of the member's name.
+/// Statistics of sizes, none negative; the unit is in the member's name.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Size {
     /// Mean.
@@ -22,7 +22,7 @@ pub struct Size {
     pub max: f64,
 }
 
-/// Statistics of values with a sign; the unit is that of the member's name.
+/// Statistics of values with a sign; the unit is in the member's name.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Component {
     /// Mean.
@@ -33,7 +33,7 @@ pub struct Component {
 }
 
 impl Size {
-    /// Of at least one value; zero without values.
+    /// Statistics of at least one value; zero without values.
     pub(super) fn of(values: impl Iterator<Item = f64> + Clone) -> Self {
         Self {
             mean: mean(values.clone()),
@@ -41,7 +41,7 @@ impl Size {
         }
     }
 
-    /// Of the known values, if any.
+    /// Statistics of the known values, if any.
     pub(super) fn of_known(values: impl Iterator<Item = Option<f64>> + Clone) -> Option<Self> {
         let known = values.flatten();
         known.clone().next()?;
@@ -56,7 +56,7 @@ impl Size {
 }
 
 impl Component {
-    /// Of at least one value; zero without values.
+    /// Statistics of at least one value; zero without values.
     pub(super) fn of(values: impl Iterator<Item = f64> + Clone) -> Self {
         Self {
             mean: mean(values.clone()),

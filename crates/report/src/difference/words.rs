@@ -126,7 +126,7 @@ impl RunDifference {
         sentences
     }
 
-    /// The same without the contents of the tables below, and without unmoved images.
+    /// The sentences without the contents of the tables below, and without unmoved images.
     #[must_use]
     pub fn first_sentences(&self) -> Vec<String> {
         let mut sentences = self.of_inputs();

@@ -47,7 +47,7 @@ fn words(found: &BoresightSummary) -> String {
 
 fn table(images: &[SpotsOfImage]) -> String {
     let mut table = Table::new(
-        "Shots in simultaneous images: footprints by the kernels minus laser by the mounting",
+        "Shots in simultaneous images: footprints from the kernels minus laser positions from the mounting",
         &[
             Column::Text("image"),
             Column::Number("shots"),

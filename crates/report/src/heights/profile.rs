@@ -7,7 +7,7 @@ use areograph_geom::{ellipsoid::local_axes, statistics::Summary};
 use areograph_products::{GeometricProducts, SiteProducts};
 use areograph_stages::check_heights::{HeightCheck, TieHeight};
 
-/// Number of tie points drawn, and of those of a site of many images.
+/// Number of tie points drawn, and number for a site of many images.
 const POINTS_SHOWN: usize = 400;
 const POINTS_OF_MANY: usize = 200;
 /// One value in this many may be beyond each end of the axis of differences.

@@ -18,7 +18,7 @@ const EDGE: f64 = 140.0;
 const LEFT: f64 = 30.0;
 const TOP: f64 = 6.0;
 const SIZE: [f64; 2] = [LEFT + EDGE + 9.0, TOP + EDGE + 18.0];
-/// Width and height of the bar of colours with its words, units of its own drawing.
+/// Width and height of the bar of colours with its words, in units of its drawing.
 const BAR: [u32; 2] = [600, 130];
 /// Number of colours: more would not be visible, and would make pages larger.
 const COLOURS: u8 = 51;

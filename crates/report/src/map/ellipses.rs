@@ -27,7 +27,7 @@ pub(super) struct Ellipses {
 }
 
 impl Ellipses {
-    /// Those of a selection of adjusted tie points, for a map of this width.
+    /// Ellipses of a selection of adjusted tie points, for a map of this width.
     pub(super) fn of<'a>(ties: impl Iterator<Item = &'a CorrectedPoint>, width_m: f64) -> Self {
         let ties: Vec<&CorrectedPoint> = ties.collect();
         let axes: Vec<(Vector3<f64>, [Vector3<f64>; 2])> = thinned(&ties, ELLIPSES)

@@ -164,7 +164,7 @@ pub(crate) fn width(text: &str) -> i32 {
     width_in(text, LETTERS)
 }
 
-/// The same in letters of another size.
+/// The width in letters of a different size.
 pub(crate) fn width_in(text: &str, letters: i32) -> i32 {
     let share = |letter: char| match letter {
         'i' | 'j' | 'l' | 'I' | '.' | ',' | ':' | ' ' | '-' | '/' | '\'' => 0.42,

@@ -61,7 +61,7 @@ impl Grid {
         }
     }
 
-    /// The value of a cell; beyond the edge that of the nearest edge cell.
+    /// The value of a cell; beyond the edge, of the nearest edge cell.
     fn at(&self, column: isize, row: isize) -> f64 {
         let held = |place: isize, count: usize| place.clamp(0, count as isize - 1) as usize;
         self.values[held(row, self.rows) * self.columns + held(column, self.columns)]

@@ -10,7 +10,7 @@ use super::super::{
 use areograph_products::{GeometricProducts, IMAGES_SHOWN};
 use areograph_stages::compare_pairs::PairComparison;
 
-/// Largest number of pairs with rows of their own: all pairs of a site whose images are all shown.
+/// Largest number of pairs with separate rows: all pairs of a site whose images are all shown.
 pub(crate) const PAIRS_TABLED: usize = IMAGES_SHOWN * (IMAGES_SHOWN - 1) / 2;
 
 /// A pair of images before the adjustment and, if tie points still join it, after.
@@ -50,8 +50,8 @@ impl<'a> BeforeAfter<'a> {
         pairs.iter().max_by(|a, b| size(a).total_cmp(&size(b)))
     }
 
-    /// The pairs with rows of their own: all of a few, and of many those with the largest along-track parallax, after the
-    /// adjustment where there is one, in the order of the site.
+    /// The pairs with separate rows: all of a few pairs, and of many the ones with the largest along-track parallax,
+    /// after the adjustment where there is one, in the order of the site.
     pub(crate) fn tabled(mut pairs: Vec<Self>) -> Vec<Self> {
         if pairs.len() > PAIRS_TABLED {
             let apart_m = |pair: &Self| {
@@ -65,7 +65,7 @@ impl<'a> BeforeAfter<'a> {
         pairs
     }
 
-    /// The images of the pairs with rows of their own.
+    /// The images of the pairs with separate rows.
     pub(crate) fn images_tabled(geometric: &GeometricProducts<'a>) -> HashSet<&'a [String; 2]> {
         let tabled = Self::tabled(Self::all(geometric)).into_iter();
         tabled.map(|pair| &pair.before.images).collect()
@@ -171,7 +171,7 @@ struct Apart {
     metres: f64,
     /// Its standard deviation; `None` if by tie points.
     sigma_m: Option<f64>,
-    /// The same in distances of successive footprints.
+    /// The disagreement in distances of successive footprints.
     spacings: Option<f64>,
 }
 

@@ -112,7 +112,7 @@ fn published_pairs_have_their_published_differences() {
     for [l1, a1, b1, l2, a2, b2, published] in PUBLISHED {
         let (one, other) = ([l1, a1, b1], [l2, a2, b2]);
         for found in [ciede2000(one, other), ciede2000(other, one)] {
-            // Half a unit of the last printed digit, and rounding.
+            // Half a unit of the last published digit, and rounding.
             assert!(
                 (found - published).abs() < 0.51e-4,
                 "{one:?} {other:?}: {found}"

@@ -282,7 +282,7 @@ impl Extent {
         }
     }
 
-    /// The same, extended to include `values`, with a margin.
+    /// The extent, widened to include `values`, with a margin.
     pub(super) fn with(self, values: impl Iterator<Item = f64>) -> Self {
         let beyond: Vec<f64> = values.filter(|value| !self.contains(*value)).collect();
         if beyond.is_empty() {

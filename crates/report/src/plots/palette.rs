@@ -34,7 +34,7 @@ mod tests {
     /// Least contrast of a line or mark with the page (WCAG 2.2, 1.4.11).
     const CONTRAST: f64 = 3.0;
 
-    /// What remains of linear red, green and blue without the cones for medium wavelengths.
+    /// Linear red, green and blue as seen without the cones for medium wavelengths.
     ///
     /// # Source
     /// Machado, Oliveira and Fernandes 2009, IEEE Trans. Vis. Comput. Graph. 15, table 1, deuteranomaly at 1.0.

@@ -19,7 +19,7 @@ const RESIDUAL_POINTS: usize = 5_000;
 const PROFILE_POINTS: usize = 500;
 /// Number of profiles up to which each has a plot.
 const PROFILES_ALONE: usize = 12;
-/// Of more profiles, this number have one: those with the largest means.
+/// With more profiles, only this number have a plot: the ones with the largest means.
 const WORST: usize = 6;
 
 /// Whether a site has too many profiles for a plot and a row each.
@@ -185,7 +185,7 @@ struct Shots {
 }
 
 impl Shots {
-    /// Of profile `index`, whose shots begin at `first`.
+    /// The plot of profile `index`, whose shots begin at `first`.
     fn of(site: &SiteProducts, index: usize, first: usize) -> Self {
         let (profile, all) = (&site.profiles[index], &site.ranges.shots);
         let start_s = profile.interval.start.seconds();

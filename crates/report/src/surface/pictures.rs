@@ -312,7 +312,7 @@ fn small(number: f64) -> f32 {
     number as f32
 }
 
-/// The numbers of a figure: those of its shots, or the ends of its colours.
+/// The numbers of a figure: of its shots, or of the ends of its colours.
 fn csv(bar: &Bar, shots: &[ShotOnSurface]) -> String {
     if shots.is_empty() {
         let [low, high] = bar.ends;

@@ -10,8 +10,8 @@ use areograph_base::{
 };
 use areograph_geom::{body_rotation::body_matrix, ellipsoid::local_axes};
 
-/// The image lit as if it had been taken half a Mars year later at the same hour: those of the other pairs were taken
-/// within seven weeks.
+/// The image lit as if it had been taken half a Mars year later at the same hour: the images of the other pairs were
+/// taken within seven weeks.
 const OF_OTHER_SEASON: &str = "E02-01453";
 /// Half a year of Mars, seconds.
 const HALF_YEAR_S: f64 = 343.49 * SECONDS_PER_DAY;

@@ -16,9 +16,9 @@ pub struct Attempt {
     pub process: Option<ProcessIdentity>,
     /// The last reported stage.
     pub stage: Option<String>,
-    /// When it began, milliseconds of UTC since 1970.
+    /// Time at which it began, milliseconds of UTC since 1970.
     pub started_ms: i64,
-    /// When it ended.
+    /// Time at which it ended.
     pub ended_ms: Option<i64>,
 }
 
@@ -76,7 +76,7 @@ pub fn put_beat(
     Ok(())
 }
 
-/// How an attempt ended.
+/// End of an attempt.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct AttemptEnd<'a> {
     /// As text.

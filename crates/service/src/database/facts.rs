@@ -17,7 +17,8 @@ pub const INTENDED_MS: &str = "intended_ms";
 pub const IDENTITY: &str = "identity";
 /// Present while the runs on the disk are not yet recorded in a new database.
 pub const RECOVERING: &str = "recovering";
-/// When the database was made again from the products, milliseconds of UTC since 1970; and the sites and runs found.
+/// Time of reconstruction of the database from the products, milliseconds of UTC since 1970; and the sites and runs
+/// found.
 pub const RECOVERED_MS: &str = "recovered_ms";
 /// See [`RECOVERED_MS`].
 pub const RECOVERED_SITES: &str = "recovered_sites";

@@ -43,11 +43,11 @@ pub struct FileRow {
     pub identity: Identity,
     /// BLAKE3 of the content that was last read.
     pub blake3: Option<String>,
-    /// When it was first seen, milliseconds of UTC since 1970.
+    /// Time at which it was first seen, milliseconds of UTC since 1970.
     pub first_seen_ms: i64,
-    /// When a change was last detected.
+    /// Time at which a change was last detected.
     pub changed_ms: i64,
-    /// When its content was last read.
+    /// Time at which its content was last read.
     pub checked_ms: Option<i64>,
     /// Its reliability.
     pub state: FileState,

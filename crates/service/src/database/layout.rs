@@ -13,7 +13,8 @@ use super::{DatabaseError, Stored, copy};
 pub(super) const VERSION: i64 = 2;
 /// Tables by which a database of the service is recognized.
 const OWN_TABLES: &str = "SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name IN ('service', 'run', 'site', 'token')";
-/// Step from layout 1: when the products of a run were last read, and how many of them do not match its manifest.
+/// Step from layout 1: time of the last reading of the products of a run, and number of them that do not match its
+/// manifest.
 const CHECKED_RUNS: &str = "ALTER TABLE run ADD COLUMN checked_ms INTEGER;
     ALTER TABLE run ADD COLUMN damaged INTEGER NOT NULL DEFAULT 0;";
 const SCHEMA: &str = include_str!("schema.sql");
@@ -44,7 +45,7 @@ pub(super) fn migrate(connection: &mut Connection, folder: &Path) -> Stored<()> 
         )));
     }
     if found >= 1 && count(OWN_TABLES)? < 4 {
-        let why = "its tables are those of another program".to_owned();
+        let why = "its tables belong to another program".to_owned();
         return Err(DatabaseError::Foreign(why));
     }
     if found == VERSION {

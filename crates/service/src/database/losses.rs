@@ -8,7 +8,7 @@ use crate::{clock::utc_text, words::counted};
 /// A loss.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Loss {
-    /// When the database was made again, milliseconds of UTC since 1970.
+    /// Time at which the database was made again, milliseconds of UTC since 1970.
     pub at_ms: i64,
     /// Sites with runs that were found on the disk.
     pub sites: i64,

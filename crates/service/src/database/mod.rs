@@ -148,7 +148,7 @@ impl Database {
         })
     }
 
-    /// The same for a database that must exist.
+    /// Opens a database that must exist.
     ///
     /// # Errors
     /// As [`Self::open`]; there is none.

@@ -38,9 +38,9 @@ pub struct Night {
     pub id: i64,
     /// The instant that was intended, milliseconds of UTC since 1970.
     pub due_ms: i64,
-    /// When it began.
+    /// Time at which it began.
     pub started_ms: Option<i64>,
-    /// When it ended.
+    /// Time at which it ended.
     pub ended_ms: Option<i64>,
     /// Its origin: `due`, `caught_up`, `asked` or `missed`.
     pub how: String,

@@ -24,7 +24,7 @@ pub struct RunRow {
     pub valid: bool,
     /// The verdict in a word.
     pub verdict: String,
-    /// Why the products are not valid: sentences.
+    /// Reasons why the products are not valid: sentences.
     pub reasons: Value,
     /// Causes of the run: sentences.
     pub because: Value,
@@ -38,11 +38,11 @@ pub struct RunRow {
     pub kernels: Value,
     /// The previous current run.
     pub predecessor: Option<String>,
-    /// When it was published, milliseconds of UTC since 1970.
+    /// Time at which it was published, milliseconds of UTC since 1970.
     pub published_ms: i64,
     /// Whether it is kept permanently.
     pub pinned: bool,
-    /// When its products were removed.
+    /// Time at which its products were removed.
     pub removed_ms: Option<i64>,
 }
 
@@ -159,7 +159,7 @@ pub fn put_checked(transaction: &Transaction<'_>, run: &str, now_ms: i64) -> Sto
     Ok(())
 }
 
-/// Records how many products of a run do not match its manifest.
+/// Records the number of products of a run that do not match its manifest.
 ///
 /// # Errors
 /// SQLite errors.
@@ -181,7 +181,7 @@ pub fn is_kept(connection: &Connection, run: &str) -> Stored<bool> {
     Ok(query.exists([run])?)
 }
 
-/// How many products of a run do not match its manifest, as far as known.
+/// Number of products of a run that do not match its manifest, as far as known.
 ///
 /// # Errors
 /// SQLite errors.

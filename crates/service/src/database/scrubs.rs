@@ -8,7 +8,7 @@ use crate::words::counted;
 /// One check of products.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ScrubPass {
-    /// When it ended, milliseconds of UTC since 1970.
+    /// Time at which it ended, milliseconds of UTC since 1970.
     pub ended_ms: i64,
     /// Runs whose products were read.
     pub runs: i64,

@@ -21,7 +21,7 @@ pub struct SiteRow {
     pub problem: Option<String>,
     /// The current run.
     pub current_run: Option<String>,
-    /// When all its inputs were last compared, milliseconds of UTC since 1970.
+    /// Time at which all its inputs were last compared, milliseconds of UTC since 1970.
     pub checked_ms: Option<i64>,
     /// Since when the products do not correspond to the inputs.
     pub stale_since_ms: Option<i64>,
@@ -95,7 +95,7 @@ pub fn put_unread(transaction: &Transaction<'_>, name: &str) -> Stored<()> {
 pub struct Checked<'a> {
     /// The round of the comparison.
     pub round: i64,
-    /// When, milliseconds of UTC since 1970.
+    /// Time, milliseconds of UTC since 1970.
     pub at_ms: i64,
     /// BLAKE3 of its keys, if it was planned.
     pub config_blake3: Option<&'a str>,

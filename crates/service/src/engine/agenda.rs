@@ -5,7 +5,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use super::retry::milliseconds;
 use areograph_config::ChangesConfig;
 
-/// How long new files may take to settle: three polls find them quiet, each of which lasts as long as its folders take to list.
+/// Time that new files may take to settle: three polls find them quiet, each of which lasts as long as its folders take
+/// to list.
 ///
 /// * `lists_s` – time for listing them, seconds
 pub(super) fn patience_ms(changes: &ChangesConfig, lists_s: f64) -> i64 {
@@ -59,7 +60,7 @@ impl Agenda {
     ///
     /// * `is_wanted` – by the configuration
     pub(super) fn begin_fetch(&mut self, is_wanted: bool) -> bool {
-        // What is in progress is not given up by a new configuration.
+        // A new configuration does not end work in progress.
         self.to_fetch &= is_wanted || self.fetching;
         let begins = self.to_fetch && !self.fetching && self.night.is_some();
         self.fetching |= begins;

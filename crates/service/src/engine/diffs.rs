@@ -20,7 +20,7 @@ use areograph_config::AlertKind;
 
 /// Longest time for a comparison.
 const LIMIT: Duration = Duration::from_mins(30);
-/// Folder of the pages, beside that of the runs.
+/// Folder of the pages, beside the folder of the runs.
 const DIFFS: &str = "diffs";
 
 /// The page of a run's comparison with its predecessor.

@@ -1,4 +1,4 @@
-//! Files of archives: before the comparisons of a night, `areograph fetch` runs as a process of its own, first for the
+//! Files of archives: before the comparisons of a night, `areograph fetch` runs as a separate process, first for the
 //! indexes and then for each site file.
 
 use std::{
@@ -28,7 +28,8 @@ use areograph_config::{AlertKind, ServiceConfig};
 /// Bytes kept of the end of a complaint.
 const COMPLAINT_MAX: usize = 2_000;
 
-/// Brings the copies of the indexes up to date and fetches what site files need. A failure is an alert; others go on.
+/// Brings the copies of the indexes up to date and fetches what site files need. A failure is an alert; others
+/// continue.
 pub(super) async fn fetch_all<W: Workers>(core: &Core<W>) {
     if let Err(error) = fetch(core).await {
         tracing::error!("fetching files failed: {error}");
@@ -69,10 +70,7 @@ async fn fetch<W: Workers>(core: &Core<W>) -> Stored<()> {
     core.shared.write(|transaction| {
         let data = json!({ "sites": fetched, "failures": failures });
         append(transaction, now_ms, "fetch", About::default(), &data)?;
-        let text = format!(
-            "files of archives were not fetched: {}",
-            failures.join("; ")
-        );
+        let text = format!("archive files were not fetched: {}", failures.join("; "));
         let alert = |kind, text| Alert {
             kind,
             site: None,
@@ -88,7 +86,7 @@ async fn fetch<W: Workers>(core: &Core<W>) -> Stored<()> {
                 &alert(AlertKind::FetchFailed, &text),
                 Some(&alert(
                     AlertKind::Recovered,
-                    "files of archives are fetched again",
+                    "archive files are fetched again",
                 )),
             ),
         )
@@ -110,7 +108,7 @@ fn site_files(folders: &[PathBuf]) -> Vec<PathBuf> {
     files
 }
 
-/// How a process ended.
+/// End of a process.
 #[derive(Debug, PartialEq)]
 enum Outcome {
     Done,
@@ -119,7 +117,7 @@ enum Outcome {
     Stopped,
 }
 
-/// What a process fetches.
+/// Target of a fetch process.
 #[derive(Debug, Clone, Copy)]
 enum What<'a> {
     /// Copies of the indexes.
@@ -162,7 +160,7 @@ async fn run<W: Workers>(core: &Core<W>, config: &ServiceConfig, what: What<'_>)
         () = core.shared.ending.cancelled() => Outcome::Stopped,
     };
     if let Some(group) = group.and_then(Pid::from_raw) {
-        // What has arrived is kept, and no file is ever half there.
+        // Received parts are kept, and no file is ever incomplete under its name.
         let _ = kill_process_group(group, Signal::KILL);
     }
     ended

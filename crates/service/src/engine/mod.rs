@@ -1,6 +1,7 @@
-//! The engine: it detects changes, determines the affected sites, has them run, and keeps their publications.
+//! The engine: it detects changes, determines the affected sites, runs them, and keeps their publications.
 //!
-//! [`Engine::turn`] does all that is due at an instant and delegates long work to tasks; [`Engine::run`] repeats turns.
+//! [`Engine::turn`] performs all work due at an instant and delegates long work to tasks; [`Engine::run`] repeats
+//! turns.
 //!
 //! `turn.rs` repeats turns and begins what is due. Each file is one step of this picture:
 //!

@@ -152,7 +152,7 @@ impl Context<'_> {
         let runs = stages_run || only_keeps;
         if runs && causes.is_empty() {
             let (kind, text) = match &self.candidate.site.problem {
-                // What was missing has come, and was no input before: a blocked job waits for it, also in a night.
+                // A missing file has appeared, and was no input before: a blocked job waits for it, also in a night.
                 Some(_) => (CauseKind::RetryOf, "the site could not be planned before"),
                 None => self.without_change(transaction)?,
             };

@@ -18,7 +18,7 @@ pub struct Poll<'a> {
     pub known: &'a BTreeMap<String, FileRow>,
     /// Files found below it, or the reason for which it could not be listed.
     pub found: Result<&'a BTreeMap<String, Identity>, &'a str>,
-    /// When, milliseconds of UTC since 1970.
+    /// Time, milliseconds of UTC since 1970.
     pub now_ms: i64,
     /// A larger share of missing files makes the folder unavailable.
     pub max_loss: f64,

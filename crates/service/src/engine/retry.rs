@@ -33,7 +33,7 @@ const MEMORY_SHARE: f64 = 0.9;
 pub struct Fruitless<'a> {
     /// The job, as of the end of the attempt.
     pub job: &'a Job,
-    /// How the worker ended.
+    /// End of the worker.
     pub ended: &'a Ended,
     /// The last reported stage.
     pub stage: Option<&'a str>,
@@ -43,7 +43,7 @@ pub struct Fruitless<'a> {
     pub cancel: Option<CancelWhy>,
     /// Delay of the first retry.
     pub retry_s: f64,
-    /// When, milliseconds of UTC since 1970.
+    /// Time, milliseconds of UTC since 1970.
     pub now_ms: i64,
 }
 

@@ -53,7 +53,7 @@ struct Foreign {
 /// The folder of a site contains a run of another one, as after a copy of that site's folder.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("the manifest names site {found}; expected {expected}, the site of the folder")]
-#[cause(Input: "move the folder of the run back below that of its site, or away")]
+#[cause(Input: "move the folder of the run back below the folder of its site, or away")]
 struct OtherSite {
     found: String,
     expected: String,
@@ -190,7 +190,7 @@ pub fn row(
     }
 }
 
-/// When a run was published, by its manifest.
+/// Time of publication of a run, by its manifest.
 #[must_use]
 pub fn finished_ms(manifest: &Manifest) -> Option<i64> {
     let finished = DateTime::parse_from_rfc3339(&manifest.finished_utc).ok()?;

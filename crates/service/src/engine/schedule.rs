@@ -82,7 +82,7 @@ impl Schedule {
         Some(next.timestamp_millis())
     }
 
-    /// Due instants at `now_ms` if that of `last_ms` was the last one handled.
+    /// Due instants at `now_ms` if the instant `last_ms` was the last one handled.
     #[must_use]
     pub fn due(&self, last_ms: i64, now_ms: i64, catch_up_ms: i64) -> Due {
         let mut instants = Vec::new();

@@ -127,8 +127,8 @@ pub async fn scrub_products<W: Workers>(core: &Arc<Core<W>>) -> Stored<()> {
 }
 
 /// After a night: compares the products of all runs, those read longest ago first, with their manifests. While a site
-/// runs, no further run begins, nor an hour after the start of the check; the next night continues. A folder that is not
-/// that of this service is reported here, once a night.
+/// runs, no further run begins, nor an hour after the start of the check; the next night continues. A folder of a
+/// different service is reported here, once a night.
 ///
 /// # Errors
 /// The database cannot be written.
@@ -258,7 +258,7 @@ fn before_ms<W: Workers>(core: &Core<W>) -> Option<i64> {
     due_before_ms(&core.shared.config(), core.now_ms())
 }
 
-/// What was last read before this instant is due to be read again; `None` if nothing ever is.
+/// Contents last read before this instant are due to be read again; `None` if reading is never due.
 #[must_use]
 pub fn due_before_ms(config: &ServiceConfig, now_ms: i64) -> Option<i64> {
     let days = config.changes.scrub_days;

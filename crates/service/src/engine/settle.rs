@@ -172,7 +172,7 @@ fn is_kernel(path: &str) -> bool {
     ending.is_some_and(|ending| KERNELS.contains(&ending))
 }
 
-/// What opening a file as a kernel shows.
+/// Result of opening a file as a kernel.
 #[derive(Debug, Clone)]
 enum Opened {
     /// It is a usable kernel, no kernel, or its content is known.

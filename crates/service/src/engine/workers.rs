@@ -45,7 +45,7 @@ impl Workers for Processes {
     }
 }
 
-/// How a worker ended, as text.
+/// End of a worker, as text.
 #[must_use]
 pub fn words(ended: &Ended) -> String {
     match (&ended.answer, &ended.how) {

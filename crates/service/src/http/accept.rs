@@ -118,7 +118,7 @@ fn connection(
         .serve_connection(TokioIo::new(Stall::new(stream)), service)
 }
 
-/// Sends a refusal, and reads what the client still sends, without which it would not see the answer.
+/// Sends a refusal, and reads the rest of the request, without which the client would not receive the answer.
 async fn refuse(mut stream: TcpStream) -> std::io::Result<()> {
     stream.write_all(FULL).await?;
     stream.shutdown().await?;

@@ -202,7 +202,7 @@ fn open_product(
     let damaged = || Withheld::Damaged(format!("`{}` does not match its manifest", entry.path));
     let file = open_below(products, &run_folder(run).join(&entry.path))?.ok_or_else(damaged)?;
     let identity = Identity::of(&file.metadata()?);
-    // A file of another length need not be read.
+    // A file of a different length need not be read.
     if identity.bytes != entry.bytes {
         return Err(damaged());
     }

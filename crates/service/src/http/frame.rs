@@ -79,7 +79,7 @@ pub(super) async fn frame(State(app): State<Arc<App>>, request: Request, next: N
     response
 }
 
-/// Whether an answer has its own document, as that of readiness.
+/// Whether an answer has its own document, as the readiness answer does.
 fn says_itself(response: &Response) -> bool {
     let form = response.headers().get(header::CONTENT_TYPE);
     form.is_some_and(|form| form == "application/json")
@@ -95,7 +95,7 @@ pub(super) fn panicked(panic: Box<dyn Any + Send>) -> Response {
     Problem::internal(text.unwrap_or("a panic without a message")).into_response()
 }
 
-/// Formats an error; those of libraries have only a status.
+/// Formats an error; errors of libraries carry only a status.
 fn refusal(app: &App, method: &Method, uri: &Uri, response: Response, id: &str) -> Response {
     let status = response.status();
     let (parts, _) = response.into_parts();

@@ -17,7 +17,7 @@ pub(super) struct LogPiece {
     pub(super) text: String,
     /// Start of the next page, bytes.
     pub(super) next: u64,
-    /// Length of the whole log, bytes.
+    /// Length of the complete log, bytes.
     pub(super) bytes: u64,
 }
 

@@ -55,7 +55,7 @@ pub(super) async fn copy(
     Ok(memory.found)
 }
 
-/// What a process of Rust writes before it aborts because the system refused memory.
+/// Text that a Rust process writes before it aborts because the system refused memory.
 const REFUSED_MEMORY: &[u8] = b"memory allocation of ";
 
 /// Search for [`REFUSED_MEMORY`] in consecutive pieces of text.

@@ -33,7 +33,7 @@ pub struct Times {
 }
 
 impl Times {
-    /// Those of the service.
+    /// Limits of the service.
     pub const USUAL: Self = Self {
         hello: Duration::from_secs(20),
         patience: [Duration::from_secs(10), Duration::from_secs(20)],
@@ -69,7 +69,7 @@ pub enum Heard<'a> {
     Line(&'a Line),
 }
 
-/// How a worker ended.
+/// End of a worker.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum How {
     /// By itself, with this code.
@@ -95,7 +95,7 @@ pub enum How {
 /// Result of a worker.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ended {
-    /// How it ended; an answer counts in any case.
+    /// Its end; an answer counts in any case.
     pub how: How,
     /// Its last line.
     pub answer: Option<Result<Answer, Failure>>,
@@ -188,7 +188,7 @@ struct Worker {
     rss_peak_kib: u64,
 }
 
-/// Why a worker is being ended, and since when.
+/// Reason why a worker is being ended, and since when.
 struct Ending {
     how: How,
     since: Instant,
@@ -282,7 +282,7 @@ impl Worker {
         });
     }
 
-    /// The same without waiting for a graceful stop.
+    /// Ends the worker without waiting for a graceful stop.
     fn end_at_once(&mut self, how: How) {
         let now = Instant::now();
         self.end(how, now.checked_sub(self.times.patience[0]).unwrap_or(now));

@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 /// A unique identity of a process of this machine.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ProcessIdentity {
-    /// Its number, which is also that of its group.
+    /// Its number, which is also the number of its group.
     pub pid: u32,
-    /// When it started, in ticks since the boot.
+    /// Start, in ticks since the boot.
     pub start: u64,
     /// Identifier of the boot.
     pub boot_id: String,

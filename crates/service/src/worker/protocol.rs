@@ -59,7 +59,7 @@ pub enum What {
         /// Whether every stage runs.
         force: bool,
     },
-    /// Reports what a run would do, and which files the site reads.
+    /// Reports the plan of a run, and the files that the site reads.
     Plan {
         /// The site file.
         site_file: PathBuf,
@@ -151,7 +151,7 @@ pub enum Line {
         stage: String,
         /// `running`, `kept` or `done`.
         state: String,
-        /// Why it runs, or that it does not.
+        /// Reason why it runs, or the statement that it does not.
         because: String,
         /// Seconds that it took; 0 before it is done.
         seconds: f64,
@@ -178,11 +178,11 @@ pub enum Line {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "done", rename_all = "snake_case")]
 pub enum Answer {
-    /// Of a run.
+    /// Answer of a run.
     Run(RunAnswer),
-    /// Of a plan.
+    /// Answer of a plan.
     Plan(PlanAnswer),
-    /// Of a comparison: the headline, sentences, whether a limit was exceeded, and the largest movements.
+    /// Answer of a comparison: the headline, sentences, whether a limit was exceeded, and the largest movements.
     Diff {
         /// One sentence.
         headline: String,
@@ -191,22 +191,22 @@ pub enum Answer {
         /// Whether a limit was exceeded.
         beyond_limit: bool,
     },
-    /// Of a probe: kernels in the order of the task.
+    /// Answer of a probe: kernels in the order of the task.
     Probe {
         /// The coverage of each, or the reason for which CSPICE rejects it.
         kernels: Vec<Probed>,
     },
-    /// Of a list: the number of files.
+    /// Answer of a list: the number of files.
     List {
         /// Files found.
         files: u64,
     },
-    /// Of hashing: files in the order of the task.
+    /// Answer of hashing: files in the order of the task.
     Hash {
         /// The result for each.
         files: Vec<Hashed>,
     },
-    /// Of a search.
+    /// Answer of a search.
     Shots {
         /// Rows written.
         rows: u64,
@@ -226,13 +226,13 @@ pub struct RunAnswer {
     pub valid: bool,
     /// The verdict in a word.
     pub verdict: String,
-    /// Why they are not valid.
+    /// Reasons why they are not valid.
     pub reasons: Vec<String>,
     /// Stages that ran, with their reasons.
     pub ran: Vec<PlannedStage>,
 }
 
-/// What a run would do.
+/// Plan of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlanAnswer {
     /// BLAKE3 of the keys of the site file.
@@ -252,7 +252,7 @@ pub struct PlannedStage {
     pub stage: String,
     /// Whether it runs.
     pub runs: bool,
-    /// Why, or that it does not.
+    /// Reason why it runs, or the statement that it does not.
     pub because: String,
 }
 

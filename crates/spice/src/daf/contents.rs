@@ -12,8 +12,8 @@ use crate::role::KernelRole;
 const CHUNK_WORDS: usize = 1 << 16;
 /// Words at the end of a segment that contain its counts.
 const TAIL_WORDS: usize = 8;
-/// Largest deviation of the mid-point and half length of a record from those of its position, as a share of its length:
-/// above rounding, far below any damage that matters.
+/// Largest deviation of the mid-point and half length of a record from the values for its position, as a share of its
+/// length: above rounding, far below any damage that matters.
 const STRETCH_TOLERANCE: f64 = 1e-6;
 /// Largest deviation of a quaternion's norm from 1. Quaternions stored in single precision, or digitised in 16 bits on
 /// board, stay below it.

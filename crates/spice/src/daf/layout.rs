@@ -52,7 +52,7 @@ pub(super) enum List {
 }
 
 impl Layout {
-    /// Words of the whole segment.
+    /// Words of the complete segment.
     pub(super) fn words(&self) -> usize {
         let lists = self.lists.iter().map(|list| match list {
             List::Times(count) => *count,

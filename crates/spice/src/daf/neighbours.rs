@@ -3,7 +3,7 @@
 //!
 //! Every state is predicted by cubic Hermite interpolation between the one before and the one after. A single damaged
 //! state departs from its prediction, and changes the predictions of its two neighbours by known shares of that, and no
-//! others. A manoeuvre, a seam or noise does not: the whole pattern is required.
+//! others. A manoeuvre, a seam or noise does not: the complete pattern is required.
 
 use nalgebra::Vector3;
 
@@ -13,7 +13,7 @@ use super::{Reader, layout::STATE, problem::Problem};
 const REACH: usize = 3;
 /// States read at a time.
 const CHUNK: usize = 4_096;
-/// Ratio of the departure of a damaged state to those of undamaged ones near it.
+/// Ratio of the departure of a damaged state to the departures of undamaged states near it.
 const STANDS_OUT: f64 = 100.0;
 /// Departure that rounding may explain, as a share of the distance or speed.
 const ROUNDING: f64 = 1e-9;
@@ -25,8 +25,8 @@ const ABSURD_KM: f64 = 1e12;
 const ABSURD_TIMES: f64 = 1e9;
 /// Largest ratio of the steps around a state for which the shares below hold.
 const UNEVEN_MAX: f64 = 1.2;
-/// Share of its own departure that a damaged position, or velocity, adds to those of its neighbours: −1/2 and 1/4 for
-/// even steps, and the tolerance for rounding, uneven steps and the orbit itself.
+/// Share of its own departure that a damaged position, or velocity, adds to the departures of its neighbours: −1/2 and
+/// 1/4 for even steps, and the tolerance for rounding, uneven steps and the orbit itself.
 const PARTS: [f64; 2] = [-0.5, 0.25];
 const PART_TOLERANCE: f64 = 0.15;
 
@@ -194,7 +194,7 @@ fn departure(states: &[State]) -> [Vector3<f64>; 2] {
 mod tests {
     use super::*;
 
-    /// An orbit like that of MGS, sampled every `step_s`.
+    /// An orbit like MGS's, sampled every `step_s`.
     fn orbit(step_s: f64) -> Vec<State> {
         let (radius_km, rate) = (3_780.0, 8.9e-4);
         let state = |index: u8| {
@@ -256,7 +256,7 @@ mod tests {
                 "{told}"
             );
         }
-        // Half of them stored in another precision.
+        // Half of them stored in a different precision.
         let halves: Vec<f64> = (0..20)
             .map(|index| if index < 10 { 1.0 } else { 1.0 + 1e-4 })
             .collect();

@@ -2,7 +2,7 @@
 
 use areograph_base::error::Error;
 
-/// Why a segment is invalid.
+/// Reasons why a segment is invalid.
 pub(super) enum Problem {
     /// Its words contradict each other.
     Damaged(String),

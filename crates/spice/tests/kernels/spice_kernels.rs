@@ -182,7 +182,7 @@ fn what_is_no_kernel_is_refused_with_its_name() {
         (
             "image.bc",
             b"\x89PNG\0\0\0\0\0",
-            "is a binary file of another kind; expected",
+            "is a binary file of a different kind; expected",
         ),
         (
             "odd.ti",

@@ -4,10 +4,10 @@ use crate::tag_times::ImageTimes;
 use areograph_base::{constants::SPACECRAFT, footprints::AdjustmentModel};
 use areograph_config::{AdjustmentConfig, SiteConfig, usual_altimeter};
 
-/// Why absolute accuracies of a site are withheld: the default standard deviations of its orientations are those of one
-/// spacecraft, and these images are not known to be of it. `None` where each image is, or has its own values.
+/// Reason for withholding a site's absolute accuracies: the default standard deviations of its orientations apply to
+/// one spacecraft, and these images are not known to be from it. `None` where each image is, or has its own values.
 ///
-/// Stated accuracies of positions are the a priori ones, and those of heights contain them on slopes.
+/// Stated position accuracies are the a priori ones, and stated height accuracies contain them on slopes.
 pub fn accuracy_withheld<'a>(
     site: &SiteConfig,
     images: impl IntoIterator<Item = &'a ImageTimes>,
@@ -42,7 +42,7 @@ pub fn accuracy_withheld<'a>(
     })
 }
 
-/// Whether the site has standard deviations of its own.
+/// Whether the site has its own standard deviations.
 fn is_configured(config: &AdjustmentConfig) -> bool {
     let defaults = AdjustmentConfig::default();
     let differ = |own: &[f64], default: &[f64]| {

@@ -32,8 +32,8 @@ pub struct Adjusted {
     pub heights: Option<HeightSummary>,
     /// Horizontal position from relief; `None` where no surface has slopes.
     pub relief: Option<ReliefSummary>,
-    /// Offset of the attitude clock with its standard deviation, seconds, where it is an unknown: the attitudes are
-    /// those at a time later by this offset.
+    /// Offset of the attitude clock with its standard deviation, seconds, where it is an unknown: the attitudes belong
+    /// to a time later by this offset.
     pub attitude_clock_s: Option<(f64, f64)>,
     /// Boresight of a laser on the bus of the cameras, or the reason why it is not determined; `None` where it is not
     /// requested.
@@ -65,13 +65,13 @@ pub struct CorrectedImage {
     pub correction: [f64; ORIENTATION_UNKNOWNS],
     /// Standard deviations of the camera at the exposure of its lines, line times included; 0 where held fixed.
     pub sigmas: [f64; ORIENTATION_UNKNOWNS],
-    /// Covariance of the same; rows and columns of unknowns that are held fixed are 0.
+    /// Covariance of these unknowns; rows and columns of unknowns that are held fixed are 0.
     pub covariance: DMatrix<f64>,
-    /// Standard deviation of a delay of all lines that these contain, seconds; 0 where they contain none.
+    /// Standard deviation of a delay of all lines, contained in `sigmas`, seconds; 0 where they contain no delay.
     pub line_time_sigma_s: f64,
-    /// Their a priori values.
+    /// A priori values of the correction.
     pub expected: [f64; ORIENTATION_UNKNOWNS],
-    /// Their a priori standard deviations; 0 where held fixed, infinite where free.
+    /// A priori standard deviations of the correction; 0 where held fixed, infinite where free.
     pub prior_sigmas: [f64; ORIENTATION_UNKNOWNS],
     /// Bias of the line times with its standard deviation, seconds, where it is an unknown.
     pub time_bias_s: Option<(f64, f64)>,
@@ -98,7 +98,7 @@ pub struct CorrectedPoint {
     /// point that fails the test against the surface but was kept, it includes the distance from the surface; for a
     /// footprint, the shift of its profile.
     pub covariance_m2: Matrix3<f64>,
-    /// The part of it that tie points of the site, or footprints of the profile, have in common; `None` for tie points
+    /// The error that tie points of the site, or footprints of the profile, have in common; `None` for tie points
     /// where no surface controls heights.
     pub shared: Option<SharedError>,
 }
@@ -186,7 +186,7 @@ impl CorrectedPoint {
         self.local_roots_m(&self.covariance_m2)
     }
 
-    /// The same without the error that the point shares with others; `None` where that is not known.
+    /// Standard deviations without the error that the point shares with others; `None` where this error is not known.
     #[must_use]
     pub fn relative_sigmas_m(&self) -> Option<[f64; 3]> {
         let shared = self.shared.as_ref()?;

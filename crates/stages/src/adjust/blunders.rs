@@ -113,8 +113,8 @@ fn by_residuals<M: ExteriorOrientation>(
     reject_worst(assembled, bundle_options, limit, first?, watch)
 }
 
-/// Adds the scatter of the tie points to their standard deviations before any is rejected, because it is no blunder; returns whether
-/// there is one.
+/// Adds the scatter of the tie points to their standard deviations before any is rejected, because scatter is no
+/// blunder; returns whether there is any.
 ///
 /// * `first` – the solution so far, where there is one
 /// * `low_weights` – options of a solution that shows the scatter better

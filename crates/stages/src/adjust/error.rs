@@ -1,4 +1,4 @@
-//! Why a site cannot be adjusted.
+//! Reasons why a site cannot be adjusted.
 
 use areograph_base::error::Cause;
 use areograph_geom::{bundle::BundleError, pushbroom::Unseen};
@@ -6,7 +6,7 @@ use areograph_geom::{bundle::BundleError, pushbroom::Unseen};
 /// Distance between initial and adjusted value that is a contradiction, in standard deviations of the initial value.
 pub(super) const CONTRADICTION: f64 = 10.0;
 
-/// Why a site cannot be adjusted.
+/// Reason why a site cannot be adjusted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, Cause)]
 #[cause(Input)]
 pub enum AdjustError {
@@ -19,7 +19,7 @@ pub enum AdjustError {
         /// The first of them, and why it has no ground point.
         first: String,
     },
-    /// The network as a whole.
+    /// A fault of the network.
     #[error("{0}")]
     #[cause(
         "check the input of the adjustment, and give orientations and footprints finite standard deviations"
@@ -68,7 +68,7 @@ pub enum AdjustError {
     Blind {
         /// Identifier of the image.
         image: String,
-        /// Why.
+        /// Reason.
         unseen: Unseen,
     },
     /// Initial values that the observations contradict.

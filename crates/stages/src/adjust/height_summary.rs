@@ -102,8 +102,8 @@ pub(super) fn heights<M>(
     })
 }
 
-/// Standard deviations of the error that tie points share towards east, north and up, metres: those of their mean and,
-/// upwards, the shift of the mean by those beyond the limit.
+/// Standard deviations of the error that tie points share towards east, north and up, metres: standard deviations of
+/// their mean and, upwards, the shift of the mean by points beyond the limit.
 pub(super) fn datum_sigma_m(adjustment: &Adjustment, variance_factor: f64) -> Option<[f64; 3]> {
     let [east_m, north_m, up_m] = mean_sigma_m(adjustment, variance_factor)?;
     let compared = &adjustment.compared;

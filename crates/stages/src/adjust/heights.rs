@@ -32,7 +32,7 @@ pub(super) struct HeightBlunder {
     pub(super) point: usize,
     /// Height above the surface without the part that tie points share, metres.
     pub(super) above_m: f64,
-    /// The same in its standard deviations.
+    /// This height in its standard deviations.
     pub(super) standardised: f64,
 }
 

@@ -34,13 +34,13 @@ pub struct AdjustImage<M> {
 
 /// Standard deviations of an image's unknowns from one for positions and one for rotations.
 ///
-/// All powers of `t`, in units of half the image, get the same.
+/// All powers of `t`, in units of half the image, get the same standard deviation.
 #[must_use]
 pub fn orientation_sigmas(position_m: f64, angle_rad: f64) -> [f64; ORIENTATION_UNKNOWNS] {
     std::array::from_fn(|index| if index < 9 { position_m } else { angle_rad })
 }
 
-/// Standard deviations of an image's unknowns from those of the three powers of `t`, the same on all axes.
+/// Standard deviations of an image's unknowns from one for each of the three powers of `t`, equal on all axes.
 #[must_use]
 pub(super) fn sigmas_of_powers(
     position_m: &[f64; 3],

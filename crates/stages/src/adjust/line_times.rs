@@ -1,14 +1,16 @@
-//! Errors of the line times in what is known of a camera.
+//! Errors of the line times in the stated accuracy of a camera.
 //!
-//! Tie points do not separate a delay of all lines of an image from a rotation about the axis across the flight, so line times
-//! are no unknown: the a priori standard deviation of rotations allows for them. The adjusted orientation then shows the
-//! ground where it is, but its position is that of the tag of a line, and its rotation contains what the camera flew on until
-//! the exposure. Of the position at the exposure the delay is an error; together with the rotation it shows the same ground.
+//! Tie points do not separate a delay of all lines of an image from a rotation about the axis across the flight, so
+//! line times are no unknown: the a priori standard deviation of rotations allows for them. The adjusted orientation
+//! then shows the ground where it is, but its position belongs to the tag of a line, and its rotation contains the
+//! flight of the camera until the exposure. The delay is an error of the position at the exposure; together with the
+//! rotation it shows the same ground.
 //!
-//! With the a priori covariance `Σ₀ = P⁻¹` of the adjustment and the cofactors `Q`, the error of an estimate is `−Q P x` plus
-//! that of the observations. If a delay moves the camera by `D` and the ground in its lines as the rotation `g` does, the true
-//! a priori covariance is `Σ₀ + σ²(D Dᵀ − g gᵀ)`, and that of the estimate, as observations do not distinguish `D` from `g`,
-//! `Q + σ²(D Dᵀ − g gᵀ − (D − g)uᵀ − u(D − g)ᵀ)`, `u = g − Q P g`. No function of image and ground changes its variance by it.
+//! With the a priori covariance `Σ₀ = P⁻¹` of the adjustment and the cofactors `Q`, the error of an estimate is
+//! `−Q P x` plus the error from the observations. If a delay moves the camera by `D` and the ground in its lines as the
+//! rotation `g` does, the true a priori covariance is `Σ₀ + σ²(D Dᵀ − g gᵀ)`, and the covariance of the estimate, as
+//! observations do not distinguish `D` from `g`, `Q + σ²(D Dᵀ − g gᵀ − (D − g)uᵀ − u(D − g)ᵀ)`, `u = g − Q P g`. No
+//! function of image and ground changes its variance by it.
 //!
 //! # Source
 //! The error of a least-squares estimate whose a priori covariance is not the true one; derived here.
@@ -27,7 +29,7 @@ const HELD_SHARE: f64 = 1e-3;
 /// Effect of a delay of all lines of an image on the unknowns of its orientation, per second.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LineDelay {
-    /// How the camera at the exposure of a line differs from that at its tag: metres and radians.
+    /// Difference of the camera at the exposure of a line from the camera at its tag: metres and radians.
     moved: [f64; ORIENTATION_UNKNOWNS],
     /// The rotation that moves the ground in the image as much: radians.
     seen_as: [f64; ORIENTATION_UNKNOWNS],
@@ -73,7 +75,7 @@ impl LineDelay {
         sigma_s.min(squares.sum::<f64>().sqrt().recip())
     }
 
-    /// What a delay adds to the covariance of an image whose unknowns have these cofactors and a priori standard deviations,
+    /// Covariance that a delay adds to an image whose unknowns have these cofactors and a priori standard deviations,
     /// and the standard deviation of the delay, seconds.
     pub(super) fn added(
         &self,
@@ -162,8 +164,8 @@ mod tests {
         })
     }
 
-    /// Where nothing is observed, cofactors are the a priori variances: the delay adds the way of the camera to its
-    /// position, takes what it is from the rotation, and leaves the ground as uncertain as it was.
+    /// Without observations, cofactors are the a priori variances: the delay adds the path of the camera to its
+    /// position, takes its part from the rotation, and does not change the uncertainty of the ground.
     #[test]
     fn a_delay_moves_the_camera_and_not_the_ground() {
         let (delay, priors) = (delay(), priors());
@@ -185,7 +187,7 @@ mod tests {
         let about = largest.unwrap();
         assert!((-added[(about, about)]).sqrt() * RANGE_M - way_m < 1e-9);
         assert!(total[(about, about)] > 0.0);
-        // Place of the boresight on the ground along the flight: what is observed of both together.
+        // Place of the boresight on the ground along the flight: the observable combination of both.
         let sense = delay.seen_as[about].signum();
         let ground_m2 = |of: &DMatrix<f64>| {
             of[(6, 6)]

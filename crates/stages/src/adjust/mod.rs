@@ -2,7 +2,7 @@
 //!
 //! The surface of all MOLA shots (`geom/surface`, kriging with full covariance) controls the heights, and
 //! `stages/check_heights` compares with it before and after. Residuals along track follow decision 0010: with the
-//! published residual, ten thousand ties in a pair and noise of a whole line biased the estimated along-track velocity
+//! published residual, ten thousand ties in a pair and noise of a full line biased the estimated along-track velocity
 //! by several of its a priori standard deviations.
 //!
 //! Image coordinates of footprints follow from the orientation under adjustment and are observations only in the

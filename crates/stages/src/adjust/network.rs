@@ -46,7 +46,7 @@ pub(super) struct Assembled<M> {
     pub(super) unseen_delay_s: f64,
     /// Scatter of tie points that was added to their standard deviations, pixels.
     pub(super) tie_scatter_px: f64,
-    /// Why the laser's position in images is not an observation although it was requested.
+    /// Reason why the laser's position in images is not an observation although it was requested.
     pub(super) no_spots: Option<String>,
 }
 
@@ -105,7 +105,7 @@ fn bundle_image<M>(image: &AdjustImage<M>) -> BundleImage<&M> {
     }
 }
 
-/// Finds lines for points in the whole of an image.
+/// Finds lines for points throughout an image.
 pub(super) fn projector<'a, M, O: ExteriorOrientation>(
     image: &AdjustImage<M>,
     orientation: &'a O,

@@ -1,7 +1,7 @@
 //! Covariances of adjusted points, and the part of them that points share.
 //!
 //! Tie points of a site share the error of its orientations, 110 m on an axis; footprints share the shift of their profile,
-//! 70 m. Neither averages out over points, and it is stated apart.
+//! 70 m. Neither averages out over points; both are stated separately.
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -15,8 +15,8 @@ use areograph_geom::{bundle::Adjustment, ellipsoid::local_axes, statistics::BAAR
 /// An error that a point has in common with others.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SharedError {
-    /// Standard deviations of the error towards east, north and up, metres: of tie points that of their mean, of a footprint
-    /// the shift of its profile.
+    /// Standard deviations of the error towards east, north and up, metres: for tie points the error of their mean, for
+    /// a footprint the shift of its profile.
     pub sigma_m: [f64; 3],
     /// Covariance of the point without it, m².
     pub relative_m2: Matrix3<f64>,
@@ -63,7 +63,7 @@ pub(super) fn point_errors<M>(
                 shared: shared(sigma_m),
             });
         }
-        // The shift of the profile is no unknown: what is known of it beforehand comes on top.
+        // The shift of the profile is no unknown: its a priori uncertainty is added.
         let profile_m = shots.profile_sigmas_m[shots.shots[point].profile];
         let shift_m2 = shift_m2(&found.ground_m, &profile_m);
         Some(PointErrors {

@@ -26,11 +26,11 @@ pub struct RejectedPoint {
     pub index: usize,
     /// Identifier.
     pub id: String,
-    /// Why.
+    /// Reason.
     pub reason: RejectionReason,
 }
 
-/// Why a point was rejected.
+/// Reasons for the rejection of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[serde(rename_all = "snake_case")]
 pub enum RejectionReason {
@@ -51,7 +51,7 @@ pub enum RejectionReason {
     Height {
         /// Height above the surface without the part that tie points share, metres.
         above_m: f64,
-        /// The same in its standard deviations, without sign.
+        /// This height in its standard deviations, without sign.
         standardised: f64,
     },
 }

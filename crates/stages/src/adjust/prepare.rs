@@ -50,7 +50,7 @@ pub struct Candidate<'a, M> {
 }
 
 impl<M: ExteriorOrientation> Candidate<'_, M> {
-    /// The image with its standard deviations: those of the model, or those that `config` gives for this image.
+    /// The image with its standard deviations, from the model or from the entry of `config` for this image.
     fn weighed(self, laser: &Altimeter, config: &AdjustmentConfig) -> AdjustImage<M> {
         let mut sigmas = match config.model {
             AdjustmentModel::MolaSurface => {
@@ -98,7 +98,7 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
         }
     }
 
-    /// Whether position and bus are those of the spacecraft with the laser: support data do not state whether their
+    /// Whether position and bus belong to the spacecraft with the laser: support data do not state whether their
     /// positions are geometric, and apparent positions differ by up to 330 m.
     const fn knows_bus(&self) -> bool {
         self.times.support.is_none()
@@ -138,7 +138,7 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
         orientation_sigmas(position_m, position_m / self.range_m())
     }
 
-    /// Distance of the ground in the middle of the image, metres; that of the centre of Mars where the image
+    /// Distance from the camera to the ground in the middle of the image, metres; to the centre of Mars where the image
     /// sees no ground.
     fn range_m(&self) -> f64 {
         let middle = self

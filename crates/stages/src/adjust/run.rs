@@ -25,7 +25,7 @@ use areograph_geom::{
 ///
 /// Tie points start from their intersection; those without one are rejected and listed. Where the along-track
 /// disagreement `disagreement_m` of the images is large, the result holds both readings of it. `watch` counts
-/// solutions: how many it takes until no blunder is left is not known in advance.
+/// solutions: their number until no blunder is left is not known in advance.
 ///
 /// # Errors
 /// No tie point with a ground point, identifiers that do not match, a singular network, initial values that contradict

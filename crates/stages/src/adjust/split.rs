@@ -37,9 +37,10 @@ pub struct OtherReading {
     /// Offset of the attitude clock with its standard deviation, seconds, where this reading uses it; otherwise all
     /// images are taken as equally likely to be wrong.
     pub attitude_clock_s: Option<(f64, f64)>,
-    /// Mean of the tie points by this reading minus that of the adjustment, towards east, north and up, metres.
+    /// Mean of the tie points by this reading minus their mean by the adjustment, towards east, north and up, metres.
     pub moved_m: [f64; 3],
-    /// Standard deviations of their mean by this reading, likewise; `None` where no surface controls heights.
+    /// Standard deviations of their mean by this reading, towards east, north and up, metres; `None` where no surface
+    /// controls heights.
     pub mean_sigma_m: Option<[f64; 3]>,
 }
 
@@ -63,7 +64,7 @@ pub(super) fn other_reading<M: ExteriorOrientation>(
     } else {
         by_attitude_clock(&mut network, images, config);
     }
-    // Of its heights only those observed are used.
+    // Only its observed heights are used.
     let other = solve_comparing(&network, bundle_options, |_| false)?;
     let points = adjustment.points.iter().zip(&other.points).enumerate();
     let both_m: Vec<[Vector3<f64>; 2]> = points

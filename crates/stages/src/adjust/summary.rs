@@ -34,7 +34,7 @@ use areograph_geom::{
 pub enum ObservationType {
     /// Image coordinates of tie points along the track.
     TieAlong,
-    /// The same across the track; uncontrolled without heights above the MOLA surface.
+    /// Image coordinates of tie points across the track; uncontrolled without heights above the MOLA surface.
     TieAcross,
     /// Heights of tie points above the MOLA surface.
     MolaHeight,
@@ -62,14 +62,14 @@ impl ObservationType {
         match self {
             Self::TieAlong => "tie points in images, along the track",
             Self::TieAcross => "tie points in images, across the track",
-            Self::MolaHeight => "heights by the MOLA surface",
+            Self::MolaHeight => "heights from the MOLA surface",
             Self::MolaImage => "image coordinates of MOLA",
             Self::MolaRange => "MOLA ranges",
             Self::Orientation => "initial orientation",
             Self::MolaGround => "ground coordinates of MOLA",
             Self::TieGround => "given coordinates of tie points",
             Self::Bias => "time and range biases",
-            Self::LaserSpot => "the laser in simultaneous images, by the mounting",
+            Self::LaserSpot => "laser spots in simultaneous images, from the mounting",
         }
     }
 }
@@ -152,9 +152,9 @@ pub struct AdjustmentSummary {
     /// Standard deviation of unit weight of tie points along and across the track; 0 where nothing controls them.
     #[schemars(transform = none_negative)]
     pub tie_components: [f64; 2],
-    /// Standard deviation of the scatter of tie points in addition to their own, focal-plane pixels, from residuals along the track, as
-    /// jitter of the images causes; their standard deviations include it, across the track as well. 0 where chance explains the
-    /// residuals, and without a blunder limit.
+    /// Standard deviation of the scatter of tie points in addition to their own, focal-plane pixels, from residuals
+    /// along the track, as jitter of the images causes; their standard deviations include it, and 1.4 times as much
+    /// across the track. 0 where chance explains the residuals, and without a blunder limit.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub tie_scatter_px: f64,

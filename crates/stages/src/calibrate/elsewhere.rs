@@ -6,10 +6,10 @@ use crate::judge::{Check, CheckKind, CheckOutcome};
 /// A figure of control may worsen by this many standard deviations of measurement and laser.
 const WORSE_MAX: f64 = 3.0;
 /// The control of another orbit may be off on average by this many standard deviations of one of its points. The mean
-/// itself is far better known: this is what constant errors of two orbits may differ by, which no point separates from
-/// an error of the control that made the calibration.
+/// itself is far better known: constant errors of two orbits may differ by this much, and no point separates them from
+/// an error of the control that determined the calibration.
 pub(super) const OFFSET_MAX: f64 = 1.5;
-/// And by this many standard deviations of the calibration itself.
+/// The limit also allows this many standard deviations of the calibration itself.
 pub(super) const CALIBRATION_SIGMAS: f64 = 3.0;
 /// Growth of tie residuals above which a remark states it.
 const TIES_WORSE: f64 = 1.05;
@@ -38,9 +38,9 @@ struct Compared {
 pub(super) struct Elsewhere {
     pub(super) reasons: Vec<String>,
     pub(super) remarks: Vec<String>,
-    /// Of every figure of control in every orbit.
+    /// Checks of every figure of control in every orbit.
     pub(super) checks: Vec<Check>,
-    /// Of every mean offset.
+    /// Checks of every mean offset.
     pub(super) offsets: Vec<Check>,
 }
 
@@ -151,7 +151,10 @@ fn control(
 ) -> Vec<Compared> {
     let [before, after] = [&orbit.before, &orbit.after].map(|of| of.of(PointKind::Control));
     let Some((before, after)) = before.zip(after) else {
-        remarks.push(format!("orbit {}: no control validates it", orbit.orbit));
+        remarks.push(format!(
+            "orbit {}: no control points for validation",
+            orbit.orbit
+        ));
         return Vec::new();
     };
     let mut all = Vec::new();

@@ -1,4 +1,4 @@
-//! Why a calibration fails, with the names of cameras and points.
+//! Reasons for the failure of a calibration, with the names of cameras and points.
 
 use areograph_base::error::Cause;
 
@@ -22,7 +22,7 @@ pub enum CalibrateError {
         found: i32,
         /// The first camera.
         first: String,
-        /// And its frame.
+        /// Frame of the first camera.
         expected: i32,
     },
     /// Two cameras have one sensor.
@@ -35,7 +35,7 @@ pub enum CalibrateError {
     SameSensor {
         /// A camera.
         first: String,
-        /// Another.
+        /// Another camera.
         second: String,
         /// The sensor of both.
         sensor: String,
@@ -75,11 +75,11 @@ pub enum CalibrateError {
     )]
     #[cause("measure more points that are visible in several lines")]
     TooFewTies {
-        /// The camera that has fewest.
+        /// The camera with the fewest.
         camera: String,
-        /// How many there are.
+        /// Number found.
         found: usize,
-        /// How many are needed.
+        /// Number required.
         expected: usize,
     },
     /// Too few control points.
@@ -91,11 +91,11 @@ pub enum CalibrateError {
          estimated"
     )]
     TooFewControls {
-        /// How many there are.
+        /// Number found.
         found: usize,
-        /// How many are withheld.
+        /// Number withheld.
         held_back: usize,
-        /// How many are needed.
+        /// Number required.
         expected: usize,
     },
     /// Most points do not fit.
@@ -107,13 +107,13 @@ pub enum CalibrateError {
     Misfit {
         /// `tie points` or `control points`.
         what: &'static str,
-        /// How many do not fit.
+        /// Number of points that do not fit.
         misfits: usize,
-        /// How many there are.
+        /// Number found.
         all: usize,
         /// One of them.
         point: String,
-        /// Why it does not.
+        /// Reason why it does not fit.
         why: String,
     },
     /// A control point has two places.
@@ -125,7 +125,7 @@ pub enum CalibrateError {
         /// The point.
         point: String,
     },
-    /// An orbit of the validation has another number of files, or another sensor.
+    /// A validation orbit has a different number of files, or a different sensor.
     #[error("validation {orbit}: no support data of {sensor}, the sensor of camera {camera}")]
     #[cause(like = SameSensor)]
     NoSupport {
@@ -142,7 +142,7 @@ pub enum CalibrateError {
     Unseen {
         /// The point.
         point: String,
-        /// Why.
+        /// Reason.
         problem: String,
     },
     /// Another orbit has too little laser control.
@@ -151,9 +151,9 @@ pub enum CalibrateError {
     ThinValidation {
         /// The orbit.
         orbit: String,
-        /// How many there are.
+        /// Number found.
         found: usize,
-        /// How many are needed.
+        /// Number required.
         expected: usize,
     },
     /// Another orbit has a file of the calibration.
@@ -195,7 +195,7 @@ pub enum CalibrateError {
          deviations"
     )]
     Adjustment {
-        /// Which step.
+        /// The step.
         step: &'static str,
         /// The problem.
         problem: String,

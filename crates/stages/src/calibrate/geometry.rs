@@ -92,7 +92,7 @@ pub(super) struct Laboratory {
 }
 
 impl Orbit {
-    /// The orbit of these images, in the given axes or in those of the first image.
+    /// The orbit of these images, in the given axes or in the axes of the first image.
     pub(super) fn of(
         images: Vec<CameraImage>,
         body: Body,

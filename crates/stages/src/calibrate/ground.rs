@@ -32,7 +32,7 @@ pub(super) struct Off {
     pub(super) index: usize,
     /// Its height above the ground, metres.
     pub(super) above_m: f64,
-    /// The same in standard deviations.
+    /// This height in standard deviations.
     pub(super) sigmas: f64,
 }
 
@@ -78,7 +78,7 @@ impl Tie {
 pub(super) struct Tested {
     /// Tie points off the ground.
     pub(super) off: Vec<Off>,
-    /// Of each other tie point in use, its index and the smallest error of height that shows, metres.
+    /// Index of each other tie point in use, and its smallest detectable height error, metres.
     pub(super) shown_m: Vec<(usize, f64)>,
     pub(super) summary: TieGround,
 }
@@ -153,7 +153,7 @@ struct OnGround {
     near: Vec<usize>,
 }
 
-/// Tie points against the ground of the others; `lasers` points of it are none.
+/// Tie points against the ground of the others; its first `lasers` points are laser points.
 fn on_ground(ties: &[Tie], ground: &ScatteredHeights, lasers: usize) -> Vec<Option<OnGround>> {
     let at = |(at, tie): (usize, &Tie)| {
         let (beneath, near) = ground.at_point(lasers + at)?;
@@ -169,7 +169,8 @@ fn on_ground(ties: &[Tie], ground: &ScatteredHeights, lasers: usize) -> Vec<Opti
     ties.iter().enumerate().map(at).collect()
 }
 
-/// Those that are off, and farther off than all near them, in order: a wrong point moves the ground at its neighbours.
+/// Points off the ground, and farther off than all near them, in order: a wrong point moves the ground at its
+/// neighbours.
 fn worst_of_neighbours(found: &[Option<OnGround>], is_off: impl Fn(&Off) -> bool) -> Vec<usize> {
     let sigmas = |at: usize| found[at].as_ref().map_or(0.0, |of| of.off.sigmas.abs());
     let is_worst =
@@ -182,7 +183,7 @@ fn worst_of_neighbours(found: &[Option<OnGround>], is_off: impl Fn(&Off) -> bool
     of.map(|(at, _)| at).collect()
 }
 
-/// Why tie points are not tested against the ground.
+/// Reason why tie points are not tested against the ground.
 pub(super) fn untested(points: &[OrbitPoint]) -> String {
     let lasers = points
         .iter()

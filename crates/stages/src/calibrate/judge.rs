@@ -38,7 +38,7 @@ pub(super) struct Evidence<'a> {
     pub(super) validation_noise: &'a [Noise],
     /// Points, and those that were left out: ties, then control.
     pub(super) left_out: [[usize; 2]; 2],
-    /// What no point tests.
+    /// Errors that no point tests.
     pub(super) untested: Vec<String>,
     /// A priori knowledge.
     pub(super) known: Known,
@@ -154,8 +154,8 @@ impl Judged {
         // Written so that NaN is a reason.
         (!(found.sigmas <= *limit)).then(|| {
             format!(
-                "{what} are {:.2} times as large as expected (root mean square); expected at most {limit:.2} times: standard deviations are too \
-                 small, or an error has another source than the camera",
+                "{what} are {:.2} times as large as expected (root mean square); expected at most {limit:.2} times: \
+                 standard deviations are too small, or an error has a source other than the camera",
                 found.sigmas
             )
         })
@@ -165,7 +165,7 @@ impl Judged {
 fn scatters(of: &Evidence<'_>) -> Vec<Judged> {
     let judged = |kind, what, found: Option<Scattered>| {
         let found = found?;
-        // Few coordinates scatter more by chance. The limit is rounded up to the printed hundredths.
+        // Few coordinates scatter more by chance. The limit is rounded up to the reported hundredths.
         let [_, by_chance] = unit_weight_limits(found.coordinates)?;
         Some(Judged {
             kind,
@@ -251,7 +251,7 @@ fn checks(of: &Evidence<'_>) -> Vec<Check> {
     checks
 }
 
-/// Why the accuracy on the ground does not exceed the a priori one, if it does not.
+/// Reason why the accuracy on the ground does not exceed the a priori accuracy, if it does not.
 fn coarse(held_back: &HeldBack, known: Known) -> Option<String> {
     let Some((plane_m, height_m)) = held_back.accuracy_plane_m.zip(held_back.accuracy_height_m)
     else {
@@ -321,8 +321,8 @@ fn remarks(of: &Evidence<'_>) -> Vec<String> {
         say(
             camera.isd_left_px > ISD_LEFT_PX,
             format!(
-                "the calibrated support data of camera {} deviate by up to {:.2} px from its look directions, which bend: they hold only a straight line \
-                 of equal samples",
+                "the calibrated support data of camera {} deviate by up to {:.2} px from its look directions, which \
+                 bend: support data hold only a straight line of equal samples",
                 camera.camera, camera.isd_left_px
             ),
         );

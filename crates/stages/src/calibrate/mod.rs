@@ -1,8 +1,8 @@
 //! Calibration of the lines of a camera: by ties only, then with laser control, validated by withheld control.
 //!
-//! This stage knows support data, names and withheld points. The axes across, along and down are those of the
-//! spacecraft that are nearest to them in the first image. Calibrated support data are the given ones with a straight
-//! line of equal samples (`pds/isd/rewrite`), and the remaining difference is stated.
+//! This stage knows support data, names and withheld points. The axes across, along and down are the spacecraft axes
+//! nearest to these directions in the first image. Calibrated support data are the given ones with a straight line of
+//! equal samples (`pds/isd/rewrite`), and the remaining difference is stated.
 
 mod demands;
 mod elsewhere;
@@ -83,7 +83,7 @@ impl Input for CalibrationFiles<'_> {
 
 impl Stage for Calibrate<'_> {
     const NAME: &'static str = "calibrate";
-    const METHOD: u32 = 11;
+    const METHOD: u32 = 12;
     type Output = Calibration;
     stage_inputs!(fingerprint);
 

@@ -27,7 +27,8 @@ pub(super) struct OrbitPoint {
     pub(super) measured: Vec<Measured>,
     pub(super) point: GroundPoint,
     pub(super) left_out: bool,
-    /// Whether it is a tie point where ties are wrong along the flight, and the ground would not show that of this one.
+    /// Whether it is a tie point where ties are wrong along the flight, and the ground would not reveal an error of
+    /// this one.
     pub(super) may_be_off: bool,
 }
 

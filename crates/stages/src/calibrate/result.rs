@@ -49,7 +49,7 @@ pub struct TieGround {
     /// Height above or below the ground, in standard deviations, beyond which a tie point is left out.
     #[schemars(range(min = 0.0))]
     pub limit_sigmas: f64,
-    /// The same in metres, for the median of the tie points: smaller errors along the flight are not identified.
+    /// This limit in metres, for the median of the tie points: smaller errors along the flight are not identified.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub limit_m: Option<f64>,
 }
@@ -75,7 +75,7 @@ pub struct CameraResult {
     pub m: Vec<Value>,
     /// Coefficients of the tangent along the flight.
     pub n: Vec<Value>,
-    /// The same of the laboratory.
+    /// Coefficients of both tangents by the laboratory.
     pub laboratory: [Vec<f64>; 2],
     /// Their largest residual against the laboratory's look directions, pixels.
     pub laboratory_left_px: f64,
@@ -182,17 +182,17 @@ pub struct HeldBack {
     /// measurement. Missing where no point is intersected, as are the next two.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub plane_m: Option<f64>,
-    /// Likewise of the height, metres.
+    /// Root mean square of intersected minus laser height, metres.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub height_m: Option<f64>,
-    /// Mean of the same east, north and up, metres.
+    /// Mean of intersected minus laser position east, north and up, metres.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub mean_m: Option<[f64; 3]>,
     /// Stated accuracy of a tie point in the plane, metres: root mean square of the standard deviations, scaled by the
     /// scatter in the plane of used or withheld control where that exceeds 1.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub accuracy_plane_m: Option<f64>,
-    /// Likewise of its height, metres.
+    /// Stated accuracy of the height of a tie point, metres.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub accuracy_height_m: Option<f64>,
 }
@@ -241,7 +241,7 @@ pub struct CalibrationRound {
     pub ties: u64,
     /// Their residuals in the worst line, root mean square, pixels, with the cameras that the terrain model was made with.
     pub model_tie_px: Option<f64>,
-    /// The same with the cameras of this round.
+    /// Their residuals in the worst line, root mean square, pixels, with the cameras of this round.
     pub tie_px: Option<f64>,
     /// Share of the cells of the terrain model with a height.
     pub filled: f64,
@@ -255,7 +255,7 @@ pub struct CalibrationRound {
     pub bias_m: Option<f64>,
     /// Residuals of control, root mean square over all lines, pixels and metres on the ground.
     pub control: PixelsAndMetres,
-    /// The same of withheld control.
+    /// Residuals of withheld control, root mean square over all lines, pixels and metres on the ground.
     pub held_back: PixelsAndMetres,
     /// Residuals of control in the lines that see it, root mean square, pixels, by the number of its unit.
     pub unit_px: BTreeMap<usize, f64>,
@@ -289,14 +289,14 @@ pub struct ControlOffset {
     /// Length of the mean offset in the plane, or of the mean height above the laser, metres.
     #[schemars(range(min = 0.0))]
     pub offset_m: f64,
-    /// Standard deviation of one control point by measurement and laser, metres.
+    /// Standard deviation of one control point from measurement and laser, metres.
     #[schemars(range(min = 0.0))]
     pub point_sigma_m: f64,
-    /// Standard deviation of the mean by measurement and laser, metres: errors of the orbit and of the calibration are
+    /// Standard deviation of the mean from measurement and laser, metres: errors of the orbit and of the calibration are
     /// additional.
     #[schemars(range(min = 0.0))]
     pub mean_sigma_m: f64,
-    /// Standard deviation by the calibration, metres.
+    /// Standard deviation from the calibration, metres.
     #[schemars(range(min = 0.0))]
     pub calibration_sigma_m: f64,
     /// The largest permitted offset, metres.
@@ -312,7 +312,7 @@ pub enum PointKind {
     Tie,
     /// The laser gives its position.
     Control,
-    /// Likewise, but withheld.
+    /// The laser gives its position; withheld for validation.
     HeldBack,
 }
 
@@ -341,9 +341,9 @@ pub struct PointResult {
     /// few, and for a point that was left out.
     pub place: Option<[f64; 3]>,
     /// Standard deviations east, north and up, metres; `None` without a place, and for a tie point whose height is not
-    /// tested for errors such as those that were found at others.
+    /// tested for errors such as those found at other points.
     pub sigma_m: Option<[f64; 3]>,
-    /// Of a laser point: intersected minus the laser's, east, north and up, metres.
+    /// Intersected minus laser position of a laser point, east, north and up, metres.
     pub off_m: Option<[f64; 3]>,
 }
 
@@ -363,6 +363,6 @@ pub struct ImageResult {
     /// Residual across and along the flight with the laboratory's geometry, pixels: at the intersected position, or at
     /// the laser's for a laser point.
     pub before_px: Option<[f64; 2]>,
-    /// The same with the calibration.
+    /// Residual across and along the flight with the calibration, pixels.
     pub after_px: Option<[f64; 2]>,
 }

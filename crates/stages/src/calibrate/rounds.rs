@@ -113,7 +113,7 @@ fn shift_cells(units: &[UnitResult]) -> f64 {
 
 impl Rounds {
     /// Share by which the residuals of control changed in the last round, root mean square over units that the last two
-    /// rounds used: units near the limits of a match come and go. Infinite in the first.
+    /// rounds used: units near the limits of a match vary from round to round. Infinite in the first.
     fn control_share(&self) -> f64 {
         let [.., before, last] = &self.rounds[..] else {
             return f64::INFINITY;

@@ -65,7 +65,8 @@ pub(super) fn calibrate(config: &CalibrationConfig) -> Result<Calibration> {
 /// Calibrates the lines of a camera by given points; without control by ties only.
 ///
 /// # Errors
-/// Support data that cannot be read or do not belong together; points that do not fit them, too few of them; other orbits likewise.
+/// Support data that cannot be read or do not belong together; points that do not fit them, or too few points; the same
+/// faults of other orbits.
 pub fn calibrate_given(config: &CalibrationConfig, given: &GivenPoints) -> Result<Calibration> {
     let is_controlled = !(given.control.is_empty() && given.held_back.is_empty());
     calibrate_by(config, &PointSource::Given(given), is_controlled)
@@ -202,7 +203,7 @@ fn tie_sigma_px(points: &[OrbitPoint]) -> f64 {
     median(&mut sigmas_px)
 }
 
-/// What no point tests, in words.
+/// Errors that no point tests, in words.
 fn untested_words(work: &Work<'_>) -> Vec<String> {
     if !work.points.iter().any(|point| point.is(PointKind::Control)) {
         // A reason states that there is no control.
@@ -239,7 +240,7 @@ impl Work<'_> {
         self.all(kinds).map(|of| of.point.clone()).collect()
     }
 
-    /// Why a step with these points failed, with the name of the point.
+    /// Reason why a step with these points failed, with the name of the point.
     fn failed(
         &self,
         step: &'static str,
@@ -266,7 +267,7 @@ impl Work<'_> {
         });
     }
 
-    /// A priori standard deviations, with that of an angle.
+    /// A priori standard deviations, with `angle_rad` for an angle.
     fn sigma(&self, angle_rad: f64) -> impl Fn(Parameter) -> f64 {
         let known = &self.config.a_priori;
         move |parameter| match parameter {

@@ -231,8 +231,8 @@ pub(super) fn control(
     Ok(points)
 }
 
-/// Points at the position of an earlier one, with that one: if one were withheld, it would validate what the other
-/// determines.
+/// Points at the position of an earlier one, paired with it: if one were withheld, it would validate a result of the
+/// other.
 fn repeated(points: &[MeasuredPoint]) -> BTreeMap<usize, usize> {
     let places = points.iter().enumerate();
     let mut places: Vec<(usize, Vector3<f64>)> = places

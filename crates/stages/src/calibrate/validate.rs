@@ -116,8 +116,8 @@ fn offsets(
     planes.chain([height]).flatten().collect()
 }
 
-/// Variances of control in the plane and in height by the errors of the cameras, over those of measurement and laser:
-/// means over the points. The orbit has a drift of its own.
+/// Variances of control in the plane and in height by the errors of the cameras, over the variances of measurement and
+/// laser: means over the points. The orbit has its own drift.
 fn calibration_shares(
     points: &[OrbitPoint],
     state: &CalibrationState,
@@ -152,7 +152,7 @@ impl Mean {
 
     /// The mean with its limit; `None` without points or without their standard deviation.
     ///
-    /// * `share` – variance by the calibration over that of a point
+    /// * `share` – variance by the calibration over the variance of a point
     fn offset(
         self,
         camera: Option<String>,

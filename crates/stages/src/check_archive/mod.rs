@@ -1,9 +1,9 @@
-//! Range check of a whole archive, file by file: every shot against the kernels, statistics of every profile.
+//! Range check of an archive, file by file: every shot against the kernels, statistics of every profile.
 //!
 //! A profile here is the part of one revolution in one file, in time order and without a gap of more than 300 s.
-//! Residuals, limits and the scan of clock biases are those of [`check_ranges`](super::check_ranges). To limit the
+//! Residuals, limits and the scan of clock biases follow [`check_ranges`](super::check_ranges). To limit the
 //! cost, the trajectory of a load of records is tabulated once, the spacecraft over a frame is interpolated by cubics
-//! through four states, and the scan uses some hundred shots of a profile.
+//! through four states, and the scan uses a few hundred shots of a profile.
 //!
 //! | step | where it runs |
 //! |---|---|
@@ -55,7 +55,7 @@ use rows::{Rows, Task};
 /// Name of the step in messages, and of its outputs.
 pub const NAME: &str = "check_archive";
 /// Raised when the results of the step change.
-pub const METHOD: u32 = 6;
+pub const METHOD: u32 = 7;
 /// Stages whose functions it calls.
 pub const CALLS: &[Called] = &[called::<ConvertDatum<'_>>(), called::<CheckRanges<'_>>()];
 
@@ -75,7 +75,7 @@ const MARGIN_S: f64 = 2.0;
 /// Complaints of a file that are kept with their text; all are counted.
 const COMPLAINTS_KEPT: usize = 5;
 
-/// How shots are judged.
+/// Rules by which shots are judged.
 #[derive(Debug, Clone, Copy)]
 pub struct ArchiveRules<'a> {
     /// The clock of MOLA.
@@ -217,7 +217,7 @@ pub struct FileCheck<'a> {
     guard: FieldGuard,
     hasher: blake3::Hasher,
     found: FileRanges,
-    /// The profile at the end of the loads so far, which may go on.
+    /// The profile at the end of the loads so far, which may continue.
     open: Gathered,
 }
 

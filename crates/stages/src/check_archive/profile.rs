@@ -40,11 +40,11 @@ pub struct ArchiveProfile {
     pub last_record: u32,
     /// Corrected time of the first shot, ET seconds.
     pub start_et_s: f64,
-    /// That of the last one.
+    /// Corrected time of the last shot, ET seconds.
     pub stop_et_s: f64,
-    /// Time tags of first and last shot, ET seconds.
+    /// Time tags of the first and the last shot, ET seconds.
     pub tags_et_s: [f64; 2],
-    /// The same of every part without a missing frame, ET seconds.
+    /// Time tags of the first and the last shot of every part without a missing frame, ET seconds.
     pub spans_et_s: Vec<[f64; 2]>,
     /// Shots that were checked.
     pub shots: u32,
@@ -54,7 +54,7 @@ pub struct ArchiveProfile {
     pub off_nadir_rad: [f64; 2],
     /// Range − |SPK spacecraft − raw footprint|, metres; all 0 without a checked shot.
     pub range_minus_distance_m: Summary,
-    /// Its mean without outliers.
+    /// Mean of range − distance without outliers, metres.
     pub mean_without_outliers_m: f64,
     /// Shots farther from the median than the configured number of robust standard deviations.
     pub outliers: u32,
@@ -62,7 +62,7 @@ pub struct ArchiveProfile {
     pub crossover_mean_m: f64,
     /// Mean of range − |PEDR spacecraft − raw footprint|, metres.
     pub decoding_mean_m: f64,
-    /// The same without outliers.
+    /// Mean of range − |PEDR spacecraft − raw footprint| without outliers, metres.
     pub decoding_without_outliers_m: f64,
     /// Mean of PEDR spacecraft − SPK spacecraft along radial, along-track and cross-track axes, metres.
     pub spacecraft_m: [f64; 3],
@@ -83,9 +83,9 @@ pub struct ArchiveProfile {
 /// Shots within a range of off-nadir angles, without the outliers of their profiles.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OffNadirBin {
-    /// From this angle, degrees.
+    /// Lower end of the range, degrees.
     pub from_deg: f64,
-    /// To this one; infinite for the last.
+    /// Upper end of the range, degrees; infinite for the last bin.
     pub to_deg: f64,
     /// Shots.
     pub shots: u64,
@@ -112,7 +112,7 @@ impl OffNadirBin {
             .collect()
     }
 
-    /// Adds the shots of another bin of the same angles.
+    /// Adds the shots of another bin with the same angles.
     pub fn add(&mut self, other: &Self) {
         self.shots += other.shots;
         self.sum_m += other.sum_m;
@@ -184,7 +184,7 @@ impl Gathered {
 #[derive(Default)]
 struct Sums {
     n: u32,
-    /// Those that are not outliers.
+    /// Shots that are not outliers.
     kept: u32,
     crossover_m: f64,
     decoding_m: f64,
@@ -277,7 +277,7 @@ impl ArchiveProfile {
             spacecraft_m: self.spacecraft_m,
         };
         self.share_of_limits = Some(figures.share_of_limits(rules.limits));
-        let why = || "orbit, clock or datum differs from that of the kernels".to_owned();
+        let why = || "orbit, clock or datum differs from the kernels".to_owned();
         self.invalid_because = figures.broken_limits(rules.limits, why);
     }
 
@@ -293,7 +293,7 @@ impl ArchiveProfile {
         self.id_in(&self.file)
     }
 
-    /// The same with another name for the file.
+    /// The identifier with a different name for the file.
     #[must_use]
     pub fn id_in(&self, file: &str) -> String {
         let part = if self.part > 1 {
@@ -332,7 +332,7 @@ fn sums(
     (sums, bins, [mean, largest])
 }
 
-/// Scans some hundred shots that are not outliers, and for which the kernels hold all positions that the scan needs.
+/// Scans a few hundred shots that are not outliers, and for which the kernels hold all positions that the scan needs.
 fn scan(
     gathered: &Gathered,
     is_outlier: impl Fn(&RangeResiduals) -> bool,

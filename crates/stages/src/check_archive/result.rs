@@ -40,7 +40,7 @@ pub struct FileFailure {
 pub struct FileCopy {
     /// Its path, as requested.
     pub file: String,
-    /// That of the other file, which was used.
+    /// Path of the other file, which was used.
     pub of: String,
 }
 

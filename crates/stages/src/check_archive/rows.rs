@@ -15,7 +15,7 @@ use areograph_pds::{
 };
 use areograph_spice::Trajectory;
 
-/// Every *n*-th shot is kept whole, for the scan of clock biases and for the map.
+/// Every *n*-th shot is kept in full, for the scan of clock biases and for the map.
 const SAMPLE_STEP: usize = 48;
 
 /// A shot in IAU 2000, and its residuals where the kernels have a position.
@@ -46,7 +46,7 @@ pub struct CheckedShot {
 #[derive(Default)]
 pub(super) struct Task {
     pub(super) shots: Vec<CheckedShot>,
-    /// Some of the shots whole, with their places among `shots`.
+    /// Some of the shots in full, with their places among `shots`.
     pub(super) samples: Vec<(usize, Footprint)>,
     pub(super) not_covered: u64,
     pub(super) rejected: BTreeMap<ShotRejection, u64>,

@@ -15,7 +15,7 @@ pub(super) struct FrameSpacecraft {
 }
 
 impl FrameSpacecraft {
-    /// `None` where the trajectory does not cover the whole frame.
+    /// `None` where the trajectory does not cover the complete frame.
     pub(super) fn around(middle: Et, trajectory: &Trajectory) -> Option<Self> {
         let [a, b, c, d] = NODES_S.map(|late_s| state(middle.plus(late_s), trajectory));
         Some(Self {

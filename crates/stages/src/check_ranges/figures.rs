@@ -15,14 +15,14 @@ pub struct RangeFigures {
     pub outliers: u32,
     /// Mean of range − distance with and without outliers, metres.
     pub mean_m: [f64; 2],
-    /// The same to the file's own spacecraft.
+    /// Mean of range − distance to the file's own spacecraft, with and without outliers, metres.
     pub decoding_m: [f64; 2],
-    /// Mean of the file's own spacecraft minus that of the kernels, radial, along and across the track, metres.
+    /// Mean of the file's own minus the kernels' spacecraft position, radial, along and across the track, metres.
     pub spacecraft_m: [f64; 3],
 }
 
 impl RangeFigures {
-    /// Mean distance of the file's own spacecraft from that of the kernels, metres.
+    /// Mean distance between the spacecraft positions of the file and of the kernels, metres.
     #[must_use]
     pub fn orbits_apart_m(&self) -> f64 {
         Vector3::from(self.spacecraft_m).norm()

@@ -2,7 +2,7 @@
 //!
 //! | residual | tests |
 //! |---|---|
-//! | range − \|PEDR spacecraft − footprint\| | our decoding of the file |
+//! | range − \|PEDR spacecraft − footprint\| | the decoding of the file |
 //! | PEDR spacecraft − SPK spacecraft | the kernels |
 //! | range − \|SPK spacecraft − footprint\| | Table 3 of Shan et al. 2005 |
 //!
@@ -75,7 +75,7 @@ stage_inputs! {
 
 impl Stage for CheckRanges<'_> {
     const NAME: &'static str = "check_ranges";
-    const METHOD: u32 = 13;
+    const METHOD: u32 = 14;
     type Output = RangeCheck;
     stage_inputs!(fingerprint);
 
@@ -151,15 +151,16 @@ pub struct ProfileRanges {
     pub off_nadir_rad: f64,
     /// Range − distance (SPK spacecraft, footprint with raw radius), metres.
     pub range_minus_distance_m: Summary,
-    /// The same with the crossover-corrected radius, metres: crossover moves the footprint, not the range.
+    /// Range − distance (SPK spacecraft, footprint with crossover-corrected radius), metres: the crossover correction
+    /// moves the footprint, not the range.
     pub range_minus_distance_crossover_m: Summary,
     /// Range − distance (PEDR spacecraft, raw footprint), metres.
     pub decoding_m: Summary,
     /// PEDR spacecraft − SPK spacecraft along radial, along-track and cross-track axes, metres.
     pub spacecraft_m: [Summary; 3],
-    /// Mean of range − distance without outliers, metres: this one is judged.
+    /// Mean of range − distance without outliers, metres; a judged value.
     pub mean_without_outliers_m: f64,
-    /// Mean of range − distance to the file's own spacecraft without the same shots, metres: this one is judged.
+    /// Mean of range − distance to the file's own spacecraft without the same shots, metres; a judged value.
     pub decoding_without_outliers_m: f64,
     /// Linear trend of range − distance over time, metres per second.
     pub trend_m_s: Option<Trend>,
@@ -167,7 +168,8 @@ pub struct ProfileRanges {
     pub outliers: u32,
     /// Scan over assumed clock biases; `None` when there are too few shots for one.
     pub scan: Option<BiasScan>,
-    /// Why the profile breaks the limits of the configuration; empty when it is valid, or too short to be judged.
+    /// Reasons why the profile breaks the limits of the configuration; empty when it is valid, or too short to be
+    /// judged.
     pub invalid_because: Vec<String>,
 }
 
@@ -180,9 +182,9 @@ impl ProfileRanges {
 
     /// Largest |mean| of range − distance, metres.
     ///
-    /// Tables without a spacecraft have radii corrected by crossovers: these move footprints by metres, of some orbits by
-    /// tens of metres, and not the ranges, so that the limit is that of two orbits. Off nadir a part of an orbit's error across
-    /// the track is along the beam: the profiles of Shan et al. 2005, Table 3, reach 25.4 m there.
+    /// Tables without a spacecraft have radii corrected by crossovers: these move footprints by metres, for some orbits
+    /// by tens of metres, but not the ranges, so that the limit for two orbits applies. Off nadir a part of an orbit's
+    /// error across the track is along the beam: the profiles of Shan et al. 2005, Table 3, reach 25.4 m there.
     #[must_use]
     pub fn mean_max_m(&self, limits: &RangeCheckConfig) -> f64 {
         if self.decoding_m.n == 0 {
@@ -220,7 +222,7 @@ impl ProfileRanges {
         self.range_minus_distance_m.n as usize
     }
 
-    /// Mean distance of the file's own spacecraft from that of the kernels, metres.
+    /// Mean distance between the spacecraft positions of the file and of the kernels, metres.
     #[must_use]
     pub fn orbits_apart_m(&self) -> f64 {
         self.figures().orbits_apart_m()
@@ -258,7 +260,7 @@ struct OutsideTrajectory {
 /// # Errors
 /// A shot whose time the trajectory does not cover; [`Stopped`](areograph_base::error::Stopped).
 /// # Source
-/// Shan et al. 2005, Table 3; the limits are ours, as the paper states none.
+/// Shan et al. 2005, Table 3; the limits are a choice of areograph, as the paper states none.
 pub fn check_ranges<'a>(
     footprints: &Footprints<BodyFixed>,
     profiles: &[Profile],
@@ -341,7 +343,8 @@ fn statistics(
     footprints: &Footprints<BodyFixed>,
 ) -> ProfileRanges {
     let summary = |column: &[f64]| Summary::of(&column[first..]);
-    // Shots of tables may have no spacecraft of their own; where the kernels are not finite, range − distance is not either.
+    // Shots of tables may have no spacecraft position; where the kernels are not finite, range − distance is not
+    // either.
     let of_own = |column: &[f64]| {
         let known = column[first..].iter().copied().filter(|of| !of.is_nan());
         Summary::of(&known.collect::<Vec<_>>())

@@ -1,8 +1,8 @@
-//! The file's own spacecraft and that of the kernels: whether both are of one orbit, one clock and one datum.
+//! Spacecraft positions of the file and of the kernels: whether both belong to one orbit, one clock and one datum.
 //!
-//! Both hold for the same shots, so their difference is not noise. Independent orbits differ by tens of metres, another
-//! clock correction shifts the spacecraft along the track by its speed times the change, and another datum shifts it by
-//! kilometres.
+//! Both hold for the same shots, so their difference is not noise. Independent orbits differ by tens of metres, a
+//! different clock correction shifts the spacecraft along the track by its speed times the change, and a different
+//! datum shifts it by kilometres.
 
 use crate::group_profiles::Profile;
 use areograph_base::{
@@ -19,8 +19,8 @@ use areograph_geom::{
 };
 use areograph_spice::Trajectory;
 
-/// The likely cause of their difference in the middle of the profile: another datum, another clock correction, or
-/// neither.
+/// The likely cause of their difference in the middle of the profile: a different datum, a different clock correction,
+/// or neither.
 pub(super) fn cause(
     footprints: &Footprints<BodyFixed>,
     profile: &Profile,
@@ -29,7 +29,7 @@ pub(super) fn cause(
     limit_m: f64,
 ) -> String {
     together(footprints, profile, trajectory, clock, limit_m)
-        .unwrap_or_else(|| "the kernels contain an orbit other than that of the file".to_owned())
+        .unwrap_or_else(|| "the kernels contain an orbit other than the file's".to_owned())
 }
 
 fn together(
@@ -46,7 +46,7 @@ fn together(
     let datum = footprints.files.get(usize::from(shot.file))?.datum;
     let own_m = to_mars.tr_mul(&own_spacecraft(&shot).xyz_m);
     for other in [Datum::Iau1991, Datum::Iau1994, Datum::Iau2000] {
-        // Back into the file's coordinates, and out of them as if they were of the other datum.
+        // Back into the file's coordinates, and out of them as if they belonged to the other datum.
         let coordinates_m = body_matrix(datum.model(), at) * own_m;
         let moved_m = body_matrix(other.model(), at).tr_mul(&coordinates_m);
         if other != datum && (moved_m - position.xyz_m).norm() <= limit_m {

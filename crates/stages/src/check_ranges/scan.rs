@@ -39,8 +39,8 @@ const NARROW_S: f64 = 2.0;
 /// Half the time over which the rate of a line of sight is measured, seconds.
 const RATE_STEP_S: f64 = 0.01;
 
-/// Corrected radii are used when their least spread is below this share of that of raw ones: reductions by chance, or
-/// where crossovers carry no information, are smaller.
+/// Corrected radii are used when their least spread is below this share of the least spread of raw radii: reductions by
+/// chance, or where crossovers carry no information, are smaller.
 const CALMER: f64 = 0.98;
 
 /// Radius of footprints.
@@ -155,7 +155,7 @@ fn spreads_m(sighted: &[Sighted], trajectory: &Trajectory, corrections: &[f64]) 
     corrections.par_iter().map(spread_m).collect()
 }
 
-/// The same from residuals at [`NODES`] corrections: as a function of the correction the residual of a shot is a
+/// Spreads from residuals at [`NODES`] corrections: as a function of the correction, the residual of a shot is a
 /// polynomial, and the variance of residuals at any correction follows from their covariances at the nodes.
 ///
 /// The line of sight turns by `v c / R`, at most 0.06 radians within [`NARROW_S`] (4.7 km/s at a range of 170 km, the lowest
@@ -213,7 +213,7 @@ fn covariance_m2(residuals_m: &[[[f64; NODES]; 2]], which: usize) -> SMatrix<f64
     products.sum::<SMatrix<f64, NODES, NODES>>() / (residuals_m.len() - 1) as f64
 }
 
-/// Factors of the values at `nodes` in that of their polynomial at `at`.
+/// Factors of the values at `nodes` in the value of their polynomial at `at`.
 fn lagrange_weights(nodes: &[f64; NODES], at: f64) -> [f64; NODES] {
     std::array::from_fn(|own| {
         let others = nodes.iter().enumerate().filter(|(other, _)| *other != own);
@@ -333,9 +333,9 @@ fn track_axes(position: &Vector3<f64>, velocity: &Vector3<f64>) -> Matrix3<f64> 
 /// component along each line of sight, and a metre along the track cannot be separated from 0.3 ms. The orbit
 /// uncertainty is taken from the across-track difference from the orbit of the PEDR file, assumed equal in all
 /// directions: along the track the two also differ by the error of the correction itself. An orbit error that changes
-/// along the profile leaves a slope too, estimated by the slope of that difference; of corrected radii by what the
-/// crossovers leave of it. Over a window they hardly remove any: a nadir profile, whose rates vary by a tenth of a metre
-/// per second, would otherwise take a slope of millimetres per second for a clock.
+/// along the profile leaves a slope too, estimated by the slope of that difference; for corrected radii, by the part of
+/// it that the crossovers leave. Over a window they hardly remove any: a nadir profile, whose rates vary by a tenth of
+/// a metre per second, would otherwise attribute a slope of millimetres per second to the clock.
 fn uncertainty_s(
     shots: &[Footprint],
     radius: ScannedRadius,

@@ -1,5 +1,6 @@
 //! The range check of shots of tables: measured range against the table's own spacecraft, and against the spacecraft of
-//! images with its laser, where one was exposed at that time, or else against that of the kernels, where they cover it.
+//! images with its laser, where one was exposed at that time, or else against the kernels' spacecraft, where they cover
+//! it.
 //!
 //! A table without positions of the spacecraft (`states_spacecraft`) is compared with the kernels alone, where these
 //! cover a profile; else its ranges are not tested.
@@ -57,7 +58,7 @@ stage_inputs! {
 
 impl Stage for CheckTableRanges<'_> {
     const NAME: &'static str = "check_ranges";
-    const METHOD: u32 = 5;
+    const METHOD: u32 = 6;
     type Output = RangeCheck;
     stage_inputs!(fingerprint);
 
@@ -104,16 +105,17 @@ impl CheckTableRanges<'_> {
     }
 }
 
-/// Positions of the spacecraft other than those of the tables.
+/// Spacecraft positions from sources other than the tables.
 #[derive(Debug, Clone, Copy)]
 pub struct Spacecraft<'a> {
     /// Images, some of which may have the laser.
     pub images: &'a [&'a ImageTimes],
-    /// The trajectory by the kernels, where they cover profiles.
+    /// The trajectory from the kernels, where they cover profiles.
     pub kernels: Option<&'a Trajectory>,
 }
 
-/// Checks the ranges of every profile against the spacecraft of the table, and against that of support data or kernels.
+/// Checks the ranges of every profile against the spacecraft of the table, and against the spacecraft of support data
+/// or kernels.
 ///
 /// Residuals exist for shots that support data or kernels cover; the table's own spacecraft is judged by all shots.
 ///
@@ -148,7 +150,7 @@ pub fn check_table_ranges(
         let mut ranges = statistics(profile, &shots, first, None, footprints);
         by_own_spacecraft(&mut ranges, footprints, profile, limits);
         let explain = || {
-            "support data or kernels contain an orbit other than that of the table, or times or radii of the table \
+            "support data or kernels contain an orbit other than the table's, or times or radii of the table \
              are in error".to_owned()
         };
         ranges.invalid_because = ranges
@@ -164,7 +166,7 @@ pub fn check_table_ranges(
 }
 
 impl Spacecraft<'_> {
-    /// The spacecraft at an instant, if known: that of an image, else that of the kernels.
+    /// The spacecraft at an instant, if known: by an image, else by the kernels.
     fn state(&self, at: Et) -> Option<SpacecraftState> {
         let of_image = self.images.iter().find_map(|image| of_image(image, at));
         of_image.or_else(|| {

@@ -23,7 +23,7 @@ pub(super) fn budget_input(
     }
 }
 
-/// Residuals of the first image minus those of the second (eq. 5), in mean line spacings of both.
+/// Residuals of the first image minus residuals of the second (eq. 5), in mean line spacings of both.
 pub(super) fn apart(
     points: &[(&IntersectedPoint, [MeasureResidual; 2])],
     line_spacing_m: [f64; 2],

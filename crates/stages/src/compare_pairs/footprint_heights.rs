@@ -20,11 +20,11 @@ use areograph_geom::{
 pub struct FootprintHeight {
     /// Row of the footprint.
     pub row: u32,
-    /// Where the rays meet.
+    /// Point where the rays meet.
     pub ground: Position<BodyFixed>,
-    /// Height of that above the ellipsoid along the radius, metres.
+    /// Height of this point above the ellipsoid along the radius, metres.
     pub height_m: f64,
-    /// Height of the footprint, likewise.
+    /// Height of the footprint above the ellipsoid along the radius, metres.
     pub mola_m: f64,
 }
 

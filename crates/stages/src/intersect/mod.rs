@@ -1,8 +1,8 @@
 //! Ground points of tie points, from images whose orientation is held fixed.
 //!
-//! Two kinds of residual are distinguished. The *focal* residual is that in an image's focal plane, in pixels. The
-//! *reprojection* residual is the measured place minus the one where the image sees the intersected point, in lines and
-//! pixels; it is the one that Shan et al. 2005 print in their Table 5.
+//! Two kinds of residual are distinguished. The *focal* residual is measured in an image's focal plane, in pixels. The
+//! *reprojection* residual is the measured place minus the place at which the image sees the intersected point, in
+//! lines and pixels; Shan et al. 2005 report it in their Table 5.
 
 mod statistics;
 
@@ -33,7 +33,7 @@ use areograph_store::{
 
 pub use statistics::{ImageResiduals, Residuals2};
 
-/// How to intersect.
+/// Options of an intersection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IntersectOptions {
     /// Weights of the measurements.
@@ -82,7 +82,7 @@ pub struct IntersectedPoint {
     pub tie: usize,
     /// Its identifier.
     pub id: String,
-    /// Where it lies.
+    /// Its position.
     pub ground: Position<BodyFixed>,
     /// Covariance of its coordinates with the common standard deviation of unit weight, m².
     pub covariance_m2: Matrix3<f64>,
@@ -90,8 +90,8 @@ pub struct IntersectedPoint {
     pub convergence_rad: f64,
     /// Residuals of its measurements.
     pub measures: Vec<MeasureResidual>,
-    /// Whether a reprojection residual is an outlier among those of other points in its image. With two images it is
-    /// undetermined which of the two measurements is wrong.
+    /// Whether a reprojection residual is an outlier among the residuals of other points in its image. With two images
+    /// it is undetermined which of the two measurements is wrong.
     pub outlier: bool,
 }
 
@@ -125,7 +125,7 @@ pub struct RejectedTie {
     pub reason: TieRejection,
 }
 
-/// Why a tie point is rejected.
+/// Reasons for the rejection of a tie point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[serde(rename_all = "snake_case")]
 pub enum TieRejection {
@@ -169,7 +169,7 @@ struct ImagePoint {
 stage_inputs! {
     /// The images with one orientation, and the tie points.
     pub struct Intersect<'a> {
-        /// Which orientation.
+        /// Round of the orientation.
         pub round: Round,
         /// The images.
         pub images: SiteImages<'a>,
@@ -240,7 +240,7 @@ pub fn intersect_ties<M: ExteriorOrientation>(
     Ok(summarise(images, ties, found))
 }
 
-/// Measurements of each tie point, or why it is rejected.
+/// Measurements of each tie point, or the reason for its rejection.
 fn places<M: ExteriorOrientation>(
     images: &[OrientedCamera<M>],
     ties: &[TiePoint],

@@ -1,22 +1,19 @@
-//! How an adjustment is judged: by MOLA first, then by agreement between the images, then by a priori values.
+//! Verdict on an adjustment: by MOLA first, then by agreement between the images, then by a priori values.
 
 use std::collections::BTreeSet;
 
 use super::{AdjustmentEvidence, JudgedImage};
 use crate::{
-    adjust::{CorrectedImage, HEIGHTS_MIN, HeightSummary, ObservationType, PointKind, TypeSummary},
+    adjust::{HEIGHTS_MIN, HeightSummary, ObservationType, PointKind, TypeSummary},
     compare_pairs::PairComparison,
 };
 use areograph_base::{footprints::AdjustmentModel, wording::signed};
 use areograph_config::LimitsConfig;
-use areograph_geom::{
-    bundle::Unknown,
-    statistics::{NORMAL_MAD, median},
-};
+use areograph_geom::statistics::{NORMAL_MAD, median};
 
 /// Mean heights with a larger standard deviation than this, metres, are hardly controlled.
 pub(super) const HEIGHT_LOOSE_M: f64 = 20.0;
-/// Craters between the profiles make outliers of a smaller share of the tie points than this.
+/// Craters between the profiles explain a smaller share of outliers among the tie points than this.
 pub(super) const HEIGHT_OUTLIERS_FEW: f64 = 0.03;
 /// A larger share of laser spots beyond their limit is not due to chance, which leaves one in a thousand there.
 const SPOTS_BEYOND_FEW: f64 = 0.05;
@@ -24,13 +21,13 @@ const SPOTS_BEYOND_FEW: f64 = 0.05;
 /// 0.2 px with the default standard deviation of 1 px are above it.
 const TIES_LOOSE: f64 = 0.15;
 /// Scatter of tie points in addition to their standard deviations, focal-plane pixels, that jitter rarely causes.
-const SCATTER_LARGE_PX: f64 = 1.0;
+pub(super) const SCATTER_LARGE_PX: f64 = 1.0;
 /// A mean height within this many of its standard deviations is no contradiction.
 const HEIGHT_SIGMAS: f64 = 3.0;
 
 impl AdjustmentEvidence<'_> {
-    /// Why the adjusted orientation is invalid, one sentence per reason: MOLA first, then agreement between the images,
-    /// then a priori values.
+    /// Reasons why the adjusted orientation is invalid, one sentence each: MOLA first, then agreement between the
+    /// images, then a priori values.
     pub(super) fn invalid_because(&self, limits: &LimitsConfig) -> Vec<String> {
         let mut invalid = self.heights_off(limits);
         let reasons = |image: &JudgedImage| -> Vec<String> {
@@ -197,42 +194,6 @@ impl AdjustmentEvidence<'_> {
         remarks
     }
 
-    /// The largest correction of each image in its standard deviations: image, unknown, correction.
-    pub(super) fn largest_corrections(&self) -> impl Iterator<Item = (&str, Unknown, f64)> {
-        let largest = |image: &CorrectedImage| -> Option<(f64, usize)> {
-            let off = image.correction.iter().zip(&image.expected);
-            let off = off.map(|(value, expected)| value - expected);
-            let corrections = off.zip(&image.prior_sigmas).enumerate();
-            let known = corrections.filter(|(_, (_, sigma))| **sigma > 0.0 && sigma.is_finite());
-            let sigmas = known.map(|(index, (value, sigma))| ((value / sigma).abs(), index));
-            sigmas.max_by(|one, other| one.0.total_cmp(&other.0))
-        };
-        self.adjusted.images.iter().filter_map(move |image| {
-            let (sigmas, coefficient) = largest(image)?;
-            let unknown = Unknown::Orientation {
-                image: 0,
-                coefficient,
-            };
-            Some((&*image.id, unknown, sigmas))
-        })
-    }
-
-    /// Corrections of orientations beyond what their a priori standard deviations allow.
-    fn corrected_too_far(&self, limits: &LimitsConfig) -> Vec<String> {
-        let far = self
-            .largest_corrections()
-            .filter(|(_, _, sigmas)| !(*sigmas <= limits.correction_max_sigma));
-        let far = far.map(|(image, unknown, sigmas)| {
-            format!(
-                "image {image}: the adjustment corrects its {} by {sigmas:.1} standard deviations, expected at most {}; check \
-                 its time, its kernels and pointing.ck_bias_s",
-                unknown.quantity(),
-                limits.correction_max_sigma
-            )
-        });
-        far.collect()
-    }
-
     /// Tie points that took part in the adjustment.
     pub(super) fn taken(&self) -> usize {
         let points = self.adjusted.points.iter();
@@ -287,7 +248,7 @@ impl AdjustmentEvidence<'_> {
         others.filter(|of| of.variance_component_limits[1] > 0.0)
     }
 
-    /// Those whose residuals are larger than chance explains.
+    /// Kinds of observation whose residuals are larger than chance explains.
     fn components_above(&self) -> impl Iterator<Item = String> {
         let above = self.other_components().filter(|of| of.is_above_chance());
         above.map(|of| {
@@ -313,7 +274,7 @@ impl AdjustmentEvidence<'_> {
             .collect()
     }
 
-    /// Pairs of images with tie points of which none took part.
+    /// Pairs of images none of whose tie points took part.
     pub(super) fn parted(&self) -> Vec<String> {
         let is_adjusted = |pair: &PairComparison| {
             self.adjusted_pairs
@@ -409,10 +370,11 @@ impl AdjustmentEvidence<'_> {
         let scatter_px = self.adjusted.summary.tie_scatter_px;
         if scatter_px > SCATTER_LARGE_PX {
             remarks.push(format!(
-                "tie points scatter by {scatter_px:.1} px in addition to their stated standard deviations, where jitter of the images \
-                 usually causes 0.2 to 0.4 px: measurements are less accurate than stated"
+                "tie points scatter by {scatter_px:.1} px in addition to their stated standard deviations, where \
+                 attitude jitter usually causes 0.2 to 0.4 px: measurements are less accurate than stated"
             ));
         }
+        remarks.extend(self.drifts(limits));
         remarks.extend(self.components_above());
         for image in self.untied() {
             remarks.push(format!(

@@ -1,4 +1,4 @@
-//! How the attitude of images is judged: by the beam of a laser on the same bus, and by the place of its footprints.
+//! Verdict on the attitude of images: by the beam of a laser on the same bus, and by the place of its footprints.
 
 use super::{
     Check, CheckKind,
@@ -28,7 +28,7 @@ pub struct BeamEvidence<'a> {
     pub images: &'a [ImageBeam],
     /// A priori standard deviations of attitude and boresight.
     pub adjustment: &'a AdjustmentConfig,
-    /// That of the position of a profile in plan.
+    /// A priori standard deviation of the position of a profile in plan.
     pub surface: &'a MolaSurfaceConfig,
 }
 
@@ -38,7 +38,7 @@ const AXES: [(CheckKind, &str); 2] = [
     (CheckKind::BeamAcross, "across the track"),
 ];
 
-/// Images of which a mean is stated.
+/// Number of images over which a mean is stated.
 fn on_average(images: usize) -> String {
     format!("{images} images, on average")
 }
@@ -96,7 +96,7 @@ impl Deviation {
             format!("{:.1} km", ground_m / METRES_PER_KM)
         };
         format!(
-            "{images}: the beam of MOLA in the PEDR lies {} mrad {} from its mounting by {whose}, {ground} \
+            "{images}: the beam of MOLA in the PEDR lies {} mrad {} from its mounting according to {whose}, {ground} \
              on the ground ({} shots), {limit}",
             signed(PER_MILLI * self.angle_rad, 2),
             AXES[self.axis].1,
@@ -119,7 +119,8 @@ impl BeamEvidence<'_> {
         self.beams().any(tested)
     }
 
-    /// Standard deviations along and across the track of what is of one image: its attitude and its profile in plan.
+    /// Standard deviations along and across the track of the errors of a single image: its attitude and its profile in
+    /// plan.
     fn own_sigmas_rad(&self, image: &ImageBeam, beam: &Beam) -> [f64; 2] {
         let own = self
             .adjustment
@@ -135,7 +136,8 @@ impl BeamEvidence<'_> {
         attitude_rad.map(|rad| rad.hypot(plan_rad))
     }
 
-    /// Those of what all images share: the boresight, and along the track the clocks of attitude and altimeter.
+    /// Standard deviations of the errors that all images share: the boresight, and along the track the clocks of
+    /// attitude and altimeter.
     fn common_sigmas_rad(&self, turn_rad_s: f64, clock_s: f64) -> [f64; 2] {
         let boresight_rad = self.adjustment.boresight_sigma_rad;
         let attitude_s = if self.adjustment.attitude_clock {
@@ -147,7 +149,7 @@ impl BeamEvidence<'_> {
         [boresight_rad.hypot(clocks_rad), boresight_rad]
     }
 
-    /// The images that the beam tests, by pass.
+    /// Images tested against the beam, grouped by pass.
     fn passes(&self) -> Vec<Vec<(&ImageBeam, &Beam)>> {
         let mut passes: Vec<Vec<(&ImageBeam, &Beam)>> = Vec::new();
         for (image, beam) in self.beams().filter(|(of, _)| self.tests(&of.image)) {
@@ -207,7 +209,8 @@ impl BeamEvidence<'_> {
         deviations
     }
 
-    /// Largest angle that all images may share unnoticed: on each axis the limit in radians, and in metres on the ground.
+    /// Largest angle that all images may share undetected: on each axis the limit in radians, and in metres on the
+    /// ground.
     pub(super) fn unnoticed(&self, limit_sigma: f64) -> Vec<[f64; 2]> {
         let deviations = self.deviations();
         let on_axis = |axis: usize| {
@@ -221,7 +224,7 @@ impl BeamEvidence<'_> {
         (0..AXES.len()).filter_map(on_axis).collect()
     }
 
-    /// Largest error in the place of the shots of a single image that its limits leave unnoticed, metres.
+    /// Largest error in the place of the shots of a single image that its limits leave undetected, metres.
     pub(super) fn unnoticed_of_one_m(&self, limit_sigma: f64) -> Option<f64> {
         let deviations = self.deviations();
         let limits_m = deviations
@@ -308,8 +311,8 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
     for (image, of, least) in evidence.beam.places() {
         if f64::from(of.inside) < least {
             reasons.push(format!(
-                "image {}: {} of {} simultaneous footprints lie in it by its orientation, where the mountings of camera and laser \
-                 place all of them, expected at least {least:.0}; check attitude, frames and times",
+                "image {}: {} of {} simultaneous footprints lie in it according to its orientation, where the mountings of \
+                 camera and laser place all of them, expected at least {least:.0}; check attitude, frames and times",
                 image.image, of.inside, of.expected_inside
             ));
         }
@@ -319,7 +322,7 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
         if !(apart_m <= limit_m) {
             reasons.push(format!(
                 "image {image}: its support data place the spacecraft {apart_m:.0} m from its position in the PEDR, expected \
-                 at most {limit_m:.0} m; check that they are those of this image, and their frame"
+                 at most {limit_m:.0} m; check that they belong to this image, and check their frame"
             ));
         }
     }
@@ -336,7 +339,7 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
     reasons
 }
 
-/// What the reader must weigh of the attitude, one sentence each.
+/// Points on the attitude that the reader must weigh, one sentence each.
 pub(super) fn remarks(evidence: &Evidence<'_>) -> Vec<String> {
     let limit_sigma = evidence.limits.correction_max_sigma;
     let deviations = evidence.beam.deviations();

@@ -115,7 +115,7 @@ fn of_ranges(evidence: &Evidence<'_>) -> Vec<Check> {
             limits.decoding_max_m,
         ),
     ];
-    // Shots of tables may have no spacecraft position other than their own, or none of their own.
+    // Shots of tables may have only their own spacecraft position, or none.
     let measured = |kind: CheckKind, of: &ProfileRanges| match kind {
         CheckKind::OrbitsApart => of.spacecraft_m[0].n > 0,
         CheckKind::Decoding => of.decoding_m.n > 0,
@@ -333,22 +333,14 @@ fn of_ties(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> {
         f64::from(limits.ties_min),
         Warning,
     ));
-    let corrections = of.largest_corrections().map(|(image, _, sigmas)| {
-        Check::new(
-            CheckKind::Correction,
-            image,
-            sigmas,
-            limits.correction_max_sigma,
-            Fail,
-        )
-    });
+    let corrections = of.largest_corrections().map(|of| of.check(limits));
     checks.extend(Check::worst(corrections));
     checks.extend(boresight(of, limits));
     checks
 }
 
-/// The variance component, among those of the other kinds of observation, that uses most of what chance explains. The
-/// subject has those below their interval as well: these are no fault, but the page shows them.
+/// The variance component, among the other kinds of observation, that uses the largest share of what chance explains.
+/// The subject also has the components below their interval: these are no fault, but the page shows them.
 fn components(of: &AdjustmentEvidence<'_>) -> Option<Check> {
     let kind = CheckKind::VarianceComponents;
     let below: Vec<String> = of
@@ -381,7 +373,7 @@ fn components(of: &AdjustmentEvidence<'_>) -> Option<Check> {
     Some(check)
 }
 
-/// How many images and pairs the adjustment joins, and which it does not.
+/// Numbers of images and pairs that the adjustment joins, and those that it does not join.
 fn joined(of: &AdjustmentEvidence<'_>) -> [Check; 2] {
     let check = |kind: CheckKind, all: usize, without: &[String], broken: CheckOutcome| {
         let subject = match without {

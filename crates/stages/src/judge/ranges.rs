@@ -1,4 +1,4 @@
-//! How the ranges of a site are judged as a whole: by its profiles that are long enough, where the spacecraft is known.
+//! Verdict on all ranges of a site: by the profiles that are long enough, where the spacecraft is known.
 
 use super::Evidence;
 use crate::check_ranges::ProfileRanges;

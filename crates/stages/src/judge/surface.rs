@@ -1,4 +1,4 @@
-//! How a terrain model is judged: by the share of the ground that it covers, and by the altimeter.
+//! Verdict on a terrain model: by the share of the ground that it covers, and by the altimeter.
 
 use super::{
     Check, CheckKind,
@@ -13,7 +13,7 @@ const HEIGHT_SIGMAS: f64 = 3.0;
 /// Fewer shots do not validate a model.
 const SHOTS_MIN: u32 = 10;
 
-/// How far the median of the shots may lie from a model, metres.
+/// Largest accepted distance of the median of the shots from a model, metres.
 fn height_max_m(evidence: &Evidence<'_>, surface: &SurfaceAccount) -> f64 {
     let limits = evidence.limits;
     match (surface.common_sigma_m, &evidence.adjustment) {
@@ -78,7 +78,7 @@ pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
     std::iter::once(filled).chain(of_shots).collect()
 }
 
-/// Why a terrain model makes its site invalid, one sentence each.
+/// Reasons why a terrain model makes its site invalid, one sentence each.
 pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
     let Some(surface) = evidence.surface else {
         return Vec::new();
@@ -87,7 +87,7 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
     if surface.is_refused {
         return vec![format!(
             "terrain model: {filled} of {searched} searched cells matched, too few to be significant, so that the \
-             model is withheld; check that the pixels are those of these images, and check their orientation"
+             model is withheld; check that the pixels belong to these images, and check their orientation"
         )];
     }
     let limits = evidence.limits;
@@ -127,7 +127,7 @@ pub(super) fn remarks(evidence: &Evidence<'_>) -> Option<String> {
     let surface = evidence.surface?;
     (!surface.is_refused && !has_shots(surface)).then(|| {
         format!(
-            "terrain model: {} of MOLA's shots lie on it, too few to validate its heights",
+            "terrain model: {} of MOLA's shots at nadir lie on it, too few to validate its heights",
             surface.shots.above_m.n
         )
     })

@@ -5,7 +5,7 @@ use areograph_base::altimetry::GroundRadius;
 
 use super::{Evidence, JudgedImage, beam::PER_MILLI};
 
-/// Why the attitude of an image is not tested; the page states the same.
+/// Reason why the attitude of an image is not tested; the page uses the same words.
 pub const NO_BEAM: &str = "no beam tests the attitude";
 
 /// Errors that remain undetected for one reason.
@@ -27,14 +27,14 @@ impl Group {
         self
     }
 
-    /// The errors, and why nothing shows them; `None` without any.
+    /// The errors, and why nothing detects them; `None` without any.
     fn phrase(&self) -> Option<String> {
         let errors = self.errors.join("; ");
         (!errors.is_empty()).then(|| format!("{errors} ({})", self.reason))
     }
 }
 
-/// What no datum of the site tests, one phrase for each reason.
+/// Errors that no datum of the site tests, one phrase for each reason.
 pub(super) fn untested(evidence: &Evidence<'_>) -> Vec<String> {
     let is_tested = |image: &&JudgedImage| evidence.beam.tests(image.id());
     let (tested, blind): (Vec<&JudgedImage>, Vec<&JudgedImage>) =
@@ -88,7 +88,7 @@ fn common_attitude(evidence: &Evidence<'_>, blind: &[&JudgedImage]) -> Vec<Group
     Vec::from_iter(is_shared.then(|| group.with("an attitude error that all images share")))
 }
 
-/// The attitude error that all images may share within the limit of the beam, and that of the place of a profile.
+/// The attitude error that all images may share within the limit of the beam, and the error in the place of a profile.
 fn small_attitude(evidence: &Evidence<'_>, is_tested: bool) -> Option<Group> {
     let limits = evidence
         .beam
@@ -109,7 +109,7 @@ fn small_attitude(evidence: &Evidence<'_>, is_tested: bool) -> Option<Group> {
     })
 }
 
-/// Why no beam tests the attitude of an image.
+/// Reason why no beam tests the attitude of an image.
 fn no_beam(evidence: &Evidence<'_>, image: &JudgedImage) -> String {
     let beams = evidence.beam.images.iter();
     let gap = beams
@@ -148,7 +148,9 @@ fn images(evidence: &Evidence<'_>) -> [Group; 3] {
         one_label = one_label.with(format!("line period of {labels} without STOP_TIME"));
     }
     if has_ties {
-        by_ties = by_ties.with("an error of the focal length, or a bend of the detector line");
+        by_ties = by_ties.with(
+            "an error of the focal length, a bend of the detector line, or a distortion of the camera across the track",
+        );
         if !of_support.is_empty() {
             by_ties = by_ties
                 .with("an error of the first sample of the detector that support data share");
@@ -191,7 +193,7 @@ fn uncovered(evidence: &Evidence<'_>) -> Group {
     }
 }
 
-/// The orbit, where that of the shots' own files tests it.
+/// The orbit, where the orbit of the shots' own files tests it.
 fn orbit(evidence: &Evidence<'_>) -> Group {
     let group = Group::new("within range_check.orbit_max_m");
     if evidence.footprints.is_some_and(|count| count > 0) {

@@ -11,11 +11,11 @@ pub const CHIP_EDGE: usize = 141;
 /// The meaning of a mark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Mark {
-    /// Where the image sees the point with the orientation of the kernels.
+    /// Place at which the image sees the point with the orientation of the kernels.
     Before,
-    /// Where it sees it with the adjusted orientation.
+    /// Place at which the image sees the point with the adjusted orientation.
     After,
-    /// Where it was measured.
+    /// Place at which the point was measured.
     Measured,
 }
 
@@ -59,7 +59,7 @@ impl Lattice {
             .then_some(chip)
     }
 
-    /// The piece of an image whose pixels there are those of `patch`.
+    /// The piece of an image, with pixels from `patch`.
     pub(super) fn cut(&self, patch: &Patch, marks: &[(Mark, Vector2<f64>)]) -> Chip {
         let centres = || (0..CHIP_EDGE).map(|at| at as f64 + 0.5);
         let row = |row: f64| {

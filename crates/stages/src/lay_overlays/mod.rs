@@ -1,5 +1,5 @@
-//! What images show at footprints and tie points: a quick look of every image with pixels, and pieces of the images
-//! around some footprints, the tie points with the largest residuals and rejected ones.
+//! Images at footprints and tie points: a quick look of every image with pixels, and image chips around some
+//! footprints, rejected tie points and those with the largest residuals.
 //!
 //! Pieces of all images show the same ground in the same place: north up, one scale. They are centred where an
 //! orientation places a point, so that two images agree if the orientation is right.
@@ -35,7 +35,7 @@ pub use places::Subject;
 pub struct Overlays {
     /// Images with pixels, in the order of the site's.
     pub images: Vec<ShownImage>,
-    /// Pieces of them: those of footprints, then those of tie points.
+    /// Places in them: footprints, then tie points.
     pub places: Vec<Place>,
 }
 
@@ -44,7 +44,7 @@ pub struct Overlays {
 pub struct ShownImage {
     /// Index of the image.
     pub image: usize,
-    /// The whole of it.
+    /// Its quick look.
     pub quick_look: QuickLook,
     /// Lines of its file, missing ones included.
     pub lines: u32,
@@ -91,7 +91,7 @@ pub struct Place {
 pub struct PlaceView {
     /// Index of the image.
     pub image: usize,
-    /// How far the adjustment moves it on the ground, metres; `None` where there is no adjustment.
+    /// Distance by which the adjustment moves it on the ground, metres; `None` where there is no adjustment.
     pub moved_m: Option<f64>,
     /// One piece for each of [`Place::centres`].
     pub chips: Vec<Chip>,
@@ -111,7 +111,7 @@ stage_inputs! {
     pub struct LayOverlays<'a> {
         /// Images with the orientation of the kernels.
         pub images: SiteImages<'a>,
-        /// The same with the adjusted one; empty without an adjustment.
+        /// Images with the adjusted orientation; empty without an adjustment.
         pub adjusted_images: SiteImages<'a>,
         /// Files of pixels.
         pub pixels: PixelFiles<'a>,

@@ -1,5 +1,5 @@
-//! The pixels of an image, read once from its first line to its last: a quick look of the whole, and full resolution
-//! where it is needed.
+//! The pixels of an image, read once from its first line to its last: a quick look of the complete image, and full
+//! resolution where it is needed.
 
 use std::{ops::Range, sync::atomic::AtomicBool};
 
@@ -40,7 +40,7 @@ pub struct QuickLook {
 }
 
 impl QuickLook {
-    /// The same with at most `pixels_max` pixels.
+    /// The quick look with at most `pixels_max` pixels.
     #[must_use]
     pub fn within(&self, pixels_max: u64) -> Self {
         let factor = reduction(self.width, self.height, pixels_max);

@@ -1,5 +1,5 @@
-//! Which places are shown: footprints spread over every pair of images, the tie points with the largest residuals, and those
-//! that were rejected.
+//! Selection of the places that are shown: footprints spread over every pair of images, the tie points with the largest
+//! residuals, and those that were rejected.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -19,7 +19,7 @@ use areograph_geom::ellipsoid::spherical_to_xyz_m;
 
 /// Footprints of a pair of images.
 const FOOTPRINTS_OF_PAIR: usize = 4;
-/// Footprints of all of them.
+/// Footprints of all pairs.
 const FOOTPRINTS_MAX: usize = 8;
 /// Tie points with the largest residuals, and rejected ones.
 const TIES_MAX: usize = 6;
@@ -31,7 +31,7 @@ pub enum Subject {
     Footprint {
         /// Index of its profile.
         profile: usize,
-        /// Which shot of the profile, counted from 1.
+        /// Number of the shot in the profile, from 1.
         number: usize,
         /// Row of the footprint.
         row: u32,
@@ -51,7 +51,7 @@ pub enum Subject {
 #[derive(Debug)]
 pub(super) struct Wanted {
     pub(super) subject: Subject,
-    /// Where it lies, with the orientation of the kernels and with the adjusted one.
+    /// Its position with the orientation of the kernels and with the adjusted orientation.
     pub(super) ground_m: [Option<Vector3<f64>>; 2],
     /// Images, with line and sample where it was measured in them.
     pub(super) images: Vec<(usize, Option<Vector2<f64>>)>,
@@ -105,7 +105,7 @@ fn of_footprints(
         }
     }
     groups.retain(|(_, common)| !common.is_empty());
-    // Those with most in common first; equal ones in the order of the images.
+    // Groups with most in common first; equal ones in the order of the images.
     groups.sort_by_key(|(_, common)| std::cmp::Reverse(common.len()));
     let paired: BTreeSet<usize> = groups
         .iter()

@@ -90,14 +90,14 @@ impl Sight {
         self.per_m.determinant().abs().sqrt().recip()
     }
 
-    /// How far the adjustment moves the place on the ground, metres.
+    /// Distance by which the adjustment moves the place on the ground, metres.
     fn moved_m(&self) -> Option<f64> {
         let moved = self.mark(Mark::After)? - self.mark(Mark::Before)?;
         Some((self.per_m.try_inverse()? * moved).norm())
     }
 }
 
-/// Where the images see a place, and which pixels are to be read; `None` where one of them does not see it.
+/// Image coordinates of a place, and the pixels to be read; `None` where one of the images does not see it.
 pub(super) fn plan(
     wanted: Wanted,
     before: &[Camera],

@@ -16,9 +16,9 @@ const ASKED: [u32; 2] = [257, 33];
 const PER_CELL: [usize; 3] = [1, 3, 5];
 /// Smallest sample of the ground, pixels of the coarser image.
 const SAMPLE_PX_MIN: f64 = 0.6;
-/// Maximum number of cells of a terrain model: some hundred bytes each while it is made.
+/// Maximum number of cells of a terrain model: a few hundred bytes each while it is made.
 const CELLS_MAX: usize = 1 << 24;
-/// Minimum convergence of rays: below it, a pixel of parallax is more than a hundred of height.
+/// Minimum convergence of rays: below it, a pixel of parallax corresponds to more than a hundred pixels of height.
 const CONVERGENCE_MIN_RAD: f64 = 0.01;
 
 /// A pair that gives no surface.

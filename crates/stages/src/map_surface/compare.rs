@@ -3,12 +3,19 @@
 use super::result::{ProfileOnSurface, ShotComparison, ShotOnSurface, SurfaceModel};
 use crate::group_profiles::Profile;
 use areograph_base::{footprints::Footprints, frames::BodyFixed};
-use areograph_geom::{height_grid::HeightGrid, statistics::Summary, surface::SurfaceOptions};
+use areograph_geom::{
+    height_grid::HeightGrid,
+    statistics::Summary,
+    surface::{NADIR_MAX_RAD, SurfaceOptions},
+};
 
-/// Slopes are differences over this to both sides, metres: about a spot of the laser.
+/// Slopes are differences over this distance to both sides, metres: about a footprint of the laser.
 const SLOPE_STEP_M: f64 = 100.0;
 
 /// Every shot of the profiles on a model against its height there.
+///
+/// Profiles off nadir do not control heights (decision 0028) and do not test them either: the statistics of all shots
+/// refer to profiles at nadir.
 pub(super) fn compare(
     model: &SurfaceModel,
     footprints: &Footprints<BodyFixed>,
@@ -16,9 +23,11 @@ pub(super) fn compare(
     options: &SurfaceOptions,
 ) -> ShotComparison {
     let mut shots = Vec::new();
+    let mut at_nadir = Vec::new();
     let mut by_profile = Vec::new();
     for (index, profile) in profiles.iter().enumerate() {
         let first = shots.len();
+        let is_at_nadir = profile.off_nadir_rad(footprints) <= NADIR_MAX_RAD;
         for row in &profile.rows {
             let at = *row as usize;
             let place_rad = [footprints.longitude_rad[at], footprints.latitude_rad[at]];
@@ -34,21 +43,25 @@ pub(super) fn compare(
         if shots.len() > first {
             by_profile.push(ProfileOnSurface {
                 profile: profile.id.clone(),
+                is_at_nadir,
                 above_m: summary(&shots[first..]),
             });
         }
+        if is_at_nadir {
+            at_nadir.extend_from_slice(&shots[first..]);
+        }
     }
-    let above_m = summary(&shots);
-    let normalised = shots
+    let above_m = summary(&at_nadir);
+    let normalised = at_nadir
         .iter()
         .map(|shot| (shot.above_m - above_m.median) / shot.sigma_m);
     let normalised: Vec<f64> = normalised.collect();
-    let square = shots
+    let square = at_nadir
         .iter()
         .map(|shot| shot.sigma_m * shot.sigma_m)
         .sum::<f64>();
     ShotComparison {
-        sigma_m: (square / shots.len().max(1) as f64).sqrt(),
+        sigma_m: (square / at_nadir.len().max(1) as f64).sqrt(),
         spread_sigmas: Summary::of(&normalised).nmad,
         above_m,
         profiles: by_profile,

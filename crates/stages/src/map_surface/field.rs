@@ -9,7 +9,7 @@ pub(super) struct Field {
 }
 
 impl Field {
-    /// The same number everywhere.
+    /// A field with one number everywhere.
     pub(super) fn even(size: [usize; 2], value: f32) -> Self {
         Self {
             size,
@@ -17,8 +17,8 @@ impl Field {
         }
     }
 
-    /// The number between four cells, beyond the edge that of the cells at the edge; rows and columns count from the
-    /// middle of the first cell.
+    /// The number between four cells, beyond the edge the number of the cells at the edge; rows and columns count from
+    /// the middle of the first cell.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -42,7 +42,7 @@ impl Field {
         upper + down * (lower - upper)
     }
 
-    /// The same field in cells of half the edge, of which there are `size`.
+    /// The field in cells of half the edge, of which there are `size`.
     pub(super) fn doubled(&self, size: [usize; 2]) -> Self {
         let place = |at: usize| 0.5 * at as f64 - 0.25;
         let cells = (0..size[0]).flat_map(|row| (0..size[1]).map(move |column| (row, column)));

@@ -71,7 +71,7 @@ impl Ground {
         })
     }
 
-    /// The same ground after `times` halvings of its resolution.
+    /// The ground after `times` halvings of its resolution.
     pub(super) fn halved(&self, times: usize) -> Self {
         let factor = 1_usize << times;
         Self {
@@ -83,7 +83,7 @@ impl Ground {
         }
     }
 
-    /// How many cells there are.
+    /// Number of cells.
     pub(super) const fn cells(&self) -> usize {
         self.size[0] * self.size[1]
     }
@@ -131,7 +131,7 @@ mod tests {
             assert!((again_m - place_m).norm() < 1e-6); // rounding of 3.4e6 m, metres
             assert!((0.0..ground.size[1] as f64).contains(&cell[1]));
         }
-        // The first cell of a halved grid lies over four of the whole one.
+        // The first cell of a halved grid lies over four cells of the full one.
         let first_m = ground.halved(1).place_m([0.0, 0.0], 0.0);
         assert!((first_m - ground.place_m([0.5, 0.5], 0.0)).norm() < 1e-6);
     }

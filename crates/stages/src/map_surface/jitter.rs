@@ -10,7 +10,7 @@
 //! four squares, where it is not smoothed.
 //!
 //! # Source
-//! The variance of a point about the mean of an area is that of block kriging (Journel & Huijbregts 1978, Mining
+//! The variance of a point about the mean of an area follows block kriging (Journel & Huijbregts 1978, Mining
 //! Geostatistics, II.D), with the variogram `D/2`.
 
 use super::{Cell, Found};
@@ -34,7 +34,7 @@ pub(super) struct JitterAndSmoothing {
     pub(super) smoothing_m: f64,
 }
 
-/// What the sizes of a model are.
+/// Sizes of a model.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sizes {
     /// Cells of a row.

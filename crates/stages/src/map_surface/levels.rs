@@ -1,4 +1,5 @@
-//! From coarse to fine: at every level heights are searched about those of the coarser one, then refined by least squares.
+//! From coarse to fine: at every level heights are searched about the heights of the coarser one, then refined by least
+//! squares.
 
 use rayon::prelude::*;
 
@@ -28,7 +29,7 @@ const STEPS: [usize; 2] = [3, 1];
 /// Cells to either side over which the surface under the images is smoothed: after a search, and between steps of least
 /// squares, which restore the smoothed detail.
 const SMOOTH: [usize; 2] = [2, 1];
-/// The same for the offset across the parallax, which changes little.
+/// Cells to either side over which the offset across the parallax, which changes little, is smoothed.
 const SMOOTH_ASIDE: usize = 6;
 /// Standard deviations of the a priori heights that the search covers.
 const SIGMAS: f64 = 3.0;

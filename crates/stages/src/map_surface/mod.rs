@@ -8,9 +8,9 @@
 //!
 //! Both images are resampled at every halving of the cells, so that the epipolar curves of the camera need not be
 //! known; their difference is height along the parallax, and orientation across it. A thread holds tiles of at most 240
-//! samples and the margin of the comparison; cells are held whole, at most 2²⁴. Every tile sees the whole result of the
-//! step before, so that there are no seams and the number of threads changes no byte. Standard deviations are those of
-//! the matching; the common part of all heights is stated separately, by the adjustment.
+//! samples and the margin of the comparison; all cells are in memory, at most 2²⁴. Every tile sees the complete result
+//! of the previous step, so that there are no seams and the number of threads changes no byte. Standard deviations
+//! result from the matching; the common part of all heights is stated separately, by the adjustment.
 
 mod common;
 mod compare;
@@ -61,7 +61,7 @@ pub use result::{
     SurfaceModel,
 };
 
-/// Smallest share of searched cells that must be found for the result to be significant: chance finds one in some
+/// Smallest share of searched cells that must be found for the result to be significant: chance finds one in a few
 /// hundred.
 const FOUND_SHARE_MIN: f64 = 0.1;
 /// Cells along the longer side of the model on a page.
@@ -118,7 +118,7 @@ enum SurfaceError {
 struct Found {
     /// Above the sphere, metres.
     height_m: f64,
-    /// Standard deviation of that by the match, metres.
+    /// Standard deviation of the height by the match, metres.
     sigma_m: f64,
     /// Offset of the second image across the parallax, samples of the ground.
     aside: f64,
@@ -130,7 +130,7 @@ type Cell = Option<std::result::Result<Found, Unmatched>>;
 
 impl Stage for MapSurface<'_> {
     const NAME: &'static str = "map_surface";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     type Output = Surface;
     stage_inputs!(fingerprint);
 
@@ -178,7 +178,7 @@ impl Stage for MapSurface<'_> {
 }
 
 impl MapSurface<'_> {
-    /// Indices of the two images: those that are named, or those that have pixels.
+    /// Indices of the two images: the named ones, or those with pixels.
     fn pair(&self, times: &[&ImageTimes]) -> Result<Vec<usize>> {
         let images = times.iter().enumerate();
         let pair: Vec<usize> = match &self.surface.images {

@@ -42,9 +42,9 @@ pub struct SurfaceAccount {
     pub compared_m: f64,
     /// Cells that both images show.
     pub cells: u32,
-    /// Of these, those with a height.
+    /// Number of these with a height.
     pub filled: u32,
-    /// The others by reason.
+    /// Numbers of cells without a height, by reason.
     pub unfilled: BTreeMap<Unmatched, u32>,
     /// Whether too few cells were found to be significant; no height is then used.
     pub is_refused: bool,
@@ -77,13 +77,13 @@ pub struct SurfaceAccount {
 pub struct ShotComparison {
     /// Every shot on it, profile by profile.
     pub shots: Vec<ShotOnSurface>,
-    /// Heights of shots minus those of the model, metres.
+    /// Heights of shots minus heights of the model, for profiles at nadir, metres.
     pub above_m: Summary,
     /// Root mean square of the standard deviations of these differences about their common part, metres.
     pub sigma_m: f64,
     /// Robust spread of the differences about their median in these standard deviations.
     pub spread_sigmas: f64,
-    /// The same by profile, of profiles with shots on it.
+    /// Comparison by profile, for profiles with shots on the model.
     pub profiles: Vec<ProfileOnSurface>,
 }
 
@@ -96,9 +96,9 @@ pub struct ShotOnSurface {
     pub row: u32,
     /// East longitude and latitude, radians.
     pub place_rad: [f64; 2],
-    /// Its height minus that of the model, metres.
+    /// Its height minus the model's, metres.
     pub above_m: f64,
-    /// Standard deviation of that about the common part of all differences, metres.
+    /// Standard deviation of the difference about the common part of all differences, metres.
     pub sigma_m: f64,
 }
 
@@ -107,7 +107,9 @@ pub struct ShotOnSurface {
 pub struct ProfileOnSurface {
     /// Its identifier.
     pub profile: String,
-    /// Heights of its shots minus those of the model, metres.
+    /// Whether it points at nadir: the others do not test heights.
+    pub is_at_nadir: bool,
+    /// Heights of its shots minus the heights of the model, metres.
     pub above_m: Summary,
 }
 
@@ -116,7 +118,7 @@ pub struct ProfileOnSurface {
 pub struct SurfaceLook {
     /// Mean heights, NaN where there is none.
     pub heights: HeightGrid,
-    /// Root mean squares of standard deviations, metres, likewise.
+    /// Root mean squares of standard deviations, metres, NaN where there is none.
     pub sigmas_m: Vec<f32>,
 }
 
@@ -193,7 +195,7 @@ impl SurfaceAccount {
         self.cells - not_searched.sum::<u32>()
     }
 
-    /// Of the cells that both images show, the share with a height.
+    /// Share of the cells in both images that have a height.
     #[must_use]
     pub fn filled_share(&self) -> f64 {
         f64::from(self.filled) / f64::from(self.cells.max(1))

@@ -65,7 +65,7 @@ pub(super) fn settle(level: &Level<'_>, tile: Tile, known: &Known) -> Result<Vec
     Ok(settled.collect())
 }
 
-/// Missing pixels near an edge count as the edge.
+/// Reports missing pixels near an edge as the edge.
 fn at_edge(why: Unmatched, edge_px: f64) -> Unmatched {
     match why {
         // Half of the compared square, and the margin of smoothing, slopes and interpolation.
@@ -112,7 +112,7 @@ impl Slopes {
 struct Shift {
     along: f64,
     aside: f64,
-    /// Of the shift along the parallax.
+    /// Variance of the shift along the parallax.
     variance: f64,
     correlation: f64,
 }

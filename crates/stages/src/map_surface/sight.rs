@@ -17,7 +17,7 @@ const HEIGHTS_MIN_M: f64 = 60.0;
 pub(super) struct Tile {
     /// Rows and columns of cells.
     pub(super) cells: [Range<usize>; 2],
-    /// First sample along both axes, counted from the first of the first cell, and how many there are.
+    /// First sample along both axes, counted from the first of the first cell, and their numbers.
     pub(super) first: [i64; 2],
     pub(super) size: [usize; 2],
 }
@@ -96,7 +96,7 @@ pub(super) struct Sight {
     powers: Vec<[Vector2<f64>; 3]>,
     /// Lines and samples of the image at the level.
     size_px: Vector2<f64>,
-    /// Of the image for a sample of the ground along each axis.
+    /// Pixels of the image for a sample of the ground along each axis.
     pub(super) px_per_sample: Matrix2<f64>,
     /// Displacement in the image for a metre of height, samples of the ground.
     pub(super) shift_per_m: Vector2<f64>,

@@ -17,7 +17,7 @@ const STEPS_MAX: usize = 100;
 ///
 /// # Source
 /// Li et al. 2023, section 2.2.3 (eq. 17): `R`, the largest radius over the smallest distance of two centres, determines
-/// the number of units; the paper gives no limit, ours is 1.
+/// the number of units; the paper gives no limit; 1 is a choice of areograph.
 pub(super) fn clusters(places_m: &[[f64; 2]], seed: u64) -> Vec<usize> {
     let count = places_m.len() as f64;
     let [mut units, most] = POINTS.map(|points| (count / points).round().max(1.0));

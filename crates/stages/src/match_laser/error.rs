@@ -1,4 +1,4 @@
-//! Why matching fails.
+//! Reasons for the failure of a match.
 
 use areograph_base::error::Cause;
 

@@ -57,7 +57,7 @@ pub(super) struct Evidence<'a> {
     pub(super) similarity: Similarity,
     /// Median of model minus laser by correlation, and the largest bias at which concordance is usable, metres.
     pub(super) located_m: Option<[f64; 2]>,
-    /// Whether the measure was chosen by it.
+    /// Whether the measure was chosen by this bias.
     pub(super) is_auto: bool,
     pub(super) held_out: Option<HeldOut>,
     pub(super) widened: Option<Widened>,

@@ -14,7 +14,7 @@
 //! | `surface` | similarities for the page: a byte per shift, at most 141 by 141; rounds of a calibration compute none |
 //!
 //! The bias found by correlation selects the measure. Disagreement reveals shifts by chance: units far from the median
-//! of all are rejected, and where fewer than half agree, all of it is.
+//! of all are rejected; where fewer than half agree, the match is rejected.
 //!
 //! # Source
 //! Li et al. 2023, sections 2.2.2 and 2.2.3: segments, relief filter, clusters, similarity (eq. 16–18). Points that the paper leaves
@@ -69,7 +69,7 @@ use areograph_store::{
 };
 
 stage_inputs! {
-    /// What to match and how, and the files.
+    /// Request of a match, and its files.
     pub struct MatchLaser<'a> {
         /// The request.
         pub request: &'a MatchRequest,
@@ -158,7 +158,7 @@ impl UnitShots {
 /// Matches laser profiles with a terrain model in memory, part of the ground withheld; returns the shots of each unit
 /// too.
 ///
-/// * `units` – those of an earlier model; without them segments and clusters are made anew
+/// * `units` – units of an earlier model; without them segments and clusters are made anew
 ///
 /// # Errors
 /// Files that cannot be read; no shot on the model; shots that two files hold; [`Stopped`].
@@ -319,7 +319,7 @@ fn matched(
     Ok((result, UnitShots::of(&units)))
 }
 
-/// Units of the points of segments, in the order of their first points; then those of withheld ground.
+/// Units of the points of segments, in the order of their first points; then units of withheld ground.
 fn units_of<'a>(
     grid: &HeightGrid,
     segments: &[&'a [Shot]],

@@ -12,8 +12,8 @@ use areograph_base::{
 };
 use areograph_geom::height_grid::HeightGrid;
 
-/// How laser profiles are matched with a terrain model. Li et al. 2023 and its published program have 15 points, 1000 m², 70 cells,
-/// similarities above 0.9 and contrasts above 1.
+/// Options of the match of laser profiles with a terrain model. Li et al. 2023 and its published program have 15
+/// points, 1000 m², 70 cells, similarities above 0.9 and contrasts above 1.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MatchOptions {
     /// Maximum number of points of a segment.
@@ -33,7 +33,7 @@ pub struct MatchOptions {
     pub limit_m: f64,
     /// Seed of the clusters.
     pub seed: u64,
-    /// Radius of a shot that is that of the ground.
+    /// Radius of a shot that represents the ground.
     pub ground: GroundRadius,
     /// Shots that are taken.
     pub filter: ShotFilter,
@@ -64,7 +64,7 @@ pub struct ModelRequest<'a> {
     pub held_back: HeldBackGround,
 }
 
-/// What to match.
+/// Request of a match.
 #[derive(Debug, Clone, Serialize)]
 pub struct MatchRequest {
     /// Options.
@@ -73,7 +73,7 @@ pub struct MatchRequest {
     pub body: Body,
     /// Radius of the reference sphere of the model's heights, metres, where it is stated.
     pub radius_m: Option<f64>,
-    /// Whether that sphere is meant to differ from that of the model's map.
+    /// Whether that sphere is meant to differ from the sphere of the model's map.
     pub heights_apart: bool,
     /// The terrain model.
     #[serde(skip)]
@@ -88,7 +88,7 @@ pub struct MatchRequest {
 /// An image by its support data.
 #[derive(Debug, Clone, Serialize)]
 pub struct MatchImage {
-    /// Name in the table of control: that of a camera of `areograph calibrate`.
+    /// Name in the control table: the name of a camera of `areograph calibrate`.
     pub name: String,
     /// The support data.
     #[serde(skip)]
@@ -141,7 +141,7 @@ pub struct HeldOut {
     pub shots: usize,
     /// Without the shift.
     pub before_m: f64,
-    /// With it.
+    /// With the shift.
     pub after_m: f64,
 }
 
@@ -168,7 +168,7 @@ pub struct UnitResult {
     pub held_out: Option<HeldOut>,
     /// Similarity over the shifts of that search; absent in matches of models that are made round by round.
     pub similarity: Option<SimilaritySurface>,
-    /// Why it is rejected; empty if it is kept.
+    /// Reason why it is rejected; empty if it is kept.
     pub refused_because: String,
 }
 
@@ -180,18 +180,18 @@ impl UnitResult {
     }
 }
 
-/// Result of the search of a unit: position of the ground in the model relative to that by the laser.
+/// Result of the search of a unit: position of the ground in the model relative to its position by the laser.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct UnitMatch {
     /// Shift to the east and the north, cells.
     pub shift_cells: [f64; 2],
-    /// The same, metres.
+    /// Shift to the east and the north, metres.
     pub shift_m: [f64; 2],
-    /// The same in longitude and latitude, radians.
+    /// Shift in longitude and latitude, radians.
     pub shift_rad: [f64; 2],
     /// Similarity.
     pub score: f64,
-    /// That over the mean of similarities above 0.
+    /// Similarity over the mean of similarities above 0.
     pub contrast: f64,
     /// Mean of model minus laser over the shots that were used, metres.
     pub bias_m: f64,
@@ -203,14 +203,14 @@ pub struct UnitMatch {
 /// Errors of the laser that its shots share are not included.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MatchSigma {
-    /// Of the shift to the east and the north, metres.
+    /// Standard deviations of the shift to the east and the north, metres.
     pub shift_m: [f64; 2],
-    /// Of model minus laser, metres.
+    /// Standard deviation of model minus laser, metres.
     pub bias_m: f64,
 }
 
 impl MatchSigma {
-    /// The same, widened by these factors.
+    /// The standard deviations, widened by these factors.
     pub(super) fn wider(self, by: Widened) -> Self {
         Self {
             shift_m: self.shift_m.map(|sigma_m| by.shift * sigma_m),
@@ -220,17 +220,17 @@ impl MatchSigma {
 }
 
 /// Factors by which standard deviations of units were widened, at least 1: scatter of units about a plane over the
-/// ground relative to that predicted by leaving out their shots. The shots of a unit share an error of the model, which
-/// they cannot show.
+/// ground relative to the scatter predicted by leaving out their shots. The shots of a unit share an error of the
+/// model, which they cannot show.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Widened {
-    /// Of shifts.
+    /// Factor of shifts.
     pub shift: f64,
-    /// Of biases.
+    /// Factor of biases.
     pub bias: f64,
 }
 
-/// A laser control point: the shot of a unit that lies nearest to its bias.
+/// A laser control point: the shot of a unit whose height residual is closest to the unit's bias.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MatchedPoint {
     /// Number of its unit.
@@ -241,7 +241,7 @@ pub struct MatchedPoint {
     pub name: String,
     /// East longitude, latitude, radians, and radius, metres, by the laser.
     pub laser: [f64; 3],
-    /// The same by the model.
+    /// East longitude, latitude, radians, and radius, metres, by the model.
     pub model: [f64; 3],
     /// Standard deviations of their difference towards the east, the north and up, metres, from the matching only.
     pub sigma_m: [f64; 3],

@@ -35,7 +35,7 @@ struct Seen {
 /// A plane through values of units, and their residuals.
 struct Plane {
     off: Vec<f64>,
-    /// The same over standard deviations.
+    /// Residuals over standard deviations.
     normalised: Vec<f64>,
 }
 

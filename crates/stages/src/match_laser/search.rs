@@ -19,9 +19,9 @@ pub(super) struct Best {
     pub(super) shift: [f64; 2],
     /// Similarity at the nearest whole cells.
     pub(super) score: f64,
-    /// That over the mean of all similarities above 0.
+    /// Similarity over the mean of all similarities above 0.
     pub(super) contrast: f64,
-    /// Whether the best whole cells are at the border of all shifts, or of those for which the model has heights.
+    /// Whether the best whole cells are at the border of all shifts, or of the shifts for which the model has heights.
     pub(super) at_border: bool,
 }
 
@@ -351,7 +351,7 @@ mod tests {
         let shots = shots();
         let shots: Vec<&Shot> = shots.iter().collect();
         let rms = |shift| rms_m(&model, &shots, shift, 80.0).unwrap_or(f64::NAN);
-        // Bilinear heights of waves 30 cells long miss by some metres; unshifted ones by hundreds.
+        // Bilinear heights of waves 30 cells long miss by a few metres; unshifted ones by hundreds.
         assert!(rms([7.0, 12.0]) < 5.0 && rms([0.0, 0.0]) > 200.0);
     }
 }

@@ -34,7 +34,7 @@ pub(super) struct Settled {
     pub(super) sigma_bias_m: f64,
 }
 
-/// Why least squares give no position for a unit.
+/// Reasons why least squares give no position for a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Unsettled {
     /// Steps diverge, or do not end.

@@ -52,7 +52,7 @@ impl Moments {
         self.count
     }
 
-    /// Mean of the first series minus that of the second.
+    /// Mean of the first series minus mean of the second.
     #[must_use]
     pub fn bias(&self) -> f64 {
         (self.sums[0] - self.sums[1]) / self.count

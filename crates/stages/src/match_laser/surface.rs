@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// Maximum number of values from side to side: every shift of a search within 70 cells.
 const SIDE_MAX: i64 = 141;
-/// Levels above that of similarity 0.
+/// Number of levels above the level of similarity 0.
 const STEPS: f64 = 254.0;
 
 /// Similarity over the shifts of a search, in levels of a byte.
@@ -12,7 +12,7 @@ const STEPS: f64 = 254.0;
 pub struct SimilaritySurface {
     /// Edge of the square of shifts of which a value is the best; odd, so that one value is centred on the zero shift.
     pub step_cells: u32,
-    /// Values from that one to each side.
+    /// Number of values from the central one to each side.
     pub reach: u32,
     /// Row by row from the north-west, as many columns as rows: 1 for similarity 0 and below, 255 for 1, between them evenly by
     /// `1 − √(1 − similarity)`, as a good match and a chance one both lie near 1; 0 where the model covers too few shots, or is flat.

@@ -179,7 +179,8 @@ impl<'a> Unit<'a> {
         })
     }
 
-    /// The control point of a kept unit: the used shot nearest to their bias, so that its height is not an outlier.
+    /// The control point of a kept unit: the used shot whose height residual is closest to the unit's bias, so that it
+    /// is not an outlier.
     pub(super) fn point(&self, grid: &HeightGrid, result: &UnitResult) -> Option<MatchedPoint> {
         let found = result.found.as_ref()?;
         let sigma = found.sigma?;

@@ -36,7 +36,7 @@ impl Margin {
         }
     }
 
-    /// The same margin for all images, metres.
+    /// One margin for all images, metres.
     pub(super) fn within(images: usize, most_m: f64) -> Self {
         Self {
             images: vec![[most_m, 0.0]; images],
@@ -77,7 +77,7 @@ fn sigmas(config: &AdjustmentConfig, image: &str) -> [f64; 2] {
         }
     };
     let own = config.images.iter().find(|own| own.id == image);
-    // Of nine numbers three are those of an axis.
+    // Three of the nine numbers belong to an axis.
     let of_axis = |sigmas: &[f64; 9]| norm(sigmas) / 3.0_f64.sqrt();
     let own_m = own.and_then(|own| own.position_m.as_ref()).map(of_axis);
     let own_rad = own.and_then(|own| own.rotation_rad.as_ref()).map(of_axis);

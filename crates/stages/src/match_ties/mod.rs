@@ -86,7 +86,7 @@ enum MatchError {
     #[error("image {image}: its orientation sees no ground: {unseen}")]
     #[cause("check that the site's images overlap, and check their kernels and times")]
     Unseen { image: String, unseen: Unseen },
-    #[error("no two images with pixels show the same ground by their orientation")]
+    #[error("no two images with pixels show the same ground according to their orientation")]
     #[cause(like = Unseen)]
     NothingInCommon,
     #[error("no tie point was found: {0}")]

@@ -23,7 +23,7 @@ const ONE_WAY_PX: f64 = 0.25;
 const SIGMA_MAX_PX: f64 = 0.3;
 /// Parts along and across the flight into which the common ground is divided to assess the distribution of tie points.
 const PARTS: [usize; 2] = [10, 2];
-/// Smallest share of searched places that must be found for the result to be significant: chance finds one in some
+/// Smallest share of searched places that must be found for the result to be significant: chance finds one in a few
 /// hundred.
 const FOUND_SHARE_MIN: f64 = 0.1;
 /// Minimum number of tie points of a pair.
@@ -99,7 +99,7 @@ pub(super) fn match_pair(
     )))
 }
 
-/// Finds a place of the first image in the second, and that one in the first again.
+/// Finds a place of the first image in the second, and the found place in the first again.
 fn both_ways(
     search: &Search<'_>,
     place: &Vector2<f64>,

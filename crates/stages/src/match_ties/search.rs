@@ -63,7 +63,7 @@ macro_rules! or_unmatched {
 }
 
 impl Search<'_> {
-    /// The same from the other image.
+    /// The search from the other image.
     pub(super) fn turned(&self) -> Self {
         let [here, there] = self.views;
         let [level, other] = self.levels;
@@ -155,7 +155,7 @@ impl Search<'_> {
     }
 }
 
-/// Pixels of an image in one of a level.
+/// Pixels of an image per pixel of a level.
 pub(super) fn scale(level: usize) -> f64 {
     (1_u64 << level.min(63)) as f64
 }

@@ -40,7 +40,7 @@ impl RayOrigin {
     /// # Errors
     /// Kernels that do not cover the instant.
     /// # Accuracy
-    /// For [`LightTime::Surface`] the light time is that to the ellipsoid along the boresight: ground one kilometre
+    /// For [`LightTime::Surface`] the light time is counted to the ellipsoid along the boresight: ground one kilometre
     /// above it is seen 0.011 m (`v/c`) away along the track, and the limb at the edge of a wide-angle image, four times
     /// as far as nadir, 14 m, less than a tenth of its pixels.
     pub(crate) fn at(
@@ -126,7 +126,7 @@ impl OrientationSample {
     }
 }
 
-/// When the light that `exposure` sees left the ground.
+/// Instant at which the light that `exposure` sees left the ground.
 fn left(exposure: Et, origin: &Position<BodyFixed>, boresight: &Vector3<f64>) -> Et {
     exposure.plus(-light_time_s(range_to_ellipsoid_m(
         Body::Mars.model(),
@@ -135,7 +135,7 @@ fn left(exposure: Et, origin: &Position<BodyFixed>, boresight: &Vector3<f64>) ->
     )))
 }
 
-/// Mars at the instant `left`, stamped with that of the exposure.
+/// Mars at the instant `left`, stamped with the instant of the exposure.
 fn mars_at(left: Et, exposure: Et) -> Rotation<J2000, BodyFixed> {
     Rotation::new(*body_rotation(Body::Mars, left).matrix(), exposure)
 }

@@ -37,7 +37,7 @@ pub struct Orientation {
     pub image: String,
     /// The body that it shows.
     pub body: Body,
-    /// Samples over the whole header image, both ends included.
+    /// Samples over the complete header image, both ends included.
     pub samples: Vec<OrientationSample>,
     /// Outline of the delivered image on the ellipsoid: along the first pixel's outer edge,
     /// back along the last one's, not closed. `None` when a corner sees no ground.
@@ -46,14 +46,14 @@ pub struct Orientation {
     pub tables: CameraTables,
     /// The light-time convention of all positions, and its difference from the others.
     pub light_time: LightTimeEffect,
-    /// What the reader should know, one sentence each.
+    /// Notes for the reader, one sentence each.
     pub notes: Vec<String>,
-    /// Why the orientation is invalid; empty when it is valid.
+    /// Reasons why the orientation is invalid; empty when it is valid.
     pub invalid_because: Vec<String>,
 }
 
 impl Orientation {
-    /// The same without the nodes of its tables for camera models.
+    /// The orientation without the nodes of its tables for camera models.
     #[must_use]
     pub fn without_tables(&self) -> Self {
         Self {
@@ -80,12 +80,12 @@ pub struct OrientationSample {
     pub position: Position<BodyFixed>,
     /// Rotation from camera to Mars-fixed axes.
     pub camera_to_mars: Rotation<CameraFrame, BodyFixed>,
-    /// The same rotation as ω, φ, κ.
+    /// This rotation as ω, φ, κ.
     pub angles: OmegaPhiKappa,
-    /// Where the boresight meets the ellipsoid, if it does.
+    /// Point where the boresight meets the ellipsoid, if it does.
     pub boresight: Option<BoresightGround>,
-    /// From the perspective centre to the geometric position of the spacecraft by the kernels at the epoch, from where
-    /// ranges are measured; body-fixed, metres.
+    /// From the perspective centre to the geometric position of the spacecraft from the kernels at the epoch, from
+    /// where ranges are measured; body-fixed, metres.
     pub to_spacecraft_m: Vector3<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! The camera of an image by the kernels, at any instant.
+//! The camera of an image from the kernels, at any instant.
 
 use super::{Camera, RayOrigin};
 use crate::tag_times::ImageTimes;
@@ -15,7 +15,7 @@ use areograph_spice::{Attitude, Session};
 /// Reads position and attitude of the camera of an image.
 #[derive(Clone, Copy)]
 pub(crate) struct CameraReader<'a> {
-    /// Of the spacecraft that carries the camera.
+    /// Kernels of the spacecraft that carries the camera.
     pub(crate) session: &'a Session,
     pub(crate) instrument: &'a Instrument,
     pub(crate) bias: PointingBias,
@@ -53,7 +53,7 @@ impl CameraReader<'_> {
         Ok(body_rotation(Body::Mars, et).apply(&self.session.state(et)?.position))
     }
 
-    /// Where rays start in IAU 2000, and the rotation from the camera to it.
+    /// Start of the rays in IAU 2000, and the rotation from the camera to this frame.
     pub(crate) fn camera(&self, et: Et) -> Result<Camera> {
         let to_camera = self.inertial_to_camera(et)?;
         let boresight = to_camera.matrix().row(2).transpose();

@@ -57,7 +57,7 @@ pub struct InterpolationCheck {
 }
 
 impl CameraTables {
-    /// The same without its nodes, which occupy most of the memory of an image.
+    /// The tables without their nodes, which occupy most of the memory of an image.
     #[must_use]
     pub fn without_nodes(&self) -> Self {
         Self {

@@ -1,7 +1,8 @@
 //! Registration: which line and sample of an image sees each footprint.
 //!
-//! Every profile goes into every image, not only into the one exposed with it. Production is Newton's method; the
-//! published iterations run beside it on the same points, so that their cost and convergence are known for this site.
+//! Every profile is projected into every image, not only into the one exposed with it. Production is Newton's method;
+//! the published iterations run beside it on the same points, so that their cost and convergence are known for this
+//! site.
 
 mod methods;
 mod points;
@@ -55,7 +56,7 @@ pub struct ImageRegistration {
 }
 
 impl ImageRegistration {
-    /// The same without its points.
+    /// The registration without its points.
     #[must_use]
     pub fn without_points(&self) -> Self {
         Self {
@@ -81,13 +82,13 @@ impl ImageRegistration {
 pub struct ModelDifference {
     /// The other model.
     pub model: CameraModel,
-    /// Its line minus the one of the production model.
+    /// Its line minus the line of the production model.
     pub lines: Summary,
-    /// Its sample minus the one of the production model.
+    /// Its sample minus the sample of the production model.
     pub samples: Summary,
 }
 
-/// Why a footprint has no place in an image.
+/// Reasons why a footprint has no place in an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 enum FootprintRejection {
     #[error(transparent)]
@@ -102,7 +103,7 @@ stage_inputs! {
     pub struct Register<'a> {
         /// Identifier of the image.
         pub image: &'a str,
-        /// Which orientation.
+        /// Round of the orientation.
         pub round: Round,
         /// Its line times.
         pub times: &'a Output<ImageTimes>,

@@ -7,7 +7,7 @@ use areograph_geom::pushbroom::CameraModel;
 
 macro_rules! columns {
     ($($(#[$doc:meta])* $column:ident: $kind:ty,)*) => {
-        /// Where one footprint lies in an image.
+        /// Place of one footprint in an image.
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub struct PointOnImage { $($(#[$doc])* pub $column: $kind,)* }
 
@@ -22,7 +22,7 @@ macro_rules! columns {
             /// Evaluations of the frame-first iteration with the second-order model; 0 where it was not
             /// tried (outside the image's lines) or does not converge.
             pub evaluations_frame_first: Vec<u32>,
-            /// The same of the fixed point of eq. 4 of Shan et al. 2005.
+            /// Evaluations of the fixed-point iteration, eq. 4 of Shan et al. 2005; 0 in the same cases.
             pub evaluations_fixed_point: Vec<u32>,
         }
 

@@ -22,7 +22,7 @@ const POSITION_M: f64 = 200.0;
 pub(super) struct Comparison {
     /// Their contradiction; `None` where they agree, and where they are not compared.
     pub(super) contradiction: Option<String>,
-    /// Why they are not compared although the kernels hold the spacecraft.
+    /// Reason why they are not compared although the kernels hold the spacecraft.
     pub(super) note: Option<String>,
 }
 
@@ -39,8 +39,8 @@ impl Comparison {
     }
 }
 
-/// Compares the support data of `image` with `kernels` in the middle of the image; kernels without position and attitude
-/// of its spacecraft state nothing of it.
+/// Compares the support data of `image` with `kernels` in the middle of the image; kernels without position and
+/// attitude of its spacecraft allow no comparison.
 ///
 /// The camera is the built-in one with the NAIF numbers of the file. Support data do not state their convention for light
 /// time: the one that agrees best counts.

@@ -35,8 +35,8 @@ impl CameraReader<'_> {
         })
     }
 
-    /// Where another convention places `ground`, which the boresight meets in the middle of `image`; `None` where its
-    /// boresight misses the ground.
+    /// Place that another convention gives `ground`, which the boresight meets in the middle of `image`; `None` where
+    /// its boresight misses the ground.
     fn other(
         &self,
         convention: LightTime,

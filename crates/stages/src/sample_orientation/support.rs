@@ -1,4 +1,4 @@
-//! Orientation of an image by its support data: their tables, sampled as those of kernels.
+//! Orientation of an image by its support data: their tables, sampled as kernels are.
 
 use nalgebra::Vector3;
 
@@ -18,7 +18,7 @@ use areograph_pds::isd::SupportTables;
 /// The orientation of `image` by its support data at `epochs`.
 ///
 /// Only the positions of the tables are known: their offset from the spacecraft is set to zero. Ranges are measured
-/// from them where the site declares them to be those of the spacecraft with the laser.
+/// from them where the site declares them to be positions of the spacecraft with the laser.
 pub(super) fn support_orientation(
     image: &ImageTimes,
     support: &SupportTables,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use areograph_pds::pedr::{Complaint, Reason};
 
-/// Numbers of what was left out, with the first example.
+/// Numbers of records and shots that were left out, with the first example.
 pub(super) fn findings(
     complaints: &[Complaint],
     counts: &BTreeMap<Reason, u64>,

@@ -60,17 +60,17 @@ stage_inputs! {
     pub struct TabulateKernels<'a> {
         /// Identifier of the image.
         pub image: &'a str,
-        /// Its place among the images.
+        /// Its index among the images.
         pub index: &'a usize,
         /// Line times of all images.
         pub times: InOrder<'a, Output<ImageTimes>>,
-        /// Its orientation by the tags of the lines, see [`super::reorient`].
+        /// Its orientation at the tags of the lines, see [`super::reorient`].
         pub orientation: &'a Output<Orientation>,
         /// The original kernels.
         pub kernels: &'a KernelView,
         /// Padding and tolerance with which the image was sampled.
         pub coverage: &'a KernelsConfig,
-        /// The pointing bias that users of the kernels will apply, where it is not that of the camera.
+        /// The pointing bias that users of the kernels will apply, where it replaces the camera's.
         pub pointing: &'a PointingConfig,
     }
 }
@@ -118,11 +118,10 @@ enum TabulateError {
 
 /// States and attitudes around one of `images`, whose adjusted orientation is `orientation`.
 ///
-/// Attitudes are those of samples and camera tables; positions those of the original kernels with the difference at the
-/// samples, interpolated, added; they are geometric, so that a user of the light-time convention of `orientation`
-/// obtains its positions. Around the image, where neither is available, the original motion continues with the
-/// difference at the end. Sampling an image with its kernels loaded reproduces its orientation within 1 mm and 1e-9
-/// rad.
+/// Attitudes come from samples and camera tables, positions from the original kernels plus the interpolated difference
+/// at the samples; positions are geometric, so that a user of the light-time convention of `orientation` obtains its
+/// positions. Around the image, where neither is available, the original motion continues with the difference at the
+/// end. Sampling an image with its kernels loaded reproduces its orientation within 1 mm and 1e-9 rad.
 ///
 /// # Errors
 /// [`Kind::Coverage`](areograph_base::error::Kind::Coverage) where the original kernels do not reach around an image; [`Kind::Bug`](areograph_base::error::Kind::Bug) for too few samples.

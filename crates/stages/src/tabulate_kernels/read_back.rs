@@ -13,10 +13,12 @@ use areograph_spice::Session;
 /// Tolerance for positions read back from a kernel, metres: 30 times the 3e-5 m that MGS flies in the 7e-9 s to which
 /// ET is rounded.
 const POSITION_TOLERANCE_M: f64 = 1e-3;
-/// The same for rotations, radians: 100 times what the bus turns in the 1.5e-8 s to which ticks are rounded.
+/// Tolerance for rotations read back from a kernel, radians: 100 times the rotation of the bus in the 1.5e-8 s to which
+/// ticks are rounded.
 const ROTATION_TOLERANCE_RAD: f64 = 1e-9;
 
-/// Makes sure that `session`, with the original kernels and those of the image, gives every sample of `orientation`.
+/// Makes sure that `session`, with the original kernels and the kernels of the image, gives every sample of
+/// `orientation`.
 ///
 /// # Errors
 /// [`Kind::Bug`](areograph_base::error::Kind::Bug) for orientations that are not reproduced within 1 mm and 1e-9 rad, and the

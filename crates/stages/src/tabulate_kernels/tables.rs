@@ -34,7 +34,7 @@ const HALF_DIFFERENCE_S: f64 = 0.5;
 pub(super) struct Source<'a> {
     pub(super) session: &'a Session,
     pub(super) times: &'a ImageTimes,
-    /// As adjusted.
+    /// Adjusted orientation.
     pub(super) orientation: &'a Orientation,
     pub(super) tolerance_s: f64,
     pub(super) bias: PointingBias,
@@ -70,7 +70,7 @@ impl Source<'_> {
         })
     }
 
-    /// When and where the spacecraft was for each sample.
+    /// Instant and position of the spacecraft for each sample.
     fn flown(&self) -> Result<Vec<(Et, Position<J2000>)>> {
         let light_time = self.orientation.light_time.convention;
         let samples = self.orientation.samples.iter();

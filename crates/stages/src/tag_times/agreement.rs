@@ -1,4 +1,4 @@
-//! What is stated twice about an image must agree: its product, its clock and UTC, its stop time and lines.
+//! Agreement of double statements about an image: its product, its clock and UTC, its stop time and lines.
 
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
@@ -19,7 +19,7 @@ use areograph_pds::product_named;
 /// Clock and UTC, or stop time and lines, that differ by more than this get a remark, seconds.
 ///
 /// UTC in MOC labels is truncated to 10 ms: in five labels it differs by 1 to 5 ms from the clock, and in three the
-/// time from start to stop is 4 to 6 ms less than that of the lines. The limit is 60 m on the ground.
+/// time from start to stop is 4 to 6 ms less than the time of the lines. The limit is 60 m on the ground.
 pub(super) const CLOSE_S: f64 = 0.02;
 /// With a larger difference they belong to two images, seconds.
 const TOLERANCE_S: f64 = 1.0;
@@ -39,12 +39,12 @@ pub(super) const HEIGHT_M: f64 = 380_000.0;
 pub struct Disagreement {
     /// One sentence.
     pub text: String,
-    /// How far the difference displaces the image on the ground, metres; 0 where it does not displace it.
+    /// Displacement of the image on the ground by the difference, metres; 0 where there is none.
     pub ground_m: f64,
 }
 
 impl Disagreement {
-    /// Whether the displacement exceeds what the stated accuracy covers.
+    /// Whether the displacement exceeds the stated accuracy.
     #[must_use]
     pub fn is_beyond_accuracy(&self) -> bool {
         // Written so that NaN counts.
@@ -252,7 +252,7 @@ pub(super) fn piece_follows(piece: &LinePiece, next: &LinePiece) -> Option<Strin
     })
 }
 
-/// A stop time that does not agree with the lines, those of the header and those delivered.
+/// A stop time that does not agree with the lines of the header and the delivered lines.
 ///
 /// The period of the lines and the stop time are two statements of which the period is used without proof: a difference
 /// displaces the last line. A stop time of the delivered lines is a remark.

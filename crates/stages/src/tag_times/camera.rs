@@ -1,4 +1,4 @@
-//! A camera of the site's own against the built-in one of the same frame.
+//! A camera that the site defines against the built-in camera of the same frame.
 
 use super::agreement::{Disagreement, HEIGHT_M, ground};
 use areograph_base::instruments::Instrument;

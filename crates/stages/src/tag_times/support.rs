@@ -1,5 +1,5 @@
-//! Image support data, or an oriented cube, as a source of times, camera and orientation, checked to be those of the site's
-//! body.
+//! Image support data, or an oriented cube, as a source of times, camera and orientation, checked to belong to the
+//! site's body.
 
 use std::path::Path;
 
@@ -36,7 +36,7 @@ pub struct SupportFile {
     pub blake3: String,
     /// Name of the spacecraft.
     pub platform: String,
-    /// Whether positions are those of the spacecraft with the laser, geometric.
+    /// Whether positions are geometric positions of the spacecraft with the laser.
     pub has_laser: bool,
     /// Positions and rotations.
     pub tables: SupportTables,
@@ -81,10 +81,10 @@ impl SupportFile {
         spacecraft.label_name.eq_ignore_ascii_case(&self.platform)
     }
 
-    /// A note on what is used from the file.
+    /// A note on the data used from the file.
     fn note(&self) -> String {
         format!(
-            "camera, line times and orientation are those of the support data {}; no pointing bias, clock correction \
+            "camera, line times and orientation come from the support data {}; no pointing bias, clock correction \
              or light time is applied to them",
             self.name
         )
@@ -105,7 +105,7 @@ pub(super) fn supported(
     let period_s = said.line_times.mean_period_s();
     let turned = file.tables.frame_remark(body, &file.name, start);
     let mut remarks: Vec<Disagreement> = turned.map(Disagreement::from).into_iter().collect();
-    // A number of NAIF is that of its spacecraft only.
+    // A NAIF number is valid for its spacecraft only.
     if file.is_of(said.instrument.spacecraft) {
         if let Some(camera) = known_one(&said.instrument, all_instruments()) {
             let part = [said.first_detector, said.samples];

@@ -1,4 +1,4 @@
-//! Why a net has no solution, with the names of its pictures and points.
+//! Reasons why a net has no solution, with the names of its pictures and points.
 
 use areograph_base::error::Cause;
 use areograph_geom::plane::{FilmError, PlaneError};
@@ -15,7 +15,7 @@ pub enum NetError {
     #[error("controls measured in a picture: {found}; expected two or more")]
     #[cause("give at least two controls, named as the points of the measurements")]
     TooFewControls {
-        /// How many there are.
+        /// Number found.
         found: usize,
     },
     /// A picture or brick, with the parts tied to it, can turn, shrink or move.
@@ -96,7 +96,7 @@ pub enum NetError {
         x_m: f64,
         /// North, metres.
         y_m: f64,
-        /// How far the map reaches, metres.
+        /// Reach of the map, metres.
         limit_m: f64,
     },
     /// A control outside the area of the projection.

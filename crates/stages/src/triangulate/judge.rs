@@ -166,7 +166,7 @@ fn remarks(of: &Evidence) -> Vec<String> {
     );
     say(
         kept == 2 && of.controls.iter().all(|control| control.sigma_m.is_none()),
-        "two controls without standard deviations: those of points are relative to them".to_owned(),
+        "two controls without standard deviations: standard deviations of points are relative to them".to_owned(),
     );
     say(
         of.complaints > 0,

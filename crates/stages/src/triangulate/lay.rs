@@ -16,9 +16,9 @@ use areograph_geom::plane::{
 pub(super) struct Laid {
     pub(super) names: Vec<String>,
     pub(super) figures: Vec<Figure>,
-    /// Of every measurement, whether it was left out.
+    /// Whether each measurement was left out.
     pub(super) removed: Vec<bool>,
-    /// The net of the others, and their indices in the whole one.
+    /// The net of the others, and their indices in the complete net.
     pub(super) net: Net,
     pub(super) alive: Vec<usize>,
     pub(super) block: Block,
@@ -30,13 +30,13 @@ pub(super) struct Laid {
 #[derive(Clone)]
 pub(super) struct Kept {
     pub(super) net: Net,
-    /// Indices of its measurements in the whole net.
+    /// Indices of its measurements in the complete net.
     alive: Vec<usize>,
-    /// Of every measurement, whether it was left out.
+    /// Whether each measurement was left out.
     removed: Vec<bool>,
 }
 
-/// Leaves out the blunders of a net, where they are to be.
+/// Leaves out the blunders of a net, where this is configured.
 pub(super) fn without_blunders(config: &NetConfig, data: &NetData) -> Result<Kept, PlaneError> {
     let mut removed = vec![false; data.net.measurements.len()];
     if config.triangulation.blunders == Blunders::Remove {
@@ -52,8 +52,8 @@ pub(super) fn without_blunders(config: &NetConfig, data: &NetData) -> Result<Kep
     })
 }
 
-/// Bricks of pictures: one for the method that has none. Pictures that hang on one point in their brick are tied in another,
-/// with a remark where a table names the bricks.
+/// Bricks of pictures: one for the method that has none. Pictures that hang on one point in their brick are tied in a
+/// different one, with a remark where a table names the bricks.
 pub(super) fn bricks_of(config: &NetConfig, data: &NetData, net: &Net) -> (Bricks, Vec<String>) {
     if config.triangulation.method == Method::OneShot {
         return (one_brick(data), Vec::new());
@@ -137,7 +137,7 @@ pub(super) fn lay(
     let mut figures: Vec<Figure> = figures
         .collect::<Result<_, _>>()
         .map_err(|error| names.of(error, "picture"))?;
-    // The deviations of a brick are reported beside those of the whole net.
+    // The deviations of a brick are reported beside the deviations of the complete net.
     for (index, _) in figures.iter_mut().flat_map(|of| &mut of.deviations) {
         *index = alive[*index];
     }

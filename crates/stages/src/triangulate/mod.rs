@@ -65,7 +65,7 @@ impl Input for NetFiles<'_> {
 
 impl Stage for Triangulate<'_> {
     const NAME: &'static str = "triangulate";
-    const METHOD: u32 = 12;
+    const METHOD: u32 = 13;
     type Output = Triangulation;
     stage_inputs!(fingerprint);
 
@@ -75,13 +75,13 @@ impl Stage for Triangulate<'_> {
     }
 }
 
-/// Every file that a net names, tables of one kind after those of another.
+/// Every file that a net names, kind by kind.
 #[must_use]
 pub fn net_files(net: &NetConfig) -> Vec<PathBuf> {
     kinds(net).into_iter().flatten().cloned().collect()
 }
 
-/// The tables of a net, those of each kind.
+/// The tables of a net, by kind.
 const fn kinds(net: &NetConfig) -> [&Vec<PathBuf>; 4] {
     [
         &net.measurements.files,

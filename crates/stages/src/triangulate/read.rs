@@ -26,7 +26,7 @@ const COMPLAINTS_MAX: usize = 1_000;
 pub struct NetData {
     /// Names of the pictures, in the order of their first measurement.
     pub pictures: Vec<String>,
-    /// Names of the points likewise.
+    /// Names of the points, in the order of their first measurement.
     pub points: Vec<String>,
     /// Name of the brick of every picture, empty where the table has no name.
     pub bricks: Vec<String>,

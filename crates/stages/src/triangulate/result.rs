@@ -43,7 +43,7 @@ pub struct PictureResult {
     pub angle_rad: f64,
     /// Middle of its measured points on the map, metres.
     pub centre_m: [f64; 2],
-    /// East longitude in `-π..π` and latitude of that, radians.
+    /// East longitude in `-π..π` and latitude of this middle, radians.
     pub centre_rad: [f64; 2],
     /// Standard deviation of a coordinate of the middle, metres, where it is known.
     pub sigma_m: Option<f64>,
@@ -51,7 +51,7 @@ pub struct PictureResult {
     pub sigma_scale: Option<f64>,
     /// Points that it shares with other pictures.
     pub ties: u32,
-    /// Root mean square of a coordinate of its deviations from the means of those, metres.
+    /// Root mean square of a coordinate of its deviations from the means of these ties, metres.
     pub deviation_rms_m: f64,
     /// Departure of an orthographic picture of its size from a similarity on this map, metres.
     pub projection_floor_m: f64,
@@ -96,7 +96,7 @@ pub struct MeasurementResult {
     pub place_m: [f64; 2],
     /// Image minus the mean of the point, metres on the map.
     pub deviation: Deviation,
-    /// The same within its brick, as BRICK prints it; `None` for a point on one picture of the brick.
+    /// Deviation within its brick, as BRICK reports it; `None` for a point on one picture of the brick.
     pub in_brick: Option<Deviation>,
     /// Share of its own error that shows in its deviation, 0 to 1.
     pub redundancy: f64,
@@ -161,9 +161,9 @@ pub struct BrickResult {
 /// Shrinkage of the figure between two controls.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ShrinkageResult {
-    /// Their distance as computed over the one as given.
+    /// Their computed distance over their given distance.
     pub factor: f64,
-    /// The same by the law, 1 / (1 + 2T / (w L²)).
+    /// This ratio by the law, 1 / (1 + 2T / (w L²)).
     pub law: f64,
 }
 
@@ -176,7 +176,7 @@ pub struct Seams {
     pub largest_m: [f64; 2],
     /// Root mean square of δX and δY, metres.
     pub rms_m: [f64; 2],
-    /// The same after LOCAL, where it ran.
+    /// Root mean square of δX and δY after LOCAL, where it ran.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub local_rms_m: Option<[f64; 2]>,
     /// Shrinkage by the two controls of EXTEND, before it was reversed.

@@ -11,12 +11,12 @@ use crate::judge::{Check, CheckKind, CheckOutcome::Fail};
 use areograph_config::NetConfig;
 use areograph_geom::plane::{Place, Stretch, stretch};
 
-/// Factor by which a picture may differ from its stated scale at all: beyond it, units are other ones.
+/// Factor by which a picture may differ from its stated scale at all: beyond it, the units differ.
 const SIZE_FACTOR: f64 = 2.0;
 /// Relative difference that a stated scale may have: it follows from the distance of the spacecraft, known to a
 /// hundredth at the worst, and the focal length, known to a thousandth.
 const SCALE_MAX: f64 = 0.02;
-/// The same in standard deviations of the adjusted scale, where those are larger: few and coarse controls.
+/// This limit in standard deviations of the adjusted scale, where it is larger: with few and coarse controls.
 const SCALE_SIGMAS: f64 = 3.0;
 /// Stretch that two maps of one net may have.
 const STRETCH_MAX: f64 = 0.01;
@@ -188,7 +188,7 @@ impl Scales {
         })
     }
 
-    /// What is not tested.
+    /// Remarks on properties that are not tested.
     pub(super) fn remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
         if self.pictures.is_empty() {

@@ -22,7 +22,7 @@ use areograph_geom::plane::{
 /// Deviations below this share of a figure's size are rounding, as are redundancies below it.
 const ROUNDING: f64 = 1e-9;
 
-/// Everything that the result is written from.
+/// All data from which the result is written.
 pub(super) struct Report<'a> {
     pub(super) config: &'a NetConfig,
     pub(super) data: &'a NetData,
@@ -82,7 +82,7 @@ impl Report<'_> {
         of_point.iter().map(mean).collect()
     }
 
-    /// Mean of the images of points that were left out as a whole.
+    /// Mean of the images of points that were left out completely.
     fn places_of_removed(&self, places: &[Option<Place>]) -> BTreeMap<usize, Place> {
         let mut sums: BTreeMap<usize, (Place, f64)> = BTreeMap::new();
         for measured in &self.data.net.measurements {

@@ -9,8 +9,8 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-/// How long a file must have been unchanged before it was read, seconds. File systems count time in steps: of two
-/// changes within one step, the second leaves no trace. The coarsest in use count 2 s.
+/// Time for which a file must have been unchanged before it was read, seconds. File systems count time in steps: the
+/// second of two changes within one step leaves no trace. The coarsest in use count 2 s.
 const STEADY_S: u64 = 2;
 
 /// Identity of a file in the file system; writing to a file changes its times, within the resolution of the system.
@@ -66,7 +66,7 @@ pub struct KnownFile {
     pub blake3: [u8; 32],
     /// Version of the check of kernels that its content passed; 0 for none.
     pub checked: u32,
-    /// When it was read, seconds of UTC since 1970.
+    /// Time at which it was read, seconds of UTC since 1970.
     pub read_s: u64,
 }
 

@@ -25,16 +25,16 @@ const KIND_BYTES: u64 = 512;
 /// A mark of this number of bytes is recognised if one of them is damaged.
 const DAMAGED_MARK_MIN: usize = 8;
 
-/// How files of one kind are recognised.
+/// Mark by which files of one kind are recognised.
 #[derive(Debug, Clone, Copy)]
 pub struct Mark {
     /// The name of such a file in messages: "a page that areograph wrote".
     pub what: &'static str,
-    /// Where the mark is.
+    /// Place of the mark.
     pub at: MarkAt,
 }
 
-/// Where the mark of a file is.
+/// Place of the mark of a file.
 #[derive(Debug, Clone, Copy)]
 pub enum MarkAt {
     /// These bytes begin the file; one of them may be damaged, or the file may end within them.

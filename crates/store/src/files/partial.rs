@@ -93,7 +93,7 @@ fn is_held(entry: &File, path: &Path) -> bool {
     }
 }
 
-/// The same as [`remove_abandoned`], once for each folder in a process.
+/// Calls [`remove_abandoned`] once for each folder in a process.
 fn remove_abandoned_once(folder: &Path) {
     static SEEN: LazyLock<Mutex<BTreeSet<PathBuf>>> = LazyLock::new(Mutex::default);
     let mut seen = SEEN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -103,11 +103,11 @@ fn remove_abandoned_once(folder: &Path) {
     }
 }
 
-/// Removes what killed commands left in `folder`. Files of other programs, and those of a living writer, remain.
+/// Removes the remains of killed commands in `folder`. Files of other programs, and of a living writer, remain.
 pub fn remove_abandoned(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         if is_temporary(&entry.file_name()) {
-            // What cannot be removed does no harm.
+            // An entry that cannot be removed does no harm.
             let _ = remove_if_abandoned(&entry.path());
         }
     }

@@ -18,25 +18,25 @@ use areograph_base::error::{IoError, Locate, Result};
 #[derive(Debug)]
 pub struct StagedFile {
     path: PathBuf,
-    /// How an earlier file under its name is recognised; `None` in folders of areograph itself.
+    /// Mark by which an earlier file under its name is recognised; `None` in folders of areograph itself.
     mark: Option<Mark>,
     temporary: NamedTempFile,
 }
 
 impl StagedFile {
-    /// Creates the file `path`, and its folder if it is missing, in a folder whose files are all those of areograph.
+    /// Creates the file `path`, and its folder if it is missing, in a folder whose files all belong to areograph.
     ///
     /// # Errors
-    /// The folder cannot be created or written; another kind of entry has this name.
+    /// The folder cannot be created or written; a different kind of entry has this name.
     pub fn create(path: &Path) -> Result<Self> {
         require_replaceable(path)?;
         Self::staged(path, None)
     }
 
-    /// The same at a path of the user, where an existing file is replaced only if it has this mark.
+    /// Creates a file at a path of the user, where an existing file is replaced only if it has this mark.
     ///
     /// # Errors
-    /// As [`Self::create`], and those of [`require_own`].
+    /// As [`Self::create`] and [`require_own`].
     pub fn replacing(path: &Path, mark: Mark) -> Result<Self> {
         require_own(path, &mark)?;
         Self::staged(path, Some(mark))

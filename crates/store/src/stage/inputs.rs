@@ -192,7 +192,7 @@ impl Inputs {
         hasher.finalize().to_hex().to_string()
     }
 
-    /// Names of the inputs that differ from those of `earlier`, or exist only here or there.
+    /// Names of the inputs that differ from the inputs of `earlier`, or exist only here or there.
     #[must_use]
     pub fn changed_since(&self, earlier: &Self) -> Vec<String> {
         let mut changes = Vec::new();

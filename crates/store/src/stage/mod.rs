@@ -3,9 +3,9 @@
 //! [`stage_inputs!`](crate::stage_inputs) declares the struct of the inputs of a stage. Its fields are its
 //! fingerprint: a value that is not a field cannot be used, and a field cannot be forgotten.
 //!
-//! A rerun names the field that changed. Of the kernels a stage sees a `KernelView`: kernels outside its fingerprint
-//! are not loaded. A stage calls no other stage, prints nothing and does not know the files of another stage; long
-//! stages count their steps (`base/watch`).
+//! A rerun names the field that changed. A stage sees the kernels as a `KernelView`: kernels outside its fingerprint
+//! are not loaded. A stage calls no other stage, writes nothing to the terminal and does not know the files of another
+//! stage; long stages count their steps (`base/watch`).
 //!
 //! Outputs enter fingerprints by content: an early stage that gives the same bytes again ends the chain of reruns. A
 //! change of the computation raises the `METHOD` of the stage. `docs/methods.csv` holds the output of every stage for
@@ -111,10 +111,10 @@ pub trait Stage {
     /// Computes the output. `stop` is checked inside long loops.
     ///
     /// # Errors
-    /// Those of the stage; [`Stopped`](areograph_base::error::Stopped).
+    /// Errors of the stage; [`Stopped`](areograph_base::error::Stopped).
     fn run(&self, stop: &AtomicBool) -> Result<Self::Output>;
 
-    /// The same, counting the steps of long loops; identical for a stage that counts none.
+    /// Computes the output and counts the steps of long loops; identical for a stage that counts none.
     ///
     /// # Errors
     /// As [`Stage::run`].

@@ -45,7 +45,7 @@ struct Stored<T> {
     read: fn(&Path, &str) -> Option<T>,
     /// Set when it cannot be read.
     lost: Arc<AtomicBool>,
-    /// Removes rows that nobody uses any more.
+    /// Removes rows that are no longer used.
     drop_rows: Option<fn(&mut T)>,
 }
 
@@ -55,7 +55,7 @@ struct Stored<T> {
 #[cause(Io: "run with --force, which computes all outputs anew")]
 struct Lost(String);
 
-/// The same output; the value is shared.
+/// A clone shares the value.
 impl<T> Clone for Output<T> {
     fn clone(&self) -> Self {
         Self {
@@ -112,7 +112,7 @@ impl<T> Output<T> {
         Self { label, known: None }
     }
 
-    /// The same output, by its origin, without the rows that `drop_rows` removes; unchanged if it is shared.
+    /// The output, by its origin, without the rows that `drop_rows` removes; unchanged if it is shared.
     #[must_use]
     pub fn without_rows(mut self, drop_rows: fn(&mut T)) -> Self {
         if let Some(known) = self.known.as_mut().and_then(Arc::get_mut) {

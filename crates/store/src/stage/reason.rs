@@ -1,8 +1,8 @@
-//! Why a stage runs.
+//! Reasons why a stage runs.
 
 use std::fmt;
 
-/// Why a stage runs, or that it does not.
+/// Reason why a stage runs, or the statement that it does not.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Reason {
     /// Nothing changed: the stored output is used.

@@ -17,8 +17,8 @@ use crate::{
     units::METRES_PER_KM,
 };
 
-/// Records the largest distance of a corner of each image from its position by the kernels, and warns of images for
-/// which it exceeds the tolerance of the search. Images that the kernels do not cover remain unchanged.
+/// Records the largest distance of a corner of each image from its position according to the kernels, and warns of
+/// images for which it exceeds the tolerance of the search. Images that the kernels do not cover remain unchanged.
 ///
 /// # Errors
 /// Kernels that cannot be read; an image that no camera can have taken.
@@ -33,8 +33,8 @@ pub(super) fn compare(found: &mut [Found], metakernel: &Path) -> Result<()> {
         distances_m.extend(found.off_kernels_m);
         if let Some(off_m) = found.off_kernels_m.filter(|off_m| !(*off_m <= allowed_m)) {
             tracing::warn!(
-                "{}: its corners are up to {:.1} km from their positions by the kernels; the search allows {:.1} km, so similar images \
-                 may have been missed",
+                "{}: its corners are up to {:.1} km from their positions computed from the kernels; the search allows \
+                 {:.1} km, so similar images may have been missed",
                 found.image.product_id,
                 kilometres(off_m),
                 kilometres(allowed_m)

@@ -47,7 +47,7 @@ fn pair(images: [&Found; 2]) -> Option<Pair<'_>> {
     let [one, other] = images;
     let overlap = one.outline.overlap(&other.outline);
     let is_one_orbit = is_one_orbit(&one.image, &other.image);
-    // Context images are taken together with those of the narrow angle: they have no base.
+    // Context images are taken together with narrow-angle images and form no stereo base.
     if overlap <= 0.0 || is_one_orbit == Some(true) {
         return None;
     }

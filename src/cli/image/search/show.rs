@@ -8,7 +8,7 @@ use crate::{
     units::{METRES_PER_KM, RADIANS_PER_DEGREE, SECONDS_PER_MS},
 };
 
-/// Pairs that are printed for reading; all are counted.
+/// Pairs that are shown for reading; all are counted.
 const PAIRS_PRINTED: usize = 20;
 
 /// Degrees with two digits, as in the index; empty for an unknown angle.

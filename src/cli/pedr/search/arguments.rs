@@ -41,7 +41,7 @@ pub(in crate::cli::pedr) struct Arguments {
     /// Report every bad record of the files, not only those near the windows.
     #[arg(long)]
     pub(super) check_all: bool,
-    /// Format of the shots; by default that of the extension of --out; without --out shots are only counted.
+    /// Format of the shots; by default from the extension of --out; without --out shots are only counted.
     #[arg(long, value_enum)]
     pub(super) format: Option<Format>,
     /// File to write.

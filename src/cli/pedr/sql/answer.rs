@@ -20,7 +20,7 @@ use crate::{
     sql::{as_table, as_text, as_text_schema},
 };
 
-/// Rows of a table that is printed.
+/// Maximum number of rows of a table on the terminal.
 const TABLE_ROWS_MAX: usize = 1_000;
 
 /// Rows that cannot be written as requested.
@@ -40,7 +40,7 @@ impl NotWritten {
     }
 }
 
-/// Where an answer goes.
+/// Destination of an answer.
 pub(super) enum Answer {
     /// A table on standard output.
     Table {

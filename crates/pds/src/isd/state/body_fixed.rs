@@ -45,7 +45,7 @@ impl BodyFixed {
         let position_m: Vec<Vector3<f64>> = position_m.collect();
         if let Some(row) = position_m.iter().position(|at| !(at.norm() >= radii_m[1])) {
             let expected = format!(
-                "positions at least {} m from the centre of the target; that of epoch {row} is {:.1} m from it",
+                "positions at least {} m from the centre of the target; the position of epoch {row} is {:.1} m from it",
                 radii_m[1],
                 position_m[row].norm()
             );
@@ -58,7 +58,7 @@ impl BodyFixed {
             // Written so that NaN is rejected too.
             if !((length - 1.0).abs() <= UNIT_TOLERANCE) {
                 let expected = format!(
-                    "unit quaternions (x, y, z, w); that of epoch {row} has length {length}"
+                    "unit quaternions (x, y, z, w); the quaternion of epoch {row} has length {length}"
                 );
                 return Err(document.refused("m_quaternions", expected));
             }
@@ -216,7 +216,7 @@ pub(super) fn radii_m(document: &Object<'_>) -> Result<[f64; 2], IsdError> {
     Ok([equatorial_m, polar_m])
 }
 
-/// The body with these radii: its frame is that of the state, which does not name it.
+/// The body with these radii: the state uses its frame, but does not name it.
 fn body_of(document: &Object<'_>, radii_m: [f64; 2]) -> Result<Body, IsdError> {
     let has_them = |body: &Body| {
         let model = body.model();
@@ -246,7 +246,7 @@ fn rows<const N: usize>(document: &Object<'_>, key: &str) -> Result<Vec<[f64; N]
     Err(document.refused(key, expected))
 }
 
-/// The same, as many numbers as the state declares under `count`.
+/// The rows, with as many numbers as the state declares under `count`.
 fn counted_rows<const N: usize>(
     document: &Object<'_>,
     key: &str,

@@ -1,16 +1,16 @@
 //! The state of a line scanner of usgscsm, as `csminit` of ISIS keeps it in a cube: read as the support data that it was made of.
 //!
-//! A state has positions and attitudes in the frame of the body, metres and quaternions (x, y, z, w) of camera to body, at
-//! uniform epochs from `m_centerEphemerisTime`. The rotation of the body is not in it; the one of the products takes its place,
-//! so that what the state places on the ground stays there. The bus is not in it either: its code is 0, and what needs it (the beam
-//! of the laser) is not tested. Every value then goes through the reader of support data.
+//! A state has positions and attitudes in the frame of the body, metres and quaternions (x, y, z, w) of camera to body,
+//! at uniform epochs from `m_centerEphemerisTime`. The rotation of the body is not in it; the products' rotation takes
+//! its place, so that the ground positions of the state are unchanged. The bus is not in it either: its code is 0, and
+//! the beam of the laser, which needs the bus, is not tested. Every value then goes through the reader of support data.
 //!
 //! A state with corrections of its parameters (`m_currentParameterValue`, by `jigsaw`) is refused.
 //!
 //! # Source
-//! `UsgsAstroLsSensorModel` of usgscsm: `constructStateFromIsd`, `getModelState` (newer versions write a line with the name of the
-//! model before it), `losToEcf` and `getImageTime`. Its Sun has as many intervals as epochs, hence another step than its support data;
-//! here the Sun's epochs are spread over the positions, as in ALE's files.
+//! `UsgsAstroLsSensorModel` of usgscsm: `constructStateFromIsd`, `getModelState` (newer versions write a line with the
+//! name of the model before it), `losToEcf` and `getImageTime`. Its Sun has as many intervals as epochs, hence a step
+//! different from its support data; here the Sun's epochs are spread over the positions, as in ALE's files.
 
 mod body_fixed;
 
@@ -30,7 +30,7 @@ const NUMBERS_MAX: usize = 1 << 25;
 const RADIAL: u32 = 0;
 const LROLROCNAC: u32 = 4;
 const DISTORTIONS_MAX: u32 = 1_000;
-/// Keys of support data, and those of a state with the same meaning; the longer of two alike first.
+/// Keys of support data, and keys of a state with the same meaning; the longer of two alike first.
 const NAMES: [(&str, &str); 24] = [
     (
         "line_scan_rate",
@@ -77,15 +77,15 @@ pub(crate) enum StateError {
     #[error("state of the camera model: {0}")]
     Content(IsdError),
     #[error(
-        "the state is that of the camera model {model}; expected {LINE_SCANNER}: frame, push-frame, radar and projected models \
-         have no line of detector pixels with times of its own"
+        "the state belongs to the camera model {model}; expected {LINE_SCANNER}: frame, push-frame, radar and projected \
+         models have no line of detector pixels with times of its own"
     )]
     #[cause("configure the image by label and kernels, or leave it out")]
     Model { model: String },
 }
 
 impl StateError {
-    /// Requires the name of a model to be that of line scanners.
+    /// Requires a model name of line scanners.
     pub(crate) fn unless_line_scanner(model: &str) -> std::result::Result<(), Self> {
         if model == LINE_SCANNER {
             return Ok(());
@@ -95,11 +95,12 @@ impl StateError {
     }
 }
 
-/// Support data from the text of a state; `camera` – the NAIF code of the camera, in place of that of the state, usually 0.
+/// Support data from the text of a state; `camera` – the NAIF code of the camera, in place of the state's code, usually
+/// 0.
 ///
 /// # Errors
-/// Invalid JSON; another model; a state with corrections; a key that is missing or has an invalid value; lists of other lengths
-/// than the state declares; whatever is refused of support data.
+/// Invalid JSON; another model; a state with corrections; a key that is missing or has an invalid value; lists whose
+/// lengths differ from the state's declaration; any fault for which support data are refused.
 pub(crate) fn support_of_state(text: &[u8], camera: Option<i32>) -> Result<ImageSupport> {
     let state = json_of(text)?;
     let isd = Object::document(&state)
@@ -249,7 +250,7 @@ fn distortion(document: &Object<'_>, state: &Value) -> std::result::Result<Value
     }
 }
 
-/// A whole number that usgscsm wrote with a decimal point; any other value unchanged, for its own refusal.
+/// A whole number that usgscsm wrote with a decimal point; any other value unchanged, so that it is refused separately.
 fn whole(value: &Value) -> Value {
     let number = value.as_f64();
     let number = number.filter(|number| number.fract().abs() <= 0.0 && (0.0..1e9).contains(number));

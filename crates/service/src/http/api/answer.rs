@@ -22,7 +22,7 @@ pub(super) fn answer<T: Serialize>(app: &App, document: &T) -> Result<Response, 
     Ok(response)
 }
 
-/// The same with another status.
+/// Answers with a different status.
 pub(super) fn answer_with<T: Serialize>(
     app: &App,
     status: StatusCode,

@@ -209,13 +209,17 @@ fn of_products(data: &DataStatus) -> Vec<Gauge> {
             ),
             plain(
                 "last_scrub_runs",
-                "Runs whose products that check read",
+                "Runs whose products the last check after a night read",
                 scrub.runs as f64,
             ),
-            plain("last_scrub_bytes", "Bytes that it read", scrub.bytes as f64),
+            plain(
+                "last_scrub_bytes",
+                "Bytes that the last check after a night read",
+                scrub.bytes as f64,
+            ),
             plain(
                 "last_scrub_damaged_runs",
-                "Runs in which it found damaged products",
+                "Runs in which the last check after a night found damaged products",
                 scrub.damaged_runs as f64,
             ),
         ]);
@@ -223,7 +227,7 @@ fn of_products(data: &DataStatus) -> Vec<Gauge> {
     if let Some(loss) = &data.database_loss {
         gauges.push(plain(
             "database_lost_seconds",
-            "When a lost database was made again from the products, seconds of UTC since 1970",
+            "Time at which a lost database was made again from the products, seconds of UTC since 1970",
             loss.at_utc.0 as f64 / 1e3,
         ));
     }

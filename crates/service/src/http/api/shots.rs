@@ -35,7 +35,7 @@ const ROWS: u64 = 1_000_000;
 const CORNERS: usize = 10_000;
 /// Longest polygon as text, bytes.
 const BODY: usize = 1 << 20;
-/// Longest time for a search, seconds: shorter than that of a request.
+/// Longest time for a search, seconds: shorter than the time for a request.
 const DEADLINE_S: f64 = 25.0;
 const COMPLETE: HeaderName = HeaderName::from_static("areograph-complete");
 const ROW_COUNT: HeaderName = HeaderName::from_static("areograph-rows");

@@ -8,7 +8,7 @@ use crate::{
     words::counted,
 };
 
-/// What needs attention: list items.
+/// Points that need attention: list items.
 pub(super) fn attention(data: &DataStatus, recovering: bool) -> Markup {
     let products = &data.products;
     html! {

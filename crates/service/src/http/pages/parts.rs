@@ -39,7 +39,7 @@ impl Times {
         }
     }
 
-    /// The same, or a dash.
+    /// The instant, or a dash.
     pub(super) fn maybe(&self, instant: Option<Instant>) -> Markup {
         html! { @match instant { Some(instant) => (self.at(instant)), None => "–" } }
     }

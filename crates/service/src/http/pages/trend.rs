@@ -28,7 +28,7 @@ pub(super) struct KernelChange {
 }
 
 impl KernelChange {
-    /// From the kernels of `before` to those of `after`.
+    /// From the kernels of `before` to the kernels of `after`.
     pub(super) fn between(before: &Run, after: &Run) -> Self {
         let (before, after) = (kernels(before), kernels(after));
         let named = |set: &BTreeSet<&String>| set.iter().map(|name| (*name).clone()).collect();

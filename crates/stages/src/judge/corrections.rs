@@ -1,0 +1,122 @@
+//! Corrections of orientations beyond what their a priori standard deviations allow.
+
+use super::{
+    AdjustmentEvidence, Check, CheckKind,
+    CheckOutcome::{Fail, Pass, Warning},
+    adjustment::SCATTER_LARGE_PX,
+};
+use crate::adjust::CorrectedImage;
+use areograph_config::LimitsConfig;
+use areograph_geom::bundle::Unknown;
+
+/// Drift and bend of the attitude up to this multiple of the limit are a remark: tie points determine them to a tenth of their
+/// a priori standard deviation, and residuals of C-kernels to a parabola (Shan et al. 2005, Table 4) exceed it.
+const DRIFT_MULTIPLE: f64 = 1.5;
+/// Rotations follow the nine coefficients of the position.
+const FIRST_ROTATION: usize = 9;
+
+/// The largest correction of an image.
+pub(super) struct LargestCorrection<'a> {
+    /// Identifier of the image.
+    image: &'a str,
+    /// The unknown, of image 0.
+    unknown: Unknown,
+    /// The correction in its standard deviations.
+    sigmas: f64,
+    /// Multiple of the limit beyond which it makes the site invalid.
+    multiple: f64,
+}
+
+impl LargestCorrection<'_> {
+    /// Written so that NaN exceeds every limit.
+    fn is_within(&self, limit: f64) -> bool {
+        self.sigmas <= limit
+    }
+
+    pub(super) fn check(&self, limits: &LimitsConfig) -> Check {
+        let limit = limits.correction_max_sigma;
+        let largest = self.multiple * limit;
+        let mut check = Check::new(
+            CheckKind::Correction,
+            self.image,
+            self.sigmas,
+            largest,
+            Fail,
+        );
+        if check.outcome == Pass && !self.is_within(limit) {
+            check.outcome = Warning;
+        }
+        check
+    }
+}
+
+impl AdjustmentEvidence<'_> {
+    /// The correction of each image that is largest against its limit.
+    pub(super) fn largest_corrections(&self) -> impl Iterator<Item = LargestCorrection<'_>> {
+        // Ties that contradict each other do not determine a drift.
+        let is_scattered = self.adjusted.summary.tie_scatter_px > SCATTER_LARGE_PX;
+        let multiple = move |coefficient: usize| {
+            let is_drift = coefficient >= FIRST_ROTATION && !coefficient.is_multiple_of(3);
+            if is_drift && !is_scattered {
+                DRIFT_MULTIPLE
+            } else {
+                1.0
+            }
+        };
+        let largest = move |image: &CorrectedImage| -> Option<(f64, usize)> {
+            let off = image.correction.iter().zip(&image.expected);
+            let off = off.map(|(value, expected)| value - expected);
+            let corrections = off.zip(&image.prior_sigmas).enumerate();
+            let known = corrections.filter(|(_, (_, sigma))| **sigma > 0.0 && sigma.is_finite());
+            let sigmas = known.map(|(index, (value, sigma))| ((value / sigma).abs(), index));
+            let used = |(sigmas, index): &(f64, usize)| sigmas / multiple(*index);
+            sigmas.max_by(|one, other| used(one).total_cmp(&used(other)))
+        };
+        self.adjusted.images.iter().filter_map(move |image| {
+            let (sigmas, coefficient) = largest(image)?;
+            Some(LargestCorrection {
+                image: &image.id,
+                unknown: Unknown::Orientation {
+                    image: 0,
+                    coefficient,
+                },
+                sigmas,
+                multiple: multiple(coefficient),
+            })
+        })
+    }
+
+    /// Reasons why corrections make the site invalid, one sentence each.
+    pub(super) fn corrected_too_far(&self, limits: &LimitsConfig) -> Vec<String> {
+        let limit = limits.correction_max_sigma;
+        let far = self.largest_corrections();
+        let far = far.filter(|of| !of.is_within(of.multiple * limit));
+        let far = far.map(|of| {
+            format!(
+                "image {}: the adjustment corrects its {} by {:.1} standard deviations, expected at most {limit}; check \
+                 its time, its kernels and pointing.ck_bias_s",
+                of.image,
+                of.unknown.quantity(),
+                of.sigmas
+            )
+        });
+        far.collect()
+    }
+
+    /// Remarks on drift and bend of attitudes beyond the limit.
+    pub(super) fn drifts(&self, limits: &LimitsConfig) -> Vec<String> {
+        let limit = limits.correction_max_sigma;
+        let drifts = self.largest_corrections();
+        let drifts = drifts.filter(|of| !of.is_within(limit) && of.is_within(of.multiple * limit));
+        let drifts = drifts.map(|of| {
+            format!(
+                "image {}: the adjustment corrects its {} by {:.1} standard deviations, usually at most {limit}: the attitude \
+                 drifts by more than assumed, or its time or summing is wrong",
+                of.image,
+                of.unknown.quantity(),
+                of.sigmas
+            )
+        });
+        drifts.collect()
+    }
+}
