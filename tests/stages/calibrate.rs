@@ -115,6 +115,19 @@ fn held_back(of: &Figures) -> &ControlFigures {
 
 /// Calibrated minus true places of points of a kind, east, north, up, metres, and over the stated standard deviations.
 fn errors_m(of: &Calibration, truth: &Value, kind: PointKind) -> Vec<[Vector3<f64>; 2]> {
+    let errors = all_errors_m(of, truth, kind).into_iter();
+    let normalised = |(error_m, sigma_m): (Vector3<f64>, Option<[f64; 3]>)| {
+        Some([error_m, error_m.component_div(&Vector3::from(sigma_m?))])
+    };
+    errors.filter_map(normalised).collect()
+}
+
+/// Errors of the points in use, and their standard deviations, unless these are withheld.
+fn all_errors_m(
+    of: &Calibration,
+    truth: &Value,
+    kind: PointKind,
+) -> Vec<(Vector3<f64>, Option<[f64; 3]>)> {
     let points = of
         .points
         .iter()
@@ -130,8 +143,7 @@ fn errors_m(of: &Calibration, truth: &Value, kind: PointKind) -> Vec<[Vector3<f6
             latitude.sin(),
         ) * radius_m;
         let error_m = local_axes(&place_m) * (found_m - place_m);
-        let sigma_m = Vector3::from(point.sigma_m?);
-        Some([error_m, error_m.component_div(&sigma_m)])
+        Some((error_m, point.sigma_m))
     };
     points.filter_map(error).collect()
 }

@@ -23,6 +23,7 @@ declare_table! {
         /// deviations: profiles that contradict each other are no control.
         profiles_apart_max_sigma: f64 = key(above_to(0.0, 1000.0)).or(4.0),
         /// Largest correction of an image's position or pointing by the adjustment, in its standard deviations.
+        /// Drift and bend of the attitude up to 1.5 times as large are a remark, because tie points determine them.
         correction_max_sigma: f64 = key(above_to(0.0, 1000.0)).or(4.0),
         /// Largest distance along the flight between two images at their tie points before the adjustment. Shan et
         /// al. 2005 find 225 to 271 m; the default corresponds to the rotation of the attitude in 3 s.

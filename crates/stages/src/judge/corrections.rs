@@ -111,7 +111,7 @@ impl AdjustmentEvidence<'_> {
         let drifts = drifts.map(|of| {
             format!(
                 "image {}: the adjustment corrects its {} by {:.1} standard deviations, usually at most {limit}: the attitude \
-                 drifts by more than assumed, or its time or summing is wrong",
+                 drifts by more than assumed, or the label states a wrong time or summing",
                 of.image,
                 of.unknown.quantity(),
                 of.sigmas
