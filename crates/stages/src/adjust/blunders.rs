@@ -19,6 +19,8 @@ const ROUNDS_MAX: u32 = 20;
 /// Each round rejects only points whose residual reaches this share of the largest: a blunder distorts its neighbours,
 /// which recover once it is removed.
 const SHARE_OF_LARGEST: f64 = 0.5;
+/// Solutions that show a scatter: where standard deviations are far too small, low weights hide a part of it at first.
+const SCATTER_ROUNDS: u32 = 4;
 /// Weights for networks with very many blunders.
 const WHERE_MANY: RobustWeight = RobustWeight::Cauchy {
     limit: RobustWeight::CAUCHY_LIMIT,
@@ -124,14 +126,19 @@ fn add_scatter<M: ExteriorOrientation>(
     low_weights: Option<&BundleOptions>,
     watch: Watch<'_>,
 ) -> bool {
-    // Low weights may alternate between solutions. The median of the residuals resists blunders as well.
-    let shown = low_weights.and_then(|options| solved(assembled, options, watch).ok());
-    let shown = shown.as_ref().or(first);
-    let scatter_px = shown.map_or(0.0, |shown| tie_scatter_px(assembled, shown));
-    if scatter_px > 0.0 {
+    let mut is_added = false;
+    for _ in 0..SCATTER_ROUNDS {
+        // Low weights may alternate between solutions. The median of the residuals resists blunders as well.
+        let shown = low_weights.and_then(|options| solved(assembled, options, watch).ok());
+        let shown = shown.as_ref().or(first.filter(|_| !is_added));
+        let scatter_px = shown.map_or(0.0, |shown| tie_scatter_px(assembled, shown));
+        if scatter_px <= 0.0 {
+            break;
+        }
         assembled.scatter_ties(scatter_px);
+        is_added = true;
     }
-    scatter_px > 0.0
+    is_added
 }
 
 /// Rejects the worst tie points of `adjustment`, adjusts again and repeats until none is beyond `limit`.

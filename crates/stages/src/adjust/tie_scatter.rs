@@ -68,11 +68,19 @@ pub(super) fn tie_scatter_px<M>(assembled: &Assembled<M>, adjustment: &Adjustmen
     high_px
 }
 
+/// Scatter along the track and the one expected across it, focal-plane pixels.
+fn of_axes_px(scatter_px: f64) -> Vector2<f64> {
+    let across_px = (ACROSS.sqrt() * scatter_px).min(SCATTER_MAX_PX);
+    Vector2::new(scatter_px, across_px)
+}
+
 impl<M> Assembled<M> {
-    /// Adds a scatter along the track, focal-plane pixels, and the one expected across it, to the standard deviations of all
-    /// measurements of tie points; once.
+    /// Adds a scatter along the track, focal-plane pixels, to the one so far, and adds both to the standard deviations of all
+    /// measurements of tie points, with the one expected across the track.
     pub(super) fn scatter_ties(&mut self, scatter_px: f64) {
-        let scatter_px_of_axes = Vector2::new(scatter_px, ACROSS.sqrt() * scatter_px);
+        let total_px = self.tie_scatter_px.hypot(scatter_px).min(SCATTER_MAX_PX);
+        let [before_px, after_px] = [self.tie_scatter_px, total_px].map(of_axes_px);
+        let added_px2 = after_px.component_mul(&after_px) - before_px.component_mul(&before_px);
         let shots = self.shots;
         let ties = self
             .network
@@ -80,8 +88,10 @@ impl<M> Assembled<M> {
             .iter_mut()
             .filter(|view| view.point >= shots);
         for view in ties {
-            view.sigma_px = view.sigma_px.zip_map(&scatter_px_of_axes, f64::hypot);
+            view.sigma_px = view.sigma_px.zip_map(&added_px2, |sigma_px, added_px2| {
+                (sigma_px * sigma_px + added_px2).sqrt()
+            });
         }
-        self.tie_scatter_px = scatter_px;
+        self.tie_scatter_px = total_px;
     }
 }
