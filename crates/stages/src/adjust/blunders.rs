@@ -4,7 +4,7 @@ use super::{
     heights::height_blunders,
     network::Assembled,
     points::{PointKind, RejectedPoint, RejectionReason},
-    tie_scatter::tie_scatter_px,
+    tie_scatter::{SCATTER_MAX_PX, tie_scatter_px},
 };
 use areograph_base::watch::Watch;
 use areograph_config::AdjustmentConfig;
@@ -137,6 +137,9 @@ fn add_scatter<M: ExteriorOrientation>(
         }
         assembled.scatter_ties(scatter_px);
         is_added = true;
+        if assembled.tie_scatter_px >= SCATTER_MAX_PX {
+            break;
+        }
     }
     is_added
 }

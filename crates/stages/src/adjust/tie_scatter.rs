@@ -25,7 +25,7 @@ const RESIDUALS_MIN: usize = 40;
 /// Residuals with less redundancy hardly show an error.
 const REDUNDANCY_MIN: f64 = 0.05;
 /// Largest scatter that may be jitter, focal-plane pixels: 5 µrad are 1.4 pixels of the narrow-angle camera.
-const SCATTER_MAX_PX: f64 = 1.5;
+pub(super) const SCATTER_MAX_PX: f64 = 1.5;
 /// Halvings of the interval in which the scatter is searched: to 1e-6 pixels.
 const HALVINGS: u32 = 21;
 
