@@ -370,10 +370,10 @@ fn measurements_weigh_by_their_own_standard_deviations() {
 
 #[test]
 fn blunders_are_found_and_good_ties_kept() {
-    const RUNS: u64 = 5;
     const BLUNDERS: usize = 8; // 5 % of 154
+    let runs = if common::long() { 5 } else { 2 };
     let (mut found, mut false_alarms, mut clean) = (0, 0, 0);
-    for run in 0..RUNS {
+    for run in 0..runs {
         let mut site = Site::of(Recipe {
             seed: 100 + run,
             ..Recipe::GUSEV
@@ -430,7 +430,7 @@ fn blunders_are_found_and_good_ties_kept() {
     }
     println!("found {found}, false {false_alarms} of {clean}");
     assert!(
-        f64::from(found) >= 0.95 * (RUNS as f64) * BLUNDERS as f64,
+        f64::from(found) >= 0.95 * (runs as f64) * BLUNDERS as f64,
         "{found}"
     );
     assert!(
@@ -492,7 +492,7 @@ fn scatter_beyond_the_standard_deviations_is_no_blunder() {
 #[test]
 fn blunders_that_leave_no_common_solution_are_found() {
     let mut site = Site::of(Recipe {
-        ties: 2_000,
+        ties: if common::long() { 2_000 } else { 1_000 },
         tie_noise: 0.3,
         ..Recipe::GUSEV
     });
@@ -524,7 +524,8 @@ fn blunders_that_leave_no_common_solution_are_found() {
         .iter()
         .filter(|tie| !tie.is_multiple_of(20))
         .count();
-    assert!(good <= 4, "{good} good ties of 1900 were lost"); // 0.2 %
+    // 0.2 %.
+    assert!(500 * good <= site.ties.len(), "{good} good ties were lost");
 }
 
 #[test]

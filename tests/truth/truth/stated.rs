@@ -284,7 +284,7 @@ fn counts(sites: &[Site]) -> String {
     let ([sound, refused], [misplaced, noticed]) = (invalid(false), invalid(true));
     let ties = TieCounts::of(sites);
     format!(
-        "{refused} of {sound} sites with correctly placed profiles are invalid, and {noticed} of {misplaced} with a misplaced profile. \
+        "Invalid sites: {refused} of {sound} with correctly placed profiles, {noticed} of {misplaced} with a misplaced profile. \
          The valid sites lost {} of {} good tie points; blunders kept: {}.\n",
         ties.lost, ties.good, ties.kept_blunders
     )
@@ -330,7 +330,7 @@ were invalid. Since then, drifts of up to six standard deviations are a remark, 
 the ratios below by at most 0.02.
 
 The correlation of a profile with the roll of its image (`common_bus`) was introduced because of the missions from 60,001, where the ratio
-east had been 1.30. The expected scatter of tie points across the track was tried in 16 missions from 80,001, which are in no table.
+east had been 1.30. The expected scatter of tie points across the track was chosen with 16 other missions (seeds from 80,001), which the tables do not include.
 
 Below each table, the page lists the quantities that exceed their standard deviations. The causes:
 

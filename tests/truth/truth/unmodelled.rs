@@ -372,9 +372,9 @@ Sites that are valid with remarks count as valid. *Answer*:
 - *stated as not tested*: a ratio exceeds these limits. Terminal, page and manifest list errors of this kind as not tested; larger ones can
   make a site invalid.
 
-A drift of 0.08 mrad is eight times the standard deviation that areograph assumes. Tie points determine this drift. A correction of up to
-six standard deviations is a remark. Beyond that the site is invalid, although its result is right: no other check detects a wrong
-`CROSSTRACK_SUMMING` in both labels, which moves the ground by 707 m.
+A drift of 0.08 mrad is eight times the standard deviation that areograph assumes. Tie points determine this drift. A correction of drift or bend
+by four to six standard deviations leads to a remark. A larger one makes the site invalid even if the result is correct, because no other check
+detects a wrong `CROSSTRACK_SUMMING` in both labels, which moves the ground by 707 m.
 
 | error | sites | invalid | height | east | north | single heights | footprints | answer |
 |---|---:|---:|---:|---:|---:|---:|---:|---|

@@ -166,6 +166,9 @@ fn shared_rotation<M: ExteriorOrientation>(
     let mut of_profile = shots.shots.iter().filter(|shot| shot.profile == profile);
     let range = of_profile.find_map(|shot| shot.range.as_ref())?;
     let image = &images[range.image];
+    if !image.sigmas[ROLL].is_finite() {
+        return None;
+    }
     let pose = image.oriented_camera.orientation.pose(range.x_lines);
     let beam = image.laser_axes?.column(2).into_owned();
     let by_roll_m = pose.mars_to_camera.tr_mul(&beam.cross(&Vector3::x())) * range.range_m;

@@ -27,6 +27,11 @@ pub(super) struct LargestCorrection<'a> {
     multiple: f64,
 }
 
+/// Whether a coefficient is of a drift or bend of the attitude.
+const fn is_drift(coefficient: usize) -> bool {
+    coefficient >= FIRST_ROTATION && !coefficient.is_multiple_of(3)
+}
+
 impl LargestCorrection<'_> {
     /// Written so that NaN exceeds every limit.
     fn is_within(&self, limit: f64) -> bool {
@@ -51,38 +56,35 @@ impl LargestCorrection<'_> {
 }
 
 impl AdjustmentEvidence<'_> {
-    /// The correction of each image that is largest against its limit.
+    /// Of each image the largest correction of position and constant rotation, and the largest drift or bend of its attitude.
     pub(super) fn largest_corrections(&self) -> impl Iterator<Item = LargestCorrection<'_>> {
         // Ties that contradict each other do not determine a drift.
         let is_scattered = self.adjusted.summary.tie_scatter_px > SCATTER_LARGE_PX;
-        let multiple = move |coefficient: usize| {
-            let is_drift = coefficient >= FIRST_ROTATION && !coefficient.is_multiple_of(3);
-            if is_drift && !is_scattered {
-                DRIFT_MULTIPLE
-            } else {
-                1.0
-            }
-        };
-        let largest = move |image: &CorrectedImage| -> Option<(f64, usize)> {
+        let of_drift = if is_scattered { 1.0 } else { DRIFT_MULTIPLE };
+        let largest = |image: &CorrectedImage, drift: bool| -> Option<(f64, usize)> {
             let off = image.correction.iter().zip(&image.expected);
             let off = off.map(|(value, expected)| value - expected);
             let corrections = off.zip(&image.prior_sigmas).enumerate();
-            let known = corrections.filter(|(_, (_, sigma))| **sigma > 0.0 && sigma.is_finite());
+            let known = corrections.filter(|(index, (_, sigma))| {
+                **sigma > 0.0 && sigma.is_finite() && is_drift(*index) == drift
+            });
             let sigmas = known.map(|(index, (value, sigma))| ((value / sigma).abs(), index));
-            let used = |(sigmas, index): &(f64, usize)| sigmas / multiple(*index);
-            sigmas.max_by(|one, other| used(one).total_cmp(&used(other)))
+            sigmas.max_by(|one, other| one.0.total_cmp(&other.0))
         };
-        self.adjusted.images.iter().filter_map(move |image| {
-            let (sigmas, coefficient) = largest(image)?;
-            Some(LargestCorrection {
-                image: &image.id,
-                unknown: Unknown::Orientation {
-                    image: 0,
-                    coefficient,
-                },
-                sigmas,
-                multiple: multiple(coefficient),
-            })
+        self.adjusted.images.iter().flat_map(move |image| {
+            let found = [(false, 1.0), (true, of_drift)].map(|(drift, multiple)| {
+                let (sigmas, coefficient) = largest(image, drift)?;
+                Some(LargestCorrection {
+                    image: &image.id,
+                    unknown: Unknown::Orientation {
+                        image: 0,
+                        coefficient,
+                    },
+                    sigmas,
+                    multiple,
+                })
+            });
+            found.into_iter().flatten()
         })
     }
 
@@ -93,11 +95,12 @@ impl AdjustmentEvidence<'_> {
         let far = far.filter(|of| !of.is_within(of.multiple * limit));
         let far = far.map(|of| {
             format!(
-                "image {}: the adjustment corrects its {} by {:.1} standard deviations, expected at most {limit}; check \
+                "image {}: the adjustment corrects its {} by {:.1} standard deviations, expected at most {}; check \
                  its time, its kernels and pointing.ck_bias_s",
                 of.image,
                 of.unknown.quantity(),
-                of.sigmas
+                of.sigmas,
+                of.multiple * limit
             )
         });
         far.collect()
