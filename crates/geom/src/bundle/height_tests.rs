@@ -14,7 +14,7 @@ use super::{
     solve,
     solve::{Stop, settle},
     tests::{dense_rows, layout, network},
-    unknowns::State,
+    unknowns::{State, Unknown},
 };
 use crate::{
     ellipsoid::height_m,
@@ -329,8 +329,13 @@ pub(super) fn are_those_of_the_dense_equations(
     // Redundancy numbers add up to observations minus unknowns.
     let mut sum = sum_of_redundancies(&adjustment);
     for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
-        let variance = prior_variance(&layout, &cofactors, column);
-        sum += 1.0 - variance / sigma.powi(2);
+        let redundancy = 1.0 - prior_variance(&layout, &cofactors, column) / sigma.powi(2);
+        sum += redundancy;
+        if let Unknown::ProfileShift { profile, axis } = layout.columns.unknowns[column] {
+            let bus = adjustment.common_bus.as_ref().unwrap();
+            let stated = bus.profile_shifts_m[profile][axis].prior.unwrap();
+            assert!((stated.redundancy - redundancy).abs() < 1e-9, "{axis}"); // rounding
+        }
     }
     let spots = adjustment.common_bus.iter().flat_map(|bus| &bus.spots);
     let spots: Vec<_> = spots.flatten().flatten().collect();

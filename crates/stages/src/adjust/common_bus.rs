@@ -28,9 +28,9 @@ use areograph_geom::{
 /// and interpolation of attitudes. The recorded footprint has a separate error.
 const SPOT_SIGMA_PX: f64 = 0.5;
 /// Share of the attitude error of the bus that coordinates of PEDR files contain, and its standard deviation: they are computed
-/// from telemetry of the same attitude, and crossovers remove an unknown part of its error. Rolls have 160 m on the ground (0.4
-/// mrad), coordinates of files 100 m (Neumann et al. 2001), hence the share is below 0.6. The values are a choice: synthetic missions with shares drawn up to 0.4 at nadir
-/// and to 1 off nadir hold it (`tests/truth/truth/stated.rs`).
+/// from telemetry of the same attitude, and crossovers remove an unknown part of its error. A roll of 0.4 mrad is 160 m on the
+/// ground, and coordinates of files have 100 m (Neumann et al. 2001), so that the share is below 0.6 at nadir. The values are a
+/// choice; missions with shares up to 0.4 at nadir and 1 off nadir test them (`tests/truth/truth/stated.rs`).
 const ATTITUDE_IN_FILES: [f64; 2] = [0.25, 0.25];
 /// Index of the constant rotation about the camera's x axis, which moves an image across its track.
 const ROLL: usize = 9;
