@@ -114,8 +114,7 @@ fn overview(adjusted: &Adjusted) -> String {
     if summary.tie_scatter_px > 0.0 {
         html += &sentence(
             "Tie points scatter by {} px along the track in addition to their stated σ, as expected from attitude \
-            jitter. The σ of the adjustment \
-             include this scatter, and 1.4 times as much across the track, where residuals do not show it.",
+             jitter. The σ of the adjustment include this scatter, and 1.4 times as much (at most 1.5 px) across the track, where residuals do not show it.",
             &[(label(summary.tie_scatter_px, 2), &*at("/tie_scatter_px"))],
         );
     }

@@ -11,7 +11,7 @@ use super::{
 use areograph_base::{error::Result, ties::reasons, units::RADIANS_PER_DEGREE};
 use areograph_geom::statistics::Summary;
 use areograph_products::SiteProducts;
-use areograph_stages::map_surface::{ShotComparison, SurfaceAccount};
+use areograph_stages::map_surface::{SHOTS_MIN, ShotComparison, SurfaceAccount};
 
 /// More profiles than this are folded.
 const PROFILES_SHOWN: usize = 6;
@@ -104,6 +104,7 @@ fn made(site: &SiteProducts, account: &SurfaceAccount) -> String {
 fn compared(account: &SurfaceAccount) -> String {
     let ShotComparison {
         above_m,
+        attitude_sigma_m,
         sigma_m,
         spread_sigmas,
         profiles,
@@ -116,10 +117,11 @@ fn compared(account: &SurfaceAccount) -> String {
     }
     let mut single = shots_table("MOLA minus the terrain model by profile, metres");
     for (index, profile) in profiles.iter().enumerate() {
-        let name = if profile.is_at_nadir {
-            profile.profile.clone()
+        let id = &profile.profile;
+        let name = if profile.attitude_sigma_m > 0.0 {
+            format!("{id} (attitude: ±{:.0} m)", profile.attitude_sigma_m)
         } else {
-            format!("{} (off nadir)", profile.profile)
+            id.clone()
         };
         single.row_of(
             &format!("surface.json#/mola_minus_surface/profiles/{index}/above_m"),
@@ -132,16 +134,16 @@ fn compared(account: &SurfaceAccount) -> String {
         "Single profiles",
         &single.finish(),
     );
-    if above_m.n == 0 {
-        let only = "Only profiles off nadir lie on the model. Attitude errors change their heights, so that they do not \
-            test those of the model.";
-        return paragraph(only) + &single;
-    }
     let mut all = shots_table("MOLA minus the terrain model, metres");
+    let name = if *attitude_sigma_m > 0.0 {
+        "all profiles"
+    } else {
+        "all at nadir"
+    };
     all.row_of(
         "surface.json#/mola_minus_surface/all",
         true,
-        summary_row("all at nadir", above_m),
+        summary_row(name, above_m),
     );
     let words = if account.shots_take_part {
         "MOLA controlled heights of the adjustment: the mean shows how well that control was met; the scatter about it is \
@@ -154,7 +156,16 @@ fn compared(account: &SurfaceAccount) -> String {
         label(*sigma_m, 1),
         label(*spread_sigmas, 2)
     );
-    all.finish() + &paragraph(&format!("{words} {spread}")) + &single
+    let attitude = if *attitude_sigma_m > 0.0 {
+        format!(
+            " Fewer than {SHOTS_MIN} shots at nadir lie on the model. Attitude errors shift the heights of the other profiles by up to \
+             {} m (σ).",
+            label(*attitude_sigma_m, 0)
+        )
+    } else {
+        String::new()
+    };
+    all.finish() + &paragraph(&format!("{words} {spread}{attitude}")) + &single
 }
 
 fn shots_table(caption: &str) -> Table {

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{convert_datum::Converted, tag_times::ImageTimes};
 use areograph_base::{
+    altimetry::NO_ATTITUDE,
     error::Result,
     footprints::Footprints,
     frames::BodyFixed,
@@ -60,6 +61,13 @@ impl Profile {
         let angles_rad = self.rows.iter();
         let angles_rad = angles_rad.map(|row| footprints.off_nadir_rad[*row as usize].abs());
         median(&mut angles_rad.collect::<Vec<f64>>())
+    }
+
+    /// Whether its file states the attitude of every shot.
+    #[must_use]
+    pub fn attitude_is_known(&self, footprints: &Footprints<BodyFixed>) -> bool {
+        let flag = |row: &u32| footprints.attitude_flag[*row as usize];
+        self.rows.iter().all(|row| flag(row) < NO_ATTITUDE)
     }
 }
 

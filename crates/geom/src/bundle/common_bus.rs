@@ -68,7 +68,7 @@ pub struct AdjustedBus {
     pub boresight_rad: [Estimate; 2],
     /// Delay of the lines of each image, seconds, where it has spots and the delay is unknown.
     pub line_times_s: Vec<Option<Estimate>>,
-    /// Offset between the recorded and the true position of each profile, towards east, north and up, metres.
+    /// Recorded minus true position of each profile, towards east, north and up, metres.
     pub profile_shifts_m: Vec<[Estimate; 3]>,
     /// Residuals of the spots along and across the track, focal-plane pixels; `None` for dropped points.
     pub spots: Vec<Option<[Residual; 2]>>,

@@ -273,8 +273,8 @@ impl Columns {
         let follows = self.follows.iter().enumerate();
         follows.filter_map(|(column, follows)| {
             let (other, _) = (*follows)?;
-            let blocks = [other, column].map(|column| self.block_of(column));
-            (blocks[0] < blocks[1]).then_some(blocks)
+            let [one, two] = [other, column].map(|column| self.block_of(column));
+            (one != two).then_some([one.min(two), one.max(two)])
         })
     }
 

@@ -55,7 +55,9 @@ use areograph_base::body::{Body, BodyModel};
 
 pub use crossovers::{Crossover, crossovers};
 pub use profiles::{LeftOut, ProfileNet, ProfilePriors, ProfileShift};
-pub use shot::{NADIR_MAX_RAD, SharedErrors, SurfaceShot, turned_sigmas_m, with_across_track};
+pub use shot::{
+    NADIR_MAX_RAD, SharedErrors, SurfaceShot, attitude_sigma_m, turned_sigmas_m, with_across_track,
+};
 pub use variogram::Variogram;
 pub use withheld::{Withheld, WithheldScore, withheld};
 

@@ -43,6 +43,22 @@ pub fn turned_sigmas_m(off_nadir_rad: f64) -> [f64; 2] {
     }
 }
 
+/// Standard deviation of the shift of a profile along the radius due to its attitude, in addition to `profile_sigma_m`, metres; 0
+/// at nadir where the attitude is known.
+///
+/// * `attitude_known`, `off_nadir_rad` – see [`SurfaceShot`]
+/// * `profile_sigma_m` – radial error of a profile at nadir of known attitude
+#[must_use]
+pub fn attitude_sigma_m(attitude_known: bool, off_nadir_rad: f64, profile_sigma_m: f64) -> f64 {
+    let [_, up_m] = turned_sigmas_m(off_nadir_rad);
+    let unknown_m = if attitude_known {
+        0.0
+    } else {
+        profile_sigma_m * (UNKNOWN_ATTITUDE.powi(2) - 1.0).sqrt()
+    };
+    up_m.hypot(unknown_m)
+}
+
 /// Standard deviations towards east, north and up with an additional one across a track, metres.
 ///
 /// * `ends_m` – first and last place of the track, Mars-fixed; of a single place the direction is unknown, and nothing is added

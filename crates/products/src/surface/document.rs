@@ -42,7 +42,9 @@ const DEFINITIONS: [(&str, &str); 7] = [
     (
         "mola_minus_surface",
         "radius of a footprint minus the radius of the model at its place, between the four nearest cells, metres; \
-         all: of profiles at nadir, because attitude errors change the heights of the others; \
+         all: of profiles at nadir, because attitude errors change the heights of the others, or of all profiles where fewer \
+         than 10 shots at nadir lie on the model; attitude_sigma_m is the standard deviation of this change (0 at nadir), for \
+         all its largest; \
          spread_sigmas is its robust spread about the median in its standard deviations: of the height, the shot, the \
          profile, and of the slope times the uncertainty of the position",
     ),
@@ -128,6 +130,8 @@ struct Heights {
 struct Shots<'a> {
     mola_takes_part: bool,
     all: Summary,
+    #[schemars(range(min = 0.0))]
+    attitude_sigma_m: f64,
     /// Root mean square of the standard deviations of the differences about their common offset.
     #[schemars(range(min = 0.0))]
     sigma_m: f64,
@@ -178,6 +182,7 @@ impl<'a> Document<'a> {
             mola_minus_surface: Shots {
                 mola_takes_part: account.shots_take_part,
                 all: account.shots.above_m,
+                attitude_sigma_m: account.shots.attitude_sigma_m,
                 sigma_m: account.shots.sigma_m,
                 spread_sigmas: account.shots.spread_sigmas,
                 profiles: &account.shots.profiles,

@@ -98,17 +98,18 @@ fn by_residuals<M: ExteriorOrientation>(
     };
     if is_doubtful {
         // Low weights of blunders keep these from bending the solution that shows the scatter.
-        let low_weights = bundle_options.robust.is_none().then_some(BundleOptions {
-            robust: Some(WHERE_MANY),
+        let low_weights = BundleOptions {
+            robust: bundle_options.robust.or(Some(WHERE_MANY)),
             ..*bundle_options
-        });
-        if add_scatter(assembled, first.as_ref().ok(), low_weights.as_ref(), watch) {
+        };
+        if add_scatter(assembled, first.as_ref().ok(), &low_weights, watch) {
             first = solved_within(assembled, bundle_options, limit, watch);
         }
-        if let (Err(BundleError::NotConverged { .. }), Some(robust)) = (&first, &low_weights) {
+        let is_lost = matches!(first, Err(BundleError::NotConverged { .. }));
+        if is_lost && bundle_options.robust.is_none() {
             // Too many or too large blunders leave no common solution; low weights reveal them.
-            let adjustment = solved_within(assembled, robust, limit, watch)?;
-            reject_worst(assembled, robust, limit, adjustment, watch)?;
+            let adjustment = solved_within(assembled, &low_weights, limit, watch)?;
+            reject_worst(assembled, &low_weights, limit, adjustment, watch)?;
             first = solved_within(assembled, bundle_options, limit, watch);
         }
     }
@@ -123,13 +124,13 @@ fn by_residuals<M: ExteriorOrientation>(
 fn add_scatter<M: ExteriorOrientation>(
     assembled: &mut Assembled<M>,
     first: Option<&Adjustment>,
-    low_weights: Option<&BundleOptions>,
+    low_weights: &BundleOptions,
     watch: Watch<'_>,
 ) -> bool {
     let mut is_added = false;
     for _ in 0..SCATTER_ROUNDS {
         // Low weights may alternate between solutions. The median of the residuals resists blunders as well.
-        let shown = low_weights.and_then(|options| solved(assembled, options, watch).ok());
+        let shown = solved(assembled, low_weights, watch).ok();
         let shown = shown.as_ref().or(first.filter(|_| !is_added));
         let scatter_px = shown.map_or(0.0, |shown| tie_scatter_px(assembled, shown));
         if scatter_px <= 0.0 {

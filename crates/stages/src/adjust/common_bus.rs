@@ -113,11 +113,12 @@ pub(super) fn add_spots<M: ExteriorOrientation>(
     let profiles = assembled.profiles.iter().zip(&middles_m);
     let profiles = profiles.map(|(profile, middle_m)| {
         let axes = local_axes(middle_m);
+        let shared = shared_rotation(images, shots, profile.index, &axes);
         RecordedProfile {
             surface_profile: profile.index,
             axes,
-            sigma_m: shift_sigmas_m(images, shots, profile.index),
-            shared: shared_rotation(images, shots, profile.index, &axes),
+            sigma_m: shift_sigmas_m(images, shots, profile.index, shared.as_ref()),
+            shared,
         }
     });
     assembled.network.common_bus = Some(CommonBus {
@@ -130,12 +131,13 @@ pub(super) fn add_spots<M: ExteriorOrientation>(
     Ok(Ok(()))
 }
 
-/// Standard deviations of the shift of a recorded profile towards east, north and up, metres, with the uncertainty of the attitude
-/// error that it shares with the images.
+/// Standard deviations of the shift of a recorded profile towards east, north and up, metres, about the part that follows the
+/// rotation of its image (`shared`). Where none does, the attitude error that the profile shares is independent.
 fn shift_sigmas_m<M>(
     images: &[AdjustImage<M>],
     shots: &LaserShots,
     profile: usize,
+    shared: Option<&SharedRotation>,
 ) -> Vector3<f64> {
     let own_m = shots.profile_sigmas_m[profile];
     let of_profile = shots.shots.iter().filter(|shot| shot.profile == profile);
@@ -152,21 +154,29 @@ fn shift_sigmas_m<M>(
         .filter(|shift_m| shift_m.is_finite())
         .fold(0.0, f64::max);
     let ends_m = [&first.ground.xyz_m, &last.ground.xyz_m];
-    with_across_track(own_m, ends_m, ATTITUDE_IN_FILES[1] * of_attitude_m)
+    let [share, sigma] = ATTITUDE_IN_FILES;
+    let share = if shared.is_some() {
+        sigma
+    } else {
+        share.hypot(sigma)
+    };
+    with_across_track(own_m, ends_m, share * of_attitude_m)
 }
 
 /// The part of a constant roll of its image by which a profile is recorded aside, along `axes`: a rotated bus meets ground farther
-/// along the y axis of the camera, where the telemetry places the shot without the correction.
+/// along the y axis of the camera, where the telemetry places the shot without the correction. `None` where several images were
+/// exposed during the profile, whose rotations it could follow.
 fn shared_rotation<M: ExteriorOrientation>(
     images: &[AdjustImage<M>],
     shots: &LaserShots,
     profile: usize,
     axes: &Matrix3<f64>,
 ) -> Option<SharedRotation> {
-    let mut of_profile = shots.shots.iter().filter(|shot| shot.profile == profile);
-    let range = of_profile.find_map(|shot| shot.range.as_ref())?;
+    let of_profile = shots.shots.iter().filter(|shot| shot.profile == profile);
+    let mut ranges = of_profile.flat_map(|shot| shot.range.iter().chain(&shot.also));
+    let range = ranges.next()?;
     let image = &images[range.image];
-    if !image.sigmas[ROLL].is_finite() {
+    if !image.sigmas[ROLL].is_finite() || ranges.any(|other| other.image != range.image) {
         return None;
     }
     let pose = image.oriented_camera.orientation.pose(range.x_lines);
@@ -315,4 +325,116 @@ fn farthest<M>(
         let words = words.trim_start_matches("the ").to_owned();
         (words, sigmas)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        adjust::{input::LaserShot, orientation_sigmas},
+        invented_pair::{HEIGHT_M, Invented},
+    };
+    use areograph_base::frames::Position;
+    use areograph_geom::{
+        oriented_camera::OrientedCamera,
+        pushbroom::{CorrectedOrientation, OrientationCorrection, SampledOrientation},
+    };
+
+    type Rotated = AdjustImage<CorrectedOrientation<SampledOrientation>>;
+
+    const ROLL_RAD: f64 = 1e-5;
+
+    /// A camera whose bus is rotated about the camera's x axis, with a laser on its optical axis.
+    fn image(number: usize, roll_rad: f64) -> Rotated {
+        let camera = Invented::camera(number, [0.0; 2]);
+        let mut correction = OrientationCorrection::of(&[0.0; 18], 0.5 * camera.lines(), 0.0);
+        correction.rotation_rad[0].x = roll_rad;
+        let base = camera.orientation;
+        AdjustImage {
+            oriented_camera: OrientedCamera {
+                id: camera.id,
+                orientation: CorrectedOrientation { base, correction },
+                detector: camera.detector,
+                line_times: camera.line_times,
+            },
+            line_period_s: 1.4e-3,
+            sigmas: orientation_sigmas(25.0, 4e-4),
+            time_bias_sigma_s: 0.0,
+            expected_m: Vector3::zeros(),
+            turn_rad_s: Vector3::zeros(),
+            line_delay: None,
+            laser_axes: Some(Matrix3::identity()),
+        }
+    }
+
+    /// Two shots of a profile, fired while these images were exposed.
+    fn shots(images: &[Rotated], exposed: &[usize]) -> LaserShots {
+        let shot = |row: u32| {
+            let mut ranges = exposed.iter().map(|image| ShotRange {
+                image: *image,
+                x_lines: 100.0 * f64::from(row),
+                to_laser_m: Vector3::zeros(),
+                range_m: HEIGHT_M,
+            });
+            let range = ranges.next();
+            let (ground_m, _) = met(&images[0], range.as_ref().unwrap()).unwrap();
+            LaserShot {
+                profile: 0,
+                row,
+                ground: Position::new(ground_m),
+                range,
+                also: ranges.collect(),
+            }
+        };
+        LaserShots {
+            profiles: vec!["a/1".to_owned()],
+            profile_sigmas_m: vec![Vector3::repeat(10.0)],
+            shots: vec![shot(0), shot(1)],
+            surface: None,
+        }
+    }
+
+    #[test]
+    fn a_profile_is_recorded_where_a_bus_without_the_correction_would_point() {
+        let images = [image(0, 0.0)];
+        let shots = shots(&images, &[0]);
+        let range = shots.shots[0].range.as_ref().unwrap();
+        let ground_m = |image: &Rotated| met(image, range).unwrap().0;
+        // Towards the true place, the ground moves with the correction; the recorded place lacks a share of this.
+        let moved_m = ground_m(&image(0, ROLL_RAD)) - ground_m(&images[0]);
+        let axes = local_axes(&ground_m(&images[0]));
+        let shared = shared_rotation(&images, &shots, 0, &axes).unwrap();
+        let expected_m = axes * moved_m * -ATTITUDE_IN_FILES[0];
+        let off_m = (shared.by_rotation_m * ROLL_RAD - expected_m).norm();
+        assert!(expected_m.norm() > 0.9, "{expected_m}");
+        // The second order of the rotation: 380 km times half of its square.
+        assert!(off_m < 1e-4, "{} {expected_m}", shared.by_rotation_m);
+    }
+
+    #[test]
+    fn a_profile_that_could_follow_two_images_follows_neither_and_is_less_certain() {
+        let images = [image(0, 0.0), image(1, 0.0)];
+        let east_m = |exposed: &[usize]| {
+            let shots = shots(&images, exposed);
+            let axes = local_axes(&shots.shots[0].ground.xyz_m);
+            let shared = shared_rotation(&images, &shots, 0, &axes);
+            let sigmas_m = shift_sigmas_m(&images, &shots, 0, shared.as_ref());
+            (shared.is_some(), sigmas_m.x)
+        };
+        // 0.4 mrad from 380 km, and 10 m of its own.
+        let of_share_m = |share: f64| f64::hypot(10.0, share * 4e-4 * HEIGHT_M);
+        let [share, sigma] = ATTITUDE_IN_FILES;
+        for (exposed, expected) in [
+            (&[0][..], (true, of_share_m(sigma))),
+            (&[0, 1], (false, of_share_m(share.hypot(sigma)))),
+        ] {
+            let (follows, sigma_m) = east_m(exposed);
+            assert_eq!(follows, expected.0, "{exposed:?}");
+            // A centimetre: the track is not exactly north.
+            assert!(
+                (sigma_m - expected.1).abs() < 0.01,
+                "{sigma_m} {expected:?}"
+            );
+        }
+    }
 }

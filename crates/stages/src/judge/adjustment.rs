@@ -371,7 +371,7 @@ impl AdjustmentEvidence<'_> {
         if scatter_px > SCATTER_LARGE_PX {
             remarks.push(format!(
                 "tie points scatter by {scatter_px:.1} px in addition to their stated standard deviations, where \
-                 attitude jitter usually causes 0.2 to 0.4 px: measurements are less accurate than stated"
+                 attitude jitter usually causes less than 0.8 px: measurements are less accurate than stated"
             ));
         }
         remarks.extend(self.drifts(limits));

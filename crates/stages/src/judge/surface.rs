@@ -5,22 +5,22 @@ use super::{
     CheckOutcome::{Fail, Warning},
     Evidence,
 };
-use crate::map_surface::SurfaceAccount;
+use crate::map_surface::{SHOTS_MIN, SurfaceAccount};
 use areograph_base::wording::signed;
 
 /// A mean height within this many of its standard deviations is no contradiction.
 const HEIGHT_SIGMAS: f64 = 3.0;
-/// Fewer shots do not validate a model.
-const SHOTS_MIN: u32 = 10;
 
-/// Largest accepted distance of the median of the shots from a model, metres.
+/// Largest accepted distance of the median of the shots from a model, metres: where only profiles off nadir or of unknown
+/// attitude test it, also as much as their attitude explains.
 fn height_max_m(evidence: &Evidence<'_>, surface: &SurfaceAccount) -> f64 {
     let limits = evidence.limits;
-    match (surface.common_sigma_m, &evidence.adjustment) {
+    let at_nadir_m = match (surface.common_sigma_m, &evidence.adjustment) {
         (Some(common_m), _) => limits.height_after_max_m.max(HEIGHT_SIGMAS * common_m),
         // No adjustment has brought the images closer to the shots.
         _ => limits.height_before_max_m,
-    }
+    };
+    at_nadir_m.hypot(HEIGHT_SIGMAS * surface.shots.attitude_sigma_m)
 }
 
 const fn has_shots(surface: &SurfaceAccount) -> bool {
@@ -125,10 +125,21 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
 /// Remarks on a terrain model.
 pub(super) fn remarks(evidence: &Evidence<'_>) -> Option<String> {
     let surface = evidence.surface?;
-    (!surface.is_refused && !has_shots(surface)).then(|| {
+    let shots = &surface.shots;
+    if surface.is_refused {
+        return None;
+    }
+    if !has_shots(surface) {
+        let n = shots.above_m.n;
+        return Some(format!(
+            "terrain model: {n} of MOLA's shots lie on it, too few to validate its heights"
+        ));
+    }
+    (shots.attitude_sigma_m > 0.0).then(|| {
         format!(
-            "terrain model: {} of MOLA's shots at nadir lie on it, too few to validate its heights",
-            surface.shots.above_m.n
+            "terrain model: fewer than {SHOTS_MIN} shots at nadir lie on it; the other profiles test its heights to \
+             ±{:.0} m, because attitude errors shift them",
+            shots.attitude_sigma_m
         )
     })
 }

@@ -57,8 +57,8 @@ use areograph_store::{
 
 pub use lines::{LinesToMap, map_lines};
 pub use result::{
-    ProfileOnSurface, ShotComparison, ShotOnSurface, Surface, SurfaceAccount, SurfaceLook,
-    SurfaceModel,
+    ProfileOnSurface, SHOTS_MIN, ShotComparison, ShotOnSurface, Surface, SurfaceAccount,
+    SurfaceLook, SurfaceModel,
 };
 
 /// Smallest share of searched cells that must be found for the result to be significant: chance finds one in a few
@@ -130,7 +130,7 @@ type Cell = Option<std::result::Result<Found, Unmatched>>;
 
 impl Stage for MapSurface<'_> {
     const NAME: &'static str = "map_surface";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     type Output = Surface;
     stage_inputs!(fingerprint);
 

@@ -72,13 +72,19 @@ pub struct SurfaceAccount {
     pub look: SurfaceLook,
 }
 
+/// Fewer shots do not validate a terrain model.
+pub const SHOTS_MIN: u32 = 10;
+
 /// The altimeter's shots against a terrain model.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ShotComparison {
     /// Every shot on it, profile by profile.
     pub shots: Vec<ShotOnSurface>,
-    /// Heights of shots minus heights of the model, for profiles at nadir, metres.
+    /// Heights of shots minus heights of the model, metres: of profiles at nadir, or of all profiles where fewer than
+    /// [`SHOTS_MIN`] shots of these lie on it.
     pub above_m: Summary,
+    /// Largest [`ProfileOnSurface::attitude_sigma_m`] of these profiles, metres; 0 at nadir.
+    pub attitude_sigma_m: f64,
     /// Root mean square of the standard deviations of these differences about their common part, metres.
     pub sigma_m: f64,
     /// Robust spread of the differences about their median in these standard deviations.
@@ -107,8 +113,8 @@ pub struct ShotOnSurface {
 pub struct ProfileOnSurface {
     /// Its identifier.
     pub profile: String,
-    /// Whether it points at nadir: the others do not test heights.
-    pub is_at_nadir: bool,
+    /// Standard deviation of the height of all its shots due to its attitude, metres: 0 at nadir where the attitude is known.
+    pub attitude_sigma_m: f64,
     /// Heights of its shots minus the heights of the model, metres.
     pub above_m: Summary,
 }
