@@ -32,7 +32,7 @@ pub(crate) const EAST_M: [f64; 2] = [0.0, 120_000.0];
 pub(crate) type Hill = fn(&Vector3<f64>) -> f64;
 
 /// Brightness of a place: plane waves 15 to 300 m long.
-fn brightness(place_m: &Vector3<f64>, waves: &[[f64; 5]]) -> f64 {
+pub(crate) fn brightness(place_m: &Vector3<f64>, waves: &[[f64; 5]]) -> f64 {
     let of_wave = |wave: &[f64; 5]| {
         let phase = wave[0] * place_m.x + wave[1] * place_m.y + wave[2] * place_m.z + wave[3];
         wave[4] * phase.sin()

@@ -3,8 +3,9 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::{ground::Ground, level::Level, search::HALF};
+use super::{level::Level, search::HALF};
 use crate::{
+    ground::Ground,
     image_view::{Prediction, View},
     shot_heights::Heights,
 };

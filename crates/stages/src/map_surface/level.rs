@@ -1,7 +1,9 @@
 //! One size of cells and images, and the known ground when it is matched.
 
-use super::{field::Field, ground::Ground};
-use crate::image_view::View;
+use crate::{
+    ground::{Field, Ground},
+    image_view::View,
+};
 
 /// One level: its cells, and the images at a similar size.
 pub(super) struct Level<'a> {

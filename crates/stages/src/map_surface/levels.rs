@@ -6,14 +6,16 @@ use rayon::prelude::*;
 use super::{
     Cell,
     common::Common,
-    field::Field,
     level::{Known, Level},
     search::{self, search},
     settle::settle,
-    sight::Tile,
     tidy::{field, without_strays},
 };
-use crate::{image_view::View, shot_heights::Heights};
+use crate::{
+    ground::{Field, Tile},
+    image_view::View,
+    shot_heights::Heights,
+};
 use areograph_base::{error::Result, watch::Watch};
 
 /// Samples of the ground along the edge of a tile: a thread holds some megabytes of both images.

@@ -14,8 +14,6 @@
 
 mod common;
 mod compare;
-mod field;
-mod ground;
 mod jitter;
 mod level;
 mod levels;
@@ -24,7 +22,6 @@ mod pair;
 mod result;
 mod search;
 mod settle;
-mod sight;
 mod tidy;
 
 #[cfg(test)]

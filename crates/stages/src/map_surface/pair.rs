@@ -2,10 +2,8 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::{
-    level::{Known, Level},
-    sight::{Sight, Tile},
-};
+use super::level::{Known, Level};
+use crate::ground::{Sight, Tile};
 use areograph_base::error::Result;
 use areograph_geom::imaging::Patch;
 
@@ -40,7 +38,8 @@ impl Pair {
         let aside = tile.sampled(&known.aside, level.per_cell);
         let sight = |at: usize| {
             let scale = (1_u64 << level.halvings[at]) as f64;
-            Sight::of(level.views[at], scale, level, &tile, &heights_m)
+            let cells = (&level.ground, level.per_cell);
+            Sight::of(level.views[at], scale, cells, &tile, &heights_m)
         };
         let (Some(one), Some(other)) = (sight(0), sight(1)) else {
             return Ok(None);

@@ -4,8 +4,8 @@ use super::{
     Cell, Found,
     level::{Known, Level},
     pair::Pair,
-    sight::Tile,
 };
+use crate::ground::Tile;
 use areograph_base::{error::Result, ties::Unmatched};
 
 /// Half the edge of the compared square, samples of the ground.

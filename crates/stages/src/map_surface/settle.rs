@@ -10,8 +10,8 @@ use super::{
     level::{Known, Level},
     pair::Pair,
     search::HALF,
-    sight::Tile,
 };
+use crate::ground::Tile;
 use areograph_base::{error::Result, ties::Unmatched};
 
 /// Largest distance of a cell from the surface, samples of parallax; beyond it, the match is false.

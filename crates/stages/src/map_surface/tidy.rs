@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::{Cell, Found, field::Field};
+use super::{Cell, Found};
+use crate::ground::Field;
 use areograph_base::ties::Unmatched;
 
 /// Half the edge of the square of neighbours of a cell.

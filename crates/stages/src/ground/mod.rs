@@ -1,4 +1,11 @@
-//! The cells of a terrain model on the ground, at full size and repeatedly halved.
+//! Cells on the ground: those of a terrain model or of an orthoimage, at full size and repeatedly halved, and their places
+//! in an image.
+
+mod field;
+mod sight;
+
+pub(crate) use field::Field;
+pub(crate) use sight::{Sight, Tile};
 
 use nalgebra::Vector3;
 
@@ -18,15 +25,15 @@ const PARALLEL_MAX_DEG: f64 = 80.0;
 
 /// Cells with even longitudes and latitudes, square at the parallel of the map.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Ground {
+pub(crate) struct Ground {
     /// The sphere of the body's maps, metres; heights refer to it.
-    pub(super) radius_m: f64,
+    pub(crate) radius_m: f64,
     /// Latitude at which cells are as wide as high.
-    pub(super) parallel_rad: f64,
+    pub(crate) parallel_rad: f64,
     /// Edge of a cell at the parallel, metres.
-    pub(super) cell_m: f64,
+    pub(crate) cell_m: f64,
     /// Rows and columns.
-    pub(super) size: [usize; 2],
+    pub(crate) size: [usize; 2],
     /// Western and northern edge, cells from 0° E 0° N.
     west: f64,
     north: f64,
@@ -35,16 +42,26 @@ pub(super) struct Ground {
 impl Ground {
     /// Cells of this edge over all `places_m`, body-fixed; edges lie at whole cells, so that models of one parallel fit each
     /// other. `None` without a place.
+    pub(crate) fn over(body: Body, places_m: &[Vector3<f64>], cell_m: f64) -> Option<Self> {
+        let middle = Spherical::from_xyz_m(&places_m.iter().sum());
+        let degrees = (middle.latitude.0 / RADIANS_PER_DEGREE).round();
+        let parallel_rad = degrees.clamp(-PARALLEL_MAX_DEG, PARALLEL_MAX_DEG) * RADIANS_PER_DEGREE;
+        Self::over_at(parallel_rad, body.map().radius_m, places_m, cell_m)
+    }
+
+    /// As [`Self::over`], on the map of a sphere whose cells are square at `parallel_rad`.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "a number of cells, held against a limit by the caller; a cast ends at the bounds"
     )]
-    pub(super) fn over(body: Body, places_m: &[Vector3<f64>], cell_m: f64) -> Option<Self> {
+    pub(crate) fn over_at(
+        parallel_rad: f64,
+        radius_m: f64,
+        places_m: &[Vector3<f64>],
+        cell_m: f64,
+    ) -> Option<Self> {
         let middle = Spherical::from_xyz_m(&places_m.iter().sum());
-        let degrees = (middle.latitude.0 / RADIANS_PER_DEGREE).round();
-        let parallel_rad = degrees.clamp(-PARALLEL_MAX_DEG, PARALLEL_MAX_DEG) * RADIANS_PER_DEGREE;
-        let radius_m = body.map().radius_m;
         let mut edges = [f64::INFINITY, f64::INFINITY, -f64::INFINITY, -f64::INFINITY];
         for place_m in places_m {
             let place = Spherical::from_xyz_m(place_m);
@@ -72,7 +89,7 @@ impl Ground {
     }
 
     /// The ground after `times` halvings of its resolution.
-    pub(super) fn halved(&self, times: usize) -> Self {
+    pub(crate) fn halved(&self, times: usize) -> Self {
         let factor = 1_usize << times;
         Self {
             cell_m: self.cell_m * factor as f64,
@@ -84,13 +101,13 @@ impl Ground {
     }
 
     /// Number of cells.
-    pub(super) const fn cells(&self) -> usize {
+    pub(crate) const fn cells(&self) -> usize {
         self.size[0] * self.size[1]
     }
 
     /// The place at this height above the sphere at a row and column, 0 in the middle of the first cell; body-fixed,
     /// metres.
-    pub(super) fn place_m(&self, [row, column]: [f64; 2], height_m: f64) -> Vector3<f64> {
+    pub(crate) fn place_m(&self, [row, column]: [f64; 2], height_m: f64) -> Vector3<f64> {
         let cell_rad = self.cell_m / self.radius_m;
         let longitude_rad = (self.west + column + 0.5) * cell_rad / self.parallel_rad.cos();
         let latitude_rad = (self.north - row - 0.5) * cell_rad;
@@ -98,7 +115,7 @@ impl Ground {
     }
 
     /// Heights of all cells, metres above the sphere, row by row; NaN where there is none.
-    pub(super) fn height_grid(&self, heights_m: Vec<f32>) -> HeightGrid {
+    pub(crate) fn height_grid(&self, heights_m: Vec<f32>) -> HeightGrid {
         let north_rad = self.cell_m / self.radius_m;
         let east_rad = north_rad / self.parallel_rad.cos();
         HeightGrid {

@@ -2,15 +2,15 @@
 
 /// A number of every cell, row by row.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Field {
+pub(crate) struct Field {
     /// Rows and columns.
-    pub(super) size: [usize; 2],
-    pub(super) values: Vec<f32>,
+    pub(crate) size: [usize; 2],
+    pub(crate) values: Vec<f32>,
 }
 
 impl Field {
     /// A field with one number everywhere.
-    pub(super) fn even(size: [usize; 2], value: f32) -> Self {
+    pub(crate) fn even(size: [usize; 2], value: f32) -> Self {
         Self {
             size,
             values: vec![value; size[0] * size[1]],
@@ -24,7 +24,7 @@ impl Field {
         clippy::cast_sign_loss,
         reason = "held within the field just before; numbers keep the digits of the field"
     )]
-    pub(super) fn between(&self, row: f64, column: f64) -> f32 {
+    pub(crate) fn between(&self, row: f64, column: f64) -> f32 {
         let split = |at: f64, count: usize| {
             let at = at.clamp(0.0, (count - 1) as f64);
             let first = (at as usize).min(count.saturating_sub(2));
@@ -43,7 +43,7 @@ impl Field {
     }
 
     /// The field in cells of half the edge, of which there are `size`.
-    pub(super) fn doubled(&self, size: [usize; 2]) -> Self {
+    pub(crate) fn doubled(&self, size: [usize; 2]) -> Self {
         let place = |at: usize| 0.5 * at as f64 - 0.25;
         let cells = (0..size[0]).flat_map(|row| (0..size[1]).map(move |column| (row, column)));
         Self {
@@ -56,7 +56,7 @@ impl Field {
 
     /// The field with its holes (NaN) filled from coarser and coarser means around them; 0 where there is no number at
     /// all.
-    pub(super) fn filled(mut self) -> Self {
+    pub(crate) fn filled(mut self) -> Self {
         if self.values.iter().all(|value| !value.is_nan()) {
             return self;
         }
@@ -92,7 +92,7 @@ impl Field {
     }
 
     /// Means over squares of `2 half + 1` cells, less of them at the edge.
-    pub(super) fn smoothed(&self, half: usize) -> Self {
+    pub(crate) fn smoothed(&self, half: usize) -> Self {
         let [rows, columns] = self.size;
         let across = means_of_runs(&self.values, rows, [columns, 1], half);
         Self {

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::{field::Field, level::Level};
+use super::{Field, Ground};
 use crate::image_view::View;
 
 /// Samples from node to node. Over as many pixels an orientation bends by less than a thousandth of one.
@@ -14,17 +14,17 @@ const HEIGHTS_MIN_M: f64 = 60.0;
 
 /// Some cells, and the samples of the ground that matching them needs.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Tile {
+pub(crate) struct Tile {
     /// Rows and columns of cells.
-    pub(super) cells: [Range<usize>; 2],
+    pub(crate) cells: [Range<usize>; 2],
     /// First sample along both axes, counted from the first of the first cell, and their numbers.
-    pub(super) first: [i64; 2],
-    pub(super) size: [usize; 2],
+    pub(crate) first: [i64; 2],
+    pub(crate) size: [usize; 2],
 }
 
 impl Tile {
     /// Tiles over `size` cells, each of at most `edge` cells along an edge, with `margin` samples around them.
-    pub(super) fn all(size: [usize; 2], edge: usize, per_cell: usize, margin: usize) -> Vec<Self> {
+    pub(crate) fn all(size: [usize; 2], edge: usize, per_cell: usize, margin: usize) -> Vec<Self> {
         let spans = size.map(|length| {
             let starts = (0..length).step_by(edge);
             starts.map(move |start| start..(start + edge).min(length))
@@ -50,7 +50,7 @@ impl Tile {
     }
 
     /// Row and column of cells of a sample, 0 in the middle of the first cell.
-    fn cell_of(&self, [line, sample]: [usize; 2], per_cell: usize) -> [f64; 2] {
+    pub(crate) fn cell_of(&self, [line, sample]: [usize; 2], per_cell: usize) -> [f64; 2] {
         let of = |axis: usize, at: usize| {
             (self.first[axis] as f64 + at as f64 + 0.5) / per_cell as f64 - 0.5
         };
@@ -58,7 +58,7 @@ impl Tile {
     }
 
     /// A field at all samples.
-    pub(super) fn sampled(&self, field: &Field, per_cell: usize) -> Vec<f32> {
+    pub(crate) fn sampled(&self, field: &Field, per_cell: usize) -> Vec<f32> {
         let mut sampled = Vec::with_capacity(self.size[0] * self.size[1]);
         for line in 0..self.size[0] {
             for sample in 0..self.size[1] {
@@ -70,7 +70,7 @@ impl Tile {
     }
 
     /// Every cell with its row-by-row number in a grid of `columns`, and the sample in its middle.
-    pub(super) fn middles(
+    pub(crate) fn middles(
         &self,
         per_cell: usize,
         columns: usize,
@@ -91,23 +91,23 @@ impl Tile {
 }
 
 /// Lines and samples of an image, at its level, of every sample of a tile: three powers of the height above the middle.
-pub(super) struct Sight {
+pub(crate) struct Sight {
     middle_m: f64,
     powers: Vec<[Vector2<f64>; 3]>,
     /// Lines and samples of the image at the level.
     size_px: Vector2<f64>,
     /// Pixels of the image for a sample of the ground along each axis.
-    pub(super) px_per_sample: Matrix2<f64>,
+    pub(crate) px_per_sample: Matrix2<f64>,
     /// Displacement in the image for a metre of height, samples of the ground.
-    pub(super) shift_per_m: Vector2<f64>,
+    pub(crate) shift_per_m: Vector2<f64>,
 }
 
 impl Sight {
     /// `None` where the orientation gives no place for the middle of the tile.
-    pub(super) fn of(
+    pub(crate) fn of(
         view: &View<'_>,
         scale: f64,
-        level: &Level<'_>,
+        (ground, per_cell): (&Ground, usize),
         tile: &Tile,
         heights_m: &[f32],
     ) -> Option<Self> {
@@ -118,9 +118,9 @@ impl Sight {
         let middle_m = 0.5 * (ends[0] + ends[1]);
         let half_m = HEIGHTS_MIN_M.max(0.5 * (ends[1] - ends[0]));
         let node = |at: [usize; 2]| -> Option<[Vector2<f64>; 3]> {
-            let cell = tile.cell_of(at, level.per_cell);
+            let cell = tile.cell_of(at, per_cell);
             let place = |height_m: f64| {
-                let place_m = level.ground.place_m(cell, height_m);
+                let place_m = ground.place_m(cell, height_m);
                 view.place(&place_m).map(|place| place / scale)
             };
             let [low, here, high] = [
@@ -159,7 +159,7 @@ impl Sight {
     }
 
     /// Line and sample of the image for a sample of the tile at a height.
-    pub(super) fn place_px(&self, at: usize, height_m: f64) -> Vector2<f64> {
+    pub(crate) fn place_px(&self, at: usize, height_m: f64) -> Vector2<f64> {
         let [here, first, second] = self.powers[at];
         let above_m = height_m - self.middle_m;
         here + above_m * (first + above_m * second)
@@ -171,7 +171,7 @@ impl Sight {
         clippy::cast_sign_loss,
         reason = "negative numbers become 0"
     )]
-    pub(super) fn spans_px(
+    pub(crate) fn spans_px(
         &self,
         heights_m: &[f32],
         reach_m: f64,
@@ -193,7 +193,7 @@ impl Sight {
     }
 
     /// Distance of a sample from the nearest edge of the image, pixels of its level; below 0 beyond, and where there is no place.
-    pub(super) fn edge_px(&self, at: usize, height_m: f64) -> f64 {
+    pub(crate) fn edge_px(&self, at: usize, height_m: f64) -> f64 {
         let place = self.place_px(at, height_m);
         let behind = self.size_px - place;
         let nearest = place.x.min(place.y).min(behind.x).min(behind.y);

@@ -1,0 +1,196 @@
+//! The cells of an orthoimage, and their brightness tile by tile.
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::{CELLS_MAX, RectifyError, sight_lines::SightLines};
+use crate::{
+    ground::{Ground, Sight, Tile},
+    image_view::View,
+    map_surface::SurfaceModel,
+};
+use areograph_base::{error::Result, watch::Watch};
+use areograph_geom::{ellipsoid::spherical_to_xyz_m, height_grid::HeightGrid};
+
+/// Cells along the edge of a tile.
+const TILE: usize = 256;
+/// Pixels around a place that its brightness needs, and some room.
+const ROOM_PX: f64 = 3.0;
+/// Distance of a place from the edge of the image within which its brightness is not known, pixels.
+const EDGE_PX: f64 = 2.0;
+
+/// Cells of an orthoimage, on the map of the terrain model.
+pub(super) struct Cells {
+    ground: Ground,
+    /// Halvings of the image after which a pixel is not larger than a cell.
+    halvings: usize,
+}
+
+/// Brightness of all cells.
+pub(super) struct Brightness {
+    /// Row by row; 0 where there is none.
+    pub(super) pixels: Vec<u8>,
+    /// Number of cells on ground inside the image whose pixels are missing.
+    pub(super) without_pixels: u32,
+}
+
+impl Cells {
+    /// Cells of this edge over the part of the terrain model that the image shows; `None` where it shows nothing.
+    ///
+    /// # Errors
+    /// [`RectifyError::TooLarge`].
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "few halvings"
+    )]
+    pub(super) fn of(
+        view: &View<'_>,
+        model: &SurfaceModel,
+        sight_lines: &SightLines,
+        cell_m: f64,
+    ) -> std::result::Result<Option<Self>, RectifyError> {
+        let shown = &sight_lines.shown;
+        let columns = shown.size[1];
+        let heights = shown.heights_m.iter().enumerate();
+        let known = heights.filter(|(_, height_m)| !height_m.is_nan());
+        let places_m = known.map(|(at, height_m)| {
+            let [longitude_rad, latitude_rad] =
+                shown.place_rad([(at / columns) as f64, (at % columns) as f64]);
+            let radius_m = shown.radius_m + f64::from(*height_m);
+            spherical_to_xyz_m(longitude_rad, latitude_rad, radius_m)
+        });
+        let places_m: Vec<Vector3<f64>> = places_m.collect();
+        let ground = Ground::over_at(model.parallel_rad, shown.radius_m, &places_m, cell_m);
+        let Some(ground) = ground else {
+            return Ok(None);
+        };
+        let cells = ground.size[0].saturating_mul(ground.size[1]);
+        if cells > CELLS_MAX {
+            let image = view.camera.id.clone();
+            return Err(RectifyError::TooLarge {
+                image,
+                cell_m,
+                cells,
+            });
+        }
+        let halvings = (cell_m / sight_lines.pixel_m).log2().max(0.0) as usize;
+        Ok(Some(Self {
+            ground,
+            halvings: halvings.min(view.pixels.halvings()),
+        }))
+    }
+
+    /// Rows and columns.
+    pub(super) const fn size(&self) -> [usize; 2] {
+        self.ground.size
+    }
+
+    /// The cells as a grid without heights.
+    pub(super) fn map(&self) -> HeightGrid {
+        self.ground.height_grid(Vec::new())
+    }
+
+    /// Brightness of every cell.
+    ///
+    /// # Errors
+    /// The system's refusal to read the image's temporary file; a stop.
+    pub(super) fn brightness(
+        &self,
+        view: &View<'_>,
+        sight_lines: &SightLines,
+        watch: Watch<'_>,
+    ) -> Result<Brightness> {
+        let [rows, columns] = self.ground.size;
+        let map = self.map();
+        let tiles = Tile::all([rows, columns], TILE, 1, 0);
+        watch.announce(tiles.len());
+        let of_tiles = tiles.par_iter().map(|tile| {
+            watch.check()?;
+            let brightness = self.of_tile(view, &sight_lines.shown, &map, tile);
+            watch.step(1, "tiles");
+            brightness
+        });
+        let of_tiles: Vec<Brightness> = of_tiles.collect::<Result<_>>()?;
+        let mut all = Brightness {
+            pixels: vec![0; rows * columns],
+            without_pixels: 0,
+        };
+        for (tile, of_tile) in tiles.iter().zip(&of_tiles) {
+            let [down, across] = &tile.cells;
+            let lines = of_tile.pixels.chunks_exact(across.len());
+            for (row, pixels) in down.clone().zip(lines) {
+                let start = row * columns + across.start;
+                all.pixels[start..start + across.len()].copy_from_slice(pixels);
+            }
+            all.without_pixels += of_tile.without_pixels;
+        }
+        Ok(all)
+    }
+
+    fn of_tile(
+        &self,
+        view: &View<'_>,
+        shown: &HeightGrid,
+        map: &HeightGrid,
+        tile: &Tile,
+    ) -> Result<Brightness> {
+        let mut found = Brightness {
+            pixels: vec![0; tile.size[0] * tile.size[1]],
+            without_pixels: 0,
+        };
+        let heights_m = heights_m(shown, map, tile);
+        let scale = (1_u64 << self.halvings) as f64;
+        let has_heights = heights_m.iter().any(|height_m| !height_m.is_nan());
+        let sight =
+            has_heights.then(|| Sight::of(view, scale, (&self.ground, 1), tile, &heights_m));
+        let Some(sight) = sight.flatten() else {
+            return Ok(found);
+        };
+        let [lines, samples] = sight.spans_px(&heights_m, 0.0, ROOM_PX);
+        let patch = view
+            .pixels
+            .window_with_gaps(self.halvings, [&lines, &samples])?;
+        for (at, height_m) in heights_m.iter().enumerate() {
+            let height_m = f64::from(*height_m);
+            // NaN, where there is no height, is not above.
+            if !(sight.edge_px(at, height_m) >= EDGE_PX) {
+                continue;
+            }
+            let number = patch.number(&sight.place_px(at, height_m));
+            if number.is_nan() {
+                found.without_pixels += 1;
+            } else {
+                found.pixels[at] = byte(number);
+            }
+        }
+        Ok(found)
+    }
+}
+
+/// Heights of the cells of a tile, NaN where there is none.
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "heights of a planet keep a millimetre"
+)]
+fn heights_m(shown: &HeightGrid, map: &HeightGrid, tile: &Tile) -> Vec<f32> {
+    let mut heights_m = Vec::with_capacity(tile.size[0] * tile.size[1]);
+    for line in 0..tile.size[0] {
+        for sample in 0..tile.size[1] {
+            let [longitude_rad, latitude_rad] = map.place_rad(tile.cell_of([line, sample], 1));
+            let height_m = shown.height_m(shown.cell_of(longitude_rad, latitude_rad));
+            heights_m.push(height_m.map_or(f32::NAN, |height_m| height_m as f32));
+        }
+    }
+    heights_m
+}
+
+/// The nearest brightness above 0, which means none.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped to the numbers of a byte"
+)]
+fn byte(number: f32) -> u8 {
+    number.round().clamp(1.0, 255.0) as u8
+}

@@ -1,0 +1,249 @@
+//! Orthoimages: images on the cells of a map, where heights of the terrain model no longer displace them.
+//!
+//! The brightness of a cell is that of the place of the image that sees its ground, by cubic convolution. Ground without a
+//! height, ground that relief hides from the camera, and lines that were not received have none: nothing is filled.
+//!
+//! # Source
+//! The products that Shan, Lee & Yoon 2002 and Yoon & Shan 2004 announce; cubic convolution: Keys 1981.
+
+mod cells;
+mod sight_lines;
+
+use std::sync::atomic::AtomicBool;
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    adjust::Adjusted,
+    image_pixels::PixelFiles,
+    image_view::View,
+    map_surface::{AdjustmentOfImages, Surface, SurfaceModel},
+    site_image::SiteImages,
+    tag_times::ImageTimes,
+};
+use areograph_base::{
+    error::{Cause, Result},
+    watch::Watch,
+};
+use areograph_geom::{height_grid::HeightGrid, pushbroom::Unseen};
+use areograph_store::{
+    stage::{Output, Stage},
+    stage_inputs,
+};
+
+use cells::Cells;
+use sight_lines::SightLines;
+
+/// Maximum number of cells of an orthoimage: 1.3 bytes each in its file.
+const CELLS_MAX: usize = 1 << 27;
+/// Cells along the longer side of an orthoimage on a page.
+const LOOK: usize = 640;
+
+stage_inputs! {
+    /// Images with their best orientation and their pixels, and the terrain model.
+    pub struct RectifyImages<'a> {
+        /// The images.
+        pub images: SiteImages<'a>,
+        /// Their pixels.
+        pub pixels: PixelFiles<'a>,
+        /// The terrain model.
+        pub surface: &'a Output<Surface>,
+        /// The adjustment that gave the images their orientation.
+        pub adjusted: AdjustmentOfImages<'a>,
+        /// Edge of a cell, metres.
+        pub cell_m: &'a f64,
+    }
+}
+
+/// An image on the cells of a map.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Orthoimage {
+    /// Statistics.
+    pub account: OrthoimageAccount,
+    /// Brightness, row by row: pixel values from 1 on (a pixel of 0 becomes 1), 0 where there is none.
+    pub brightness: Vec<u8>,
+    /// Standard deviations of the horizontal position of the ground in the cells of the terrain model, metres, NaN where the
+    /// image does not show them: by heights and by jitter, without the error that all cells share.
+    pub sigmas_m: Vec<f32>,
+}
+
+/// Statistics of an orthoimage.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OrthoimageAccount {
+    /// Index of the image.
+    pub image: usize,
+    /// Cells of the map, without heights.
+    pub map: HeightGrid,
+    /// Latitude at which cells are as wide as high, radians.
+    pub parallel_rad: f64,
+    /// Edge of a cell, metres.
+    pub cell_m: f64,
+    /// Edge of a pixel of the image on the ground, metres.
+    pub pixel_m: f64,
+    /// Number of cells with a brightness.
+    pub filled: u32,
+    /// Number of cells on the terrain model whose pixels are missing.
+    pub without_pixels: u32,
+    /// Number of cells of the terrain model inside the image, and of those among them that relief hides from the camera.
+    pub terrain_cells: u32,
+    /// See `terrain_cells`.
+    pub hidden: u32,
+    /// Root mean square of the standard deviations of its horizontal position, metres.
+    pub sigma_m: f64,
+    /// Part of these by jitter of the image, metres; `None` without an adjustment, which measures it.
+    pub jitter_m: Option<f64>,
+    /// Standard deviations of the error that all cells share, towards east and north, metres; `None` without an adjustment
+    /// with heights.
+    pub common_sigma_m: Option<[f64; 2]>,
+    /// The orthoimage in larger cells, for display.
+    pub look: OrthoimageLook,
+}
+
+/// An orthoimage in larger cells.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct OrthoimageLook {
+    /// Rows and columns.
+    pub size: [usize; 2],
+    /// Mean brightness, row by row; 0 where there is none.
+    pub brightness: Vec<u8>,
+}
+
+/// No orthoimage can be made.
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Input)]
+enum RectifyError {
+    #[error("image {image}: its orientation sees no ground: {unseen}")]
+    #[cause("check the kernels and times of the image")]
+    Unseen { image: String, unseen: Unseen },
+    #[error(
+        "surface.orthoimage_cell_m is {cell_m}: the orthoimage of {image} has {cells} cells of this size; expected at most \
+         {CELLS_MAX}"
+    )]
+    #[cause("give larger cells: those of a pixel of the image are usual")]
+    TooLarge {
+        image: String,
+        cell_m: f64,
+        cells: usize,
+    },
+}
+
+impl Stage for RectifyImages<'_> {
+    const NAME: &'static str = "rectify_images";
+    type Output = Vec<Orthoimage>;
+    stage_inputs!(fingerprint);
+
+    fn run(&self, stop: &AtomicBool) -> Result<Vec<Orthoimage>> {
+        self.run_watched(stop.into())
+    }
+
+    fn run_watched(&self, watch: Watch<'_>) -> Result<Vec<Orthoimage>> {
+        let surface = self.surface.value()?;
+        let mut made = Vec::new();
+        if surface.account.is_refused {
+            return Ok(made);
+        }
+        let adjusted = self.adjusted.0.map(Output::value).transpose()?;
+        let oriented = self.images.oriented()?;
+        let times = self.images.0.iter().map(|image| image.times.value());
+        let times: Vec<&ImageTimes> = times.collect::<Result<_>>()?;
+        let pixels = self.pixels.decoded(&times)?;
+        let images = oriented.iter().zip(&pixels).enumerate();
+        for (index, (image, pixels)) in images {
+            let Some(pixels) = pixels else { continue };
+            let id = || times[index].id.clone();
+            let view = View::of(image, pixels).map_err(|unseen| RectifyError::Unseen {
+                image: id(),
+                unseen,
+            })?;
+            let scatter_px = adjusted.map(|of| of.summary.tie_scatter_px);
+            let cell_m = *self.cell_m;
+            let Some(mut orthoimage) = rectified(&view, &surface.model, cell_m, scatter_px, watch)?
+            else {
+                continue;
+            };
+            let account = &mut orthoimage.account;
+            account.image = index;
+            account.common_sigma_m = adjusted.and_then(common_sigma_m);
+            made.push(orthoimage);
+        }
+        Ok(made)
+    }
+}
+
+/// Standard deviations of the mean place of the adjusted tie points, towards east and north, metres.
+fn common_sigma_m(adjusted: &Adjusted) -> Option<[f64; 2]> {
+    let [east_m, north_m, _] = adjusted.heights.as_ref()?.mean_sigma_m;
+    Some([east_m, north_m])
+}
+
+/// The orthoimage of a view, without its index; `None` where the image does not show the terrain model.
+fn rectified(
+    view: &View<'_>,
+    model: &SurfaceModel,
+    cell_m: f64,
+    scatter_px: Option<f64>,
+    watch: Watch<'_>,
+) -> Result<Option<Orthoimage>> {
+    watch.check()?;
+    let Some(sight_lines) = SightLines::of(view, model) else {
+        return Ok(None);
+    };
+    // Pitch and roll: the adjustment adds the scatter along the track, and the root of two of it across.
+    let jitter_m = scatter_px.map(|scatter_px| 3.0_f64.sqrt() * scatter_px * sight_lines.pixel_m);
+    let sigmas_m = sight_lines.sigmas_m(&model.sigmas_m, jitter_m.unwrap_or_default());
+    let cells = Cells::of(view, model, &sight_lines, cell_m)?;
+    let Some(cells) = cells else {
+        return Ok(None);
+    };
+    let brightness = cells.brightness(view, &sight_lines, watch)?;
+    let filled = brightness.pixels.iter().filter(|pixel| **pixel > 0).count();
+    let count = |of: usize| u32::try_from(of).unwrap_or(u32::MAX);
+    let known = sigmas_m.iter().filter(|sigma_m| !sigma_m.is_nan());
+    let square_m2: f64 = known.clone().map(|of| f64::from(of * of)).sum();
+    let account = OrthoimageAccount {
+        image: 0,
+        map: cells.map(),
+        parallel_rad: model.parallel_rad,
+        cell_m,
+        pixel_m: sight_lines.pixel_m,
+        filled: count(filled),
+        without_pixels: brightness.without_pixels,
+        terrain_cells: count(sight_lines.seen()),
+        hidden: count(sight_lines.hidden()),
+        sigma_m: (square_m2 / known.count().max(1) as f64).sqrt(),
+        jitter_m,
+        common_sigma_m: None,
+        look: OrthoimageLook::of(cells.size(), &brightness.pixels),
+    };
+    Ok(Some(Orthoimage {
+        account,
+        brightness: brightness.pixels,
+        sigmas_m,
+    }))
+}
+
+impl OrthoimageLook {
+    /// In cells so large that no side has more than [`LOOK`] of them.
+    fn of([rows, columns]: [usize; 2], pixels: &[u8]) -> Self {
+        let step = rows.max(columns).div_ceil(LOOK).max(1);
+        let size = [rows.div_ceil(step), columns.div_ceil(step)];
+        let mut sums = vec![[0_u32; 2]; size[0] * size[1]];
+        for (row, pixels) in pixels.chunks_exact(columns.max(1)).enumerate() {
+            for (column, pixel) in pixels.iter().enumerate() {
+                if *pixel > 0 {
+                    let [sum, count] = &mut sums[row / step * size[1] + column / step];
+                    *sum += u32::from(*pixel);
+                    *count += 1;
+                }
+            }
+        }
+        let mean = |[sum, count]: &[u32; 2]| u8::try_from(sum / (*count).max(1)).unwrap_or(u8::MAX);
+        Self {
+            size,
+            brightness: sums.iter().map(mean).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
