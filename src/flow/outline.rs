@@ -40,6 +40,7 @@ pub fn stages() -> &'static [&'static str] {
         config.ties.files.push(PathBuf::new());
         config.ties.matched = true;
         config.surface.cell_m = Some(1.0);
+        config.surface.orthoimage_cell_m = Some(1.0);
         // Nothing is read and nothing runs, so nothing fails.
         let _ = site(&mut outline, &config);
         outline.names
@@ -60,7 +61,7 @@ pub fn stage_count(of: &SiteConfig) -> usize {
     config.images = of.images.iter().map(image).collect();
     config.ties.files.clone_from(&of.ties.files);
     config.ties.matched = of.ties.matched;
-    config.surface.cell_m = of.surface.cell_m;
+    config.surface = of.surface.clone();
     let _ = site(&mut outline, &config);
     outline.passed
 }

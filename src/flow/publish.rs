@@ -22,7 +22,8 @@ use crate::{
     spice::{KernelSet, KernelView, Session},
     stage::{Input, Inputs, Output, Reason, Round},
     stages::{
-        convert_datum::Converted, describe_kernels::KernelDescription, site_image::SiteImage,
+        convert_datum::Converted, describe_kernels::KernelDescription, rectify_images::Orthoimage,
+        site_image::SiteImage,
     },
     store::{
         cache::StageCache,
@@ -145,6 +146,7 @@ pub(super) fn publish(
         })
     });
     let converted = book.of::<Converted>()?;
+    let orthoimages = book.find::<Vec<Orthoimage>>(Round::Initial)?;
     let products = SiteProducts {
         config,
         kernels: &described.kernels,
@@ -164,6 +166,7 @@ pub(super) fn publish(
         geometric: geometric.transpose()?,
         overlays: book.find(Round::Initial)?,
         surface: book.find(Round::Initial)?,
+        orthoimages: orthoimages.map_or(&[], Vec::as_slice),
         program: &Program {
             cspice: Session::version_of_cspice()?,
             methods: methods.to_vec(),

@@ -1,4 +1,4 @@
-//! The part of the flow that makes a terrain model.
+//! The part of the flow that makes a terrain model, and orthoimages on it.
 
 use super::{
     driver::{Driver, Flow},
@@ -13,10 +13,11 @@ use crate::{
         adjust::Adjusted,
         image_pixels::PixelFiles,
         map_surface::{AdjustmentOfImages, MapSurface},
+        rectify_images::RectifyImages,
     },
 };
 
-/// The terrain model of a pair of images with their best orientation; not for a site that requests none, or whose
+/// The terrain model of a pair of images with their best orientation, and orthoimages; not for a site that requests none, or whose
 /// adjustment failed.
 pub(super) fn surface<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut Site) -> Flow<()> {
     if !config.surface.is_asked_for() || site.adjustment_failure.is_some() {
@@ -25,8 +26,9 @@ pub(super) fn surface<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut S
     let adjusted = site.book.output::<Adjusted>(Round::Initial);
     let limits = &config.limits;
     let pixels = pixel_files(flow, MapSurface::NAME, config)?;
+    let images = SiteImages(site.adjusted_images.as_ref().unwrap_or(&site.images));
     let surface = flow.stage(&MapSurface {
-        images: SiteImages(site.adjusted_images.as_ref().unwrap_or(&site.images)),
+        images,
         pixels: PixelFiles(&pixels),
         converted: &site.converted,
         profiles: &site.profiles,
@@ -35,5 +37,15 @@ pub(super) fn surface<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut S
         adjusted: AdjustmentOfImages(adjusted),
         off_m: adjusted.map_or(&limits.height_before_max_m, |_| &limits.height_after_max_m),
     })?;
+    if let Some(cell_m) = &config.surface.orthoimage_cell_m {
+        let orthoimages = flow.stage(&RectifyImages {
+            images,
+            pixels: PixelFiles(&pixels),
+            surface: &surface,
+            adjusted: AdjustmentOfImages(adjusted),
+            cell_m,
+        })?;
+        site.book.enter(Round::Initial, orthoimages)?;
+    }
     Ok(site.book.enter(Round::Initial, surface)?)
 }

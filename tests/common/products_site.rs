@@ -259,6 +259,7 @@ impl Site {
             verdict: &verdict,
             geometric: None,
             overlays: None,
+            orthoimages: &[],
             surface: None,
             conversions: &self.conversions,
             program: &Program {

@@ -17,16 +17,22 @@ declare_table! {
         /// finer than a pixel are refused; for cells larger than six pixels, images are compared at a coarser size,
         /// which is quick.
         cell_m: Option<f64> = key(above_to(0.0, 1e5)).unused("15.0"),
+        /// Edge of a cell of orthoimages of all images with `pixels`, on this model: a pixel of the image is usual. Without it no
+        /// orthoimages are made.
+        orthoimage_cell_m: Option<f64> = key(above_to(0.0, 1e5)).unused("5.0"),
         /// Identifiers of the two images, where more than two of the site have pixels.
         images: Option<[String; 2]> = key(several(identifier(), "identifiers of two images")).unused(r#"["m0402852", "m0403104"]"#),
     }
     check a_cell_is_given
 }
 
-/// A requested terrain model has a cell size.
+/// A requested terrain model has a cell size, and orthoimages have a terrain model.
 fn a_cell_is_given(surface: &SurfaceConfig, keys: &mut Keys<'_, '_>) {
-    keys.rule(|| json!({"dependentRequired": {"images": ["cell_m"]}}));
-    if surface.images.is_some() && keys.span_of("cell_m").is_none() {
+    keys.rule(
+        || json!({"dependentRequired": {"images": ["cell_m"], "orthoimage_cell_m": ["cell_m"]}}),
+    );
+    let needs_model = surface.images.is_some() || surface.orthoimage_cell_m.is_some();
+    if needs_model && keys.span_of("cell_m").is_none() {
         keys.missing(
             "cell_m",
             "the edge of a cell in metres (or no table surface at all)",

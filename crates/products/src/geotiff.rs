@@ -12,8 +12,6 @@ use areograph_geom::height_grid::HeightGrid;
 
 /// Edge of a tile, cells.
 const TILE: usize = 256;
-/// Value of cells without a number.
-const NO_DATA: f32 = -32_768.0;
 /// Signals to GDAL that tables come first; 32 and its own bytes counted from its third line.
 const LAYOUT: &str = "LAYOUT=IFDS_BEFORE_DATA\nKNOWN_INCOMPATIBLE_EDITION=NO\n ";
 
@@ -23,8 +21,67 @@ const SHORT: u16 = 3;
 const LONG: u16 = 4;
 const DOUBLE: u16 = 12;
 
+/// A kind of number in a file.
+pub(super) trait Number: Copy {
+    /// Bits, and format of the sample: 1 without a sign, 3 with decimals.
+    const LAYOUT: [usize; 2];
+    /// Cells without a number, as readers of the file find them.
+    const NO_DATA: &'static str;
+    /// A cell without a number.
+    const NONE: Self;
+
+    fn is_none(self) -> bool;
+
+    /// The mean of numbers, of which there is at least one.
+    fn mean(numbers: impl Iterator<Item = Self> + Clone) -> Self;
+
+    fn append(self, bytes: &mut Vec<u8>);
+}
+
+/// Numbers in metres; NaN without a number.
+impl Number for f32 {
+    const LAYOUT: [usize; 2] = [32, 3];
+    const NO_DATA: &'static str = "-32768";
+    const NONE: Self = Self::NAN;
+
+    fn is_none(self) -> bool {
+        self.is_nan()
+    }
+
+    fn mean(numbers: impl Iterator<Item = Self> + Clone) -> Self {
+        let count: Self = numbers.clone().map(|_| 1.0).sum();
+        numbers.sum::<Self>() / count
+    }
+
+    fn append(self, bytes: &mut Vec<u8>) {
+        let number = if self.is_nan() { -32_768.0 } else { self };
+        bytes.extend(number.to_le_bytes());
+    }
+}
+
+/// Brightness from 1 on; 0 without one.
+impl Number for u8 {
+    const LAYOUT: [usize; 2] = [8, 1];
+    const NO_DATA: &'static str = "0";
+    const NONE: Self = 0;
+
+    fn is_none(self) -> bool {
+        self == 0
+    }
+
+    fn mean(numbers: impl Iterator<Item = Self> + Clone) -> Self {
+        let count: u32 = numbers.clone().map(|_| 1).sum();
+        let sum: u32 = numbers.map(u32::from).sum();
+        Self::try_from((sum + count / 2) / count).unwrap_or(Self::MAX)
+    }
+
+    fn append(self, bytes: &mut Vec<u8>) {
+        bytes.push(self);
+    }
+}
+
 /// Contents of a file.
-pub(super) struct GeoTiff<'a> {
+pub(super) struct GeoTiff<'a, N> {
     /// Grid of the cells; its heights are not written.
     pub(super) grid: &'a HeightGrid,
     /// Latitude at which cells are as wide as high, radians.
@@ -33,8 +90,8 @@ pub(super) struct GeoTiff<'a> {
     pub(super) body: Body,
     /// Meaning of the numbers, in words.
     pub(super) what: &'a str,
-    /// Row by row, NaN in cells without a number.
-    pub(super) numbers: &'a [f32],
+    /// Row by row.
+    pub(super) numbers: &'a [N],
 }
 
 /// A field of a table.
@@ -46,13 +103,13 @@ struct Field {
 }
 
 /// One size of the numbers.
-struct Size {
+struct Size<N> {
     rows: usize,
     columns: usize,
-    numbers: Vec<f32>,
+    numbers: Vec<N>,
 }
 
-impl GeoTiff<'_> {
+impl<N: Number> GeoTiff<'_, N> {
     /// The file.
     pub(super) fn encoded(&self) -> Vec<u8> {
         let sizes = self.sizes();
@@ -72,7 +129,7 @@ impl GeoTiff<'_> {
         let mut begins = nowhere;
         for (begin, size) in begins.iter_mut().zip(&sizes).rev() {
             *begin = at;
-            at += size.tiles() * TILE * TILE * 4;
+            at += size.tiles() * tile_bytes::<N>();
         }
         bytes.extend(self.tables(&sizes, first, &begins));
         for size in sizes.iter().rev() {
@@ -82,7 +139,7 @@ impl GeoTiff<'_> {
     }
 
     /// The numbers, and their means over 2 by 2, 4 by 4 … cells until one tile holds them.
-    fn sizes(&self) -> Vec<Size> {
+    fn sizes(&self) -> Vec<Size<N>> {
         let [rows, columns] = self.grid.size;
         let mut sizes = vec![Size {
             rows,
@@ -98,14 +155,14 @@ impl GeoTiff<'_> {
     }
 
     /// Tables of all sizes, which begin at the byte `at`.
-    fn tables(&self, sizes: &[Size], at: usize, begins: &[usize]) -> Vec<u8> {
+    fn tables(&self, sizes: &[Size<N>], at: usize, begins: &[usize]) -> Vec<u8> {
         let mut bytes = Vec::new();
         for (number, (size, begin)) in sizes.iter().zip(begins).enumerate() {
             let mut fields = size.fields(*begin, number > 0);
             if number == 0 {
                 fields.extend(self.fields());
             }
-            fields.push(Field::text(42_113, "-32768"));
+            fields.push(Field::text(42_113, N::NO_DATA));
             fields.sort_by_key(|field| field.tag);
             let is_last = number + 1 == sizes.len();
             bytes.extend(table(&fields, at + bytes.len(), is_last));
@@ -162,7 +219,7 @@ impl GeoTiff<'_> {
     }
 }
 
-impl Size {
+impl<N: Number> Size<N> {
     fn across(&self) -> [usize; 2] {
         [self.rows.div_ceil(TILE), self.columns.div_ceil(TILE)]
     }
@@ -174,18 +231,19 @@ impl Size {
 
     /// Layout of the numbers in the file, from the byte `begin` on.
     fn fields(&self, begin: usize, is_reduced: bool) -> Vec<Field> {
-        let bytes = TILE * TILE * 4;
+        let bytes = tile_bytes::<N>();
+        let [bits, format] = N::LAYOUT;
         let begins: Vec<usize> = (0..self.tiles()).map(|tile| begin + tile * bytes).collect();
         vec![
             Field::longs(254, &[usize::from(is_reduced)]),
             Field::longs(256, &[self.columns]),
             Field::longs(257, &[self.rows]),
-            // Of 32 bits, not compressed, the least black, one of a cell, with decimals.
-            Field::shorts(258, &[32]),
+            // Not compressed, the least black, one of a cell.
+            Field::shorts(258, &[bits]),
             Field::shorts(259, &[1]),
             Field::shorts(262, &[1]),
             Field::shorts(277, &[1]),
-            Field::shorts(339, &[3]),
+            Field::shorts(339, &[format]),
             Field::shorts(322, &[TILE]),
             Field::shorts(323, &[TILE]),
             Field::longs(324, &begins),
@@ -193,11 +251,11 @@ impl Size {
         ]
     }
 
-    fn number(&self, row: usize, column: usize) -> f32 {
+    fn number(&self, row: usize, column: usize) -> N {
         if row < self.rows && column < self.columns {
             self.numbers[row * self.columns + column]
         } else {
-            f32::NAN
+            N::NONE
         }
     }
 
@@ -208,9 +266,7 @@ impl Size {
             let [top, left] = [tile / across * TILE, tile % across * TILE];
             for row in top..top + TILE {
                 for column in left..left + TILE {
-                    let number = self.number(row, column);
-                    let number = if number.is_nan() { NO_DATA } else { number };
-                    bytes.extend(number.to_le_bytes());
+                    self.number(row, column).append(bytes);
                 }
             }
         }
@@ -224,12 +280,9 @@ impl Size {
             for column in 0..columns {
                 let four = [[0, 0], [0, 1], [1, 0], [1, 1]]
                     .map(|[down, right]| self.number(2 * row + down, 2 * column + right));
-                let known = four.iter().filter(|number| !number.is_nan());
-                let (sum, count) = known.fold((0.0_f32, 0.0_f32), |(sum, count), number| {
-                    (sum + number, count + 1.0)
-                });
-                // Without a number 0/0.
-                numbers.push(sum / count);
+                let known = four.iter().copied().filter(|number| !number.is_none());
+                let is_empty = known.clone().next().is_none();
+                numbers.push(if is_empty { N::NONE } else { N::mean(known) });
             }
         }
         Self {
@@ -238,6 +291,11 @@ impl Size {
             numbers,
         }
     }
+}
+
+/// Bytes of a tile.
+const fn tile_bytes<N: Number>() -> usize {
+    TILE * TILE * N::LAYOUT[0] / 8
 }
 
 impl Field {
@@ -346,7 +404,7 @@ mod tests {
                 panic!("{number}");
             };
             // A cell without a number stays empty in the full size, and is not counted in means.
-            let expected = [NO_DATA, 0.5 * (1.0 + 1.0) * 2.0 / 3.0, 1.5];
+            let expected = [-32_768.0, 0.5 * (1.0 + 1.0) * 2.0 / 3.0, 1.5];
             assert!((tile[0] - expected[number]).abs() < 0.1, "{}", tile[0]);
             // A row farther south is one more, or two, or four.
             let width = usize::try_from(size.0).unwrap().min(TILE);

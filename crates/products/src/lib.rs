@@ -41,6 +41,7 @@ mod light_time;
 mod listed;
 mod net;
 mod orientation;
+mod orthoimages;
 mod overlays;
 mod page;
 mod page_data;
@@ -215,23 +216,17 @@ fn write(
         (Write::Image(write) | Write::AdjustedImage(write), Some(image), _) => {
             write(&path, of, image).map(Some)
         }
-        (Write::Overlay(write), Some(image), _) => {
+        (Write::Where { has, write, .. }, ..) if has(of.site) => write(&path, of).map(Some),
+        (Write::ImageWhere { has, write, .. }, Some(image), _) => {
             let mut all = of.site.images.iter();
             let index = all.position(|of| of.times.id == image.times.id);
-            index.map_or(Ok(None), |index| write(&path, of, index))
+            let index = index.filter(|index| has(of.site, *index));
+            index.map(|index| write(&path, of, index)).transpose()
         }
         (Write::Ties(write), _, Some(geometric)) => write(&path, of, geometric).map(Some),
         (Write::Matched(write), _, Some(geometric)) if !geometric.ties.matched.is_empty() => {
             write(&path, of, geometric).map(Some)
         }
-        (Write::Surface(write), ..) => match of.site.surface {
-            Some(surface) => write(&path, of, surface).map(Some),
-            None => Ok(None),
-        },
-        (Write::Model(write), ..) => match of.site.surface {
-            Some(surface) if !surface.account.is_refused => write(&path, of, surface).map(Some),
-            _ => Ok(None),
-        },
         (Write::Adjustment(write), _, Some(geometric)) => match &geometric.adjustment {
             Some(adjustment) => write(&path, of, geometric, adjustment),
             None => Ok(None),

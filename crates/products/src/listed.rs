@@ -36,10 +36,7 @@ pub fn listed(site: &SiteProducts) -> Vec<Listed> {
             Write::Image(_) | Write::AdjustedImage(_) => images(&|_| true),
             // Images with support data get no kernels.
             Write::WithAnother => images(&|index| site.images[index].times.support.is_none()),
-            Write::Overlay(_) => images(&|index| {
-                let overlays = site.overlays;
-                overlays.is_some_and(|overlays| overlays.quick_look(index).is_some())
-            }),
+            Write::ImageWhere { has, .. } => images(&|index| has(site, index)),
             _ => vec![None],
         };
         images.into_iter().map(|image| Listed {
@@ -66,14 +63,11 @@ fn has(site: &SiteProducts, declaration: &Declaration) -> bool {
         return site.overlays.is_some();
     }
     match declaration.write {
-        Write::Site(_) | Write::Image(_) | Write::Overlay(_) => true,
+        Write::Site(_) | Write::Image(_) | Write::ImageWhere { .. } => true,
+        Write::Where { has, .. } => has(site),
         Write::Matched(_) => site
             .geometric
             .is_some_and(|geometric| !geometric.ties.matched.is_empty()),
-        Write::Surface(_) => site.surface.is_some(),
-        Write::Model(_) => site
-            .surface
-            .is_some_and(|surface| !surface.account.is_refused),
         Write::OfPage(_) => declaration.path != FIGURE.path,
         Write::Footprints(format, _) => site.has_footprints_in(format),
         Write::Ties(_) => site.geometric.is_some(),

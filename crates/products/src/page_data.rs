@@ -44,6 +44,7 @@ use areograph_stages::{
     lay_overlays::Overlays,
     map_surface::{Surface, SurfaceAccount, SurfaceModel},
     read_ties::Ties,
+    rectify_images::{Orthoimage, OrthoimageAccount},
     register::ImageRegistration,
     sample_orientation::Orientation,
     tag_times::ImageTimes,
@@ -92,6 +93,8 @@ pub struct PageData<'a> {
     overlays: Option<Cow<'a, Overlays>>,
     /// The page shows only the account of a terrain model.
     surface: Option<Cow<'a, SurfaceAccount>>,
+    /// See `surface`.
+    orthoimages: Vec<Cow<'a, OrthoimageAccount>>,
     program: Cow<'a, Program>,
 }
 
@@ -136,6 +139,7 @@ impl<'a> PageData<'a> {
             serde_json::to_string(site.verdict).map_err(ProductError::refused("encode JSON"))?;
         let pedr_files = site.config.pedr.files.iter();
         let shown = site.shown_images();
+        let orthoimages = site.orthoimages.iter();
         Ok(Self {
             config: config.to_string(),
             pedr_files: pedr_files.map(|path| file_name(path)).collect(),
@@ -155,6 +159,7 @@ impl<'a> PageData<'a> {
             geometric: site.geometric.map(|of| geometric(of, &shown)),
             overlays: site.overlays.map(Cow::Borrowed),
             surface: site.surface.map(|of| Cow::Borrowed(&of.account)),
+            orthoimages: orthoimages.map(|of| Cow::Borrowed(&of.account)).collect(),
             program: Cow::Borrowed(site.program),
         })
     }
@@ -196,6 +201,12 @@ impl<'a> PageData<'a> {
             pairs: &of.pairs,
             images_agree: of.images_agree,
         });
+        let orthoimages = self.orthoimages.iter().map(|account| Orthoimage {
+            account: account.clone().into_owned(),
+            brightness: Vec::new(),
+            sigmas_m: Vec::new(),
+        });
+        let orthoimages: Vec<Orthoimage> = orthoimages.collect();
         let surface = self.surface.as_ref().map(|account| Surface {
             account: account.clone().into_owned(),
             model: SurfaceModel::nothing(),
@@ -225,6 +236,7 @@ impl<'a> PageData<'a> {
             }),
             overlays: self.overlays.as_deref(),
             surface: surface.as_ref(),
+            orthoimages: &orthoimages,
             program: &self.program,
         })
     }

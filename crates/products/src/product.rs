@@ -11,7 +11,6 @@ use areograph_base::{
     schema::DocumentSchema,
 };
 use areograph_config::ShotFormat;
-use areograph_stages::map_surface::Surface;
 
 /// A file that was written.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -99,16 +98,22 @@ pub(super) enum Write {
     Footprints(ShotFormat, WriteFootprints),
     /// For every image.
     Image(fn(&Path, &Context, &ImageProducts) -> Result<u64>),
-    /// For every image with pixels, by its index.
-    Overlay(fn(&Path, &Context, usize) -> Result<Option<u64>>),
+    /// For sites, and for images by their index, that have what the product shows.
+    Where {
+        sites: &'static str,
+        has: fn(&SiteProducts) -> bool,
+        write: fn(&Path, &Context) -> Result<u64>,
+    },
+    /// See [`Self::Where`].
+    ImageWhere {
+        images: &'static str,
+        has: fn(&SiteProducts, usize) -> bool,
+        write: fn(&Path, &Context, usize) -> Result<u64>,
+    },
     /// For a site with tie points.
     Ties(fn(&Path, &Context, &GeometricProducts) -> Result<u64>),
     /// For a site with tie points that were matched.
     Matched(fn(&Path, &Context, &GeometricProducts) -> Result<u64>),
-    /// For a site with a terrain model.
-    Surface(fn(&Path, &Context, &Surface) -> Result<u64>),
-    /// For a site with a significant terrain model.
-    Model(fn(&Path, &Context, &Surface) -> Result<u64>),
     /// For a site with an adjustment.
     Adjustment(fn(&Path, &Context, &GeometricProducts, &AdjustmentProducts) -> Result<Option<u64>>),
     /// For every image of a site with an adjustment.
@@ -185,7 +190,7 @@ pub(super) struct Use {
 impl Declaration {
     pub(super) const fn scope(&self) -> Scope {
         match self.write {
-            Write::Image(_) | Write::Overlay(_) => Scope::Image,
+            Write::Image(_) | Write::ImageWhere { .. } => Scope::Image,
             Write::AdjustedImage(_) => Scope::AdjustedImage,
             _ => Scope::Site,
         }
@@ -206,10 +211,9 @@ impl Declaration {
             Write::Site(_) => "every site",
             Write::OfPage(_) => "every figure of the report",
             Write::Image(_) => "every image",
-            Write::Overlay(_) => "every image with pixels",
+            Write::Where { sites: when, .. } | Write::ImageWhere { images: when, .. } => when,
             Write::Ties(_) => "a site with tie points",
             Write::Matched(_) => "a site with matched tie points",
-            Write::Surface(_) | Write::Model(_) => "a site with a terrain model",
             Write::Adjustment(_) | Write::Several(_) => "a site with an adjustment",
             Write::AdjustedImage(_) | Write::WithAnother => {
                 "every image of a site with an adjustment"

@@ -3,7 +3,8 @@
 use super::{
     adjusted_footprints, adjusted_kernels, adjustment, correlations,
     exchange::{adjusted, geopackage, jigsaw, matched, readme, shapefile, stac, tables},
-    figures, footprints, heights, isd, kernel_report, orientation, overlays, page, page_data,
+    figures, footprints, heights, isd, kernel_report, orientation, orthoimages, overlays, page,
+    page_data,
     product::Declaration,
     profile_check, ranges, registration, surface, ties,
 };
@@ -41,6 +42,9 @@ pub(super) static PRODUCTS: &[&Declaration] = &[
     &surface::HEIGHTS,
     &surface::SIGMAS,
     &surface::DOCUMENT,
+    &orthoimages::ORTHOIMAGE,
+    &orthoimages::SIGMAS,
+    &orthoimages::DOCUMENT,
     &page::PAGE,
     &page::OVERLAYS,
     &figures::FIGURE,

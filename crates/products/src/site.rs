@@ -28,6 +28,7 @@ use areograph_stages::{
     lay_overlays::Overlays,
     map_surface::Surface,
     read_ties::Ties,
+    rectify_images::Orthoimage,
     register::ImageRegistration,
     sample_orientation::Orientation,
     tabulate_kernels::KernelTables,
@@ -73,6 +74,8 @@ pub struct SiteProducts<'a> {
     pub overlays: Option<&'a Overlays>,
     /// The terrain model of a pair of images; `None` if the site does not request one.
     pub surface: Option<&'a Surface>,
+    /// Orthoimages of images with pixels on the terrain model.
+    pub orthoimages: &'a [Orthoimage],
     /// Software that computed the products.
     pub program: &'a Program,
 }

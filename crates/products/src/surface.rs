@@ -9,13 +9,15 @@ use super::{
     files::{write_bytes, write_json},
     geotiff::GeoTiff,
     product::{Content, Context, Declaration, Role, Write},
+    site::SiteProducts,
 };
 use areograph_base::{
     error::{Locate as _, Result},
     schema::DocumentSchema,
 };
+use areograph_geom::height_grid::HeightGrid;
 use areograph_pds::terrain_model::{HeightsAbove, read_terrain_model};
-use areograph_stages::map_surface::Surface;
+use areograph_stages::map_surface::SurfaceModel;
 
 use document::Document;
 
@@ -27,10 +29,23 @@ pub(super) static HEIGHTS: Declaration = Declaration {
     rows: "cells with a height",
     role: Role::Data,
     content: Content::Foreign,
-    write: Write::Model(|path, of, surface| {
-        let what = "height above the sphere, metres";
-        write(path, of, surface, (what, &surface.model.heights.heights_m))
-    }),
+    write: Write::Where {
+        sites: WITH_A_MODEL,
+        has: |site| significant(site).is_some(),
+        write: |path, of| {
+            let what = "height above the sphere, metres";
+            let model = significant(of.site);
+            model.map_or(Ok(0), |model| {
+                write_map(
+                    path,
+                    of,
+                    &model.heights,
+                    (what, &model.heights.heights_m),
+                    model.parallel_rad,
+                )
+            })
+        },
+    },
     uses: &[],
 };
 
@@ -42,10 +57,23 @@ pub(super) static SIGMAS: Declaration = Declaration {
     rows: "cells with a height",
     role: Role::Data,
     content: Content::Foreign,
-    write: Write::Model(|path, of, surface| {
-        let what = "standard deviation of the height about the common offset, metres";
-        write(path, of, surface, (what, &surface.model.sigmas_m))
-    }),
+    write: Write::Where {
+        sites: WITH_A_MODEL,
+        has: |site| significant(site).is_some(),
+        write: |path, of| {
+            let what = "standard deviation of the height about the common offset, metres";
+            let model = significant(of.site);
+            model.map_or(Ok(0), |model| {
+                write_map(
+                    path,
+                    of,
+                    &model.heights,
+                    (what, &model.sigmas_m),
+                    model.parallel_rad,
+                )
+            })
+        },
+    },
     uses: &[],
 };
 
@@ -56,25 +84,41 @@ pub(super) static DOCUMENT: Declaration = Declaration {
     rows: "profiles on it",
     role: Role::Metadata,
     content: Content::Document(|| DocumentSchema::of::<Document>("surface")),
-    write: Write::Surface(|path, of, surface| {
-        write_json(path, &Document::of(of, surface))?;
-        Ok(surface.account.shots.profiles.len() as u64)
-    }),
+    write: Write::Where {
+        sites: WITH_A_MODEL,
+        has: |site| site.surface.is_some(),
+        write: |path, of| {
+            let Some(surface) = of.site.surface else {
+                return Ok(0);
+            };
+            write_json(path, &Document::of(of, surface))?;
+            Ok(surface.account.shots.profiles.len() as u64)
+        },
+    },
     uses: &[],
 };
 
+/// Sites with these products.
+pub(super) const WITH_A_MODEL: &str = "a site with a terrain model";
+
+/// The terrain model of a site, where enough cells matched.
+fn significant<'a>(site: &SiteProducts<'a>) -> Option<&'a SurfaceModel> {
+    let surface = site.surface?;
+    (!surface.account.is_refused).then_some(&surface.model)
+}
+
 /// Writes numbers of all cells, and reads them back as every terrain model is read.
-fn write(
+pub(super) fn write_map(
     path: &Path,
     of: &Context,
-    surface: &Surface,
+    grid: &HeightGrid,
     (what, numbers): (&str, &[f32]),
+    parallel_rad: f64,
 ) -> Result<u64> {
-    let model = &surface.model;
     let body = of.site.config.body;
     let file = GeoTiff {
-        grid: &model.heights,
-        parallel_rad: model.parallel_rad,
+        grid,
+        parallel_rad,
         body,
         what,
         numbers,
@@ -84,15 +128,15 @@ fn write(
     let is_same = |(one, other): (&f32, &f32)| {
         one.to_bits() == other.to_bits() || (one.is_nan() && other.is_nan())
     };
-    let rounding_rad = 1e-9 * model.heights.cell_rad[1];
-    let moved = [0, 1].map(|axis| again.first_rad[axis] - model.heights.first_rad[axis]);
+    let rounding_rad = 1e-9 * grid.cell_rad[1];
+    let moved = [0, 1].map(|axis| again.first_rad[axis] - grid.first_rad[axis]);
     let is_there = moved.iter().all(|moved_rad| {
         let turns = (moved_rad / std::f64::consts::TAU).round() * std::f64::consts::TAU;
         // A cell keeps a millionth of its edge beside a radian.
         (moved_rad - turns).abs() <= rounding_rad.max(1e-14)
     });
     let all = again.heights_m.iter().zip(numbers);
-    if again.size == model.heights.size && is_there && all.clone().all(is_same) {
+    if again.size == grid.size && is_there && all.clone().all(is_same) {
         return Ok(all.filter(|(_, number)| !number.is_nan()).count() as u64);
     }
     let what = format!("{what} of {} cells", numbers.len());

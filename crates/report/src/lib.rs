@@ -41,6 +41,7 @@ mod moved;
 mod net;
 mod notes;
 mod numbers;
+mod orthoimages;
 mod outlines;
 mod overlays;
 mod plots;
@@ -89,6 +90,7 @@ const SECTIONS: &[Section] = &[
     misregistration::SECTION,
     matching::SECTION,
     surface::SECTION,
+    orthoimages::SECTION,
     adjustment::SECTION,
     profiles::SECTION,
     ranges::SECTION,

@@ -235,7 +235,8 @@ fn caption(site: &SiteProducts, place: &Place) -> String {
     words
 }
 
-fn img(picture: &Picture, alt: &str) -> String {
+/// A picture inside the page.
+pub(super) fn img(picture: &Picture, alt: &str) -> String {
     format!(
         "<img src=\"data:image/png;base64,{}\" width=\"{}\" height=\"{}\" alt=\"{}\">",
         STANDARD.encode(&picture.png),

@@ -146,6 +146,7 @@ impl Site {
             notes: &[],
             verdict: &verdict,
             overlays: None,
+            orthoimages: &[],
             surface: None,
             program: &Program::default(),
             geometric: Some(GeometricProducts {

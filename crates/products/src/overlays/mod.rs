@@ -14,6 +14,7 @@ pub use self::pictures::{Picture, anaglyph, piece, strip};
 use super::{
     files::{read, write_bytes, write_json},
     product::{Content, Context, Declaration, Role, Write},
+    site::SiteProducts,
 };
 use crate::error::ProductError;
 use areograph_base::error::Locate as _;
@@ -26,17 +27,21 @@ pub(super) static PICTURE: Declaration = Declaration {
     rows: "footprints in the image",
     role: Role::Overview,
     content: Content::Foreign,
-    write: Write::Overlay(|path, of, image| {
-        let Some(picture) = strip(of.site, image, u64::MAX)? else {
-            return Ok(None);
-        };
-        write_bytes(path, &picture.png)?;
-        if read(path)? != picture.png {
-            let what = format!("{} bytes of a picture", picture.png.len());
-            return Err(ProductError::ReadBack { what }).in_file(path);
-        }
-        Ok(Some(footprints(of.site, image).len() as u64))
-    }),
+    write: Write::ImageWhere {
+        images: WITH_PIXELS,
+        has: has_pixels,
+        write: |path, of, image| {
+            let Some(picture) = strip(of.site, image, u64::MAX)? else {
+                return Ok(0);
+            };
+            write_bytes(path, &picture.png)?;
+            if read(path)? != picture.png {
+                let what = format!("{} bytes of a picture", picture.png.len());
+                return Err(ProductError::ReadBack { what }).in_file(path);
+            }
+            Ok(footprints(of.site, image).len() as u64)
+        },
+    },
     uses: &[],
 };
 
@@ -48,30 +53,34 @@ pub(super) static MARKS: Declaration = Declaration {
     rows: "marks",
     role: Role::Data,
     content: Content::Foreign,
-    write: Write::Overlay(|path, of, image| {
-        if of
-            .site
-            .overlays
-            .and_then(|overlays| overlays.quick_look(image))
-            .is_none()
-        {
-            return Ok(None);
-        }
-        let features = features(of, image);
-        let count = features.len() as u64;
-        let name = &of.site.images[image].times.id;
-        write_json(
-            path,
-            &json!({
-                "type": "FeatureCollection",
-                "name": format!("{name} in image coordinates"),
-                "features": features,
-            }),
-        )?;
-        Ok(Some(count))
-    }),
+    write: Write::ImageWhere {
+        images: WITH_PIXELS,
+        has: has_pixels,
+        write: |path, of, image| {
+            let features = features(of, image);
+            let count = features.len() as u64;
+            let name = &of.site.images[image].times.id;
+            write_json(
+                path,
+                &json!({
+                    "type": "FeatureCollection",
+                    "name": format!("{name} in image coordinates"),
+                    "features": features,
+                }),
+            )?;
+            Ok(count)
+        },
+    },
     uses: &[],
 };
+
+/// Images with these products.
+const WITH_PIXELS: &str = "every image with pixels";
+
+fn has_pixels(site: &SiteProducts, image: usize) -> bool {
+    let overlays = site.overlays;
+    overlays.is_some_and(|overlays| overlays.quick_look(image).is_some())
+}
 
 /// Every mark as a point with its meaning.
 fn features(of: &Context, image: usize) -> Vec<Value> {

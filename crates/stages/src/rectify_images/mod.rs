@@ -1,12 +1,14 @@
 //! Orthoimages: images on the cells of a map, where heights of the terrain model no longer displace them.
 //!
 //! The brightness of a cell is that of the place of the image that sees its ground, by cubic convolution. Ground without a
-//! height, ground that relief hides from the camera, and lines that were not received have none: nothing is filled.
+//! height, ground that relief hides from the camera, and lines that were not received have none. Narrow holes of the terrain
+//! model are bridged, with larger standard deviations.
 //!
 //! # Source
 //! The products that Shan, Lee & Yoon 2002 and Yoon & Shan 2004 announce; cubic convolution: Keys 1981.
 
 mod cells;
+mod holes;
 mod sight_lines;
 
 use std::sync::atomic::AtomicBool;
@@ -32,6 +34,7 @@ use areograph_store::{
 };
 
 use cells::Cells;
+use holes::bridged;
 use sight_lines::SightLines;
 
 /// Maximum number of cells of an orthoimage: 1.3 bytes each in its file.
@@ -84,7 +87,8 @@ pub struct OrthoimageAccount {
     pub filled: u32,
     /// Number of cells on the terrain model whose pixels are missing.
     pub without_pixels: u32,
-    /// Number of cells of the terrain model inside the image, and of those among them that relief hides from the camera.
+    /// Number of cells of the terrain model inside the image, with bridged holes, and of those among them that relief hides from
+    /// the camera.
     pub terrain_cells: u32,
     /// See `terrain_cells`.
     pub hidden: u32,
@@ -147,6 +151,7 @@ impl Stage for RectifyImages<'_> {
         let times = self.images.0.iter().map(|image| image.times.value());
         let times: Vec<&ImageTimes> = times.collect::<Result<_>>()?;
         let pixels = self.pixels.decoded(&times)?;
+        let model = bridged(&surface.model);
         let images = oriented.iter().zip(&pixels).enumerate();
         for (index, (image, pixels)) in images {
             let Some(pixels) = pixels else { continue };
@@ -157,8 +162,7 @@ impl Stage for RectifyImages<'_> {
             })?;
             let scatter_px = adjusted.map(|of| of.summary.tie_scatter_px);
             let cell_m = *self.cell_m;
-            let Some(mut orthoimage) = rectified(&view, &surface.model, cell_m, scatter_px, watch)?
-            else {
+            let Some(mut orthoimage) = rectified(&view, &model, cell_m, scatter_px, watch)? else {
                 continue;
             };
             let account = &mut orthoimage.account;

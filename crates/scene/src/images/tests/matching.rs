@@ -5,6 +5,7 @@
     reason = "site files in a temporary folder need no atomic writer"
 )]
 
+mod orthoimages;
 mod surface;
 
 use std::{
@@ -28,7 +29,7 @@ use crate::{
 };
 use areograph::flow::{Ending, PUBLISH, RunOptions, run_site};
 use areograph_config::{self as config};
-use areograph_geom::ellipsoid::local_axes;
+use areograph_geom::{ellipsoid::local_axes, imaging::Patch};
 use areograph_pds::ties::read_ties;
 use areograph_store::hashes::HashCache;
 
@@ -91,8 +92,62 @@ impl Mission {
         let text = fs::read_to_string(self.folder.join(format!("sites/{site}.toml"))).unwrap();
         let named = text.replace("site = \"", "site = \"mapped_");
         let path = self.folder.join(format!("sites/mapped_{site}.toml"));
-        fs::write(&path, named + "\n[surface]\ncell_m = 60.0\n").unwrap();
+        fs::write(
+            &path,
+            named + "\n[surface]\ncell_m = 60.0\northoimage_cell_m = 5.0\n",
+        )
+        .unwrap();
         path
+    }
+
+    /// Compares orthoimages of a site with the true ground, and with each other.
+    fn hold_orthoimages_against_truth(&self, site: &str, products: &Path) {
+        let document = fs::read(products.join("orthoimages.json")).unwrap();
+        let document: serde_json::Value = serde_json::from_slice(&document).unwrap();
+        let stated = document["orthoimages"].as_array().unwrap();
+        let mut made = Vec::new();
+        for (image, stated) in IMAGES
+            .iter()
+            .filter(|image| image.site.id == site)
+            .zip(stated)
+        {
+            let orthoimage = orthoimages::Published::of(products, image.id);
+            let (_, pixels) = decoded(&self.folder.join("images").join(image_name(image.id)));
+            let samples = image.samples() as usize;
+            let pixels = Patch {
+                first: [0, 0],
+                size: [pixels.len() / samples, samples],
+                values: pixels.into_iter().map(f32::from).collect(),
+            };
+            let errors_m = orthoimage.errors_m(&self.image(image.id), &self.terrain, &pixels);
+            let count = errors_m.len() as f64;
+            let mean_m = errors_m.iter().sum::<Vector2<f64>>() / count;
+            let about_m2 = errors_m.iter().map(|of| (of - mean_m).norm_squared());
+            let about_m = (about_m2.sum::<f64>() / count).sqrt();
+            println!(
+                "orthoimage of {}: {count} places, mean error {mean_m:.1?} m, {about_m:.2} m about it; {stated}",
+                image.id
+            );
+            assert!(count >= 30.0);
+            let number = |place: &str| stated.pointer(place).unwrap().as_f64().unwrap();
+            // The errors of both images and of the ground between them share their mean.
+            for axis in 0..2 {
+                let sigma_m = number(&format!("/common_sigma_m/{axis}"));
+                assert!(mean_m[axis].abs() <= 3.0 * sigma_m, "{mean_m} {sigma_m}");
+            }
+            // And a tenth of a pixel of the comparison itself.
+            let expected_m = number("/sigma_m").hypot(0.1 * number("/pixel_m"));
+            assert!(about_m <= 1.25 * expected_m, "{about_m} {expected_m}");
+            made.push(orthoimage);
+        }
+        let shifts = made[0].shifts(&made[1]);
+        let square = shifts.iter().map(Vector2::norm_squared).sum::<f64>();
+        let rms = (square / shifts.len() as f64).sqrt();
+        println!(
+            "{} places in both orthoimages, {rms:.3} cells apart",
+            shifts.len()
+        );
+        assert!(shifts.len() >= 30 && rms <= 0.3, "{rms}");
     }
 
     /// The same site with the pixels of one image as a cube of ISIS, and of the other as a TIFF.
@@ -351,6 +406,7 @@ fn matched_ties_are_within_what_they_state_and_adjust_as_well_as_given_ones() {
         if is_long && site.id == "gusev_crater" {
             let mapped = run(&mission.mapped_site(site.id), folder.path());
             surface::Published::of(&mapped).hold_against(&mission.terrain);
+            mission.hold_orthoimages_against_truth(site.id, &mapped);
         }
         let by_given = Judged::of(&given, &given_m.collect());
         println!("{}: by given ties {by_given:.2?}", site.id);

@@ -1,0 +1,183 @@
+//! Orthoimages: brightness and positional uncertainty on the map of the terrain model, and their statistics.
+
+use std::path::Path;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::{
+    error::ProductError,
+    files::{read, write_bytes, write_json},
+    geotiff::GeoTiff,
+    product::{Content, Context, Declaration, Role, Write},
+    site::SiteProducts,
+    surface::write_map,
+};
+use areograph_base::{
+    error::{Locate as _, Result},
+    schema::DocumentSchema,
+};
+use areograph_stages::rectify_images::Orthoimage;
+
+/// Images and sites with these products.
+const IMAGES: &str = "every image with an orthoimage";
+const SITES: &str = "a site with orthoimages";
+
+pub(super) static ORTHOIMAGE: Declaration = Declaration {
+    path: "images/<image>/orthoimage.tif",
+    what: "the image on the terrain model, on the same equirectangular map: brightness from 1 on (a pixel of 0 becomes 1), 0 \
+           where there is no height (narrow holes of the model are bridged), where relief hides the ground, or where pixels are missing; a cloud-optimised GeoTIFF",
+    readers: "GIS",
+    rows: "cells with a brightness",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::ImageWhere {
+        images: IMAGES,
+        has: |site, image| orthoimage(site, image).is_some(),
+        write: |path, of, image| {
+            orthoimage(of.site, image).map_or(Ok(0), |image| write_brightness(path, of, image))
+        },
+    },
+    uses: &[],
+};
+
+pub(super) static SIGMAS: Declaration = Declaration {
+    path: "images/<image>/orthoimage_sigma.tif",
+    what: "standard deviation of the horizontal position of the ground in the orthoimage, metres, in the cells of the terrain \
+           model: by its heights and by jitter of the image; orthoimages.json has the error that all cells share",
+    readers: "GIS",
+    rows: "cells that the image shows",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::ImageWhere {
+        images: IMAGES,
+        has: |site, image| orthoimage(site, image).is_some(),
+        write: |path, of, image| {
+            let what = "standard deviation of the horizontal position, metres";
+            let terrain = of.site.surface.map(|surface| &surface.model);
+            let made = orthoimage(of.site, image).zip(terrain);
+            made.map_or(Ok(0), |(image, model)| {
+                let numbers = (what, &*image.sigmas_m);
+                write_map(path, of, &model.heights, numbers, model.parallel_rad)
+            })
+        },
+    },
+    uses: &[],
+};
+
+pub(super) static DOCUMENT: Declaration = Declaration {
+    path: "orthoimages.json",
+    what: "cells of every orthoimage, and the uncertainty of positions in it",
+    readers: "scripts",
+    rows: "orthoimages",
+    role: Role::Metadata,
+    content: Content::Document(|| DocumentSchema::of::<Document>("orthoimages")),
+    write: Write::Where {
+        sites: SITES,
+        has: |site| !site.orthoimages.is_empty(),
+        write: |path, of| {
+            write_json(path, &Document::of(of.site))?;
+            Ok(of.site.orthoimages.len() as u64)
+        },
+    },
+    uses: &[],
+};
+
+fn orthoimage<'a>(site: &SiteProducts<'a>, image: usize) -> Option<&'a Orthoimage> {
+    let mut all = site.orthoimages.iter();
+    all.find(|of| of.account.image == image)
+}
+
+/// Writes the brightness of all cells, and reads it back.
+fn write_brightness(path: &Path, of: &Context, image: &Orthoimage) -> Result<u64> {
+    let file = GeoTiff {
+        grid: &image.account.map,
+        parallel_rad: image.account.parallel_rad,
+        body: of.site.config.body,
+        what: "brightness of an image",
+        numbers: &*image.brightness,
+    };
+    let bytes = file.encoded();
+    write_bytes(path, &bytes)?;
+    if read(path)? != bytes {
+        let what = format!("{} bytes of an orthoimage", bytes.len());
+        return Err(ProductError::ReadBack { what }).in_file(path);
+    }
+    Ok(u64::from(image.account.filled))
+}
+
+/// `orthoimages.json`.
+#[derive(Serialize, JsonSchema)]
+#[schemars(
+    deny_unknown_fields,
+    title = "orthoimages.json",
+    description = "orthoimages.json of areograph: cells of every orthoimage of a site, and the uncertainty of positions in it. Metres; unknown values are omitted."
+)]
+struct Document<'a> {
+    #[schemars(extend("const" = "areograph orthoimages 1"))]
+    format: &'static str,
+    site: &'a str,
+    #[schemars(length(min = 1))]
+    orthoimages: Vec<Entry<'a>>,
+}
+
+/// An orthoimage.
+#[derive(Serialize, JsonSchema)]
+struct Entry<'a> {
+    /// Identifier of the image.
+    image: &'a str,
+    /// Edge of a cell.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    cell_m: f64,
+    /// Edge of a pixel of the image on the ground.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pixel_m: f64,
+    rows: usize,
+    columns: usize,
+    /// Number of cells with a brightness.
+    filled: u32,
+    /// Number of cells on the terrain model whose pixels are missing.
+    without_pixels: u32,
+    /// Number of cells of the terrain model inside the image, with its narrow holes, which are bridged.
+    terrain_cells: u32,
+    /// Number of these that relief hides from the camera.
+    hidden: u32,
+    /// Root mean square of the standard deviations of the horizontal position about the error that all cells share.
+    #[schemars(range(min = 0.0))]
+    sigma_m: f64,
+    /// The part of these by jitter, from the scatter of tie points; omitted without an adjustment.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    jitter_m: Option<f64>,
+    /// Standard deviations of the error that all cells share, towards east and north; omitted without an adjustment with
+    /// heights.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    common_sigma_m: Option<[f64; 2]>,
+}
+
+impl<'a> Document<'a> {
+    fn of(site: &SiteProducts<'a>) -> Self {
+        let orthoimages = site.orthoimages.iter().map(|of| {
+            let of = &of.account;
+            let [rows, columns] = of.map.size;
+            Entry {
+                image: &site.images[of.image].times.id,
+                cell_m: of.cell_m,
+                pixel_m: of.pixel_m,
+                rows,
+                columns,
+                filled: of.filled,
+                without_pixels: of.without_pixels,
+                terrain_cells: of.terrain_cells,
+                hidden: of.hidden,
+                sigma_m: of.sigma_m,
+                jitter_m: of.jitter_m,
+                common_sigma_m: of.common_sigma_m,
+            }
+        });
+        Self {
+            format: "areograph orthoimages 1",
+            site: &site.config.site,
+            orthoimages: orthoimages.collect(),
+        }
+    }
+}

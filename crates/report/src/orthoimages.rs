@@ -1,0 +1,139 @@
+//! Orthoimages: their cells, the uncertainty of positions in them, and pictures.
+
+use super::{
+    html::{Cell, Column, Table, escape, link, paragraph},
+    map::relief,
+    numbers::whole,
+    overlays::img,
+    plots::label,
+    section::Section,
+};
+use areograph_base::error::Result;
+use areograph_products::{Picture, SiteProducts, error::ProductError};
+use areograph_stages::rectify_images::{OrthoimageAccount, OrthoimageLook};
+
+/// Share of the darkest and of the brightest cells that are shown as black and as white.
+const CLIPPED: f64 = 0.005;
+
+pub(super) const SECTION: Section = Section {
+    title: "Orthoimages",
+    anchor: "orthoimages",
+    appears: |site| !site.orthoimages.is_empty(),
+    write,
+};
+
+fn write(site: &SiteProducts) -> Result<String> {
+    let pictures = site.orthoimages.iter().map(|of| picture(site, &of.account));
+    let pictures: String = pictures.collect::<Result<_>>()?;
+    Ok(table(site)
+        + &paragraph(
+            "Wide holes of the terrain model, ground that relief hides from the camera, and missing pixels are \
+             empty; narrow holes are bridged, with a larger σ. σ: horizontal position of a cell about the error that all cells share, from the heights and from jitter of the \
+             image. The shared error is stated separately (σ, common, east and north, from the adjustment).",
+        )
+        + &format!("<div class=\"pieces\">\n{pictures}</div>\n"))
+}
+
+fn table(site: &SiteProducts) -> String {
+    let mut table = Table::new(
+        "Orthoimages on the terrain model",
+        &[
+            Column::Text("image"),
+            Column::Number("cell (m)"),
+            Column::Number("pixel (m)"),
+            Column::Number("cells with a brightness"),
+            Column::Number("cells without pixels"),
+            Column::Number("terrain cells"),
+            Column::Number("hidden"),
+            Column::Number("σ (m)"),
+            Column::Number("by jitter"),
+            Column::Number("σ, common (m)"),
+        ],
+    );
+    for (index, of) in site.orthoimages.iter().enumerate() {
+        let of = &of.account;
+        let number = |value: f64, decimals: usize, place: &str| {
+            Cell::from(label(value, decimals)).traced(place)
+        };
+        let count = |count: u32, place: &str| Cell::from(whole(count)).traced(place);
+        let common = of.common_sigma_m.map_or_else(
+            || Cell::from("not known"),
+            |[east_m, north_m]| {
+                Cell::from(format!("{}, {}", label(east_m, 0), label(north_m, 0)))
+                    .traced("/common_sigma_m/0 /common_sigma_m/1")
+            },
+        );
+        let jitter = of.jitter_m.map_or_else(
+            || Cell::from("not known"),
+            |jitter_m| number(jitter_m, 2, "/jitter_m"),
+        );
+        table.row_of(
+            &format!("orthoimages.json#/orthoimages/{index}"),
+            true,
+            [
+                (*site.images[of.image].times.id).into(),
+                number(of.cell_m, 2, "/cell_m"),
+                number(of.pixel_m, 2, "/pixel_m"),
+                count(of.filled, "/filled"),
+                count(of.without_pixels, "/without_pixels"),
+                count(of.terrain_cells, "/terrain_cells"),
+                count(of.hidden, "/hidden"),
+                number(of.sigma_m, 2, "/sigma_m"),
+                jitter,
+                common,
+            ],
+        );
+    }
+    table.finish()
+}
+
+/// An orthoimage, north up, with links to its files.
+fn picture(site: &SiteProducts, of: &OrthoimageAccount) -> Result<String> {
+    let id = &site.images[of.image].times.id;
+    let [rows, columns] = of.look.size;
+    let pixels = grey(&of.look);
+    let size = |of: usize| u32::try_from(of).unwrap_or(u32::MAX);
+    let png = relief::png(&pixels, size(columns), size(rows))
+        .map_err(ProductError::refused("draw an orthoimage"))?;
+    let picture = Picture {
+        width: size(columns),
+        height: size(rows),
+        reduction: 1,
+        step: 1,
+        png,
+    };
+    let files = ["orthoimage.tif", "orthoimage_sigma.tif"].map(|name| {
+        let path = format!("../images/{id}/{name}");
+        link(&path, name)
+    });
+    Ok(format!(
+        "<div>{}<p>{}: {}, {}</p></div>\n",
+        img(&picture, &format!("Orthoimage of {id}, north up")),
+        escape(id),
+        files[0],
+        files[1]
+    ))
+}
+
+/// Pixels of four bytes, the last of them the opacity, stretched between the darkest and the brightest cells.
+fn grey(look: &OrthoimageLook) -> Vec<u8> {
+    let mut known: Vec<u8> = look
+        .brightness
+        .iter()
+        .copied()
+        .filter(|of| *of > 0)
+        .collect();
+    known.sort_unstable();
+    let at = |share: f64| {
+        let place = (share * known.len() as f64) as usize;
+        known.get(place.min(known.len().saturating_sub(1))).copied()
+    };
+    let [dark, bright] = [CLIPPED, 1.0 - CLIPPED].map(|share| f64::from(at(share).unwrap_or(1)));
+    let pixel = |brightness: &u8| {
+        let share = (f64::from(*brightness) - dark) / (bright - dark).max(1.0);
+        let grey = (255.0 * share).round() as u8;
+        let opacity = if *brightness > 0 { u8::MAX } else { 0 };
+        [grey, grey, grey, opacity]
+    };
+    look.brightness.iter().flat_map(pixel).collect()
+}

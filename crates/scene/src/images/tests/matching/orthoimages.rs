@@ -1,0 +1,166 @@
+//! Orthoimages of a site against the true ground, and against each other.
+
+use std::{fs::File, path::Path};
+
+use nalgebra::{Matrix2, Vector2, Vector3};
+use tiff::{
+    decoder::{Decoder, DecodingResult},
+    tags::Tag,
+};
+
+use super::place;
+use crate::{terrain::Terrain, ties::TrueImage};
+use areograph_base::units::RADIANS_PER_DEGREE;
+use areograph_geom::{
+    ellipsoid::{local_axes, spherical_to_xyz_m},
+    imaging::{Affine, Patch, match_least_squares, search},
+};
+
+/// Half the edge of a compared square, and the largest shift, cells.
+const HALF: i64 = 12;
+const REACH: i64 = 8;
+/// Largest error of a place, cells.
+const FAR: i64 = 70;
+/// Distance of compared squares, cells.
+const APART: usize = 150;
+
+/// An orthoimage, with its map.
+pub(super) struct Published {
+    pixels: Patch,
+    /// Edge of a cell, western and northern edge, metres; cosine of the parallel; radius of the sphere, metres.
+    cell_m: f64,
+    edges_m: [f64; 2],
+    parallel_cosine: f64,
+    sphere_m: f64,
+}
+
+impl Published {
+    pub(super) fn of(products: &Path, image: &str) -> Self {
+        let path = products.join(format!("images/{image}/orthoimage.tif"));
+        let mut decoder = Decoder::new(File::open(path).unwrap()).unwrap();
+        let (columns, rows) = decoder.dimensions().unwrap();
+        let mut numbers = |tag| decoder.get_tag_f64_vec(tag).unwrap();
+        let scale = numbers(Tag::ModelPixelScaleTag);
+        let corner = numbers(Tag::ModelTiepointTag);
+        let [sphere_m, parallel_deg, _] = numbers(Tag::GeoDoubleParamsTag)[..] else {
+            panic!("other parameters");
+        };
+        let DecodingResult::U8(bytes) = decoder.read_image().unwrap() else {
+            panic!("other numbers");
+        };
+        let missing_or = |byte: u8| if byte == 0 { f32::NAN } else { f32::from(byte) };
+        Self {
+            pixels: Patch {
+                first: [0, 0],
+                size: [rows as usize, columns as usize],
+                values: bytes.into_iter().map(missing_or).collect(),
+            },
+            cell_m: scale[0],
+            edges_m: [corner[3], corner[4]],
+            parallel_cosine: (parallel_deg * RADIANS_PER_DEGREE).cos(),
+            sphere_m,
+        }
+    }
+
+    /// A square about the middle of a cell; `None` where a cell is empty or missing.
+    fn square(&self, middle: [i64; 2], half: i64) -> Option<Patch> {
+        let first = middle.map(|at| at - half);
+        let edge = usize::try_from(2 * half + 1).ok()?;
+        let starts = first.map(usize::try_from);
+        let [Ok(row), Ok(column)] = starts else {
+            return None;
+        };
+        let [rows, columns] = self.pixels.size;
+        if row + edge > rows || column + edge > columns {
+            return None;
+        }
+        let lines = (row..row + edge).map(|row| row * columns + column);
+        let values = lines.flat_map(|start| &self.pixels.values[start..start + edge]);
+        let values: Vec<f32> = values.copied().collect();
+        let is_whole = values.iter().all(|value| !value.is_nan());
+        is_whole.then_some(Patch {
+            first,
+            size: [edge; 2],
+            values,
+        })
+    }
+
+    /// The middles of squares.
+    fn middles(&self) -> impl Iterator<Item = [i64; 2]> {
+        let [rows, columns] = self.pixels.size.map(|of| i64::try_from(of).unwrap());
+        let rows = (0..rows).step_by(APART);
+        rows.flat_map(move |row| {
+            (0..columns)
+                .step_by(APART / 2)
+                .map(move |column| [row, column])
+        })
+    }
+
+    /// The true ground at a place in cells, counted from the north-western edge.
+    fn ground_m(&self, terrain: &Terrain, cell: &Vector2<f64>) -> Vector3<f64> {
+        let east_m = self.edges_m[0] + cell.y * self.cell_m;
+        let north_m = self.edges_m[1] - cell.x * self.cell_m;
+        let longitude_rad = east_m / self.sphere_m / self.parallel_cosine;
+        let direction = spherical_to_xyz_m(longitude_rad, north_m / self.sphere_m, 1.0);
+        direction * terrain.radius_m(&direction)
+    }
+
+    /// Errors of its places towards east and north, metres: against the true place of the ground that its cells show.
+    pub(super) fn errors_m(
+        &self,
+        truth: &TrueImage<'_>,
+        terrain: &Terrain,
+        pixels: &Patch,
+    ) -> Vec<Vector2<f64>> {
+        let error_m = |middle: [i64; 2]| {
+            let template = self.square(middle, HALF)?;
+            let from = template.middle();
+            let through = |cell: Vector2<f64>| place(truth, &self.ground_m(terrain, &cell));
+            let steps = [Vector2::x(), Vector2::y()];
+            let matrix = Matrix2::from_columns(
+                &steps.map(|step| (through(from + step) - through(from - step)) * 0.5),
+            );
+            let warp = Affine {
+                from,
+                to: through(from),
+                matrix,
+            };
+            // The true image on the same cells.
+            let first = middle.map(|at| at - HALF - FAR);
+            let edge = usize::try_from(2 * (HALF + FAR) + 1).ok()?;
+            let area = pixels.resampled(first, [edge; 2], &warp)?;
+            let peak = search(&template, &area)?;
+            let to = Vector2::from_fn(|axis, _| first[axis] as f64 + peak.at[axis] as f64);
+            let start = Affine {
+                from,
+                to: to + Vector2::repeat(HALF as f64 + 0.5),
+                matrix: Matrix2::identity(),
+            };
+            let found = match_least_squares(&template, &area, &start).ok()?;
+            let here_m = self.ground_m(terrain, &from);
+            let shown_m = self.ground_m(terrain, &found.affine.to);
+            Some((local_axes(&here_m) * (here_m - shown_m)).xy())
+        };
+        self.middles().filter_map(error_m).collect()
+    }
+
+    /// Shifts of another orthoimage against this one, cells southwards and eastwards.
+    pub(super) fn shifts(&self, other: &Self) -> Vec<Vector2<f64>> {
+        let offset = [
+            (other.edges_m[1] - self.edges_m[1]) / self.cell_m,
+            (self.edges_m[0] - other.edges_m[0]) / self.cell_m,
+        ];
+        let shift = |middle: [i64; 2]| {
+            let template = self.square(middle, HALF)?;
+            let from = template.middle();
+            let to = from + Vector2::from(offset);
+            #[allow(clippy::cast_possible_truncation, reason = "cells of a small grid")]
+            let near = [0, 1].map(|axis| to[axis].floor() as i64);
+            let area = other.square(near, HALF + REACH)?;
+            let matrix = Matrix2::identity();
+            let found = match_least_squares(&template, &area, &Affine { from, to, matrix }).ok()?;
+            Some(found.affine.to - to)
+        };
+        self.middles().filter_map(shift).collect()
+    }
+}
