@@ -44,7 +44,7 @@ pub(super) static ORTHOIMAGE: Declaration = Declaration {
 pub(super) static SIGMAS: Declaration = Declaration {
     path: "images/<image>/orthoimage_sigma.tif",
     what: "standard deviation of the horizontal position of the ground in the orthoimage, metres, in the cells of the terrain \
-           model: by its heights and by jitter of the image; orthoimages.json has the error that all cells share",
+           model: by its heights, and by jitter and drift of the image; orthoimages.json has the error that all cells share",
     readers: "GIS",
     rows: "cells that the image shows",
     role: Role::Data,
@@ -148,6 +148,9 @@ struct Entry<'a> {
     /// The part of these by jitter, from the scatter of tie points; omitted without an adjustment.
     #[serde(skip_serializing_if = "Option::is_none")]
     jitter_m: Option<f64>,
+    /// The part by errors of the orientation that change along the image; omitted without an adjustment.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    drift_m: Option<f64>,
     /// Standard deviations of the error that all cells share, towards east and north; omitted without an adjustment with
     /// heights.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -171,6 +174,7 @@ impl<'a> Document<'a> {
                 hidden: of.hidden,
                 sigma_m: of.sigma_m,
                 jitter_m: of.jitter_m,
+                drift_m: of.drift_m,
                 common_sigma_m: of.common_sigma_m,
             }
         });

@@ -28,7 +28,7 @@ fn write(site: &SiteProducts) -> Result<String> {
     Ok(table(site)
         + &paragraph(
             "Wide holes of the terrain model, ground that relief hides from the camera, and missing pixels are \
-             empty; narrow holes are bridged, with a larger σ. σ: horizontal position of a cell about the error that all cells share, from the heights and from jitter of the \
+             empty; narrow holes are bridged, with a larger σ. σ: horizontal position of a cell about the error that all cells share, from the heights, and from jitter and drift of the \
              image. The shared error is stated separately (σ, common, east and north, from the adjustment).",
         )
         + &format!("<div class=\"pieces\">\n{pictures}</div>\n"))
@@ -47,6 +47,7 @@ fn table(site: &SiteProducts) -> String {
             Column::Number("hidden"),
             Column::Number("σ (m)"),
             Column::Number("by jitter"),
+            Column::Number("by drift"),
             Column::Number("σ, common (m)"),
         ],
     );
@@ -63,10 +64,10 @@ fn table(site: &SiteProducts) -> String {
                     .traced("/common_sigma_m/0 /common_sigma_m/1")
             },
         );
-        let jitter = of.jitter_m.map_or_else(
-            || Cell::from("not known"),
-            |jitter_m| number(jitter_m, 2, "/jitter_m"),
-        );
+        let of_adjustment = |value: Option<f64>, place: &str| {
+            let known = value.map(|value| number(value, 2, place));
+            known.unwrap_or_else(|| Cell::from("not known"))
+        };
         table.row_of(
             &format!("orthoimages.json#/orthoimages/{index}"),
             true,
@@ -79,7 +80,8 @@ fn table(site: &SiteProducts) -> String {
                 count(of.terrain_cells, "/terrain_cells"),
                 count(of.hidden, "/hidden"),
                 number(of.sigma_m, 2, "/sigma_m"),
-                jitter,
+                of_adjustment(of.jitter_m, "/jitter_m"),
+                of_adjustment(of.drift_m, "/drift_m"),
                 common,
             ],
         );

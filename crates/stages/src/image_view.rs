@@ -68,7 +68,7 @@ impl<'a> View<'a> {
     }
 
     /// Point where the ray of a place meets a sphere, metres; `None` where the ray misses the sphere.
-    fn on_sphere_m(&self, place: &Vector2<f64>, radius_m: f64) -> Option<Vector3<f64>> {
+    pub(crate) fn on_sphere_m(&self, place: &Vector2<f64>, radius_m: f64) -> Option<Vector3<f64>> {
         let (x_lines, _) = self.camera.focal_plane_coordinates(place.x, place.y);
         let pose = self.camera.orientation.pose(x_lines);
         let look = self.camera.detector.look(place.y);

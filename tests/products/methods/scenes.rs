@@ -236,6 +236,7 @@ pixels = "second/images/nd.tif"
 match = true
 [surface]
 cell_m = 200.0
+orthoimage_cell_m = 50.0
 images = ["s1", "nd"]
 [registration]
 model = "samples"

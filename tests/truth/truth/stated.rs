@@ -396,7 +396,7 @@ fn statements_hold_where_the_world_is_not_that_of_the_estimator() {
         for variant in &variants {
             page += &variant.section();
         }
-        page += "\n{{#include further_missions.md}}\n";
+        page += "\n## Further missions\n\n{{#include further_missions.md}}\n";
         kept::is_up_to_date(PAGE, &page);
     }
     for variant in &variants {

@@ -8,6 +8,7 @@
 //! The products that Shan, Lee & Yoon 2002 and Yoon & Shan 2004 announce; cubic convolution: Keys 1981.
 
 mod cells;
+mod drift;
 mod holes;
 mod sight_lines;
 
@@ -16,7 +17,7 @@ use std::sync::atomic::AtomicBool;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    adjust::Adjusted,
+    adjust::{Adjusted, CorrectedImage},
     image_pixels::PixelFiles,
     image_view::View,
     map_surface::{AdjustmentOfImages, Surface, SurfaceModel},
@@ -34,13 +35,14 @@ use areograph_store::{
 };
 
 use cells::Cells;
+use drift::drift_m;
 use holes::bridged;
 use sight_lines::SightLines;
 
 /// Maximum number of cells of an orthoimage: 1.3 bytes each in its file.
 const CELLS_MAX: usize = 1 << 27;
 /// Cells along the longer side of an orthoimage on a page.
-const LOOK: usize = 640;
+const LOOK: usize = 1_000;
 
 stage_inputs! {
     /// Images with their best orientation and their pixels, and the terrain model.
@@ -66,7 +68,7 @@ pub struct Orthoimage {
     /// Brightness, row by row: pixel values from 1 on (a pixel of 0 becomes 1), 0 where there is none.
     pub brightness: Vec<u8>,
     /// Standard deviations of the horizontal position of the ground in the cells of the terrain model, metres, NaN where the
-    /// image does not show them: by heights and by jitter, without the error that all cells share.
+    /// image does not show them: by heights, jitter and drift of the orientation, without the error that all cells share.
     pub sigmas_m: Vec<f32>,
 }
 
@@ -96,6 +98,8 @@ pub struct OrthoimageAccount {
     pub sigma_m: f64,
     /// Part of these by jitter of the image, metres; `None` without an adjustment, which measures it.
     pub jitter_m: Option<f64>,
+    /// Part by errors of the orientation that change along the image, metres; `None` without an adjustment.
+    pub drift_m: Option<f64>,
     /// Standard deviations of the error that all cells share, towards east and north, metres; `None` without an adjustment
     /// with heights.
     pub common_sigma_m: Option<[f64; 2]>,
@@ -160,9 +164,9 @@ impl Stage for RectifyImages<'_> {
                 image: id(),
                 unseen,
             })?;
-            let scatter_px = adjusted.map(|of| of.summary.tie_scatter_px);
-            let cell_m = *self.cell_m;
-            let Some(mut orthoimage) = rectified(&view, &model, cell_m, scatter_px, watch)? else {
+            let adjustment = adjusted.and_then(|adjusted| AdjustedView::of(adjusted, index));
+            let made_of = rectified(&view, &model, *self.cell_m, adjustment, watch)?;
+            let Some(mut orthoimage) = made_of else {
                 continue;
             };
             let account = &mut orthoimage.account;
@@ -171,6 +175,23 @@ impl Stage for RectifyImages<'_> {
             made.push(orthoimage);
         }
         Ok(made)
+    }
+}
+
+/// What an adjustment states of the orientation of an image.
+#[derive(Debug, Clone, Copy)]
+struct AdjustedView<'a> {
+    /// Scatter of tie points along the track, focal-plane pixels.
+    scatter_px: f64,
+    image: &'a CorrectedImage,
+}
+
+impl<'a> AdjustedView<'a> {
+    fn of(adjusted: &'a Adjusted, index: usize) -> Option<Self> {
+        Some(Self {
+            scatter_px: adjusted.summary.tie_scatter_px,
+            image: adjusted.images.get(index)?,
+        })
     }
 }
 
@@ -185,7 +206,7 @@ fn rectified(
     view: &View<'_>,
     model: &SurfaceModel,
     cell_m: f64,
-    scatter_px: Option<f64>,
+    adjustment: Option<AdjustedView<'_>>,
     watch: Watch<'_>,
 ) -> Result<Option<Orthoimage>> {
     watch.check()?;
@@ -193,8 +214,12 @@ fn rectified(
         return Ok(None);
     };
     // Pitch and roll: the adjustment adds the scatter along the track, and the root of two of it across.
-    let jitter_m = scatter_px.map(|scatter_px| 3.0_f64.sqrt() * scatter_px * sight_lines.pixel_m);
-    let sigmas_m = sight_lines.sigmas_m(&model.sigmas_m, jitter_m.unwrap_or_default());
+    let jitter_m = adjustment.map(|of| 3.0_f64.sqrt() * of.scatter_px * sight_lines.pixel_m);
+    let drift_m = adjustment.map(|of| drift_m(view, of.image, sight_lines.radius_m));
+    let of_orientation_m = jitter_m
+        .unwrap_or_default()
+        .hypot(drift_m.unwrap_or_default());
+    let sigmas_m = sight_lines.sigmas_m(&model.sigmas_m, of_orientation_m);
     let cells = Cells::of(view, model, &sight_lines, cell_m)?;
     let Some(cells) = cells else {
         return Ok(None);
@@ -216,6 +241,7 @@ fn rectified(
         hidden: count(sight_lines.hidden()),
         sigma_m: (square_m2 / known.count().max(1) as f64).sqrt(),
         jitter_m,
+        drift_m,
         common_sigma_m: None,
         look: OrthoimageLook::of(cells.size(), &brightness.pixels),
     };

@@ -7,6 +7,7 @@ use crate::{image_view::View, map_surface::SurfaceModel};
 use areograph_geom::{
     ellipsoid::{local_axes, spherical_to_xyz_m},
     height_grid::HeightGrid,
+    statistics::median,
 };
 
 /// Horizontal displacement for a metre of height below which nothing can be hidden.
@@ -30,6 +31,8 @@ pub(super) struct SightLines {
     pub(super) shown: HeightGrid,
     /// Median edge of a pixel of the image on the ground, metres.
     pub(super) pixel_m: f64,
+    /// Median radius of the cells inside the image, metres.
+    pub(super) radius_m: f64,
 }
 
 impl SightLines {
@@ -50,8 +53,14 @@ impl SightLines {
             })
             .collect();
         let mut pixels_m: Vec<f64> = rays.iter().flatten().map(|ray| ray.pixel_m).collect();
-        pixels_m.sort_by(f64::total_cmp);
-        let pixel_m = *pixels_m.get(pixels_m.len() / 2)?;
+        if pixels_m.is_empty() {
+            return None;
+        }
+        let pixel_m = median(&mut pixels_m);
+        let seen = grid.heights_m.iter().zip(&rays);
+        let seen = seen.filter(|(_, ray)| ray.is_some());
+        let mut heights_m: Vec<f64> = seen.map(|(height_m, _)| f64::from(*height_m)).collect();
+        let radius_m = grid.radius_m + median(&mut heights_m);
         let heights = grid.heights_m.iter().zip(&rays);
         let heights_m = heights.map(|(height_m, ray)| match ray {
             Some(ray) if !ray.is_hidden => *height_m,
@@ -64,6 +73,7 @@ impl SightLines {
             },
             rays,
             pixel_m,
+            radius_m,
         })
     }
 
@@ -81,9 +91,9 @@ impl SightLines {
             .count()
     }
 
-    /// Standard deviations of the horizontal position by heights with these standard deviations, and by jitter, metres; NaN
-    /// in cells that the image does not show.
-    pub(super) fn sigmas_m(&self, heights_m: &[f32], jitter_m: f64) -> Vec<f32> {
+    /// Standard deviations of the horizontal position by heights with these standard deviations and by the orientation,
+    /// metres; NaN in cells that the image does not show.
+    pub(super) fn sigmas_m(&self, heights_m: &[f32], of_orientation_m: f64) -> Vec<f32> {
         let cells = self.rays.iter().zip(heights_m);
         #[allow(
             clippy::cast_possible_truncation,
@@ -91,7 +101,7 @@ impl SightLines {
         )]
         let sigma_m = |(ray, height_m): (&Option<Ray>, &f32)| match ray {
             Some(ray) if !ray.is_hidden => {
-                (ray.displacement * f64::from(*height_m)).hypot(jitter_m) as f32
+                (ray.displacement * f64::from(*height_m)).hypot(of_orientation_m) as f32
             }
             _ => f32::NAN,
         };

@@ -8,8 +8,6 @@ const TABLES: &str = "docs/guide/src/further_missions.md";
 const FIRST_SEEDS: [u32; 3] = [60_001, 70_001, 90_001];
 
 const INTRODUCTION: &str = "\
-## Further missions
-
 A test of the long run computes these tables (`tests/truth/truth/stated/further.rs`). Entries are ratios, with the share beyond three
 standard deviations in brackets.
 ";
