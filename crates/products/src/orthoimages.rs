@@ -95,7 +95,7 @@ fn write_brightness(path: &Path, of: &Context, image: &Orthoimage) -> Result<u64
         parallel_rad: image.account.parallel_rad,
         body: of.site.config.body,
         what: "brightness of an image",
-        numbers: &*image.brightness,
+        numbers: &image.brightness,
     };
     let bytes = file.encoded();
     write_bytes(path, &bytes)?;

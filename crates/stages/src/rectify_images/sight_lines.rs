@@ -135,20 +135,31 @@ fn ray(view: &View<'_>, grid: &HeightGrid, cell: [usize; 2], highest_m: f64) -> 
     let direction = towards_m.xy().try_normalize(0.0).unwrap_or_default();
     // Rows count southwards.
     let cells_per_m = Vector2::new(-direction.y / north_m, direction.x / east_m);
+    let is_above = |step: u32| {
+        let away_m = f64::from(step) * north_m;
+        let at = cells_per_m * away_m;
+        let ground_m = grid.height_m([cell[0] + at.x, cell[1] + at.y]);
+        ground_m.is_some_and(|ground_m| ground_m > height_m + away_m / displacement)
+    };
     Some(Ray {
         displacement,
-        is_hidden: displacement > STEEP
-            && (1_u32..)
-                .map(|step| f64::from(step) * north_m)
-                .map(|away_m| (away_m, height_m + away_m / displacement))
-                .take_while(|(_, ray_m)| *ray_m <= highest_m)
-                .any(|(away_m, ray_m)| {
-                    let at = cells_per_m * away_m;
-                    let ground_m = grid.height_m([cell[0] + at.x, cell[1] + at.y]);
-                    ground_m.is_some_and(|ground_m| ground_m > ray_m)
-                }),
+        is_hidden: (1..=steps(displacement, highest_m - height_m, north_m)).any(is_above),
         pixel_m: (east_m * north_m / beside.perp(&below).abs()).sqrt(),
     })
+}
+
+/// Number of cells after which a ray is above the highest ground.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a cast from floating point saturates, and the grid ends long before"
+)]
+fn steps(displacement: f64, climb_m: f64, cell_m: f64) -> u32 {
+    if displacement > STEEP {
+        (climb_m * displacement / cell_m) as u32
+    } else {
+        0
+    }
 }
 
 #[allow(

@@ -87,20 +87,14 @@ fn aligned(one: &HeightGrid, other: &HeightGrid) -> [i64; 2] {
 /// A square of an orthoimage; `None` where a cell has no brightness.
 fn square(of: &Orthoimage, first: [i64; 2], edge: usize) -> Option<Patch> {
     let [rows, columns] = of.account.map.size;
-    let mut values = Vec::new();
-    for row in 0..edge {
-        let at = first[0] + row as i64;
-        let start = first[1];
-        if at < 0 || start < 0 || at as usize >= rows || start as usize + edge > columns {
-            return None;
-        }
-        let start = at as usize * columns + start as usize;
-        values.extend(
-            of.brightness[start..start + edge]
-                .iter()
-                .map(|of| f32::from(*of)),
-        );
+    let [row, column] = first.map(|at| usize::try_from(at).ok());
+    let (row, column) = (row?, column?);
+    if row + edge > rows || column + edge > columns {
+        return None;
     }
+    let starts = (row..row + edge).map(|row| row * columns + column);
+    let pixels = starts.flat_map(|start| &of.brightness[start..start + edge]);
+    let values: Vec<f32> = pixels.map(|pixel| f32::from(*pixel)).collect();
     let size = [edge; 2];
     values.iter().all(|of| *of > 0.0).then_some(Patch {
         first,

@@ -42,13 +42,13 @@ struct Mission {
 
 impl Mission {
     fn new(folder: &Path, sites: &[&Site]) -> Self {
-        Self::flown(folder, sites, SceneOptions::default())
+        Self::flown(folder, sites, &SceneOptions::default())
     }
 
-    fn flown(folder: &Path, sites: &[&Site], options: SceneOptions) -> Self {
+    fn flown(folder: &Path, sites: &[&Site], options: &SceneOptions) -> Self {
         let options = SceneOptions {
             day_s: 600.0,
-            ..options
+            ..*options
         };
         let begun = Instant::now();
         mission::write(folder, &options, Some((Coder::Predictive, sites))).unwrap();
@@ -465,7 +465,7 @@ fn orthoimages_of_realistic_missions_are_where_they_state() {
             ..SceneOptions::default()
         };
         let sites: Vec<&Site> = SITES.to_vec();
-        let mission = Mission::flown(&folder.path().join("mission"), &sites, options);
+        let mission = Mission::flown(&folder.path().join("mission"), &sites, &options);
         for site in sites {
             let written = mission.matched_site(site.id);
             let mapped = mission.mapped_site(&written, site.id, 30.0);
