@@ -25,8 +25,8 @@ const SITES: &str = "a site with orthoimages";
 
 pub(super) static ORTHOIMAGE: Declaration = Declaration {
     path: "images/<image>/orthoimage.tif",
-    what: "the image on the terrain model, on the same equirectangular map: brightness from 1 on (a pixel of 0 becomes 1), 0 \
-           where there is no height (narrow holes of the model are bridged), where relief hides the ground, or where pixels are missing; a cloud-optimised GeoTIFF",
+    what: "orthoimage on the equirectangular map of surface.tif: brightness 1 to 255 (pixel value 0 is stored as 1); 0 in empty \
+           cells: no height, ground hidden by relief, or missing pixels; a cloud-optimised GeoTIFF",
     readers: "GIS",
     rows: "cells with a brightness",
     role: Role::Data,
@@ -43,8 +43,8 @@ pub(super) static ORTHOIMAGE: Declaration = Declaration {
 
 pub(super) static SIGMAS: Declaration = Declaration {
     path: "images/<image>/orthoimage_sigma.tif",
-    what: "standard deviation of the horizontal position of the ground in the orthoimage, metres, in the cells of the terrain \
-           model: by its heights, and by jitter and drift of the image; orthoimages.json has the error that all cells share",
+    what: "standard deviation of horizontal positions in the orthoimage without the shared error, metres, on the cells of \
+           surface.tif: from height errors, jitter and drift; orthoimages.json states the shared error",
     readers: "GIS",
     rows: "cells that the image shows",
     role: Role::Data,
@@ -138,23 +138,22 @@ struct Entry<'a> {
     filled: u32,
     /// Number of cells on the terrain model whose pixels are missing.
     without_pixels: u32,
-    /// Number of cells of the terrain model inside the image, with its narrow holes, which are bridged.
+    /// Number of terrain cells inside the image, including interpolated holes.
     terrain_cells: u32,
-    /// Number of these that relief hides from the camera.
+    /// Number of terrain cells inside the image that relief hides from the camera.
     hidden: u32,
-    /// Root mean square of the standard deviations of the horizontal position about the error that all cells share.
+    /// Root mean square of the standard deviations of the horizontal position without the shared error.
     #[schemars(range(min = 0.0))]
     sigma_m: f64,
-    /// The part of these by jitter, from the scatter of tie points; omitted without an adjustment.
+    /// Standard deviation due to jitter, from the scatter of tie points; omitted without an adjustment.
     #[serde(skip_serializing_if = "Option::is_none")]
     jitter_m: Option<f64>,
-    /// The part by errors of the orientation that change along the image; omitted without an adjustment.
+    /// Standard deviation due to drift: errors of the orientation that change along the image; omitted without an adjustment.
     #[serde(skip_serializing_if = "Option::is_none")]
     drift_m: Option<f64>,
-    /// Standard deviations of the error that all cells share, towards east and north; omitted without an adjustment with
-    /// heights.
+    /// Standard deviations of the shared error, east and north; omitted without an adjustment with heights.
     #[serde(skip_serializing_if = "Option::is_none")]
-    common_sigma_m: Option<[f64; 2]>,
+    shared_sigma_m: Option<[f64; 2]>,
 }
 
 impl<'a> Document<'a> {
@@ -175,7 +174,7 @@ impl<'a> Document<'a> {
                 sigma_m: of.sigma_m,
                 jitter_m: of.jitter_m,
                 drift_m: of.drift_m,
-                common_sigma_m: of.common_sigma_m,
+                shared_sigma_m: of.shared_sigma_m,
             }
         });
         Self {

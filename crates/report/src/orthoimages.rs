@@ -27,9 +27,10 @@ fn write(site: &SiteProducts) -> Result<String> {
     let pictures: String = pictures.collect::<Result<_>>()?;
     Ok(table(site)
         + &paragraph(
-            "Wide holes of the terrain model, ground that relief hides from the camera, and missing pixels are \
-             empty; narrow holes are bridged, with a larger σ. σ: horizontal position of a cell about the error that all cells share, from the heights, and from jitter and drift of the \
-             image. The shared error is stated separately (σ, common, east and north, from the adjustment).",
+            "Cells in wide holes of the terrain model, on ground that relief hides from the camera, or with missing pixels are \
+             empty. Heights in narrow holes are interpolated; their σ is larger. σ is the standard deviation of the horizontal \
+             position of a cell without the shared error. Its parts are height errors, jitter, and drift (errors of the orientation \
+             that change along the image). The adjustment states the σ of the shared error.",
         )
         + &format!("<div class=\"pieces\">\n{pictures}</div>\n"))
 }
@@ -41,14 +42,14 @@ fn table(site: &SiteProducts) -> String {
             Column::Text("image"),
             Column::Number("cell (m)"),
             Column::Number("pixel (m)"),
-            Column::Number("cells with a brightness"),
-            Column::Number("cells without pixels"),
-            Column::Number("terrain cells"),
-            Column::Number("hidden"),
+            Column::Number("filled cells"),
+            Column::Number("cells with missing pixels"),
+            Column::Number("terrain cells in the image"),
+            Column::Number("hidden terrain cells"),
             Column::Number("σ (m)"),
-            Column::Number("by jitter"),
-            Column::Number("by drift"),
-            Column::Number("σ, common (m)"),
+            Column::Number("σ, jitter (m)"),
+            Column::Number("σ, drift (m)"),
+            Column::Number("σ, shared: east, north (m)"),
         ],
     );
     for (index, of) in site.orthoimages.iter().enumerate() {
@@ -57,11 +58,11 @@ fn table(site: &SiteProducts) -> String {
             Cell::from(label(value, decimals)).traced(place)
         };
         let count = |count: u32, place: &str| Cell::from(whole(count)).traced(place);
-        let common = of.common_sigma_m.map_or_else(
+        let shared = of.shared_sigma_m.map_or_else(
             || Cell::from("not known"),
             |[east_m, north_m]| {
                 Cell::from(format!("{}, {}", label(east_m, 0), label(north_m, 0)))
-                    .traced("/common_sigma_m/0 /common_sigma_m/1")
+                    .traced("/shared_sigma_m/0 /shared_sigma_m/1")
             },
         );
         let of_adjustment = |value: Option<f64>, place: &str| {
@@ -82,7 +83,7 @@ fn table(site: &SiteProducts) -> String {
                 number(of.sigma_m, 2, "/sigma_m"),
                 of_adjustment(of.jitter_m, "/jitter_m"),
                 of_adjustment(of.drift_m, "/drift_m"),
-                common,
+                shared,
             ],
         );
     }

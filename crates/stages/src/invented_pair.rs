@@ -31,15 +31,6 @@ pub(crate) const EAST_M: [f64; 2] = [0.0, 120_000.0];
 /// Height of the ground above the sphere at a place, metres.
 pub(crate) type Hill = fn(&Vector3<f64>) -> f64;
 
-/// Brightness of a place: plane waves 15 to 300 m long.
-pub(crate) fn brightness(place_m: &Vector3<f64>, waves: &[[f64; 5]]) -> f64 {
-    let of_wave = |wave: &[f64; 5]| {
-        let phase = wave[0] * place_m.x + wave[1] * place_m.y + wave[2] * place_m.z + wave[3];
-        wave[4] * phase.sin()
-    };
-    waves.iter().map(of_wave).sum()
-}
-
 /// Pseudorandom numbers with a fixed seed.
 pub(crate) struct Random(pub(crate) u64);
 
@@ -124,6 +115,15 @@ impl Invented {
         pose.position_m + range_m * look
     }
 
+    /// Brightness of a place: plane waves 15 to 300 m long.
+    pub(crate) fn brightness(place_m: &Vector3<f64>, waves: &[[f64; 5]]) -> f64 {
+        let of_wave = |wave: &[f64; 5]| {
+            let phase = wave[0] * place_m.x + wave[1] * place_m.y + wave[2] * place_m.z + wave[3];
+            wave[4] * phase.sin()
+        };
+        waves.iter().map(of_wave).sum()
+    }
+
     pub(crate) fn rendered(
         camera: &OrientedCamera<SampledOrientation>,
         lines: u32,
@@ -136,7 +136,8 @@ impl Invented {
         let number = |[line, sample]: [u32; 2]| {
             let place = Vector2::new(f64::from(line) + 0.5, f64::from(sample) + 0.5);
             let noise = 2.0 * (random.unit() + random.unit() + random.unit() - 1.5);
-            let dn = 120.0 + brightness(&Self::ground_m(camera, &place, hill_m), waves) + noise;
+            let dn =
+                120.0 + Self::brightness(&Self::ground_m(camera, &place, hill_m), waves) + noise;
             dn.round().clamp(0.0, 255.0) as u8
         };
         places.map(number).collect()

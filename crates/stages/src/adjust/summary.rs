@@ -154,7 +154,7 @@ pub struct AdjustmentSummary {
     pub tie_components: [f64; 2],
     /// Standard deviation of the scatter of tie points in addition to their own, focal-plane pixels, from residuals
     /// along the track, as jitter of the images causes; their standard deviations include it, and 1.4 times as much
-    /// (at most 1.5) across the track. 0 where chance explains the residuals, and without a blunder limit.
+    /// (at most 1.5 px) across the track. 0 where chance explains the residuals, and without a blunder limit.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub tie_scatter_px: f64,

@@ -7,7 +7,7 @@
 
 use nalgebra::Vector2;
 
-use super::network::Assembled;
+use super::{network::Assembled, summary::AdjustmentSummary};
 use areograph_geom::{
     bundle::{Adjustment, Residual},
     statistics::{NORMAL_MAD, median},
@@ -72,6 +72,14 @@ pub(super) fn tie_scatter_px<M>(assembled: &Assembled<M>, adjustment: &Adjustmen
 fn of_axes_px(scatter_px: f64) -> Vector2<f64> {
     let across_px = (ACROSS.sqrt() * scatter_px).min(SCATTER_MAX_PX);
     Vector2::new(scatter_px, across_px)
+}
+
+impl AdjustmentSummary {
+    /// Scatter of tie points along the track and the one expected across it, focal-plane pixels; 0 where there is none.
+    #[must_use]
+    pub fn tie_scatter_of_axes_px(&self) -> [f64; 2] {
+        of_axes_px(self.tie_scatter_px).into()
+    }
 }
 
 impl<M> Assembled<M> {

@@ -1,5 +1,4 @@
-//! Cells on the ground: those of a terrain model or of an orthoimage, at full size and repeatedly halved, and their places
-//! in an image.
+//! Ground cells of a terrain model or an orthoimage, at full and repeatedly halved resolution, and their image coordinates.
 
 mod field;
 mod sight;

@@ -1,11 +1,11 @@
-//! Holes of a terrain model, bridged where they are narrow: a height between known ones displaces an image by little.
+//! Heights across narrow holes of a terrain model: an error of an interpolated height displaces the image only slightly.
 
 use std::collections::BTreeMap;
 
 use crate::{ground::Field, map_surface::SurfaceModel};
 use areograph_geom::height_grid::HeightGrid;
 
-/// Cells on each side of a hole from which it is bridged: holes twice as wide are filled, and larger ones stay empty.
+/// Maximum distance of interpolation from known cells, cells: holes up to twice as wide are filled, and wider ones stay empty.
 const REACH: usize = 8;
 
 /// A terrain model with heights in its narrow holes. Their standard deviations contain the change of known heights over the

@@ -1,8 +1,8 @@
 //! Orthoimages: images on the cells of a map, where heights of the terrain model no longer displace them.
 //!
-//! The brightness of a cell is that of the place of the image that sees its ground, by cubic convolution. Ground without a
-//! height, ground that relief hides from the camera, and lines that were not received have none. Narrow holes of the terrain
-//! model are bridged, with larger standard deviations.
+//! Cubic convolution interpolates the brightness of a cell at the image point of its ground. A cell stays empty if its ground has
+//! no height or is hidden by relief, or if its lines were not received. Heights are interpolated across narrow holes of the terrain
+//! model, with larger standard deviations.
 //!
 //! # Source
 //! The products that Shan, Lee & Yoon 2002 and Yoon & Shan 2004 announce; cubic convolution: Keys 1981.
@@ -14,6 +14,7 @@ mod sight_lines;
 
 use std::sync::atomic::AtomicBool;
 
+use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -68,7 +69,7 @@ pub struct Orthoimage {
     /// Brightness, row by row: pixel values from 1 on (a pixel of 0 becomes 1), 0 where there is none.
     pub brightness: Vec<u8>,
     /// Standard deviations of the horizontal position of the ground in the cells of the terrain model, metres, NaN where the
-    /// image does not show them: by heights, jitter and drift of the orientation, without the error that all cells share.
+    /// image does not show them: by heights, jitter and drift of the orientation, without the shared error.
     pub sigmas_m: Vec<f32>,
 }
 
@@ -89,20 +90,19 @@ pub struct OrthoimageAccount {
     pub filled: u32,
     /// Number of cells on the terrain model whose pixels are missing.
     pub without_pixels: u32,
-    /// Number of cells of the terrain model inside the image, with bridged holes, and of those among them that relief hides from
-    /// the camera.
+    /// Number of terrain cells inside the image, including interpolated holes.
     pub terrain_cells: u32,
-    /// See `terrain_cells`.
+    /// Number of these terrain cells that relief hides from the camera.
     pub hidden: u32,
     /// Root mean square of the standard deviations of its horizontal position, metres.
     pub sigma_m: f64,
-    /// Part of these by jitter of the image, metres; `None` without an adjustment, which measures it.
+    /// Standard deviation due to jitter, metres; `None` without an adjustment, which measures it.
     pub jitter_m: Option<f64>,
-    /// Part by errors of the orientation that change along the image, metres; `None` without an adjustment.
+    /// Standard deviation due to drift, metres: errors of the orientation that change along the image; `None` without an
+    /// adjustment.
     pub drift_m: Option<f64>,
-    /// Standard deviations of the error that all cells share, towards east and north, metres; `None` without an adjustment
-    /// with heights.
-    pub common_sigma_m: Option<[f64; 2]>,
+    /// Standard deviations of the shared error, east and north, metres; `None` without an adjustment with heights.
+    pub shared_sigma_m: Option<[f64; 2]>,
     /// The orthoimage in larger cells, for display.
     pub look: OrthoimageLook,
 }
@@ -120,14 +120,13 @@ pub struct OrthoimageLook {
 #[derive(Debug, thiserror::Error, Cause)]
 #[cause(Input)]
 enum RectifyError {
-    #[error("image {image}: its orientation sees no ground: {unseen}")]
+    #[error("image {image}: its rays do not intersect the ground: {unseen}")]
     #[cause("check the kernels and times of the image")]
     Unseen { image: String, unseen: Unseen },
     #[error(
-        "surface.orthoimage_cell_m is {cell_m}: the orthoimage of {image} has {cells} cells of this size; expected at most \
-         {CELLS_MAX}"
+        "image {image}: surface.orthoimage_cell_m is {cell_m} m and requires {cells} cells; expected at most {CELLS_MAX}"
     )]
-    #[cause("give larger cells: those of a pixel of the image are usual")]
+    #[cause("increase surface.orthoimage_cell_m; the ground size of an image pixel is usual")]
     TooLarge {
         image: String,
         cell_m: f64,
@@ -171,7 +170,7 @@ impl Stage for RectifyImages<'_> {
             };
             let account = &mut orthoimage.account;
             account.image = index;
-            account.common_sigma_m = adjusted.and_then(common_sigma_m);
+            account.shared_sigma_m = adjusted.and_then(shared_sigma_m);
             made.push(orthoimage);
         }
         Ok(made)
@@ -181,22 +180,22 @@ impl Stage for RectifyImages<'_> {
 /// What an adjustment states of the orientation of an image.
 #[derive(Debug, Clone, Copy)]
 struct AdjustedView<'a> {
-    /// Scatter of tie points along the track, focal-plane pixels.
-    scatter_px: f64,
+    /// Scatter of tie points along and across the track, focal-plane pixels.
+    scatter_px: [f64; 2],
     image: &'a CorrectedImage,
 }
 
 impl<'a> AdjustedView<'a> {
     fn of(adjusted: &'a Adjusted, index: usize) -> Option<Self> {
         Some(Self {
-            scatter_px: adjusted.summary.tie_scatter_px,
+            scatter_px: adjusted.summary.tie_scatter_of_axes_px(),
             image: adjusted.images.get(index)?,
         })
     }
 }
 
 /// Standard deviations of the mean place of the adjusted tie points, towards east and north, metres.
-fn common_sigma_m(adjusted: &Adjusted) -> Option<[f64; 2]> {
+fn shared_sigma_m(adjusted: &Adjusted) -> Option<[f64; 2]> {
     let [east_m, north_m, _] = adjusted.heights.as_ref()?.mean_sigma_m;
     Some([east_m, north_m])
 }
@@ -213,8 +212,8 @@ fn rectified(
     let Some(sight_lines) = SightLines::of(view, model) else {
         return Ok(None);
     };
-    // Pitch and roll: the adjustment adds the scatter along the track, and the root of two of it across.
-    let jitter_m = adjustment.map(|of| 3.0_f64.sqrt() * of.scatter_px * sight_lines.pixel_m);
+    // Jitter in pitch and in roll displaces along and across the track.
+    let jitter_m = adjustment.map(|of| Vector2::from(of.scatter_px).norm() * sight_lines.pixel_m);
     let drift_m = adjustment.map(|of| drift_m(view, of.image, sight_lines.radius_m));
     let of_orientation_m = jitter_m
         .unwrap_or_default()
@@ -242,7 +241,7 @@ fn rectified(
         sigma_m: (square_m2 / known.count().max(1) as f64).sqrt(),
         jitter_m,
         drift_m,
-        common_sigma_m: None,
+        shared_sigma_m: None,
         look: OrthoimageLook::of(cells.size(), &brightness.pixels),
     };
     Ok(Some(Orthoimage {

@@ -9,7 +9,7 @@
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::*;
-use crate::invented_pair::{Invented, LINES, RADIUS_M, brightness};
+use crate::invented_pair::{Invented, LINES, RADIUS_M};
 use areograph_geom::{
     ellipsoid::spherical_to_xyz_m,
     imaging::{Affine, Patch, match_least_squares, search},
@@ -158,7 +158,7 @@ fn orthoimages_show_the_ground_where_it_is() {
         let place_m = spherical_to_xyz_m(longitude_rad, latitude_rad, RADIUS_M);
         let height_m = hill_m(&place_m);
         let place_m = spherical_to_xyz_m(longitude_rad, latitude_rad, RADIUS_M + height_m);
-        differences.push(f64::from(*pixel) - 120.0 - brightness(&place_m, &waves));
+        differences.push(f64::from(*pixel) - 120.0 - Invented::brightness(&place_m, &waves));
     }
     let square = differences.iter().map(|of| of * of).sum::<f64>();
     let rms = (square / differences.len() as f64).sqrt();

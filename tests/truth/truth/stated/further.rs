@@ -8,7 +8,7 @@ const TABLES: &str = "docs/guide/src/further_missions.md";
 const FIRST_SEEDS: [u32; 3] = [60_001, 70_001, 90_001];
 
 const INTRODUCTION: &str = "\
-A test of the long run computes these tables (`tests/truth/truth/stated/further.rs`). Entries are ratios, with the share beyond three
+A long test computes these tables (`tests/truth/truth/stated/further.rs`). Entries are ratios, with the share beyond three
 standard deviations in brackets.
 ";
 
@@ -44,7 +44,8 @@ fn table(name: &str, sets: &[Variant; 3]) -> String {
         text.push('\n');
     }
     for (first_seed, set) in FIRST_SEEDS.iter().zip(sets) {
-        let _infallible = write!(text, "\nSeeds from {first_seed}: {}", counts(&set.sites));
+        let of_set = counts(&set.sites);
+        let _infallible = write!(text, "\nMissions from seed {first_seed}. {of_set}");
     }
     text
 }

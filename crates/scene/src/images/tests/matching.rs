@@ -19,7 +19,7 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::*;
 use crate::{
-    Roughness, SceneErrors, SceneOptions,
+    SceneOptions,
     arc::Arc,
     drawn::DayErrors,
     kernels::{clock_session, image_start},
@@ -29,7 +29,7 @@ use crate::{
 };
 use areograph::flow::{Ending, PUBLISH, RunOptions, run_site};
 use areograph_config::{self as config};
-use areograph_geom::{ellipsoid::local_axes, imaging::Patch};
+use areograph_geom::ellipsoid::local_axes;
 use areograph_pds::ties::read_ties;
 use areograph_store::hashes::HashCache;
 
@@ -99,37 +99,6 @@ impl Mission {
         let table = format!("\n[surface]\ncell_m = {cell_m:.1}\northoimage_cell_m = 5.0\n");
         fs::write(&path, named + &table).unwrap();
         path
-    }
-
-    /// The errors of all orthoimages of a site, and how far those of the first two are apart, root mean square in cells.
-    fn judged_orthoimages(&self, products: &Path) -> (Vec<JudgedOrthoimage>, f64) {
-        let document = fs::read(products.join("orthoimages.json")).unwrap();
-        let document: serde_json::Value = serde_json::from_slice(&document).unwrap();
-        let (mut made, mut judged) = (Vec::new(), Vec::new());
-        for stated in document["orthoimages"].as_array().unwrap() {
-            let id = stated["image"].as_str().unwrap();
-            let image = IMAGES.iter().find(|image| image.id == id).unwrap();
-            let orthoimage = orthoimages::Published::of(products, id);
-            let (_, pixels) = decoded(&self.folder.join("images").join(image_name(id)));
-            let samples = image.samples() as usize;
-            let pixels = Patch {
-                first: [0, 0],
-                size: [pixels.len() / samples, samples],
-                values: pixels.into_iter().map(f32::from).collect(),
-            };
-            let errors_m = orthoimage.errors_m(&self.image(id), &self.terrain, &pixels);
-            judged.push(JudgedOrthoimage::of(id, &errors_m, stated));
-            made.push(orthoimage);
-        }
-        let shifts = made[0].shifts(&made[1]);
-        let square = shifts.iter().map(Vector2::norm_squared).sum::<f64>();
-        let apart = (square / shifts.len() as f64).sqrt();
-        println!(
-            "{} places in both orthoimages, {apart:.3} cells apart",
-            shifts.len()
-        );
-        assert!(shifts.len() >= 30);
-        (judged, apart)
     }
 
     /// The same site with the pixels of one image as a cube of ISIS, and of the other as a TIFF.
@@ -210,41 +179,6 @@ fn published(site: &Path, out: &Path) -> (PathBuf, bool) {
     };
     println!("{:?}\n{:?}", manifest.verdict.reasons, manifest.counts);
     (outcome.folder, manifest.verdict.valid)
-}
-
-/// Errors of an orthoimage, with what is stated of them, metres.
-struct JudgedOrthoimage {
-    /// Mean error and its standard deviation, east and north.
-    mean: [[f64; 2]; 2],
-    /// Root mean square about the mean, and what is stated.
-    about: [f64; 2],
-}
-
-impl JudgedOrthoimage {
-    fn of(id: &str, errors_m: &[Vector2<f64>], stated: &serde_json::Value) -> Self {
-        let count = errors_m.len() as f64;
-        let mean_m = errors_m.iter().sum::<Vector2<f64>>() / count;
-        let squares_m2 = errors_m.iter().map(|of| (of - mean_m).norm_squared());
-        let about_m = (squares_m2.sum::<f64>() / count).sqrt();
-        let number = |place: &str| stated.pointer(place).unwrap().as_f64().unwrap();
-        println!(
-            "orthoimage of {id}: {count} places, mean error {:.1} and {:.1} m, {about_m:.2} m about it; stated {:.1} and \
-             {:.1} m, {:.2} m (jitter {:.2} m, drift {:.2} m)",
-            mean_m.x,
-            mean_m.y,
-            number("/common_sigma_m/0"),
-            number("/common_sigma_m/1"),
-            number("/sigma_m"),
-            number("/jitter_m"),
-            number("/drift_m"),
-        );
-        assert!(errors_m.len() >= 30);
-        Self {
-            mean: [0, 1].map(|axis| [mean_m[axis], number(&format!("/common_sigma_m/{axis}"))]),
-            // With a tenth of a pixel of the comparison itself.
-            about: [about_m, number("/sigma_m").hypot(0.1 * number("/pixel_m"))],
-        }
-    }
 }
 
 /// True image coordinates of a point.
@@ -430,10 +364,10 @@ fn matched_ties_are_within_what_they_state_and_adjust_as_well_as_given_ones() {
             let written = mission.folder.join(format!("sites/{}.toml", site.id));
             let mapped = run(&mission.mapped_site(&written, site.id, 60.0), folder.path());
             surface::Published::of(&mapped).hold_against(&mission.terrain);
-            let (judged, apart) = mission.judged_orthoimages(&mapped);
+            let (judged, apart) = orthoimages::judged(&mission, &mapped);
             // Without jitter: 0.3 cells of 5 m.
             assert!(apart <= 0.3, "{apart}");
-            for JudgedOrthoimage { mean, about } in judged {
+            for orthoimages::Judged { mean, about } in judged {
                 assert!(
                     mean.iter()
                         .all(|[error_m, sigma_m]| error_m.abs() <= 3.0 * sigma_m)
@@ -445,51 +379,4 @@ fn matched_ties_are_within_what_they_state_and_adjust_as_well_as_given_ones() {
         println!("{}: by given ties {by_given:.2?}", site.id);
         assert!(by_matched.heights_m <= by_given.heights_m, "{by_given:?}");
     }
-}
-
-#[test]
-fn orthoimages_of_realistic_missions_are_where_they_state() {
-    if !areograph_testing::long() {
-        return;
-    }
-    let (mut means, mut abouts) = (Vec::new(), Vec::new());
-    for (seed, roughness) in [
-        (26_001, Roughness::Plains),
-        (26_002, Roughness::Medium),
-        (26_003, Roughness::Varied),
-    ] {
-        let folder = tempfile::tempdir().unwrap();
-        let options = SceneOptions {
-            seed,
-            errors: SceneErrors::realistic(roughness).with_drawn_sizes(seed),
-            ..SceneOptions::default()
-        };
-        let sites: Vec<&Site> = SITES.to_vec();
-        let mission = Mission::flown(&folder.path().join("mission"), &sites, &options);
-        for site in sites {
-            let written = mission.matched_site(site.id);
-            let mapped = mission.mapped_site(&written, site.id, 30.0);
-            let (products, is_valid) = published(&mapped, folder.path());
-            if !is_valid {
-                continue;
-            }
-            let (judged, _) = mission.judged_orthoimages(&products);
-            for JudgedOrthoimage { mean, about } in judged {
-                means.extend(mean.map(|[error_m, sigma_m]| error_m / sigma_m));
-                abouts.push(about);
-            }
-        }
-    }
-    let square = means.iter().map(|of| of * of).sum::<f64>() / means.len() as f64;
-    let [found, stated] =
-        [0, 1].map(|of| abouts.iter().map(|about| about[of].powi(2)).sum::<f64>());
-    let ratio = (found / stated).sqrt();
-    println!(
-        "{} orthoimages: mean {:.2}, about it {ratio:.2}",
-        abouts.len(),
-        square.sqrt()
-    );
-    assert!(means.iter().all(|of| of.abs() <= 3.0));
-    // Twelve sites: chance is a third.
-    assert!(square.sqrt() <= 1.33 && (0.5..=1.25).contains(&ratio));
 }

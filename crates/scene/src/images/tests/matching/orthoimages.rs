@@ -1,6 +1,9 @@
 //! Orthoimages of a site against the true ground, and against each other.
 
-use std::{fs::File, path::Path};
+use std::{
+    fs::{self, File},
+    path::Path,
+};
 
 use nalgebra::{Matrix2, Vector2, Vector3};
 use tiff::{
@@ -8,8 +11,14 @@ use tiff::{
     tags::Tag,
 };
 
-use super::place;
-use crate::{terrain::Terrain, ties::TrueImage};
+use super::{Mission, decoded, place, published};
+use crate::{
+    Roughness, SceneErrors, SceneOptions,
+    images::image_name,
+    plan::{IMAGES, SITES, Site},
+    terrain::Terrain,
+    ties::TrueImage,
+};
 use areograph_base::units::RADIANS_PER_DEGREE;
 use areograph_geom::{
     ellipsoid::{local_axes, spherical_to_xyz_m},
@@ -163,4 +172,117 @@ impl Published {
         };
         self.middles().filter_map(shift).collect()
     }
+}
+
+/// Errors of an orthoimage, with what is stated of them, metres.
+pub(super) struct Judged {
+    /// Mean error and its standard deviation, east and north.
+    pub(super) mean: [[f64; 2]; 2],
+    /// Root mean square about the mean, and what is stated.
+    pub(super) about: [f64; 2],
+}
+
+impl Judged {
+    fn of(id: &str, errors_m: &[Vector2<f64>], stated: &serde_json::Value) -> Self {
+        let count = errors_m.len() as f64;
+        let mean_m = errors_m.iter().sum::<Vector2<f64>>() / count;
+        let squares_m2 = errors_m.iter().map(|of| (of - mean_m).norm_squared());
+        let about_m = (squares_m2.sum::<f64>() / count).sqrt();
+        let number = |place: &str| stated.pointer(place).unwrap().as_f64().unwrap();
+        println!(
+            "orthoimage of {id}: {count} places, mean error {:.1} and {:.1} m, {about_m:.2} m about it; stated {:.1} and \
+             {:.1} m, {:.2} m (jitter {:.2} m, drift {:.2} m)",
+            mean_m.x,
+            mean_m.y,
+            number("/shared_sigma_m/0"),
+            number("/shared_sigma_m/1"),
+            number("/sigma_m"),
+            number("/jitter_m"),
+            number("/drift_m"),
+        );
+        assert!(errors_m.len() >= 30);
+        Self {
+            mean: [0, 1].map(|axis| [mean_m[axis], number(&format!("/shared_sigma_m/{axis}"))]),
+            // With a tenth of a pixel of the comparison itself.
+            about: [about_m, number("/sigma_m").hypot(0.1 * number("/pixel_m"))],
+        }
+    }
+}
+
+/// The errors of all orthoimages of a site, and how far those of the first two are apart, root mean square in cells.
+pub(super) fn judged(mission: &Mission, products: &Path) -> (Vec<Judged>, f64) {
+    let document = fs::read(products.join("orthoimages.json")).unwrap();
+    let document: serde_json::Value = serde_json::from_slice(&document).unwrap();
+    let (mut made, mut judged) = (Vec::new(), Vec::new());
+    for stated in document["orthoimages"].as_array().unwrap() {
+        let id = stated["image"].as_str().unwrap();
+        let image = IMAGES.iter().find(|image| image.id == id).unwrap();
+        let orthoimage = Published::of(products, id);
+        let (_, pixels) = decoded(&mission.folder.join("images").join(image_name(id)));
+        let samples = image.samples() as usize;
+        let pixels = Patch {
+            first: [0, 0],
+            size: [pixels.len() / samples, samples],
+            values: pixels.into_iter().map(f32::from).collect(),
+        };
+        let errors_m = orthoimage.errors_m(&mission.image(id), &mission.terrain, &pixels);
+        judged.push(Judged::of(id, &errors_m, stated));
+        made.push(orthoimage);
+    }
+    let shifts = made[0].shifts(&made[1]);
+    let square = shifts.iter().map(Vector2::norm_squared).sum::<f64>();
+    let apart = (square / shifts.len() as f64).sqrt();
+    println!(
+        "{} places in both orthoimages, {apart:.3} cells apart",
+        shifts.len()
+    );
+    assert!(shifts.len() >= 30);
+    (judged, apart)
+}
+
+#[test]
+fn orthoimages_of_realistic_missions_are_where_they_state() {
+    if !areograph_testing::long() {
+        return;
+    }
+    let (mut means, mut abouts) = (Vec::new(), Vec::new());
+    for (seed, roughness) in [
+        (26_001, Roughness::Plains),
+        (26_002, Roughness::Medium),
+        (26_003, Roughness::Varied),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let options = SceneOptions {
+            seed,
+            errors: SceneErrors::realistic(roughness).with_drawn_sizes(seed),
+            ..SceneOptions::default()
+        };
+        let sites: Vec<&Site> = SITES.to_vec();
+        let mission = Mission::flown(&folder.path().join("mission"), &sites, &options);
+        for site in sites {
+            let written = mission.matched_site(site.id);
+            let mapped = mission.mapped_site(&written, site.id, 30.0);
+            let (products, is_valid) = published(&mapped, folder.path());
+            if !is_valid {
+                continue;
+            }
+            let (of_site, _) = judged(&mission, &products);
+            for Judged { mean, about } in of_site {
+                means.extend(mean.map(|[error_m, sigma_m]| error_m / sigma_m));
+                abouts.push(about);
+            }
+        }
+    }
+    let square = means.iter().map(|of| of * of).sum::<f64>() / means.len() as f64;
+    let [found, stated] =
+        [0, 1].map(|of| abouts.iter().map(|about| about[of].powi(2)).sum::<f64>());
+    let ratio = (found / stated).sqrt();
+    println!(
+        "{} orthoimages: mean {:.2}, about it {ratio:.2}",
+        abouts.len(),
+        square.sqrt()
+    );
+    assert!(means.iter().all(|of| of.abs() <= 3.0));
+    // Nine sites have 18 axes: chance alone gives 1 ± 0.17, and two of these are allowed.
+    assert!(square.sqrt() <= 1.33 && (0.5..=1.25).contains(&ratio));
 }
