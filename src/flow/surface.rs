@@ -20,7 +20,10 @@ use crate::{
 /// The terrain model of a pair of images with their best orientation, and orthoimages; not for a site that requests none, or whose
 /// adjustment failed.
 pub(super) fn surface<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut Site) -> Flow<()> {
-    if !config.surface.is_asked_for() || site.adjustment_failure.is_some() {
+    let Some(cell_m) = &config.surface.cell_m else {
+        return Ok(());
+    };
+    if site.adjustment_failure.is_some() {
         return Ok(());
     }
     let adjusted = site.book.output::<Adjusted>(Round::Initial);
@@ -32,7 +35,8 @@ pub(super) fn surface<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut S
         pixels: PixelFiles(&pixels),
         converted: &site.converted,
         profiles: &site.profiles,
-        surface: &config.surface,
+        cell_m,
+        pair: &config.surface.images,
         laser_surface: &config.laser_surface,
         adjusted: AdjustmentOfImages(adjusted),
         off_m: adjusted.map_or(&limits.height_before_max_m, |_| &limits.height_after_max_m),

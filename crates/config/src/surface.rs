@@ -17,7 +17,7 @@ declare_table! {
         /// finer than a pixel are refused; for cells larger than six pixels, images are compared at a coarser size,
         /// which is quick.
         cell_m: Option<f64> = key(above_to(0.0, 1e5)).unused("15.0"),
-        /// Cell edge for orthoimages on this terrain model, made from every image with `pixels`; the ground size of an image
+        /// Cell edge for orthoimages on this terrain model, made from every image with `pixels` and tie points; the ground size of an image
         /// pixel is usual. Without this key no orthoimages are made.
         orthoimage_cell_m: Option<f64> = key(above_to(0.0, 1e5)).unused("5.0"),
         /// Identifiers of the two images, where more than two of the site have pixels.

@@ -43,7 +43,7 @@ pub(super) static ORTHOIMAGE: Declaration = Declaration {
 
 pub(super) static SIGMAS: Declaration = Declaration {
     path: "images/<image>/orthoimage_sigma.tif",
-    what: "standard deviation of horizontal positions in the orthoimage without the shared error, metres, on the cells of \
+    what: "standard deviation of horizontal positions (both axes together) in the orthoimage without the shared error, metres, on the cells of \
            surface.tif: from height errors, jitter and drift; orthoimages.json states the shared error",
     readers: "GIS",
     rows: "cells that the image shows",
@@ -142,13 +142,16 @@ struct Entry<'a> {
     terrain_cells: u32,
     /// Number of terrain cells inside the image that relief hides from the camera.
     hidden: u32,
-    /// Root mean square of the standard deviations of the horizontal position without the shared error.
+    /// Number of terrain cells shown with an interpolated height.
+    interpolated: u32,
+    /// Root mean square of the standard deviations of the horizontal position without the shared error, both axes together.
     #[schemars(range(min = 0.0))]
     sigma_m: f64,
-    /// Standard deviation due to jitter, from the scatter of tie points; omitted without an adjustment.
+    /// Standard deviation due to jitter, both axes together, from the scatter of tie points; omitted where
+    /// none was measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     jitter_m: Option<f64>,
-    /// Standard deviation due to drift: errors of the orientation that change along the image; omitted without an adjustment.
+    /// Standard deviation due to drift, both axes together: errors of the orientation that change along the image; omitted without an adjustment.
     #[serde(skip_serializing_if = "Option::is_none")]
     drift_m: Option<f64>,
     /// Standard deviations of the shared error, east and north; omitted without an adjustment with heights.
@@ -171,6 +174,7 @@ impl<'a> Document<'a> {
                 without_pixels: of.without_pixels,
                 terrain_cells: of.terrain_cells,
                 hidden: of.hidden,
+                interpolated: of.interpolated,
                 sigma_m: of.sigma_m,
                 jitter_m: of.jitter_m,
                 drift_m: of.drift_m,

@@ -28,9 +28,10 @@ fn write(site: &SiteProducts) -> Result<String> {
     Ok(table(site)
         + &paragraph(
             "Cells in wide holes of the terrain model, on ground that relief hides from the camera, or with missing pixels are \
-             empty. Heights in narrow holes are interpolated; their σ is larger. σ is the standard deviation of the horizontal \
-             position of a cell without the shared error. Its parts are height errors, jitter, and drift (errors of the orientation \
-             that change along the image). The adjustment states the σ of the shared error.",
+             empty. Heights in narrow holes are interpolated; off nadir their σ is larger. σ is the standard deviation of the \
+             horizontal position of a cell, both axes together, without the shared error. Its parts are height errors, jitter (where \
+             the scatter of tie points shows it), and drift (errors of the orientation that change along the image). The adjustment \
+             states the σ of the shared error on each axis. Images without tie points are not rectified in an adjusted site.",
         )
         + &format!("<div class=\"pieces\">\n{pictures}</div>\n"))
 }
@@ -46,6 +47,7 @@ fn table(site: &SiteProducts) -> String {
             Column::Number("cells with missing pixels"),
             Column::Number("terrain cells in the image"),
             Column::Number("hidden terrain cells"),
+            Column::Number("interpolated terrain cells"),
             Column::Number("σ (m)"),
             Column::Number("σ, jitter (m)"),
             Column::Number("σ, drift (m)"),
@@ -80,6 +82,7 @@ fn table(site: &SiteProducts) -> String {
                 count(of.without_pixels, "/without_pixels"),
                 count(of.terrain_cells, "/terrain_cells"),
                 count(of.hidden, "/hidden"),
+                count(of.interpolated, "/interpolated"),
                 number(of.sigma_m, 2, "/sigma_m"),
                 of_adjustment(of.jitter_m, "/jitter_m"),
                 of_adjustment(of.drift_m, "/drift_m"),

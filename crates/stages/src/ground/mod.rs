@@ -45,26 +45,26 @@ impl Ground {
         let middle = Spherical::from_xyz_m(&places_m.iter().sum());
         let degrees = (middle.latitude.0 / RADIANS_PER_DEGREE).round();
         let parallel_rad = degrees.clamp(-PARALLEL_MAX_DEG, PARALLEL_MAX_DEG) * RADIANS_PER_DEGREE;
-        Self::over_at(parallel_rad, body.map().radius_m, places_m, cell_m)
+        let middle_rad = [wrap_pi(middle.longitude_rad), parallel_rad];
+        Self::over_at(middle_rad, body.map().radius_m, places_m, cell_m)
     }
 
-    /// As [`Self::over`], on the map of a sphere whose cells are square at `parallel_rad`.
+    /// As [`Self::over`], on the map of a sphere whose cells are square at `parallel_rad`, with longitudes within half a turn of
+    /// `middle_rad`.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "a number of cells, held against a limit by the caller; a cast ends at the bounds"
     )]
     pub(crate) fn over_at(
-        parallel_rad: f64,
+        [middle_rad, parallel_rad]: [f64; 2],
         radius_m: f64,
         places_m: &[Vector3<f64>],
         cell_m: f64,
     ) -> Option<Self> {
-        let middle = Spherical::from_xyz_m(&places_m.iter().sum());
         let mut edges = [f64::INFINITY, f64::INFINITY, -f64::INFINITY, -f64::INFINITY];
         for place_m in places_m {
             let place = Spherical::from_xyz_m(place_m);
-            let middle_rad = wrap_pi(middle.longitude_rad);
             let longitude_rad = middle_rad + wrap_pi(place.longitude_rad - middle_rad);
             let x = longitude_rad * parallel_rad.cos() * radius_m / cell_m;
             let y = place.latitude.0 * radius_m / cell_m;

@@ -60,19 +60,25 @@ pub(super) fn compare(
         at_nadir.collect()
     };
     let above_m = summary(tested.iter().copied());
-    let sigmas_m = || {
-        tested
-            .iter()
-            .map(|shot| shot.sigma_m.hypot(of_shot_m(shot)))
+    let attitude_sigma_m = tested
+        .iter()
+        .map(|shot| of_shot_m(shot))
+        .fold(0.0, f64::max);
+    // An attitude error shifts all shots of a profile.
+    let of_profile = |shot: &ShotOnSurface| {
+        let id = &profiles[shot.profile].id;
+        by_profile.iter().find(|of| of.profile == *id)
     };
-    let normalised = tested.iter().zip(sigmas_m());
-    let normalised = normalised.map(|(shot, sigma_m)| (shot.above_m - above_m.median) / sigma_m);
-    let square = sigmas_m().map(|sigma_m| sigma_m * sigma_m).sum::<f64>();
+    let middle_m = |shot: &ShotOnSurface| {
+        let own = (attitude_sigma_m > 0.0).then(|| of_profile(shot)).flatten();
+        own.map_or(above_m.median, |of: &ProfileOnSurface| of.above_m.median)
+    };
+    let normalised = tested.iter();
+    let normalised = normalised.map(|shot| (shot.above_m - middle_m(shot)) / shot.sigma_m);
+    let square = tested.iter().map(|shot| shot.sigma_m * shot.sigma_m);
+    let square = square.sum::<f64>();
     ShotComparison {
-        attitude_sigma_m: tested
-            .iter()
-            .map(|shot| of_shot_m(shot))
-            .fold(0.0, f64::max),
+        attitude_sigma_m,
         sigma_m: (square / tested.len().max(1) as f64).sqrt(),
         spread_sigmas: Summary::of(&normalised.collect::<Vec<f64>>()).nmad,
         above_m,
@@ -254,8 +260,8 @@ mod tests {
             (2 * shots + 1, 60.0)
         );
         assert!(same(without.attitude_sigma_m, turned_m));
-        // A fifth of their uncertainty lies between the profiles.
-        assert!(without.spread_sigmas < 1.0, "{without:?}");
+        // Shots of a profile lie at one height, whatever the shift between the profiles.
+        assert!(same(without.spread_sigmas, 0.0));
 
         let none_known = compared(&[unknown]);
         assert!(same(none_known.above_m.median, -30.0));

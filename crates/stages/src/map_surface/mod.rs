@@ -45,7 +45,7 @@ use areograph_base::{
     ties::Unmatched,
     watch::Watch,
 };
-use areograph_config::{MolaSurfaceConfig, SurfaceConfig};
+use areograph_config::MolaSurfaceConfig;
 use areograph_geom::pushbroom::Unseen;
 use areograph_store::{
     stage::{Input, Inputs, Output, Stage},
@@ -75,8 +75,10 @@ stage_inputs! {
         pub converted: &'a Output<Converted>,
         /// Profiles.
         pub profiles: &'a Output<Vec<Profile>>,
-        /// Configuration of the terrain model.
-        pub surface: &'a SurfaceConfig,
+        /// Edge of a cell, metres.
+        pub cell_m: &'a f64,
+        /// Identifiers of the two images, where they are named.
+        pub pair: &'a Option<[String; 2]>,
         /// Uncertainties of shots.
         pub laser_surface: &'a MolaSurfaceConfig,
         /// The adjustment that gave the images their orientation.
@@ -158,7 +160,7 @@ impl Stage for MapSurface<'_> {
         let heights = Heights::of(footprints, profiles);
         let options = Options {
             body: footprints.body,
-            cell_m: self.surface.cell_m.unwrap_or_default(),
+            cell_m: *self.cell_m,
             off_m: *self.off_m,
         };
         let mut surface = map_surface([one, other], &heights, &options, watch)?;
@@ -178,7 +180,7 @@ impl MapSurface<'_> {
     /// Indices of the two images: the named ones, or those with pixels.
     fn pair(&self, times: &[&ImageTimes]) -> Result<Vec<usize>> {
         let images = times.iter().enumerate();
-        let pair: Vec<usize> = match &self.surface.images {
+        let pair: Vec<usize> = match self.pair {
             Some(named) => {
                 let place = |id: &String| times.iter().position(|time| time.id == *id);
                 named.iter().filter_map(place).collect()

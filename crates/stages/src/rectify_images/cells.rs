@@ -61,7 +61,12 @@ impl Cells {
             spherical_to_xyz_m(longitude_rad, latitude_rad, radius_m)
         });
         let places_m: Vec<Vector3<f64>> = places_m.collect();
-        let ground = Ground::over_at(model.parallel_rad, shown.radius_m, &places_m, cell_m);
+        let ground = Ground::over_at(
+            [shown.middle_rad()[0], model.parallel_rad],
+            shown.radius_m,
+            &places_m,
+            cell_m,
+        );
         let Some(ground) = ground else {
             return Ok(None);
         };

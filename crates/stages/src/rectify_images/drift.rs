@@ -5,14 +5,16 @@ use nalgebra::{Matrix2xX, Vector2, Vector3};
 use crate::{adjust::CorrectedImage, image_view::View};
 use areograph_geom::{bundle::ORIENTATION_UNKNOWNS, ellipsoid::local_axes};
 
-/// Lines at which the error is computed, from the first to the last one.
+/// Lines at which the error is computed, from the first to the last one, and places along each of them.
 const LINES: u32 = 17;
+const SAMPLES: [f64; 3] = [0.0, 0.5, 1.0];
 
-/// Standard deviation of the horizontal position of a line about the mean of all lines, root mean square over the lines, metres,
-/// from the covariance of the orientation of `image`; the ground is a sphere of `radius_m`.
+/// Standard deviation of the horizontal position of a place about the mean of all places, both axes together, root mean square
+/// over the image, metres, from the covariance of the orientation of `image`; the ground is a sphere of `radius_m`.
 pub(super) fn drift_m(view: &View<'_>, image: &CorrectedImage, radius_m: f64) -> f64 {
     let step = |line: u32| 2.0 * f64::from(line) / f64::from(LINES - 1) - 1.0;
-    let effects = (0..LINES).filter_map(|line| effect(view, image, step(line), radius_m));
+    let places = (0..LINES).flat_map(|line| SAMPLES.map(|share| [step(line), share]));
+    let effects = places.filter_map(|place| effect(view, image, place, radius_m));
     let effects: Vec<Matrix2xX<f64>> = effects.collect();
     let Some(first) = effects.first() else {
         return 0.0;
@@ -27,17 +29,17 @@ pub(super) fn drift_m(view: &View<'_>, image: &CorrectedImage, radius_m: f64) ->
     (variances_m2.sum::<f64>() / count).max(0.0).sqrt()
 }
 
-/// Horizontal displacement of the ground at `t`, from −1 to 1 along the image, by each unknown of its orientation: east and
+/// Horizontal displacement of the ground at `t`, from −1 to 1 along the image, and `share` of its line, by each unknown of its orientation: east and
 /// north, metres per unit.
 fn effect(
     view: &View<'_>,
     image: &CorrectedImage,
-    t: f64,
+    [t, share]: [f64; 2],
     radius_m: f64,
 ) -> Option<Matrix2xX<f64>> {
     let x_lines = t * image.half_lines;
     let line = view.camera.line_times.line_of_offset(x_lines);
-    let place = Vector2::new(line, 0.5 * view.camera.detector.samples);
+    let place = Vector2::new(line, share * view.camera.detector.samples);
     let ground_m = view.on_sphere_m(&place, radius_m)?;
     let pose = view.camera.orientation.pose(x_lines);
     let ray_m = ground_m - pose.position_m;

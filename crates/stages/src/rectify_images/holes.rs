@@ -41,12 +41,14 @@ pub(super) fn bridged(model: &SurfaceModel) -> SurfaceModel {
 }
 
 /// Distance in cells to the nearest known one, along rows, columns or diagonals, for known cells and narrow holes between
-/// them; `None` elsewhere: cells are added around known ones, and removed again from outside.
-fn closed(is_known: &[bool], size: [usize; 2]) -> Vec<Option<usize>> {
-    let mut distances: Vec<Option<usize>> = is_known
-        .iter()
-        .map(|is_known| is_known.then_some(0))
-        .collect();
+/// them; `None` elsewhere: cells are added around known ones, also beyond the map, and removed again from outside.
+fn closed(is_known: &[bool], [rows, columns]: [usize; 2]) -> Vec<Option<usize>> {
+    let size = [rows, columns].map(|of| of + 2 * REACH);
+    let place = |at: usize| (at / columns + REACH) * size[1] + at % columns + REACH;
+    let mut distances = vec![None; size[0] * size[1]];
+    for (at, is_known) in is_known.iter().enumerate() {
+        distances[place(at)] = is_known.then_some(0);
+    }
     for distance in 1..=REACH {
         let is_reached: Vec<bool> = distances.iter().map(Option::is_some).collect();
         for at in 0..distances.len() {
@@ -55,7 +57,6 @@ fn closed(is_known: &[bool], size: [usize; 2]) -> Vec<Option<usize>> {
             }
         }
     }
-    // The edge of the model counts as outside.
     let mut is_inside: Vec<bool> = distances.iter().map(Option::is_some).collect();
     for _ in 0..REACH {
         let before = is_inside.clone();
@@ -64,10 +65,10 @@ fn closed(is_known: &[bool], size: [usize; 2]) -> Vec<Option<usize>> {
             is_inside[at] = before[at] && all == 8;
         }
     }
-    for (at, distance) in distances.iter_mut().enumerate() {
-        *distance = distance.filter(|_| is_inside[at] || is_known[at]);
-    }
-    distances
+    let cells = is_known.iter().enumerate();
+    cells
+        .map(|(at, is_known)| distances[place(at)].filter(|_| *is_known || is_inside[place(at)]))
+        .collect()
 }
 
 /// The cells around a cell.
@@ -121,6 +122,8 @@ mod tests {
             (20..30).contains(&row) && (15..25).contains(&column)
                 || (15..39).contains(&row) && (50..74).contains(&column)
                 || row < 5
+                // A cell beside the edge of the map.
+                || [row, column] == [58, 90]
         };
         let heights_m: Vec<f32> = cells
             .map(|[row, column]| {
@@ -157,6 +160,7 @@ mod tests {
         assert!((height_m - plane_m(45, 45)).abs() < 1e-3 && (sigma_m - 2.0).abs() < 1e-3);
         assert!(at(27, 62)[0].is_nan());
         assert!(at(3, 40)[0].is_nan());
+        assert!(!at(58, 90)[0].is_nan());
         assert!((at(5, 40)[1] - 2.0).abs() < 1e-3);
     }
 }

@@ -18,7 +18,7 @@ use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    adjust::{Adjusted, CorrectedImage},
+    adjust::{Adjusted, CorrectedImage, PointKind},
     image_pixels::PixelFiles,
     image_view::View,
     map_surface::{AdjustmentOfImages, Surface, SurfaceModel},
@@ -92,11 +92,13 @@ pub struct OrthoimageAccount {
     pub without_pixels: u32,
     /// Number of terrain cells inside the image, including interpolated holes.
     pub terrain_cells: u32,
+    /// Number of these terrain cells with an interpolated height.
+    pub interpolated: u32,
     /// Number of these terrain cells that relief hides from the camera.
     pub hidden: u32,
     /// Root mean square of the standard deviations of its horizontal position, metres.
     pub sigma_m: f64,
-    /// Standard deviation due to jitter, metres; `None` without an adjustment, which measures it.
+    /// Standard deviation due to jitter, metres; `None` where the adjustment does not measure it.
     pub jitter_m: Option<f64>,
     /// Standard deviation due to drift, metres: errors of the orientation that change along the image; `None` without an
     /// adjustment.
@@ -116,13 +118,16 @@ pub struct OrthoimageLook {
     pub brightness: Vec<u8>,
 }
 
-/// No orthoimage can be made.
+/// An orthoimage cannot be made.
 #[derive(Debug, thiserror::Error, Cause)]
 #[cause(Input)]
 enum RectifyError {
     #[error("image {image}: its rays do not intersect the ground: {unseen}")]
     #[cause("check the kernels and times of the image")]
     Unseen { image: String, unseen: Unseen },
+    #[error("image {image}: no cell of surface.orthoimage_cell_m = {cell_m} m lies in the image")]
+    #[cause("decrease surface.orthoimage_cell_m; the ground size of an image pixel is usual")]
+    Empty { image: String, cell_m: f64 },
     #[error(
         "image {image}: surface.orthoimage_cell_m is {cell_m} m and requires {cells} cells; expected at most {CELLS_MAX}"
     )]
@@ -163,6 +168,10 @@ impl Stage for RectifyImages<'_> {
                 image: id(),
                 unseen,
             })?;
+            // Its own error is not the shared error of the adjusted images.
+            if adjusted.is_some_and(|adjusted| !is_tied(adjusted, index)) {
+                continue;
+            }
             let adjustment = adjusted.and_then(|adjusted| AdjustedView::of(adjusted, index));
             let made_of = rectified(&view, &model, *self.cell_m, adjustment, watch)?;
             let Some(mut orthoimage) = made_of else {
@@ -170,6 +179,7 @@ impl Stage for RectifyImages<'_> {
             };
             let account = &mut orthoimage.account;
             account.image = index;
+            account.interpolated = interpolated(&orthoimage.sigmas_m, &surface.model);
             account.shared_sigma_m = adjusted.and_then(shared_sigma_m);
             made.push(orthoimage);
         }
@@ -194,6 +204,19 @@ impl<'a> AdjustedView<'a> {
     }
 }
 
+/// Whether tie points in an image took part in the adjustment.
+fn is_tied(adjusted: &Adjusted, index: usize) -> bool {
+    let mut views = adjusted.views.iter();
+    views.any(|view| view.kind == PointKind::Tie && view.image == index)
+}
+
+/// Number of shown cells whose height is not one of the terrain model.
+fn interpolated(shown_sigmas_m: &[f32], model: &SurfaceModel) -> u32 {
+    let cells = shown_sigmas_m.iter().zip(&model.heights.heights_m);
+    let interpolated = cells.filter(|(sigma_m, height_m)| !sigma_m.is_nan() && height_m.is_nan());
+    u32::try_from(interpolated.count()).unwrap_or(u32::MAX)
+}
+
 /// Standard deviations of the mean place of the adjusted tie points, towards east and north, metres.
 fn shared_sigma_m(adjusted: &Adjusted) -> Option<[f64; 2]> {
     let [east_m, north_m, _] = adjusted.heights.as_ref()?.mean_sigma_m;
@@ -213,7 +236,9 @@ fn rectified(
         return Ok(None);
     };
     // Jitter in pitch and in roll displaces along and across the track.
-    let jitter_m = adjustment.map(|of| Vector2::from(of.scatter_px).norm() * sight_lines.pixel_m);
+    let scatter_px = adjustment.map(|of| Vector2::from(of.scatter_px).norm());
+    let scatter_px = scatter_px.filter(|scatter_px| *scatter_px > 0.0);
+    let jitter_m = scatter_px.map(|scatter_px| scatter_px * sight_lines.focal_pixel_m);
     let drift_m = adjustment.map(|of| drift_m(view, of.image, sight_lines.radius_m));
     let of_orientation_m = jitter_m
         .unwrap_or_default()
@@ -225,6 +250,10 @@ fn rectified(
     };
     let brightness = cells.brightness(view, &sight_lines, watch)?;
     let filled = brightness.pixels.iter().filter(|pixel| **pixel > 0).count();
+    if filled == 0 && brightness.without_pixels == 0 {
+        let image = view.camera.id.clone();
+        return Err(RectifyError::Empty { image, cell_m }.into());
+    }
     let count = |of: usize| u32::try_from(of).unwrap_or(u32::MAX);
     let known = sigmas_m.iter().filter(|sigma_m| !sigma_m.is_nan());
     let square_m2: f64 = known.clone().map(|of| f64::from(of * of)).sum();
@@ -238,6 +267,7 @@ fn rectified(
         without_pixels: brightness.without_pixels,
         terrain_cells: count(sight_lines.seen()),
         hidden: count(sight_lines.hidden()),
+        interpolated: 0,
         sigma_m: (square_m2 / known.count().max(1) as f64).sqrt(),
         jitter_m,
         drift_m,

@@ -19,8 +19,8 @@ struct Ray {
     /// Horizontal displacement for an error of a metre in the height, metres.
     displacement: f64,
     is_hidden: bool,
-    /// Edge of a pixel on the ground, metres.
-    pixel_m: f64,
+    /// Edge of a pixel of the image, and of the focal plane, on the ground, metres.
+    pixels_m: [f64; 2],
 }
 
 /// Rays of all cells of a terrain model.
@@ -31,6 +31,8 @@ pub(super) struct SightLines {
     pub(super) shown: HeightGrid,
     /// Median edge of a pixel of the image on the ground, metres.
     pub(super) pixel_m: f64,
+    /// Median edge of a pixel of the focal plane on the ground, metres: lines may be farther apart.
+    pub(super) focal_pixel_m: f64,
     /// Median radius of the cells inside the image, metres.
     pub(super) radius_m: f64,
 }
@@ -52,11 +54,11 @@ impl SightLines {
                 )
             })
             .collect();
-        let mut pixels_m: Vec<f64> = rays.iter().flatten().map(|ray| ray.pixel_m).collect();
-        if pixels_m.is_empty() {
-            return None;
-        }
-        let pixel_m = median(&mut pixels_m);
+        rays.iter().flatten().next()?;
+        let [pixel_m, focal_pixel_m] = [0, 1].map(|of| {
+            let edges_m = rays.iter().flatten().map(|ray| ray.pixels_m[of]);
+            median(&mut edges_m.collect::<Vec<f64>>())
+        });
         let seen = grid.heights_m.iter().zip(&rays);
         let seen = seen.filter(|(_, ray)| ray.is_some());
         let mut heights_m: Vec<f64> = seen.map(|(height_m, _)| f64::from(*height_m)).collect();
@@ -73,6 +75,7 @@ impl SightLines {
             },
             rays,
             pixel_m,
+            focal_pixel_m,
             radius_m,
         })
     }
@@ -144,7 +147,10 @@ fn ray(view: &View<'_>, grid: &HeightGrid, cell: [usize; 2], highest_m: f64) -> 
     Some(Ray {
         displacement,
         is_hidden: (1..=steps(displacement, highest_m - height_m, north_m)).any(is_above),
-        pixel_m: (east_m * north_m / beside.perp(&below).abs()).sqrt(),
+        pixels_m: [
+            (east_m * north_m / beside.perp(&below).abs()).sqrt(),
+            towards_m.norm_squared() / towards_m.z / view.camera.detector.focal_length_px,
+        ],
     })
 }
 
