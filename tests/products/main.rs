@@ -10,6 +10,7 @@ mod exchange_readers;
 mod fidelity;
 mod generated;
 mod methods;
+mod orthoimages;
 mod products_site;
 mod report_geometric;
 mod report_many;

@@ -179,7 +179,7 @@ fn matched_images(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
 
 /// A terrain model requires two images with pixels, and their names where there are more.
 fn images_of_surface(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
-    if !site.surface.is_asked_for() {
+    if site.surface.cell_m.is_none() {
         return;
     }
     let with_pixels = site.images.iter().filter(|image| image.pixels.is_some());

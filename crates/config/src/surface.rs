@@ -39,11 +39,3 @@ fn a_cell_is_given(surface: &SurfaceConfig, keys: &mut Keys<'_, '_>) {
         );
     }
 }
-
-impl SurfaceConfig {
-    /// Whether a terrain model is requested.
-    #[must_use]
-    pub const fn is_asked_for(&self) -> bool {
-        self.cell_m.is_some()
-    }
-}

@@ -59,7 +59,6 @@ fn made(site: &SiteProducts, account: &SurfaceAccount) -> String {
             Column::Number("σ, common (m)"),
             Column::Number("convergence (°)"),
             Column::Number("correlation"),
-            Column::Text("cells without a height"),
         ],
     );
     let [first, second] = account.images.map(|image| &site.images[image].times.id);
@@ -88,10 +87,14 @@ fn made(site: &SiteProducts, account: &SurfaceAccount) -> String {
                 "/matching/convergence_deg",
             ),
             of(account.correlation, 2, "/matching/correlation"),
-            reasons(&account.unfilled).into(),
         ],
     );
+    let unfilled = match &*reasons(&account.unfilled) {
+        "" => String::new(),
+        reasons => paragraph(&format!("Cells without a height: {reasons}.")),
+    };
     table.finish()
+        + &unfilled
         + &paragraph(
             "σ of a cell: of one height against the others, from the residuals of its match, from jitter of the images \
              (the scatter of their shifts across the parallax, where no height moves them), and from the relief inside the \

@@ -55,6 +55,15 @@ pub struct Adjusted {
     pub weighted_squares: Vec<f64>,
 }
 
+impl Adjusted {
+    /// Whether tie points in the image with this index took part: without any, its orientation is the a priori one.
+    #[must_use]
+    pub fn is_tied(&self, image: usize) -> bool {
+        let mut views = self.views.iter();
+        views.any(|view| view.kind == PointKind::Tie && view.image == image)
+    }
+}
+
 /// An image with the correction of its orientation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CorrectedImage {

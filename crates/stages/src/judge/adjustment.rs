@@ -1,7 +1,5 @@
 //! Verdict on an adjustment: by MOLA first, then by agreement between the images, then by a priori values.
 
-use std::collections::BTreeSet;
-
 use super::{AdjustmentEvidence, JudgedImage};
 use crate::{
     adjust::{HEIGHTS_MIN, HeightSummary, ObservationType, PointKind, TypeSummary},
@@ -264,12 +262,9 @@ impl AdjustmentEvidence<'_> {
 
     /// Images without a tie point in the adjustment.
     pub(super) fn untied(&self) -> Vec<String> {
-        let views = self.adjusted.views.iter();
-        let ties = views.filter(|view| view.kind == PointKind::Tie);
-        let tied: BTreeSet<usize> = ties.map(|view| view.image).collect();
         let images = self.adjusted.images.iter().enumerate();
         images
-            .filter(|(index, _)| !tied.contains(index))
+            .filter(|(index, _)| !self.adjusted.is_tied(*index))
             .map(|(_, image)| image.id.clone())
             .collect()
     }

@@ -18,7 +18,7 @@ use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    adjust::{Adjusted, CorrectedImage, PointKind},
+    adjust::{Adjusted, CorrectedImage},
     image_pixels::PixelFiles,
     image_view::View,
     map_surface::{AdjustmentOfImages, Surface, SurfaceModel},
@@ -125,9 +125,9 @@ enum RectifyError {
     #[error("image {image}: its rays do not intersect the ground: {unseen}")]
     #[cause("check the kernels and times of the image")]
     Unseen { image: String, unseen: Unseen },
-    #[error("image {image}: no cell of surface.orthoimage_cell_m = {cell_m} m lies in the image")]
+    #[error("surface.orthoimage_cell_m is {cell_m} m: no cell of this size lies in an image")]
     #[cause("decrease surface.orthoimage_cell_m; the ground size of an image pixel is usual")]
-    Empty { image: String, cell_m: f64 },
+    Empty { cell_m: f64 },
     #[error(
         "image {image}: surface.orthoimage_cell_m is {cell_m} m and requires {cells} cells; expected at most {CELLS_MAX}"
     )]
@@ -150,7 +150,7 @@ impl Stage for RectifyImages<'_> {
 
     fn run_watched(&self, watch: Watch<'_>) -> Result<Vec<Orthoimage>> {
         let surface = self.surface.value()?;
-        let mut made = Vec::new();
+        let (mut made, mut is_empty) = (Vec::new(), false);
         if surface.account.is_refused {
             return Ok(made);
         }
@@ -169,12 +169,13 @@ impl Stage for RectifyImages<'_> {
                 unseen,
             })?;
             // Its own error is not the shared error of the adjusted images.
-            if adjusted.is_some_and(|adjusted| !is_tied(adjusted, index)) {
+            if adjusted.is_some_and(|adjusted| !adjusted.is_tied(index)) {
                 continue;
             }
             let adjustment = adjusted.and_then(|adjusted| AdjustedView::of(adjusted, index));
-            let made_of = rectified(&view, &model, *self.cell_m, adjustment, watch)?;
-            let Some(mut orthoimage) = made_of else {
+            let orthoimage = rectified(&view, &model, *self.cell_m, adjustment, watch)?;
+            let Some(mut orthoimage) = orthoimage else {
+                is_empty = true;
                 continue;
             };
             let account = &mut orthoimage.account;
@@ -182,6 +183,11 @@ impl Stage for RectifyImages<'_> {
             account.interpolated = interpolated(&orthoimage.sigmas_m, &surface.model);
             account.shared_sigma_m = adjusted.and_then(shared_sigma_m);
             made.push(orthoimage);
+        }
+        // The images of the model show it, so that only cells larger than they are leave nothing.
+        if made.is_empty() && is_empty {
+            let cell_m = *self.cell_m;
+            return Err(RectifyError::Empty { cell_m }.into());
         }
         Ok(made)
     }
@@ -204,12 +210,6 @@ impl<'a> AdjustedView<'a> {
     }
 }
 
-/// Whether tie points in an image took part in the adjustment.
-fn is_tied(adjusted: &Adjusted, index: usize) -> bool {
-    let mut views = adjusted.views.iter();
-    views.any(|view| view.kind == PointKind::Tie && view.image == index)
-}
-
 /// Number of shown cells whose height is not one of the terrain model.
 fn interpolated(shown_sigmas_m: &[f32], model: &SurfaceModel) -> u32 {
     let cells = shown_sigmas_m.iter().zip(&model.heights.heights_m);
@@ -223,7 +223,7 @@ fn shared_sigma_m(adjusted: &Adjusted) -> Option<[f64; 2]> {
     Some([east_m, north_m])
 }
 
-/// The orthoimage of a view, without its index; `None` where the image does not show the terrain model.
+/// The orthoimage of a view, without its index; `None` where no cell has a brightness.
 fn rectified(
     view: &View<'_>,
     model: &SurfaceModel,
@@ -250,9 +250,8 @@ fn rectified(
     };
     let brightness = cells.brightness(view, &sight_lines, watch)?;
     let filled = brightness.pixels.iter().filter(|pixel| **pixel > 0).count();
-    if filled == 0 && brightness.without_pixels == 0 {
-        let image = view.camera.id.clone();
-        return Err(RectifyError::Empty { image, cell_m }.into());
+    if filled == 0 {
+        return Ok(None);
     }
     let count = |of: usize| u32::try_from(of).unwrap_or(u32::MAX);
     let known = sigmas_m.iter().filter(|sigma_m| !sigma_m.is_nan());

@@ -61,6 +61,17 @@ fn orthoimage(
     ground_m: fn(&Vector3<f64>) -> f64,
     model: &SurfaceModel,
 ) -> Orthoimage {
+    in_cells(CELL_M, number, off_m, ground_m, model).unwrap()
+}
+
+/// The same in cells of this edge; `None` if all are empty.
+fn in_cells(
+    cell_m: f64,
+    number: usize,
+    off_m: [f64; 2],
+    ground_m: fn(&Vector3<f64>) -> f64,
+    model: &SurfaceModel,
+) -> Option<Orthoimage> {
     let waves = Invented::waves(5);
     let camera = Invented::camera(number, [0.0; 2]);
     let pixels = Invented::rendered(&camera, LINES, ground_m, &waves, number as u64 + 1);
@@ -69,9 +80,7 @@ fn orthoimage(
     let assumed = Invented::camera(number, off_m);
     let view = Invented::view(&assumed, &pyramid);
     let never = AtomicBool::new(false);
-    rectified(&view, model, CELL_M, None, (&never).into())
-        .unwrap()
-        .unwrap()
+    rectified(&view, model, cell_m, None, (&never).into()).unwrap()
 }
 
 /// Row and column of the first whose middle is at this cell of the second.
@@ -162,11 +171,7 @@ fn orthoimages_show_the_ground_where_it_is() {
     }
     let square = differences.iter().map(|of| of * of).sum::<f64>();
     let rms = (square / differences.len() as f64).sqrt();
-    println!(
-        "{} cells, rms {rms:.2} DN, {:?}",
-        differences.len(),
-        of.account
-    );
+    println!("{} cells, rms {rms:.2} DN", differences.len());
     assert!(differences.len() > 80_000);
     // Noise of a DN, and detail between pixels; a displacement of half a pixel has more than twice as much.
     assert!(rms < 2.5, "{rms}");
@@ -217,11 +222,11 @@ fn ground_that_relief_hides_stays_empty() {
     assert_eq!(inside(-250.0 * 0.316 + TERRAIN_CELL_M, -TERRAIN_CELL_M), 0);
     assert!(inside(-200.0, -120.0) > 1_000);
     assert!(inside(20.0, 100.0) > 1_000);
-    assert!(of.account.hidden > 100, "{:?}", of.account);
+    assert!(of.account.hidden > 100, "{}", of.account.hidden);
 }
 
 #[test]
-fn nothing_is_filled_and_large_cells_average() {
+fn ground_without_heights_stays_empty() {
     let mut holes = model(hill_m);
     for at in 0..holes.heights.heights_m.len() {
         if at % 80 > 38 {
@@ -233,4 +238,35 @@ fn nothing_is_filled_and_large_cells_average() {
     assert!(east_rad * RADIUS_M < 0.0, "the eastern half has no heights");
     let brightest = of.account.look.brightness.iter().max();
     assert!(of.account.look.size.iter().max() <= Some(&LOOK) && brightest > Some(&0));
+}
+
+#[test]
+fn large_cells_are_means_of_small_ones_and_cells_larger_than_the_image_are_empty() {
+    const FACTOR: usize = 4;
+    let model = model(hill_m);
+    let fine = orthoimage(1, [0.0; 2], hill_m, &model);
+    let coarse = in_cells(FACTOR as f64 * CELL_M, 1, [0.0; 2], hill_m, &model).unwrap();
+    let [_, columns] = coarse.account.map.size;
+    // Differences from the means of small cells, `aside` of these too far east.
+    let rms = |aside: i64| {
+        let mut squares = Vec::new();
+        for (at, pixel) in coarse.brightness.iter().enumerate() {
+            let [longitude_rad, latitude_rad] =
+                (coarse.account.map).place_rad([(at / columns) as f64, (at % columns) as f64]);
+            let middle = fine.account.map.cell_of(longitude_rad, latitude_rad);
+            let [row, column] = middle.map(|of| (of - 0.5 * (FACTOR as f64 - 1.0)).round() as i64);
+            let cells = square(&fine, [row, column + aside], FACTOR);
+            if let (true, Some(cells)) = (*pixel > 0, cells) {
+                let mean = cells.values.iter().sum::<f32>() / (FACTOR * FACTOR) as f32;
+                squares.push((f64::from(*pixel) - f64::from(mean)).powi(2));
+            }
+        }
+        assert!(squares.len() > 4_000);
+        (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+    };
+    let [here, beside] = [0, 1].map(rms);
+    println!("large cells: {here:.2} DN, and {beside:.2} DN a small cell aside");
+    // Large cells average over pixels of the image, which are not those of the map.
+    assert!(here < 4.0 && beside > 1.5 * here, "{here} {beside}");
+    assert!(in_cells(1e5, 1, [0.0; 2], hill_m, &model).is_none());
 }

@@ -1,0 +1,160 @@
+//! Orthoimages of a small site: their files as other programs read them, and the page against the document.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests may fail loudly")]
+
+use std::{collections::BTreeMap, fs::File};
+
+use areograph::{
+    geom::height_grid::HeightGrid,
+    products::{SiteProducts, write_products},
+    report,
+    stages::{
+        map_surface::{ShotComparison, Surface, SurfaceAccount, SurfaceLook, SurfaceModel},
+        rectify_images::{Orthoimage, OrthoimageAccount, OrthoimageLook},
+    },
+};
+use serde_json::json;
+use tiff::{
+    decoder::{Decoder, DecodingResult},
+    tags::Tag,
+};
+
+use crate::common::{self, products_site::Site};
+
+/// Rows and columns of the orthoimage, and of the terrain model, whose cells are twice as large.
+const SIZE: [usize; 2] = [6, 8];
+const TERRAIN: [usize; 2] = [3, 4];
+const RADIUS_M: f64 = 3_396_190.0;
+
+/// A map without heights, its cells `cell_m` wide.
+fn map(size: [usize; 2], cell_m: f64) -> HeightGrid {
+    HeightGrid {
+        size,
+        first_rad: [1.0, 0.2],
+        cell_rad: [cell_m / RADIUS_M; 2],
+        radius_m: RADIUS_M,
+        heights_m: Vec::new(),
+    }
+}
+
+fn surface() -> Surface {
+    let heights = HeightGrid {
+        heights_m: (0..12_u8).map(f32::from).collect(),
+        ..map(TERRAIN, 10.0)
+    };
+    let sigmas_m = vec![2.0; 12];
+    Surface {
+        account: SurfaceAccount {
+            images: [0, 0],
+            cell_m: 10.0,
+            sample_m: 5.0,
+            compared_m: 50.0,
+            cells: 12,
+            filled: 12,
+            unfilled: BTreeMap::new(),
+            is_refused: false,
+            convergence_rad: 0.3,
+            height_of_pixel_m: 12.0,
+            sigma_m: 2.0,
+            jitter_m: 1.0,
+            smoothing_m: 0.5,
+            correlation: 0.9,
+            aside_m: 0.1,
+            common_sigma_m: Some(1.5),
+            shots_take_part: true,
+            shots: ShotComparison::default(),
+            look: SurfaceLook {
+                heights: heights.clone(),
+                sigmas_m: sigmas_m.clone(),
+            },
+        },
+        model: SurfaceModel {
+            heights,
+            parallel_rad: 0.0,
+            sigmas_m,
+        },
+    }
+}
+
+/// Brightness 0 (empty) to 47; no jitter was measured.
+fn orthoimage() -> Orthoimage {
+    let brightness: Vec<u8> = (0..48).collect();
+    Orthoimage {
+        account: OrthoimageAccount {
+            image: 0,
+            map: map(SIZE, 5.0),
+            parallel_rad: 0.0,
+            cell_m: 5.0,
+            pixel_m: 3.5,
+            filled: 47,
+            without_pixels: 1,
+            terrain_cells: 11,
+            hidden: 2,
+            interpolated: 3,
+            sigma_m: 4.25,
+            jitter_m: None,
+            drift_m: Some(2.75),
+            shared_sigma_m: Some([113.0, 108.0]),
+            look: OrthoimageLook {
+                size: SIZE,
+                brightness: brightness.clone(),
+            },
+        },
+        brightness,
+        sigmas_m: vec![4.25; 12],
+    }
+}
+
+#[test]
+fn files_and_page_state_what_was_computed() {
+    let folder = tempfile::tempdir().unwrap();
+    let (surface, orthoimages) = (surface(), [orthoimage()]);
+    let (id, page) = Site::small().with(true, |site| {
+        let site = SiteProducts {
+            surface: Some(&surface),
+            orthoimages: &orthoimages,
+            ..*site
+        };
+        write_products(folder.path(), &site, "").unwrap();
+        let id = site.images[0].times.id.clone();
+        (id, report::page(&site).unwrap())
+    });
+
+    let path = folder.path().join(format!("images/{id}/orthoimage.tif"));
+    let mut decoder = Decoder::new(File::open(path).unwrap()).unwrap();
+    assert_eq!(decoder.dimensions().unwrap(), (8, 6));
+    let scale_m = decoder.get_tag_f64_vec(Tag::ModelPixelScaleTag).unwrap();
+    // Rounding of an angle of a microradian, metres.
+    assert!((scale_m[0] - 5.0).abs() < 1e-6 && (scale_m[1] - 5.0).abs() < 1e-6);
+    let corner_m = decoder.get_tag_f64_vec(Tag::ModelTiepointTag).unwrap();
+    let edges_m = [RADIUS_M * 1.0 - 2.5, RADIUS_M * 0.2 + 2.5];
+    assert!((corner_m[3] - edges_m[0]).abs() < 1e-6 && (corner_m[4] - edges_m[1]).abs() < 1e-6);
+    assert_eq!(decoder.get_tag_ascii_string(Tag::GdalNodata).unwrap(), "0");
+    let DecodingResult::U8(bytes) = decoder.read_image().unwrap() else {
+        panic!("other numbers");
+    };
+    assert_eq!(bytes, orthoimages[0].brightness);
+
+    let document = common::json(&folder.path().join("orthoimages.json"));
+    let stated = &document["orthoimages"][0];
+    assert_eq!(stated["image"], json!(id));
+    assert_eq!(stated["jitter_m"], json!(null));
+    assert_eq!(stated["shared_sigma_m"], json!([113.0, 108.0]));
+    let section = page.split("id=\"orthoimages\"").nth(1).unwrap();
+    let row = section.split("</table>").next().unwrap();
+    for number in ["5.00", "3.50", "47", "4.25", "2.75", "113, 108"] {
+        assert!(row.contains(&format!(">{number}<")), "{number}: {row}");
+    }
+    assert!(row.contains("not known"), "{row}");
+}
+
+#[test]
+fn a_site_without_orthoimages_has_neither_files_nor_section() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = Site::small().with(true, |site| {
+        write_products(folder.path(), site, "").unwrap();
+        report::page(site).unwrap()
+    });
+    assert!(!page.contains("id=\"orthoimages\""));
+    assert!(!folder.path().join("orthoimages.json").exists());
+}
