@@ -6,6 +6,7 @@
 //!
 //! The root names these crates by their rooms: `crate::geom` is `areograph_geom`.
 
+pub mod capabilities;
 pub mod cli;
 pub mod flow;
 pub mod worker;

@@ -145,8 +145,8 @@ impl<'a> Check<'a> {
         }
         let mut site = orient(self, config, prepared, Some(kernels))?;
         if config.ties.matched {
-            let shots = (&site.converted, &site.profiles);
-            match_ties(self, config, Round::Initial, &site.images, shots, None)?;
+            let images = site.images()?;
+            match_ties(self, config, Round::Initial, &images, site.shots()?, None)?;
         }
         overlays(self, config, &mut site)
     }

@@ -8,6 +8,7 @@ use std::{
 
 use super::{choice::KernelChoice, outputs::Site};
 use crate::{
+    capabilities::findings,
     config::SiteConfig,
     error::{Error, Result},
     footprints::SourceFile,
@@ -21,12 +22,11 @@ use crate::{
         describe_kernels::KernelDescription,
         judge::{AdjustmentEvidence, BeamEvidence, Evidence, JudgedImage, Verdict, judge},
         lay_overlays::{Overlays, ShownImage},
-        map_surface::Surface,
         read_ties::Ties,
         search_footprints::SearchResult,
-        site_image::SiteImage,
         tag_times::ImageTimes,
     },
+    store::book::Book,
     wording::with_minus,
 };
 
@@ -37,9 +37,8 @@ pub(super) fn judged(
     warnings: &[String],
     complaints: &[String],
 ) -> Result<(Verdict, bool)> {
-    let images = judged_images(&site.images)?;
-    let adjusted_images = site.adjusted_images.as_deref().unwrap_or_default();
-    let adjusted_images = judged_images(adjusted_images)?;
+    let images = judged_images(&site.book, Round::Initial)?;
+    let adjusted_images = judged_images(&site.book, Round::Adjusted)?;
     let book = &site.book;
     let adjustment = book.find(Round::Initial)?.map(|adjusted| {
         Ok::<_, Error>(AdjustmentEvidence {
@@ -57,7 +56,7 @@ pub(super) fn judged(
         .adjustment_failure
         .as_ref()
         .map(|failure| format!("{}; {}", failure.cause, failure.cause.advice()));
-    let surface = book.find::<Surface>(Round::Initial)?;
+    let findings = findings(config, book)?;
     let searched = config.has_shots();
     let verdict = judge(&Evidence {
         wording: config.wording(),
@@ -79,7 +78,7 @@ pub(super) fn judged(
         complaints,
         profiles: book.of()?,
         adjustment,
-        surface: surface.map(|of| &of.account),
+        findings: &findings,
         adjustment_failure: failure.as_deref(),
     });
     Ok((
@@ -93,29 +92,28 @@ pub(super) fn warnings(config: &SiteConfig, site: &Site) -> Result<Vec<String>> 
     let described = site.book.of::<KernelDescription>()?;
     let mut warnings: Vec<String> = described.pck_note.iter().cloned().collect();
     warnings.extend(described.rates_note.iter().cloned());
-    for camera in cameras(&site.images)? {
+    let images = judged_images(&site.book, Round::Initial)?;
+    for camera in cameras(&images) {
         warnings.extend(config.pointing.departure(camera));
     }
-    for image in &site.images {
-        let times = image.times.value()?;
+    for JudgedImage { times, model, .. } in &images {
         let remarks = times.remarks.iter();
         let remarks = remarks.filter(|remark| !remark.is_beyond_accuracy());
         warnings.extend(remarks.map(|remark| format!("image {}: {}", times.id, remark.text)));
-        let remark = image.model.value()?.remark.as_ref();
+        let remark = model.remark.as_ref();
         warnings.extend(remark.map(|remark| format!("image {}: {remark}", times.id)));
     }
-    warnings.extend(same_exposures(&site.images)?);
+    warnings.extend(same_exposures(&images));
     let checked = site.book.of::<ProfileCheck>()?;
     warnings.extend(checked.remark());
     warnings.extend(empty_pedr_files(config, site)?);
-    warnings.extend(gimbal_locks(&site.images, true)?);
+    warnings.extend(gimbal_locks(&images, true));
     if let Some(ties) = site.book.find::<Ties>(Round::Initial)? {
         let remarks = ties.remarks.iter();
         warnings.extend(remarks.map(|remark| format!("tie points: {remark}")));
     }
-    if site.adjusted_images.is_some() {
-        let times = site.images.iter().map(|image| image.times.value());
-        let times = times.collect::<Result<Vec<_>>>()?;
+    if site.is_adjusted()? {
+        let times = images.iter().map(|image| image.times);
         warnings.extend(accuracy_withheld(config, times));
     }
     for (id, image) in shown(site)? {
@@ -130,22 +128,23 @@ fn shown(site: &Site) -> Result<Vec<(&str, &ShownImage)>> {
     let Some(overlays) = site.book.find::<Overlays>(Round::Initial)? else {
         return Ok(Vec::new());
     };
+    let times = site.book.parts::<ImageTimes>(Round::Initial)?;
     let shown = overlays.images.iter();
-    let named = shown.map(|shown| Ok((&*site.images[shown.image].times.value()?.id, shown)));
-    named.collect()
+    Ok(shown
+        .map(|shown| (&*times[shown.image].id, shown))
+        .collect())
 }
 
 /// The cameras of the images that kernels orient, each once.
-fn cameras(images: &[SiteImage]) -> Result<Vec<&Instrument>> {
+fn cameras<'a>(images: &[JudgedImage<'a>]) -> Vec<&'a Instrument> {
     let mut cameras: Vec<&Instrument> = Vec::new();
-    for image in images {
-        let times = image.times.value()?;
+    for JudgedImage { times, .. } in images {
         let camera = &times.instrument;
         if times.support.is_none() && !cameras.contains(&camera) {
             cameras.push(camera);
         }
     }
-    Ok(cameras)
+    cameras
 }
 
 /// Whether a form of orientation has polynomials of ω, φ and κ.
@@ -158,10 +157,9 @@ const fn has_angles(model: CameraModel) -> bool {
 
 /// Images whose angles ω and κ turn about nearly the same axis; `use_angles` – of images that use these angles, or of
 /// the others.
-fn gimbal_locks(images: &[SiteImage], use_angles: bool) -> Result<Vec<String>> {
+fn gimbal_locks(images: &[JudgedImage], use_angles: bool) -> Vec<String> {
     let mut locks = Vec::new();
-    for image in images {
-        let (times, model) = (image.times.value()?, image.model.value()?);
+    for JudgedImage { times, model, .. } in images {
         if model.near_gimbal_lock && has_angles(model.model) == use_angles {
             locks.push(format!(
                 "image {}: |cos φ| falls to {:.3}, where ω and κ are poorly determined; the rotation-vector form is unaffected",
@@ -169,17 +167,16 @@ fn gimbal_locks(images: &[SiteImage], use_angles: bool) -> Result<Vec<String>> {
             ));
         }
     }
-    Ok(locks)
+    locks
 }
 
 /// Images that one camera took at one time with the same pixels: their labels may have been exchanged. A remark for each
 /// group of such images.
-fn same_exposures(images: &[SiteImage]) -> Result<Vec<String>> {
+fn same_exposures(images: &[JudgedImage]) -> Vec<String> {
     /// Images that a remark names; of more images, it states the number.
     const NAMED: usize = 5;
     let mut groups: Vec<Vec<&ImageTimes>> = Vec::new();
-    for image in images {
-        let times = image.times.value()?;
+    for JudgedImage { times, .. } in images {
         let is_same = |group: &&mut Vec<&ImageTimes>| {
             let other = group[0];
             let starts = [times, other].map(|of| of.line_times.start());
@@ -209,7 +206,7 @@ fn same_exposures(images: &[SiteImage]) -> Result<Vec<String>> {
             "images {named} were exposed at the same time by the same pixels: {which} of the labels may belong to another image"
         ))
     };
-    Ok(groups.iter().filter_map(remark).collect())
+    groups.iter().filter_map(remark).collect()
 }
 
 /// PEDR files without a shot in the windows: every file that the site file names, and files of patterns most of whose
@@ -257,15 +254,15 @@ fn empty_pedr_files(config: &SiteConfig, site: &Site) -> Result<Option<String>> 
     }))
 }
 
-fn judged_images(images: &[SiteImage]) -> Result<Vec<JudgedImage<'_>>> {
-    let images = images.iter().map(|image| {
-        Ok(JudgedImage {
-            times: image.times.value()?,
-            orientation: image.orientation.value()?,
-            model: image.model.value()?,
-        })
+fn judged_images(book: &Book, round: Round) -> Result<Vec<JudgedImage<'_>>> {
+    let times = book.parts(Round::Initial)?.into_iter();
+    let oriented = times.zip(book.parts(round)?).zip(book.parts(round)?);
+    let images = oriented.map(|((times, orientation), model)| JudgedImage {
+        times,
+        orientation,
+        model,
     });
-    images.collect()
+    Ok(images.collect())
 }
 
 /// Notes for a reader of the products, one sentence each.
@@ -280,12 +277,12 @@ pub(super) fn notes(config: &SiteConfig, site: &Site) -> Result<Vec<String>> {
     }
     notes.extend(book.of::<SearchResult>()?.notes.iter().cloned());
     notes.extend(site.book.of::<Converted>()?.notes.iter().cloned());
-    for image in &site.images {
-        let times = image.times.value()?;
+    let images = judged_images(book, Round::Initial)?;
+    for JudgedImage { times, .. } in &images {
         let of_image = times.notes.iter();
         notes.extend(of_image.map(|note| format!("image {}: {note}", times.id)));
     }
-    notes.extend(gimbal_locks(&site.images, false)?);
+    notes.extend(gimbal_locks(&images, false));
     if let Some(ties) = book.find::<Ties>(Round::Initial)? {
         notes.extend(ties.notes());
     }

@@ -6,6 +6,7 @@ use std::{
 };
 
 use crate::{
+    capabilities::declarations,
     config::ShotFormat,
     error::{Cause, IoError, Locate, Result},
     files::PartialFolder,
@@ -54,7 +55,7 @@ pub fn export_site(folder: &Path, formats: &[ShotFormat], to: Option<&Path>) -> 
     still_published(folder, &manifest)?;
     let site = manifest.site;
     let to = to.map_or_else(|| format!("{site}_export").into(), Path::to_owned);
-    let files = data.with(|products| {
+    let files = data.with(declarations(), |products| {
         if products.footprints.is_empty() {
             let site = site.clone();
             return Err(ExportError::NoFootprints { site }).in_file(folder);

@@ -8,9 +8,11 @@ use super::{
 use crate::{
     altimetry::BiasScope,
     body::Body,
+    capabilities,
     config::SiteConfig,
     error::Result,
     files::file_name,
+    products::SiteStatements,
     stage::{Inputs, Round},
     stages::{
         adjust::Adjusted,
@@ -19,12 +21,12 @@ use crate::{
         compare_pairs::PairComparison,
         convert_datum::Converted,
         describe_kernels::{KernelDescription, KernelLine},
+        fit_sensor_model::SensorModel,
         group_profiles::Profile,
-        judge::Verdict,
-        map_surface::Surface,
         read_ties::Ties,
+        register::ImageRegistration,
         search_footprints::SearchResult,
-        tag_times::used_biases,
+        tag_times::{ImageTimes, used_biases},
     },
     store::{
         book::Book,
@@ -37,15 +39,6 @@ use crate::{
 
 /// Complaints that the manifest quotes; all are counted.
 const COMPLAINTS_QUOTED: usize = 100;
-
-/// Account of the finished products.
-pub(super) struct Account {
-    pub(super) verdict: Verdict,
-    pub(super) products: Vec<ProductEntry>,
-    pub(super) notes: Vec<String>,
-    pub(super) complaints: Vec<String>,
-    pub(super) rejected: BTreeMap<String, u64>,
-}
 
 /// Largest along-track parallax of a pair of images at their tie points, metres.
 fn largest_along_track_parallax_m(book: &Book, round: Round) -> Result<Option<f64>> {
@@ -69,11 +62,11 @@ fn height_off_surface_m(book: &Book, round: Round) -> Result<Option<f64>> {
 pub(super) fn manifest(
     config: &SiteConfig,
     site: &Site,
-    account: Account,
+    (statements, products): (SiteStatements, Vec<ProductEntry>),
     ledger: &Ledger,
     inputs: &Inputs,
 ) -> Result<Manifest> {
-    let (book, complaints) = (&site.book, account.complaints);
+    let (book, complaints) = (&site.book, statements.complaints);
     let found = book.of::<SearchResult>()?;
     let ties = book.find::<Ties>(Round::Initial)?;
     let of_ties = ties.map_or(0, |ties| ties.complaint_count);
@@ -83,7 +76,7 @@ pub(super) fn manifest(
         tool: "areograph".to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         site: config.site.clone(),
-        verdict: account.verdict,
+        verdict: statements.verdict,
         configuration: ConfigurationEntry {
             file_name: file_name(&config.file),
             blake3: config.blake3.clone(),
@@ -98,15 +91,15 @@ pub(super) fn manifest(
             .collect(),
         kernel_choice: choice.map_or_else(Vec::new, |choice| choice.entries.clone()),
         stages: stages(ledger, inputs),
-        products: account.products,
+        products,
         counts: counts(site)?,
         figures: figures_of(site)?,
-        rejected: account.rejected,
+        rejected: statements.rejected,
         complaints: Complaints {
             count: found.complaint_counts.values().sum::<u64>() + of_ties + of_pixels,
             texts: complaints.into_iter().take(COMPLAINTS_QUOTED).collect(),
         },
-        notes: account.notes,
+        notes: statements.notes,
         finished_utc: chrono::Utc::now().format("%Y-%m-%dT%H:%M:%SZ").to_string(),
     })
 }
@@ -140,8 +133,7 @@ fn counts(site: &Site) -> Result<BTreeMap<String, u64>> {
     let book = &site.book;
     let found = book.of::<SearchResult>()?;
     let (mut registered, mut inside, mut rejected) = (0, 0, 0);
-    for image in &site.images {
-        let registration = image.registration.value()?;
+    for registration in book.parts::<ImageRegistration>(Round::Initial)? {
         registered += registration.points.len() as u64;
         inside += registration.points.inside_count() as u64;
         rejected += registration.rejected.values().sum::<u64>();
@@ -154,7 +146,10 @@ fn counts(site: &Site) -> Result<BTreeMap<String, u64>> {
             book.of::<Converted>()?.footprints.len() as u64,
         ),
         ("profiles", book.of::<Vec<Profile>>()?.len() as u64),
-        ("images", site.images.len() as u64),
+        (
+            "images",
+            book.parts::<ImageTimes>(Round::Initial)?.len() as u64,
+        ),
         ("registered", registered),
         ("registered_inside", inside),
         ("registration_rejected", rejected),
@@ -164,11 +159,7 @@ fn counts(site: &Site) -> Result<BTreeMap<String, u64>> {
     if let Some(ties) = book.find(Round::Initial)? {
         counts.extend(matched(ties));
     }
-    if let Some(surface) = book.find::<Surface>(Round::Initial)? {
-        let account = &surface.account;
-        counts.insert("surface_cells".to_owned(), u64::from(account.cells));
-        counts.insert("surface_filled".to_owned(), u64::from(account.filled));
-    }
+    counts.extend(capabilities::counts(book)?);
     Ok(counts)
 }
 
@@ -195,8 +186,7 @@ fn figures_of(site: &Site) -> Result<BTreeMap<String, f64>> {
     // Ranges of tables may have nothing to be compared with.
     let measured = profiles.filter(|ranges| ranges.measured() > 0);
     let means = measured.map(|ranges| ranges.mean_without_outliers_m.abs());
-    let models = site.images.iter().map(|image| image.model.value());
-    let models = models.collect::<Result<Vec<_>>>()?;
+    let models = book.parts::<SensorModel>(Round::Initial)?;
     let positions = models
         .iter()
         .map(|model| model.second_order.position_rmse_m());
@@ -240,8 +230,7 @@ fn biases(config: &SiteConfig, site: &Site) -> Result<Vec<BiasEntry>> {
         scope: scope.to_owned(),
         source: config.altimeter_clock.source.clone(),
     };
-    let images = site.images.iter().map(|image| image.times.value());
-    let images = images.collect::<Result<Vec<_>>>()?;
+    let images = site.book.parts(Round::Initial)?;
     let pointing = used_biases(&config.pointing, images);
     let several = pointing.len() > 1;
     let pointing = pointing.into_iter().map(|of| BiasEntry {

@@ -1,13 +1,14 @@
 //! The outputs of the stages of a site.
 
+use super::registered::Shots;
 use crate::{
-    error::Error,
+    error::{Error, Result},
     spice::{KernelSet, RequiredCoverage},
-    stage::Output,
+    stage::{Output, Round},
     stages::{
-        check_heights::HeightCheck, compare_pairs::PairComparison, convert_datum::Converted,
-        group_profiles::Profile, intersect::IntersectedTies, search_footprints::SearchResult,
-        site_image::SiteImage, tag_times::ImageTimes,
+        adjust::Adjusted, check_heights::HeightCheck, compare_pairs::PairComparison,
+        convert_datum::Converted, group_profiles::Profile, intersect::IntersectedTies,
+        search_footprints::SearchResult, site_image::SiteImage, tag_times::ImageTimes,
     },
     store::book::Book,
 };
@@ -27,19 +28,50 @@ pub(super) struct Prepared {
 
 /// A site with the outputs of all its stages.
 pub(super) struct Site {
-    /// The outputs, except outputs of images.
     pub(super) book: Book,
-    /// Footprints and profiles again, inputs of most stages.
-    pub(super) converted: Output<Converted>,
-    pub(super) profiles: Output<Vec<Profile>>,
     pub(super) required: Option<RequiredCoverage>,
     pub(super) kernels: Option<KernelSet>,
-    /// In the order of the configuration.
-    pub(super) images: Vec<SiteImage>,
-    /// The images with their adjusted orientation; `None` without an adjustment.
-    pub(super) adjusted_images: Option<Vec<SiteImage>>,
     /// Reason why a site with tie points has no adjustment.
     pub(super) adjustment_failure: Option<Error>,
+}
+
+impl Site {
+    /// The images with the orientation of the kernels, in the order of the configuration.
+    ///
+    /// # Errors
+    /// A bug in areograph: they were not entered.
+    pub(super) fn images(&self) -> Result<Vec<SiteImage>> {
+        SiteImage::all(&self.book, Round::Initial)
+    }
+
+    /// The images with their best orientation: the adjusted one, where there is an adjustment.
+    ///
+    /// # Errors
+    /// As [`Site::images`].
+    pub(super) fn best_images(&self) -> Result<Vec<SiteImage>> {
+        let round = match self.is_adjusted()? {
+            true => Round::Adjusted,
+            false => Round::Initial,
+        };
+        SiteImage::all(&self.book, round)
+    }
+
+    /// Whether the site has an adjustment.
+    ///
+    /// # Errors
+    /// As [`Site::images`].
+    pub(super) fn is_adjusted(&self) -> Result<bool> {
+        Ok(self.book.output::<Adjusted>(Round::Initial)?.is_some())
+    }
+
+    /// Footprints and their profiles, inputs of most stages.
+    ///
+    /// # Errors
+    /// As [`Site::images`].
+    pub(super) fn shots(&self) -> Result<Shots<'_>> {
+        let round = Round::Initial;
+        Ok((self.book.require(round)?, self.book.require(round)?))
+    }
 }
 
 /// Ground points of the tie points, and the internal agreement of every pair of images.

@@ -4,7 +4,7 @@ use super::{
     driver::{Driver, Flow},
     outputs::Site,
 };
-use crate::stages::site_image::SiteImages;
+use crate::stages::site_image::{SiteImage, SiteImages};
 use crate::{
     config::{ImageConfig, SiteConfig},
     files::HashedFile,
@@ -32,16 +32,17 @@ pub(super) fn overlays<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut 
     }
     let pixels = pixel_files(flow, LayOverlays::NAME, config)?;
     let book = &site.book;
-    let measured = book.output(Round::Initial);
-    let measured = measured.zip(book.output(Round::Initial));
-    let adjusted = book.output(Round::Initial);
-    let adjusted = adjusted.zip(book.output(Round::Adjusted));
+    let measured = book.output(Round::Initial)?;
+    let measured = measured.zip(book.output(Round::Initial)?);
+    let adjusted = book.output(Round::Initial)?;
+    let adjusted = adjusted.zip(book.output(Round::Adjusted)?);
+    let (converted, profiles) = site.shots()?;
     let overlays = flow.stage(&LayOverlays {
-        images: SiteImages(&site.images),
-        adjusted_images: SiteImages(site.adjusted_images.as_deref().unwrap_or_default()),
+        images: SiteImages(&site.images()?),
+        adjusted_images: SiteImages(&SiteImage::all(book, Round::Adjusted)?),
         pixels: PixelFiles(&pixels),
-        converted: &site.converted,
-        profiles: &site.profiles,
+        converted,
+        profiles,
         ties: measured.map(|(ties, intersected)| MeasuredTies {
             ties,
             intersected,

@@ -1,14 +1,14 @@
 //! The page of a published site, rebuilt from its products.
 //!
-//! The content of the page is a separate product, unrounded (`products/page_data.rs`), and the page depends only on
-//! it (decision 0023). New content of `SiteProducts` for a page belongs there too.
+//! The book of the site's outputs is a separate product, unrounded (`products/page_data.rs`), and the page depends only on
+//! it (decision 0023).
 
 use std::path::{Path, PathBuf};
 
 use crate::{
+    capabilities::{declarations, page},
     error::{Cause, Locate, Result},
     products::{PAGE_DATA, PageData, REPORT},
-    report,
     store::{
         atomic,
         lock::SiteLock,
@@ -43,7 +43,9 @@ pub fn page_again(folder: &Path) -> Result<PageAgain> {
     let manifest = read_published_by_this_version(folder, |path| path == REPORT)?;
     let data = PageData::read(folder)?;
     still_published(folder, &manifest)?;
-    let page = data.with(report::page).in_file(folder.join(PAGE_DATA))?;
+    let page = data
+        .with(declarations(), page)
+        .in_file(folder.join(PAGE_DATA))?;
     Ok(PageAgain {
         site: manifest.site.clone(),
         page,

@@ -6,25 +6,19 @@ use super::{
     PUBLISH,
     driver::Ledger,
     evidence::{complaints, complaints_of_pixels, judged, notes, rejected, warnings},
-    manifest::{Account, manifest},
+    manifest::manifest,
     outputs::Site,
     read_back::read_back,
 };
 use crate::{
+    capabilities::{declarations, page},
     config::SiteConfig,
-    error::{Error, Result},
+    error::Result,
     files::file_name,
-    products::{
-        AdjustmentProducts, GeometricProducts, ImageProducts, Pages, Program, SiteProducts,
-        error::ProductError, write_products,
-    },
+    products::{Pages, Program, SiteBook, SiteStatements, error::ProductError, write_products},
     report,
     spice::{KernelSet, KernelView, Session},
-    stage::{Input, Inputs, Output, Reason, Round},
-    stages::{
-        convert_datum::Converted, describe_kernels::KernelDescription, rectify_images::Orthoimage,
-        site_image::SiteImage,
-    },
+    stage::{Input, Inputs, Output, Reason},
     store::{
         cache::StageCache,
         manifest::Manifest,
@@ -107,90 +101,33 @@ pub(super) fn publish(
 ) -> Result<Manifest> {
     let none = KernelSet::default();
     let kernels = site.kernels.as_ref().unwrap_or(&none);
-    let book = &site.book;
-    let described = book.of::<KernelDescription>()?;
-    let (notes, mut complaints, rejected) =
-        (notes(config, site)?, complaints(site)?, rejected(site)?);
-    let warnings = warnings(config, site)?;
-    for warning in &warnings {
-        tracing::warn!("{warning}");
-    }
-    let (verdict, images_agree) = judged(config, site, &warnings, &complaints)?;
-    // Complaints about pixels are no skipped records; the verdict receives them through the warnings.
-    complaints.extend(complaints_of_pixels(site)?.0);
-    let images = image_products(&site.images)?;
-    let adjusted_images = site.adjusted_images.as_deref().unwrap_or_default();
-    let adjusted_images = image_products(adjusted_images)?;
-    let tables = book.parts(Round::Adjusted)?;
-    let adjustment = book.find(Round::Initial)?.map(|adjusted| {
-        Ok::<_, Error>(AdjustmentProducts {
-            kernels,
-            folder,
-            adjusted,
-            heights: book.require(Round::Adjusted)?.value()?,
-            images: &adjusted_images,
-            tables: &tables,
-            intersected: book.require(Round::Adjusted)?.value()?,
-            pairs: book.require::<Vec<_>>(Round::Adjusted)?.value()?,
-            images_agree,
-        })
-    });
-    let adjustment = adjustment.transpose()?;
-    let geometric = book.find(Round::Initial)?.map(|intersected| {
-        Ok::<_, Error>(GeometricProducts {
-            ties: book.of()?,
-            intersected,
-            pairs: book.of::<Vec<_>>()?,
-            heights: book.of()?,
-            adjustment,
-        })
-    });
-    let converted = book.of::<Converted>()?;
-    let orthoimages = book.find::<Vec<Orthoimage>>(Round::Initial)?;
-    let products = SiteProducts {
+    let statements = statements(config, site, methods)?;
+    let mut book = site.book.clone();
+    book.enter_value("required", site.required.clone().unwrap_or_default())?;
+    book.enter_value("statements", statements.clone())?;
+    let products = SiteBook {
         config,
-        kernels: &described.kernels,
-        metakernel: &kernels.metakernel_text(Some(folder)),
-        required: &site.required.clone().unwrap_or_default(),
-        images: &images,
-        conversions: &converted.files,
-        footprints: &converted.footprints,
-        utc: book.of::<Vec<_>>()?,
-        profiles: book.of::<Vec<_>>()?,
-        profile_check: book.of()?,
-        ranges: book.of()?,
-        rejected: &rejected,
-        complaints: &complaints,
-        notes: &notes,
-        verdict: &verdict,
-        geometric: geometric.transpose()?,
-        overlays: book.find(Round::Initial)?,
-        surface: book.find(Round::Initial)?,
-        orthoimages: orthoimages.map_or(&[], Vec::as_slice),
-        program: &Program {
-            cspice: Session::version_of_cspice()?,
-            methods: methods.to_vec(),
-        },
-    };
-    let (report, overlays) = (report::page(&products)?, report::overlays_page(&products)?);
-    let pages = Pages {
-        report: &report,
-        overlays: overlays.as_deref(),
+        book: &book,
+        kernels,
+        folder,
+        declarations: declarations(),
     };
     let staging = staging(folder)?;
-    let files: Vec<(PathBuf, u64)> = write_products(&staging, &products, pages)?
+    let files = products.with(|products| {
+        let (report, overlays) = (page(products)?, report::overlays_page(products)?);
+        let pages = Pages {
+            report: &report,
+            overlays: overlays.as_deref(),
+        };
+        write_products(&staging, products, pages)
+    })?;
+    let files: Vec<(PathBuf, u64)> = files
         .into_iter()
         .map(|product| (product.path, product.rows))
         .collect();
     read_back(config, site, kernels, &staging)?;
-    let account = Account {
-        verdict,
-        products: entries(&staging, &files)?,
-        notes,
-        complaints,
-        rejected,
-    };
-    let manifest = manifest(config, site, account, ledger, inputs)?;
+    let products = entries(&staging, &files)?;
+    let manifest = manifest(config, site, (statements, products), ledger, inputs)?;
     publish_files(folder, &staging, &manifest)?;
     tracing::info!(
         stage = PUBLISH,
@@ -200,15 +137,29 @@ pub(super) fn publish(
     Ok(manifest)
 }
 
-/// The images in the form that products require.
-fn image_products(images: &[SiteImage]) -> Result<Vec<ImageProducts<'_>>> {
-    let images = images.iter().map(|image| {
-        Ok(ImageProducts {
-            times: image.times.value()?,
-            orientation: image.orientation.value()?,
-            model: image.model.value()?,
-            registration: image.registration.value()?,
-        })
-    });
-    images.collect()
+/// The verdict, and what follows from all outputs.
+fn statements(
+    config: &SiteConfig,
+    site: &Site,
+    methods: &[(String, u32)],
+) -> Result<SiteStatements> {
+    let mut complaints = complaints(site)?;
+    let warnings = warnings(config, site)?;
+    for warning in &warnings {
+        tracing::warn!("{warning}");
+    }
+    let (verdict, images_agree) = judged(config, site, &warnings, &complaints)?;
+    // Complaints about pixels are no skipped records; the verdict receives them through the warnings.
+    complaints.extend(complaints_of_pixels(site)?.0);
+    Ok(SiteStatements {
+        verdict,
+        images_agree,
+        rejected: rejected(site)?,
+        complaints,
+        notes: notes(config, site)?,
+        program: Program {
+            cspice: Session::version_of_cspice()?,
+            methods: methods.to_vec(),
+        },
+    })
 }

@@ -8,7 +8,8 @@ use crate::{
     error::{Locate, Result},
     products::{attitude_kernel, position_kernel},
     spice::{KernelSet, Session},
-    stages::tabulate_kernels::require_same,
+    stage::Round,
+    stages::{site_image::SiteImage, tabulate_kernels::require_same},
 };
 
 /// Samples every adjusted image through the original kernels and its own pair in `staging`.
@@ -21,8 +22,7 @@ pub(super) fn read_back(
     kernels: &KernelSet,
     staging: &Path,
 ) -> Result<()> {
-    let images = site.adjusted_images.iter().flatten();
-    for image in images {
+    for image in SiteImage::all(&site.book, Round::Adjusted)? {
         let (times, orientation) = (image.times.value()?, image.orientation.value()?);
         if times.support.is_some() {
             continue;

@@ -34,7 +34,7 @@ use crate::{
         read_shots::{ReadShots, ShotFiles},
         sample_orientation::SampleOrientation,
         search_footprints::{KnownPlaces, PedrFiles, SearchFootprints, SearchResult},
-        site_image::SiteImages,
+        site_image::{SiteImage, SiteImages},
         tag_times::{ImageTimes, TagTimes},
         tag_utc::TagUtc,
     },
@@ -273,9 +273,9 @@ pub(super) fn orient<D: Driver>(
         (orientations, described)
     };
     let shots = (&converted, &profiles);
-    let images = registered(flow, config, Round::Initial, &images, orientations, shots)?;
+    let oriented = registered(flow, config, Round::Initial, &images, orientations, shots)?;
     let beam = flow.stage(&CheckBeam {
-        images: SiteImages(&images),
+        images: SiteImages(&oriented),
         converted: &converted,
         profiles: &profiles,
         altimeter: &config.altimeter,
@@ -283,21 +283,19 @@ pub(super) fn orient<D: Driver>(
     })?;
     let (mut book, round) = (Book::default(), Round::Initial);
     book.enter(round, found)?;
-    book.enter(round, converted.clone())?;
+    book.enter(round, converted)?;
     book.enter(round, utc)?;
-    book.enter(round, profiles.clone())?;
+    book.enter(round, profiles)?;
     book.enter(round, checked)?;
     book.enter(round, described)?;
     book.enter(round, ranges)?;
     book.enter(round, beam)?;
+    book.enter_parts(round, images)?;
+    SiteImage::enter(&mut book, round, &oriented)?;
     Ok(Site {
         book,
-        converted,
-        profiles,
         required,
         kernels,
-        images,
-        adjusted_images: None,
         adjustment_failure: None,
     })
 }

@@ -12,8 +12,8 @@ use crate::{
     stages::{
         adjust::Adjusted,
         image_pixels::PixelFiles,
-        map_surface::{AdjustmentOfImages, MapSurface},
-        rectify_images::RectifyImages,
+        map_surface::{AdjustmentOfImages, MapSurface, Surface},
+        rectify_images::{Orthoimage, RectifyImages},
     },
 };
 
@@ -26,15 +26,17 @@ pub(super) fn surface<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut S
     if site.adjustment_failure.is_some() {
         return Ok(());
     }
-    let adjusted = site.book.output::<Adjusted>(Round::Initial);
+    let adjusted = site.book.output::<Adjusted>(Round::Initial)?;
     let limits = &config.limits;
     let pixels = pixel_files(flow, MapSurface::NAME, config)?;
-    let images = SiteImages(site.adjusted_images.as_ref().unwrap_or(&site.images));
+    let images = site.best_images()?;
+    let images = SiteImages(&images);
+    let (converted, profiles) = site.shots()?;
     let surface = flow.stage(&MapSurface {
         images,
         pixels: PixelFiles(&pixels),
-        converted: &site.converted,
-        profiles: &site.profiles,
+        converted,
+        profiles,
         cell_m,
         pair: &config.surface.images,
         laser_surface: &config.laser_surface,
@@ -49,7 +51,9 @@ pub(super) fn surface<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut S
             adjusted: AdjustmentOfImages(adjusted),
             cell_m,
         })?;
-        site.book.enter(Round::Initial, orthoimages)?;
+        let shown = |of: &Vec<Orthoimage>| of.iter().map(Orthoimage::without_cells).collect();
+        site.book.enter_heavy(Round::Initial, orthoimages, shown)?;
     }
-    Ok(site.book.enter(Round::Initial, surface)?)
+    let shown = Surface::without_model;
+    Ok(site.book.enter_heavy(Round::Initial, surface, shown)?)
 }

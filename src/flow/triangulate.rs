@@ -57,13 +57,12 @@ pub(super) fn triangulate<D: Driver>(
         return Ok(());
     };
     site.book.enter(Round::Initial, ties.clone())?;
-    let (images, shots) = (&site.images[..], (&site.converted, &site.profiles));
-    let initial = intersect(flow, config, None, images, &ties, shots)?;
+    let images = &site.images()?;
+    let initial = intersect(flow, config, None, images, &ties, site.shots()?)?;
     initial.clone().enter(&mut site.book, Round::Initial)?;
     let kernels = &KernelView::all(site.kernels.as_ref());
-    let ranges = &site.book.require(Round::Initial)?.clone();
-    let measured = (images, &ties, ranges);
-    let adjustment = adjust(flow, config, measured, &initial, shots, kernels)?;
+    let measured = (&images[..], &ties, site.book.require(Round::Initial)?);
+    let adjustment = adjust(flow, config, measured, &initial, site.shots()?, kernels)?;
     Ok(adjustment.enter(site)?)
 }
 
@@ -72,12 +71,8 @@ fn ties<D: Driver>(flow: &mut D, config: &SiteConfig, site: &Site) -> Flow<Optio
     let read = if config.ties.files.is_empty() {
         None
     } else {
-        let times: Vec<_> = site
-            .images
-            .iter()
-            .map(|image| image.times.clone())
-            .collect();
-        Some(ties_of_files(flow, config, &times)?)
+        let times = site.book.outputs(Round::Initial)?.unwrap_or_default();
+        Some(ties_of_files(flow, config, times)?)
     };
     if config.ties.matched {
         matched(flow, config, site, read.as_ref()).map(Some)
@@ -109,8 +104,8 @@ fn matched<D: Driver>(
     site: &Site,
     read: Option<&Output<Ties>>,
 ) -> Flow<Output<Ties>> {
-    let (images, round) = (&site.images[..], Round::Matching);
-    let shots = (&site.converted, &site.profiles);
+    let (images, round) = (&site.images()?[..], Round::Matching);
+    let shots = site.shots()?;
     let ties = &match_ties(flow, config, Round::Initial, images, shots, read)?;
     let (intersected, pairs) = &ground(flow, config, round, images, ties, shots)?;
     let measured = (images, ties, site.book.require(Round::Initial)?);
@@ -304,7 +299,6 @@ impl Adjustment {
         site.book.enter(Round::Initial, self.adjusted)?;
         site.book.enter_parts(Round::Adjusted, self.tables)?;
         self.intersection.enter(&mut site.book, Round::Adjusted)?;
-        site.adjusted_images = Some(self.images);
-        Ok(())
+        SiteImage::enter(&mut site.book, Round::Adjusted, &self.images)
     }
 }

@@ -37,7 +37,7 @@ pub(super) fn finish(path: &Path, mut file: BufWriter<File>) -> Result<()> {
 }
 
 /// Writes `bytes` to `path`, its folder made where missing, through to the disk.
-pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut file = create(path)?;
     file.write_all(bytes)
         .map_err(IoError::on("write"))
@@ -53,7 +53,7 @@ pub(super) fn open(path: &Path) -> Result<File> {
 /// Writes `text` and checks that the file holds it.
 pub(super) fn write_text(path: &Path, text: &str) -> Result<()> {
     write_bytes(path, text.as_bytes())?;
-    if read(path)? == text.as_bytes() {
+    if read_bytes(path)? == text.as_bytes() {
         return Ok(());
     }
     Err(ProductError::ReadBack {
@@ -63,7 +63,7 @@ pub(super) fn write_text(path: &Path, text: &str) -> Result<()> {
 }
 
 /// All bytes of `path`.
-pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
+pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?
         .read_to_end(&mut bytes)
@@ -76,13 +76,13 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
 ///
 /// # Errors
 /// As [`to_value`]; errors of the disk; a document that is read back differently.
-pub(super) fn write_json(path: &Path, document: &impl Serialize) -> Result<()> {
+pub fn write_json(path: &Path, document: &impl Serialize) -> Result<()> {
     let written = to_value(document).in_file(path)?;
     let text = serde_json::to_string_pretty(document)
         .map_err(ProductError::refused("encode JSON"))
         .in_file(path)?;
     write_bytes(path, (text + "\n").as_bytes())?;
-    let found: Value = serde_json::from_slice(&read(path)?)
+    let found: Value = serde_json::from_slice(&read_bytes(path)?)
         .map_err(ProductError::unreadable)
         .in_file(path)?;
     if found == written {

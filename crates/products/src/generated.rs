@@ -8,16 +8,15 @@ use super::{
     laser_match::{CONTROL, MATCH_PRODUCTS},
     net::NET_PRODUCTS,
     product::{Content, Declaration},
-    registry::PRODUCTS,
     table::{Kind, Meaning},
 };
 use areograph_base::schema::DocumentSchema;
 
-/// JSON Schemas of the documents, each once.
+/// JSON Schemas of the documents, each once; `of_sites` are all products of sites.
 #[must_use]
-pub fn schemas() -> Vec<DocumentSchema> {
+pub fn schemas(of_sites: &[&'static Declaration]) -> Vec<DocumentSchema> {
     let mut schemas: Vec<DocumentSchema> = Vec::new();
-    for content in contents() {
+    for content in contents(of_sites) {
         if let Content::Document(schema) = content {
             let schema = schema();
             if !schemas.contains(&schema) {
@@ -29,12 +28,12 @@ pub fn schemas() -> Vec<DocumentSchema> {
 }
 
 /// The content declarations of all files.
-fn contents() -> impl Iterator<Item = &'static Content> {
+fn contents(of_sites: &[&'static Declaration]) -> impl Iterator<Item = &'static Content> {
     let of_nets = NET_PRODUCTS.iter().map(|product| &product.content);
     let of_archives = ARCHIVE_PRODUCTS.iter().map(|product| &product.content);
     let of_calibrations = CALIBRATION_PRODUCTS.iter().map(|product| &product.content);
     let of_matches = MATCH_PRODUCTS.iter().map(|product| &product.content);
-    let of_sites = PRODUCTS.iter().map(|product| &product.content);
+    let of_sites = of_sites.iter().map(|product| &product.content);
     let all = of_sites.chain(of_nets).chain(of_archives);
     all.chain(of_calibrations)
         .chain(of_matches)
@@ -43,14 +42,14 @@ fn contents() -> impl Iterator<Item = &'static Content> {
 
 /// `docs/products.md`: every product, and the columns of every table.
 #[must_use]
-pub fn documentation() -> String {
+pub fn documentation(of_sites: &[&'static Declaration]) -> String {
     let mut text = "# Products\n\n\
         Generated from the declarations in `crates/products/src`; `tests/products/generated.rs` reports when it is stale.\n\n\
         Paths are relative to the site's folder, `<image>` stands for the identifier of an image. `manifest.json`, \
         which is written last, records the inputs of all of them.\n\n\
         | file | what it is | for | one for | rows | schema |\n|---|---|---|---|---|---|\n"
         .to_owned();
-    for product in PRODUCTS {
+    for product in of_sites {
         let _infallible = writeln!(
             text,
             "| `{}` | {} | {} | {} | {} | {} |",
@@ -64,7 +63,7 @@ pub fn documentation() -> String {
     }
     text +=
         "\n## Columns\n\nNames end in the unit. `?` marks columns without a value in some rows.\n";
-    for product in PRODUCTS {
+    for product in of_sites {
         text += &columns_of(product, "");
     }
     text += "\n## Nets of rectified pictures\n\n\
@@ -191,7 +190,8 @@ mod tests {
 
     #[test]
     fn names_of_our_columns_end_in_their_unit() {
-        let columns = contents().filter_map(|content| match content {
+        let declared = crate::declarations(&[]);
+        let columns = contents(&declared).filter_map(|content| match content {
             Content::Table(columns) => Some(columns()),
             _ => None,
         });
@@ -210,7 +210,8 @@ mod tests {
 
     #[test]
     fn a_product_is_declared_once() {
-        let paths: BTreeSet<&str> = PRODUCTS.iter().map(|product| product.path).collect();
-        assert_eq!(paths.len(), PRODUCTS.len());
+        let declared = crate::declarations(&[]);
+        let paths: BTreeSet<&str> = declared.iter().map(|product| product.path).collect();
+        assert_eq!(paths.len(), declared.len());
     }
 }

@@ -22,7 +22,7 @@ const LONG: u16 = 4;
 const DOUBLE: u16 = 12;
 
 /// A kind of number in a file.
-pub(super) trait Number: Copy {
+pub trait Number: Copy {
     /// Bits, and format of the sample: 1 without a sign, 3 with decimals.
     const LAYOUT: [usize; 2];
     /// Cells without a number, as readers of the file find them.
@@ -30,11 +30,13 @@ pub(super) trait Number: Copy {
     /// A cell without a number.
     const NONE: Self;
 
+    /// Whether the cell has no number.
     fn is_none(self) -> bool;
 
     /// The mean of numbers, of which there is at least one.
     fn mean(numbers: impl Iterator<Item = Self> + Clone) -> Self;
 
+    /// Appends its bytes in the file.
     fn append(self, bytes: &mut Vec<u8>);
 }
 
@@ -81,17 +83,17 @@ impl Number for u8 {
 }
 
 /// Contents of a file.
-pub(super) struct GeoTiff<'a, N> {
+pub struct GeoTiff<'a, N> {
     /// Grid of the cells; its heights are not written.
-    pub(super) grid: &'a HeightGrid,
+    pub grid: &'a HeightGrid,
     /// Latitude at which cells are as wide as high, radians.
-    pub(super) parallel_rad: f64,
+    pub parallel_rad: f64,
     /// The body whose sphere the grid is of.
-    pub(super) body: Body,
+    pub body: Body,
     /// Meaning of the numbers, in words.
-    pub(super) what: &'a str,
+    pub what: &'a str,
     /// Row by row.
-    pub(super) numbers: &'a [N],
+    pub numbers: &'a [N],
 }
 
 /// A field of a table.
@@ -111,7 +113,8 @@ struct Size<N> {
 
 impl<N: Number> GeoTiff<'_, N> {
     /// The file.
-    pub(super) fn encoded(&self) -> Vec<u8> {
+    #[must_use]
+    pub fn encoded(&self) -> Vec<u8> {
         let sizes = self.sizes();
         let head = format!(
             "GDAL_STRUCTURAL_METADATA_SIZE={:06} bytes\n{LAYOUT}",

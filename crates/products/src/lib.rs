@@ -41,7 +41,6 @@ mod light_time;
 mod listed;
 mod net;
 mod orientation;
-mod orthoimages;
 mod overlays;
 mod page;
 mod page_data;
@@ -60,7 +59,7 @@ mod rows_file;
 mod shot_columns;
 mod shown;
 mod site;
-mod surface;
+mod site_book;
 mod table;
 mod text_table;
 mod ties;
@@ -80,8 +79,10 @@ pub use exchange::{
     NetworkMeasure, NetworkPoint, ProfileShift, isis_serial_number, write_control_network,
     write_gcp, write_lidar_data,
 };
+pub use files::{read_bytes, write_bytes, write_json};
 pub use found_shots::ShotsFile;
 pub use generated::{documentation, schemas};
+pub use geotiff::{GeoTiff, Number};
 pub use laser_match::{MatchProducts, write_match_products};
 pub use listed::{Listed, listed};
 pub use net::{NetProducts, write_net_products};
@@ -89,19 +90,22 @@ pub use overlays::{Picture, anaglyph, piece, strip};
 pub use page::REPORT;
 pub use page_data::{PAGE_DATA, PageData};
 pub use picture::{PictureFile, PictureFormat, PictureHead};
-pub use product::{Pages, Product};
+pub use product::{
+    Content, Context, Declaration, Pages, Product, Program as ReadingProgram, Role, Use, Write,
+};
+pub use registry::declarations;
 pub use rows_file::{Out, RowsFormat, RowsWriter, SQL};
 #[cfg(feature = "sql")]
 pub use shot_columns::ShotColumns;
 pub use shown::IMAGES_SHOWN;
 pub use site::{AdjustmentProducts, GeometricProducts, ImageProducts, Program, SiteProducts};
+pub use site_book::{SiteBook, SiteStatements};
 
 use rayon::prelude::*;
 
 use areograph_base::error::{Locate, Result};
 use areograph_config::ShotFormat;
-use product::{Context, Declaration, Scope, Write, Written};
-use registry::PRODUCTS;
+use product::{Scope, Written};
 
 /// Writes every product of `site` below `directory`, with `pages` (or one page as its report), and reads each of them
 /// back.
@@ -118,7 +122,10 @@ pub fn write_products<'a>(
     site.check()?;
     let pages = pages.into();
     let mut written: Vec<Written> = Vec::new();
-    for group in PRODUCTS.chunk_by(|one, next| one.scope() == next.scope()) {
+    for group in site
+        .declarations
+        .chunk_by(|one, next| one.scope() == next.scope())
+    {
         let images: Vec<Option<&ImageProducts>> = match group[0].scope() {
             Scope::Site => vec![None],
             Scope::Image => site.images.iter().map(Some).collect(),
@@ -133,7 +140,6 @@ pub fn write_products<'a>(
                     site,
                     pages,
                     directory,
-                    products: PRODUCTS,
                     written: &written,
                 };
                 let files: Vec<Result<Vec<Written>>> = together
@@ -153,8 +159,8 @@ pub fn write_products<'a>(
 fn in_formats(
     formats: &[ShotFormat],
 ) -> impl Iterator<Item = (&'static str, product::WriteFootprints)> {
-    PRODUCTS
-        .iter()
+    declarations(&[])
+        .into_iter()
         .filter_map(|declaration| match declaration.write {
             Write::Footprints(format, write) if formats.contains(&format) => {
                 Some((declaration.path.trim_start_matches("exchange/"), write))
@@ -182,7 +188,6 @@ pub fn export_footprints(
         site,
         pages: Pages::from(""),
         directory,
-        products: PRODUCTS,
         written: &[],
     };
     let products = in_formats(formats).map(|(name, write)| {

@@ -5,7 +5,6 @@ use super::{
     figures::FIGURE,
     page::OVERLAYS,
     product::{Declaration, Write},
-    registry::PRODUCTS,
     site::SiteProducts,
 };
 use areograph_stages::adjust::PointKind;
@@ -26,7 +25,10 @@ pub struct Listed {
 /// The products of `site` in the order in which they are written, without the figures of its report.
 #[must_use]
 pub fn listed(site: &SiteProducts) -> Vec<Listed> {
-    let declared = PRODUCTS.iter().filter(|declaration| has(site, declaration));
+    let declared = site
+        .declarations
+        .iter()
+        .filter(|declaration| has(site, declaration));
     let paths = declared.flat_map(|declaration| {
         let images = |is_there: &dyn Fn(usize) -> bool| -> Vec<Option<usize>> {
             let images = 0..site.images.len();

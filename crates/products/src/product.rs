@@ -1,6 +1,9 @@
 //! Declaration of a product: its file, its readers, its conditions and its writer.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+};
 
 use super::{
     site::{AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts},
@@ -40,23 +43,23 @@ pub(super) fn write_each<W>(
 
 /// A product, declared once: the files, the STAC item, `exchange/README.txt` and `docs/products.md` follow. `W` is how
 /// it is written: for a site by [`Write`].
-pub(super) struct Declaration<W = Write> {
+pub struct Declaration<W = Write> {
     /// Path below the site's folder; [`IMAGE`] stands for an image's identifier.
-    pub(super) path: &'static str,
+    pub path: &'static str,
     /// Contents of the file.
-    pub(super) what: &'static str,
+    pub what: &'static str,
     /// Readers of it.
-    pub(super) readers: &'static str,
+    pub readers: &'static str,
     /// Meaning of its rows; empty for a file without rows.
-    pub(super) rows: &'static str,
+    pub rows: &'static str,
     /// Its role in a catalogue.
-    pub(super) role: Role,
+    pub role: Role,
     /// Columns or schema.
-    pub(super) content: Content,
+    pub content: Content,
     /// Its writer, and the sites that have it.
-    pub(super) write: W,
+    pub write: W,
     /// Instructions for reading it in other programs.
-    pub(super) uses: &'static [Use],
+    pub uses: &'static [Use],
 }
 
 /// Placeholder of an image in paths and commands.
@@ -64,9 +67,12 @@ pub(super) const IMAGE: &str = "<image>";
 
 /// Roles of STAC assets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Role {
+pub enum Role {
+    /// Data.
     Data,
+    /// Data about data.
     Metadata,
+    /// A picture or page.
     Overview,
 }
 
@@ -81,7 +87,7 @@ impl Role {
 }
 
 /// Description of the structure of a file.
-pub(super) enum Content {
+pub enum Content {
     /// A table with these columns.
     Table(fn() -> Vec<Meaning>),
     /// A document of this schema.
@@ -91,7 +97,7 @@ pub(super) enum Content {
 }
 
 /// Writer of a product. The functions return its number of rows, or `None` if there was nothing to write.
-pub(super) enum Write {
+pub enum Write {
     /// For every site.
     Site(fn(&Path, &Context) -> Result<Option<u64>>),
     /// In this format for a site with footprints: GIS readers reject tables without a row, or guess their types.
@@ -100,14 +106,20 @@ pub(super) enum Write {
     Image(fn(&Path, &Context, &ImageProducts) -> Result<u64>),
     /// For sites, and for images by their index, that have what the product shows.
     Where {
+        /// These sites, in words.
         sites: &'static str,
+        /// Whether the site has it.
         has: fn(&SiteProducts) -> bool,
+        /// Its writer.
         write: fn(&Path, &Context) -> Result<u64>,
     },
     /// See [`Self::Where`].
     ImageWhere {
+        /// These images, in words.
         images: &'static str,
+        /// Whether the image with this index has it.
         has: fn(&SiteProducts, usize) -> bool,
+        /// Its writer.
         write: fn(&Path, &Context, usize) -> Result<u64>,
     },
     /// For a site with tie points.
@@ -159,32 +171,40 @@ impl<'a, T: AsRef<str> + ?Sized> From<&'a T> for Pages<'a> {
 pub(super) type Written = (Product, &'static Declaration);
 
 /// Inputs of products.
-pub(super) struct Context<'a> {
-    pub(super) site: &'a SiteProducts<'a>,
-    pub(super) pages: Pages<'a>,
+pub struct Context<'a> {
+    /// The site.
+    pub site: &'a SiteProducts<'a>,
+    /// Its pages.
+    pub pages: Pages<'a>,
     /// Folder that products are written to.
-    pub(super) directory: &'a Path,
-    /// All declarations, in order.
-    pub(super) products: &'a [&'static Declaration],
+    pub directory: &'a Path,
     /// Products written so far, with their declarations.
-    pub(super) written: &'a [Written],
+    pub written: &'a [Written],
 }
 
 /// A program, or kind of program, with a section in `exchange/README.txt`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Program {
+pub enum Program {
+    /// Ames Stereo Pipeline.
     StereoPipeline,
+    /// ISIS.
     Isis,
+    /// Geographic information systems.
     Gis,
+    /// Readers of camera models.
     CameraModel,
+    /// Readers of adjusted kernels.
     AdjustedKernels,
+    /// Catalogues.
     Catalogue,
 }
 
 /// Use of a product by a program: lines for `exchange/README.txt`, equal for every image but for [`IMAGE`].
-pub(super) struct Use {
-    pub(super) program: Program,
-    pub(super) lines: &'static str,
+pub struct Use {
+    /// The program.
+    pub program: Program,
+    /// The lines.
+    pub lines: &'static str,
 }
 
 impl Declaration {
@@ -225,6 +245,12 @@ impl Declaration {
     /// The path of an image's file.
     pub(super) fn path_of(&self, image: &str) -> String {
         self.path.replace(IMAGE, image)
+    }
+}
+
+impl<W> fmt::Debug for Declaration<W> {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        to.write_str(self.path)
     }
 }
 

@@ -1,17 +1,15 @@
-//! All products, in the order in which they are written.
+//! All products of sites, in the order in which they are written.
 
 use super::{
     adjusted_footprints, adjusted_kernels, adjustment, correlations,
     exchange::{adjusted, geopackage, jigsaw, matched, readme, shapefile, stac, tables},
-    figures, footprints, heights, isd, kernel_report, orientation, orthoimages, overlays, page,
-    page_data,
+    figures, footprints, heights, isd, kernel_report, orientation, overlays, page, page_data,
     product::Declaration,
-    profile_check, ranges, registration, surface, ties,
+    profile_check, ranges, registration, ties,
 };
 
-/// The products. Those of an image that follow each other are written image by image; the catalogue is last, as it
-/// lists the others.
-pub(super) static PRODUCTS: &[&Declaration] = &[
+/// Products before those of further capabilities. Those of an image that follow each other are written image by image.
+static FIRST: &[&Declaration] = &[
     &footprints::CSV,
     &footprints::PARQUET,
     // Tables of footprints that follow each other are written in parallel; the label describes the finished CSV.
@@ -39,12 +37,10 @@ pub(super) static PRODUCTS: &[&Declaration] = &[
     &adjusted_kernels::ATTITUDE,
     &adjusted_kernels::POSITION,
     &adjusted_kernels::METAKERNEL,
-    &surface::HEIGHTS,
-    &surface::SIGMAS,
-    &surface::DOCUMENT,
-    &orthoimages::ORTHOIMAGE,
-    &orthoimages::SIGMAS,
-    &orthoimages::DOCUMENT,
+];
+
+/// Pages and files for other programs; the catalogue is last, as it lists the others.
+static LAST: &[&Declaration] = &[
     &page::PAGE,
     &page::OVERLAYS,
     &figures::FIGURE,
@@ -72,3 +68,9 @@ pub(super) static PRODUCTS: &[&Declaration] = &[
     &readme::README,
     &stac::ITEM,
 ];
+
+/// All products that a site may have, with those of further capabilities, in the order in which they are written.
+#[must_use]
+pub fn declarations(of_capabilities: &[&'static Declaration]) -> Vec<&'static Declaration> {
+    [FIRST, of_capabilities, LAST].concat()
+}

@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, path::Path};
 
 use serde::{Deserialize, Serialize};
 
-use super::error::ProductError;
+use super::{error::ProductError, product::Declaration};
 use areograph_base::{
     constants::{SPACECRAFT, Spacecraft},
     error::Result,
@@ -26,13 +26,15 @@ use areograph_stages::{
     intersect::IntersectedTies,
     judge::Verdict,
     lay_overlays::Overlays,
-    map_surface::Surface,
     read_ties::Ties,
-    rectify_images::Orthoimage,
     register::ImageRegistration,
     sample_orientation::Orientation,
     tabulate_kernels::KernelTables,
     tag_times::{ImageTimes, used_biases},
+};
+use areograph_store::{
+    book::{Book, Entered},
+    stage::Round,
 };
 
 /// One site, borrowed from the flow.
@@ -40,6 +42,10 @@ use areograph_stages::{
 pub struct SiteProducts<'a> {
     /// The configuration.
     pub config: &'a SiteConfig,
+    /// The outputs of all stages; the fields below are those that many products use.
+    pub book: &'a Book,
+    /// All products that a site may have, in order.
+    pub declarations: &'a [&'static Declaration],
     /// Kernels in load order.
     pub kernels: &'a [KernelLine],
     /// Text of the metakernel that loads them again, its paths relative to the folder of the products.
@@ -72,10 +78,6 @@ pub struct SiteProducts<'a> {
     pub geometric: Option<GeometricProducts<'a>>,
     /// Contents of images; `None` for a site without pixels.
     pub overlays: Option<&'a Overlays>,
-    /// The terrain model of a pair of images; `None` if the site does not request one.
-    pub surface: Option<&'a Surface>,
-    /// Orthoimages of images with pixels on the terrain model.
-    pub orthoimages: &'a [Orthoimage],
     /// Software that computed the products.
     pub program: &'a Program,
 }
@@ -177,6 +179,20 @@ impl<'a> SiteProducts<'a> {
     /// Whether the footprints are written in `format`: there are some, and the site requests it.
     pub(super) fn has_footprints_in(&self, format: ShotFormat) -> bool {
         !self.footprints.is_empty() && self.config.products.formats.contains(&format)
+    }
+
+    /// An output of the orientation of the kernels, or of the site; `None` if the site does not have it.
+    ///
+    /// # Errors
+    /// An output that cannot be read.
+    pub fn find<T: Entered>(&self) -> Result<Option<&'a T>> {
+        self.book.find(Round::Initial)
+    }
+
+    /// Whether the site has this output.
+    #[must_use]
+    pub fn has<T: Entered>(&self) -> bool {
+        self.book.has::<T>(Round::Initial)
     }
 
     /// Reason why absolute accuracies are withheld, if they are.

@@ -86,7 +86,7 @@ pub(super) struct DbaseField {
 
 /// Meaning of a column.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Meaning {
+pub struct Meaning {
     pub(super) name: &'static str,
     pub(super) unit: Unit,
     pub(super) description: Cow<'static, str>,

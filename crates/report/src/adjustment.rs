@@ -10,7 +10,7 @@ use super::{
     section::Section,
     source::sentence,
 };
-use areograph_base::error::Result;
+use areograph_base::{error::Result, verdict::CheckKind};
 use areograph_geom::statistics::BAARDA_LIMIT;
 use areograph_products::{AdjustmentProducts, GeometricProducts, SiteProducts};
 use areograph_stages::adjust::{Adjusted, AdjustmentSummary, TypeSummary, WORSE_THAN_CONFIGURED};
@@ -21,6 +21,16 @@ const STEPS_SHOWN_MIN: f64 = 8.0;
 pub(super) const SECTION: Section = Section {
     title: "Combined adjustment",
     anchor: "combined-adjustment",
+    checks: &[
+        CheckKind::TieResidualsAlong,
+        CheckKind::TieResidualsAcross,
+        CheckKind::VarianceComponents,
+        CheckKind::TiesRejected,
+        CheckKind::TiesUsed,
+        CheckKind::ImagesJoined,
+        CheckKind::PairsJoined,
+        CheckKind::Correction,
+    ],
     appears: |site| site.adjustment().is_some(),
     write: |site| {
         let adjustment = site.adjustment();

@@ -1,23 +1,21 @@
 //! The table of the first screen: every limit of the site with the value that uses most of it, the worst first.
 
 use super::{
-    adjustment, heights,
     html::{Cell, Column, Table, Tone, escape, link, list},
-    images, misregistration, notes,
     numbers::{number, signed, whole},
-    profiles, ranges, registration, scan,
     section::Section,
-    selection, surface, timeline,
 };
 use areograph_base::verdict::NOT_TESTED;
 use areograph_products::SiteProducts;
-use areograph_stages::judge::{Check, CheckKind, CheckOutcome};
+use areograph_stages::judge::{Check, CheckOutcome};
 
-/// The table of the checks of a site.
-pub(super) fn table(site: &SiteProducts) -> String {
+/// The table of the checks of a site, with links to the `sections` that have details.
+pub(super) fn table(site: &SiteProducts, sections: &[&Section]) -> String {
     let mut table = empty();
     for (index, check) in site.verdict.checks.iter().enumerate() {
-        let more = section(check.kind).filter(|section| (section.appears)(site));
+        let mut all = sections.iter();
+        let more = all.find(|section| section.checks.contains(&check.kind));
+        let more = more.filter(|section| (section.appears)(site));
         let what = more.map_or_else(
             || escape(check.words()),
             |section| link(&format!("#{}", section.anchor), check.words()),
@@ -132,74 +130,6 @@ pub(super) fn limit(check: &Check) -> String {
     format!("{bound} {} {}", number(limit, decimals), check.unit)
 }
 
-/// The section with details.
-const fn section(kind: CheckKind) -> Option<&'static Section> {
-    Some(match kind {
-        CheckKind::Footprints => &selection::SECTION,
-        CheckKind::WithheldStretches => &profiles::SECTION,
-        CheckKind::HeightAfter
-        | CheckKind::HeightBefore
-        | CheckKind::HeightOutliers
-        | CheckKind::ProfilesApart
-        | CheckKind::HeightSigma
-        | CheckKind::Boresight => &heights::SECTION,
-        CheckKind::RangeMean
-        | CheckKind::OrbitsApart
-        | CheckKind::Decoding
-        | CheckKind::RangeOutliers
-        | CheckKind::Shots => &ranges::SECTION,
-        CheckKind::ClockCorrection => &scan::SECTION,
-        CheckKind::ParallaxAfter | CheckKind::ParallaxBefore => &misregistration::SECTION,
-        CheckKind::TieResidualsAlong
-        | CheckKind::TieResidualsAcross
-        | CheckKind::VarianceComponents
-        | CheckKind::TiesRejected
-        | CheckKind::TiesUsed
-        | CheckKind::ImagesJoined
-        | CheckKind::PairsJoined
-        | CheckKind::Correction => &adjustment::SECTION,
-        CheckKind::PositionRmse
-        | CheckKind::PointingRmse
-        | CheckKind::TableError
-        | CheckKind::BoresightMeets => &images::SECTION,
-        CheckKind::SurfaceFilled | CheckKind::SurfaceHeight | CheckKind::SurfaceSpread => {
-            &surface::SECTION
-        }
-        CheckKind::Attitude | CheckKind::BeamAlong | CheckKind::BeamAcross => &timeline::SECTION,
-        CheckKind::FootprintsInside | CheckKind::SupportPosition => &registration::SECTION,
-        CheckKind::SkippedRecords => &notes::SECTION,
-        // Checks of the site in general, or of nets, calibrations and matches, whose pages have no such sections.
-        CheckKind::AdjustmentMade
-        | CheckKind::Contradiction
-        | CheckKind::HeldBackPlane
-        | CheckKind::HeldBackHeight
-        | CheckKind::ControlPlane
-        | CheckKind::ControlHeight
-        | CheckKind::OtherOrbits
-        | CheckKind::PlaceKnown
-        | CheckKind::HeightKnown
-        | CheckKind::LinesAgree
-        | CheckKind::CameraMoved
-        | CheckKind::TiesLeftOut
-        | CheckKind::ControlLeftOut
-        | CheckKind::RoundShift
-        | CheckKind::RoundControl
-        | CheckKind::HeldOutShots
-        | CheckKind::UnitsKept
-        | CheckKind::UnitsAgree
-        | CheckKind::ModelBias
-        | CheckKind::Redundancy
-        | CheckKind::MeasurementsRemoved
-        | CheckKind::MeasurementsFlagged
-        | CheckKind::ControlsKept
-        | CheckKind::ControlsRefused
-        | CheckKind::Seams
-        | CheckKind::PictureScale
-        | CheckKind::ControlStretch
-        | CheckKind::OtherOrbitsOffset => return None,
-    })
-}
-
 /// Errors that no datum can show.
 pub(super) fn untested(phrases: &[String]) -> String {
     if phrases.is_empty() {
@@ -214,6 +144,7 @@ pub(super) fn untested(phrases: &[String]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use areograph_stages::judge::CheckKind;
 
     fn check(kind: CheckKind, value: f64, limit: f64) -> Check {
         Check {

@@ -12,6 +12,7 @@ use areograph_products::SiteProducts;
 pub(super) const SECTION: Section = Section {
     title: "Clock corrections and datum",
     anchor: "clock-corrections-and-datum",
+    checks: &[],
     appears: |_| true,
     write: |site| Ok(biases(site) + &datum(site)),
 };

@@ -16,6 +16,7 @@ use areograph_stages::register::{Method, MethodRun};
 pub(super) const SECTION: Section = Section {
     title: "Appendix: iterations from ground to image",
     anchor: "iterations",
+    checks: &[],
     appears: |site| site.images.iter().any(registered),
     write,
 };

@@ -13,7 +13,7 @@ use super::{
     section::Section,
     source::sentence,
 };
-use areograph_base::{error::Result, footprints::AdjustmentModel};
+use areograph_base::{error::Result, footprints::AdjustmentModel, verdict::CheckKind};
 use areograph_products::{AdjustmentProducts, GeometricProducts, SiteProducts};
 use areograph_stages::{
     check_heights::{HeightCheck, SurfaceFigures},
@@ -23,6 +23,14 @@ use areograph_stages::{
 pub(super) const SECTION: Section = Section {
     title: "Accuracy, and agreement with MOLA",
     anchor: "accuracy",
+    checks: &[
+        CheckKind::HeightAfter,
+        CheckKind::HeightBefore,
+        CheckKind::HeightOutliers,
+        CheckKind::ProfilesApart,
+        CheckKind::HeightSigma,
+        CheckKind::Boresight,
+    ],
     appears: |site| site.geometric.is_some(),
     write: |site| {
         let geometric = site.geometric.iter();

@@ -17,7 +17,7 @@ const ROWS_TOGETHER: usize = 10;
 const COLUMNS_NARROW: usize = 2;
 
 /// `text` with the five characters that HTML reads as markup replaced.
-pub(super) fn escape(text: &str) -> String {
+pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
         match character {
@@ -142,7 +142,7 @@ pub(super) fn folded(title: &str, html: &str) -> String {
 }
 
 /// A folded section, unfolded from the start where it `matters`.
-pub(super) fn folded_unless(matters: bool, title: &str, html: &str) -> String {
+pub fn folded_unless(matters: bool, title: &str, html: &str) -> String {
     if html.is_empty() {
         return String::new();
     }
@@ -154,7 +154,7 @@ pub(super) fn folded_unless(matters: bool, title: &str, html: &str) -> String {
 }
 
 /// A paragraph of text.
-pub(super) fn paragraph(text: &str) -> String {
+pub fn paragraph(text: &str) -> String {
     if text.is_empty() {
         return String::new();
     }
@@ -162,7 +162,7 @@ pub(super) fn paragraph(text: &str) -> String {
 }
 
 /// A link to `place` named `text`, as HTML.
-pub(super) fn link(place: &str, text: &str) -> String {
+pub fn link(place: &str, text: &str) -> String {
     format!("<a href=\"{}\">{}</a>", escape(place), escape(text))
 }
 
@@ -190,7 +190,7 @@ pub(super) fn slug(text: &str) -> String {
 
 /// A column of a table.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Column {
+pub enum Column {
     /// Words, flush left.
     Text(&'static str),
     /// Numbers, flush right.
@@ -199,7 +199,7 @@ pub(super) enum Column {
 
 /// Contents of a cell.
 #[derive(Debug, Clone)]
-pub(super) enum Cell {
+pub enum Cell {
     /// Words or a number.
     Plain(String),
     /// A value with a limit: the used share of it, above 1 (or NaN) beyond it.
@@ -212,7 +212,7 @@ pub(super) enum Cell {
 
 impl Cell {
     /// The cell with the places of its numbers in the products, below the place of its row.
-    pub(super) fn traced(self, places: impl Into<String>) -> Self {
+    pub fn traced(self, places: impl Into<String>) -> Self {
         Self::Traced(Box::new(self), places.into())
     }
 }
@@ -236,7 +236,7 @@ impl From<String> for Cell {
 }
 
 /// A table being filled row by row; the first cell of a row is its head.
-pub(super) struct Table {
+pub struct Table {
     html: String,
     columns: &'static [Column],
     rows: usize,
@@ -246,7 +246,7 @@ pub(super) struct Table {
 
 impl Table {
     /// A table with a caption and column heads.
-    pub(super) fn new(caption: &str, columns: &'static [Column]) -> Self {
+    pub fn new(caption: &str, columns: &'static [Column]) -> Self {
         let heads: String = columns
             .iter()
             .map(|column| match column {
@@ -281,17 +281,12 @@ impl Table {
     }
 
     /// Adds a row, tinted when it is not `valid`.
-    pub(super) fn row(&mut self, valid: bool, cells: impl IntoIterator<Item = Cell>) {
+    pub fn row(&mut self, valid: bool, cells: impl IntoIterator<Item = Cell>) {
         self.row_of("", valid, cells);
     }
 
     /// Adds a row whose cells are from `place` in the products.
-    pub(super) fn row_of(
-        &mut self,
-        place: &str,
-        valid: bool,
-        cells: impl IntoIterator<Item = Cell>,
-    ) {
+    pub fn row_of(&mut self, place: &str, valid: bool, cells: impl IntoIterator<Item = Cell>) {
         self.rows += 1;
         let class = if valid { "" } else { " class=\"invalid\"" };
         let class = class.to_owned() + &within(place);
@@ -344,7 +339,7 @@ impl Table {
     }
 
     /// The finished table.
-    pub(super) fn finish(self) -> String {
+    pub fn finish(self) -> String {
         let html = self.html + "</tbody>\n</table></div>\n";
         let kind = match (
             self.rows > ROWS_TOGETHER,

@@ -11,6 +11,7 @@ use super::{
 use areograph_base::{
     error::Result,
     units::{METRES_PER_KM, RADIANS_PER_ARCSECOND, RADIANS_PER_DEGREE},
+    verdict::CheckKind,
 };
 use areograph_geom::{light_time::LightTime, polynomial::Fit, pushbroom::CameraModel};
 use areograph_products::{ImageProducts, SiteProducts};
@@ -23,6 +24,12 @@ use areograph_stages::{
 pub(super) const SECTION: Section = Section {
     title: "Exterior orientation",
     anchor: "exterior-orientation",
+    checks: &[
+        CheckKind::PositionRmse,
+        CheckKind::PointingRmse,
+        CheckKind::TableError,
+        CheckKind::BoresightMeets,
+    ],
     appears: |site| !site.images.is_empty(),
     write,
 };

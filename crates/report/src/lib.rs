@@ -41,7 +41,6 @@ mod moved;
 mod net;
 mod notes;
 mod numbers;
-mod orthoimages;
 mod outlines;
 mod overlays;
 mod plots;
@@ -61,7 +60,7 @@ mod sky;
 mod source;
 mod summary;
 mod support_data;
-mod surface;
+mod terrain_pictures;
 mod timeline;
 mod uncertainty;
 
@@ -80,17 +79,29 @@ pub use html::STYLE;
 pub use laser_match::match_page;
 pub use net::net_page;
 pub use overlays::overlays_page;
+pub use section::Section;
 pub use sites::{Earlier, SiteLine, SiteSummary, sites_page};
+pub use terrain_pictures::terrain_pictures;
 
-use section::Section;
+/// Parts of sections that are declared outside this crate.
+pub mod parts {
+    pub use super::{
+        html::{Cell, Column, Table, escape, folded_unless, link, paragraph},
+        numbers::{signed, whole},
+        overlays::picture_of,
+        plots::label,
+    };
+}
 
-/// Every section of a site's page, in its order.
-const SECTIONS: &[Section] = &[
+/// The first sections of a site's page, in their order.
+const FIRST_SECTIONS: &[Section] = &[
     heights::SECTION,
     misregistration::SECTION,
     matching::SECTION,
-    surface::SECTION,
-    orthoimages::SECTION,
+];
+
+/// The sections after those of further capabilities.
+const LAST_SECTIONS: &[Section] = &[
     adjustment::SECTION,
     profiles::SECTION,
     ranges::SECTION,
@@ -110,17 +121,27 @@ const SECTIONS: &[Section] = &[
     uncertainty::SECTION,
 ];
 
-/// The report of `site` as one HTML page.
+/// The report of `site` as one HTML page, with the sections of further capabilities.
 ///
 /// # Errors
 /// A plot that cannot be drawn, which is a bug in areograph.
-pub fn page(site: &SiteProducts) -> Result<String> {
-    let sections = SECTIONS.iter().map(|section| section.of(site));
-    let sections: Vec<html::Section> = sections
+pub fn page(site: &SiteProducts, of_capabilities: &[Section]) -> Result<String> {
+    let sections: Vec<&Section> = sections(of_capabilities).collect();
+    let written = sections.iter().map(|section| section.of(site));
+    let written: Vec<html::Section> = written
         .filter_map(Result::transpose)
         .collect::<Result<_>>()?;
-    let page = html::page(&site.config.site, &summary::lead(site)?, &sections);
+    let lead = summary::lead(site, &sections)?;
+    let page = html::page(&site.config.site, &lead, &written);
     Ok(plots::with_files(&page))
+}
+
+/// Every section of a site's page, in its order.
+fn sections(of_capabilities: &[Section]) -> impl Iterator<Item = &Section> {
+    FIRST_SECTIONS
+        .iter()
+        .chain(of_capabilities)
+        .chain(LAST_SECTIONS)
 }
 
 #[cfg(test)]
@@ -129,10 +150,11 @@ mod tests {
 
     #[test]
     fn anchors_are_unique_and_need_no_escape() {
-        let mut anchors: Vec<&str> = SECTIONS.iter().map(|section| section.anchor).collect();
+        let mut anchors: Vec<&str> = sections(&[]).map(|section| section.anchor).collect();
+        let count = anchors.len();
         assert!(anchors.iter().all(|anchor| html::slug(anchor) == *anchor));
         anchors.sort_unstable();
         anchors.dedup();
-        assert_eq!(anchors.len(), SECTIONS.len());
+        assert_eq!(anchors.len(), count);
     }
 }

@@ -52,6 +52,7 @@ const TIE: usize = 1;
 pub(super) const SECTION: Section = Section {
     title: "Further maps",
     anchor: "further-maps",
+    checks: &[],
     appears: |site| sheets(site).len() > 1,
     write: |site| {
         let mut html = String::new();

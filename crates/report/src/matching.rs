@@ -14,6 +14,7 @@ use areograph_stages::read_ties::Ties;
 pub(super) const SECTION: Section = Section {
     title: "Matching of tie points",
     anchor: "matching-of-tie-points",
+    checks: &[],
     appears: |site| matched(site).is_some(),
     write: |site| {
         Ok(matched(site)

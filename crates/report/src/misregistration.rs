@@ -12,7 +12,7 @@ use super::{
     section::Section,
     source::filled,
 };
-use areograph_base::{error::Result, units::RADIANS_PER_DEGREE};
+use areograph_base::{error::Result, units::RADIANS_PER_DEGREE, verdict::CheckKind};
 use areograph_geom::intersection::Unintersected;
 use areograph_products::{GeometricProducts, SiteProducts};
 use areograph_stages::{
@@ -29,6 +29,7 @@ pub(super) use pair::{BeforeAfter, PAIRS_TABLED, by_footprints};
 pub(super) const SECTION: Section = Section {
     title: "Tie points and misregistration",
     anchor: "tie-points-and-misregistration",
+    checks: &[CheckKind::ParallaxAfter, CheckKind::ParallaxBefore],
     appears: |site| site.geometric.is_some(),
     write: |site| {
         let geometric = site.geometric.iter();

@@ -5,6 +5,7 @@ use super::{
     numbers::whole,
     section::Section,
 };
+use areograph_base::verdict::CheckKind;
 use areograph_products::SiteProducts;
 
 /// Number of notes shown; the rest are counted.
@@ -15,6 +16,7 @@ const COMPLAINTS_SHOWN: usize = 50;
 pub(super) const SECTION: Section = Section {
     title: "Notes",
     anchor: "notes",
+    checks: &[CheckKind::SkippedRecords],
     appears: |site| !site.notes.is_empty() || !site.complaints.is_empty(),
     write: |site| Ok(write(site)),
 };

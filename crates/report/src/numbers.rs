@@ -20,7 +20,7 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
 }
 
 /// A number with a sign on positive values too.
-pub(super) fn signed(value: f64, decimals: usize) -> String {
+pub fn signed(value: f64, decimals: usize) -> String {
     let text = number(value, decimals);
     let zero = !text.contains(|digit| matches!(digit, '1'..='9'));
     if value > 0.0 && !zero {
@@ -31,7 +31,7 @@ pub(super) fn signed(value: f64, decimals: usize) -> String {
 }
 
 /// A count.
-pub(super) fn whole(count: impl TryInto<u64>) -> String {
+pub fn whole(count: impl TryInto<u64>) -> String {
     spaced(&count.try_into().unwrap_or(u64::MAX).to_string())
 }
 

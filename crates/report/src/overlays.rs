@@ -7,12 +7,13 @@ use base64::{Engine as _, engine::general_purpose::STANDARD};
 use super::{
     html::{self, escape, link, list, paragraph},
     many,
+    map::relief,
     numbers::whole,
     plots::label,
     section::Section,
 };
 use areograph_base::error::Result;
-use areograph_products::{Picture, SiteProducts, anaglyph, piece, strip};
+use areograph_products::{Picture, SiteProducts, anaglyph, error::ProductError, piece, strip};
 use areograph_stages::lay_overlays::{
     CHIP_EDGE, Mark, Overlays, Place, PlaceView, ShownImage, Subject,
 };
@@ -23,6 +24,7 @@ const STRIP_PIXELS: u64 = 2_300_000;
 pub(super) const SECTION: Section = Section {
     title: "Images and footprints",
     anchor: "overlays",
+    checks: &[],
     appears: |site| site.overlays.is_some(),
     write,
 };
@@ -235,8 +237,26 @@ fn caption(site: &SiteProducts, place: &Place) -> String {
     words
 }
 
+/// A picture of `size` rows and columns inside the page; `pixels` have four bytes, the last of them the opacity.
+///
+/// # Errors
+/// A picture that the library rejects, which is a bug in areograph.
+pub fn picture_of(pixels: &[u8], [rows, columns]: [usize; 2], alt: &str) -> Result<String> {
+    let size = |of: usize| u32::try_from(of).unwrap_or(u32::MAX);
+    let png = relief::png(pixels, size(columns), size(rows))
+        .map_err(ProductError::refused("draw a picture"))?;
+    let picture = Picture {
+        width: size(columns),
+        height: size(rows),
+        reduction: 1,
+        step: 1,
+        png,
+    };
+    Ok(img(&picture, alt))
+}
+
 /// A picture inside the page.
-pub(super) fn img(picture: &Picture, alt: &str) -> String {
+fn img(picture: &Picture, alt: &str) -> String {
     format!(
         "<img src=\"data:image/png;base64,{}\" width=\"{}\" height=\"{}\" alt=\"{}\">",
         STANDARD.encode(&picture.png),

@@ -6,7 +6,7 @@ use super::{
     plots::{Extent, GREY, Panel, Plot, Series, Style, figure, label, thinned},
     section::Section,
 };
-use areograph_base::{error::Result, units::METRES_PER_KM};
+use areograph_base::{error::Result, units::METRES_PER_KM, verdict::CheckKind};
 use areograph_geom::surface::{WithheldScore, tails};
 use areograph_products::SiteProducts;
 use areograph_stages::check_profiles::{ProfileCheck, WithheldStretch};
@@ -17,6 +17,7 @@ const SHOWN: usize = 400;
 pub(super) const SECTION: Section = Section {
     title: "The surface between shots, tested",
     anchor: "surface-tested",
+    checks: &[CheckKind::WithheldStretches],
     appears: |site| {
         let check = site.profile_check;
         check.score.is_some() || !check.crossovers.is_empty() || !check.left_out.is_empty()

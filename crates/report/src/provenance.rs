@@ -14,6 +14,7 @@ use areograph_products::{SiteProducts, listed};
 pub(super) const SECTION: Section = Section {
     title: "Provenance",
     anchor: "provenance",
+    checks: &[],
     appears: |_| true,
     write: |site| Ok(write(site)),
 };

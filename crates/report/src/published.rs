@@ -15,6 +15,7 @@ use areograph_stages::adjust::{AdjustmentSummary, GroundSummary};
 pub(super) const SECTION: Section = Section {
     title: "Appendix: tables of Yoon & Shan 2004",
     anchor: "yoon-and-shan-2004",
+    checks: &[],
     appears: |site| site.adjustment().is_some(),
     write: |site| {
         let adjustment = site.adjustment();

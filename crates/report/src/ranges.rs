@@ -9,7 +9,7 @@ use super::{
     section::Section,
     source::{filled, sentence},
 };
-use areograph_base::error::Result;
+use areograph_base::{error::Result, verdict::CheckKind};
 use areograph_geom::statistics::Summary;
 use areograph_products::SiteProducts;
 use areograph_stages::check_ranges::ProfileRanges;
@@ -19,6 +19,13 @@ pub(super) use plots::{many, plotted};
 pub(super) const SECTION: Section = Section {
     title: "Range check",
     anchor: "range-check",
+    checks: &[
+        CheckKind::RangeMean,
+        CheckKind::OrbitsApart,
+        CheckKind::Decoding,
+        CheckKind::RangeOutliers,
+        CheckKind::Shots,
+    ],
     appears: |site| site.config.has_shots(),
     write,
 };

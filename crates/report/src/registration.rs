@@ -7,7 +7,7 @@ use super::{
     plots::{COLOURS, Extent, GREY, INK, Mark, Panel, Plot, Series, Style, figure, label, thinned},
     section::Section,
 };
-use areograph_base::error::Result;
+use areograph_base::{error::Result, verdict::CheckKind};
 use areograph_geom::pushbroom::CameraModel;
 use areograph_products::{ImageProducts, SiteProducts};
 use areograph_stages::group_profiles::Profile;
@@ -25,6 +25,7 @@ type Indexed<'a> = (usize, &'a ImageProducts<'a>);
 pub(super) const SECTION: Section = Section {
     title: "Registration",
     anchor: "registration",
+    checks: &[CheckKind::FootprintsInside, CheckKind::SupportPosition],
     appears: |site| site.images.iter().any(registered),
     write,
 };

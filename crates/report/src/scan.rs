@@ -7,13 +7,14 @@ use super::{
     ranges::{many, place, plotted},
     section::Section,
 };
-use areograph_base::error::Result;
+use areograph_base::{error::Result, verdict::CheckKind};
 use areograph_products::SiteProducts;
 use areograph_stages::check_ranges::BiasScan;
 
 pub(super) const SECTION: Section = Section {
     title: "Clock bias scan",
     anchor: "clock-bias-scan",
+    checks: &[CheckKind::ClockCorrection],
     appears: |site| {
         let mut profiles = site.ranges.profiles.iter();
         profiles.any(|ranges| ranges.scan.is_some())

@@ -1,20 +1,23 @@
 //! Declaration of a section of a site's page.
 
 use super::html;
-use areograph_base::error::Result;
+use areograph_base::{error::Result, verdict::CheckKind};
 use areograph_products::SiteProducts;
 
-/// A section of the page of one site. Its file declares it as `SECTION`; [`super::SECTIONS`] lists it once, and order
-/// and contents of the page follow.
-pub(super) struct Section {
+/// A section of the page of one site. Its file declares it as `SECTION`; it is listed once, with the other sections or
+/// by its capability, and order and contents of the page follow.
+#[derive(Debug, Clone, Copy)]
+pub struct Section {
     /// Its heading, and its name in the list of contents.
-    pub(super) title: &'static str,
+    pub title: &'static str,
     /// Its name in links, unique on the page.
-    pub(super) anchor: &'static str,
+    pub anchor: &'static str,
+    /// Kinds of checks whose details it has.
+    pub checks: &'static [CheckKind],
     /// Whether the page of this site has it.
-    pub(super) appears: fn(&SiteProducts) -> bool,
+    pub appears: fn(&SiteProducts) -> bool,
     /// Its body as HTML; fails if a plot cannot be drawn.
-    pub(super) write: fn(&SiteProducts) -> Result<String>,
+    pub write: fn(&SiteProducts) -> Result<String>,
 }
 
 impl Section {

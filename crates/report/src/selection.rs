@@ -9,6 +9,7 @@ use super::{
 use areograph_base::{
     body::Body,
     units::{METRES_PER_KM, RADIANS_PER_DEGREE},
+    verdict::CheckKind,
 };
 use areograph_config::WindowConfig;
 use areograph_geom::window::WindowShape;
@@ -17,6 +18,7 @@ use areograph_products::SiteProducts;
 pub(super) const SECTION: Section = Section {
     title: "Selection of shots",
     anchor: "selection-of-shots",
+    checks: &[CheckKind::Footprints],
     appears: |site| site.config.has_shots(),
     write: |site| Ok(write(site)),
 };

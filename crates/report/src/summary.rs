@@ -7,6 +7,7 @@ use super::{
     map,
     misregistration::{BeforeAfter, by_footprints},
     numbers::{number, signed, whole},
+    section::Section,
     source::traced,
 };
 use areograph_base::{error::Result, footprints::AdjustmentModel};
@@ -23,7 +24,7 @@ const REASONS_SHOWN: usize = 4;
 ///
 /// # Errors
 /// A map that cannot be drawn.
-pub(super) fn lead(site: &SiteProducts) -> Result<String> {
+pub(super) fn lead(site: &SiteProducts, sections: &[&Section]) -> Result<String> {
     let (reasons, remarks) = (&site.verdict.reasons, &site.verdict.remarks);
     let tone = match (reasons.len(), remarks.len()) {
         (0, 0) => Tone::Good,
@@ -45,7 +46,7 @@ pub(super) fn lead(site: &SiteProducts) -> Result<String> {
         verdict(tone, &headline(site), &first_of(reasons)),
         numbers(site),
         checks::untested(&site.verdict.untested),
-        checks::table(site),
+        checks::table(site, sections),
         map::first(site)?,
     );
     // The user's text is not changed.

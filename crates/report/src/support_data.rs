@@ -13,6 +13,7 @@ use areograph_stages::tag_times::{ImageTimes, SupportFile};
 pub(super) const SECTION: Section = Section {
     title: "Support data",
     anchor: "support-data",
+    checks: &[],
     appears: |site| supported(site).next().is_some(),
     write: |site| Ok(write(site)),
 };

@@ -11,6 +11,7 @@ use super::{
 use areograph_base::{
     error::Result,
     time::{Et, Interval, Intervals},
+    verdict::CheckKind,
 };
 use areograph_products::SiteProducts;
 use areograph_stages::describe_kernels::KernelLine;
@@ -31,6 +32,11 @@ const ASKED: usize = 0;
 pub(super) const SECTION: Section = Section {
     title: "Kernel coverage",
     anchor: "kernel-coverage",
+    checks: &[
+        CheckKind::Attitude,
+        CheckKind::BeamAlong,
+        CheckKind::BeamAcross,
+    ],
     appears: |site| !stretches(site).is_empty(),
     write,
 };

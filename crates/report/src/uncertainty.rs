@@ -13,6 +13,7 @@ use areograph_products::GeometricProducts;
 pub(super) const SECTION: Section = Section {
     title: "Appendix: uncertainty budget of Shan et al. 2005",
     anchor: "gap-of-footprints",
+    checks: &[],
     appears: |site| {
         let pairs = site.geometric.as_ref().map(|geometric| geometric.pairs);
         pairs.is_some_and(|pairs| !pairs.is_empty())

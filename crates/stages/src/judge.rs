@@ -8,7 +8,6 @@ mod beam;
 mod checks;
 mod corrections;
 mod ranges;
-mod surface;
 mod untested;
 
 use std::collections::BTreeMap;
@@ -24,7 +23,6 @@ use super::{
     check_ranges::{BiasScan, RangeCheck},
     compare_pairs::PairComparison,
     fit_sensor_model::SensorModel,
-    map_surface::SurfaceAccount,
     orientation::Orientation,
     read_ties::Ties,
     tag_times::{Disagreement, ImageTimes},
@@ -69,10 +67,21 @@ pub struct Evidence<'a> {
     pub profiles: &'a ProfileCheck,
     /// The adjustment; `None` for a site without tie points.
     pub adjustment: Option<AdjustmentEvidence<'a>>,
-    /// The terrain model of a pair; `None` where it is not requested.
-    pub surface: Option<&'a SurfaceAccount>,
+    /// Findings that are declared outside this module, in order.
+    pub findings: &'a [Findings],
     /// Reason why there is no adjustment although there are tie points.
     pub adjustment_failure: Option<&'a str>,
+}
+
+/// Findings of one capability on a site.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Findings {
+    /// Reasons why the site is invalid, one sentence each.
+    pub reasons: Vec<String>,
+    /// Points that the reader must weigh although no limit is broken, one sentence each.
+    pub remarks: Vec<String>,
+    /// Its limits with their largest use.
+    pub checks: Vec<Check>,
 }
 
 /// An image that is judged.
@@ -186,7 +195,7 @@ impl Evidence<'_> {
                 .iter()
                 .flat_map(|of| of.invalid_because(self.limits)),
         );
-        reasons.extend(surface::invalid_because(self));
+        reasons.extend(self.findings.iter().flat_map(|of| of.reasons.clone()));
         let failed = self.adjustment_failure;
         reasons.extend(failed.map(|failure| format!("no adjustment: {failure}")));
         reasons
@@ -222,7 +231,7 @@ impl Evidence<'_> {
                 .iter()
                 .flat_map(|of| of.remarks(self.limits)),
         );
-        remarks.extend(surface::remarks(self));
+        remarks.extend(self.findings.iter().flat_map(|of| of.remarks.clone()));
         remarks
     }
 }

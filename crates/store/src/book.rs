@@ -2,28 +2,59 @@
 //!
 //! The flow enters an output once, when it is final. Whoever reads outputs asks for them by their type: a new stage
 //! changes no list of outputs. Alternative stages with one type of output, such as those that search files or read
-//! tables, have one place.
+//! tables, have one place. A book can be written to a file ([`Book::write`]) and opened again ([`Book::open`]); the
+//! data of a page are such a file.
+
+mod file;
 
 use std::{
-    any::{Any, TypeId, type_name},
+    any::{Any, type_name},
     collections::BTreeMap,
     fmt,
+    io::Write,
+    sync::{Arc, OnceLock},
 };
 
-use super::stage::{Output, Round};
+use serde::{Serialize, de::DeserializeOwned};
+
+use self::file::Written;
+use super::stage::{Output, Provenance, Round};
 use areograph_base::error::{Cause, Result};
 
+/// A value that can be entered in a book.
+pub trait Entered: Serialize + DeserializeOwned + Send + Sync + 'static {}
+
+impl<T: Serialize + DeserializeOwned + Send + Sync + 'static> Entered for T {}
+
 /// Outputs by type and round; outputs of a stage that runs once per image are a list in the order of the site.
-#[derive(Default)]
+///
+/// A clone shares the outputs.
+#[derive(Clone, Default)]
 pub struct Book {
-    entries: BTreeMap<(TypeId, Round), Entry>,
+    entries: BTreeMap<Key, Entry>,
 }
 
-/// A list of outputs of one type, `Vec<Output<T>>`.
+/// Type and round of an output. Two types with one name would exclude each other.
+type Key = (String, Round);
+
+/// A list of outputs of one type.
+#[derive(Clone)]
 struct Entry {
     labels: Vec<String>,
-    outputs: Box<dyn Any + Send + Sync>,
+    /// `Vec<Output<T>>`; an entry of an opened file is read when it is first used.
+    outputs: OnceLock<Arc<dyn Any + Send + Sync>>,
+    /// Where a file has it.
+    written: Option<Written>,
+    /// Writes one output of the list; unknown for an entry of an opened file.
+    write: Option<WritePart>,
+    /// Makes the list without the parts that no page shows.
+    lighten: Option<Arc<Lighten>>,
 }
+
+type Lighten = dyn Fn(&Entry) -> Result<Entry> + Send + Sync;
+
+/// Writes the output with this index of the list; `None` for an index beyond it.
+type WritePart = fn(&dyn Any, usize, &mut dyn Write) -> Result<Option<()>>;
 
 /// An output that the book does not have, or has twice.
 #[derive(Debug, thiserror::Error, Cause)]
@@ -41,29 +72,56 @@ impl Book {
     ///
     /// # Errors
     /// A bug in areograph: an output of this type and round exists.
-    pub fn enter<T: Send + Sync + 'static>(
+    pub fn enter<T: Entered>(&mut self, round: Round, output: Output<T>) -> Result<()> {
+        self.enter_parts(round, vec![output])
+    }
+
+    /// Enters the output of a stage, of which pages show only what `shown` returns: see [`Book::lightened`].
+    ///
+    /// # Errors
+    /// As [`Book::enter`].
+    pub fn enter_heavy<T: Entered>(
         &mut self,
         round: Round,
         output: Output<T>,
+        shown: fn(&T) -> T,
     ) -> Result<()> {
-        self.enter_parts(round, vec![output])
+        self.enter(round, output)?;
+        let lighten = move |entry: &Entry| entry.changed(|_, value| Some(shown(value)));
+        let entry = self.entries.get_mut(&key::<T>(round));
+        entry.map(|entry| entry.lighten = Some(Arc::new(lighten)));
+        Ok(())
+    }
+
+    /// The book without the parts that no page shows.
+    ///
+    /// # Errors
+    /// An output whose value is not known or cannot be read.
+    pub fn lightened(&self) -> Result<Self> {
+        let entries = self.entries.iter().map(|(key, entry)| {
+            let lighten = entry.lighten.as_ref();
+            let light = lighten.map_or_else(|| Ok(entry.clone()), |lighten| lighten(entry))?;
+            Ok((key.clone(), light))
+        });
+        let entries = entries.collect::<Result<_>>()?;
+        Ok(Self { entries })
+    }
+
+    /// Enters a value that is no output of a stage, under this label.
+    ///
+    /// # Errors
+    /// As [`Book::enter`].
+    pub fn enter_value<T: Entered>(&mut self, label: &str, value: T) -> Result<()> {
+        self.enter(Round::Initial, valued(label.to_owned(), value))
     }
 
     /// Enters the outputs of a stage that runs once per image, in the order of the site.
     ///
     /// # Errors
     /// As [`Book::enter`].
-    pub fn enter_parts<T: Send + Sync + 'static>(
-        &mut self,
-        round: Round,
-        outputs: Vec<Output<T>>,
-    ) -> Result<()> {
-        let labels = outputs.iter().map(|output| output.label().to_owned());
-        let entry = Entry {
-            labels: labels.collect(),
-            outputs: Box::new(outputs),
-        };
-        let key = (TypeId::of::<T>(), round);
+    pub fn enter_parts<T: Entered>(&mut self, round: Round, outputs: Vec<Output<T>>) -> Result<()> {
+        let entry = Entry::of(outputs);
+        let key = key::<T>(round);
         if let Some(earlier) = self.entries.get(&key) {
             let labels = earlier.labels.clone();
             return Err(Misuse::Twice(type_name::<T>(), labels, entry.labels).into());
@@ -72,51 +130,140 @@ impl Book {
         Ok(())
     }
 
+    /// Replaces every output of this type by what `change` returns for its index and value; `None` keeps it.
+    ///
+    /// # Errors
+    /// An output whose value is not known or cannot be read.
+    pub fn change<T: Entered>(&mut self, change: impl Fn(usize, &T) -> Option<T>) -> Result<()> {
+        for ((name, _), entry) in &mut self.entries {
+            if name == type_name::<T>() {
+                *entry = entry.changed(&change)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Leaves the outputs of this type out.
+    pub fn leave_out<T: Entered>(&mut self) {
+        self.entries.retain(|(name, _), _| name != type_name::<T>());
+    }
+
     /// The output of this type, as the input of a stage; `None` if the site does not have it.
-    #[must_use]
-    pub fn output<T: 'static>(&self, round: Round) -> Option<&Output<T>> {
-        self.outputs(round).and_then(<[_]>::first)
+    ///
+    /// # Errors
+    /// An output of an opened file that cannot be read.
+    pub fn output<T: Entered>(&self, round: Round) -> Result<Option<&Output<T>>> {
+        Ok(self.outputs(round)?.and_then(<[_]>::first))
     }
 
     /// An output that every site has, as the input of a stage.
     ///
     /// # Errors
-    /// A bug in areograph: it was not entered.
-    pub fn require<T: 'static>(&self, round: Round) -> Result<&Output<T>> {
-        let found = self.output(round);
+    /// As [`Book::output`]; a bug in areograph: it was not entered.
+    pub fn require<T: Entered>(&self, round: Round) -> Result<&Output<T>> {
+        let found = self.output(round)?;
         found.ok_or_else(|| Misuse::Missing(type_name::<T>()).into())
     }
 
     /// The value of the output of this type; `None` if the site does not have it.
     ///
     /// # Errors
-    /// A bug in areograph: the value is not known yet.
-    pub fn find<T: 'static>(&self, round: Round) -> Result<Option<&T>> {
-        self.output(round).map(Output::value).transpose()
+    /// As [`Book::output`]; a bug in areograph: the value is not known yet.
+    pub fn find<T: Entered>(&self, round: Round) -> Result<Option<&T>> {
+        self.output(round)?.map(Output::value).transpose()
     }
 
     /// The value of an output that every site has, in the round of the kernels.
     ///
     /// # Errors
-    /// A bug in areograph: it was not entered, or its value is not known yet.
-    pub fn of<T: 'static>(&self) -> Result<&T> {
+    /// As [`Book::require`]; a bug in areograph: its value is not known yet.
+    pub fn of<T: Entered>(&self) -> Result<&T> {
         self.require(Round::Initial)?.value()
     }
 
     /// The values of the outputs of this type, in the order of the site; empty if it has none.
     ///
     /// # Errors
-    /// A bug in areograph: a value is not known yet.
-    pub fn parts<T: 'static>(&self, round: Round) -> Result<Vec<&T>> {
-        let outputs = self.outputs(round).unwrap_or_default();
+    /// As [`Book::find`].
+    pub fn parts<T: Entered>(&self, round: Round) -> Result<Vec<&T>> {
+        let outputs = self.outputs(round)?.unwrap_or_default();
         outputs.iter().map(Output::value).collect()
     }
 
-    fn outputs<T: 'static>(&self, round: Round) -> Option<&[Output<T>]> {
-        let entry = self.entries.get(&(TypeId::of::<T>(), round))?;
-        let outputs: &Vec<Output<T>> = entry.outputs.downcast_ref()?;
-        Some(outputs)
+    /// Whether outputs of this type were entered, of which there is at least one.
+    #[must_use]
+    pub fn has<T: Entered>(&self, round: Round) -> bool {
+        let entry = self.entries.get(&key::<T>(round));
+        entry.is_some_and(|entry| !entry.labels.is_empty())
     }
+
+    /// The outputs of this type, in the order of the site, as inputs of a stage; `None` if none was entered.
+    ///
+    /// # Errors
+    /// As [`Book::output`].
+    pub fn outputs<T: Entered>(&self, round: Round) -> Result<Option<&[Output<T>]>> {
+        let Some(entry) = self.entries.get(&key::<T>(round)) else {
+            return Ok(None);
+        };
+        let outputs: Option<&Vec<Output<T>>> = entry.outputs::<T>()?.downcast_ref();
+        Ok(outputs.map(Vec::as_slice))
+    }
+}
+
+impl Entry {
+    fn of<T: Entered>(outputs: Vec<Output<T>>) -> Self {
+        let labels = outputs.iter().map(|output| output.label().to_owned());
+        let labels = labels.collect();
+        let outputs: Arc<dyn Any + Send + Sync> = Arc::new(outputs);
+        Self {
+            labels,
+            outputs: OnceLock::from(outputs),
+            written: None,
+            write: Some(file::write_part::<T>),
+            lighten: None,
+        }
+    }
+
+    /// See [`Book::change`].
+    fn changed<T: Entered>(&self, change: impl Fn(usize, &T) -> Option<T>) -> Result<Self> {
+        let outputs: Option<&Vec<Output<T>>> = self.outputs::<T>()?.downcast_ref();
+        let outputs = outputs.into_iter().flatten().enumerate();
+        let changed = outputs.map(|(index, output)| {
+            let value = change(index, output.value()?);
+            Ok(value.map_or_else(
+                || output.clone(),
+                |value| valued(output.label().to_owned(), value),
+            ))
+        });
+        Ok(Self::of(changed.collect::<Result<Vec<_>>>()?))
+    }
+
+    /// The list, read from the file if need be.
+    fn outputs<T: Entered>(&self) -> Result<&(dyn Any + Send + Sync)> {
+        if let Some(outputs) = self.outputs.get() {
+            return Ok(&**outputs);
+        }
+        let mut outputs: Vec<Output<T>> = Vec::new();
+        for (part, label) in self.labels.iter().enumerate() {
+            if let Some(written) = &self.written {
+                outputs.push(valued(label.clone(), written.read(part)?));
+            }
+        }
+        Ok(&**self.outputs.get_or_init(|| Arc::new(outputs)))
+    }
+}
+
+fn key<T>(round: Round) -> Key {
+    (type_name::<T>().to_owned(), round)
+}
+
+/// A value as an output, without origin.
+fn valued<T>(label: String, value: T) -> Output<T> {
+    let nowhere = Provenance {
+        blake3: String::new(),
+        fingerprint: String::new(),
+    };
+    Output::known(label, value, nowhere)
 }
 
 impl fmt::Debug for Book {
@@ -128,27 +275,96 @@ impl fmt::Debug for Book {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
-    use crate::stage::Provenance;
 
     fn known(label: &str, value: u32) -> Output<u32> {
-        let provenance = Provenance {
-            blake3: String::new(),
-            fingerprint: String::new(),
-        };
-        Output::known(label.to_owned(), value, provenance)
+        valued(label.to_owned(), value)
     }
 
-    #[test]
-    fn outputs_are_found_by_type_and_round() {
+    fn book() -> Book {
         let mut book = Book::default();
         book.enter(Round::Initial, known("count", 1)).unwrap();
         let adjusted = vec![known("count/a/adjusted", 2), known("count/b/adjusted", 3)];
         book.enter_parts(Round::Adjusted, adjusted).unwrap();
+        book.enter_value("name", "gusev".to_owned()).unwrap();
+        book
+    }
+
+    fn assert_whole(book: &Book) {
         assert_eq!(book.of::<u32>().unwrap(), &1);
         assert_eq!(book.parts::<u32>(Round::Adjusted).unwrap(), [&2, &3]);
         assert_eq!(book.find::<u32>(Round::Matching).unwrap(), None);
         assert_eq!(book.find::<u64>(Round::Initial).unwrap(), None);
+        assert_eq!(book.of::<String>().unwrap(), "gusev");
+    }
+
+    #[test]
+    fn outputs_are_found_by_type_and_round() {
+        assert_whole(&book());
+    }
+
+    #[test]
+    fn a_written_book_is_opened_again_and_its_labels_remain() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("book");
+        let hash = book().write(fs::File::create(&path).unwrap()).unwrap();
+        assert_eq!(hash, blake3::hash(&fs::read(&path).unwrap()));
+        let opened = Book::open(&path).unwrap();
+        assert_whole(&opened);
+        assert_eq!(format!("{opened:?}"), format!("{:?}", book()));
+    }
+
+    #[test]
+    fn a_damaged_file_is_an_error_of_the_input() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("book");
+        book().write(fs::File::create(&path).unwrap()).unwrap();
+        let bytes = fs::read(&path).unwrap();
+        for length in [0, 7, 8, bytes.len() - 1] {
+            fs::write(&path, &bytes[..length]).unwrap();
+            let error = Book::open(&path).unwrap_err();
+            assert_eq!(error.kind(), areograph_base::error::Kind::Input, "{length}");
+        }
+        // The text is longer than its place.
+        let text = bytes.windows(6).position(|of| of == b"\x05gusev").unwrap();
+        let mut damaged = bytes;
+        damaged[text] = 90;
+        fs::write(&path, damaged).unwrap();
+        let opened = Book::open(&path).unwrap();
+        assert_eq!(opened.of::<u32>().unwrap(), &1);
+        let error = opened.of::<String>().unwrap_err();
+        assert_eq!(error.file.as_deref(), Some(&*path));
+    }
+
+    #[test]
+    fn outputs_are_changed_and_left_out_in_every_round() {
+        let whole = book();
+        let mut page = whole.clone();
+        page.change(|index, value: &u32| (index == 1).then_some(value + 10))
+            .unwrap();
+        page.leave_out::<String>();
+        assert_eq!(page.parts::<u32>(Round::Adjusted).unwrap(), [&2, &13]);
+        assert_eq!(page.find::<String>(Round::Initial).unwrap(), None);
+        assert_whole(&whole);
+    }
+
+    #[test]
+    fn a_lightened_book_has_the_shown_part_of_a_heavy_output() {
+        let mut book = Book::default();
+        let rows = Output::<Vec<u8>>::known(
+            "rows".to_owned(),
+            vec![1, 2, 3],
+            known("", 0).provenance().unwrap().clone(),
+        );
+        book.enter_heavy(Round::Initial, rows, |rows| rows[..1].to_vec())
+            .unwrap();
+        book.enter_value("count", 1_u32).unwrap();
+        let light = book.lightened().unwrap();
+        assert_eq!(light.of::<Vec<u8>>().unwrap(), &[1]);
+        assert_eq!(light.of::<u32>().unwrap(), &1);
+        assert_eq!(book.of::<Vec<u8>>().unwrap(), &[1, 2, 3]);
     }
 
     #[test]

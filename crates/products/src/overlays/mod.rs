@@ -12,7 +12,7 @@ use serde_json::{Map, Value, json};
 use self::marks::{MarkedFootprint, footprints};
 pub use self::pictures::{Picture, anaglyph, piece, strip};
 use super::{
-    files::{read, write_bytes, write_json},
+    files::{read_bytes, write_bytes, write_json},
     product::{Content, Context, Declaration, Role, Write},
     site::SiteProducts,
 };
@@ -35,7 +35,7 @@ pub(super) static PICTURE: Declaration = Declaration {
                 return Ok(0);
             };
             write_bytes(path, &picture.png)?;
-            if read(path)? != picture.png {
+            if read_bytes(path)? != picture.png {
                 let what = format!("{} bytes of a picture", picture.png.len());
                 return Err(ProductError::ReadBack { what }).in_file(path);
             }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
 
 use super::ReadError;
-use crate::files::read;
+use crate::files::read_bytes;
 use areograph_base::error::{Locate, Result};
 use areograph_geom::statistics::Summary;
 
@@ -109,7 +109,7 @@ pub fn read_image(path: &Path) -> Result<ImageDocument> {
 }
 
 fn document<T: DeserializeOwned>(path: &Path, what: &'static str) -> Result<T> {
-    serde_json::from_slice(&read(path)?)
+    serde_json::from_slice(&read_bytes(path)?)
         .map_err(ReadError::unreadable(what))
         .in_file(path)
 }

@@ -50,6 +50,6 @@ pub(crate) fn draw_text<'a>(
 }
 
 /// A number of an axis or a table, see [`number`].
-pub(crate) fn label(value: f64, decimals: usize) -> String {
+pub fn label(value: f64, decimals: usize) -> String {
     number(value, decimals)
 }

@@ -10,7 +10,8 @@ mod frame;
 mod palette;
 
 pub(super) use arrows::{Arrow, Arrows, magnification};
-pub(super) use canvas::{Canvas, Drawn, draw_text, drawn, label};
+pub use canvas::label;
+pub(super) use canvas::{Canvas, Drawn, draw_text, drawn};
 pub(super) use figure::{Key, figure_html, with_files};
 pub(super) use frame::Frame;
 pub(super) use palette::{COLOURS, GREY, GRID, INK, MARK, SOFT};

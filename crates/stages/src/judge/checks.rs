@@ -5,7 +5,7 @@ use super::{
     CheckOutcome::{self, Fail, Pass, Warning},
     Evidence, JudgedImage,
     adjustment::{HEIGHT_LOOSE_M, HEIGHT_OUTLIERS_FEW},
-    beam, clock_limit_s, surface,
+    beam, clock_limit_s,
 };
 use crate::{
     check_heights::HeightCheck, check_ranges::ProfileRanges, compare_pairs::PairComparison,
@@ -61,7 +61,7 @@ pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
         checks.extend(of_heights(adjustment, evidence.limits));
         checks.extend(of_ties(adjustment, evidence.limits));
     }
-    checks.extend(surface::checks(evidence));
+    checks.extend(evidence.findings.iter().flat_map(|of| of.checks.clone()));
     let skipped = evidence.complaints.len();
     if skipped > 0 {
         checks.push(Check::new(

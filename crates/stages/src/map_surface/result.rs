@@ -128,6 +128,17 @@ pub struct SurfaceLook {
     pub sigmas_m: Vec<f32>,
 }
 
+impl Surface {
+    /// Its statistics, which a page shows.
+    #[must_use]
+    pub fn without_model(&self) -> Self {
+        Self {
+            account: self.account.clone(),
+            model: SurfaceModel::nothing(),
+        }
+    }
+}
+
 impl SurfaceModel {
     /// A model without cells, for statistics without a model.
     #[must_use]

@@ -73,6 +73,18 @@ pub struct Orthoimage {
     pub sigmas_m: Vec<f32>,
 }
 
+impl Orthoimage {
+    /// Its statistics, which a page shows.
+    #[must_use]
+    pub fn without_cells(&self) -> Self {
+        Self {
+            account: self.account.clone(),
+            brightness: Vec::new(),
+            sigmas_m: Vec::new(),
+        }
+    }
+}
+
 /// Statistics of an orthoimage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OrthoimageAccount {

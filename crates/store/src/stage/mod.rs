@@ -19,7 +19,7 @@ mod reason;
 
 use std::sync::atomic::AtomicBool;
 
-use serde::{Serialize, de::DeserializeOwned};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 pub use inputs::{InOrder, Input, Inputs};
 pub use output::{Output, Provenance};
@@ -28,7 +28,7 @@ pub use reason::Reason;
 use areograph_base::{error::Result, watch::Watch};
 
 /// Whether a stage works on the orientation of the kernels or on the adjusted one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Round {
     /// The orientation of the kernels.
     Initial,

@@ -1,16 +1,15 @@
 //! Orthoimages: their cells, the uncertainty of positions in them, and pictures.
 
-use super::{
-    html::{Cell, Column, Table, escape, link, paragraph},
-    map::relief,
-    numbers::whole,
-    overlays::img,
-    plots::label,
-    section::Section,
+use super::products::orthoimages;
+use crate::{
+    error::Result,
+    products::SiteProducts,
+    report::{
+        Section,
+        parts::{Cell, Column, Table, escape, label, link, paragraph, picture_of, whole},
+    },
+    stages::rectify_images::{OrthoimageAccount, OrthoimageLook},
 };
-use areograph_base::error::Result;
-use areograph_products::{Picture, SiteProducts, error::ProductError};
-use areograph_stages::rectify_images::{OrthoimageAccount, OrthoimageLook};
 
 /// Share of the darkest and of the brightest cells that are shown as black and as white.
 const CLIPPED: f64 = 0.005;
@@ -18,12 +17,15 @@ const CLIPPED: f64 = 0.005;
 pub(super) const SECTION: Section = Section {
     title: "Orthoimages",
     anchor: "orthoimages",
-    appears: |site| !site.orthoimages.is_empty(),
+    checks: &[],
+    appears: |site| !orthoimages(site).is_empty(),
     write,
 };
 
 fn write(site: &SiteProducts) -> Result<String> {
-    let pictures = site.orthoimages.iter().map(|of| picture(site, &of.account));
+    let pictures = orthoimages(site)
+        .iter()
+        .map(|of| picture(site, &of.account));
     let pictures: String = pictures.collect::<Result<_>>()?;
     Ok(table(site)
         + &paragraph(
@@ -54,7 +56,7 @@ fn table(site: &SiteProducts) -> String {
             Column::Number("σ, shared: east, north (m)"),
         ],
     );
-    for (index, of) in site.orthoimages.iter().enumerate() {
+    for (index, of) in orthoimages(site).iter().enumerate() {
         let of = &of.account;
         let number = |value: f64, decimals: usize, place: &str| {
             Cell::from(label(value, decimals)).traced(place)
@@ -96,25 +98,14 @@ fn table(site: &SiteProducts) -> String {
 /// An orthoimage, north up, with links to its files.
 fn picture(site: &SiteProducts, of: &OrthoimageAccount) -> Result<String> {
     let id = &site.images[of.image].times.id;
-    let [rows, columns] = of.look.size;
-    let pixels = grey(&of.look);
-    let size = |of: usize| u32::try_from(of).unwrap_or(u32::MAX);
-    let png = relief::png(&pixels, size(columns), size(rows))
-        .map_err(ProductError::refused("draw an orthoimage"))?;
-    let picture = Picture {
-        width: size(columns),
-        height: size(rows),
-        reduction: 1,
-        step: 1,
-        png,
-    };
+    let alt = format!("Orthoimage of {id}, north up");
+    let picture = picture_of(&grey(&of.look), of.look.size, &alt)?;
     let files = ["orthoimage.tif", "orthoimage_sigma.tif"].map(|name| {
         let path = format!("../images/{id}/{name}");
         link(&path, name)
     });
     Ok(format!(
-        "<div>{}<p>{}: {}, {}</p></div>\n",
-        img(&picture, &format!("Orthoimage of {id}, north up")),
+        "<div>{picture}<p>{}: {}, {}</p></div>\n",
         escape(id),
         files[0],
         files[1]

@@ -1,25 +1,19 @@
 //! The terrain model of a pair of images: heights, their standard deviations, and statistics.
 
-mod document;
-
 use std::path::Path;
 
-use super::{
-    error::ProductError,
-    files::{write_bytes, write_json},
-    geotiff::GeoTiff,
-    product::{Content, Context, Declaration, Role, Write},
-    site::SiteProducts,
-};
-use areograph_base::{
+use super::document::Document;
+use crate::{
     error::{Locate as _, Result},
+    geom::height_grid::HeightGrid,
+    pds::terrain_model::{HeightsAbove, read_terrain_model},
+    products::{
+        Content, Context, Declaration, GeoTiff, Role, SiteProducts, Write, error::ProductError,
+        write_bytes, write_json,
+    },
     schema::DocumentSchema,
+    stages::map_surface::{Surface, SurfaceModel},
 };
-use areograph_geom::height_grid::HeightGrid;
-use areograph_pds::terrain_model::{HeightsAbove, read_terrain_model};
-use areograph_stages::map_surface::SurfaceModel;
-
-use document::Document;
 
 pub(super) static HEIGHTS: Declaration = Declaration {
     path: "surface.tif",
@@ -86,9 +80,9 @@ pub(super) static DOCUMENT: Declaration = Declaration {
     content: Content::Document(|| DocumentSchema::of::<Document>("surface")),
     write: Write::Where {
         sites: WITH_A_MODEL,
-        has: |site| site.surface.is_some(),
+        has: |site| site.has::<Surface>(),
         write: |path, of| {
-            let Some(surface) = of.site.surface else {
+            let Some(surface) = of.site.find::<Surface>()? else {
                 return Ok(0);
             };
             write_json(path, &Document::of(of, surface))?;
@@ -99,16 +93,16 @@ pub(super) static DOCUMENT: Declaration = Declaration {
 };
 
 /// Sites with these products.
-pub(super) const WITH_A_MODEL: &str = "a site with a terrain model";
+const WITH_A_MODEL: &str = "a site with a terrain model";
 
 /// The terrain model of a site, where enough cells matched.
 fn significant<'a>(site: &SiteProducts<'a>) -> Option<&'a SurfaceModel> {
-    let surface = site.surface?;
+    let surface = site.find::<Surface>().ok().flatten()?;
     (!surface.account.is_refused).then_some(&surface.model)
 }
 
 /// Writes numbers of all cells, and reads them back as every terrain model is read.
-pub(super) fn write_map(
+pub(in crate::capabilities) fn write_map(
     path: &Path,
     of: &Context,
     grid: &HeightGrid,

@@ -5,10 +5,12 @@ use std::{borrow::Cow, collections::BTreeMap};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::product::Context;
-use areograph_base::units::RADIANS_PER_DEGREE;
-use areograph_geom::statistics::Summary;
-use areograph_stages::map_surface::{ProfileOnSurface, Surface};
+use crate::{
+    geom::statistics::Summary,
+    products::Context,
+    stages::map_surface::{ProfileOnSurface, Surface},
+    units::RADIANS_PER_DEGREE,
+};
 
 /// Definitions of the numbers, for readers of the file.
 const DEFINITIONS: [(&str, &str); 7] = [

@@ -1,24 +1,31 @@
 //! Verdict on a terrain model: by the share of the ground that it covers, and by the altimeter.
 
-use super::{
-    Check, CheckKind,
-    CheckOutcome::{Fail, Warning},
-    Evidence,
+use crate::{
+    config::{LimitsConfig, SiteConfig},
+    error::Result,
+    stage::Round,
+    stages::{
+        judge::Findings,
+        map_surface::{SHOTS_MIN, Surface, SurfaceAccount},
+    },
+    store::book::Book,
+    verdict::{
+        Check, CheckKind,
+        CheckOutcome::{Fail, Warning},
+    },
+    wording::signed,
 };
-use crate::map_surface::{SHOTS_MIN, SurfaceAccount};
-use areograph_base::wording::signed;
 
 /// A mean height within this many of its standard deviations is no contradiction.
 const HEIGHT_SIGMAS: f64 = 3.0;
 
 /// Largest accepted distance of the median of the shots from a model, metres: where only profiles off nadir or of unknown
 /// attitude test it, also as much as their attitude explains.
-fn height_max_m(evidence: &Evidence<'_>, surface: &SurfaceAccount) -> f64 {
-    let limits = evidence.limits;
-    let at_nadir_m = match (surface.common_sigma_m, &evidence.adjustment) {
-        (Some(common_m), _) => limits.height_after_max_m.max(HEIGHT_SIGMAS * common_m),
+fn height_max_m(limits: &LimitsConfig, surface: &SurfaceAccount) -> f64 {
+    let at_nadir_m = match surface.common_sigma_m {
+        Some(common_m) => limits.height_after_max_m.max(HEIGHT_SIGMAS * common_m),
         // No adjustment has brought the images closer to the shots.
-        _ => limits.height_before_max_m,
+        None => limits.height_before_max_m,
     };
     at_nadir_m.hypot(HEIGHT_SIGMAS * surface.shots.attitude_sigma_m)
 }
@@ -27,11 +34,20 @@ const fn has_shots(surface: &SurfaceAccount) -> bool {
     surface.shots.above_m.n >= SHOTS_MIN
 }
 
-pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
-    let Some(surface) = evidence.surface else {
-        return Vec::new();
-    };
-    let limits = evidence.limits;
+/// The findings on the terrain model of a site, if it has one.
+pub(super) fn findings(config: &SiteConfig, book: &Book) -> Result<Findings> {
+    let surface = book.find::<Surface>(Round::Initial)?;
+    Ok(surface.map_or_else(Findings::default, |surface| {
+        let (limits, surface) = (&config.limits, &surface.account);
+        Findings {
+            reasons: invalid_because(limits, surface),
+            remarks: remark(surface).into_iter().collect(),
+            checks: checks(limits, surface),
+        }
+    }))
+}
+
+fn checks(limits: &LimitsConfig, surface: &SurfaceAccount) -> Vec<Check> {
     let share = if surface.is_refused {
         0.0
     } else {
@@ -50,7 +66,7 @@ pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
             ""
         };
         let shots = &surface.shots;
-        let height_max_m = height_max_m(evidence, surface);
+        let height_max_m = height_max_m(limits, surface);
         let spread_max = limits.surface_spread_max_sigma;
         [
             (
@@ -79,10 +95,7 @@ pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
 }
 
 /// Reasons why a terrain model makes its site invalid, one sentence each.
-pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
-    let Some(surface) = evidence.surface else {
-        return Vec::new();
-    };
+fn invalid_because(limits: &LimitsConfig, surface: &SurfaceAccount) -> Vec<String> {
     let (filled, searched) = (surface.filled, surface.searched());
     if surface.is_refused {
         return vec![format!(
@@ -90,7 +103,6 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
              model is withheld; check that the pixels belong to these images, and check their orientation"
         )];
     }
-    let limits = evidence.limits;
     let mut reasons = Vec::new();
     // Written so that NaN counts, here and below.
     if !(surface.filled_share() >= limits.surface_filled_min) {
@@ -104,7 +116,7 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
         return reasons;
     }
     let shots = &surface.shots;
-    let height_max_m = height_max_m(evidence, surface);
+    let height_max_m = height_max_m(limits, surface);
     if !(shots.above_m.median.abs() <= height_max_m) {
         reasons.push(format!(
             "terrain model: MOLA lies {} m above it (median of {} shots), expected at most {height_max_m:.1} m",
@@ -122,9 +134,8 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
     reasons
 }
 
-/// Remarks on a terrain model.
-pub(super) fn remarks(evidence: &Evidence<'_>) -> Option<String> {
-    let surface = evidence.surface?;
+/// Remark on a terrain model.
+fn remark(surface: &SurfaceAccount) -> Option<String> {
     let shots = &surface.shots;
     if surface.is_refused {
         return None;

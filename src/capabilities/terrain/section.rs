@@ -1,17 +1,19 @@
 //! The terrain model of a pair of images: statistics, comparison with MOLA, and pictures.
 
-mod pictures;
-
-use super::{
-    html::{Cell, Column, Table, folded_unless, link, paragraph},
-    numbers::{signed, whole},
-    plots::label,
-    section::Section,
+use crate::{
+    error::Result,
+    geom::statistics::Summary,
+    products::SiteProducts,
+    report::{
+        Section,
+        parts::{Cell, Column, Table, folded_unless, label, link, paragraph, signed, whole},
+        terrain_pictures,
+    },
+    stages::map_surface::{SHOTS_MIN, ShotComparison, Surface, SurfaceAccount},
+    ties::reasons,
+    units::RADIANS_PER_DEGREE,
+    verdict::CheckKind,
 };
-use areograph_base::{error::Result, ties::reasons, units::RADIANS_PER_DEGREE};
-use areograph_geom::statistics::Summary;
-use areograph_products::SiteProducts;
-use areograph_stages::map_surface::{SHOTS_MIN, ShotComparison, SurfaceAccount};
 
 /// More profiles than this are folded.
 const PROFILES_SHOWN: usize = 6;
@@ -19,12 +21,15 @@ const PROFILES_SHOWN: usize = 6;
 pub(super) const SECTION: Section = Section {
     title: "Terrain model",
     anchor: "terrain-model",
-    appears: |site| site.surface.is_some(),
+    checks: &[
+        CheckKind::SurfaceFilled,
+        CheckKind::SurfaceHeight,
+        CheckKind::SurfaceSpread,
+    ],
+    appears: |site| site.has::<Surface>(),
     write: |site| {
-        let surface = site.surface.iter();
-        surface
-            .map(|surface| write(site, &surface.account))
-            .collect()
+        let surface = site.find::<Surface>()?;
+        surface.map_or_else(|| Ok(String::new()), |of| write(site, &of.account))
     },
 };
 
@@ -39,7 +44,7 @@ fn write(site: &SiteProducts, account: &SurfaceAccount) -> Result<String> {
     let files = format!(
         "<p>Heights above the sphere of the body's maps: {model}; their standard deviations: {sigmas}.</p>\n"
     );
-    let pictures = pictures::figures(account, site.config.body)?;
+    let pictures = terrain_pictures(account, site.config.body)?;
     Ok(files + &table + &compared(account) + &format!("<div class=\"plots\">\n{pictures}</div>\n"))
 }
 

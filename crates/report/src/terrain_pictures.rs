@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use base64::{Engine as _, engine::general_purpose::STANDARD};
 use plotters::prelude::*;
 
-use super::super::{
+use super::{
     map::{
         keys::{ColourBar, draw_scale},
         relief, round_length_m,
@@ -47,11 +47,11 @@ struct Bar {
     colour: fn(f64) -> [u8; 3],
 }
 
-/// The three pictures.
+/// The three pictures: shaded heights, standard deviations, and the altimeter's shots on the model, as HTML.
 ///
 /// # Errors
 /// A picture that the library rejects, which is a bug in areograph.
-pub(super) fn figures(account: &SurfaceAccount, body: Body) -> Result<String> {
+pub fn terrain_pictures(account: &SurfaceAccount, body: Body) -> Result<String> {
     let frame = Frame::of(&account.look);
     let exaggeration = frame.exaggeration();
     let heights = &account.look.heights.heights_m;

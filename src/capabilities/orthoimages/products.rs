@@ -5,19 +5,16 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{
-    error::ProductError,
-    files::{read, write_bytes, write_json},
-    geotiff::GeoTiff,
-    product::{Content, Context, Declaration, Role, Write},
-    site::SiteProducts,
-    surface::write_map,
-};
-use areograph_base::{
+use crate::{
+    capabilities::terrain::write_map,
     error::{Locate as _, Result},
+    products::{
+        Content, Context, Declaration, GeoTiff, Role, SiteProducts, Write, error::ProductError,
+        read_bytes, write_bytes, write_json,
+    },
     schema::DocumentSchema,
+    stages::{map_surface::Surface, rectify_images::Orthoimage},
 };
-use areograph_stages::rectify_images::Orthoimage;
 
 /// Images and sites with these products.
 const IMAGES: &str = "every image with an orthoimage";
@@ -54,9 +51,9 @@ pub(super) static SIGMAS: Declaration = Declaration {
         has: |site, image| orthoimage(site, image).is_some(),
         write: |path, of, image| {
             let what = "standard deviation of the horizontal position, metres";
-            let terrain = of.site.surface.map(|surface| &surface.model);
+            let terrain = of.site.find::<Surface>()?;
             let made = orthoimage(of.site, image).zip(terrain);
-            made.map_or(Ok(0), |(image, model)| {
+            made.map_or(Ok(0), |(image, Surface { model, .. })| {
                 let numbers = (what, &*image.sigmas_m);
                 write_map(path, of, &model.heights, numbers, model.parallel_rad)
             })
@@ -74,18 +71,24 @@ pub(super) static DOCUMENT: Declaration = Declaration {
     content: Content::Document(|| DocumentSchema::of::<Document>("orthoimages")),
     write: Write::Where {
         sites: SITES,
-        has: |site| !site.orthoimages.is_empty(),
+        has: |site| !orthoimages(site).is_empty(),
         write: |path, of| {
             write_json(path, &Document::of(of.site))?;
-            Ok(of.site.orthoimages.len() as u64)
+            Ok(orthoimages(of.site).len() as u64)
         },
     },
     uses: &[],
 };
 
 fn orthoimage<'a>(site: &SiteProducts<'a>, image: usize) -> Option<&'a Orthoimage> {
-    let mut all = site.orthoimages.iter();
+    let mut all = orthoimages(site).iter();
     all.find(|of| of.account.image == image)
+}
+
+/// The orthoimages of a site; empty if it requests none.
+pub(super) fn orthoimages<'a>(site: &SiteProducts<'a>) -> &'a [Orthoimage] {
+    let found = site.find::<Vec<Orthoimage>>().ok().flatten();
+    found.map_or(&[], Vec::as_slice)
 }
 
 /// Writes the brightness of all cells, and reads it back.
@@ -99,7 +102,7 @@ fn write_brightness(path: &Path, of: &Context, image: &Orthoimage) -> Result<u64
     };
     let bytes = file.encoded();
     write_bytes(path, &bytes)?;
-    if read(path)? != bytes {
+    if read_bytes(path)? != bytes {
         let what = format!("{} bytes of an orthoimage", bytes.len());
         return Err(ProductError::ReadBack { what }).in_file(path);
     }
@@ -161,7 +164,7 @@ struct Entry<'a> {
 
 impl<'a> Document<'a> {
     fn of(site: &SiteProducts<'a>) -> Self {
-        let orthoimages = site.orthoimages.iter().map(|of| {
+        let orthoimages = orthoimages(site).iter().map(|of| {
             let of = &of.account;
             let [rows, columns] = of.map.size;
             Entry {

@@ -1,0 +1,246 @@
+//! A book in a file: the outputs one after the other, then the table of contents and its length.
+//!
+//! Outputs are read one by one, when they are used. The layout of the outputs is that of this version of areograph.
+
+use std::{
+    any::{Any, type_name},
+    collections::BTreeMap,
+    fs::File,
+    io::{self, BufWriter, Read as _, Seek as _, SeekFrom, Write},
+    path::{Path, PathBuf},
+    sync::{Arc, OnceLock},
+};
+
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+
+use super::{Book, Entered, Entry};
+use crate::stage::{Output, Round};
+use areograph_base::{
+    error::{Cause, Error, IoError, Locate as _, Result},
+    stored::whole,
+};
+
+/// Bytes that are hashed at once.
+const PIECE_BYTES: usize = 1 << 17;
+/// Bytes of the length of the table of contents.
+const TAIL_BYTES: u64 = 8;
+
+/// A file that is no book, or an output that cannot be written or read.
+#[derive(Debug, thiserror::Error, Cause)]
+enum BookError {
+    #[error("cannot be read as the outputs of a site: {0}")]
+    #[cause(Input: "regenerate products of another version of areograph with this version")]
+    Unreadable(String),
+    #[error("{name} cannot be stored: {source}")]
+    #[cause(Bug: "this is a bug in areograph; please report it with the configuration")]
+    Unstorable {
+        name: &'static str,
+        source: postcard::Error,
+    },
+}
+
+/// An entry of the table of contents.
+#[derive(Serialize, Deserialize)]
+struct Line {
+    name: String,
+    round: Round,
+    labels: Vec<String>,
+    /// Where the outputs end; the first begins where the entry before ends.
+    ends: Vec<u64>,
+}
+
+/// The outputs of an entry in a file.
+#[derive(Debug, Clone)]
+pub(super) struct Written {
+    file: Arc<(PathBuf, File)>,
+    start: u64,
+    ends: Vec<u64>,
+}
+
+impl Written {
+    /// The output with this index.
+    pub(super) fn read<T: DeserializeOwned>(&self, part: usize) -> Result<T> {
+        let start = part
+            .checked_sub(1)
+            .map_or(self.start, |before| self.ends[before]);
+        let (path, file) = &*self.file;
+        let bytes = bytes_of(file, start, self.ends[part]).in_file(path)?;
+        Ok(postcard::from_bytes(&bytes)
+            .map_err(unreadable)
+            .in_file(path)?)
+    }
+}
+
+impl Book {
+    /// Writes all outputs to `to`, and returns the BLAKE3 of what was written.
+    ///
+    /// # Errors
+    /// Errors of `to`; an output that is not known or cannot be stored.
+    pub fn write(&self, to: impl Write) -> Result<blake3::Hash> {
+        // Numbers are encoded one by one, and hashed in pieces.
+        let mut to = BufWriter::with_capacity(PIECE_BYTES, Hashed::new(to));
+        let written = self.write_all(&mut to);
+        let flushed = to.flush();
+        if let Some(refusal) = to.get_mut().refusal.take() {
+            return Err(IoError::on("write")(refusal).into());
+        }
+        written?;
+        flushed.map_err(IoError::on("write"))?;
+        Ok(to.get_ref().hash.finalize())
+    }
+
+    fn write_all(&self, to: &mut BufWriter<Hashed<impl Write>>) -> Result<()> {
+        let mut lines = Vec::new();
+        for ((name, round), entry) in &self.entries {
+            // An entry of an opened file has no type before it is used.
+            let Some((outputs, write)) = entry.outputs.get().zip(entry.write) else {
+                continue;
+            };
+            let mut ends = Vec::new();
+            while write(&**outputs, ends.len(), to)?.is_some() {
+                ends.push(to.get_ref().bytes + to.buffer().len() as u64);
+            }
+            lines.push(Line {
+                name: name.clone(),
+                round: *round,
+                labels: entry.labels.clone(),
+                ends,
+            });
+        }
+        let start = to.get_ref().bytes + to.buffer().len() as u64;
+        encode(&lines, "the table of contents", to)?;
+        let end = to.get_ref().bytes + to.buffer().len() as u64;
+        to.write_all(&(end - start).to_le_bytes())
+            .map_err(IoError::on("write"))?;
+        Ok(())
+    }
+
+    /// Opens the book in the file `path`; its outputs are read when they are used.
+    ///
+    /// # Errors
+    /// A file of kind input that this version did not write; an error of the disk.
+    pub fn open(path: &Path) -> Result<Self> {
+        let file = File::open(path)
+            .map_err(IoError::on("open"))
+            .in_file(path)?;
+        let lines = contents(&file).in_file(path)?;
+        let file = Arc::new((path.to_owned(), file));
+        let (mut entries, mut start) = (BTreeMap::new(), 0);
+        for line in lines {
+            let written = Written {
+                file: Arc::clone(&file),
+                start,
+                ends: line.ends,
+            };
+            start = written.ends.last().copied().unwrap_or(start);
+            let entry = Entry {
+                labels: line.labels,
+                outputs: OnceLock::new(),
+                written: Some(written),
+                write: None,
+                lighten: None,
+            };
+            entries.insert((line.name, line.round), entry);
+        }
+        Ok(Self { entries })
+    }
+}
+
+/// The table of contents.
+fn contents(file: &File) -> Result<Vec<Line>> {
+    let bytes = file.metadata().map_err(IoError::on("read"))?.len();
+    let short = || unreadable("it is too short");
+    let end = bytes.checked_sub(TAIL_BYTES).ok_or_else(short)?;
+    let tail = bytes_of(file, end, bytes)?;
+    let length = tail.try_into().map_or(u64::MAX, u64::from_le_bytes);
+    let start = end.checked_sub(length).ok_or_else(short)?;
+    let lines: Vec<Line> =
+        postcard::from_bytes(&bytes_of(file, start, end)?).map_err(unreadable)?;
+    let ends = lines.iter().flat_map(|line| &line.ends);
+    let is_sorted = ends.clone().is_sorted() && ends.max().is_none_or(|end| *end <= start);
+    let is_whole = lines
+        .iter()
+        .all(|line| line.labels.len() == line.ends.len());
+    if is_sorted && is_whole {
+        return Ok(lines);
+    }
+    Err(unreadable("its table of contents is inconsistent"))
+}
+
+/// The bytes from `start` to `end`.
+fn bytes_of(mut file: &File, start: u64, end: u64) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    file.seek(SeekFrom::Start(start))
+        .and_then(|_| file.take(end - start).read_to_end(&mut bytes))
+        .map_err(IoError::on("read"))?;
+    Ok(bytes)
+}
+
+fn unreadable(reason: impl ToString) -> Error {
+    BookError::Unreadable(reason.to_string()).into()
+}
+
+/// See [`super::WritePart`].
+pub(super) fn write_part<T: Entered>(
+    outputs: &dyn Any,
+    part: usize,
+    to: &mut dyn Write,
+) -> Result<Option<()>> {
+    let outputs: Option<&Vec<Output<T>>> = outputs.downcast_ref();
+    let Some(output) = outputs.and_then(|outputs| outputs.get(part)) else {
+        return Ok(None);
+    };
+    encode(output.value()?, type_name::<T>(), to).map(Some)
+}
+
+fn encode(
+    value: &impl Serialize,
+    name: &'static str,
+    to: &mut (impl Write + ?Sized),
+) -> Result<()> {
+    whole(|| postcard::to_io(value, to))
+        .map(|_| ())
+        .map_err(|source| BookError::Unstorable { name, source }.into())
+}
+
+/// A writer that hashes its data, and keeps the reason of an error, which postcard discards.
+struct Hashed<W> {
+    to: W,
+    hash: blake3::Hasher,
+    bytes: u64,
+    refusal: Option<io::Error>,
+}
+
+impl<W: Write> Hashed<W> {
+    fn new(to: W) -> Self {
+        Self {
+            to,
+            hash: blake3::Hasher::new(),
+            bytes: 0,
+            refusal: None,
+        }
+    }
+}
+
+impl<W: Write> Write for Hashed<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self.to.write(bytes) {
+            Ok(count) => {
+                self.hash.update(&bytes[..count]);
+                self.bytes += count as u64;
+                Ok(count)
+            }
+            // Is tried again.
+            Err(refusal) if refusal.kind() == io::ErrorKind::Interrupted => Err(refusal),
+            Err(refusal) => {
+                let kind = refusal.kind();
+                self.refusal = Some(refusal);
+                Err(kind.into())
+            }
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.to.flush()
+    }
+}

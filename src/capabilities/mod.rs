@@ -1,0 +1,80 @@
+//! What a stage adds to the products, the page and the verdict of a site.
+//!
+//! A capability declares its products, its section of the page, its findings for the verdict and its counts of the
+//! manifest in one folder; each of them asks the book of outputs for what it needs. [`CAPABILITIES`] lists it once, and
+//! files, catalogue, documentation, page and verdict follow. The flow (`flow/site.rs`) calls its stage. Stages that
+//! many products use have these in the crates `products`, `report` and `stages/judge`.
+
+mod orthoimages;
+mod terrain;
+
+use std::{collections::BTreeMap, sync::LazyLock};
+
+use crate::{
+    config::SiteConfig,
+    error::Result,
+    products::{self, Declaration, SiteProducts},
+    report::{self, Section},
+    stages::judge::Findings,
+    store::book::Book,
+};
+
+/// Judges a site by an output of its book.
+type Judge = fn(&SiteConfig, &Book) -> Result<Findings>;
+/// Counts of a site for its manifest.
+type Count = fn(&Book) -> Result<Vec<(&'static str, u64)>>;
+
+/// The products, section, findings and counts of a stage.
+struct Capability {
+    products: &'static [&'static Declaration],
+    section: Section,
+    judge: Option<Judge>,
+    count: Option<Count>,
+}
+
+/// All capabilities, in the order of their products and sections.
+static CAPABILITIES: &[&Capability] = &[&terrain::CAPABILITY, &orthoimages::CAPABILITY];
+
+/// All products that a site may have, in the order in which they are written.
+#[must_use]
+pub fn declarations() -> &'static [&'static Declaration] {
+    static DECLARATIONS: LazyLock<Vec<&'static Declaration>> = LazyLock::new(|| {
+        let own = CAPABILITIES.iter().flat_map(|of| of.products).copied();
+        products::declarations(&own.collect::<Vec<_>>())
+    });
+    &DECLARATIONS
+}
+
+/// The report of `site` as one HTML page.
+///
+/// # Errors
+/// A plot that cannot be drawn, which is a bug in areograph.
+pub fn page(site: &SiteProducts) -> Result<String> {
+    let sections: Vec<Section> = CAPABILITIES.iter().map(|of| of.section).collect();
+    report::page(site, &sections)
+}
+
+/// The findings of all capabilities on a site.
+///
+/// # Errors
+/// An output that is not known or cannot be read.
+pub fn findings(config: &SiteConfig, book: &Book) -> Result<Vec<Findings>> {
+    let judges = CAPABILITIES.iter().filter_map(|of| of.judge);
+    judges.map(|judge| judge(config, book)).collect()
+}
+
+/// The counts of all capabilities for the manifest of a site.
+///
+/// # Errors
+/// As [`findings`].
+pub fn counts(book: &Book) -> Result<BTreeMap<String, u64>> {
+    let mut counts = BTreeMap::new();
+    for count in CAPABILITIES.iter().filter_map(|of| of.count) {
+        counts.extend(
+            count(book)?
+                .into_iter()
+                .map(|(name, of)| (name.to_owned(), of)),
+        );
+    }
+    Ok(counts)
+}

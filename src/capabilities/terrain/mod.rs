@@ -1,0 +1,29 @@
+//! The terrain model of a pair of images (`stages/map_surface`): files, section of the page, findings, counts.
+
+mod document;
+mod findings;
+mod products;
+mod section;
+
+use super::Capability;
+use crate::{error::Result, stage::Round, stages::map_surface::Surface, store::book::Book};
+
+pub(super) use products::write_map;
+
+pub(super) static CAPABILITY: Capability = Capability {
+    products: &[&products::HEIGHTS, &products::SIGMAS, &products::DOCUMENT],
+    section: section::SECTION,
+    judge: Some(findings::findings),
+    count: Some(counts),
+};
+
+fn counts(book: &Book) -> Result<Vec<(&'static str, u64)>> {
+    let surface = book.find::<Surface>(Round::Initial)?;
+    Ok(surface.map_or_else(Vec::new, |surface| {
+        let account = &surface.account;
+        vec![
+            ("surface_cells", u64::from(account.cells)),
+            ("surface_filled", u64::from(account.filled)),
+        ]
+    }))
+}
