@@ -8,12 +8,12 @@
 mod orthoimages;
 mod terrain;
 
-use std::{collections::BTreeMap, sync::LazyLock};
+use std::{collections::BTreeMap, path::Path, sync::LazyLock};
 
 use crate::{
     config::SiteConfig,
     error::Result,
-    products::{self, Declaration, SiteProducts},
+    products::{self, Declaration, Pages, Product, SiteProducts},
     report::{self, Section},
     stages::judge::Findings,
     store::book::Book,
@@ -43,6 +43,19 @@ pub fn declarations() -> &'static [&'static Declaration] {
         products::declarations(&own.collect::<Vec<_>>())
     });
     &DECLARATIONS
+}
+
+/// Writes every product of `site` below `directory`, with `pages` (or one page as its report), and reads each of them
+/// back.
+///
+/// # Errors
+/// Those of [`products::write_products`].
+pub fn write_products<'a>(
+    directory: &Path,
+    site: &SiteProducts,
+    pages: impl Into<Pages<'a>>,
+) -> Result<Vec<Product>> {
+    products::write_products(directory, site, declarations(), pages)
 }
 
 /// The report of `site` as one HTML page.

@@ -1,6 +1,5 @@
 //! The outputs of the stages of a site.
 
-use super::registered::Shots;
 use crate::{
     error::{Error, Result},
     spice::{KernelSet, RequiredCoverage},
@@ -12,6 +11,9 @@ use crate::{
     },
     store::book::Book,
 };
+
+/// Footprints and their profiles.
+pub(super) type Shots<'a> = (&'a Output<Converted>, &'a Output<Vec<Profile>>);
 
 /// Outputs of the stages before the choice of kernels.
 #[derive(Clone)]

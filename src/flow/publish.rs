@@ -11,11 +11,11 @@ use super::{
     read_back::read_back,
 };
 use crate::{
-    capabilities::{declarations, page},
+    capabilities::{declarations, page, write_products},
     config::SiteConfig,
     error::Result,
     files::file_name,
-    products::{Pages, Program, SiteBook, SiteStatements, error::ProductError, write_products},
+    products::{Pages, Program, SiteBook, SiteStatements, error::ProductError},
     report,
     spice::{KernelSet, KernelView, Session},
     stage::{Input, Inputs, Output, Reason},
@@ -29,7 +29,7 @@ use crate::{
 };
 
 /// Raised when the layout of products changes.
-const METHOD: u32 = 28;
+const METHOD: u32 = 29;
 
 /// The configuration as written, the outlines that it names, all kernels and their paths relative to `folder`, and
 /// the inputs of every stage.

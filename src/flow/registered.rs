@@ -1,17 +1,17 @@
 //! The images of a site with one orientation: sensor models and footprints of each.
 
-use super::driver::{Driver, Flow};
+use super::{
+    driver::{Driver, Flow},
+    outputs::Shots,
+};
 use crate::{
     config::{ImageConfig, SiteConfig},
     stage::{Output, Round},
     stages::{
-        convert_datum::Converted, fit_sensor_model::FitSensorModel, group_profiles::Profile,
-        orientation::Orientation, register::Register, site_image::SiteImage, tag_times::ImageTimes,
+        fit_sensor_model::FitSensorModel, orientation::Orientation, register::Register,
+        site_image::SiteImage, tag_times::ImageTimes,
     },
 };
-
-/// Footprints and their profiles.
-pub(super) type Shots<'a> = (&'a Output<Converted>, &'a Output<Vec<Profile>>);
 
 /// Every image with its orientation, sensor models and footprints.
 pub(super) fn registered<D: Driver>(

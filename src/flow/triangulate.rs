@@ -4,9 +4,9 @@
 
 use super::{
     driver::{Driver, Flow, of_adjustment},
-    outputs::{Intersection, Site},
+    outputs::{Intersection, Shots, Site},
     overlays::pixel_files,
-    registered::{Shots, registered},
+    registered::registered,
 };
 use crate::{
     config::SiteConfig,

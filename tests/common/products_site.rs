@@ -1,11 +1,12 @@
 //! A small site made by hand: one orbit across the antimeridian, one image, one outlier.
 
-use std::{collections::BTreeMap, sync::atomic::AtomicBool};
+use std::{collections::BTreeMap, path::Path, sync::atomic::AtomicBool};
 
 use areograph::{
     altimetry::{BiasScope, DatumChoice, GroundRadius, MolaClock, ShotFilter, TagSign},
     body::Body,
     body::Datum,
+    capabilities::declarations,
     config::{
         KernelsConfig, OrientationConfig, PedrConfig, PointingConfig, ProductsConfig,
         RangeCheckConfig, ShotFormat, SiteConfig, WindowConfig, usual_instrument,
@@ -22,13 +23,14 @@ use areograph::{
     },
     kernel_source::{KernelList, KernelSource},
     line_times::LineTimes,
-    products::{ImageProducts, Program, SiteProducts},
-    spice::RequiredCoverage,
+    products::{ImageProducts, Program, SiteBook, SiteProducts, SiteStatements},
+    spice::{KernelSet, RequiredCoverage},
+    stage::{Output, Provenance, Round},
     stages::{
         check_profiles::{ProfileCheck, check_profiles},
         check_ranges::{BiasScan, ProfileRanges, RangeCheck, ScannedRadius, ShotResiduals},
-        convert_datum::FileConversion,
-        describe_kernels::KernelLine,
+        convert_datum::{Converted, FileConversion},
+        describe_kernels::{KernelDescription, KernelLine},
         fit_sensor_model::{SensorModel, fit_sensor_model},
         group_profiles::{Profile, group_profiles},
         judge::{BeamEvidence, Evidence, JudgedImage, judge},
@@ -39,6 +41,7 @@ use areograph::{
         },
         tag_times::{ImageTimes, StartFrom},
     },
+    store::book::{Book, Entered},
     time::{Et, Interval, Intervals},
 };
 use nalgebra::{Matrix3, Vector3};
@@ -239,35 +242,70 @@ impl Site {
             complaints: &self.complaints,
             profiles: &profile_check,
             adjustment: None,
-            surface: None,
+            findings: &[],
             adjustment_failure: None,
         });
-        with(&SiteProducts {
-            config: &self.config,
-            kernels: &self.kernels,
-            metakernel: "KPL/MK\n",
-            required: &self.required,
-            images,
-            footprints: &self.footprints,
-            utc: &self.utc,
-            profiles: &self.profiles,
-            profile_check: &profile_check,
-            ranges: &self.ranges,
-            rejected: &self.rejected,
-            complaints: &self.complaints,
-            notes: &self.notes,
-            verdict: &verdict,
-            geometric: None,
-            overlays: None,
-            orthoimages: &[],
-            surface: None,
-            conversions: &self.conversions,
-            program: &Program {
+        let mut book = Book::default();
+        let kernels = KernelDescription {
+            kernels: self.kernels.clone(),
+            pck_note: None,
+            rates_note: None,
+        };
+        book.enter_value("describe_kernels", kernels).unwrap();
+        book.enter_value("required", self.required.clone()).unwrap();
+        let converted = Converted {
+            footprints: self.footprints.clone(),
+            files: self.conversions.clone(),
+            notes: Vec::new(),
+        };
+        book.enter_value("convert_datum", converted).unwrap();
+        book.enter_value("tag_utc", self.utc.clone()).unwrap();
+        book.enter_value("group_profiles", self.profiles.clone())
+            .unwrap();
+        book.enter_value("check_profiles", profile_check).unwrap();
+        book.enter_value("check_ranges", self.ranges.clone())
+            .unwrap();
+        enter(&mut book, images, |image| image.times);
+        enter(&mut book, images, |image| image.orientation);
+        enter(&mut book, images, |image| image.model);
+        enter(&mut book, images, |image| image.registration);
+        let statements = SiteStatements {
+            verdict,
+            images_agree: false,
+            rejected: self.rejected.clone(),
+            complaints: self.complaints.clone(),
+            notes: self.notes.clone(),
+            program: Program {
                 cspice: "CSPICE_N0067".to_owned(),
                 methods: vec![("search_footprints".to_owned(), 2)],
             },
-        })
+        };
+        book.enter_value("statements", statements).unwrap();
+        let site = SiteBook {
+            config: &self.config,
+            book: &book,
+            kernels: &KernelSet::default(),
+            folder: Path::new(""),
+            declarations: declarations(),
+        };
+        site.with(|site| Ok(with(site))).unwrap()
     }
+}
+
+/// Enters a part of every image.
+fn enter<'a, T: Entered + Clone>(
+    book: &mut Book,
+    images: &[ImageProducts<'a>],
+    part: impl Fn(&ImageProducts<'a>) -> &'a T,
+) {
+    let nowhere = Provenance {
+        blake3: String::new(),
+        fingerprint: String::new(),
+    };
+    let outputs = images
+        .iter()
+        .map(|image| Output::known(String::new(), part(image).clone(), nowhere.clone()));
+    book.enter_parts(Round::Initial, outputs.collect()).unwrap();
 }
 
 /// An interval in seconds from the first shot.

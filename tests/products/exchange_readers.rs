@@ -16,9 +16,9 @@ use std::{
 };
 
 use areograph::{
+    capabilities::write_products,
     footprints::{Footprint, Footprints},
     geom::ellipsoid::spherical_to_xyz_m,
-    products::write_products,
     stages::{describe_kernels::KernelLine, group_profiles::group_profiles},
     time::{Et, Interval, Intervals},
 };

@@ -8,17 +8,20 @@
 
 use areograph_testing::kept;
 
-use areograph::schema::DocumentSchema;
+use areograph::{capabilities::declarations, schema::DocumentSchema};
 use kept::is_up_to_date;
 
 #[test]
 fn the_list_of_products_is_up_to_date() {
-    is_up_to_date("docs/products.md", &areograph::products::documentation());
+    is_up_to_date(
+        "docs/products.md",
+        &areograph::products::documentation(declarations()),
+    );
 }
 
 #[test]
 fn schemas_are_up_to_date() {
-    let mut schemas = areograph::products::schemas();
+    let mut schemas = areograph::products::schemas(declarations());
     schemas.push(areograph::store::manifest::schema());
     schemas.push(areograph::difference::schema());
     schemas.push(areograph::flow::comparison_schema());

@@ -5,9 +5,10 @@
 use std::{collections::BTreeMap, fs::File};
 
 use areograph::{
+    capabilities::{self, write_products},
     geom::height_grid::HeightGrid,
-    products::{SiteProducts, write_products},
-    report,
+    products::{PageData, SiteProducts},
+    stage::{Output, Provenance, Round},
     stages::{
         map_surface::{ShotComparison, Surface, SurfaceAccount, SurfaceLook, SurfaceModel},
         rectify_images::{Orthoimage, OrthoimageAccount, OrthoimageLook},
@@ -105,20 +106,41 @@ fn orthoimage() -> Orthoimage {
     }
 }
 
+fn output<T>(value: T) -> Output<T> {
+    let nowhere = Provenance {
+        blake3: String::new(),
+        fingerprint: String::new(),
+    };
+    Output::known(String::new(), value, nowhere)
+}
+
 #[test]
 fn files_and_page_state_what_was_computed() {
     let folder = tempfile::tempdir().unwrap();
-    let (surface, orthoimages) = (surface(), [orthoimage()]);
+    let (surface, orthoimages) = (surface(), vec![orthoimage()]);
     let (id, page) = Site::small().with(true, |site| {
+        let mut book = site.book.clone();
+        book.enter_heavy(Round::Initial, output(surface), Surface::without_model)
+            .unwrap();
+        let shown = |of: &Vec<Orthoimage>| of.iter().map(Orthoimage::without_cells).collect();
+        book.enter_heavy(Round::Initial, output(orthoimages.clone()), shown)
+            .unwrap();
         let site = SiteProducts {
-            surface: Some(&surface),
-            orthoimages: &orthoimages,
+            book: &book,
             ..*site
         };
         write_products(folder.path(), &site, "").unwrap();
         let id = site.images[0].times.id.clone();
-        (id, report::page(&site).unwrap())
+        (id, capabilities::page(&site).unwrap())
     });
+    // The data of the page have no cells, and give the same page.
+    let data = PageData::read(folder.path()).unwrap();
+    let again = data.with(capabilities::declarations(), |site| {
+        let orthoimages = site.find::<Vec<Orthoimage>>()?.unwrap();
+        assert!(orthoimages[0].brightness.is_empty());
+        capabilities::page(site)
+    });
+    assert_eq!(again.unwrap(), page);
 
     let path = folder.path().join(format!("images/{id}/orthoimage.tif"));
     let mut decoder = Decoder::new(File::open(path).unwrap()).unwrap();
@@ -153,7 +175,7 @@ fn a_site_without_orthoimages_has_neither_files_nor_section() {
     let folder = tempfile::tempdir().unwrap();
     let page = Site::small().with(true, |site| {
         write_products(folder.path(), site, "").unwrap();
-        report::page(site).unwrap()
+        capabilities::page(site).unwrap()
     });
     assert!(!page.contains("id=\"orthoimages\""));
     assert!(!folder.path().join("orthoimages.json").exists());

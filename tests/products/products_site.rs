@@ -13,11 +13,11 @@ use std::{
 use areograph::{
     body::Body,
     body::MARS_IAU2000,
+    capabilities,
+    capabilities::write_products,
     error::Kind,
     footprints::Footprint,
     geom::body_rotation::body_matrix,
-    products::write_products,
-    report,
     spice::{KernelSet, Session},
     store::manifest::Manifest,
     time::Et,
@@ -41,7 +41,7 @@ fn written(name: &str, site: &Site, image: bool) -> (PathBuf, Vec<(String, u64)>
     }
     let products = site
         .with(image, |site| {
-            write_products(&folder, site, &report::page(site)?)
+            write_products(&folder, site, &capabilities::page(site)?)
         })
         .unwrap();
     let list = products
@@ -484,7 +484,7 @@ fn numbers_that_are_not_finite_are_refused_with_their_place() {
     let folder = tempfile::tempdir().unwrap();
     let failure = site
         .with(true, |site| {
-            write_products(folder.path(), site, &report::page(site)?)
+            write_products(folder.path(), site, &capabilities::page(site)?)
         })
         .unwrap_err();
     assert_eq!(failure.kind(), Kind::Bug);
@@ -497,7 +497,7 @@ fn numbers_that_are_not_finite_are_refused_with_their_place() {
     site.orientation.tables.velocity_m_s[1][2] = f64::INFINITY;
     let failure = site
         .with(true, |site| {
-            write_products(folder.path(), site, &report::page(site)?)
+            write_products(folder.path(), site, &capabilities::page(site)?)
         })
         .unwrap_err();
     assert_eq!(
@@ -514,7 +514,7 @@ fn parts_that_do_not_belong_together_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let failure = site
         .with(true, |site| {
-            write_products(folder.path(), site, &report::page(site)?)
+            write_products(folder.path(), site, &capabilities::page(site)?)
         })
         .unwrap_err();
     assert_eq!(

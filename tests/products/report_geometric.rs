@@ -12,9 +12,9 @@ use crate::common::page;
 mod site;
 
 use areograph::{
+    capabilities,
     config::all_instruments,
     geom::uncertainty::GroundPart,
-    report,
     stages::{
         adjust::{
             ObservationType, OtherReading, PointKind, RejectedPoint, RejectionReason,
@@ -676,7 +676,7 @@ fn a_site_without_tie_points_has_none_of_it() {
         .with(|products| {
             let mut products = *products;
             products.geometric = None;
-            report::page(&products)
+            capabilities::page(&products)
         })
         .unwrap();
     for id in SECTIONS {

@@ -5,8 +5,8 @@
 use crate::common::{page::assert_complete, products_site as fixture};
 
 use areograph::{
-    products::{IMAGES_SHOWN, PageData, Pages, SiteProducts, write_products},
-    report,
+    capabilities::{self, write_products},
+    products::{IMAGES_SHOWN, PageData, Pages, SiteProducts},
 };
 use fixture::Site;
 
@@ -14,7 +14,7 @@ use fixture::Site;
 const BYTES_EACH_MAX: usize = 400;
 
 fn page(site: &Site, count: usize) -> String {
-    site.with_copies(count, report::page).unwrap()
+    site.with_copies(count, capabilities::page).unwrap()
 }
 
 /// Images with a plot called after them.
@@ -64,7 +64,7 @@ fn the_page_of_many_images_is_made_again_from_its_data() {
     let folder = tempfile::tempdir().unwrap();
     let site = Site::small();
     let written = |products: &SiteProducts| {
-        let page = report::page(products)?;
+        let page = capabilities::page(products)?;
         let pages = Pages {
             report: &page,
             overlays: None,
@@ -74,7 +74,12 @@ fn the_page_of_many_images_is_made_again_from_its_data() {
     };
     let page = site.with_copies(2 * IMAGES_SHOWN, written).unwrap();
     let again = PageData::read(folder.path()).unwrap();
-    assert_eq!(again.with(report::page).unwrap(), page);
+    assert_eq!(
+        again
+            .with(capabilities::declarations(), capabilities::page)
+            .unwrap(),
+        page
+    );
     // What is not on the page is a file.
     for index in 0..2 * IMAGES_SHOWN {
         let file = format!("images/M04-{index:05}/orientation.json");

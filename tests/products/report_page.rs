@@ -10,12 +10,12 @@ use crate::common::products_site as fixture;
 
 use std::{collections::BTreeSet, fs, path::Path};
 
-use areograph::{geom::statistics::Summary, report, stages::judge::CheckKind};
+use areograph::{capabilities, geom::statistics::Summary, stages::judge::CheckKind};
 use fixture::{SHOTS, Site};
 
 /// The page, also left below `target`, where a person may look at it.
 fn page(name: &str, site: &Site, image: bool) -> String {
-    let page = site.with(image, report::page).unwrap();
+    let page = site.with(image, capabilities::page).unwrap();
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report_page");
     fs::create_dir_all(&folder).unwrap();
     fs::write(folder.join(format!("{name}.html")), &page).unwrap();

@@ -8,10 +8,10 @@ use crate::common::products_site as fixture;
 use std::fs;
 
 use areograph::{
+    capabilities::write_products,
     config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig, usual_instrument},
     geom::light_time::LightTime,
     kernel_source::{KernelList, KernelSource},
-    products::write_products,
     spice::{KernelSet, Session},
     stages::{
         fit_sensor_model::fit_sensor_model, sample_orientation::sample_orientation,

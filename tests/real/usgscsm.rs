@@ -21,9 +21,9 @@ use std::{
 };
 
 use areograph::{
+    capabilities::write_products,
     config::OrientationConfig,
     geom::{light_time::LightTime, pushbroom::CameraModel},
-    products::write_products,
     stages::{
         fit_sensor_model::fit_sensor_model,
         oriented::OrientedImage,

@@ -15,13 +15,13 @@ use std::{fs, sync::atomic::AtomicBool};
 
 use areograph::{
     body::Body,
+    capabilities::write_products,
     frames::{BodyFixed, Position},
     geom::{
         ellipsoid::{Spherical, ray_meets_ellipsoid},
         pushbroom::CameraModel,
     },
     line_times::{LinePiece, LineTimes, LineTimesError},
-    products::write_products,
     spice::Session,
     stages::{
         fit_sensor_model::fit_sensor_model, oriented::OrientedImage, register::register,

@@ -84,7 +84,7 @@ pub use found_shots::ShotsFile;
 pub use generated::{documentation, schemas};
 pub use geotiff::{GeoTiff, Number};
 pub use laser_match::{MatchProducts, write_match_products};
-pub use listed::{Listed, listed};
+pub use listed::listed;
 pub use net::{NetProducts, write_net_products};
 pub use overlays::{Picture, anaglyph, piece, strip};
 pub use page::REPORT;
@@ -98,7 +98,9 @@ pub use rows_file::{Out, RowsFormat, RowsWriter, SQL};
 #[cfg(feature = "sql")]
 pub use shot_columns::ShotColumns;
 pub use shown::IMAGES_SHOWN;
-pub use site::{AdjustmentProducts, GeometricProducts, ImageProducts, Program, SiteProducts};
+pub use site::{
+    AdjustmentProducts, GeometricProducts, ImageProducts, Listed, Program, SiteProducts,
+};
 pub use site_book::{SiteBook, SiteStatements};
 
 use rayon::prelude::*;
@@ -107,8 +109,8 @@ use areograph_base::error::{Locate, Result};
 use areograph_config::ShotFormat;
 use product::{Scope, Written};
 
-/// Writes every product of `site` below `directory`, with `pages` (or one page as its report), and reads each of them
-/// back.
+/// Writes those of `declarations` that `site` has below `directory`, with `pages` (or one page as its report), and reads
+/// each of them back.
 ///
 /// # Errors
 /// [`Kind::Io`](areograph_base::error::Kind::Io) for errors of the disk; [`Kind::Bug`](areograph_base::error::Kind::Bug)
@@ -117,15 +119,13 @@ use product::{Scope, Written};
 pub fn write_products<'a>(
     directory: &Path,
     site: &SiteProducts,
+    declarations: &[&'static Declaration],
     pages: impl Into<Pages<'a>>,
 ) -> Result<Vec<Product>> {
     site.check()?;
     let pages = pages.into();
     let mut written: Vec<Written> = Vec::new();
-    for group in site
-        .declarations
-        .chunk_by(|one, next| one.scope() == next.scope())
-    {
+    for group in declarations.chunk_by(|one, next| one.scope() == next.scope()) {
         let images: Vec<Option<&ImageProducts>> = match group[0].scope() {
             Scope::Site => vec![None],
             Scope::Image => site.images.iter().map(Some).collect(),
@@ -140,6 +140,7 @@ pub fn write_products<'a>(
                     site,
                     pages,
                     directory,
+                    declarations,
                     written: &written,
                 };
                 let files: Vec<Result<Vec<Written>>> = together
@@ -188,6 +189,7 @@ pub fn export_footprints(
         site,
         pages: Pages::from(""),
         directory,
+        declarations: &[],
         written: &[],
     };
     let products = in_formats(formats).map(|(name, write)| {

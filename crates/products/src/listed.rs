@@ -5,28 +5,14 @@ use super::{
     figures::FIGURE,
     page::OVERLAYS,
     product::{Declaration, Write},
-    site::SiteProducts,
+    site::{Listed, SiteProducts},
 };
 use areograph_stages::adjust::PointKind;
 
-/// A product that a site has.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Listed {
-    /// Path below the site's folder.
-    pub path: String,
-    /// Index of the image that it belongs to, if it is of one.
-    pub image: Option<usize>,
-    /// Contents of the file.
-    pub what: &'static str,
-    /// Readers of it.
-    pub readers: &'static str,
-}
-
-/// The products of `site` in the order in which they are written, without the figures of its report.
+/// Those of `declarations` that `site` has, in the order in which they are written, without the figures of its report.
 #[must_use]
-pub fn listed(site: &SiteProducts) -> Vec<Listed> {
-    let declared = site
-        .declarations
+pub fn listed(site: &SiteProducts, declarations: &[&'static Declaration]) -> Vec<Listed> {
+    let declared = declarations
         .iter()
         .filter(|declaration| has(site, declaration));
     let paths = declared.flat_map(|declaration| {

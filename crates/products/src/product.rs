@@ -178,8 +178,10 @@ pub struct Context<'a> {
     pub pages: Pages<'a>,
     /// Folder that products are written to.
     pub directory: &'a Path,
+    /// All products that a site may have, in order.
+    pub declarations: &'a [&'static Declaration],
     /// Products written so far, with their declarations.
-    pub written: &'a [Written],
+    pub(super) written: &'a [Written],
 }
 
 /// A program, or kind of program, with a section in `exchange/README.txt`.

@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, path::Path};
 
 use serde::{Deserialize, Serialize};
 
-use super::{error::ProductError, product::Declaration};
+use super::error::ProductError;
 use areograph_base::{
     constants::{SPACECRAFT, Spacecraft},
     error::Result,
@@ -44,8 +44,8 @@ pub struct SiteProducts<'a> {
     pub config: &'a SiteConfig,
     /// The outputs of all stages; the fields below are those that many products use.
     pub book: &'a Book,
-    /// All products that a site may have, in order.
-    pub declarations: &'a [&'static Declaration],
+    /// The products that the site has, for links.
+    pub listed: &'a [Listed],
     /// Kernels in load order.
     pub kernels: &'a [KernelLine],
     /// Text of the metakernel that loads them again, its paths relative to the folder of the products.
@@ -80,6 +80,19 @@ pub struct SiteProducts<'a> {
     pub overlays: Option<&'a Overlays>,
     /// Software that computed the products.
     pub program: &'a Program,
+}
+
+/// A product that a site has.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Listed {
+    /// Path below the site's folder.
+    pub path: String,
+    /// Index of the image that it belongs to, if it is of one.
+    pub image: Option<usize>,
+    /// Contents of the file.
+    pub what: &'static str,
+    /// Readers of it.
+    pub readers: &'static str,
 }
 
 /// Software that computes products, besides this version of areograph.

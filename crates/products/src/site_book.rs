@@ -5,6 +5,7 @@ use std::{collections::BTreeMap, path::Path};
 use serde::{Deserialize, Serialize};
 
 use super::{
+    listed::listed,
     product::Declaration,
     site::{AdjustmentProducts, GeometricProducts, ImageProducts, Program, SiteProducts},
 };
@@ -87,10 +88,10 @@ impl SiteBook<'_> {
             }),
         };
         let converted = book.of::<Converted>()?;
-        with(&SiteProducts {
+        let site = SiteProducts {
             config: self.config,
             book,
-            declarations: self.declarations,
+            listed: &[],
             kernels: &book.of::<KernelDescription>()?.kernels,
             metakernel: &self.kernels.metakernel_text(Some(self.folder)),
             required: book.of()?,
@@ -108,7 +109,9 @@ impl SiteBook<'_> {
             geometric,
             overlays: book.find(Round::Initial)?,
             program: &statements.program,
-        })
+        };
+        let listed = &*listed(&site, self.declarations);
+        with(&SiteProducts { listed, ..site })
     }
 }
 

@@ -9,7 +9,7 @@ use super::{
 use std::collections::HashSet;
 
 use areograph_config::{self as config};
-use areograph_products::{SiteProducts, listed};
+use areograph_products::SiteProducts;
 
 pub(super) const SECTION: Section = Section {
     title: "Provenance",
@@ -117,7 +117,7 @@ fn products(site: &SiteProducts) -> String {
     let mut table = Table::new("Products", columns);
     let shown = site.shown_images();
     let is_shown = |index: usize| shown.binary_search(&index).is_ok();
-    let products = listed(site).into_iter();
+    let products = site.listed.iter();
     for product in products.filter(|product| product.image.is_none_or(is_shown)) {
         let place = format!("../{}", product.path);
         table.row(

@@ -3,9 +3,9 @@
 use std::{collections::BTreeMap, fs, path::Path};
 
 use areograph::{
+    capabilities::page,
     config::{SiteConfig, load},
     products::{AdjustmentProducts, GeometricProducts, ImageProducts, Program, SiteProducts},
-    report,
     spice::{KernelSet, RequiredCoverage},
     stages::{
         adjust::Adjusted,
@@ -23,6 +23,7 @@ use areograph::{
         sample_orientation::Orientation,
         tag_times::ImageTimes,
     },
+    store::book::Book,
 };
 use serde::de::DeserializeOwned;
 
@@ -146,8 +147,8 @@ impl Site {
             notes: &[],
             verdict: &verdict,
             overlays: None,
-            orthoimages: &[],
-            surface: None,
+            book: &Book::default(),
+            listed: &[],
             program: &Program::default(),
             geometric: Some(GeometricProducts {
                 ties: &self.ties,
@@ -220,7 +221,7 @@ impl Site {
             complaints: &[],
             profiles: &self.profile_check,
             adjustment: Some(adjustment),
-            surface: None,
+            findings: &[],
             adjustment_failure: None,
         };
         with(&evidence, &adjustment)
@@ -236,6 +237,6 @@ impl Site {
 
     /// Its report.
     pub(crate) fn page(&self) -> String {
-        self.with(report::page).unwrap()
+        self.with(page).unwrap()
     }
 }

@@ -117,7 +117,6 @@ fn files(of: &Context) -> Vec<&'static Declaration> {
         .filter(|(product, declaration)| product.rows > 0 || declaration.rows.is_empty());
     let written = used.map(|(_, declaration)| *declaration);
     let to_come = of
-        .site
         .declarations
         .iter()
         .skip_while(|file| file.path != README.path);
