@@ -18,8 +18,8 @@ use crate::{
     config::SiteConfig,
     error::{Error, Kind},
     flow::{
-        Ending, Observer, PUBLISH, RunOptions, SiteOutcome, check_out, publish_sites, run_site,
-        stages,
+        Ending, Observer, PUBLISH, RunOptions, STAGES, SiteOutcome, check_out, publish_sites,
+        run_site,
     },
     products::REPORT,
     store::{hashes::HashCache, manifest::Manifest, publish::read_manifest},
@@ -55,7 +55,7 @@ pub(super) struct Arguments {
         value_name = "STAGE",
         default_value = PUBLISH,
         hide_default_value = true,
-        value_parser = PossibleValuesParser::new(stages())
+        value_parser = PossibleValuesParser::new(STAGES)
     )]
     until: String,
     /// Run every stage, even if its stored output is up to date.

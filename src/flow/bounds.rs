@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::{
     driver::{Exit, Flow},
-    outline::stages,
+    site::STAGES,
 };
 use crate::{
     error::{Locate, Stopped},
@@ -21,7 +21,7 @@ pub(super) struct Bounds<'a> {
 impl Bounds<'_> {
     /// Leaves the flow before `stage` if it was not requested, or when the user stops the program.
     pub(super) fn enter(&self, stage: &'static str) -> Flow<()> {
-        let place = |name: &str| stages().iter().position(|stage| *stage == name);
+        let place = |name: &str| STAGES.iter().position(|stage| *stage == name);
         if place(self.until) < place(stage) {
             return Err(Exit::StageReached);
         }

@@ -196,7 +196,12 @@ impl Driver for Check<'_> {
         usable.cloned().collect()
     }
 
-    fn attempt<T>(&mut self, stage: &str, result: Result<T>) -> Flow<Option<T>> {
+    fn attempt<T>(
+        &mut self,
+        stage: &str,
+        step: impl FnOnce(&InputFiles) -> Result<T>,
+    ) -> Flow<Option<T>> {
+        let result = step(&self.files);
         Ok(self.note(stage, result))
     }
 

@@ -83,7 +83,7 @@ pub(super) trait Driver {
         paths: &[PathBuf],
     ) -> Flow<Vec<HashedFile>> {
         self.enter(stage)?;
-        let sized = paths.iter().try_for_each(|path| kind.require(path));
+        let sized = |_: &_| paths.iter().try_for_each(|path| kind.require(path));
         match self.attempt(stage, sized)? {
             Some(()) => self.hash(stage, paths),
             None => Ok(Vec::new()),
@@ -95,9 +95,14 @@ pub(super) trait Driver {
         images.to_vec()
     }
 
-    /// Result of a step between stages; `None` if it failed and the driver continues.
-    fn attempt<T>(&mut self, stage: &str, result: Result<T>) -> Flow<Option<T>> {
-        Ok(Some(result.in_stage(stage)?))
+    /// Result of a step between stages, which may read files; `None` if it failed and the driver continues, or if the
+    /// driver reads nothing.
+    fn attempt<T>(
+        &mut self,
+        stage: &str,
+        step: impl FnOnce(&InputFiles) -> Result<T>,
+    ) -> Flow<Option<T>> {
+        Ok(Some(step(self.files()).in_stage(stage)?))
     }
 
     /// The times at which the site reads kernels; `None` while they are not known.

@@ -52,11 +52,12 @@ pub use laser_match::run_match;
 pub use net::run_net;
 pub use observer::{Observer, StageEvent};
 pub use out::{OutError, check_out};
-pub use outline::{stage_count, stages};
+pub use outline::stage_count;
 pub use page::{PageAgain, page_again};
 pub use plan::{SitePlan, plan_site};
 pub use run::{Ending, RunOptions, SiteOutcome, run_site};
 pub use single::SingleOutcome;
+pub use site::STAGES;
 pub use sites::publish_sites;
 
 /// Name of the step that chooses, reads and hashes kernels.

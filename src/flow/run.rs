@@ -35,7 +35,7 @@ use crate::{
 pub struct RunOptions<'a> {
     /// Products go to `<out>/<site>`.
     pub out: PathBuf,
-    /// Last stage to run, one of [`stages`](super::stages).
+    /// Last stage to run, one of [`STAGES`](super::STAGES).
     pub until: &'a str,
     /// Use no stored output.
     pub force: bool,

@@ -1,7 +1,7 @@
 //! The flow of one site, described once: [`site`] is driven by run and plan, its two halves by check.
 
 use super::{
-    LOAD_KERNELS,
+    LOAD_KERNELS, PUBLISH,
     choice::{ChooseKernels, KernelChoice, RivalKernelSets, rival_positions},
     driver::{Driver, Exit, Flow},
     kernels::{load_kernels, required_coverage},
@@ -23,23 +23,67 @@ use crate::{
     spice::{KernelSet, KernelView, RequiredCoverage},
     stage::{InOrder, Output, Round, Stage},
     stages::{
+        adjust::Adjust,
         check_beam::CheckBeam,
+        check_heights::CheckHeights,
         check_profiles::CheckProfiles,
         check_ranges::{CheckRanges, CheckTableRanges},
+        compare_pairs::ComparePairs,
         convert_datum::ConvertDatum,
         describe_kernels::{DescribeKernels, Required},
+        fit_sensor_model::FitSensorModel,
         group_profiles::GroupProfiles,
+        intersect::Intersect,
+        lay_overlays::LayOverlays,
+        map_surface::MapSurface,
+        match_ties::MatchTies,
         orientation::Orientation,
         outline_windows::{OutlineWindows, Windows},
         read_shots::{ReadShots, ShotFiles},
+        read_ties::ReadTies,
+        rectify_images::RectifyImages,
+        register::Register,
+        reorient::Reorient,
         sample_orientation::SampleOrientation,
         search_footprints::{KnownPlaces, PedrFiles, SearchFootprints, SearchResult},
         site_image::{SiteImage, SiteImages},
+        tabulate_kernels::TabulateKernels,
         tag_times::{ImageTimes, TagTimes},
         tag_utc::TagUtc,
     },
     store::book::Book,
 };
+
+/// The names of all steps in their order, for `--until`.
+pub const STAGES: &[&str] = &[
+    LOAD_KERNELS,
+    TagTimes::NAME,
+    OutlineWindows::NAME,
+    SearchFootprints::NAME,
+    ConvertDatum::NAME,
+    TagUtc::NAME,
+    GroupProfiles::NAME,
+    ChooseKernels::NAME,
+    CheckProfiles::NAME,
+    CheckRanges::NAME,
+    SampleOrientation::NAME,
+    DescribeKernels::NAME,
+    FitSensorModel::NAME,
+    Register::NAME,
+    CheckBeam::NAME,
+    ReadTies::NAME,
+    MatchTies::NAME,
+    Intersect::NAME,
+    ComparePairs::NAME,
+    Adjust::NAME,
+    Reorient::NAME,
+    CheckHeights::NAME,
+    TabulateKernels::NAME,
+    MapSurface::NAME,
+    RectifyImages::NAME,
+    LayOverlays::NAME,
+    PUBLISH,
+];
 
 /// The flow of one site, from its configuration to its products.
 pub(super) fn site<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<()> {
@@ -134,12 +178,12 @@ fn found<D: Driver>(
     images: &[Output<ImageTimes>],
     clocks: Option<&KernelSet>,
 ) -> Flow<Output<SearchResult>> {
+    let outlined = outlined(flow, config, images)?;
     let (stage, kind) = (SearchFootprints::NAME, SizedFile::Pedr);
     let files = flow.hash_sized(stage, kind, &config.pedr.files)?;
     let tables = config.shots.iter();
     let tables = tables.map(|table| flow.hash(ReadShots::NAME, &table.files));
     let tables = tables.collect::<Flow<Vec<_>>>()?;
-    let outlined = outlined(flow, config, images)?;
     let windows = Windows {
         written: &config.windows,
         outlined: outlined.as_ref(),
@@ -155,10 +199,13 @@ fn found<D: Driver>(
             kernels: &KernelView::text(clocks),
         });
     }
-    let indexes = Indexes::beside(&config.pedr.files, |path| {
-        flow.files().admit(path).ok()?;
-        Index::read(path)
-    });
+    let indexes = flow.attempt(stage, |files| {
+        Ok(Indexes::beside(&config.pedr.files, |path| {
+            files.admit(path).ok()?;
+            Index::read(path)
+        }))
+    })?;
+    let indexes = indexes.unwrap_or_default();
     flow.stage(&SearchFootprints {
         pedr: &config.pedr,
         files: PedrFiles(&files),
@@ -201,13 +248,11 @@ fn choose<D: Driver>(
     required: Option<&RequiredCoverage>,
 ) -> Flow<(Option<Output<KernelChoice>>, Option<usize>)> {
     flow.enter(ChooseKernels::NAME)?;
-    let rivals = rival_positions(config, flow.files());
-    let rivals = flow
-        .attempt(ChooseKernels::NAME, rivals)?
-        .unwrap_or_default();
-    if rivals.is_empty() {
+    if !matches!(config.kernels.source, KernelSource::Sets(_)) {
         return Ok((None, Some(0)));
     }
+    let rivals = flow.attempt(ChooseKernels::NAME, |files| rival_positions(config, files))?;
+    let rivals = rivals.unwrap_or_default();
     let choice = flow.stage(&ChooseKernels {
         sets: RivalKernelSets::new(&rivals),
         required: Required(required),
@@ -239,7 +284,7 @@ pub(super) fn orient<D: Driver>(
     })?;
     // One session at a time: the session of the positions ends here.
     let ranges = {
-        let view = KernelView::positions(kernels.as_ref());
+        let view = |_: &_| KernelView::positions(kernels.as_ref());
         let view = flow.attempt(CheckRanges::NAME, view)?;
         let view = &view.unwrap_or_else(|| KernelView::all(None));
         if config.shots.is_empty() {
@@ -335,6 +380,7 @@ pub(super) fn kernels<D: Driver>(
         (KernelSource::Root(_), None) => return Ok(None),
         (_, required) => required.unwrap_or(&nothing),
     };
-    let loaded = load_kernels(config, required, chosen, flow.files());
-    flow.attempt(LOAD_KERNELS, loaded)
+    flow.attempt(LOAD_KERNELS, |files| {
+        load_kernels(config, required, chosen, files)
+    })
 }

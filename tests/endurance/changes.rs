@@ -16,7 +16,7 @@ use std::{
 
 use areograph::{
     config::{self, DeclaredKey, ValueKind},
-    flow::{Ending, PUBLISH, RunOptions, StageReason, plan_site, run_site, stages},
+    flow::{Ending, PUBLISH, RunOptions, STAGES, StageReason, plan_site, run_site},
     stage::Reason,
     store::hashes::HashCache,
 };
@@ -39,7 +39,7 @@ fn options<'a>(out: &Path, until: &'a str, hashes: &'a HashCache) -> RunOptions<
 
 /// The stage before the products: a run up to it makes every stage's output.
 fn last_stage() -> &'static str {
-    let (publish, before) = stages().split_last().unwrap();
+    let (publish, before) = STAGES.split_last().unwrap();
     assert_eq!(*publish, PUBLISH);
     before.last().unwrap()
 }
@@ -847,7 +847,7 @@ fn over_a_random_walk_of_changes_a_run_gives_what_a_clean_run_gives() {
         };
         // Products follow from the outputs of stages: those of every tenth step are made and compared.
         let until = if dice.below(8) == 0 {
-            stages()[dice.below(stages().len())]
+            STAGES[dice.below(STAGES.len())]
         } else if step % 10 == 9 {
             PUBLISH
         } else {
