@@ -6,7 +6,10 @@
 //! many products use have these in the crates `products`, `report` and `stages/judge`.
 
 mod orthoimages;
+mod spacing;
 mod terrain;
+
+pub use spacing::{MeasureSpacing, Neighbours, ProfileSpacing};
 
 use std::{collections::BTreeMap, path::Path, sync::LazyLock};
 
@@ -33,7 +36,11 @@ struct Capability {
 }
 
 /// All capabilities, in the order of their products and sections.
-static CAPABILITIES: &[&Capability] = &[&terrain::CAPABILITY, &orthoimages::CAPABILITY];
+static CAPABILITIES: &[&Capability] = &[
+    &terrain::CAPABILITY,
+    &orthoimages::CAPABILITY,
+    &spacing::CAPABILITY,
+];
 
 /// All products that a site may have, in the order in which they are written.
 #[must_use]

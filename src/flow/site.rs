@@ -12,6 +12,7 @@ use super::{
     triangulate::triangulate,
 };
 use crate::{
+    capabilities::MeasureSpacing,
     config::{ImageConfig, SiteConfig, WindowConfig},
     footprints::Footprints,
     geom::window::WindowShape,
@@ -65,6 +66,7 @@ pub const STAGES: &[&str] = &[
     GroupProfiles::NAME,
     ChooseKernels::NAME,
     CheckProfiles::NAME,
+    MeasureSpacing::NAME,
     CheckRanges::NAME,
     SampleOrientation::NAME,
     DescribeKernels::NAME,
@@ -282,6 +284,10 @@ pub(super) fn orient<D: Driver>(
         profiles: &profiles,
         laser_surface: &config.laser_surface,
     })?;
+    let spacing = flow.stage(&MeasureSpacing {
+        converted: &converted,
+        profiles: &profiles,
+    })?;
     // One session at a time: the session of the positions ends here.
     let ranges = {
         let view = |_: &_| KernelView::positions(kernels.as_ref());
@@ -332,6 +338,7 @@ pub(super) fn orient<D: Driver>(
     book.enter(round, utc)?;
     book.enter(round, profiles)?;
     book.enter(round, checked)?;
+    book.enter(round, spacing)?;
     book.enter(round, described)?;
     book.enter(round, ranges)?;
     book.enter(round, beam)?;

@@ -30,6 +30,8 @@ pub enum CheckKind {
     RangeOutliers,
     /// Shots of the longest profile.
     Shots,
+    /// Share of the shots of a profile that are missing.
+    ShotsMissing,
     /// Clock correction of least spread minus the configured one.
     ClockCorrection,
     /// Footprints of simultaneous shots in an image, of those that the mountings of camera and laser place in it.
@@ -168,6 +170,7 @@ impl CheckKind {
             Self::Decoding => "Range − distance, orbit of the PEDR",
             Self::RangeOutliers => "Outliers among ranges",
             Self::Shots => "Shots in the longest profile",
+            Self::ShotsMissing => "Missing shots of a profile",
             Self::ClockCorrection => "Clock correction, best − configured",
             Self::FootprintsInside => "Simultaneous footprints in the image",
             Self::SupportPosition => "Position in support data against the PEDR",
@@ -239,6 +242,7 @@ impl CheckKind {
             | Self::Seams => "m",
             Self::HeightOutliers
             | Self::RangeOutliers
+            | Self::ShotsMissing
             | Self::WithheldStretches
             | Self::SurfaceFilled
             | Self::TiesRejected
