@@ -170,6 +170,7 @@ fn row(column: &Meaning) -> String {
         Kind::Natural => "natural number",
         Kind::Integer => "integer",
         Kind::Flag => "true or false",
+        Kind::Time => "time, UTC",
         Kind::Text => "text",
         Kind::Bytes => "bytes",
     };

@@ -80,6 +80,7 @@ impl Serialize for Properties<'_> {
                 Values::Natural(of) => map.serialize_entry(name, &of[self.row])?,
                 Values::Integer(of) => map.serialize_entry(name, &of[self.row])?,
                 Values::Flag(of) => map.serialize_entry(name, &of[self.row])?,
+                Values::Time(of) => map.serialize_entry(name, &of[self.row].to_string())?,
                 Values::Text(of) => map.serialize_entry(name, &of[self.row])?,
                 Values::Bytes(_) => {}
             }
@@ -161,6 +162,7 @@ fn attribute(column: &Meaning) -> Value {
         Kind::Natural => json!({ "type": "integer", "minimum": 0 }),
         Kind::Integer => json!({ "type": "integer" }),
         Kind::Flag => json!({ "type": "boolean" }),
+        Kind::Time => json!({ "type": "string", "format": "date-time" }),
         Kind::Text | Kind::Bytes => json!({ "type": "string" }),
     };
     schema["description"] = json!(column.description);

@@ -52,6 +52,7 @@ mod product;
 mod profile_check;
 mod ranges;
 pub mod read;
+mod registered_footprints;
 mod registration;
 mod registry;
 mod rows_file;

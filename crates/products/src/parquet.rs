@@ -11,18 +11,21 @@ use ::parquet::{
 };
 use arrow_array::{
     ArrayRef, BinaryArray, BooleanArray, Float64Array, Int32Array, RecordBatch, StringArray,
-    UInt32Array,
+    TimestampMillisecondArray, UInt32Array,
 };
-use arrow_schema::{DataType, Field, Schema, SchemaRef};
+use arrow_schema::{DataType, Field, Schema, SchemaRef, TimeUnit};
 use rayon::prelude::*;
 
 use super::{
     error::ProductError,
     files::{create, finish, open},
     parquet_file::ParquetFile,
-    table::{Kind, Meaning, Table, Values},
+    table::{Kind, Meaning, Table, Utc, Values},
 };
 use areograph_base::error::{Error, IoError, Locate, Result};
+
+/// Zone of instants in the schema of a file.
+const UTC: &str = "UTC";
 
 /// Writes `table` with `metadata` (key, value) and reads it back.
 ///
@@ -70,6 +73,7 @@ fn field(column: &Meaning) -> Field {
         Kind::Natural => DataType::UInt32,
         Kind::Integer => DataType::Int32,
         Kind::Flag => DataType::Boolean,
+        Kind::Time => DataType::Timestamp(TimeUnit::Millisecond, Some(UTC.into())),
         Kind::Text => DataType::Utf8,
         Kind::Bytes => DataType::Binary,
     };
@@ -106,6 +110,11 @@ fn array(values: Values) -> ArrayRef {
         Values::Natural(values) => Arc::new(UInt32Array::from(values)),
         Values::Integer(values) => Arc::new(Int32Array::from(values)),
         Values::Flag(values) => Arc::new(BooleanArray::from(values)),
+        Values::Time(values) => {
+            let values = values.into_iter().map(|Utc(ms)| ms);
+            let times = TimestampMillisecondArray::from_iter_values(values);
+            Arc::new(times.with_timezone(UTC))
+        }
         Values::Text(values) => Arc::new(StringArray::from_iter_values(values)),
         Values::Bytes(values) => Arc::new(BinaryArray::from_iter_values(values)),
     }

@@ -90,6 +90,7 @@ const fn data_type(kind: Kind) -> Option<&'static str> {
         Kind::Real => "ASCII_Real",
         Kind::Natural | Kind::Integer => "ASCII_Integer",
         Kind::Flag => "ASCII_Boolean",
+        Kind::Time => "ASCII_Date_Time_YMD_UTC",
         Kind::Text => "UTF8_String",
         Kind::Bytes => return None,
     })

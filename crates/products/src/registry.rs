@@ -5,7 +5,7 @@ use super::{
     exchange::{adjusted, geopackage, jigsaw, matched, readme, shapefile, stac, tables},
     figures, footprints, heights, isd, kernel_report, orientation, overlays, page, page_data,
     product::Declaration,
-    profile_check, ranges, registration, ties,
+    profile_check, ranges, registered_footprints, registration, ties,
 };
 
 /// Products before those of further capabilities. Those of an image that follow each other are written image by image.
@@ -30,6 +30,8 @@ static FIRST: &[&Declaration] = &[
     &heights::TABLE,
     &correlations::TABLE,
     &adjustment::DOCUMENT,
+    &registered_footprints::PARQUET,
+    &registered_footprints::CSV,
     &registration::ADJUSTED,
     &orientation::ADJUSTED_TABLE,
     &orientation::ADJUSTED_DOCUMENT,
@@ -51,6 +53,7 @@ static LAST: &[&Declaration] = &[
     &tables::ODE,
     &tables::ODE_SIDECAR,
     &geopackage::GEOPACKAGE,
+    &registered_footprints::GEOPACKAGE,
     &shapefile::POINTS,
     &shapefile::INDEX,
     &shapefile::ATTRIBUTES,

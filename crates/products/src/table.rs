@@ -5,8 +5,9 @@
 //! column("range_m", Unit::Metre, "one-way range", |shot: &Shot| shot.range_m).in_gis().in_dbase("range_m", 12, 3)
 //! ```
 
-use std::{borrow::Cow, ops::Range};
+use std::{borrow::Cow, fmt, ops::Range};
 
+use chrono::{DateTime, NaiveDateTime};
 use rayon::prelude::*;
 
 use super::error::ProductError;
@@ -58,6 +59,8 @@ pub(super) enum Kind {
     Natural,
     Integer,
     Flag,
+    /// An instant of UTC.
+    Time,
     Text,
     /// Only Parquet has such columns.
     Bytes,
@@ -182,6 +185,25 @@ impl<R> Column<R> {
     }
 }
 
+/// An instant of UTC, milliseconds since 1970 without leap seconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Utc(pub(super) i64);
+
+impl Utc {
+    /// Of an ISO 8601 text without a zone letter; `None` for any other text. A leap second becomes the second after it.
+    pub(super) fn parsed(text: &str) -> Option<Self> {
+        let time = NaiveDateTime::parse_from_str(text, "%Y-%m-%dT%H:%M:%S%.f").ok()?;
+        Some(Self(time.and_utc().timestamp_millis()))
+    }
+}
+
+impl fmt::Display for Utc {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let time = DateTime::from_timestamp_millis(self.0).unwrap_or_default();
+        write!(to, "{}", time.format("%Y-%m-%dT%H:%M:%S%.3fZ"))
+    }
+}
+
 /// Type of a column's values.
 pub(super) trait Cell: Sized {
     const KIND: Kind;
@@ -215,6 +237,7 @@ cells! {
     u32: Natural, Natural;
     i32: Integer, Integer;
     bool: Flag, Flag;
+    Utc: Time, Time;
     String: Text, Text;
     Vec<u8>: Bytes, Bytes;
 }

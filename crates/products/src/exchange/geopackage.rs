@@ -88,6 +88,7 @@ fn create_table(table: &str, attributes: &Table) -> String {
             Kind::Real => "DOUBLE",
             Kind::Natural | Kind::Integer => "INTEGER",
             Kind::Flag => "BOOLEAN",
+            Kind::Time => "DATETIME",
             Kind::Text => "TEXT",
             Kind::Bytes => "BLOB",
         };
@@ -118,6 +119,7 @@ fn value(values: &Values, row: usize) -> Value {
         Values::Natural(of) => Value::Integer(of[row].into()),
         Values::Integer(of) => Value::Integer(of[row].into()),
         Values::Flag(of) => Value::Integer(of[row].into()),
+        Values::Time(of) => Value::Text(of[row].to_string()),
         Values::Text(of) => Value::Text(of[row].clone()),
         Values::Bytes(of) => Value::Blob(of[row].clone()),
     }

@@ -189,7 +189,8 @@ fn cell(values: &Values, row: usize) -> Cell<'_> {
         Values::Integer(of) => Cell::Number(Some(of[row].into())),
         Values::Flag(of) => Cell::Number(Some(of[row].into())),
         Values::Text(of) => Cell::Text(&of[row]),
-        Values::Bytes(_) => Cell::Text(""),
+        // No column of instants is a field of dBASE.
+        Values::Time(_) | Values::Bytes(_) => Cell::Text(""),
     }
 }
 

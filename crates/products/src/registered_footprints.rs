@@ -1,0 +1,417 @@
+//! Registered footprints: one table with every footprint that an image shows, on the ground and in the image, before and
+//! after the adjustment.
+//!
+//! The other tables are complete and separate: all footprints (`footprints`), all of them in all images
+//! (`registration`), those in the adjustment (`adjusted_footprints`). A user of footprints on images needs a part of each.
+
+use std::collections::BTreeMap;
+
+use super::{
+    coordinates::{bounding_box_deg, degrees, frame, signed_longitude_deg},
+    error::ProductError,
+    exchange::geopackage,
+    geoparquet::{geo_metadata, well_known_binary},
+    gis::Features,
+    parquet,
+    product::{Content, Context, Declaration, Program, Role, Use, Write},
+    site::{ImageProducts, SiteProducts},
+    table::{Column, Meaning, Table, Unit, Utc, column, meanings},
+    text_table,
+};
+use areograph_base::error::Result;
+use areograph_config::ShotFormat;
+use areograph_stages::{
+    adjust::{CorrectedPoint, PointKind},
+    register::RegisteredPoints,
+};
+
+/// Lines and samples of ISIS count from 1 at the centre of the first pixel, ours from 0 at its edge.
+const ISIS_OFFSET: f64 = 0.5;
+/// Sites with these products.
+const SITES: &str = "a site with footprints inside its images";
+const WHAT: &str = "every footprint that an image shows, on the ground and in the image, before and after the adjustment";
+
+pub(super) static PARQUET: Declaration = Declaration {
+    path: "registered_footprints.parquet",
+    what: WHAT,
+    readers: "scripts, GIS",
+    rows: "footprints inside images",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&columns())),
+    write: Write::Where {
+        sites: SITES,
+        has,
+        write: |path, of| {
+            let rows = rows(of.site)?;
+            let points: Vec<[f64; 2]> = rows.iter().map(Row::point_deg).collect();
+            let body = of.site.config.body;
+            let bounds = bounding_box_deg(&points);
+            let metadata = vec![
+                ("geo", geo_metadata(body, bounds, None).to_string()),
+                ("frame", frame(body).to_owned()),
+            ];
+            parquet::write(path, table(of.site, rows), metadata)
+        },
+    },
+    uses: &[Use {
+        program: Program::Gis,
+        lines: "python3 -c 'import geopandas; print(geopandas.read_parquet(\"../registered_footprints.parquet\"))'",
+    }],
+};
+
+pub(super) static CSV: Declaration = Declaration {
+    path: "registered_footprints.csv",
+    what: WHAT,
+    readers: "scripts",
+    rows: "footprints inside images",
+    role: Role::Data,
+    content: Content::Table(text_columns),
+    write: Write::Where {
+        sites: "a site with footprints inside its images, format `csv`",
+        has: |site| site.has_footprints_in(ShotFormat::Csv) && has(site),
+        write: |path, of| text_table::write(path, table(of.site, rows(of.site)?)),
+    },
+    uses: &[],
+};
+
+pub(super) static GEOPACKAGE: Declaration = Declaration {
+    path: "exchange/registered_footprints.gpkg",
+    what: WHAT,
+    readers: "GIS",
+    rows: "footprints inside images",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::Where {
+        sites: "a site with footprints inside its images, format `gpkg`",
+        has: |site| site.has_footprints_in(ShotFormat::Gpkg) && has(site),
+        write: |path, of| geopackage::write(path, features(of, rows(of.site)?)),
+    },
+    uses: &[Use {
+        program: Program::Gis,
+        lines: "ogrinfo -al -so registered_footprints.gpkg       footprints inside images",
+    }],
+};
+
+/// Whether a footprint is inside an image.
+fn has(site: &SiteProducts) -> bool {
+    let adjusted = site.adjustment().map(|(_, of)| of.images);
+    let mut images = site.images.iter().chain(adjusted.unwrap_or_default());
+    images.any(|image| image.registration.points.inside_count() > 0)
+}
+
+/// A footprint that an image shows.
+struct Row<'a> {
+    site: &'a SiteProducts<'a>,
+    image: &'a ImageProducts<'a>,
+    /// Row of the footprint.
+    footprint: usize,
+    profile: usize,
+    utc: Utc,
+    /// Its place with the orientation of the kernels, and with the adjusted one.
+    places: [Option<Place>; 2],
+    /// The footprint after the adjustment.
+    adjusted: Option<&'a CorrectedPoint>,
+}
+
+/// A place in an image.
+#[derive(Clone, Copy)]
+struct Place {
+    line: f64,
+    sample: f64,
+    inside: bool,
+}
+
+impl Place {
+    fn of(points: &RegisteredPoints, at: usize) -> Self {
+        Self {
+            line: points.line[at],
+            sample: points.sample[at],
+            inside: points.inside[at],
+        }
+    }
+}
+
+impl Row<'_> {
+    fn point_deg(&self) -> [f64; 2] {
+        let footprints = self.site.footprints;
+        [
+            signed_longitude_deg(footprints.longitude_rad[self.footprint]),
+            degrees(footprints.latitude_rad[self.footprint]),
+        ]
+    }
+
+    /// Height of the ground above the sphere of the body's maps, metres.
+    fn height_m(&self) -> f64 {
+        let radius_m = self.site.footprints.ground_radius_m(self.footprint);
+        radius_m - self.site.config.body.map().radius_m
+    }
+
+    /// Shift in the image by the adjustment, pixels.
+    fn moved_px(&self) -> Option<f64> {
+        let [before, after] = self.places;
+        let (before, after) = (before?, after?);
+        Some((after.line - before.line).hypot(after.sample - before.sample))
+    }
+}
+
+/// The footprints inside images, image by image, in the order of the registration.
+///
+/// # Errors
+/// A time that is not UTC, which is a bug in areograph.
+fn rows<'a>(site: &'a SiteProducts<'a>) -> Result<Vec<Row<'a>>> {
+    let adjustment = site.adjustment().map(|(_, adjustment)| adjustment);
+    let mut adjusted: BTreeMap<usize, &CorrectedPoint> = BTreeMap::new();
+    if let Some(adjustment) = &adjustment {
+        let points = adjustment.adjusted.points.iter();
+        let shots = points.filter(|point| point.kind == PointKind::Shot);
+        adjusted.extend(shots.map(|point| (point.index, point)));
+    }
+    let mut rows = Vec::new();
+    for (index, image) in site.images.iter().enumerate() {
+        let after = adjustment.as_ref().and_then(|of| of.images.get(index));
+        for (footprint, (profile, places)) in places(image, after) {
+            rows.push(Row {
+                site,
+                image,
+                footprint,
+                profile,
+                utc: utc(&site.utc[footprint])?,
+                places,
+                adjusted: adjusted.get(&footprint).copied(),
+            });
+        }
+    }
+    Ok(rows)
+}
+
+fn utc(text: &str) -> Result<Utc> {
+    let parsed = Utc::parsed(text);
+    parsed.ok_or_else(|| ProductError::refused("read a UTC time")(text).into())
+}
+
+/// Profile and places of every footprint that the image shows before or after the adjustment, by its row. A footprint in
+/// several windows has the first of its profiles.
+fn places(
+    before: &ImageProducts,
+    after: Option<&ImageProducts>,
+) -> BTreeMap<usize, (usize, [Option<Place>; 2])> {
+    let mut places: BTreeMap<usize, (usize, [Option<Place>; 2])> = BTreeMap::new();
+    for (round, image) in [Some(before), after].into_iter().enumerate() {
+        let Some(points) = image.map(|image| &image.registration.points) else {
+            continue;
+        };
+        for at in 0..points.len() {
+            let profile = points.profile[at] as usize;
+            let entry = places.entry(points.row[at] as usize);
+            let (_, of_rounds) = entry.or_insert((profile, [None; 2]));
+            of_rounds[round].get_or_insert(Place::of(points, at));
+        }
+    }
+    places.retain(|_, (_, places)| places.iter().flatten().any(|place| place.inside));
+    places
+}
+
+fn table<'a>(site: &SiteProducts<'a>, rows: Vec<Row<'a>>) -> Table<'a> {
+    Table::new(columns(), rows).in_words(&site.config.wording())
+}
+
+/// The columns of the CSV file.
+fn text_columns() -> Vec<Meaning> {
+    let table = Table::new(columns(), Vec::new()).for_text();
+    table.columns().cloned().collect()
+}
+
+fn features<'a>(of: &Context<'a>, rows: Vec<Row<'a>>) -> Features<'a> {
+    let site = of.site;
+    let body = site.config.body;
+    let points = rows.iter().map(|row| {
+        let [east_deg, north_deg] = row.point_deg();
+        [east_deg, north_deg, row.height_m()]
+    });
+    let points = points.collect();
+    let newest_utc = site.utc.iter().max().map_or("", String::as_str);
+    let name = &site.config.site;
+    Features {
+        table: "registered_footprints",
+        z: format!(
+            "z: radius of the ground minus {} m, metres",
+            body.map().radius_m
+        ),
+        ..Features::of_footprints(body, name, newest_utc, points, table(site, rows))
+    }
+}
+
+fn columns<'a>() -> Vec<Column<Row<'a>>> {
+    let mut columns = shot();
+    columns.extend(ground());
+    columns.extend(image());
+    columns.extend(adjusted());
+    let columns = columns.into_iter().map(Column::in_gis);
+    let mut columns: Vec<Column<Row>> = columns.collect();
+    columns.push(column(
+        "geometry",
+        Unit::None,
+        "point, longitude (-180..180) and areocentric latitude in degrees, well-known binary",
+        |row: &Row| well_known_binary(row.point_deg()),
+    ));
+    columns
+}
+
+/// Names and time of the shot.
+fn shot<'a>() -> Vec<Column<Row<'a>>> {
+    vec![
+        column("image", Unit::None, "image identifier", |row: &Row| {
+            row.image.times.id.clone()
+        }),
+        column(
+            "profile",
+            Unit::None,
+            "profile: window, orbit and crossing",
+            |row: &Row| {
+                let profile = row.site.profiles.get(row.profile);
+                profile.map_or_else(String::new, |profile| profile.id.clone())
+            },
+        ),
+        column(
+            "orbit",
+            Unit::None,
+            "orbit number of the frame",
+            |row: &Row| row.site.footprints.orbit[row.footprint],
+        ),
+        column(
+            "record",
+            Unit::None,
+            "record of the PEDR file, counted from 1 with its label records",
+            |row: &Row| row.site.footprints.record[row.footprint],
+        ),
+        column(
+            "shot",
+            Unit::None,
+            "number of the shot in its frame, 1 to 20",
+            |row: &Row| u32::from(row.site.footprints.shot[row.footprint]),
+        ),
+        column(
+            "footprint_row",
+            Unit::None,
+            "row of the footprint in footprints.parquet, counted from 0",
+            |row: &Row| u32::try_from(row.footprint).unwrap_or(u32::MAX),
+        ),
+        column(
+            "utc",
+            Unit::None,
+            "time of the shot after the MOLA clock correction, UTC",
+            |row: &Row| row.utc,
+        ),
+    ]
+}
+
+/// Place on the ground.
+fn ground<'a>() -> Vec<Column<Row<'a>>> {
+    vec![
+        column(
+            "longitude_deg",
+            Unit::Degree,
+            "east longitude, 0..360 degrees, IAU 2000",
+            |row: &Row| degrees(row.site.footprints.longitude_rad[row.footprint]),
+        ),
+        column(
+            "latitude_deg",
+            Unit::Degree,
+            "areocentric latitude, degrees, IAU 2000",
+            |row: &Row| degrees(row.site.footprints.latitude_rad[row.footprint]),
+        ),
+        column(
+            "radius_m",
+            Unit::Metre,
+            "radius of the ground: the one that all stages use, metres",
+            |row: &Row| row.site.footprints.ground_radius_m(row.footprint),
+        ),
+        column(
+            "height_m",
+            Unit::Metre,
+            "the same above the sphere of the body's maps, metres",
+            Row::height_m,
+        ),
+        column(
+            "topography_m",
+            Unit::Metre,
+            "radius after the crossover correction minus areoid radius, metres",
+            |row: &Row| row.site.footprints.row(row.footprint).topography_m(),
+        ),
+    ]
+}
+
+/// Place in the image.
+fn image<'a>() -> Vec<Column<Row<'a>>> {
+    type Of = fn(Place) -> f64;
+    let ours = "0 at the start of the first line and the outer edge of the first pixel, 0.5 at their centres";
+    let isis = "1 at the centre of the first line and the first pixel, as in ISIS";
+    let of: [([&'static str; 2], Unit, Of, &'static str); 4] = [
+        (
+            ["before_line", "adjusted_line"],
+            Unit::Line,
+            |of| of.line,
+            ours,
+        ),
+        (
+            ["before_sample", "adjusted_sample"],
+            Unit::Pixel,
+            |of| of.sample,
+            ours,
+        ),
+        (
+            ["before_isis_line", "adjusted_isis_line"],
+            Unit::Line,
+            |of| of.line + ISIS_OFFSET,
+            isis,
+        ),
+        (
+            ["before_isis_sample", "adjusted_isis_sample"],
+            Unit::Pixel,
+            |of| of.sample + ISIS_OFFSET,
+            isis,
+        ),
+    ];
+    let mut columns = Vec::new();
+    for round in 0..2 {
+        for (names, unit, of, meaning) in of {
+            columns.push(column(names[round], unit, meaning, move |row: &Row| {
+                row.places[round].map(of)
+            }));
+        }
+    }
+    let inside =
+        |round: usize| move |row: &Row| row.places[round].is_some_and(|place| place.inside);
+    columns.push(column(
+        "before_inside",
+        Unit::None,
+        "whether the delivered image shows the footprint with the orientation of the kernels",
+        inside(0),
+    ));
+    columns.push(column(
+        "adjusted_inside",
+        Unit::None,
+        "the same with the adjusted orientation; false without an adjustment",
+        inside(1),
+    ));
+    columns.push(column(
+        "moved_px",
+        Unit::Pixel,
+        "distance between both places in the image, pixels",
+        Row::moved_px,
+    ));
+    columns
+}
+
+/// Uncertainty on the ground.
+fn adjusted<'a>() -> Vec<Column<Row<'a>>> {
+    let names = ["sigma_east_m", "sigma_north_m", "sigma_up_m"];
+    let columns = names.into_iter().enumerate().map(|(axis, name)| {
+        let meaning = "standard deviation of the adjusted footprint towards east, north or up, metres, with the shift of its \
+                       profile; missing for footprints that are not part of the adjustment";
+        column(name, Unit::Metre, meaning, move |row: &Row| {
+            Some(row.adjusted?.local_sigmas_m()[axis])
+        })
+    });
+    columns.collect()
+}

@@ -1,0 +1,107 @@
+//! The table of registered footprints against the tables that it joins, and in the programs of its readers.
+#![allow(clippy::unwrap_used, reason = "helpers of tests may fail loudly")]
+
+use std::{collections::BTreeMap, path::Path};
+
+use crate::common::{
+    json,
+    mission::site_run,
+    products_site::Site,
+    readers::{output, python},
+};
+use areograph::capabilities::write_products;
+use serde_json::{Value, json};
+
+/// The rows of a CSV file by column.
+fn rows(path: &Path) -> Vec<BTreeMap<String, String>> {
+    let mut file = csv::Reader::from_path(path).unwrap();
+    file.deserialize().map(Result::unwrap).collect()
+}
+
+fn number(row: &BTreeMap<String, String>, name: &str) -> f64 {
+    row[name].parse().unwrap()
+}
+
+#[test]
+fn footprints_inside_images_have_one_row_with_both_places() {
+    let folder = site_run("gusev_crater");
+    let registered = rows(&folder.join("registered_footprints.csv"));
+    let footprints = rows(&folder.join("footprints.csv"));
+    let inside = |name: &str| registered.iter().filter(|row| row[name] == "true").count();
+    let counted = &json(&folder.join("manifest.json"))["counts"]["registered_inside"];
+    assert_eq!(*counted, inside("before_inside"));
+    assert!(inside("adjusted_inside") > 0);
+    for row in &registered {
+        assert!(row["before_inside"] == "true" || row["adjusted_inside"] == "true");
+        let footprint = &footprints[row["footprint_row"].parse::<usize>().unwrap()];
+        for name in [
+            "longitude_deg",
+            "latitude_deg",
+            "topography_m",
+            "orbit",
+            "shot",
+        ] {
+            assert_eq!(row[name], footprint[name], "{name}");
+        }
+        let [before, after] = ["before", "adjusted"].map(|round| {
+            ["line", "sample"].map(|axis| {
+                let ours = number(row, &format!("{round}_{axis}"));
+                let isis = number(row, &format!("{round}_isis_{axis}"));
+                // Rounding of numbers of some thousand pixels.
+                assert!((isis - ours - 0.5).abs() < 1e-9);
+                ours
+            })
+        });
+        let moved_px = (after[0] - before[0]).hypot(after[1] - before[1]);
+        assert!((number(row, "moved_px") - moved_px).abs() < 1e-9);
+        // The footprints inside these images are part of the adjustment.
+        assert!(number(row, "sigma_up_m") > 0.0);
+        assert!(row["utc"].ends_with('Z'));
+    }
+    let shown = |id: &str| registered.iter().filter(|row| row["image"] == id).count();
+    assert_eq!(shown("E02-00665") + shown("E02-01453"), registered.len());
+    // Times advance as the times of the shots: of the first and the last footprint, to a millisecond.
+    let [first, last] = [&registered[0], registered.last().unwrap()];
+    let utc_s = |row: &BTreeMap<String, String>| {
+        let time = chrono::DateTime::parse_from_rfc3339(&row["utc"]).unwrap();
+        time.timestamp_millis() as f64 / 1e3
+    };
+    let et_s = |row: &BTreeMap<String, String>| {
+        number(
+            &footprints[row["footprint_row"].parse::<usize>().unwrap()],
+            "et_s",
+        )
+    };
+    let apart_s = (utc_s(last) - utc_s(first)) - (et_s(last) - et_s(first));
+    assert!(apart_s.abs() < 2e-3, "{apart_s} s");
+}
+
+#[test]
+fn geopandas_and_duckdb_read_the_times_as_times() {
+    let folder = site_run("gusev_crater");
+    let Some(mut script) = python("read_registered.py", "GeoPandas and DuckDB") else {
+        return;
+    };
+    let path = folder.join("registered_footprints.parquet");
+    let found: Value = serde_json::from_str(&output(script.arg(path))).unwrap();
+    let registered = rows(&folder.join("registered_footprints.csv"));
+    assert_eq!(found["rows"], registered.len());
+    assert_eq!(found["crs"], json!(["IAU_2015", "49900"]));
+    assert_eq!(found["time"], "datetime64[ms, UTC]");
+    assert_eq!(found["duckdb_time"], "TIMESTAMP WITH TIME ZONE");
+    assert_eq!(found["span_ms"], found["geopandas_span_ms"]);
+    let oldest = registered.iter().map(|row| &*row["utc"]).min().unwrap();
+    let first = found["first"].as_str().unwrap().replace("+00:00", "Z");
+    let first = first.replace("000Z", "Z");
+    assert_eq!(first, oldest);
+}
+
+#[test]
+fn a_site_without_images_has_no_such_table() {
+    let folder = tempfile::tempdir().unwrap();
+    Site::small()
+        .with(false, |site| write_products(folder.path(), site, ""))
+        .unwrap();
+    assert!(!folder.path().join("registered_footprints.parquet").exists());
+    assert!(!folder.path().join("registered_footprints.csv").exists());
+}
