@@ -165,7 +165,7 @@ static DOCUMENT: Declaration = Declaration {
     content: Content::Document(|| DocumentSchema::of::<Document>("spacing")),
     write: Write::Where {
         sites: "a site with profiles",
-        has: |site| !site.profiles.is_empty(),
+        has: |site| !site.profiles.is_empty() && site.has::<Vec<ProfileSpacing>>(),
         write: |path, of| {
             let document = Document::of(of.site)?;
             write_json(path, &document)?;
@@ -231,7 +231,7 @@ const SECTION: Section = Section {
     title: "Spacing of shots",
     anchor: "spacing",
     checks: &[CheckKind::ShotsMissing],
-    appears: |site| !site.profiles.is_empty(),
+    appears: |site| !site.profiles.is_empty() && site.has::<Vec<ProfileSpacing>>(),
     write,
 };
 

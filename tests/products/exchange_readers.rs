@@ -455,6 +455,9 @@ fn the_pds4_label_describes_every_field_of_the_table() {
                 "ASCII_Real" => row[column].parse::<f64>().is_ok_and(f64::is_finite),
                 "ASCII_Integer" => row[column].parse::<i64>().is_ok(),
                 "ASCII_Boolean" => ["true", "false"].contains(&row[column]),
+                "ASCII_Date_Time_YMD_UTC" => {
+                    chrono::DateTime::parse_from_rfc3339(row[column]).is_ok()
+                }
                 "UTF8_String" => !row[column].contains('"'),
                 _ => false,
             };

@@ -7,7 +7,7 @@ use std::{collections::BTreeMap, fs::File};
 use areograph::{
     capabilities::{self, write_products},
     geom::height_grid::HeightGrid,
-    products::{PageData, SiteProducts},
+    products::{PageData, SiteProducts, listed},
     stage::{Output, Provenance, Round},
     stages::{
         map_surface::{ShotComparison, Surface, SurfaceAccount, SurfaceLook, SurfaceModel},
@@ -128,6 +128,11 @@ fn files_and_page_state_what_was_computed() {
         let site = SiteProducts {
             book: &book,
             ..*site
+        };
+        let listed = listed(&site, capabilities::declarations());
+        let site = SiteProducts {
+            listed: &listed,
+            ..site
         };
         write_products(folder.path(), &site, "").unwrap();
         let id = site.images[0].times.id.clone();

@@ -60,11 +60,11 @@ fn footprints_inside_images_have_one_row_with_both_places() {
     }
     let shown = |id: &str| registered.iter().filter(|row| row["image"] == id).count();
     assert_eq!(shown("E02-00665") + shown("E02-01453"), registered.len());
-    // Times advance as the times of the shots: of the first and the last footprint, to a millisecond.
+    // Times advance as the times of the shots; over the year TDB departs from TT by up to 1.7 ms.
     let [first, last] = [&registered[0], registered.last().unwrap()];
     let utc_s = |row: &BTreeMap<String, String>| {
         let time = chrono::DateTime::parse_from_rfc3339(&row["utc"]).unwrap();
-        time.timestamp_millis() as f64 / 1e3
+        time.timestamp_micros() as f64 / 1e6
     };
     let et_s = |row: &BTreeMap<String, String>| {
         number(
@@ -73,7 +73,7 @@ fn footprints_inside_images_have_one_row_with_both_places() {
         )
     };
     let apart_s = (utc_s(last) - utc_s(first)) - (et_s(last) - et_s(first));
-    assert!(apart_s.abs() < 2e-3, "{apart_s} s");
+    assert!(apart_s.abs() < 3.4e-3, "{apart_s} s");
 }
 
 #[test]
@@ -87,12 +87,11 @@ fn geopandas_and_duckdb_read_the_times_as_times() {
     let registered = rows(&folder.join("registered_footprints.csv"));
     assert_eq!(found["rows"], registered.len());
     assert_eq!(found["crs"], json!(["IAU_2015", "49900"]));
-    assert_eq!(found["time"], "datetime64[ms, UTC]");
+    assert_eq!(found["time"], "datetime64[us, UTC]");
     assert_eq!(found["duckdb_time"], "TIMESTAMP WITH TIME ZONE");
     assert_eq!(found["span_ms"], found["geopandas_span_ms"]);
     let oldest = registered.iter().map(|row| &*row["utc"]).min().unwrap();
     let first = found["first"].as_str().unwrap().replace("+00:00", "Z");
-    let first = first.replace("000Z", "Z");
     assert_eq!(first, oldest);
 }
 

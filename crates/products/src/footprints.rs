@@ -10,6 +10,7 @@ use super::{
     product::{Content, Declaration, Program, Role, Use, Write},
     table::{Column, Meaning, Table, Unit, column, meanings},
     text_table,
+    utc::Utc,
 };
 use areograph_base::{footprints::Footprints, frames::BodyFixed, schema::DocumentSchema};
 use areograph_config::ShotFormat;
@@ -196,11 +197,8 @@ pub(super) fn features<'a>(site: &'a SiteProducts<'a>) -> Features<'a> {
 
 /// The columns of the CSV file.
 fn text_columns() -> Vec<Meaning> {
-    Table::new(columns(), Vec::new())
-        .for_text()
-        .columns()
-        .cloned()
-        .collect()
+    let table = Table::new(columns(), Vec::new()).for_text();
+    table.columns().cloned().collect()
 }
 
 /// Schema of the GeoJSON file.
@@ -255,9 +253,11 @@ fn identity<'a>() -> Vec<Column<Shot<'a>>> {
         )
         .in_gis()
         .in_dbase("et_s", 20, 6),
-        column("utc", Unit::None, "et_s as UTC, ISO 8601", Shot::utc)
-            .only_in_gis()
-            .in_dbase("utc", 0, 0),
+        column("utc", Unit::None, "et_s as UTC, ISO 8601", |shot: &Shot| {
+            Utc::of(&shot.utc())
+        })
+        .in_gis()
+        .in_dbase("utc", 0, 0),
         column(
             "orbit",
             Unit::None,

@@ -76,7 +76,7 @@ impl FoundShots<'_> {
 fn table(rows: Vec<Shot<'_>>, format: RowsFormat) -> Table<'_> {
     let table = Table::new(columns(), rows).without("utc");
     match format {
-        RowsFormat::Parquet => table.for_parquet(),
+        RowsFormat::Parquet => table,
         RowsFormat::Csv => table.for_text(),
         RowsFormat::GeoJson => table.also_in_gis(&ALSO_IN_GIS).for_gis(),
     }

@@ -80,7 +80,10 @@ impl<'a> Features<'a> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::table::{Unit, column};
+    use crate::{
+        table::{Unit, column},
+        utc::Utc,
+    };
 
     /// Two points with a time, the square root of 1 and of 2, a number and texts.
     pub(crate) fn example() -> Features<'static> {
@@ -89,9 +92,9 @@ pub(super) mod tests {
                 .in_gis()
                 .in_dbase("et_s", 20, 6),
             column("utc", Unit::None, "", |_: &f64| {
-                "1999-08-24T14:12:13.000".to_owned()
+                Utc::of("1999-08-24T14:12:13.000")
             })
-            .only_in_gis()
+            .in_gis()
             .in_dbase("utc", 0, 0),
             column("orbit", Unit::None, "", |_: &f64| 9019_u32)
                 .in_gis()

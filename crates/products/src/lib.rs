@@ -64,6 +64,7 @@ mod site_book;
 mod table;
 mod text_table;
 mod ties;
+mod utc;
 
 use std::path::Path;
 

@@ -11,7 +11,7 @@ use ::parquet::{
 };
 use arrow_array::{
     ArrayRef, BinaryArray, BooleanArray, Float64Array, Int32Array, RecordBatch, StringArray,
-    TimestampMillisecondArray, UInt32Array,
+    TimestampMicrosecondArray, UInt32Array,
 };
 use arrow_schema::{DataType, Field, Schema, SchemaRef, TimeUnit};
 use rayon::prelude::*;
@@ -20,7 +20,8 @@ use super::{
     error::ProductError,
     files::{create, finish, open},
     parquet_file::ParquetFile,
-    table::{Kind, Meaning, Table, Utc, Values},
+    table::{Kind, Meaning, Table, Values},
+    utc::Utc,
 };
 use areograph_base::error::{Error, IoError, Locate, Result};
 
@@ -32,7 +33,6 @@ const UTC: &str = "UTC";
 /// # Errors
 /// Numbers that are not finite; errors of the disk; columns and values that are read back differently.
 pub(super) fn write(path: &Path, table: Table, metadata: Vec<(&str, String)>) -> Result<u64> {
-    let table = table.for_parquet();
     let mut file = create(path)?;
     encode(&mut file, &table, metadata).in_file(path)?;
     finish(path, file)?;
@@ -73,7 +73,7 @@ fn field(column: &Meaning) -> Field {
         Kind::Natural => DataType::UInt32,
         Kind::Integer => DataType::Int32,
         Kind::Flag => DataType::Boolean,
-        Kind::Time => DataType::Timestamp(TimeUnit::Millisecond, Some(UTC.into())),
+        Kind::Time => DataType::Timestamp(TimeUnit::Microsecond, Some(UTC.into())),
         Kind::Text => DataType::Utf8,
         Kind::Bytes => DataType::Binary,
     };
@@ -111,8 +111,8 @@ fn array(values: Values) -> ArrayRef {
         Values::Integer(values) => Arc::new(Int32Array::from(values)),
         Values::Flag(values) => Arc::new(BooleanArray::from(values)),
         Values::Time(values) => {
-            let values = values.into_iter().map(|Utc(ms)| ms);
-            let times = TimestampMillisecondArray::from_iter_values(values);
+            let values = values.into_iter().map(|Utc(of)| of);
+            let times = TimestampMicrosecondArray::from_iter_values(values);
             Arc::new(times.with_timezone(UTC))
         }
         Values::Text(values) => Arc::new(StringArray::from_iter_values(values)),

@@ -8,17 +8,16 @@ use std::collections::BTreeMap;
 
 use super::{
     coordinates::{bounding_box_deg, degrees, frame, signed_longitude_deg},
-    error::ProductError,
     exchange::geopackage,
     geoparquet::{geo_metadata, well_known_binary},
     gis::Features,
     parquet,
     product::{Content, Context, Declaration, Program, Role, Use, Write},
     site::{ImageProducts, SiteProducts},
-    table::{Column, Meaning, Table, Unit, Utc, column, meanings},
+    table::{Column, Meaning, Table, Unit, column, meanings},
     text_table,
+    utc::Utc,
 };
-use areograph_base::error::Result;
 use areograph_config::ShotFormat;
 use areograph_stages::{
     adjust::{CorrectedPoint, PointKind},
@@ -42,7 +41,7 @@ pub(super) static PARQUET: Declaration = Declaration {
         sites: SITES,
         has,
         write: |path, of| {
-            let rows = rows(of.site)?;
+            let rows = rows(of.site);
             let points: Vec<[f64; 2]> = rows.iter().map(Row::point_deg).collect();
             let body = of.site.config.body;
             let bounds = bounding_box_deg(&points);
@@ -69,7 +68,7 @@ pub(super) static CSV: Declaration = Declaration {
     write: Write::Where {
         sites: "a site with footprints inside its images, format `csv`",
         has: |site| site.has_footprints_in(ShotFormat::Csv) && has(site),
-        write: |path, of| text_table::write(path, table(of.site, rows(of.site)?)),
+        write: |path, of| text_table::write(path, table(of.site, rows(of.site))),
     },
     uses: &[],
 };
@@ -84,7 +83,7 @@ pub(super) static GEOPACKAGE: Declaration = Declaration {
     write: Write::Where {
         sites: "a site with footprints inside its images, format `gpkg`",
         has: |site| site.has_footprints_in(ShotFormat::Gpkg) && has(site),
-        write: |path, of| geopackage::write(path, features(of, rows(of.site)?)),
+        write: |path, of| geopackage::write(path, features(of, rows(of.site))),
     },
     uses: &[Use {
         program: Program::Gis,
@@ -96,7 +95,7 @@ pub(super) static GEOPACKAGE: Declaration = Declaration {
 fn has(site: &SiteProducts) -> bool {
     let adjusted = site.adjustment().map(|(_, of)| of.images);
     let mut images = site.images.iter().chain(adjusted.unwrap_or_default());
-    images.any(|image| image.registration.points.inside_count() > 0)
+    !site.footprints.is_empty() && images.any(|image| image.registration.points.inside_count() > 0)
 }
 
 /// A footprint that an image shows.
@@ -106,7 +105,6 @@ struct Row<'a> {
     /// Row of the footprint.
     footprint: usize,
     profile: usize,
-    utc: Utc,
     /// Its place with the orientation of the kernels, and with the adjusted one.
     places: [Option<Place>; 2],
     /// The footprint after the adjustment.
@@ -155,10 +153,7 @@ impl Row<'_> {
 }
 
 /// The footprints inside images, image by image, in the order of the registration.
-///
-/// # Errors
-/// A time that is not UTC, which is a bug in areograph.
-fn rows<'a>(site: &'a SiteProducts<'a>) -> Result<Vec<Row<'a>>> {
+fn rows<'a>(site: &'a SiteProducts<'a>) -> Vec<Row<'a>> {
     let adjustment = site.adjustment().map(|(_, adjustment)| adjustment);
     let mut adjusted: BTreeMap<usize, &CorrectedPoint> = BTreeMap::new();
     if let Some(adjustment) = &adjustment {
@@ -175,18 +170,12 @@ fn rows<'a>(site: &'a SiteProducts<'a>) -> Result<Vec<Row<'a>>> {
                 image,
                 footprint,
                 profile,
-                utc: utc(&site.utc[footprint])?,
                 places,
                 adjusted: adjusted.get(&footprint).copied(),
             });
         }
     }
-    Ok(rows)
-}
-
-fn utc(text: &str) -> Result<Utc> {
-    let parsed = Utc::parsed(text);
-    parsed.ok_or_else(|| ProductError::refused("read a UTC time")(text).into())
+    rows
 }
 
 /// Profile and places of every footprint that the image shows before or after the adjustment, by its row. A footprint in
@@ -300,7 +289,7 @@ fn shot<'a>() -> Vec<Column<Row<'a>>> {
             "utc",
             Unit::None,
             "time of the shot after the MOLA clock correction, UTC",
-            |row: &Row| row.utc,
+            |row: &Row| Utc::of(&row.site.utc[row.footprint]),
         ),
     ]
 }

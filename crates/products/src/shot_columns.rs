@@ -42,7 +42,6 @@ impl ShotNames for Nameless {
 
 fn table(shots: Vec<Shot<'_>>) -> Table<'_> {
     Table::new(columns(), shots)
-        .for_parquet()
         .without("utc")
         .without("windows")
 }

@@ -5,12 +5,11 @@
 //! column("range_m", Unit::Metre, "one-way range", |shot: &Shot| shot.range_m).in_gis().in_dbase("range_m", 12, 3)
 //! ```
 
-use std::{borrow::Cow, fmt, ops::Range};
+use std::{borrow::Cow, ops::Range};
 
-use chrono::{DateTime, NaiveDateTime};
 use rayon::prelude::*;
 
-use super::error::ProductError;
+use super::{error::ProductError, utc::Utc};
 use areograph_base::wording::Wording;
 
 /// Rows whose values are in memory at once.
@@ -74,8 +73,6 @@ enum Gis {
     Yes,
     /// After all others.
     Last,
-    /// Only GIS formats have it.
-    Only,
 }
 
 /// A field of a dBASE table, whose names have ten letters.
@@ -168,12 +165,6 @@ impl<R> Column<R> {
         self
     }
 
-    /// An attribute of points, but not a column of Parquet and CSV.
-    pub(super) const fn only_in_gis(mut self) -> Self {
-        self.meaning.gis = Gis::Only;
-        self
-    }
-
     /// A field of the shapefile's table too, under this name.
     pub(super) const fn in_dbase(mut self, name: &'static str, width: u8, decimals: u8) -> Self {
         self.meaning.dbase = Some(DbaseField {
@@ -182,25 +173,6 @@ impl<R> Column<R> {
             decimals,
         });
         self
-    }
-}
-
-/// An instant of UTC, milliseconds since 1970 without leap seconds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Utc(pub(super) i64);
-
-impl Utc {
-    /// Of an ISO 8601 text without a zone letter; `None` for any other text. A leap second becomes the second after it.
-    pub(super) fn parsed(text: &str) -> Option<Self> {
-        let time = NaiveDateTime::parse_from_str(text, "%Y-%m-%dT%H:%M:%S%.f").ok()?;
-        Some(Self(time.and_utc().timestamp_millis()))
-    }
-}
-
-impl fmt::Display for Utc {
-    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let time = DateTime::from_timestamp_millis(self.0).unwrap_or_default();
-        write!(to, "{}", time.format("%Y-%m-%dT%H:%M:%S%.3fZ"))
     }
 }
 
@@ -252,7 +224,7 @@ impl Cell for Option<f64> {
 }
 
 impl Values {
-    /// The first row that is not a finite number.
+    /// The first row that is not a finite number or a known instant.
     fn not_finite(&self) -> Option<usize> {
         match self {
             Self::Real(values) => values.iter().position(|value| !value.is_finite()),
@@ -260,6 +232,7 @@ impl Values {
                 let infinite = |value: &Option<f64>| value.is_some_and(|value| !value.is_finite());
                 values.iter().position(infinite)
             }
+            Self::Time(values) => values.iter().position(|value| *value == Utc::UNKNOWN),
             _ => None,
         }
     }
@@ -290,14 +263,9 @@ impl<'a> Table<'a> {
         self
     }
 
-    /// With only the columns of Parquet.
-    pub(super) fn for_parquet(self) -> Self {
-        self.keep(|column| column.gis != Gis::Only)
-    }
-
     /// With only the columns of text formats.
     pub(super) fn for_text(self) -> Self {
-        self.keep(|column| column.gis != Gis::Only && column.kind != Kind::Bytes)
+        self.keep(|column| column.kind != Kind::Bytes)
     }
 
     /// With only the attributes of GeoJSON and GeoPackage.
@@ -320,7 +288,7 @@ impl<'a> Table<'a> {
     /// With only the fields of dBASE, numbers first.
     pub(super) fn for_dbase(mut self) -> Self {
         self.columns
-            .sort_by_key(|(_, column)| column.kind == Kind::Text);
+            .sort_by_key(|(_, column)| matches!(column.kind, Kind::Text | Kind::Time));
         self.keep(|column| column.dbase.is_some())
     }
 
@@ -439,7 +407,7 @@ pub(super) mod tests {
                 none("text").in_dbase("text", 0, 0).last_in_gis(),
                 column("bytes", Unit::None, "", |(): &()| vec![1_u8]),
                 column("number_m", Unit::Metre, "", |(): &()| 1.0).in_dbase("number", 5, 1),
-                none("utc").only_in_gis(),
+                column("utc", Unit::None, "", |(): &()| Utc(0)).in_gis(),
             ];
             Table::new(columns, vec![()])
         };
@@ -449,8 +417,8 @@ pub(super) mod tests {
                 .map(|column| column.name)
                 .collect::<Vec<_>>()
         };
-        assert_eq!(names(table().for_parquet()), ["text", "bytes", "number_m"]);
-        assert_eq!(names(table().for_text()), ["text", "number_m"]);
+        assert_eq!(names(table()), ["text", "bytes", "number_m", "utc"]);
+        assert_eq!(names(table().for_text()), ["text", "number_m", "utc"]);
         assert_eq!(names(table().for_gis()), ["utc", "text"]);
         assert_eq!(names(table().for_dbase()), ["number_m", "text"]);
         let text = [Values::Real(vec![1.0]), Values::Text(vec![String::new()])];

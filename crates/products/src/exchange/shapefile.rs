@@ -181,6 +181,15 @@ enum Cell<'a> {
     Text(&'a str),
 }
 
+/// The values with instants as texts: dBASE has days only.
+fn texts(values: Vec<Values>) -> Vec<Values> {
+    let text = |values: Values| match values {
+        Values::Time(times) => Values::Text(times.iter().map(ToString::to_string).collect()),
+        values => values,
+    };
+    values.into_iter().map(text).collect()
+}
+
 fn cell(values: &Values, row: usize) -> Cell<'_> {
     match values {
         Values::Real(of) => Cell::Number(Some(of[row])),
@@ -189,7 +198,7 @@ fn cell(values: &Values, row: usize) -> Cell<'_> {
         Values::Integer(of) => Cell::Number(Some(of[row].into())),
         Values::Flag(of) => Cell::Number(Some(of[row].into())),
         Values::Text(of) => Cell::Text(&of[row]),
-        // No column of instants is a field of dBASE.
+        // Instants are texts here, see `texts`.
         Values::Time(_) | Values::Bytes(_) => Cell::Text(""),
     }
 }
@@ -219,7 +228,7 @@ fn encode_attributes(newest_utc: &str, table: &Table) -> Result<Vec<u8>> {
     let mut bytes = Cursor::new(Vec::new());
     let mut writer = fields.build_with_dest(&mut bytes);
     for rows in table.pieces() {
-        let values = &table.values(rows.clone())?;
+        let values = &texts(table.values(rows.clone())?);
         for row in 0..rows.len() {
             let record = Record { values, row };
             writer.write_record(&record).map_err(refused)?;
@@ -241,10 +250,10 @@ fn dbase_fields(table: &Table) -> impl Iterator<Item = DbaseField> {
 fn text_widths(table: &Table) -> Result<Vec<Option<u8>>> {
     let mut widths = vec![None; table.columns().count()];
     for (width, column) in widths.iter_mut().zip(table.columns()) {
-        *width = (column.kind == Kind::Text).then_some(1);
+        *width = matches!(column.kind, Kind::Text | Kind::Time).then_some(1);
     }
     for rows in table.pieces() {
-        for (width, values) in widths.iter_mut().zip(table.values(rows)?) {
+        for (width, values) in widths.iter_mut().zip(texts(table.values(rows)?)) {
             if let (Some(width), Values::Text(texts)) = (width, values) {
                 let longest = texts.iter().map(String::len).max().unwrap_or(0);
                 let longest = u8::try_from(longest.min(TEXT_MAX)).unwrap_or(u8::MAX);
@@ -278,7 +287,7 @@ fn read_attributes(path: &Path, table: &Table) -> Result<()> {
     let mut reader = dbase::Reader::new(BufReader::new(open(path)?)).map_err(unreadable)?;
     let mut found = reader.iter_records();
     for rows in table.pieces() {
-        let values = table.values(rows.clone())?;
+        let values = texts(table.values(rows.clone())?);
         for row in 0..rows.len() {
             let record = found.next().transpose().map_err(unreadable)?;
             let holds = |record: dbase::Record| {
