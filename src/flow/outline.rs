@@ -7,8 +7,7 @@ use std::{
 
 use super::{
     PUBLISH,
-    driver::{Driver, Flow},
-    outputs::Site,
+    driver::{Driver, Flow, Publication, SiteDriver},
     site::site,
 };
 use crate::{
@@ -49,8 +48,7 @@ pub fn stages() -> &'static [&'static str] {
 }
 
 /// Number of stages that a run of the site passes, counting each image and round.
-#[must_use]
-pub fn stage_count(of: &SiteConfig) -> usize {
+pub(super) fn stage_count(of: &SiteConfig) -> usize {
     let mut outline = Outline::default();
     // Only the parts of the configuration that determine stages: nothing is read.
     let mut config = SiteConfig::default();
@@ -66,13 +64,14 @@ pub fn stage_count(of: &SiteConfig) -> usize {
     outline.passed
 }
 
+/// The names of the stages of a flow.
 #[derive(Default)]
-struct Outline {
+pub(super) struct Outline {
     files: InputFiles,
     never: AtomicBool,
-    names: Vec<&'static str>,
+    pub(super) names: Vec<&'static str>,
     /// Stages passed, counting each image.
-    passed: usize,
+    pub(super) passed: usize,
 }
 
 impl Driver for Outline {
@@ -106,11 +105,13 @@ impl Driver for Outline {
         Ok(result.ok())
     }
 
-    fn publish(&mut self, _config: &SiteConfig, _site: &Site) -> Flow<()> {
+    fn publish(&mut self, _publication: &impl Publication) -> Flow<()> {
         self.passed += 1;
         self.enter(PUBLISH)
     }
 }
+
+impl SiteDriver for Outline {}
 
 #[cfg(test)]
 mod tests {
