@@ -79,9 +79,8 @@ fn answer(
     words: impl Fn(&dyn Fn(&str) -> u64) -> String,
 ) -> ExitCode {
     let folder = &outcome.folder;
-    let (manifest, unchanged) = match &outcome.ending {
-        Ending::Published(manifest) => (manifest, false),
-        Ending::Unchanged(manifest) => (manifest, true),
+    let manifest = match &outcome.ending {
+        Ending::Published(manifest) | Ending::Unchanged(manifest) => manifest,
         Ending::StoppedAfter(stage) => {
             if as_json {
                 let earlier = read_manifest(folder).map(|earlier| earlier.finished_utc);
@@ -97,6 +96,7 @@ fn answer(
             return ExitCode::SUCCESS;
         }
     };
+    let unchanged = outcome.is_unchanged();
     let page = folder.join("report/index.html");
     if as_json {
         output::json(&json!({

@@ -101,6 +101,12 @@ impl RunOutcome {
             Ending::StoppedAfter(_) => None,
         }
     }
+
+    /// Whether the products already existed.
+    #[must_use]
+    pub const fn is_unchanged(&self) -> bool {
+        matches!(self.ending, Ending::Unchanged(_))
+    }
 }
 
 /// Runs one site from its configuration to its products, as [`run_task`].

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use nalgebra::Vector3;
 
-use super::{calibrate::Calibration, line_camera::LineCamera, match_laser::Survey};
+use super::{calibrate::Calibration, line_camera::LineCamera};
 use areograph_base::{
     body::Body,
     error::{Cause, Locate as _, Result},
@@ -97,14 +97,14 @@ impl<'a> CameraLines<'a> {
             .collect()
     }
 
-    /// Ground as the lines see it, body-fixed, metres: tie points of the calibration, or shots before there is one.
+    /// Ground as the lines see it, body-fixed, metres: tie points of the calibration, or `shots_m` before there is one.
     ///
     /// # Errors
     /// The calibration is not known yet.
-    pub fn ground_m(&self, survey: &Survey) -> Result<Vec<Vector3<f64>>> {
+    pub fn ground_m(&self, shots_m: &[[f64; 3]]) -> Result<Vec<Vector3<f64>>> {
         Ok(match self.calibrated {
             Some(calibrated) => calibrated.value()?.ground_m(),
-            None => survey.ground_m.iter().copied().map(Vector3::from).collect(),
+            None => shots_m.iter().copied().map(Vector3::from).collect(),
         })
     }
 }

@@ -61,7 +61,7 @@ impl Stage for MapLines<'_> {
         let lines = LinesToMap {
             body,
             pair: [one, other].map(|at| (&cameras[at], &pixels[at])),
-            ground_m: &self.lines.ground_m(survey)?,
+            ground_m: &self.lines.ground_m(&survey.ground_m)?,
             off_m: OFF_PX * cameras[one].pixel_m(body.map().radius_m),
             cell_m: *self.cell_m,
         };

@@ -69,7 +69,7 @@ impl Stage for MatchLines<'_> {
             body: self.lines.body,
             cameras: &cameras,
             pixels: self.pixels.decoded(&cameras)?,
-            ground_m: &self.lines.ground_m(survey)?,
+            ground_m: &self.lines.ground_m(&survey.ground_m)?,
             reach_m,
         };
         match_lines(&lines, watch)
