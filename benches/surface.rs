@@ -16,7 +16,7 @@ use areograph::{
     altimetry::{GroundRadius, ShotFilter},
     body::Body,
     config::load_calibration,
-    flow::run_calibration,
+    flow::{PUBLISH, RunOptions, Task, run_task},
     pds::pixel_file::{PixelFile, Pyramid},
     scene::{write_calibration_loop_scene, write_terrain_model_scene},
     stages::{
@@ -24,6 +24,7 @@ use areograph::{
         map_surface::{LinesToMap, map_lines},
         match_laser::{MatchOptions, MatchRequest, match_laser},
     },
+    store::hashes::HashCache,
 };
 use nalgebra::Vector3;
 use serde_json::Value;
@@ -51,7 +52,16 @@ fn terrain_models(folder: &Path) {
     write_calibration_loop_scene(&scene, 1).unwrap();
     let config = load_calibration(&scene.join("calibration.toml")).unwrap();
     let out = folder.join("calibrated");
-    let run = run_calibration(&config.calibration, &out, false).unwrap();
+    let options = RunOptions {
+        out: out.clone(),
+        until: PUBLISH,
+        force: false,
+        stop: &AtomicBool::new(false),
+        hashes: &HashCache::in_folder(&out, false),
+        roots: &[],
+        observer: &(),
+    };
+    let run = run_task(Task::Calibration(&config.calibration), &options).unwrap();
     let cameras = LINES.map(|line| {
         let isd = run.folder.join(format!("cameras/{line}/isd.json"));
         LineCamera::read(&isd, line, Body::Mars).unwrap()
@@ -76,7 +86,8 @@ fn terrain_models(folder: &Path) {
             off_m: 100.0,
             cell_m,
         };
-        let (seconds, surface) = timed(|| map_lines(&lines, &AtomicBool::new(false)).unwrap());
+        let (seconds, surface) =
+            timed(|| map_lines(&lines, (&AtomicBool::new(false)).into()).unwrap());
         let account = &surface.account;
         println!(
             "terrain model, {} by {} pixels: {} cells of {cell_m} m, {} with a height, in {seconds:.2} s; {:.2} million pixels a second; \

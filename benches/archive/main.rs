@@ -30,7 +30,7 @@ use std::{
 use areograph::{
     altimetry::{BiasScope, DatumChoice, MolaClock, ShotFilter, TagSign},
     error::{Error, Result},
-    flow::{ArchiveRequest, check_archive},
+    flow::{ArchiveRequest, PUBLISH, RunOptions, Task, run_task},
     geom::{
         range_residuals::{RangeResiduals, SpacecraftState},
         window::{Region, WindowShape},
@@ -43,6 +43,7 @@ use areograph::{
     },
     scene::{ArchiveOptions, write_archive},
     spice::{KernelSet, Session},
+    store::hashes::HashCache,
 };
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -115,15 +116,21 @@ impl Archive {
         let request = ArchiveRequest {
             paths: std::slice::from_ref(&self.folder),
             kernels: &self.kernels(),
-            out,
             clock: clock(),
             allow_uncovered: false,
+        };
+        let options = RunOptions {
+            out: out.to_owned(),
+            until: PUBLISH,
             force: true,
             stop: &RUN_ON,
+            hashes: &HashCache::in_folder(out, false),
+            roots: &[],
+            observer: &(),
         };
-        let outcome = check_archive(&request, &|_| ()).unwrap();
-        assert!(outcome.failures.is_empty());
-        outcome.manifest.counts["shots"]
+        let outcome = run_task(Task::Archive(&request), &options).unwrap();
+        assert!(outcome.left_out.is_empty());
+        outcome.manifest().unwrap().counts["shots"]
     }
 
     /// The same residuals for some frames, one after the other with a CSPICE state each; returns shots per second.

@@ -6,16 +6,17 @@ use clap::Args;
 
 use super::{
     report,
-    single::{Request, answer},
+    single::{self, RunArguments},
 };
 use crate::{
     config::{LoadedCalibration, load_calibration},
-    flow::run_calibration,
+    flow::Task,
 };
 
 /// Calibrates the lines of a camera in orbit: ties between them, then laser points, part of which are withheld for validation.
 ///
-/// Points are read from tables; with `ties.match` and `[laser]` they are measured in pixels, in rounds until convergence.
+/// Points are read from tables; with `ties.match` and `[laser]` they are measured in pixels, in rounds until convergence. A
+/// calibration that was stopped or killed resumes at the stage of the round that it did not complete.
 ///
 /// Products go to `<out>/<calibration>`, with calibrated support data (ISD) of every line. Angles that ties cannot determine
 /// are detected and reported.
@@ -30,12 +31,8 @@ pub(super) struct Arguments {
     /// Output folder; the calibration is written to a subfolder.
     #[arg(long, default_value = "out")]
     out: PathBuf,
-    /// Calibrate again, even if stored results are up to date.
-    #[arg(long)]
-    force: bool,
-    /// Print JSON.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    run: RunArguments,
 }
 
 /// Runs the calibration and reports the outcome.
@@ -51,13 +48,8 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     for warning in warnings {
         tracing::warn!("{warning}");
     }
-    let request = Request {
-        what: "calibration",
-        name: &calibration.calibration,
-        json: arguments.json,
-    };
-    let ran = run_calibration(&calibration, &arguments.out, arguments.force);
-    answer(&request, ran, |count| {
+    let (task, name) = (Task::Calibration(&calibration), &calibration.calibration);
+    single::run(task, name, &arguments.out, &arguments.run, |count| {
         format!(
             "{} lines, {} ties, {} laser points, {} more withheld, {} left out",
             count("cameras"),

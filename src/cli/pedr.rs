@@ -45,7 +45,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
         Command::Index(arguments) => index::run(arguments),
         Command::Search(arguments) => search::run(arguments),
         Command::Crossovers(arguments) => crossovers::run(arguments),
-        Command::Qa(arguments) => qa::run(arguments),
+        Command::Qa(arguments) => return qa::run(arguments),
         Command::Match(arguments) => return matching::run(arguments),
         #[cfg(feature = "sql")]
         Command::Sql(arguments) => sql::run(arguments),

@@ -1,15 +1,19 @@
 //! `areograph plan`.
 
-use std::{path::PathBuf, sync::atomic::AtomicBool};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::atomic::AtomicBool,
+};
 
 use clap::Args;
 use serde_json::json;
 
 use super::{load_sites, output};
 use crate::{
-    config::SiteConfig,
+    config::{CalibrationConfig, NetConfig, load_calibration, load_net},
     error::Error,
-    flow::{PUBLISH, RunOptions, StageReason, check_out, plan_site},
+    flow::{PUBLISH, RunOptions, StageReason, Task, check_out, plan_task},
     store::hashes::HashCache,
 };
 
@@ -18,12 +22,13 @@ use crate::{
 /// Examples:
 ///   areograph plan sites/gusev.toml --out products
 ///   areograph plan sites/*.toml --out products --json
+///   areograph plan hrsc/calibration.toml net/net.toml --out products
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
-    /// Site files (TOML).
-    #[arg(required = true, value_name = "SITE.toml")]
-    sites: Vec<PathBuf>,
+    /// Site, net and calibration files (TOML).
+    #[arg(required = true, value_name = "FILE.toml")]
+    files: Vec<PathBuf>,
     /// Folder of the products.
     #[arg(long, default_value = "out")]
     out: PathBuf,
@@ -35,8 +40,49 @@ pub(super) struct Arguments {
     json: bool,
 }
 
+/// Files by the flow that they describe.
+#[derive(Default)]
+struct Files {
+    sites: Vec<PathBuf>,
+    nets: Vec<NetConfig>,
+    calibrations: Vec<CalibrationConfig>,
+}
+
+impl Files {
+    /// Recognises each file by the key that gives it its name; all others are site files.
+    fn of(paths: &[PathBuf]) -> Result<Self, Error> {
+        let mut files = Self::default();
+        for path in paths {
+            let warnings = if has_key(path, "net") {
+                let loaded = load_net(path)?;
+                files.nets.push(loaded.net);
+                loaded.warnings
+            } else if has_key(path, "calibration") {
+                let loaded = load_calibration(path)?;
+                files.calibrations.push(loaded.calibration);
+                loaded.warnings
+            } else {
+                files.sites.push(path.clone());
+                Vec::new()
+            };
+            for warning in warnings {
+                tracing::warn!("{warning}");
+            }
+        }
+        Ok(files)
+    }
+}
+
+/// Whether a file has this key outside of tables; loading reports a file that cannot be read.
+fn has_key(path: &Path, key: &str) -> bool {
+    let text = fs::read_to_string(path).unwrap_or_default();
+    let table: Result<toml::Table, _> = text.parse();
+    table.is_ok_and(|table| table.contains_key(key))
+}
+
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
-    let sites = load_sites(&arguments.sites)?;
+    let files = Files::of(&arguments.files)?;
+    let sites = load_sites(&files.sites)?;
     check_out(&arguments.out, &sites)?;
     let options = RunOptions {
         out: arguments.out.clone(),
@@ -47,24 +93,27 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
         roots: &[],
         observer: &(),
     };
-    print(&sites, &options, arguments.json)
+    let tasks = sites.iter().map(Task::Site);
+    let tasks = tasks.chain(files.nets.iter().map(Task::Net));
+    let tasks = tasks.chain(files.calibrations.iter().map(Task::Calibration));
+    print(&tasks.collect::<Vec<_>>(), &options, arguments.json)
 }
 
-/// Prints the plan of every site.
+/// Prints the plan of every task.
 pub(super) fn print(
-    sites: &[SiteConfig],
+    tasks: &[Task<'_>],
     options: &RunOptions<'_>,
     as_json: bool,
 ) -> Result<(), Error> {
     let mut answers = Vec::new();
-    for site in sites {
-        let stages = plan_site(site, options)?.stages;
+    for task in tasks {
+        let stages = plan_task(*task, options)?.stages;
         if as_json {
             let stages: Vec<_> = stages.iter().map(stage_json).collect();
-            answers.push(json!({ "site": site.site, "stages": stages }));
+            answers.push(json!({ task.kind(): task.name(), "stages": stages }));
             continue;
         }
-        output::line(format_args!("{}:", site.site));
+        output::line(format_args!("{}:", task.name()));
         for planned in stages {
             let word = if planned.reason.runs() {
                 "run "

@@ -1,4 +1,4 @@
-//! Progress of a run: on a terminal a live line for each site; elsewhere a line for each stage, and lines at
+//! Progress of a run: on a terminal a live line for each site, net, calibration, match or archive; elsewhere a line for each stage, and lines at
 //! intervals during long stages.
 
 use std::{
@@ -13,8 +13,7 @@ use tracing::level_filters::LevelFilter;
 use tracing_subscriber::fmt::MakeWriter;
 
 use crate::{
-    config::SiteConfig,
-    flow::{Observer, StageEvent, stage_count},
+    flow::{Observer, PUBLISH, StageEvent, Task},
     watch::Count,
 };
 
@@ -50,10 +49,10 @@ impl Write for Log {
     }
 }
 
-/// Progress of a site.
+/// Progress of a run.
 #[derive(Debug)]
 pub(super) struct Progress {
-    site: String,
+    name: String,
     line: ProgressBar,
     counted: Mutex<Option<Counted>>,
     /// Whether each stage has a separate line.
@@ -61,26 +60,25 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// Progress of a new site. Nothing is shown with `--verbose`, since the log reports stages, or with `--quiet`.
-    pub(super) fn of(site: &SiteConfig) -> Self {
+    /// Progress of a new run. Nothing is shown with `--verbose`, since the log reports stages, or with `--quiet`.
+    pub(super) fn of(task: Task<'_>) -> Self {
         let level = LevelFilter::current();
         let told = level >= LevelFilter::WARN && level < LevelFilter::INFO;
         let terminal = io::stderr().is_terminal();
         let line = if told && terminal {
-            let stages = stage_count(site);
-            let line = LINES.add(ProgressBar::new(stages as u64));
+            let line = LINES.add(ProgressBar::new(task.stage_count() as u64));
             // If the library rejects the template, its default remains.
             if let Ok(style) = ProgressStyle::with_template(LINE) {
                 line.set_style(style.with_key("left", left));
             }
-            line.set_prefix(site.site.clone());
+            line.set_prefix(task.name().to_owned());
             line.enable_steady_tick(TICK);
             line
         } else {
             ProgressBar::hidden()
         };
         Self {
-            site: site.site.clone(),
+            name: task.name().to_owned(),
             line,
             counted: Mutex::new(None),
             plain: told && !terminal,
@@ -104,11 +102,17 @@ impl Observer for Progress {
                 self.line.set_message(stage.to_owned());
                 if self.plain {
                     // A closed standard error is not a failure.
-                    let _ = writeln!(io::stderr().lock(), "{}: {stage}", self.site);
+                    let _ = writeln!(io::stderr().lock(), "{}: {stage}", self.name);
                 }
             }
             StageEvent::Counts(count) => self.count(stage, *count),
-            StageEvent::Kept | StageEvent::Done(_) => self.line.inc(1),
+            StageEvent::Kept | StageEvent::Done(_) => {
+                self.line.inc(1);
+                // Only the first round of a calibration is known beforehand.
+                if self.line.length() <= Some(self.line.position()) && stage != PUBLISH {
+                    self.line.inc_length(1);
+                }
+            }
         }
     }
 }
@@ -143,7 +147,7 @@ impl Progress {
         let words = words(stage, count, counted.begun.elapsed());
         if self.plain && counted.told.elapsed() >= TOLD_EVERY {
             counted.told = now;
-            let _ = writeln!(io::stderr().lock(), "{}: {words}", self.site);
+            let _ = writeln!(io::stderr().lock(), "{}: {words}", self.name);
         }
         self.line.set_message(words);
     }

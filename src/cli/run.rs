@@ -11,14 +11,19 @@ use serde_json::json;
 use tokio::{sync::Semaphore, task::JoinHandle};
 
 use super::{
-    load_sites, open, output, panicked::flatten, plan, progress::Progress, report,
-    single::untested, stop::on_signals,
+    load_sites, open, output,
+    panicked::flatten,
+    plan,
+    progress::Progress,
+    report,
+    single::{stopped_after, untested},
+    stop::on_signals,
 };
 use crate::{
     config::SiteConfig,
     error::{Error, Kind},
     flow::{
-        Ending, Observer, PUBLISH, RunOptions, STAGES, SiteOutcome, check_out, publish_sites,
+        Ending, Observer, PUBLISH, RunOptions, RunOutcome, STAGES, Task, check_out, publish_sites,
         run_site,
     },
     products::REPORT,
@@ -107,7 +112,8 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     if arguments.dry_run {
         let never = AtomicBool::new(false);
         let options = arguments.options(&never, &hashes, &());
-        return super::finish(plan::print(&sites, &options, arguments.json));
+        let tasks: Vec<Task<'_>> = sites.iter().map(Task::Site).collect();
+        return super::finish(plan::print(&tasks, &options, arguments.json));
     }
     if let Some(threads) = arguments.threads {
         // The only failure is an existing pool, which keeps its size.
@@ -152,7 +158,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     ExitCode::from(failed.or(codes.first()).copied().unwrap_or(0))
 }
 
-type Outcome = Result<SiteOutcome, Error>;
+type Outcome = Result<RunOutcome, Error>;
 
 /// Runs at most `jobs` sites at a time; after a signal each finishes its stage, or leaves a long one, and stops.
 async fn run_all(
@@ -170,7 +176,7 @@ async fn run_all(
             tokio::spawn(async move {
                 let _place = places.acquire_owned().await;
                 let work = move || {
-                    let progress = Progress::of(&site);
+                    let progress = Progress::of(Task::Site(&site));
                     run_site(&site, &arguments.options(&stop, &hashes, &progress))
                 };
                 flatten(tokio::task::spawn_blocking(work).await)
@@ -189,12 +195,8 @@ async fn run_all(
 fn exit_code(outcome: &Outcome) -> u8 {
     match outcome {
         Err(failure) => failure.kind().exit_code(),
-        Ok(outcome) => match &outcome.ending {
-            Ending::Published(manifest) | Ending::Unchanged(manifest)
-                if !manifest.verdict.valid =>
-            {
-                Kind::Validation.exit_code()
-            }
+        Ok(outcome) => match outcome.manifest() {
+            Some(manifest) if !manifest.verdict.valid => Kind::Validation.exit_code(),
             _ => 0,
         },
     }
@@ -213,19 +215,10 @@ fn print(outcomes: &[Outcome], as_json: bool) {
     }
 }
 
-fn print_outcome(outcome: &SiteOutcome) {
-    let (site, folder) = (&outcome.site, outcome.folder.display());
+fn print_outcome(outcome: &RunOutcome) {
+    let (site, folder) = (&outcome.name, outcome.folder.display());
     let (what, manifest) = match &outcome.ending {
-        Ending::StoppedAfter(stage) => {
-            let products = read_manifest(&outcome.folder).map_or_else(
-                || ", no products".to_owned(),
-                |earlier| {
-                    let utc = earlier.finished_utc;
-                    format!("; the products of {utc} in {folder} remain unchanged")
-                },
-            );
-            return output::line(format_args!("{site}: stopped after {stage}{products}"));
-        }
+        Ending::StoppedAfter(stage) => return stopped_after(outcome, stage),
         Ending::Published(manifest) => ("products", manifest),
         Ending::Unchanged(manifest) => ("nothing changed; products are up to date", manifest),
     };
@@ -280,11 +273,12 @@ fn outcome_json(outcome: &Outcome) -> serde_json::Value {
             "error": failure.to_string(),
             "exit_code": failure.kind().exit_code(),
         }),
-        Ok(SiteOutcome {
-            site,
+        Ok(RunOutcome {
+            name: site,
             folder,
             stages,
             ending,
+            ..
         }) => {
             let ending = match ending {
                 Ending::Published(manifest) => products(folder, true, manifest),

@@ -1,68 +1,145 @@
-//! The answer of a flow of one stage: a line or JSON, the verdict, the exit code.
+//! A run of a net, a calibration, a match or an archive: its options, and the answer as a line or JSON.
 
-use std::process::ExitCode;
+use std::{path::Path, process::ExitCode};
 
+use clap::Args;
 use serde_json::json;
 
-use super::{output, report};
+use super::{output, plan, progress::Progress, report, stop::Signals};
 use crate::{
     error::{Kind, Result},
-    flow::SingleOutcome,
-    store::manifest::Manifest,
+    flow::{Ending, PUBLISH, RunOptions, RunOutcome, Task, run_task},
+    store::{hashes::HashCache, manifest::Manifest, publish::read_manifest},
     verdict::{NOT_TESTED, Verdict},
 };
 
-/// Name of such a flow in its answer.
-pub(super) struct Request<'a> {
-    /// The key of its name in JSON.
-    pub(super) what: &'static str,
-    /// Its name.
-    pub(super) name: &'a str,
-    /// Whether JSON was requested.
-    pub(super) json: bool,
+/// Options that every such run has.
+#[derive(Debug, Args)]
+pub(super) struct RunArguments {
+    /// Stop after this stage; an unknown name lists the stages.
+    #[arg(long, value_name = "STAGE", default_value = PUBLISH, hide_default_value = true)]
+    until: String,
+    /// Run every stage, even if its stored output is up to date.
+    #[arg(long)]
+    force: bool,
+    /// Read all input files, stored outputs and products again, even if unchanged.
+    #[arg(long)]
+    rehash: bool,
+    /// Show the stages that would run, with the reasons; write no products.
+    #[arg(long)]
+    dry_run: bool,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
 }
 
-/// Prints the outcome of a run, with its counts in words.
-pub(super) fn answer(
-    request: &Request<'_>,
-    ran: Result<SingleOutcome>,
+/// Runs a task, or shows its plan, and reports the outcome, with its counts in words.
+///
+/// * `name` – name in the answer
+pub(super) fn run(
+    task: Task<'_>,
+    name: &str,
+    out: &Path,
+    arguments: &RunArguments,
     words: impl Fn(&dyn Fn(&str) -> u64) -> String,
 ) -> ExitCode {
-    let outcome = match ran {
-        Ok(outcome) => outcome,
-        Err(failure) => return report(&failure),
+    match ran(task, out, arguments) {
+        Ok(Some(outcome)) => answer(task.kind(), name, &outcome, arguments.json, words),
+        Ok(None) => ExitCode::SUCCESS,
+        Err(failure) => report(&failure),
+    }
+}
+
+/// The outcome of a run; `None` of a plan, which is printed.
+fn ran(task: Task<'_>, out: &Path, arguments: &RunArguments) -> Result<Option<RunOutcome>> {
+    let signals = Signals::heard()?;
+    let hashes = HashCache::in_folder(out, arguments.rehash);
+    let options = |observer| RunOptions {
+        out: out.to_owned(),
+        until: &arguments.until,
+        force: arguments.force,
+        stop: signals.stop(),
+        hashes: &hashes,
+        roots: &[],
+        observer,
     };
-    let manifest = &outcome.manifest;
-    if request.json {
+    if arguments.dry_run {
+        plan::print(&[task], &options(&()), arguments.json)?;
+        return Ok(None);
+    }
+    run_task(task, &options(&Progress::of(task))).map(Some)
+}
+
+/// Prints the outcome of a run.
+fn answer(
+    kind: &str,
+    name: &str,
+    outcome: &RunOutcome,
+    as_json: bool,
+    words: impl Fn(&dyn Fn(&str) -> u64) -> String,
+) -> ExitCode {
+    let folder = &outcome.folder;
+    let manifest = match &outcome.ending {
+        Ending::Published(manifest) | Ending::Unchanged(manifest) => manifest,
+        Ending::StoppedAfter(stage) => {
+            if as_json {
+                let earlier = read_manifest(folder).map(|earlier| earlier.finished_utc);
+                output::json(&json!({
+                    kind: name,
+                    "folder": folder,
+                    "stopped_after": stage,
+                    "earlier_products_utc": earlier,
+                }));
+            } else {
+                stopped_after(outcome, stage);
+            }
+            return ExitCode::SUCCESS;
+        }
+    };
+    let unchanged = outcome.is_unchanged();
+    let page = folder.join("report/index.html");
+    if as_json {
         output::json(&json!({
-            request.what: request.name,
-            "folder": outcome.folder,
-            "unchanged": outcome.unchanged,
+            kind: name,
+            "folder": folder,
+            "page": page,
+            "unchanged": unchanged,
             "verdict": manifest.verdict,
             "counts": manifest.counts,
             "figures": manifest.figures,
         }));
     } else {
         let count = |name: &str| manifest.counts.get(name).copied().unwrap_or(0);
-        let unchanged = if outcome.unchanged {
-            ", nothing changed"
-        } else {
-            ""
-        };
         output::line(format_args!(
-            "{}: {}{unchanged}; {}; {}",
-            request.name,
+            "{name}: {}{}; {}; {}",
             manifest.verdict.word(),
+            if unchanged { ", nothing changed" } else { "" },
             words(&count),
-            outcome.folder.join("report/index.html").display(),
+            page.display(),
         ));
         tell(manifest);
     }
+    outcome.left_out.iter().for_each(output::error);
     if manifest.verdict.valid {
         ExitCode::SUCCESS
     } else {
         ExitCode::from(Kind::Validation.exit_code())
     }
+}
+
+/// Reports that a run stopped after the requested stage, and what remains of earlier products.
+pub(super) fn stopped_after(outcome: &RunOutcome, stage: &str) {
+    let products = read_manifest(&outcome.folder).map_or_else(
+        || ", no products".to_owned(),
+        |earlier| {
+            let (utc, folder) = (earlier.finished_utc, outcome.folder.display());
+            format!("; the products of {utc} in {folder} remain unchanged")
+        },
+    );
+    output::line(format_args!(
+        "{}: stopped after {stage}{products}",
+        outcome.name
+    ));
 }
 
 /// Reports reasons, remarks, and errors that are not tested.

@@ -6,11 +6,11 @@ use clap::Args;
 
 use super::{
     report,
-    single::{Request, answer},
+    single::{self, RunArguments},
 };
 use crate::{
     config::{LoadedNet, load_net},
-    flow::run_net,
+    flow::Task,
 };
 
 /// Triangulates a net of rectified pictures in the plane: four unknowns per picture, no kernels.
@@ -27,12 +27,8 @@ pub(super) struct Arguments {
     /// Output folder; the net is written to a subfolder.
     #[arg(long, default_value = "out")]
     out: PathBuf,
-    /// Triangulate again, even if stored results are up to date.
-    #[arg(long)]
-    force: bool,
-    /// Print JSON.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    run: RunArguments,
 }
 
 /// Runs the net and reports the outcome.
@@ -45,13 +41,8 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     for warning in warnings {
         tracing::warn!("{warning}");
     }
-    let request = Request {
-        what: "net",
-        name: &net.net,
-        json: arguments.json,
-    };
-    let ran = run_net(&net, &arguments.out, arguments.force);
-    answer(&request, ran, |count| {
+    let (task, name) = (Task::Net(&net), &net.net);
+    single::run(task, name, &arguments.out, &arguments.run, |count| {
         format!(
             "{} pictures, {} points, {} blunders, {} controls left out of {}",
             count("pictures"),

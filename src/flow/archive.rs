@@ -21,28 +21,24 @@ mod loader;
 mod manifest;
 
 use std::{
+    cell::RefCell,
     collections::BTreeMap,
     path::{Path, PathBuf},
-    sync::{atomic::AtomicBool, mpsc::sync_channel},
+    sync::mpsc::sync_channel,
     thread,
 };
 
-pub use self::checker::ArchiveProgress;
 use self::{
-    checker::{Checker, Results},
+    checker::{Checker, FILES, Results},
     gather::{Gathered, file_failure, gather},
     loader::Loader,
     manifest::manifest,
 };
-use super::{
-    PUBLISH,
-    out::check_out_path,
-    publish::{keep, standing},
-};
+use super::driver::{Driver, Flow, Ledger, MadeFrom, Publication};
 use crate::{
     altimetry::{MolaClock, ShotFilter},
     config::RangeCheckConfig,
-    error::{Cause, Error, Kind, Locate as _, Result, Stopped},
+    error::{Cause, Error, Kind, Result},
     files::{Identity, InputFiles, file_name},
     pds::{archive::Listing, pedr::RULES},
     products::{
@@ -51,20 +47,27 @@ use crate::{
     report::archive_page,
     spice::{KernelSet, KernelView},
     stage::{Input as _, Inputs},
-    stages::check_archive::{
-        ArchiveProfile, ArchiveRanges, ArchiveRules, ArchiveSource, CALLS, CheckedFile, FileRanges,
-        KernelUsed, METHOD, NAME, TRAJECTORY_TOLERANCE_M, shots_of,
+    stages::{
+        check_archive::{
+            self, ArchiveProfile, ArchiveRanges, ArchiveRules, ArchiveSource, CALLS, CheckedFile,
+            FileRanges, KernelUsed, METHOD, TRAJECTORY_TOLERANCE_M, shots_of,
+        },
+        judge::Verdict,
     },
     store::{
         cache::StageCache,
-        lock::SiteLock,
         manifest::Manifest,
-        publish::{CACHE, entries, publish, read_manifest, staging},
+        publish::{entries, publish, read_manifest, staging},
     },
     time::Et,
     units::RADIANS_PER_DEGREE,
+    watch::Watch,
 };
 
+/// Stands for the name of a site in messages and in the manifest.
+pub(super) const NAME: &str = "archive";
+/// The only stage.
+pub(super) const STAGE: &str = check_archive::NAME;
 /// Raised when the layout of the products changes.
 const LAYOUT: u32 = 3;
 /// Profiles whose shots are written.
@@ -79,27 +82,10 @@ pub struct ArchiveRequest<'a> {
     pub paths: &'a [PathBuf],
     /// The metakernel.
     pub kernels: &'a Path,
-    /// Folder of the products.
-    pub out: &'a Path,
     /// The clock of MOLA.
     pub clock: MolaClock,
     /// Whether shots without a position in the kernels leave the archive valid.
     pub allow_uncovered: bool,
-    /// Check every file again, even if its result is stored.
-    pub force: bool,
-    /// Checked before every load.
-    pub stop: &'a AtomicBool,
-}
-
-/// Outcome of a check of an archive.
-#[derive(Debug)]
-pub struct ArchiveOutcome {
-    /// The manifest of the products.
-    pub manifest: Manifest,
-    /// Whether the products already existed.
-    pub unchanged: bool,
-    /// Reasons why files could not be checked; all others were.
-    pub failures: Vec<Error>,
 }
 
 /// No file to check.
@@ -129,47 +115,26 @@ pub fn archive_filter() -> ShotFilter {
     }
 }
 
-/// Checks every file and publishes the products in the folder `out`.
-///
-/// The result of a file is stored once it is complete: a check that was interrupted resumes where it stopped.
-///
-/// # Errors
-/// Kernels that cannot be read; write errors; [`Stopped`]. Files that cannot be checked are part of the outcome.
-pub fn check_archive(
-    request: &ArchiveRequest<'_>,
-    progress: &(dyn Fn(&ArchiveProgress) + Sync),
-) -> Result<ArchiveOutcome> {
-    check_out_path(request.out)?;
-    let files = InputFiles::default();
-    let kernels = KernelSet::from_metakernel_of(&files, request.kernels)?;
-    let view = KernelView::positions(Some(&kernels))?;
-    let _lock = SiteLock::take(request.out)?;
+/// Checks every file and publishes the products. The result of a file is stored once it is complete.
+pub(super) fn archive<D: Driver>(flow: &mut D, request: &ArchiveRequest<'_>) -> Flow<()> {
+    flow.enter(STAGE)?;
+    let kernels = KernelSet::from_metakernel_of(flow.files(), request.kernels)?;
     let archive = Archive {
         request,
         limits: archive_limits(),
         filter: archive_filter(),
-        view,
-        kernels: &files,
-        cache: StageCache::new(&request.out.join(CACHE), request.force),
-        progress,
+        view: KernelView::positions(Some(&kernels))?,
     };
-    let (mut ranges, mut failures) = archive.check_all().in_stage(NAME)?;
-    files.verify_all()?;
-    let inputs = archive.publish_inputs(&ranges);
-    let known = standing(request.out, &archive.cache, &inputs);
-    let (manifest, unchanged) = match known {
-        Ok(manifest) => (manifest, true),
-        Err(reason) => {
-            tracing::info!(stage = PUBLISH, %reason, "running");
-            let published = archive.publish(&mut ranges, &mut failures);
-            (published.in_stage(PUBLISH)?, false)
-        }
+    let checked = archive.check_all(flow)?;
+    let publication = ArchivePublication {
+        archive: &archive,
+        checked: RefCell::new(checked),
     };
-    Ok(ArchiveOutcome {
-        manifest,
-        unchanged,
-        failures,
-    })
+    flow.publish(&publication)?;
+    if let Some((_, failures)) = publication.checked.into_inner() {
+        flow.leave_out(failures);
+    }
+    Ok(())
 }
 
 /// A check under way.
@@ -178,11 +143,65 @@ struct Archive<'a> {
     limits: RangeCheckConfig,
     filter: ShotFilter,
     view: KernelView,
-    /// The kernels, which must not change.
-    kernels: &'a InputFiles,
-    cache: StageCache,
-    progress: &'a (dyn Fn(&ArchiveProgress) + Sync),
 }
+
+/// The files of an archive.
+struct Files<'a> {
+    paths: &'a [PathBuf],
+    sources: &'a BTreeMap<usize, Identity>,
+    /// Those without a stored result: under which name it is stored, and its inputs.
+    todo: &'a BTreeMap<usize, (String, Inputs)>,
+}
+
+/// The results, and the failures of files that have none.
+type Checked = (ArchiveRanges, Vec<Error>);
+
+/// The products of an archive.
+struct ArchivePublication<'a> {
+    archive: &'a Archive<'a>,
+    /// `None` while a file is still to be checked. Publishing adds failures of files that can no longer be read.
+    checked: RefCell<Option<Checked>>,
+}
+
+impl Publication for ArchivePublication<'_> {
+    fn inputs(&self, _folder: &Path, _ledger: &Ledger) -> Inputs {
+        match &*self.checked.borrow() {
+            Some((ranges, _)) => self.archive.publish_inputs(ranges),
+            None => {
+                let mut inputs = self.archive.inputs();
+                inputs.output(STAGE, None);
+                for prefix in [
+                    "key files",
+                    "key copies",
+                    "key failures",
+                    "key allow_uncovered",
+                ] {
+                    inputs.not_known_yet(&format!("output of {STAGE}"), prefix);
+                }
+                inputs.setting("(layout)", &LAYOUT);
+                inputs
+            }
+        }
+    }
+
+    fn verdict(&self) -> Result<Verdict> {
+        let checked = self.checked.borrow();
+        let (ranges, _) = checked.as_ref().ok_or(NotChecked)?;
+        Ok(ranges.verdict())
+    }
+
+    fn publish(&self, from: &MadeFrom<'_>) -> Result<Manifest> {
+        let mut checked = self.checked.borrow_mut();
+        let (ranges, failures) = checked.as_mut().ok_or(NotChecked)?;
+        self.archive.publish(from.folder, ranges, failures)
+    }
+}
+
+/// Products were requested before the files were checked.
+#[derive(Debug, thiserror::Error, Cause)]
+#[error("the products of an archive were requested before its files were checked")]
+#[cause(Bug: "this is a bug in areograph; please report it with the command")]
+struct NotChecked;
 
 impl Archive<'_> {
     const fn rules(&self) -> ArchiveRules<'_> {
@@ -206,18 +225,17 @@ impl Archive<'_> {
         inputs
     }
 
-    fn check_all(&self) -> Result<(ArchiveRanges, Vec<Error>)> {
+    /// The results of all files; `None` where files are still to be checked and nothing runs.
+    fn check_all<D: Driver>(&self, flow: &mut D) -> Flow<Option<Checked>> {
         let Listing { paths, failures } = Listing::of(self.request.paths);
         if paths.is_empty() {
-            return Err(failures
-                .into_iter()
-                .next()
-                .unwrap_or_else(|| NoFiles.into()));
+            let first = failures.into_iter().next();
+            return Err(first.unwrap_or_else(|| NoFiles.into()).into());
         }
         let mut sources = BTreeMap::new();
         let mut results = Results::new();
         for (file, path) in paths.iter().enumerate() {
-            Stopped::check(self.request.stop)?;
+            flow.enter(STAGE)?;
             match ArchiveSource::open(path) {
                 Ok(source) => drop(sources.insert(file, source.identity())),
                 Err(failure) => drop(results.insert(file, Err(failure))),
@@ -225,22 +243,30 @@ impl Archive<'_> {
         }
         let mut todo = BTreeMap::new();
         for (file, identity) in &sources {
-            let (label, inputs) = self.stored_as(&paths[*file], identity);
-            match self.cache.load::<FileRanges>(&label, &inputs) {
-                Ok(known) => drop(results.insert(*file, Ok(known.value()?.clone()))),
-                Err(_) => drop(todo.insert(*file, (label, inputs))),
+            let (stored_as, inputs) = self.stored_as(&paths[*file], identity);
+            let label = format!("{STAGE}/{}", file_name(&paths[*file]));
+            match flow.part::<FileRanges>(label, &stored_as, &inputs)? {
+                Some(known) => drop(results.insert(*file, Ok(known.value()?.clone()))),
+                None => drop(todo.insert(*file, (stored_as, inputs))),
             }
         }
-        let start = ArchiveProgress {
-            files_done: paths.len() - todo.len(),
-            files_stored: paths.len() - todo.len(),
-            files: paths.len(),
-            bytes_left: todo.keys().map(|file| sources[file].bytes).sum(),
-            ..ArchiveProgress::default()
-        };
-        (self.progress)(&start);
-        results.extend(self.check_todo(&paths, &sources, &todo, start)?);
-        Ok(self.ranges(gather(&paths, &sources, results, failures)))
+        if !todo.is_empty() {
+            let checked = flow.work(STAGE, |cache, kernels, watch| {
+                let files = Files {
+                    paths: &paths,
+                    sources: &sources,
+                    todo: &todo,
+                };
+                self.check_todo(&files, kernels, cache, watch)
+            })?;
+            match checked {
+                Some(checked) => results.extend(checked),
+                None => return Ok(None),
+            }
+        }
+        Ok(Some(
+            self.ranges(gather(&paths, &sources, results, failures)),
+        ))
     }
 
     /// Name under which the result of a file is stored, and its inputs.
@@ -249,41 +275,43 @@ impl Archive<'_> {
         let mut inputs = self.inputs();
         inputs.setting("file", &file_name(path));
         inputs.setting("identity", identity);
-        (format!("{NAME}/{}", &place[..32]), inputs)
+        (format!("{STAGE}/{}", &place[..32]), inputs)
     }
 
     /// Checks the files without stored results: this thread loads, while another one distributes the checks to all
     /// threads of the pool.
     fn check_todo(
         &self,
-        paths: &[PathBuf],
-        sources: &BTreeMap<usize, Identity>,
-        todo: &BTreeMap<usize, (String, Inputs)>,
-        start: ArchiveProgress,
+        files: &Files<'_>,
+        kernels: &InputFiles,
+        cache: &StageCache,
+        watch: Watch<'_>,
     ) -> Result<Results> {
-        if todo.is_empty() {
-            return Ok(Results::new());
-        }
         let session = self.view.session()?;
+        let todo = files.todo;
         let checker = Checker {
             rules: self.rules(),
-            kernels: self.kernels,
-            cache: &self.cache,
+            kernels,
+            cache,
             todo,
-            progress: self.progress,
+            watch,
         };
+        watch.announce(todo.len());
+        watch.step(0, FILES);
         thread::scope(|scope| {
             // The channel has no buffer: at most two loads are in memory.
             let (parts, received) = sync_channel(0);
-            let worker = scope.spawn(|| checker.run(received, start));
+            let worker = scope.spawn(|| checker.run(received));
             let loader = Loader {
                 rules: self.rules(),
                 session,
-                stop: self.request.stop,
+                stop: watch.stop(),
                 parts,
             };
-            let files = todo.keys();
-            let loaded = loader.run(files.map(|file| (*file, &*paths[*file], &sources[file])));
+            let paths = todo
+                .keys()
+                .map(|file| (*file, &*files.paths[*file], &files.sources[file]));
+            let loaded = loader.run(paths);
             let checked = worker.join();
             loaded?;
             checked.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
@@ -329,11 +357,15 @@ impl Archive<'_> {
     }
 
     /// Publishes, and adds the failures of files that could not be read again for it.
-    fn publish(&self, ranges: &mut ArchiveRanges, failures: &mut Vec<Error>) -> Result<Manifest> {
-        let staging = staging(self.request.out)?;
+    fn publish(
+        &self,
+        folder: &Path,
+        ranges: &mut ArchiveRanges,
+        failures: &mut Vec<Error>,
+    ) -> Result<Manifest> {
+        let staging = staging(folder)?;
         let (mut written, mut shots) = (Vec::new(), Vec::new());
         for (file, profile) in ranges.worst(WORST) {
-            Stopped::check(self.request.stop)?;
             match self.shots_of(file, profile, &staging)? {
                 Ok(product) => {
                     shots.push(Some(product.path.to_string_lossy().into_owned()));
@@ -380,10 +412,8 @@ impl Archive<'_> {
             products: entries(&staging, &files)?,
             ..manifest(ranges, &inputs)
         };
-        publish(self.request.out, &staging, &manifest)?;
-        let manifest = read_manifest(self.request.out).unwrap_or(manifest);
-        keep(&self.cache, inputs, &manifest)?;
-        Ok(manifest)
+        publish(folder, &staging, &manifest)?;
+        Ok(read_manifest(folder).unwrap_or(manifest))
     }
 
     /// Writes the shots of a profile, or returns the reason why its file no longer provides them.

@@ -2,10 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::{
-    driver::{Exit, Flow},
-    site::STAGES,
-};
+use super::driver::{Exit, Flow};
 use crate::{
     error::{Locate, Stopped},
     files::InputFiles,
@@ -13,6 +10,8 @@ use crate::{
 
 /// Last stage of a run or a plan, and the files that it reads.
 pub(super) struct Bounds<'a> {
+    /// The stages of the flow in order.
+    pub(super) stages: Vec<&'static str>,
     pub(super) until: &'a str,
     pub(super) stop: &'a AtomicBool,
     pub(super) files: InputFiles,
@@ -21,7 +20,7 @@ pub(super) struct Bounds<'a> {
 impl Bounds<'_> {
     /// Leaves the flow before `stage` if it was not requested, or when the user stops the program.
     pub(super) fn enter(&self, stage: &'static str) -> Flow<()> {
-        let place = |name: &str| STAGES.iter().position(|stage| *stage == name);
+        let place = |name: &str| self.stages.iter().position(|stage| *stage == name);
         if place(self.until) < place(stage) {
             return Err(Exit::StageReached);
         }

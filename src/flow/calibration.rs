@@ -1,20 +1,16 @@
-//! A calibration of the lines of a camera, from support data and tables to its products.
-//!
-//! `flow/single.rs` contains the common part of this flow and the flow of a net; `flow/calibration_loop.rs` is the
-//! calibration from pixels.
-
-use std::path::Path;
+//! A calibration of the lines of a camera, from support data to its products: from tables by one stage, from pixels in
+//! the rounds of `flow/calibration_rounds.rs`.
 
 use super::{
-    calibration_loop::CalibrationLoop,
-    out::check_out_path,
-    single::{ManifestEntry, Single, SingleOutcome, made},
+    calibration_rounds::rounds,
+    driver::{Driver, Flow},
+    result::{ManifestEntry, ResultPublication, Written},
 };
 use crate::{
     config::CalibrationConfig,
-    error::Result,
     products::{CalibrationProducts, write_calibration_products},
     report::calibration_page,
+    stage::Stage as _,
     stages::calibrate::{
         Calibrate, Calibration, CalibrationFiles, CalibrationKeys, PointKind, calibration_files,
     },
@@ -24,37 +20,29 @@ use crate::{
 /// Raised when the layout of the products of a calibration changes.
 const METHOD: u32 = 7;
 
-/// Calibrates the lines of a camera and publishes the products in `<out>/<calibration>`, if an input has changed
-/// since the last run.
-///
-/// # Errors
-/// Files that cannot be read, points that do not fit the support data, write errors; earlier products then remain.
-pub fn run_calibration(
-    config: &CalibrationConfig,
-    out: &Path,
-    force: bool,
-) -> Result<SingleOutcome> {
-    check_out_path(out)?;
-    let single = Single {
-        name: &config.calibration,
-        file: &config.file,
-        blake3: &config.blake3,
-        keys: &config.keys,
-        method: METHOD,
-        folder: out.join(&config.calibration),
-        force,
+/// Calibrates the lines of a camera and publishes the products.
+pub(super) fn calibration<D: Driver>(flow: &mut D, config: &CalibrationConfig) -> Flow<()> {
+    let (result, has_further_stages) = if config.ties.matched {
+        rounds(flow, config)?
+    } else {
+        let files = flow.hash(Calibrate::NAME, &calibration_files(config))?;
+        let result = flow.stage(&Calibrate {
+            calibration: CalibrationKeys(config),
+            files: CalibrationFiles(&files),
+        })?;
+        (result, false)
     };
-    single.run(
-        &calibration_files(config),
-        |hashed, cache, stop| {
-            let (calibration, files) = (CalibrationKeys(config), CalibrationFiles(hashed));
-            if config.ties.matched {
-                let rounds = CalibrationLoop { calibration, files };
-                return made(&rounds, cache, stop);
-            }
-            made(&Calibrate { calibration, files }, cache, stop)
+    flow.publish(&ResultPublication {
+        written: Written {
+            name: &config.calibration,
+            file: &config.file,
+            blake3: &config.blake3,
+            keys: &config.keys,
+            method: METHOD,
         },
-        |staging, result| {
+        result: &result,
+        has_further_stages,
+        write: |staging: &_, result: &_| {
             let page = calibration_page(config, result)?;
             let products = CalibrationProducts {
                 config,
@@ -63,8 +51,8 @@ pub fn run_calibration(
             };
             write_calibration_products(staging, &products)
         },
-        manifest_entry,
-    )
+        entry: manifest_entry,
+    })
 }
 
 /// Content of the manifest of a calibration.

@@ -5,10 +5,9 @@ use std::{collections::BTreeSet, path::PathBuf, sync::atomic::AtomicBool};
 
 use super::{
     RivalSet,
-    driver::{Driver, Exit, Flow},
-    evidence::{complaints, judged, warnings},
+    driver::{Driver, Exit, Flow, Publication, SiteDriver},
     kernels::{load_rivals, required_coverage},
-    outputs::{Prepared, Site},
+    outputs::Prepared,
     overlays::overlays,
     site::{finish, kernels, orient, prepare},
     triangulate::{match_ties, ties_of_files},
@@ -190,12 +189,6 @@ impl Driver for Check<'_> {
         Ok(hashed.unwrap_or_default())
     }
 
-    /// An image without times fails on its own; profiles are checked nevertheless.
-    fn usable(&self, images: &[Output<ImageTimes>]) -> Vec<Output<ImageTimes>> {
-        let usable = images.iter().filter(|image| image.get().is_some());
-        usable.cloned().collect()
-    }
-
     fn attempt<T>(
         &mut self,
         stage: &str,
@@ -203,18 +196,6 @@ impl Driver for Check<'_> {
     ) -> Flow<Option<T>> {
         let result = step(&self.files);
         Ok(self.note(stage, result))
-    }
-
-    /// The required times, as far as they are known.
-    fn required(
-        &self,
-        config: &SiteConfig,
-        images: &[Output<ImageTimes>],
-        profiles: &Output<Vec<Profile>>,
-    ) -> Option<RequiredCoverage> {
-        let images: Vec<&ImageTimes> = images.iter().filter_map(Output::get).collect();
-        let profiles = profiles.get().map_or(&[][..], Vec::as_slice);
-        Some(required_coverage(config, &images, profiles))
     }
 
     fn stage<S: Stage>(&mut self, stage: &S) -> Flow<Output<S::Output>> {
@@ -245,16 +226,35 @@ impl Driver for Check<'_> {
     }
 
     /// The verdict, as a run would publish it.
-    fn publish(&mut self, config: &SiteConfig, site: &Site) -> Flow<()> {
-        let warnings = warnings(config, site)?;
-        let (verdict, _) = judged(config, site, &warnings, &complaints(site)?)?;
+    fn publish(&mut self, publication: &impl Publication) -> Flow<()> {
+        let verdict = publication.verdict()?;
         for reason in &verdict.reasons {
             let reason = reason.clone();
             let failure = Error::from(WouldBeInvalid { reason });
-            self.checked.failures.push(failure.in_site(&config.site));
+            self.checked.failures.push(failure.in_site(self.site));
         }
         self.checked.verdict = Some(verdict);
         Ok(())
+    }
+}
+
+impl SiteDriver for Check<'_> {
+    /// An image without times fails on its own; profiles are checked nevertheless.
+    fn usable(&self, images: &[Output<ImageTimes>]) -> Vec<Output<ImageTimes>> {
+        let usable = images.iter().filter(|image| image.get().is_some());
+        usable.cloned().collect()
+    }
+
+    /// The required times, as far as they are known.
+    fn required(
+        &self,
+        config: &SiteConfig,
+        images: &[Output<ImageTimes>],
+        profiles: &Output<Vec<Profile>>,
+    ) -> Option<RequiredCoverage> {
+        let images: Vec<&ImageTimes> = images.iter().filter_map(Output::get).collect();
+        let profiles = profiles.get().map_or(&[][..], Vec::as_slice);
+        Some(required_coverage(config, &images, profiles))
     }
 }
 

@@ -1,16 +1,22 @@
 //! Interface of a driver of the flow to its stages.
 
-use std::{path::PathBuf, sync::atomic::AtomicBool};
+use std::{
+    path::{Path, PathBuf},
+    sync::atomic::AtomicBool,
+};
 
-use super::outputs::Site;
+use serde::{Serialize, de::DeserializeOwned};
+
 use crate::{
     config::SiteConfig,
     error::{Error, Kind, Locate, Result},
     files::{HashedFile, InputFiles},
     pds::SizedFile,
     spice::RequiredCoverage,
-    stage::{Output, Provenance, Reason, Stage},
-    stages::{group_profiles::Profile, tag_times::ImageTimes},
+    stage::{Inputs, Output, Provenance, Reason, Stage},
+    stages::{group_profiles::Profile, judge::Verdict, tag_times::ImageTimes},
+    store::{cache::StageCache, manifest::Manifest},
+    watch::Watch,
 };
 
 /// Reasons why the flow ends before its end.
@@ -55,9 +61,30 @@ pub struct StageReason {
 /// Stages that the flow has passed, with the origin of their outputs where these are known.
 pub(super) type Ledger = Vec<(String, Option<Provenance>)>;
 
-/// Carries out one description of the flow: run, plan or check.
+/// The products at the end of a flow.
+pub(super) trait Publication {
+    /// Everything on which the products depend.
+    fn inputs(&self, folder: &Path, ledger: &Ledger) -> Inputs;
+
+    /// The verdict that the products state.
+    fn verdict(&self) -> Result<Verdict>;
+
+    /// Makes the products and gives them their final names.
+    fn publish(&self, made_from: &MadeFrom<'_>) -> Result<Manifest>;
+}
+
+/// Origin of products, and their folder.
+pub(super) struct MadeFrom<'a> {
+    pub(super) folder: &'a Path,
+    pub(super) ledger: &'a Ledger,
+    /// The number of the method of each stage.
+    pub(super) methods: &'a [(String, u32)],
+    pub(super) inputs: &'a Inputs,
+}
+
+/// Carries out the description of a flow: run, plan, check, or list of names.
 pub(super) trait Driver {
-    /// The input files of the site.
+    /// The input files.
     fn files(&self) -> &InputFiles;
 
     /// Set from outside to stop.
@@ -68,6 +95,31 @@ pub(super) trait Driver {
 
     /// The output of a stage, or a pending one.
     fn stage<S: Stage>(&mut self, stage: &S) -> Flow<Output<S::Output>>;
+
+    /// The stored output of one of many parts that [`Driver::work`] makes together; `None` if it has to be made.
+    ///
+    /// * `label` – in plans, with the name of the stage
+    /// * `stored_as` – in the folder of stored outputs
+    fn part<T: Serialize + DeserializeOwned>(
+        &mut self,
+        _label: String,
+        _stored_as: &str,
+        _inputs: &Inputs,
+    ) -> Flow<Option<Output<T>>> {
+        Ok(None)
+    }
+
+    /// Makes parts of a stage, each of which is stored when it is complete; `None` where no stage runs.
+    fn work<T>(
+        &mut self,
+        _stage: &'static str,
+        _work: impl FnOnce(&StageCache, &InputFiles, Watch<'_>) -> Result<T>,
+    ) -> Flow<Option<T>> {
+        Ok(None)
+    }
+
+    /// Records inputs that the products leave out.
+    fn leave_out(&mut self, _failures: Vec<Error>) {}
 
     /// Files that a stage reads, with their hashes.
     fn hash(&mut self, stage: &'static str, paths: &[PathBuf]) -> Flow<Vec<HashedFile>> {
@@ -90,11 +142,6 @@ pub(super) trait Driver {
         }
     }
 
-    /// The images with which profiles may be simultaneous.
-    fn usable(&self, images: &[Output<ImageTimes>]) -> Vec<Output<ImageTimes>> {
-        images.to_vec()
-    }
-
     /// Result of a step between stages, which may read files; `None` if it failed and the driver continues, or if the
     /// driver reads nothing.
     fn attempt<T>(
@@ -103,6 +150,17 @@ pub(super) trait Driver {
         step: impl FnOnce(&InputFiles) -> Result<T>,
     ) -> Flow<Option<T>> {
         Ok(Some(step(self.files()).in_stage(stage)?))
+    }
+
+    /// The products.
+    fn publish(&mut self, publication: &impl Publication) -> Flow<()>;
+}
+
+/// Carries out the description of the flow of a site.
+pub(super) trait SiteDriver: Driver {
+    /// The images with which profiles may be simultaneous.
+    fn usable(&self, images: &[Output<ImageTimes>]) -> Vec<Output<ImageTimes>> {
+        images.to_vec()
     }
 
     /// The times at which the site reads kernels; `None` while they are not known.
@@ -120,7 +178,4 @@ pub(super) trait Driver {
             profiles.get()?,
         ))
     }
-
-    /// The products.
-    fn publish(&mut self, config: &SiteConfig, site: &Site) -> Flow<()>;
 }

@@ -3,18 +3,21 @@
 //! This flow has one stage, `stages/match_laser`. `pds/terrain_model` reads a `GeoTIFF` into a grid
 //! (`geom/height_grid`, at most 134 million cells).
 
-use std::{collections::BTreeMap, path::Path};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use super::{
-    out::check_out_path,
-    single::{ManifestEntry, Single, SingleOutcome, made},
+    driver::{Driver, Flow},
+    result::{ManifestEntry, ResultPublication, Written},
 };
 use crate::{
-    error::{Cause, Locate as _, Result},
+    error::{Cause, Result},
     pds::archive::Listing,
     products::{MatchProducts, write_match_products},
     report::match_page,
-    stage::InOrder,
+    stage::{InOrder, Stage as _},
     stages::match_laser::{LaserMatch, MatchLaser, MatchRequest, match_files},
     store::manifest::figures,
 };
@@ -22,7 +25,7 @@ use crate::{
 /// Raised when the layout of the products of a match changes.
 const METHOD: u32 = 6;
 /// Stands for the name of a site in messages and in the manifest.
-const NAME: &str = "pedr_match";
+pub(super) const NAME: &str = "pedr_match";
 
 /// No file to search.
 #[derive(Debug, thiserror::Error, Cause)]
@@ -30,45 +33,30 @@ const NAME: &str = "pedr_match";
 #[cause(Input: "name PEDR files (AP#####v.B), or folders that contain them")]
 struct NoFiles;
 
-/// Matches laser profiles with a terrain model and publishes the products in the folder `out`, if an input has
-/// changed since the last run. `request.pedr` may name folders too.
-///
-/// # Errors
-/// Files that cannot be read, no shot on the model, write errors; earlier products then remain.
-pub fn run_match(request: &MatchRequest, out: &Path, force: bool) -> Result<SingleOutcome> {
-    check_out_path(out)?;
-    let listing = Listing::of(&request.pedr);
-    if let Some(failure) = listing.failures.into_iter().next() {
-        return Err(failure.in_site(NAME));
-    }
-    if listing.paths.is_empty() {
-        return Err(NoFiles).in_site(NAME);
-    }
+/// Matches laser profiles with a terrain model and publishes the products. `request.pedr` may name folders too.
+pub(super) fn laser_match<D: Driver>(flow: &mut D, request: &MatchRequest) -> Flow<()> {
+    let pedr = flow.attempt(MatchLaser::NAME, |_| listed(request))?;
     let request = MatchRequest {
-        pedr: listing.paths,
+        pedr: pedr.unwrap_or_default(),
         ..request.clone()
     };
+    let files = flow.hash(MatchLaser::NAME, &match_files(&request))?;
+    let result = flow.stage(&MatchLaser {
+        request: &request,
+        files: InOrder(&files),
+    })?;
     let keys = keys(&request);
-    let hash = blake3::hash(format!("{keys:?}").as_bytes()).to_hex();
-    let single = Single {
-        name: NAME,
-        file: Path::new(""),
-        blake3: &hash,
-        keys: &keys,
-        method: METHOD,
-        folder: out.to_owned(),
-        force,
-    };
-    single.run(
-        &match_files(&request),
-        |hashed, cache, stop| {
-            let stage = MatchLaser {
-                request: &request,
-                files: InOrder(hashed),
-            };
-            made(&stage, cache, stop)
+    flow.publish(&ResultPublication {
+        written: Written {
+            name: NAME,
+            file: Path::new(""),
+            blake3: &blake3::hash(format!("{keys:?}").as_bytes()).to_hex(),
+            keys: &keys,
+            method: METHOD,
         },
-        |staging, result| {
+        result: &result,
+        has_further_stages: false,
+        write: |staging: &_, result: &_| {
             let page = match_page(result)?;
             let products = MatchProducts {
                 result,
@@ -76,8 +64,18 @@ pub fn run_match(request: &MatchRequest, out: &Path, force: bool) -> Result<Sing
             };
             write_match_products(staging, &products)
         },
-        manifest_entry,
-    )
+        entry: manifest_entry,
+    })
+}
+
+/// The PEDR files of a request.
+fn listed(request: &MatchRequest) -> Result<Vec<PathBuf>> {
+    let Listing { paths, failures } = Listing::of(&request.pedr);
+    match failures.into_iter().next() {
+        Some(failure) => Err(failure),
+        None if paths.is_empty() => Err(NoFiles.into()),
+        None => Ok(paths),
+    }
 }
 
 /// The request, as in the manifest.

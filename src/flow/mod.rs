@@ -3,12 +3,12 @@
 //!
 //! `flow/site.rs` is one description of it, read top to bottom. A driver decides on each stage: a run computes or
 //! keeps its output, a plan determines whether it would be kept, a check runs the stages that determine whether a run
-//! can succeed.
+//! can succeed. Nets, calibrations, laser matches and archives are descriptions for the same drivers (`flow/task.rs`).
 
 mod archive;
 mod bounds;
 mod calibration;
-mod calibration_loop;
+mod calibration_rounds;
 mod check;
 mod choice;
 mod compare;
@@ -29,17 +29,15 @@ mod plan;
 mod publish;
 mod read_back;
 mod registered;
+mod result;
 mod run;
-mod single;
 mod site;
 mod sites;
 mod surface;
+mod task;
 mod triangulate;
 
-pub use archive::{
-    ArchiveOutcome, ArchiveProgress, ArchiveRequest, archive_filter, archive_limits, check_archive,
-};
-pub use calibration::run_calibration;
+pub use archive::{ArchiveRequest, archive_filter, archive_limits};
 pub use check::{Checked, check_site, required_by_site, rival_sets};
 pub use choice::{ChooseKernels, KernelChoice, RivalKernelSets};
 pub use compare::{
@@ -48,17 +46,14 @@ pub use compare::{
 };
 pub use driver::StageReason;
 pub use export::{Exported, export_site};
-pub use laser_match::run_match;
-pub use net::run_net;
 pub use observer::{Observer, StageEvent};
 pub use out::{OutError, check_out};
-pub use outline::stage_count;
 pub use page::{PageAgain, page_again};
-pub use plan::{SitePlan, plan_site};
-pub use run::{Ending, RunOptions, SiteOutcome, run_site};
-pub use single::SingleOutcome;
+pub use plan::{RunPlan, plan_site, plan_task};
+pub use run::{Ending, RunOptions, RunOutcome, run_site, run_task};
 pub use site::STAGES;
 pub use sites::publish_sites;
+pub use task::Task;
 
 /// Name of the step that chooses, reads and hashes kernels.
 pub const LOAD_KERNELS: &str = "load_kernels";

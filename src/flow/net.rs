@@ -1,20 +1,18 @@
 //! A net from its tables to its products.
 //!
 //! A net of pictures is not a site: it has no images with times, no kernels and no `[plane]` table in a site file. One
-//! stage leads from its tables to the result. Declarations, store and journal are shared with sites; since its folder
-//! has a manifest like a site's, the page over all sites and the checks of published products apply to it too.
-
-use std::path::Path;
+//! stage leads from its tables to the result. Since its folder has a manifest like a site's, the page over all sites
+//! and the checks of published products apply to it too.
 
 use super::{
-    out::check_out_path,
-    single::{ManifestEntry, Single, SingleOutcome, made},
+    driver::{Driver, Flow},
+    result::{ManifestEntry, ResultPublication, Written},
 };
 use crate::{
     config::NetConfig,
-    error::Result,
     products::{NetProducts, write_net_products},
     report::net_page,
+    stage::Stage as _,
     stages::triangulate::{NetFiles, NetKeys, Triangulate, Triangulation, net_files},
     store::manifest::figures,
 };
@@ -22,31 +20,24 @@ use crate::{
 /// Raised when the layout of the products of a net changes.
 const METHOD: u32 = 5;
 
-/// Triangulates a net and publishes its products in `<out>/<net>`, if an input has changed since the last run.
-///
-/// # Errors
-/// Tables that cannot be read, a net without a solution, write errors; earlier products then remain.
-pub fn run_net(config: &NetConfig, out: &Path, force: bool) -> Result<SingleOutcome> {
-    check_out_path(out)?;
-    let single = Single {
-        name: &config.net,
-        file: &config.file,
-        blake3: &config.blake3,
-        keys: &config.keys,
-        method: METHOD,
-        folder: out.join(&config.net),
-        force,
-    };
-    single.run(
-        &net_files(config),
-        |hashed, cache, stop| {
-            let stage = Triangulate {
-                net: NetKeys(config),
-                files: NetFiles(hashed),
-            };
-            made(&stage, cache, stop)
+/// Triangulates a net and publishes its products.
+pub(super) fn net<D: Driver>(flow: &mut D, config: &NetConfig) -> Flow<()> {
+    let files = flow.hash(Triangulate::NAME, &net_files(config))?;
+    let result = flow.stage(&Triangulate {
+        net: NetKeys(config),
+        files: NetFiles(&files),
+    })?;
+    flow.publish(&ResultPublication {
+        written: Written {
+            name: &config.net,
+            file: &config.file,
+            blake3: &config.blake3,
+            keys: &config.keys,
+            method: METHOD,
         },
-        |staging, result| {
+        result: &result,
+        has_further_stages: false,
+        write: |staging: &_, result: &_| {
             let page = net_page(config, result)?;
             let net = NetProducts {
                 config,
@@ -55,8 +46,8 @@ pub fn run_net(config: &NetConfig, out: &Path, force: bool) -> Result<SingleOutc
             };
             write_net_products(staging, &net)
         },
-        manifest_entry,
-    )
+        entry: manifest_entry,
+    })
 }
 
 /// Content of the manifest of a net.

@@ -1,35 +1,37 @@
-//! The flow of a site without its files: the number of its stages.
+//! A flow without its files: the stages that it passes.
 
 use std::{path::PathBuf, sync::atomic::AtomicBool};
 
 use super::{
     PUBLISH,
-    driver::{Driver, Flow},
-    outputs::Site,
-    site::site,
+    driver::{Driver, Flow, Publication, SiteDriver},
 };
 use crate::{
-    config::SiteConfig,
     error::Result,
     files::{HashedFile, InputFiles},
     stage::{Output, Stage},
 };
 
-/// Number of stages that a run of the site passes, counting each image and round.
-#[must_use]
-pub fn stage_count(config: &SiteConfig) -> usize {
-    let mut outline = Outline::default();
-    // Nothing is read and nothing runs, so nothing fails.
-    let _ = site(&mut outline, config);
-    outline.passed.len()
-}
-
+/// Passes a flow, reads nothing and runs nothing.
 #[derive(Default)]
-struct Outline {
+pub(super) struct Outline {
     files: InputFiles,
     never: AtomicBool,
-    /// Labels of the stages passed.
-    passed: Vec<String>,
+    /// The names of the stages passed, once for each image and round.
+    pub(super) passed: Vec<&'static str>,
+}
+
+impl Outline {
+    /// The names of the stages, in the order in which the flow passes them first.
+    pub(super) fn names(&self) -> Vec<&'static str> {
+        let mut names = Vec::new();
+        for name in &self.passed {
+            if !names.contains(name) {
+                names.push(*name);
+            }
+        }
+        names
+    }
 }
 
 impl Driver for Outline {
@@ -46,7 +48,7 @@ impl Driver for Outline {
     }
 
     fn stage<S: Stage>(&mut self, stage: &S) -> Flow<Output<S::Output>> {
-        self.passed.push(stage.label());
+        self.passed.push(S::NAME);
         Ok(Output::pending(stage.label()))
     }
 
@@ -62,18 +64,20 @@ impl Driver for Outline {
         Ok(None)
     }
 
-    fn publish(&mut self, _config: &SiteConfig, _site: &Site) -> Flow<()> {
-        self.passed.push(PUBLISH.to_owned());
+    fn publish(&mut self, _publication: &impl Publication) -> Flow<()> {
+        self.passed.push(PUBLISH);
         Ok(())
     }
 }
+
+impl SiteDriver for Outline {}
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{
-        config::{ImageConfig, WindowConfig},
-        flow::{LOAD_KERNELS, STAGES},
+        config::{ImageConfig, SiteConfig, WindowConfig},
+        flow::{LOAD_KERNELS, STAGES, Task, site::site},
         geom::window::WindowShape,
         kernel_source::KernelSource,
     };
@@ -84,7 +88,7 @@ mod tests {
             let mut config = SiteConfig::default();
             config.images.resize_with(images, ImageConfig::default);
             change(&mut config);
-            stage_count(&config)
+            Task::Site(&config).stage_count()
         };
         let [none, one, two] = [0, 1, 2].map(|images| count(images, &|_| ()));
         assert!(none < one && two - one == one - none);
@@ -116,13 +120,7 @@ mod tests {
         config.surface.orthoimage_cell_m = Some(1.0);
         let mut outline = Outline::default();
         site(&mut outline, &config).unwrap();
-        let mut first: Vec<&str> = Vec::new();
-        for label in &outline.passed {
-            let name = label.split('/').next().unwrap();
-            if !first.contains(&name) {
-                first.push(name);
-            }
-        }
+        let mut first = outline.names();
         let listed: Vec<&str> = STAGES.to_vec();
         let (load, stages) = listed.split_first().unwrap();
         assert_eq!(*load, LOAD_KERNELS);

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{
     PUBLISH,
-    driver::Ledger,
+    driver::{Ledger, MadeFrom, Publication},
     evidence::{complaints, complaints_of_pixels, judged, notes, rejected, warnings},
     manifest::manifest,
     outputs::Site,
@@ -19,6 +19,7 @@ use crate::{
     report,
     spice::{KernelSet, KernelView, Session},
     stage::{Input, Inputs, Output, Reason},
+    stages::judge::Verdict,
     store::{
         cache::StageCache,
         manifest::Manifest,
@@ -31,9 +32,30 @@ use crate::{
 /// Raised when the layout of products changes.
 const METHOD: u32 = 29;
 
+/// The products of a site.
+pub(super) struct SitePublication<'a> {
+    pub(super) config: &'a SiteConfig,
+    pub(super) site: &'a Site,
+}
+
+impl Publication for SitePublication<'_> {
+    fn inputs(&self, folder: &Path, ledger: &Ledger) -> Inputs {
+        inputs(self.config, self.site, folder, ledger)
+    }
+
+    fn verdict(&self) -> Result<Verdict> {
+        let (config, site) = (self.config, self.site);
+        Ok(judged(config, site, &warnings(config, site)?, &complaints(site)?)?.0)
+    }
+
+    fn publish(&self, from: &MadeFrom<'_>) -> Result<Manifest> {
+        publish(self.config, self.site, from)
+    }
+}
+
 /// The configuration as written, the outlines that it names, all kernels and their paths relative to `folder`, and
 /// the inputs of every stage.
-pub(super) fn inputs(config: &SiteConfig, site: &Site, folder: &Path, ledger: &Ledger) -> Inputs {
+fn inputs(config: &SiteConfig, site: &Site, folder: &Path, ledger: &Ledger) -> Inputs {
     let mut inputs = Inputs::new(METHOD);
     for (key, value) in &config.keys {
         inputs.setting(key, value);
@@ -91,14 +113,13 @@ pub(super) fn keep(cache: &StageCache, inputs: Inputs, manifest: &Manifest) -> R
 ///
 /// # Errors
 /// A product that cannot be read back, write errors.
-pub(super) fn publish(
-    config: &SiteConfig,
-    site: &Site,
-    folder: &Path,
-    ledger: &Ledger,
-    methods: &[(String, u32)],
-    inputs: &Inputs,
-) -> Result<Manifest> {
+fn publish(config: &SiteConfig, site: &Site, from: &MadeFrom<'_>) -> Result<Manifest> {
+    let MadeFrom {
+        folder,
+        ledger,
+        methods,
+        inputs,
+    } = *from;
     let none = KernelSet::default();
     let kernels = site.kernels.as_ref().unwrap_or(&none);
     let statements = statements(config, site, methods)?;

@@ -6,20 +6,22 @@ use std::{
     time::Instant,
 };
 
+use serde::{Serialize, de::DeserializeOwned};
+
 use super::{
     PUBLISH,
     bounds::Bounds,
-    driver::{Driver, Exit, Flow, Ledger, StageReason},
+    driver::{Driver, Exit, Flow, Ledger, MadeFrom, Publication, SiteDriver, StageReason},
     observer::{Observer, StageEvent},
-    outputs::Site,
-    publish::{inputs, keep, publish, standing},
-    site::site,
+    out::check_out_path,
+    publish::{keep, standing},
+    task::Task,
 };
 use crate::{
     config::SiteConfig,
-    error::{Locate, Result},
+    error::{Error, Locate, Result},
     files::{HashedFile, InputFiles},
-    stage::{Output, Reason, Stage},
+    stage::{Inputs, Output, Reason, Stage},
     store::{
         cache::StageCache,
         hashes::HashCache,
@@ -33,9 +35,10 @@ use crate::{
 /// Options of a run.
 #[derive(Debug)]
 pub struct RunOptions<'a> {
-    /// Products go to `<out>/<site>`.
+    /// Products go to a subfolder with the name of the site, net or calibration; those of a match or of an archive to
+    /// this folder.
     pub out: PathBuf,
-    /// Last stage to run, one of [`STAGES`](super::STAGES).
+    /// Last stage to run, one of [`Task::stages`].
     pub until: &'a str,
     /// Use no stored output.
     pub force: bool,
@@ -55,7 +58,7 @@ impl RunOptions<'_> {
         self.hashes.files().within(self.roots)
     }
 
-    /// The stored outputs of the site with products in `folder`.
+    /// The stored outputs of the flow with products in `folder`.
     pub(super) fn stage_cache(&self, folder: &Path) -> StageCache {
         let folder = folder.join(CACHE);
         let own = self.hashes.of_own(&folder).files();
@@ -65,13 +68,15 @@ impl RunOptions<'_> {
 
 /// Outcome of a run.
 #[derive(Debug)]
-pub struct SiteOutcome {
-    /// Site identifier.
-    pub site: String,
+pub struct RunOutcome {
+    /// Name of the task: the identifier of a site.
+    pub name: String,
     /// Folder of the products.
     pub folder: PathBuf,
     /// Every stage that the run passed, with the reason why it ran, or that it was kept.
     pub stages: Vec<StageReason>,
+    /// Reasons why inputs are left out, which the products state.
+    pub left_out: Vec<Error>,
     /// End of the run.
     pub ending: Ending,
 }
@@ -87,24 +92,52 @@ pub enum Ending {
     StoppedAfter(String),
 }
 
-/// Runs one site from its configuration to its products.
+impl RunOutcome {
+    /// The manifest of the products; `None` if the run stopped before them.
+    #[must_use]
+    pub const fn manifest(&self) -> Option<&Manifest> {
+        match &self.ending {
+            Ending::Published(manifest) | Ending::Unchanged(manifest) => Some(manifest),
+            Ending::StoppedAfter(_) => None,
+        }
+    }
+
+    /// Whether the products already existed.
+    #[must_use]
+    pub const fn is_unchanged(&self) -> bool {
+        matches!(self.ending, Ending::Unchanged(_))
+    }
+}
+
+/// Runs one site from its configuration to its products, as [`run_task`].
+///
+/// # Errors
+/// As [`run_task`].
+pub fn run_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<RunOutcome> {
+    run_task(Task::Site(config), options)
+}
+
+/// Runs a flow from its inputs to its products.
 ///
 /// A stage whose inputs are unchanged is not run; its stored output is used.
 ///
 /// # Errors
-/// The first failure, with site, stage and file; products of an earlier run remain unchanged.
-pub fn run_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOutcome> {
-    let span = tracing::info_span!("site", id = %config.site);
+/// The first failure, with task, stage and file; products of an earlier run remain unchanged.
+pub fn run_task(task: Task<'_>, options: &RunOptions<'_>) -> Result<RunOutcome> {
+    let name = task.name();
+    let span = tracing::info_span!("site", id = %name);
     let _entered = span.enter();
-    let folder = options.out.join(&config.site);
-    let _lock = SiteLock::take(&folder).in_site(&config.site)?;
+    check_out_path(&options.out)?;
+    let stages = task.stages_with(options.until)?;
+    let folder = task.folder(&options.out);
+    let _lock = SiteLock::take(&folder).in_site(name)?;
     let cache = options.stage_cache(&folder);
-    let (mut run, mut driven) = drive(config, options, &folder, cache);
+    let (mut run, mut driven) = drive(task, &stages, options, &folder, cache);
     if run.cache.has_lost_output() {
         tracing::warn!("a stored output is damaged or cannot be read: the run begins again");
         // Every stored output is read at once, and a damaged one is computed anew.
         let at_once = StageCache::new(&folder.join(CACHE), options.force);
-        (run, driven) = drive(config, options, &folder, at_once);
+        (run, driven) = drive(task, &stages, options, &folder, at_once);
     }
     run.hashes.keep(run.files());
     let of_own = run.hashes.of_own(&folder.join(CACHE));
@@ -112,23 +145,25 @@ pub fn run_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOut
         Ending::Published(_) | Ending::Unchanged(_) => of_own.keep_only(run.cache.own()),
         Ending::StoppedAfter(_) => of_own.keep(run.cache.own()),
     }
-    let driven = driven.in_site(&config.site);
+    let driven = driven.in_site(name);
     note_failure(
         &run.folder,
         driven.as_ref().err().map(ToString::to_string).as_deref(),
     );
     driven?;
-    Ok(SiteOutcome {
-        site: config.site.clone(),
+    Ok(RunOutcome {
+        name: name.to_owned(),
         folder: run.folder,
         stages: run.passed,
+        left_out: run.left_out,
         ending: run.ending,
     })
 }
 
-/// Drives the flow of the site once.
+/// Drives the flow once.
 fn drive<'a>(
-    config: &SiteConfig,
+    task: Task<'_>,
+    stages: &[&'static str],
     options: &'a RunOptions<'_>,
     folder: &Path,
     cache: StageCache,
@@ -137,6 +172,7 @@ fn drive<'a>(
         cache,
         folder: folder.to_owned(),
         bounds: Bounds {
+            stages: stages.to_vec(),
             until: options.until,
             stop: options.stop,
             files: options.files(),
@@ -146,9 +182,11 @@ fn drive<'a>(
         ledger: Ledger::new(),
         methods: Vec::new(),
         passed: Vec::new(),
+        has_parts: false,
+        left_out: Vec::new(),
         ending: Ending::StoppedAfter(options.until.to_owned()),
     };
-    let driven = match site(&mut run, config) {
+    let driven = match task.drive(&mut run) {
         Ok(()) | Err(Exit::StageReached) => run.verify_inputs(),
         Err(Exit::Failed(failure) | Exit::NotAdjusted(failure)) => {
             // Outputs made from changed files are discarded; the failure itself takes precedence over the change.
@@ -170,6 +208,9 @@ struct Run<'a> {
     methods: Vec<(String, u32)>,
     /// Every stage so far.
     passed: Vec<StageReason>,
+    /// Whether a stage has parts that are not in the manifest.
+    has_parts: bool,
+    left_out: Vec<Error>,
     ending: Ending,
 }
 
@@ -253,6 +294,44 @@ impl Driver for Run<'_> {
         Ok(output)
     }
 
+    fn part<T: Serialize + DeserializeOwned>(
+        &mut self,
+        label: String,
+        stored_as: &str,
+        inputs: &Inputs,
+    ) -> Flow<Option<Output<T>>> {
+        self.has_parts = true;
+        let (reason, output) = match self.cache.load(stored_as, inputs) {
+            Ok(output) => (Reason::Unchanged, Some(output)),
+            Err(reason) => (reason, None),
+        };
+        tracing::debug!(stage = label, "{reason}");
+        let stage = label;
+        self.passed.push(StageReason { stage, reason });
+        Ok(output)
+    }
+
+    fn work<T>(
+        &mut self,
+        stage: &'static str,
+        work: impl FnOnce(&StageCache, &InputFiles, Watch<'_>) -> Result<T>,
+    ) -> Flow<Option<T>> {
+        self.enter(stage)?;
+        let begun = Instant::now();
+        self.observer
+            .hear(stage, &StageEvent::Begins(&Reason::First));
+        let tell = |count| self.observer.hear(stage, &StageEvent::Counts(count));
+        let counter = Counter::new(&tell);
+        let watch = Watch::counted(self.bounds.stop, &counter);
+        let made = work(&self.cache, &self.bounds.files, watch).in_stage(stage)?;
+        self.done(stage, begun);
+        Ok(Some(made))
+    }
+
+    fn leave_out(&mut self, failures: Vec<Error>) {
+        self.left_out.extend(failures);
+    }
+
     fn hash(&mut self, stage: &'static str, paths: &[PathBuf]) -> Flow<Vec<HashedFile>> {
         self.enter(stage)?;
         let tell = |count| self.observer.hear(stage, &StageEvent::Counts(count));
@@ -262,9 +341,9 @@ impl Driver for Run<'_> {
     }
 
     /// Publishes the products unless the products of an earlier run are current.
-    fn publish(&mut self, config: &SiteConfig, site: &Site) -> Flow<()> {
+    fn publish(&mut self, publication: &impl Publication) -> Flow<()> {
         self.enter(PUBLISH)?;
-        let inputs = inputs(config, site, &self.folder, &self.ledger);
+        let inputs = publication.inputs(&self.folder, &self.ledger);
         self.ending = match standing(&self.folder, &self.cache, &inputs) {
             Ok(manifest) => {
                 self.pass(PUBLISH, Reason::Unchanged);
@@ -274,18 +353,21 @@ impl Driver for Run<'_> {
                 self.pass(PUBLISH, reason);
                 let begun = Instant::now();
                 self.verify_inputs().in_stage(PUBLISH)?;
-                let manifest = publish(
-                    config,
-                    site,
-                    &self.folder,
-                    &self.ledger,
-                    &self.methods,
-                    &inputs,
-                );
-                let manifest = manifest.in_stage(PUBLISH)?;
+                let made_from = MadeFrom {
+                    folder: &self.folder,
+                    ledger: &self.ledger,
+                    methods: &self.methods,
+                    inputs: &inputs,
+                };
+                let manifest = publication.publish(&made_from).in_stage(PUBLISH)?;
+                // Publishing may leave out further inputs.
+                let inputs = publication.inputs(&self.folder, &self.ledger);
                 keep(&self.cache, inputs, &manifest).in_stage(PUBLISH)?;
-                self.cache
-                    .keep_only(manifest.stages.iter().map(|stage| &*stage.name));
+                // Results of files of an archive remain: a later check may name these files again.
+                if !self.has_parts {
+                    self.cache
+                        .keep_only(manifest.stages.iter().map(|stage| &*stage.name));
+                }
                 self.done(PUBLISH, begun);
                 Ending::Published(manifest)
             }
@@ -293,3 +375,5 @@ impl Driver for Run<'_> {
         Ok(())
     }
 }
+
+impl SiteDriver for Run<'_> {}

@@ -3,10 +3,11 @@
 use super::{
     LOAD_KERNELS, PUBLISH,
     choice::{ChooseKernels, KernelChoice, RivalKernelSets, rival_positions},
-    driver::{Driver, Exit, Flow},
+    driver::{Exit, Flow, SiteDriver},
     kernels::{load_kernels, required_coverage},
     outputs::{Prepared, Site},
     overlays::overlays,
+    publish::SitePublication,
     registered::registered,
     surface::surface,
     triangulate::triangulate,
@@ -88,13 +89,17 @@ pub const STAGES: &[&str] = &[
 ];
 
 /// The flow of one site, from its configuration to its products.
-pub(super) fn site<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<()> {
+pub(super) fn site<D: SiteDriver>(flow: &mut D, config: &SiteConfig) -> Flow<()> {
     let prepared = prepare(flow, config)?;
     finish(flow, config, prepared)
 }
 
 /// From the choice of kernels to the products.
-pub(super) fn finish<D: Driver>(flow: &mut D, config: &SiteConfig, prepared: Prepared) -> Flow<()> {
+pub(super) fn finish<D: SiteDriver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    prepared: Prepared,
+) -> Flow<()> {
     let (choice, chosen) = choose(flow, config, prepared.required.as_ref())?;
     let kernels = match chosen {
         Some(chosen) => kernels(flow, config, prepared.required.as_ref(), chosen)?,
@@ -115,11 +120,14 @@ pub(super) fn finish<D: Driver>(flow: &mut D, config: &SiteConfig, prepared: Pre
     }
     surface(flow, config, &mut site)?;
     overlays(flow, config, &mut site)?;
-    flow.publish(config, &site)
+    flow.publish(&SitePublication {
+        config,
+        site: &site,
+    })
 }
 
 /// Times, footprints and profiles: the stages that need clocks but no orbit.
-pub(super) fn prepare<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Prepared> {
+pub(super) fn prepare<D: SiteDriver>(flow: &mut D, config: &SiteConfig) -> Flow<Prepared> {
     let clocks = kernels(flow, config, Some(&RequiredCoverage::default()), 0)?;
     let images = {
         let kernels = &KernelView::text(clocks.as_ref());
@@ -174,7 +182,7 @@ pub(super) fn prepare<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Prep
 }
 
 /// The shots in the windows, of PEDR files or of tables.
-fn found<D: Driver>(
+fn found<D: SiteDriver>(
     flow: &mut D,
     config: &SiteConfig,
     images: &[Output<ImageTimes>],
@@ -219,7 +227,7 @@ fn found<D: Driver>(
 
 /// Windows with the outlines of images, with the first of rival kernel sets; empty if no window is the outline of an
 /// image.
-fn outlined<D: Driver>(
+fn outlined<D: SiteDriver>(
     flow: &mut D,
     config: &SiteConfig,
     images: &[Output<ImageTimes>],
@@ -244,7 +252,7 @@ fn outlined<D: Driver>(
 
 /// Index of the rival kernel set to use; the first where there is one source. The index is `None` while it is not
 /// known.
-fn choose<D: Driver>(
+fn choose<D: SiteDriver>(
     flow: &mut D,
     config: &SiteConfig,
     required: Option<&RequiredCoverage>,
@@ -265,7 +273,7 @@ fn choose<D: Driver>(
 }
 
 /// Ranges, orientation, sensor models and registration with the kernels that were chosen.
-pub(super) fn orient<D: Driver>(
+pub(super) fn orient<D: SiteDriver>(
     flow: &mut D,
     config: &SiteConfig,
     prepared: Prepared,
@@ -353,7 +361,7 @@ pub(super) fn orient<D: Driver>(
 }
 
 /// Orientation of every image from the kernels, or from its support data.
-fn orientations<D: Driver>(
+fn orientations<D: SiteDriver>(
     flow: &mut D,
     config: &SiteConfig,
     images: &[Output<ImageTimes>],
@@ -375,7 +383,7 @@ fn orientations<D: Driver>(
 }
 
 /// The kernels of the configuration for the `required` times; `None` while these are not known.
-pub(super) fn kernels<D: Driver>(
+pub(super) fn kernels<D: SiteDriver>(
     flow: &mut D,
     config: &SiteConfig,
     required: Option<&RequiredCoverage>,

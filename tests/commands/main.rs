@@ -13,6 +13,7 @@ mod example_kernels;
 mod export;
 mod fetch;
 mod fetch_tables;
+mod flows;
 mod foreign_files;
 mod geometric;
 mod guide;

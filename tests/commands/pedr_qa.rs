@@ -23,7 +23,7 @@ use std::{
 
 use areograph::{
     constants::SPACECRAFT,
-    flow::{ArchiveProgress, ArchiveRequest, archive_filter, archive_limits, check_archive},
+    flow::{ArchiveRequest, Observer, StageEvent, Task, archive_filter, archive_limits},
     footprints::Footprint,
     geom::{
         orbit_axes::radial_along_cross,
@@ -36,7 +36,9 @@ use areograph::{
     time::Et,
 };
 use common::{
-    assert_keeps_schema, json,
+    assert_keeps_schema,
+    flows::run_observed,
+    json,
     mission::{areograph, products, succeed},
 };
 use serde_json::Value;
@@ -366,35 +368,44 @@ fn any_number_of_threads_gives_the_same_bytes() {
     assert_eq!(products(one.path()), products(CHECKED.path()));
 }
 
+/// Number of files whose results are stored in a folder of products.
+fn stored(out: &Path) -> usize {
+    let entries = fs::read_dir(out.join(".cache")).into_iter().flatten();
+    let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    names
+        .filter(|name| name.starts_with("check_archive+"))
+        .count()
+}
+
 #[test]
 fn a_killed_check_goes_on_and_ends_the_same() {
     let out = tempfile::tempdir().unwrap();
     let mut child = qa(&pedr(), &kernels(), out.path()).spawn().unwrap();
-    let stored = || {
-        let entries = fs::read_dir(out.path().join(".cache"))
-            .into_iter()
-            .flatten();
-        let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
-        names
-            .filter(|name| name.starts_with("check_archive+"))
-            .count()
-    };
-    while stored() == 0 && child.try_wait().unwrap().is_none() {
+    while stored(out.path()) == 0 && child.try_wait().unwrap().is_none() {
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
     child.kill().unwrap();
     child.wait().unwrap();
     assert!(!out.path().join("manifest.json").exists());
-    let kept = stored();
+    let kept = stored(out.path());
     assert!((1..3).contains(&kept), "{kept}");
-    let (code, _, told) = ended(&mut qa(&pedr(), &kernels(), out.path()));
-    assert_eq!(code, 5);
-    let from_before = format!("{kept} of 3 files ({kept} from before)");
-    assert!(told.contains(&from_before), "{told}");
+    let planned = |word: &str| {
+        let mut command = qa(&pedr(), &kernels(), out.path());
+        let (code, plan, _) = ended(command.arg("--dry-run"));
+        assert_eq!(code, 0);
+        let file = format!("{word}  check_archive/");
+        plan.lines().filter(|line| line.contains(&file)).count()
+    };
+    assert_eq!([planned("keep"), planned("run ")], [kept, 3 - kept]);
+    assert_eq!(ended(&mut qa(&pedr(), &kernels(), out.path())).0, 5);
+    assert_eq!([planned("keep"), planned("run ")], [3, 0]);
     assert_eq!(products(out.path()), products(CHECKED.path()));
     // Once more: everything stands.
     let (_, answer, _) = ended(&mut qa(&pedr(), &kernels(), out.path()));
-    assert!(answer.starts_with("INVALID, nothing changed"), "{answer}");
+    assert!(
+        answer.starts_with("archive: INVALID, nothing changed"),
+        "{answer}"
+    );
 }
 
 #[test]
@@ -626,13 +637,11 @@ fn a_displaced_block_is_checked_and_the_times_of_profiles_are_true() {
 
 /// The request of the command.
 macro_rules! request {
-    ($request:ident, $pedr:expr, $kernels:expr, $out:expr) => {
+    ($request:ident, $pedr:expr, $kernels:expr) => {
         let (paths, kernels) = ([$pedr.clone()], $kernels);
-        let stop = AtomicBool::new(false);
         let $request = ArchiveRequest {
             paths: &paths,
             kernels: &kernels,
-            out: &$out,
             clock: areograph::altimetry::MolaClock {
                 bias_s: 0.117,
                 sign: areograph::altimetry::TagSign::Late,
@@ -640,10 +649,25 @@ macro_rules! request {
                 source: String::new(),
             },
             allow_uncovered: false,
-            force: false,
-            stop: &stop,
         };
     };
+}
+
+/// Acts when so many files were checked.
+struct AtFile<F>(F);
+
+impl<F> std::fmt::Debug for AtFile<F> {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        out.write_str("AtFile")
+    }
+}
+
+impl<F: Fn(u64) + Sync> Observer for AtFile<F> {
+    fn hear(&self, _stage: &str, event: &StageEvent<'_>) {
+        if let StageEvent::Counts(count) = event {
+            self.0(count.done);
+        }
+    }
 }
 
 #[test]
@@ -662,25 +686,27 @@ fn what_was_checked_with_a_kernel_that_changed_is_not_stored() {
         write_records(&files.join(name), start..start + 300, b' ');
     }
     let out = folder.path().join("out");
-    request!(request, files, own.join("archive.tm"), out);
+    request!(request, files, own.join("archive.tm"));
     let mut found = fs::read_dir(&own)
         .unwrap()
         .map(|entry| entry.unwrap().path());
     let leap_seconds = found.find(|path| path.extension().is_some_and(|of| of == "tls"));
     let leap_seconds = leap_seconds.unwrap();
     // While the second file is checked, a kernel that it may depend on changes.
-    let change = |progress: &ArchiveProgress| {
-        if progress.files_done == 1 {
+    let change = AtFile(|files| {
+        if files == 1 {
             let text = fs::read_to_string(&leap_seconds).unwrap() + "\nA comment.\n";
             fs::write(&leap_seconds, text).unwrap();
         }
-    };
-    let failure = check_archive(&request, &change).unwrap_err().to_string();
+    });
+    let stop = AtomicBool::new(false);
+    let ran = run_observed(Task::Archive(&request), &out, &change, &stop);
+    let failure = ran.unwrap_err().to_string();
     assert!(
         failure.contains("the file changed while it was in use"),
         "{failure}"
     );
-    assert_eq!(fs::read_dir(out.join(".cache")).unwrap().count(), 1);
+    assert_eq!(stored(&out), 1);
 }
 
 /// One file is replaced before it is checked, another one goes away after it was.
@@ -695,25 +721,26 @@ fn files_that_change_or_go_away_are_told_and_do_not_end_the_check() {
         write_records(path, start..start + 300, b' ');
     }
     let out = folder.path().join("out");
-    request!(request, files, kernels(), out);
-    let meddle = |progress: &ArchiveProgress| {
-        if progress.files_done == 0 {
+    request!(request, files, kernels());
+    let meddle = AtFile(|done| {
+        if done == 0 {
             let other = files.join("other");
             fs::copy(&names[1], &other).unwrap();
             fs::rename(other, &names[1]).unwrap();
-        } else if progress.files_done == 3 {
+        } else if done == 3 {
             fs::remove_file(&names[0]).unwrap();
         }
-    };
-    let outcome = check_archive(&request, &meddle).unwrap();
-    let told: Vec<String> = outcome.failures.iter().map(ToString::to_string).collect();
+    });
+    let stop = AtomicBool::new(false);
+    let outcome = run_observed(Task::Archive(&request), &out, &meddle, &stop).unwrap();
+    let told: Vec<String> = outcome.left_out.iter().map(ToString::to_string).collect();
     assert_eq!(told.len(), 2, "{told:#?}");
     assert!(
         told[0].contains("ap10002l.b") && told[0].contains("changed"),
         "{told:#?}"
     );
     assert!(told[1].contains("ap10001l.b"), "{told:#?}");
-    assert!(!outcome.manifest.verdict.valid);
+    assert!(!outcome.manifest().unwrap().verdict.valid);
     assert_eq!(rows(&out).len(), 2);
     // The profile stands in the page, without a link.
     let page = fs::read_to_string(out.join("report/index.html")).unwrap();

@@ -18,6 +18,7 @@ pub(crate) mod archive_server;
 pub(crate) mod camera_files;
 pub(crate) mod case;
 pub(crate) mod daf;
+pub(crate) mod flows;
 pub(crate) mod mission;
 pub(crate) mod page;
 pub(crate) mod products_site;

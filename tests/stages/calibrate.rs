@@ -19,7 +19,7 @@ use std::{fs, path::Path, sync::atomic::AtomicBool};
 use areograph::{
     config::load_calibration,
     error::Error,
-    flow::{SingleOutcome, run_calibration},
+    flow::{RunOutcome, Task},
     geom::{ellipsoid::local_axes, pushbroom::Detector},
     pds::isd::{ImageSupport, read_isd},
     scene::write_calibration_scene,
@@ -29,7 +29,7 @@ use areograph::{
         PointKind, Scatter,
     },
 };
-use common::{assert_keeps_schema, json, number};
+use common::{assert_keeps_schema, flows::run_into, json, number};
 use nalgebra::Vector3;
 use serde_json::Value;
 
@@ -78,9 +78,9 @@ fn edited(folder: &Path, file: &str, change: impl Fn(usize, &mut Vec<String>)) {
     fs::write(path, rows.join("\n") + "\n").unwrap();
 }
 
-fn run(folder: &Path, force: bool) -> Result<SingleOutcome, Error> {
+fn run(folder: &Path, force: bool) -> Result<RunOutcome, Error> {
     let config = load_calibration(&folder.join("lines/calibration.toml"))?.calibration;
-    run_calibration(&config, &folder.join("out"), force)
+    run_into(Task::Calibration(&config), &folder.join("out"), force)
 }
 
 fn calibrated(folder: &Path) -> Result<Calibration, Error> {
@@ -500,7 +500,7 @@ fn off_of(support: &ImageSupport, row: &[f64]) -> [f64; 2] {
 fn products_are_whole_keep_their_schemas_and_are_not_made_twice() {
     let folder = scene(&[]);
     let first = run(folder.path(), false).unwrap();
-    assert!(!first.unchanged && first.manifest.verdict.valid);
+    assert!(!first.is_unchanged() && first.manifest().unwrap().verdict.valid);
     let out = &first.folder;
     assert_keeps_schema(&json(&out.join("calibration.json")), "calibration_result");
     assert_keeps_schema(&json(&out.join("manifest.json")), "manifest");
@@ -513,13 +513,16 @@ fn products_are_whole_keep_their_schemas_and_are_not_made_twice() {
     assert_eq!(points.matches("held_back").count(), 119);
     let residuals = fs::read_to_string(out.join("residuals.csv")).unwrap();
     assert_eq!(residuals.lines().count(), 1 + 2 * (206 + 476));
-    assert!(run(folder.path(), false).unwrap().unchanged);
+    assert!(run(folder.path(), false).unwrap().is_unchanged());
     let again = run(folder.path(), true).unwrap();
-    assert_eq!(again.manifest.products, first.manifest.products);
+    assert_eq!(
+        again.manifest().unwrap().products,
+        first.manifest().unwrap().products
+    );
     // A table that changes makes it run again.
     replace(folder.path(), "i864_ties.csv", &[("T007,s1,", "T007x,s1,")]);
     let changed = run(folder.path(), false).unwrap();
-    assert!(!changed.unchanged && changed.manifest.complaints.count > 0);
+    assert!(!changed.is_unchanged() && changed.manifest().unwrap().complaints.count > 0);
 }
 
 /// Wrong places and wrong points among right ones are left out, by name.

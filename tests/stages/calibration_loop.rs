@@ -13,21 +13,31 @@ use std::{
     collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
-    sync::LazyLock,
-    time::SystemTime,
+    process::Command,
+    sync::{
+        LazyLock,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::{Duration, SystemTime},
 };
 
 use areograph::{
     body::Body,
-    config::{load_calibration, parse_calibration},
-    error::Error,
-    flow::{SingleOutcome, run_calibration},
+    config::{CalibrationConfig, load_calibration, parse_calibration},
+    error::{Error, Kind},
+    flow::{Observer, RunOutcome, StageEvent, Task},
     geom::ellipsoid::local_axes,
     scene::{write_calibration_loop_scene, write_terrain_model_scene},
     stages::line_camera::LineCamera,
     store::publish::CACHE,
 };
-use common::{assert_keeps_schema, json, long, number};
+use common::{
+    assert_keeps_schema,
+    flows::{ran, run_into, run_observed, would_run},
+    json, long,
+    mission::{areograph, products, succeed},
+    number,
+};
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
 
@@ -39,7 +49,7 @@ const STEREO: [&str; 2] = ["s1", "s2"];
 static SCENE: LazyLock<tempfile::TempDir> = LazyLock::new(|| scene(1));
 
 /// Its calibration, run once: to the end in the long run, and otherwise its first round, which takes a third of the time.
-static RUN: LazyLock<SingleOutcome> = LazyLock::new(|| {
+static RUN: LazyLock<RunOutcome> = LazyLock::new(|| {
     let first = ("search_cells = 30", "search_cells = 30\nrounds_max = 1");
     let replaced: &[_] = if long() { &[] } else { &[first] };
     run("whole", replaced).unwrap()
@@ -52,11 +62,11 @@ fn scene(seed: u64) -> tempfile::TempDir {
 }
 
 /// Runs the scene's calibration file with some text replaced.
-fn run(name: &str, replaced: &[(&str, &str)]) -> Result<SingleOutcome, Error> {
+fn run(name: &str, replaced: &[(&str, &str)]) -> Result<RunOutcome, Error> {
     run_in(SCENE.path(), name, replaced)
 }
 
-fn run_in(folder: &Path, name: &str, replaced: &[(&str, &str)]) -> Result<SingleOutcome, Error> {
+fn run_in(folder: &Path, name: &str, replaced: &[(&str, &str)]) -> Result<RunOutcome, Error> {
     let mut text = fs::read_to_string(folder.join("lines/calibration.toml")).unwrap();
     for (was, is) in replaced {
         assert!(text.contains(was), "{was}");
@@ -65,7 +75,7 @@ fn run_in(folder: &Path, name: &str, replaced: &[(&str, &str)]) -> Result<Single
     let path = folder.join("lines").join(format!("{name}.toml"));
     fs::write(&path, text).unwrap();
     let config = load_calibration(&path)?.calibration;
-    run_calibration(&config, &folder.join(name), false)
+    run_into(Task::Calibration(&config), &folder.join(name), false)
 }
 
 /// What a file that was changed is told: an error, or an invalid result.
@@ -76,7 +86,7 @@ fn refused(name: &str, replaced: &[(&str, &str)]) -> String {
             failure.to_string().replace(&path, "")
         }
         Ok(outcome) => {
-            let verdict = outcome.manifest.verdict;
+            let verdict = &outcome.manifest().unwrap().verdict;
             assert!(!verdict.valid, "{verdict:?}");
             format!("{}: {}", verdict.word(), verdict.reasons.join("; "))
         }
@@ -120,7 +130,7 @@ fn plane_and_height_m(errors_m: &[Vector3<f64>]) -> [f64; 2] {
 
 #[test]
 fn rounds_converge_and_their_numbers_are_kept() {
-    let verdict = &RUN.manifest.verdict;
+    let verdict = &RUN.manifest().unwrap().verdict;
     let document = json(&RUN.folder.join("calibration.json"));
     assert_keeps_schema(&document, "calibration_result");
     let rounds = document["rounds"]["rounds"].as_array().unwrap();
@@ -157,7 +167,7 @@ fn places_are_as_near_as_stated_to_where_they_truly_are() {
     });
     let other = other.as_ref().map(|(folder, run)| (folder.path(), run));
     for (folder, run) in [(SCENE.path(), &*RUN)].into_iter().chain(other) {
-        let verdict = &run.manifest.verdict;
+        let verdict = &run.manifest().unwrap().verdict;
         assert_eq!(verdict.valid, long(), "{:?}", verdict.reasons);
         let given = errors_m(folder, |line| folder.join(format!("lines/isd/{line}.json")));
         let errors_m = errors_m(folder, |line| {
@@ -202,14 +212,22 @@ fn places_are_as_near_as_stated_to_where_they_truly_are() {
 
 #[test]
 fn a_second_run_has_nothing_to_do() {
-    let finished = RUN.manifest.finished_utc.clone();
+    let finished = RUN.manifest().unwrap().finished_utc.clone();
     let config = load_calibration(&SCENE.path().join("lines/whole.toml")).unwrap();
     let stored = stored_at(&RUN.folder);
     assert!(!stored.is_empty());
-    let again = run_calibration(&config.calibration, &SCENE.path().join("whole"), false).unwrap();
-    assert!(again.unchanged);
-    assert_eq!(again.manifest.finished_utc, finished);
-    assert_eq!(again.manifest.verdict, RUN.manifest.verdict);
+    let again = run_into(
+        Task::Calibration(&config.calibration),
+        &SCENE.path().join("whole"),
+        false,
+    )
+    .unwrap();
+    assert!(again.is_unchanged());
+    assert_eq!(again.manifest().unwrap().finished_utc, finished);
+    assert_eq!(
+        again.manifest().unwrap().verdict,
+        RUN.manifest().unwrap().verdict
+    );
     assert_eq!(
         stored_at(&RUN.folder),
         stored,
@@ -217,11 +235,156 @@ fn a_second_run_has_nothing_to_do() {
     );
 }
 
-/// When each stage output of a folder was stored.
+/// A run that an observer stops when a stage begins.
+#[derive(Debug)]
+struct StopAt {
+    stage: &'static str,
+    stop: AtomicBool,
+}
+
+impl Observer for StopAt {
+    fn hear(&self, stage: &str, event: &StageEvent<'_>) {
+        if stage == self.stage && matches!(event, StageEvent::Begins(_)) {
+            self.stop.store(true, Ordering::Relaxed);
+        }
+    }
+}
+
+/// The calibration of [`RUN`].
+fn whole() -> CalibrationConfig {
+    LazyLock::force(&RUN);
+    let path = SCENE.path().join("lines/whole.toml");
+    load_calibration(&path).unwrap().calibration
+}
+
+/// The stages that [`RUN`] ran, from `first` on.
+fn stages_from(first: &str) -> Vec<&'static str> {
+    let all = ran(&RUN);
+    let place = all.iter().position(|stage| *stage == first).unwrap();
+    all[place..].to_vec()
+}
+
+/// A run that was ended in `stage` goes on there, and gives the products of an undisturbed one.
+fn assert_resumes(out: &Path, stage: &str) {
+    let config = whole();
+    let planned = would_run(Task::Calibration(&config), out);
+    assert_eq!(
+        planned[0],
+        (stage.to_owned(), "no earlier output".to_owned())
+    );
+    assert!(!out.join(&config.calibration).join("manifest.json").exists());
+    let resumed = run_into(Task::Calibration(&config), out, false).unwrap();
+    assert_eq!(ran(&resumed), stages_from(stage));
+    assert!(products(&resumed.folder) == products(&RUN.folder));
+}
+
+/// In the last round of the long run, and in the first one of the short run, which has no other.
+#[test]
+fn a_calibration_that_was_stopped_goes_on_at_the_round_where_it_was() {
+    let stage = if long() {
+        "match_ties/round-3"
+    } else {
+        "map_surface/round-1"
+    };
+    let (config, out) = (whole(), SCENE.path().join("stopped"));
+    let observer = StopAt {
+        stage,
+        stop: AtomicBool::new(false),
+    };
+    let stopped = run_observed(Task::Calibration(&config), &out, &observer, &observer.stop);
+    let failure = stopped.unwrap_err();
+    assert_eq!(failure.kind(), Kind::Interrupted, "{failure}");
+    let place = format!("{}/{stage}: interrupted", config.calibration);
+    assert!(failure.to_string().starts_with(&place), "{failure}");
+    assert_resumes(&out, stage);
+}
+
+/// Sends a signal to the command as soon as the stage before the terrain model of `round` is stored; its exit code.
+fn signalled(out: &Path, signal: &str, round: u32) -> Option<i32> {
+    let config = whole();
+    let mut command = areograph();
+    command.args(["--quiet", "calibrate"]).arg(&config.file);
+    let mut child = command.arg("--out").arg(out).spawn().unwrap();
+    let stored = out.join(&config.calibration).join(CACHE);
+    let before = stored.join(format!("align_lines+round-{round}"));
+    while !before.exists() {
+        assert!(child.try_wait().unwrap().is_none(), "it ended first");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let mut kill = Command::new("kill");
+    succeed(kill.arg(signal).arg(child.id().to_string()));
+    child.wait().unwrap().code()
+}
+
+#[test]
+fn a_calibration_that_was_killed_goes_on_at_the_round_where_it_was() {
+    let (round, out) = (if long() { 3 } else { 1 }, SCENE.path().join("killed"));
+    assert_eq!(signalled(&out, "-KILL", round), None);
+    let stage = format!("map_surface/round-{round}");
+    if long() {
+        assert_resumes(&out, &stage);
+    } else {
+        // The test above goes on.
+        let config = whole();
+        assert_eq!(would_run(Task::Calibration(&config), &out)[0].0, stage);
+    }
+}
+
+#[test]
+fn an_interrupt_leaves_the_terrain_model_and_the_earlier_products() {
+    let out = SCENE.path().join("interrupted");
+    let folder = out.join(whole().calibration);
+    fs::create_dir_all(&folder).unwrap();
+    for (path, bytes) in products(&RUN.folder) {
+        let path = folder.join(path);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, bytes).unwrap();
+    }
+    assert_eq!(signalled(&out, "-INT", 1), Some(130));
+    assert!(!folder.join(CACHE).join("map_surface+round-1").exists());
+    assert!(products(&folder) == products(&RUN.folder));
+}
+
+/// What a changed key reaches, up to the first output that is not known.
+#[test]
+fn a_plan_names_the_round_that_a_key_changes() {
+    let config = whole();
+    let task = Task::Calibration(&config);
+    assert_eq!(would_run(task, &SCENE.path().join("whole")), []);
+    let mut changed = config.clone();
+    changed.laser.least_score = 0.89;
+    let planned = would_run(Task::Calibration(&changed), &SCENE.path().join("whole"));
+    let named = |stage: &str, why: &str| (stage.to_owned(), why.to_owned());
+    assert_eq!(
+        planned,
+        [
+            named("match_laser/round-1", "key laser.least_score changed"),
+            named(
+                "calibrate/round-1",
+                "output of match_laser/round-1 may change"
+            ),
+            named(
+                "publish",
+                "further stages may change, inputs of calibrate/round-1 may change, \
+                 inputs of match_laser/round-1 may change, output of calibrate/round-1 may change, \
+                 output of match_laser/round-1 may change"
+            ),
+        ]
+    );
+    let nowhere = SCENE.path().join("nowhere");
+    let first = would_run(task, &nowhere);
+    // The survey, the wide search, a round, and the publication.
+    assert_eq!(first.len(), 1 + 2 + 5 + 1);
+    assert!(first.iter().all(|(_, why)| why == "no earlier output"));
+    assert!(!nowhere.exists());
+}
+
+/// When each stage output of a folder was stored; hashes of these files are hidden.
 fn stored_at(folder: &Path) -> BTreeMap<PathBuf, SystemTime> {
     let entries = fs::read_dir(folder.join(CACHE)).unwrap();
-    let outputs = entries.map(|entry| {
-        let path = entry.unwrap().path();
+    let paths = entries.map(|entry| entry.unwrap().path());
+    let is_hidden = |path: &Path| path.file_name().unwrap().to_string_lossy().starts_with('.');
+    let outputs = paths.filter(|path| !is_hidden(path)).map(|path| {
         let modified = path.metadata().unwrap().modified().unwrap();
         (path, modified)
     });

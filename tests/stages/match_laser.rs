@@ -27,7 +27,7 @@ use areograph::{
     altimetry::{GroundRadius, ShotFilter},
     body::Body,
     error::Error,
-    flow::run_match,
+    flow::Task,
     geom::{ellipsoid::spherical_to_xyz_m, pushbroom::Detector},
     pds::{
         calibration_tables::read_control,
@@ -40,6 +40,7 @@ use areograph::{
     },
 };
 use common::{
+    flows::{run_into, would_run},
     json,
     mission::{areograph, products, succeed},
 };
@@ -256,8 +257,8 @@ fn images_show_the_models_place_where_the_table_says() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let request = with_images(request(20, None));
-    let outcome = run_match(&request, &out, false).unwrap();
-    assert!(outcome.manifest.verdict.valid && !outcome.unchanged);
+    let outcome = run_into(Task::Match(&request), &out, false).unwrap();
+    assert!(outcome.manifest().unwrap().verdict.valid && !outcome.is_unchanged());
     let table = read_control(&out.join("control.csv")).unwrap();
     assert!(table.complaints.is_empty());
     let of = matched(&request).unwrap();
@@ -307,13 +308,25 @@ fn images_show_the_models_place_where_the_table_says() {
         assert!((vertical_m - point.sigma_m[2]).abs() < 1e-3 && row.sigma_m == [None; 2]);
     }
     // The same again is kept; products are those of one thread.
-    assert!(run_match(&request, &out, false).unwrap().unchanged);
+    assert!(
+        run_into(Task::Match(&request), &out, false)
+            .unwrap()
+            .is_unchanged()
+    );
+    assert_eq!(would_run(Task::Match(&request), &out), []);
+    let mut changed = request.clone();
+    changed.options.seed += 1;
+    let planned = would_run(Task::Match(&changed), &out);
+    let seed = "key request.options.seed changed".to_owned();
+    assert_eq!(planned[0], ("match_laser".to_owned(), seed));
+    assert_eq!((planned.len(), &*planned[1].0), (2, "publish"));
     let alone = folder.path().join("alone");
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build()
         .unwrap();
-    pool.install(|| run_match(&request, &alone, false)).unwrap();
+    pool.install(|| run_into(Task::Match(&request), &alone, false))
+        .unwrap();
     assert_eq!(products(&out), products(&alone));
 }
 

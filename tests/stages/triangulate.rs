@@ -24,13 +24,13 @@ use std::{
 use areograph::{
     config::{load_net, parse_net},
     error::Error,
-    flow::{SingleOutcome, run_net},
+    flow::{RunOutcome, Task},
     geom::plane::{CornerZero, Place},
     scene::write_plane_scene,
     stage::Stage,
     stages::triangulate::{NetFiles, NetKeys, Triangulate, Triangulation},
 };
-use common::{assert_keeps_schema, golden::assert_messages, json, number};
+use common::{assert_keeps_schema, flows::run_into, golden::assert_messages, json, number};
 use serde_json::Value;
 
 const SEED: u64 = 1;
@@ -53,9 +53,9 @@ fn scene(replaced: &[(&str, &str)]) -> tempfile::TempDir {
     folder
 }
 
-fn run(folder: &Path, force: bool) -> Result<SingleOutcome, Error> {
+fn run(folder: &Path, force: bool) -> Result<RunOutcome, Error> {
     let net = load_net(&folder.join("net/net.toml"))?.net;
-    run_net(&net, &folder.join("out"), force)
+    run_into(Task::Net(&net), &folder.join("out"), force)
 }
 
 fn triangulated(folder: &Path) -> Result<Triangulation, Error> {
@@ -208,7 +208,7 @@ fn a_blunder_that_is_alone_in_its_brick_shows_between_the_bricks() {
 fn products_are_whole_keep_their_schemas_and_are_not_made_twice() {
     let folder = scene(&[BRICKS]);
     let first = run(folder.path(), false).unwrap();
-    assert!(!first.unchanged && first.manifest.verdict.valid);
+    assert!(!first.is_unchanged() && first.manifest().unwrap().verdict.valid);
     let out = &first.folder;
     for name in ["triangulation", "columns"] {
         let schema = if name == "columns" {
@@ -233,10 +233,13 @@ fn products_are_whole_keep_their_schemas_and_are_not_made_twice() {
     let table = fs::read_to_string(out.join("deviations.csv")).unwrap();
     let first_row: Vec<&str> = table.lines().nth(1).unwrap().split(',').collect();
     assert_eq!(first_row[8], "true", "{first_row:?}");
-    assert!(run(folder.path(), false).unwrap().unchanged);
+    assert!(run(folder.path(), false).unwrap().is_unchanged());
     let again = run(folder.path(), true).unwrap();
-    assert!(!again.unchanged);
-    assert_eq!(again.manifest.products, first.manifest.products);
+    assert!(!again.is_unchanged());
+    assert_eq!(
+        again.manifest().unwrap().products,
+        first.manifest().unwrap().products
+    );
     // A table that changes makes the net run again; one that cannot be used leaves the products alone.
     let controls = folder.path().join("net/controls.csv");
     let text = fs::read_to_string(&controls).unwrap();
@@ -249,14 +252,14 @@ fn products_are_whole_keep_their_schemas_and_are_not_made_twice() {
     assert_eq!(failure.kind().exit_code(), 3);
     assert_eq!(
         json(&out.join("manifest.json")),
-        serde_json::to_value(&again.manifest).unwrap()
+        serde_json::to_value(again.manifest().unwrap()).unwrap()
     );
     fs::write(
         &controls,
         text.lines().take(8).collect::<Vec<_>>().join("\n"),
     )
     .unwrap();
-    assert!(!run(folder.path(), false).unwrap().unchanged);
+    assert!(!run(folder.path(), false).unwrap().is_unchanged());
 }
 
 #[test]
@@ -579,7 +582,7 @@ fn rows_that_cannot_be_read_are_told_and_the_others_are_used() {
 fn a_file_under_another_key_is_another_net() {
     let folder = scene(&[]);
     let outcome = run(folder.path(), false).unwrap();
-    assert!(outcome.manifest.counts["controls"] > 0);
+    assert!(outcome.manifest().unwrap().counts["controls"] > 0);
     let toml = folder.path().join("net/net.toml");
     let text = fs::read_to_string(&toml).unwrap();
     let net = load_net(&toml).unwrap().net;
@@ -601,10 +604,10 @@ fn a_file_under_another_key_is_another_net() {
     changed.insert_str(end, &format!(", \"{moved}\""));
     fs::write(&toml, changed).unwrap();
     if let Ok(again) = run(folder.path(), false) {
-        assert!(!again.unchanged);
+        assert!(!again.is_unchanged());
         assert_ne!(
-            again.manifest.counts["controls"],
-            outcome.manifest.counts["controls"]
+            again.manifest().unwrap().counts["controls"],
+            outcome.manifest().unwrap().counts["controls"]
         );
     }
 }

@@ -58,9 +58,9 @@ use toml::de::DeTable;
 
 pub use adjustment::{AdjustmentConfig, OrientationPrior};
 pub use calibration::{
-    APrioriConfig, CalibrationConfig, CalibrationMode, CameraConfig, LoadedCalibration,
-    SolutionConfig, ValidationConfig, calibration_example, calibration_schema, load_calibration,
-    parse_calibration,
+    APrioriConfig, CalibrationConfig, CalibrationLaserConfig, CalibrationMode, CameraConfig,
+    LoadedCalibration, SolutionConfig, ValidationConfig, calibration_example, calibration_schema,
+    load_calibration, parse_calibration,
 };
 pub use declare::{Accept, DeclaredKey, ValueKind, Word};
 pub use exposures::{ExposurePiece, line_times_of};

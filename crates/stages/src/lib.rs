@@ -8,6 +8,7 @@
 
 pub mod adjust;
 pub mod calibrate;
+pub mod camera_lines;
 pub mod check_archive;
 pub mod check_beam;
 pub mod check_heights;

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use areograph_base::{
     body::Body,
-    error::{Cause, Locate as _, Result},
+    error::{Cause, Result},
 };
 use areograph_geom::{
     ellipsoid::Spherical,
@@ -14,7 +14,7 @@ use areograph_geom::{
     oriented_camera::OrientedCamera,
     pushbroom::{Detector, ExteriorOrientation, Pose, SampledOrientation},
 };
-use areograph_pds::isd::{ImageSupport, read_isd};
+use areograph_pds::isd::{ImageSupport, SupportSource};
 
 /// Longest time between two samples of the orientation, seconds: over it the tables of a low orbit are cubics within
 /// 1e-4 pixels. `SAMPLES` bounds their number.
@@ -95,14 +95,21 @@ impl LineCamera {
     /// # Errors
     /// Files that cannot be read; support data of another body, or that do not form an orientation.
     pub fn read(path: &Path, name: &str, body: Body) -> Result<Self> {
-        let support = read_isd(path)?;
-        support.sees(body, name).in_file(path)?;
-        let orientation = SampledOrientation::new(&poses(&support))
-            .map_err(|error| NoSight {
-                image: name.to_owned(),
-                problem: error.to_string(),
-            })
-            .in_file(path)?;
+        Self::of(SupportSource::File(path), name, body)
+    }
+
+    /// The image `name` of `body` by support data.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn of(source: SupportSource<'_>, name: &str, body: Body) -> Result<Self> {
+        let support = source.read()?;
+        source.located(support.sees(body, name))?;
+        let orientation = SampledOrientation::new(&poses(&support)).map_err(|error| NoSight {
+            image: name.to_owned(),
+            problem: error.to_string(),
+        });
+        let orientation = source.located(orientation)?;
         Ok(Self {
             camera: OrientedCamera {
                 id: name.to_owned(),

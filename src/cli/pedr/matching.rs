@@ -9,10 +9,10 @@ use crate::{
     body::Body,
     cli::{
         report,
-        single::{Request, answer},
+        single::{self, RunArguments},
     },
     error::Cause,
-    flow::run_match,
+    flow::Task,
     stages::match_laser::{MatchImage, MatchOptions, MatchRequest, Similarity},
 };
 
@@ -74,12 +74,8 @@ pub(super) struct Arguments {
     shots: FilterArguments,
     #[command(flatten)]
     ground: GroundArgument,
-    /// Match again, even if stored results are up to date.
-    #[arg(long)]
-    force: bool,
-    /// Print JSON.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    run: RunArguments,
 }
 
 /// A measure, as typed.
@@ -160,13 +156,9 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
         Ok(request) => request,
         Err(failure) => return report(&failure.into()),
     };
-    let named = Request {
-        what: "model",
-        name: &crate::files::file_name(&arguments.model),
-        json: arguments.json,
-    };
-    let ran = run_match(&request, &arguments.out, arguments.force);
-    answer(&named, ran, |count| {
+    let name = crate::files::file_name(&arguments.model);
+    let task = Task::Match(&request);
+    single::run(task, &name, &arguments.out, &arguments.run, |count| {
         format!(
             "{} of {} units kept, {} shots in {} passes, {} withheld",
             count("units_kept"),

@@ -11,31 +11,16 @@ use crate::{
     stage::Inputs,
     stages::check_archive::{ArchiveRules, ArchiveSource, FileCheck, FileRanges, Load},
     store::cache::StageCache,
+    watch::Watch,
 };
 
-/// Progress of a check.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct ArchiveProgress {
-    /// Files that are done, those whose result was stored included.
-    pub files_done: usize,
-    /// Number of these whose result was stored.
-    pub files_stored: usize,
-    /// All files.
-    pub files: usize,
-    /// Bytes of files that were checked now.
-    pub bytes_done: u64,
-    /// Bytes of files that are still to be checked.
-    pub bytes_left: u64,
-    /// Shots that were checked now.
-    pub shots: u64,
-}
+/// What is counted.
+pub(super) const FILES: &str = "files";
 
 /// A part of a file on its way to the threads that check it.
 pub(super) struct Part {
     /// Index of the file.
     pub(super) file: usize,
-    /// Its size.
-    pub(super) bytes: u64,
     /// The part, or the reason why it is missing; then no further part follows.
     pub(super) loaded: Result<(Arc<ArchiveSource>, Load)>,
 }
@@ -48,7 +33,7 @@ pub(super) struct Checker<'a> {
     pub(super) cache: &'a StageCache,
     /// Name under which the result of each file is stored, and its inputs.
     pub(super) todo: &'a BTreeMap<usize, (String, Inputs)>,
-    pub(super) progress: &'a (dyn Fn(&ArchiveProgress) + Sync),
+    pub(super) watch: Watch<'a>,
 }
 
 /// By file: its results, or its failure.
@@ -56,8 +41,7 @@ pub(super) type Results = BTreeMap<usize, Result<FileRanges>>;
 
 impl Checker<'_> {
     /// Checks incoming parts, and stores the result of every file.
-    pub(super) fn run(&self, parts: Receiver<Part>, start: ArchiveProgress) -> Result<Results> {
-        let mut progress = start;
+    pub(super) fn run(&self, parts: Receiver<Part>) -> Result<Results> {
         let mut results = Results::new();
         let mut open: Option<(usize, FileCheck<'_>)> = None;
         for part in parts {
@@ -76,12 +60,8 @@ impl Checker<'_> {
                 Ok(Some(found)) => Ok(self.store(part.file, found)?),
                 Err(failure) => Err(failure),
             };
-            progress.files_done += 1;
-            progress.bytes_done += part.bytes;
-            progress.bytes_left = progress.bytes_left.saturating_sub(part.bytes);
-            progress.shots += result.as_ref().map_or(0, |found| found.shots);
             results.insert(part.file, result);
-            (self.progress)(&progress);
+            self.watch.step(1, FILES);
         }
         Ok(results)
     }

@@ -40,24 +40,16 @@ impl Loader<'_> {
 
     /// Loads a file part by part; returns whether the checker still accepts parts.
     fn load(&self, file: usize, source: Result<ArchiveSource>) -> Result<bool> {
-        let send = |bytes, loaded| {
-            let part = Part {
-                file,
-                bytes,
-                loaded,
-            };
-            self.parts.send(part).is_ok()
-        };
+        let send = |loaded| self.parts.send(Part { file, loaded }).is_ok();
         let source = match source {
             Ok(source) => Arc::new(source),
-            Err(failure) => return Ok(send(0, Err(failure))),
+            Err(failure) => return Ok(send(Err(failure))),
         };
-        let bytes = source.identity().bytes;
         for rows in source.loads() {
             Stopped::check(self.stop)?;
             let load = source.load(rows, self.session, &self.rules);
             let is_over = load.is_err();
-            if !send(bytes, load.map(|load| (Arc::clone(&source), load))) {
+            if !send(load.map(|load| (Arc::clone(&source), load))) {
                 return Ok(false);
             }
             if is_over {

@@ -38,11 +38,14 @@ impl Stored {
         }
     }
 
-    /// Whether it is of a round that follows from an adjustment, and so from what the same stage made before.
-    fn is_of_later_round(&self) -> bool {
+    /// Its round: later ones follow from an adjustment or a calibration, and so from what the same stage made before.
+    fn round(&self) -> u32 {
         let part = self.part.as_deref().unwrap_or_default();
         let round = part.rsplit('+').next().unwrap_or_default();
-        ["matching", "adjusted"].contains(&round)
+        match round.strip_prefix("round-") {
+            Some(number) => number.parse().unwrap(),
+            None => u32::from(["matching", "adjusted"].contains(&round)),
+        }
     }
 
     /// The number under which it is stored: that of products for what is published of an archive, which has one of its own.
@@ -145,9 +148,8 @@ pub(crate) fn rows(
             .push(stored);
     }
     let row = |(stage, mut stored): (String, Vec<Stored>)| {
-        if stored.iter().any(|of| !of.is_of_later_round()) {
-            stored.retain(|of| !of.is_of_later_round());
-        }
+        let first = stored.iter().map(Stored::round).min().unwrap();
+        stored.retain(|of| of.round() == first);
         let mut methods: Vec<u32> = stored.iter().map(Stored::method).collect();
         methods.dedup();
         let [method] = methods[..] else {

@@ -4,26 +4,24 @@ use std::{
     fs,
     path::{Path, PathBuf},
     process::Command,
-    sync::atomic::AtomicBool,
 };
 
 use areograph::{
     altimetry::{BiasScope, GroundRadius, MolaClock, TagSign},
     body::Body,
     config::{self, load_calibration, load_net},
-    flow::{
-        ArchiveRequest, PUBLISH, RunOptions, archive_filter, check_archive, run_calibration,
-        run_match, run_net, run_site,
-    },
+    flow::{ArchiveRequest, PUBLISH, Task, archive_filter},
     scene::{
         LineScene, SceneOptions, write_calibration_loop_scene, write_calibration_scene,
         write_line_scene, write_plane_scene, write_scene, write_terrain_model_scene,
     },
     stages::match_laser::{MatchImage, MatchOptions, MatchRequest},
-    store::hashes::HashCache,
 };
 
-use crate::common::mission::{areograph, succeed};
+use crate::common::{
+    flows::run_into,
+    mission::{areograph, succeed},
+};
 
 /// Inputs and a flow over them.
 pub(crate) struct Scene {
@@ -46,6 +44,7 @@ pub(crate) static SHORT: [Scene; 6] = [
         declared: &[
             ("search_footprints", "SearchFootprints"),
             ("check_ranges", "CheckRanges"),
+            ("match_ties", "MatchTies"),
             (PUBLISH, "flow/publish.rs"),
         ],
     },
@@ -65,7 +64,7 @@ pub(crate) static SHORT: [Scene; 6] = [
         },
         run: |folder| {
             let net = load_net(&folder.join("net/net.toml")).unwrap().net;
-            run_net(&net, &folder.join("out"), false).unwrap().folder
+            run(folder, Task::Net(&net))
         },
         declared: &[(PUBLISH, "flow/net.rs")],
     },
@@ -75,7 +74,7 @@ pub(crate) static SHORT: [Scene; 6] = [
             write_calibration_scene(&folder.join("lines"), 1).unwrap();
         },
         run: calibrated,
-        declared: &[(PUBLISH, "flow/calibration.rs")],
+        declared: &[("calibrate", "Calibrate"), (PUBLISH, "flow/calibration.rs")],
     },
     Scene {
         name: "model",
@@ -83,7 +82,10 @@ pub(crate) static SHORT: [Scene; 6] = [
             write_terrain_model_scene(&folder.join("scene"), 1).unwrap();
         },
         run: run_model,
-        declared: &[(PUBLISH, "flow/laser_match.rs")],
+        declared: &[
+            ("match_laser", "MatchLaser"),
+            (PUBLISH, "flow/laser_match.rs"),
+        ],
     },
     Scene {
         name: "pair",
@@ -92,6 +94,8 @@ pub(crate) static SHORT: [Scene; 6] = [
         declared: &[
             ("search_footprints", "ReadShots"),
             ("check_ranges", "CheckTableRanges"),
+            ("match_ties", "MatchTies"),
+            ("map_surface", "MapSurface"),
             (PUBLISH, "flow/publish.rs"),
         ],
     },
@@ -102,7 +106,13 @@ pub(crate) static LONG: [Scene; 1] = [Scene {
     name: "loop",
     write: write_loop,
     run: calibrated,
-    declared: &[(PUBLISH, "flow/calibration.rs")],
+    declared: &[
+        ("match_ties", "MatchLines"),
+        ("map_surface", "MapLines"),
+        ("match_laser", "MatchModel"),
+        ("calibrate", "CalibrateLines"),
+        (PUBLISH, "flow/calibration.rs"),
+    ],
 }];
 
 /// The site with most stages: wide-angle images, rival kernels, tie points; here also a window that is what an image sees.
@@ -128,11 +138,9 @@ fn run_mission(folder: &Path) -> PathBuf {
 
 fn run_archive(folder: &Path) -> PathBuf {
     let mission = folder.join("mission");
-    let out = folder.join("out");
     let request = ArchiveRequest {
         paths: &[mission.join("pedr")],
         kernels: &mission.join("kernels/nav.tm"),
-        out: &out,
         clock: MolaClock {
             bias_s: 0.117,
             sign: TagSign::Late,
@@ -140,36 +148,27 @@ fn run_archive(folder: &Path) -> PathBuf {
             source: "the scene".to_owned(),
         },
         allow_uncovered: true,
-        force: false,
-        stop: &AtomicBool::new(false),
     };
-    let outcome = check_archive(&request, &|_| ()).unwrap();
-    assert!(outcome.failures.is_empty(), "{:?}", outcome.failures);
-    out
+    run(folder, Task::Archive(&request))
+}
+
+/// The folder of the products of a run.
+fn run(folder: &Path, task: Task<'_>) -> PathBuf {
+    let outcome = run_into(task, &folder.join("out"), false).unwrap();
+    assert!(outcome.left_out.is_empty(), "{:?}", outcome.left_out);
+    outcome.folder
 }
 
 /// Runs a site whose file lies in `folder`.
 fn run_site_in(folder: &Path, file: &str) -> PathBuf {
     let config = config::load(&folder.join(file)).unwrap().site;
-    let out = folder.join("out");
-    let hashes = HashCache::in_folder(&out, false);
-    let options = RunOptions {
-        out,
-        until: PUBLISH,
-        force: false,
-        stop: &AtomicBool::new(false),
-        hashes: &hashes,
-        roots: &[],
-        observer: &(),
-    };
-    run_site(&config, &options).unwrap().folder
+    run(folder, Task::Site(&config))
 }
 
 fn calibrated(folder: &Path) -> PathBuf {
     let config = load_calibration(&folder.join("lines/calibration.toml"));
     let config = config.unwrap().calibration;
-    let outcome = run_calibration(&config, &folder.join("out"), false);
-    outcome.unwrap().folder
+    run(folder, Task::Calibration(&config))
 }
 
 /// Smaller ground has too few places for shots that judge; two rounds call all that more of them call.
@@ -208,8 +207,7 @@ fn run_model(folder: &Path) -> PathBuf {
         pedr: vec![scene.join("pedr")],
         images: vec![image("s1"), image("s2")],
     };
-    let outcome = run_match(&request, &folder.join("out"), false);
-    outcome.unwrap().folder
+    run(folder, Task::Match(&request))
 }
 
 const LEAP_SECONDS: &str = include_str!("../../../kernels.example/leapseconds.tls");

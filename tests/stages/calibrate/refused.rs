@@ -24,7 +24,7 @@ fn refused(replaced: &[(&str, &str)], edit: impl Fn(&Path)) -> String {
             failure.to_string().replace(&path, "")
         }
         Ok(outcome) => {
-            let verdict = outcome.manifest.verdict;
+            let verdict = &outcome.manifest().unwrap().verdict;
             assert!(!verdict.valid, "{verdict:?}");
             format!("{}: {}", verdict.word(), verdict.reasons.join("; "))
         }
@@ -462,7 +462,7 @@ fn files_that_lost_some_bytes_are_told_or_harmless() {
             !result.contains("null") && !result.contains("NaN"),
             "turn {turn}"
         );
-        if !outcome.manifest.verdict.valid {
+        if !outcome.manifest().unwrap().verdict.valid {
             marked += 1;
             continue;
         }

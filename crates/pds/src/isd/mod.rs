@@ -17,7 +17,7 @@ mod state;
 mod tables;
 mod target;
 
-use std::{fs, path::Path};
+use std::{borrow::Cow, fs, path::Path};
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -28,7 +28,7 @@ use self::{
     tables::span,
 };
 pub use self::{
-    rewrite::{StraightCamera, rewrite_isd},
+    rewrite::StraightCamera,
     tables::{Rotations, States},
     target::ForeignBody,
 };
@@ -38,7 +38,7 @@ pub(crate) use self::{
 };
 use super::file_size::SizedFile;
 use areograph_base::{
-    error::{IoError, Locate, Result},
+    error::{Error, IoError, Locate, Result},
     image::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN},
     instruments::Instrument,
     line_times::{LinePiece, LineTimes},
@@ -100,23 +100,61 @@ pub struct SupportTables {
     pub body_rotation: Rotations,
 }
 
-/// Reads the support data of a line scanner.
+/// Support data, in a file or in memory.
+#[derive(Debug, Clone, Copy)]
+pub enum SupportSource<'a> {
+    /// A file.
+    File(&'a Path),
+    /// Their text.
+    Text(&'a str),
+}
+
+impl SupportSource<'_> {
+    /// Reads the support data of a line scanner.
+    ///
+    /// # Errors
+    /// The file cannot be read; invalid JSON; a different kind of camera, or an unknown distortion; a key that is
+    /// missing or has an invalid value; tables that do not cover the image.
+    pub fn read(self) -> Result<ImageSupport> {
+        self.located(self.text().and_then(|text| parse(&text)))
+    }
+
+    /// A result with the file that it concerns.
+    ///
+    /// # Errors
+    /// The same failure, with its place.
+    pub fn located<T, E>(self, result: std::result::Result<T, E>) -> Result<T>
+    where
+        std::result::Result<T, E>: Locate<T>,
+        E: Into<Error>,
+    {
+        match self {
+            Self::File(path) => result.in_file(path),
+            Self::Text(_) => result.map_err(Into::into),
+        }
+    }
+
+    fn text(&self) -> Result<Cow<'_, [u8]>> {
+        let path = match self {
+            Self::File(path) => path,
+            Self::Text(text) => return Ok(Cow::Borrowed(text.as_bytes())),
+        };
+        let bytes = fs::metadata(path).map_err(IoError::on("read"))?.len();
+        if bytes > BYTES_MAX {
+            let max = BYTES_MAX;
+            return Err(IsdError::TooLarge { bytes, max }.into());
+        }
+        SizedFile::SupportData.require(path)?;
+        Ok(Cow::Owned(fs::read(path).map_err(IoError::on("read"))?))
+    }
+}
+
+/// Reads the support data of a line scanner from a file.
 ///
 /// # Errors
-/// The file cannot be read; invalid JSON; a different kind of camera, or an unknown distortion; a key that is missing
-/// or has an invalid value; tables that do not cover the image.
+/// As [`SupportSource::read`].
 pub fn read_isd(path: &Path) -> Result<ImageSupport> {
-    let bytes = fs::metadata(path)
-        .map_err(IoError::on("read"))
-        .in_file(path)?
-        .len();
-    if bytes > BYTES_MAX {
-        let max = BYTES_MAX;
-        return Err(IsdError::TooLarge { bytes, max }).in_file(path);
-    }
-    SizedFile::SupportData.require(path)?;
-    let text = fs::read(path).map_err(IoError::on("read")).in_file(path)?;
-    parse(&text).in_file(path)
+    SupportSource::File(path).read()
 }
 
 fn parse(text: &[u8]) -> Result<ImageSupport> {

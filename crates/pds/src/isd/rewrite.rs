@@ -1,15 +1,13 @@
 //! Support data with another camera and other positions; everything else is unchanged.
 
-use std::{fs, path::Path};
-
 use nalgebra::{Matrix3, Vector3};
 use serde_json::{Value, json};
 
-use super::document::{IsdError, Object};
-use areograph_base::{
-    error::{IoError, Locate, Result},
-    units::METRES_PER_KM,
+use super::{
+    SupportSource,
+    document::{IsdError, Object},
 };
+use areograph_base::{error::Result, units::METRES_PER_KM};
 
 /// A camera that support data represent exactly: a straight line of equal samples, without distortion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,17 +20,19 @@ pub struct StraightCamera {
     pub tangent_per_sample: f64,
 }
 
-/// The support data of `path` with another camera, and with `shift_m` added to positions: J2000 metres at an ET.
-///
-/// # Errors
-/// The file cannot be read; JSON that is not support data.
-pub fn rewrite_isd(
-    path: &Path,
-    camera: &StraightCamera,
-    shift_m: impl Fn(f64) -> Vector3<f64>,
-) -> Result<String> {
-    let text = fs::read(path).map_err(IoError::on("read")).in_file(path)?;
-    rewritten(&text, camera, shift_m).in_file(path)
+impl SupportSource<'_> {
+    /// The support data with another camera, and with `shift_m` added to positions: J2000 metres at an ET.
+    ///
+    /// # Errors
+    /// The file cannot be read; JSON that is not support data.
+    pub fn rewritten(
+        self,
+        camera: &StraightCamera,
+        shift_m: impl Fn(f64) -> Vector3<f64>,
+    ) -> Result<String> {
+        let text = self.text();
+        self.located(text.and_then(|text| Ok(rewritten(&text, camera, shift_m)?)))
+    }
 }
 
 fn rewritten(

@@ -1,22 +1,16 @@
 //! Images of the lines of a camera as the calibration sees them: poses in the axes of the spacecraft, look angles of the
 //! laboratory.
 
-use std::path::Path;
-
 use nalgebra::{Matrix3, Vector3};
 
 use super::error::CalibrateError;
-use areograph_base::{
-    body::Body,
-    error::{Locate as _, Result},
-    time::Et,
-};
+use areograph_base::{body::Body, error::Result, time::Et};
 use areograph_geom::{
     calibration::{CalibrationState, GroundPoint, LineCamera, LinePose, Sight},
     polynomial::Polynomial,
     pushbroom::Detector,
 };
-use areograph_pds::isd::{ImageSupport, read_isd};
+use areograph_pds::isd::{ImageSupport, SupportSource};
 
 /// Largest angle between an axis of the spacecraft and the direction that it represents, degrees: images are taken
 /// looking down.
@@ -32,9 +26,9 @@ pub(super) struct CameraImage {
 
 impl CameraImage {
     /// The image of `name`, which sees `body`.
-    pub(super) fn read(path: &Path, name: &str, body: Body) -> Result<Self> {
-        let support = read_isd(path)?;
-        support.sees(body, name).in_file(path)?;
+    pub(super) fn read(source: SupportSource<'_>, name: &str, body: Body) -> Result<Self> {
+        let support = source.read()?;
+        source.located(support.sees(body, name))?;
         let detector = Detector::new(
             &support.instrument,
             support.crosstrack_summing,

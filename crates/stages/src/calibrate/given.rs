@@ -8,13 +8,13 @@ use super::tables::{ControlSigma, Measured, MeasuredPoint, known_place};
 
 /// Tie points, control, and withheld control; images by the index of their camera.
 #[derive(Debug, Clone, Default)]
-pub struct GivenPoints {
+pub(super) struct GivenPoints {
     /// Tie points.
-    pub ties: Vec<TiePoint>,
+    pub(super) ties: Vec<TiePoint>,
     /// Laser points that are used.
-    pub control: Vec<MatchedPoint>,
+    pub(super) control: Vec<MatchedPoint>,
     /// Withheld laser points.
-    pub held_back: Vec<MatchedPoint>,
+    pub(super) held_back: Vec<MatchedPoint>,
 }
 
 /// Tie points, with their own standard deviations where available.

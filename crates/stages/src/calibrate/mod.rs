@@ -11,6 +11,7 @@ mod geometry;
 mod given;
 mod ground;
 mod judge;
+mod lines;
 mod measure;
 mod outcome;
 mod read;
@@ -33,13 +34,12 @@ use areograph_store::{
 
 pub use demands::CONTROLS_MIN;
 pub use error::CalibrateError;
-pub use given::GivenPoints;
+pub use lines::{AlignLines, CalibrateLines, LineKeys, OtherOrbits};
 pub use result::{
     Calibration, CalibrationRound, CalibrationStep, CameraResult, ControlFigures, ControlOffset,
     Figures, HeldBack, ImageResult, PixelsAndMetres, PointKind, PointResult, Rounds, Scatter,
     Scattered, TieFigures, TieGround, ValidationResult, Value,
 };
-pub use run::calibrate_given;
 
 stage_inputs! {
     /// A calibration and its files.
@@ -61,7 +61,6 @@ impl Input for CalibrationKeys<'_> {
         inputs.setting("cameras", &self.0.cameras);
         inputs.setting("ties", &self.0.ties);
         inputs.setting("control", &self.0.control);
-        inputs.setting("laser", &self.0.laser);
         inputs.setting("a_priori", &self.0.a_priori);
         inputs.setting("solution", &self.0.solution);
         inputs.setting("validation", &self.0.validation);
@@ -101,16 +100,10 @@ pub fn calibration_files(of: &CalibrationConfig) -> Vec<PathBuf> {
 /// The files of each key: of cameras, ties and control, and of each other orbit.
 fn kinds(of: &CalibrationConfig) -> Vec<Vec<&PathBuf>> {
     let cameras = of.cameras.iter().map(|camera| &camera.isd).collect();
-    let pixels = of
-        .cameras
-        .iter()
-        .filter_map(|camera| camera.pixels.as_ref());
     let mut kinds: Vec<Vec<&PathBuf>> = vec![
         cameras,
         of.ties.files.iter().collect(),
         of.control.files.iter().collect(),
-        pixels.collect(),
-        of.laser.files.iter().collect(),
     ];
     for orbit in &of.validation {
         kinds.extend([&orbit.isd, &orbit.ties, &orbit.control].map(|files| files.iter().collect()));

@@ -13,11 +13,11 @@ use super::{
     support::calibrated,
 };
 use areograph_base::error::Result;
-use areograph_config::CalibrationConfig;
 use areograph_geom::{
     calibration::{CalibrationState, GroundPoint, Missed, TookPart},
     ellipsoid::local_axes,
 };
+use areograph_pds::isd::SupportSource;
 
 /// Places at which look directions are compared, `s′`.
 const COMPARED_AT: [f64; 3] = [-1.0, 0.0, 1.0];
@@ -26,7 +26,8 @@ const FREE_MIN: f64 = 1.0;
 
 /// A completed calibration.
 pub(super) struct Outcome<'a> {
-    pub(super) config: &'a CalibrationConfig,
+    /// The support data of each line.
+    pub(super) support: &'a [SupportSource<'a>],
     pub(super) names: &'a [String],
     pub(super) orbit: &'a Orbit,
     pub(super) laboratory: &'a Laboratory,
@@ -75,8 +76,8 @@ impl Outcome<'_> {
         for (camera, name) in self.names.iter().enumerate() {
             let image = &self.orbit.images[camera];
             let first = camera * layout.of_camera();
-            let path = &self.config.cameras[camera].isd;
-            let (isd, isd_left_px) = calibrated(path, self.orbit, camera, self.state)?;
+            let source = self.support[camera];
+            let (isd, isd_left_px) = calibrated(source, self.orbit, camera, self.state)?;
             let powers = |from: usize| (from..=from + layout.order).map(value).collect();
             let laboratory = &self.laboratory.state.cameras[camera];
             let moved = COMPARED_AT.map(|s| {

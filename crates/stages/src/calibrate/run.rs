@@ -26,6 +26,7 @@ use areograph_geom::{
     },
     statistics::{Summary, median, outliers},
 };
+use areograph_pds::isd::SupportSource;
 
 /// A point is left out when its residual exceeds the median of its kind by this many robust standard deviations: of a
 /// million good points not one does.
@@ -59,30 +60,37 @@ pub(super) fn calibrate(config: &CalibrationConfig) -> Result<Calibration> {
         control: &config.control.files,
         held_back_every: Some(config.control.held_back_every),
     };
-    calibrate_by(config, &tables, !config.control.files.is_empty())
+    let cameras = config.cameras.iter();
+    let support = cameras.map(|camera| SupportSource::File(&camera.isd));
+    let support: Vec<SupportSource<'_>> = support.collect();
+    let is_controlled = !config.control.files.is_empty();
+    calibrate_by(config, &support, &tables, is_controlled)
 }
 
-/// Calibrates the lines of a camera by given points; without control by ties only.
+/// Calibrates the lines of a camera, given by their support data, by given points; without control by ties only.
 ///
 /// # Errors
 /// Support data that cannot be read or do not belong together; points that do not fit them, or too few points; the same
 /// faults of other orbits.
-pub fn calibrate_given(config: &CalibrationConfig, given: &GivenPoints) -> Result<Calibration> {
+pub(super) fn calibrate_given(
+    config: &CalibrationConfig,
+    support: &[SupportSource<'_>],
+    given: &GivenPoints,
+) -> Result<Calibration> {
     let is_controlled = !(given.control.is_empty() && given.held_back.is_empty());
-    calibrate_by(config, &PointSource::Given(given), is_controlled)
+    calibrate_by(config, support, &PointSource::Given(given), is_controlled)
 }
 
 fn calibrate_by(
     config: &CalibrationConfig,
+    support: &[SupportSource<'_>],
     source: &PointSource<'_>,
     is_controlled: bool,
 ) -> Result<Calibration> {
     let names = config.cameras.iter().map(|camera| camera.id.clone());
     let names: Vec<String> = names.collect();
-    let images = config
-        .cameras
-        .iter()
-        .map(|camera| CameraImage::read(&camera.isd, &camera.id, config.body));
+    let images = support.iter().zip(&names);
+    let images = images.map(|(of, name)| CameraImage::read(*of, name, config.body));
     let images = images.collect::<Result<Vec<_>>>()?;
     belong_together(&images, &names)?;
     let orbit = Orbit::of(images, config.body, None)?;
@@ -125,7 +133,7 @@ fn calibrate_by(
         validation_noise.push(allowed);
     }
     let outcome = Outcome {
-        config,
+        support,
         names: &names,
         orbit: &orbit,
         laboratory: &laboratory,

@@ -1,13 +1,11 @@
 //! Calibrated support data: the straight line of equal samples that is nearest to the calibrated look directions.
 
-use std::path::Path;
-
 use nalgebra::{Matrix3, Vector3};
 
 use super::geometry::Orbit;
 use areograph_base::error::Result;
 use areograph_geom::{calibration::CalibrationState, polynomial::Polynomial};
-use areograph_pds::isd::{StraightCamera, rewrite_isd};
+use areograph_pds::isd::{StraightCamera, SupportSource};
 
 /// Places at which the line is fitted.
 const FITTED_AT: u32 = 129;
@@ -16,7 +14,7 @@ const TURNS: usize = 3;
 
 /// Text of the calibrated support data of a camera, and their largest residual against its look directions, pixels.
 pub(super) fn calibrated(
-    path: &Path,
+    source: SupportSource<'_>,
     orbit: &Orbit,
     camera: usize,
     state: &CalibrationState,
@@ -34,7 +32,7 @@ pub(super) fn calibrated(
         })
         .collect();
     let (line, left) = nearest(&samples, &looks);
-    let text = rewrite_isd(path, &line, |et_s| orbit.shift_m(camera, state, et_s))?;
+    let text = source.rewritten(&line, |et_s| orbit.shift_m(camera, state, et_s))?;
     Ok((text, left / image.pixel()))
 }
 

@@ -18,6 +18,7 @@ use areograph_geom::{
     calibration::{CalibrationState, Missed, TookPart},
     ellipsoid::local_axes,
 };
+use areograph_pds::isd::SupportSource;
 use areograph_store::files::{file_name, hash_file};
 
 /// Largest difference between the laboratory's geometry of two orbits, pixels: files are written with fifteen digits.
@@ -235,7 +236,7 @@ fn orbit(
 ) -> Result<Orbit> {
     let mut found: Vec<CameraImage> = Vec::new();
     for path in &of.isd {
-        found.push(CameraImage::read(path, &of.id, body)?);
+        found.push(CameraImage::read(SupportSource::File(path), &of.id, body)?);
     }
     let mut images = Vec::new();
     for (image, camera) in calibrated.orbit.images.iter().zip(calibrated.names) {

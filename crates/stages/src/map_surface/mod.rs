@@ -52,7 +52,7 @@ use areograph_store::{
     stage_inputs,
 };
 
-pub use lines::{LinesToMap, map_lines};
+pub use lines::{LinesToMap, MapLines, map_lines};
 pub use result::{
     ProfileOnSurface, SHOTS_MIN, ShotComparison, ShotOnSurface, Surface, SurfaceAccount,
     SurfaceLook, SurfaceModel,

@@ -24,6 +24,7 @@ mod clusters;
 mod error;
 mod images;
 mod judge;
+mod model;
 mod result;
 mod scatter;
 mod search;
@@ -31,29 +32,34 @@ mod settle;
 mod shots;
 mod similarity;
 mod surface;
+mod survey;
 mod units;
 
 use std::{collections::BTreeMap, path::PathBuf, sync::atomic::AtomicBool};
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use self::{
     clusters::clusters,
     images::enter,
     judge::{Evidence, bias_limit_m, judge, pooled},
+    result::{HeldBackGround, ModelRequest},
     scatter::widen,
     shots::{Shot, is_kept, shots_over},
     units::{Unit, refuse_lonely},
 };
 pub use self::{
     error::MatchError,
+    model::{LaserKeys, MatchModel, ModelMatch},
     result::{
-        HeldBackGround, HeldOut, LaserMatch, MatchImage, MatchOptions, MatchRequest, MatchSigma,
-        MatchedPoint, ModelRequest, UnitMatch, UnitResult, Widened,
+        HeldOut, LaserMatch, MatchImage, MatchOptions, MatchRequest, MatchSigma, MatchedPoint,
+        UnitMatch, UnitResult, Widened,
     },
     similarity::{Moments, Similarity},
     surface::SimilaritySurface,
+    survey::{ShotKeys, Survey, SurveyLines},
 };
 use super::{convert_datum::ConvertDatum, line_camera::LineCamera};
 use areograph_base::{
@@ -126,8 +132,8 @@ pub fn match_laser(request: &MatchRequest, stop: &AtomicBool) -> Result<LaserMat
 }
 
 /// The shots of each unit, by name: units from one model can be matched with another.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct UnitShots(Vec<(bool, Vec<String>)>);
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+struct UnitShots(Vec<(bool, Vec<String>)>);
 
 impl UnitShots {
     fn of(units: &[Unit<'_>]) -> Self {
@@ -162,7 +168,7 @@ impl UnitShots {
 ///
 /// # Errors
 /// Files that cannot be read; no shot on the model; shots that two files hold; [`Stopped`].
-pub fn match_model(
+fn match_model(
     request: &ModelRequest<'_>,
     units: Option<&UnitShots>,
     stop: &AtomicBool,
@@ -184,7 +190,7 @@ pub fn match_model(
 ///
 /// # Errors
 /// Files that cannot be read; no shot there; shots that two files hold; [`Stopped`].
-pub fn shots_within(
+fn shots_within(
     edges_rad: [f64; 4],
     pedr: &[PathBuf],
     ground: GroundRadius,

@@ -41,27 +41,27 @@ pub struct MatchOptions {
 
 /// Withheld ground: every *n*-th rectangle of a lattice, shifted by a seed. The rectangles do not depend on the model,
 /// so that a shot stays on its side with every model.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct HeldBackGround {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct HeldBackGround {
     /// Every *n*-th rectangle is withheld.
-    pub every: u32,
+    pub(super) every: u32,
     /// Seed of the shift.
-    pub seed: u64,
+    pub(super) seed: u64,
 }
 
 /// A terrain model in memory, to be matched.
 #[derive(Debug, Clone, Copy)]
-pub struct ModelRequest<'a> {
+pub(super) struct ModelRequest<'a> {
     /// Its heights.
-    pub model: &'a HeightGrid,
+    pub(super) model: &'a HeightGrid,
     /// PEDR files.
-    pub pedr: &'a [PathBuf],
+    pub(super) pedr: &'a [PathBuf],
     /// Images that it was made from.
-    pub images: &'a [LineCamera],
+    pub(super) images: &'a [LineCamera],
     /// Options.
-    pub options: &'a MatchOptions,
+    pub(super) options: &'a MatchOptions,
     /// Withheld ground.
-    pub held_back: HeldBackGround,
+    pub(super) held_back: HeldBackGround,
 }
 
 /// Request of a match.

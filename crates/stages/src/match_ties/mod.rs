@@ -39,7 +39,7 @@ use areograph_store::{
     stage_inputs,
 };
 
-pub use lines::{LinesToMatch, TiesOfLines, match_lines};
+pub use lines::{MatchLines, TiesOfLines};
 pub use margin::Margin;
 
 /// A pair with fewer tie points gets a remark.
