@@ -78,6 +78,8 @@ fn answer(
     as_json: bool,
     words: impl Fn(&dyn Fn(&str) -> u64) -> String,
 ) -> ExitCode {
+    outcome.left_out.iter().for_each(output::error);
+    let invalid = ExitCode::from(Kind::Validation.exit_code());
     let folder = &outcome.folder;
     let manifest = match &outcome.ending {
         Ending::Published(manifest) | Ending::Unchanged(manifest) => manifest,
@@ -93,7 +95,11 @@ fn answer(
             } else {
                 stopped_after(outcome, stage);
             }
-            return ExitCode::SUCCESS;
+            return if outcome.left_out.is_empty() {
+                ExitCode::SUCCESS
+            } else {
+                invalid
+            };
         }
     };
     let unchanged = outcome.is_unchanged();
@@ -119,11 +125,10 @@ fn answer(
         ));
         tell(manifest);
     }
-    outcome.left_out.iter().for_each(output::error);
     if manifest.verdict.valid {
         ExitCode::SUCCESS
     } else {
-        ExitCode::from(Kind::Validation.exit_code())
+        invalid
     }
 }
 

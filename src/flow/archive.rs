@@ -130,11 +130,11 @@ pub(super) fn archive<D: Driver>(flow: &mut D, request: &ArchiveRequest<'_>) -> 
         archive: &archive,
         checked: RefCell::new(checked),
     };
-    flow.publish(&publication)?;
+    let published = flow.publish(&publication);
     if let Some((_, failures)) = publication.checked.into_inner() {
         flow.leave_out(failures);
     }
-    Ok(())
+    published
 }
 
 /// A check under way.
