@@ -9,7 +9,7 @@ mod orthoimages;
 mod spacing;
 mod terrain;
 
-pub use spacing::{MeasureSpacing, Neighbours, ProfileSpacing};
+pub use spacing::{ByPeriod, MeasureSpacing, ProfileSpacing};
 
 use std::{collections::BTreeMap, path::Path, sync::LazyLock};
 
@@ -97,4 +97,21 @@ pub fn counts(book: &Book) -> Result<BTreeMap<String, u64>> {
         );
     }
     Ok(counts)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn every_path_and_anchor_is_declared_once() {
+        let paths: BTreeSet<&str> = declarations().iter().map(|of| of.path).collect();
+        assert_eq!(paths.len(), declarations().len());
+        let own: Vec<Section> = CAPABILITIES.iter().map(|of| of.section).collect();
+        let anchors: Vec<&str> = report::sections(&own).map(|of| of.anchor).collect();
+        let distinct: BTreeSet<&str> = anchors.iter().copied().collect();
+        assert_eq!(distinct.len(), anchors.len());
+    }
 }

@@ -1,24 +1,34 @@
 //! Spacing of the shots of a profile, and the gaps in it: a complete capability in one file, the worked example of
 //! CONTRIBUTING.
 //!
-//! Between shots the ground is interpolated. Clouds, saturated returns, lost packets and `pedr.filter` leave gaps of
-//! kilometres that a map of dots hides. Shan et al. 2005 (figure 5) label the distances between footprints on an image.
+//! Between shots the ground is interpolated. Clouds, saturated returns, lost packets and `pedr.filter` cause gaps of
+//! several kilometres that a map of points does not show. Shan et al. 2005 (figure 5) label the distances between
+//! footprints on an image.
 //!
-//! The altimeter fires at a constant rate. The period is the lower decile of the intervals between neighbouring shots,
-//! so that it holds while up to nine tenths of the shots are missing at random.
+//! The altimeter fires at a constant rate: MOLA ten times a second (PEDR software interface specification). Tables of shots
+//! do not state the period; it is then estimated from the intervals between the shots of a table. Only pulses inside the
+//! window count, since a track may leave a window and return.
 
-use std::sync::atomic::AtomicBool;
+#[cfg(test)]
+mod tests;
 
+use std::{collections::BTreeMap, f64::consts::TAU, sync::atomic::AtomicBool};
+
+use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Capability;
 use crate::{
-    config::SiteConfig,
+    config::{SiteConfig, WindowConfig},
     error::Result,
     footprints::Footprints,
     frames::BodyFixed,
-    geom::{ellipsoid::spherical_to_xyz_m, statistics::median},
+    geom::{
+        ellipsoid::spherical_to_xyz_m,
+        statistics::median,
+        window::{Region, WindowShape},
+    },
     products::{Content, Declaration, Role, SiteProducts, Write, write_json},
     report::{
         Section,
@@ -32,10 +42,14 @@ use crate::{
     verdict::{Check, CheckKind, CheckOutcome::Warning},
 };
 
-/// Share of missing shots above which a profile receives a remark: most of its relief is then interpolated.
-const MISSING_SHARE_MAX: f64 = 0.5;
+/// Period of MOLA, seconds.
+const PEDR_PERIOD_S: f64 = 0.1;
 /// Shots closer in time than this are spots of one pulse, seconds.
 const SAME_PULSE_S: f64 = 1e-3;
+/// Fewest intervals from which a period is estimated.
+const INTERVALS_MIN: usize = 20;
+/// Intervals within this share of their lower decile are those of consecutive pulses.
+const CONSECUTIVE: f64 = 0.1;
 
 pub(super) static CAPABILITY: Capability = Capability {
     products: &[&DOCUMENT],
@@ -45,12 +59,16 @@ pub(super) static CAPABILITY: Capability = Capability {
 };
 
 stage_inputs! {
-    /// Footprints and their profiles.
+    /// Footprints, their profiles, and the windows.
     pub struct MeasureSpacing<'a> {
         /// Footprints in the frame of the products.
         pub converted: &'a Output<Converted>,
         /// Profiles.
         pub profiles: &'a Output<Vec<Profile>>,
+        /// Windows in the order of the footprints' bits.
+        pub windows: &'a [WindowConfig],
+        /// Whether shots come from tables, whose period is not known.
+        pub has_tables: &'a bool,
     }
 }
 
@@ -61,8 +79,21 @@ impl Stage for MeasureSpacing<'_> {
 
     fn run(&self, _stop: &AtomicBool) -> Result<Vec<ProfileSpacing>> {
         let footprints = &self.converted.value()?.footprints;
-        let profiles = self.profiles.value()?.iter();
-        Ok(profiles.map(|of| spacing(footprints, &of.rows)).collect())
+        let profiles = self.profiles.value()?;
+        let periods_s = if *self.has_tables {
+            periods_s(footprints, profiles)
+        } else {
+            let files = profiles.iter().filter_map(|of| file(footprints, of));
+            files.map(|file| (file, PEDR_PERIOD_S)).collect()
+        };
+        let spacings = profiles.iter().map(|of| {
+            let mut windows = self.windows.iter();
+            let window = windows.find(|window| window.id == of.window);
+            let region = window.and_then(|window| region(&window.shape));
+            let period_s = file(footprints, of).and_then(|file| periods_s.get(&file).copied());
+            spacing(footprints, &of.rows, period_s, region.as_ref())
+        });
+        Ok(spacings.collect())
     }
 }
 
@@ -71,82 +102,129 @@ impl Stage for MeasureSpacing<'_> {
 pub struct ProfileSpacing {
     /// Shots; spots of one pulse count once.
     pub shots: u32,
-    /// Shots that are missing between the first and the last one.
-    pub missing: u32,
-    /// Times and distances; `None` for a single shot.
-    pub between: Option<Neighbours>,
+    /// What the period of the altimeter shows; `None` where it is not known.
+    pub by_period: Option<ByPeriod>,
+    /// Largest distance on the ground between consecutive shots, as far as it is inside the window, metres; `None` for a
+    /// single shot.
+    pub gap_m: Option<f64>,
 }
 
-/// Intervals between neighbouring shots.
+/// Pulses of a profile.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Neighbours {
+pub struct ByPeriod {
     /// Period of the altimeter, seconds.
     pub period_s: f64,
-    /// Median distance on the ground between shots of consecutive pulses, metres.
-    pub spacing_m: f64,
-    /// Largest distance on the ground between neighbouring shots, metres.
-    pub gap_m: f64,
+    /// Pulses inside the window, between the first and the last shot, that have no shot.
+    pub missing: u32,
+    /// Median distance on the ground between shots of consecutive pulses, metres; `None` without such shots.
+    pub spacing_m: Option<f64>,
 }
 
 impl ProfileSpacing {
-    /// Share of the pulses between the first and the last shot that have no shot.
+    /// Share of the pulses inside the window, between the first and the last shot, that have no shot; 0 where the period is
+    /// not known.
     #[must_use]
     pub fn missing_share(&self) -> f64 {
-        f64::from(self.missing) / f64::from((self.shots + self.missing).max(1))
+        let missing = self.by_period.map_or(0, |of| of.missing);
+        f64::from(missing) / f64::from((self.shots + missing).max(1))
     }
 }
 
-/// Spacing of the shots with these rows, which are in the order of time.
-fn spacing(footprints: &Footprints<BodyFixed>, rows: &[u32]) -> ProfileSpacing {
-    let et_s = |row: &u32| footprints.et_s[*row as usize];
-    let mut rows = rows.to_vec();
-    rows.dedup_by(|later, earlier| et_s(later) - et_s(earlier) < SAME_PULSE_S);
-    let shots = u32::try_from(rows.len()).unwrap_or(u32::MAX);
-    let place = |row: &u32| {
-        let row = *row as usize;
+/// The ground of a window; `None` for the outline of an image, which a track crosses once.
+fn region(shape: &WindowShape) -> Option<Region> {
+    let is_of_image = matches!(shape, WindowShape::Image { .. });
+    (!is_of_image).then(|| Region::new(shape))
+}
+
+/// Index of the file of a profile.
+fn file(footprints: &Footprints<BodyFixed>, profile: &Profile) -> Option<u16> {
+    let first = profile.rows.first()?;
+    Some(footprints.file[*first as usize])
+}
+
+/// Rows of a profile, one per pulse.
+fn pulses(footprints: &Footprints<BodyFixed>, rows: &[u32]) -> Vec<usize> {
+    let mut pulses: Vec<usize> = rows.iter().map(|row| *row as usize).collect();
+    let et_s = &footprints.et_s;
+    pulses.dedup_by(|later, earlier| (et_s[*later] - et_s[*earlier]).abs() < SAME_PULSE_S);
+    pulses
+}
+
+/// The period of every table of shots with enough of them, by its index.
+fn periods_s(footprints: &Footprints<BodyFixed>, profiles: &[Profile]) -> BTreeMap<u16, f64> {
+    let mut intervals_s: BTreeMap<u16, Vec<f64>> = BTreeMap::new();
+    for profile in profiles {
+        let Some(file) = file(footprints, profile) else {
+            continue;
+        };
+        let pulses = pulses(footprints, &profile.rows);
+        let et_s = |row: usize| footprints.et_s[row];
+        let of_profile = pulses.windows(2).map(|pair| et_s(pair[1]) - et_s(pair[0]));
+        intervals_s.entry(file).or_default().extend(of_profile);
+    }
+    let period_s = |mut intervals_s: Vec<f64>| {
+        intervals_s.sort_by(f64::total_cmp);
+        let decile_s = *intervals_s.get(intervals_s.len() / 10)?;
+        let is_consecutive = |of: &f64| (of / decile_s - 1.0).abs() < CONSECUTIVE;
+        let consecutive: Vec<f64> = intervals_s.iter().copied().filter(is_consecutive).collect();
+        let mean_s = consecutive.iter().sum::<f64>() / consecutive.len() as f64;
+        (consecutive.len() >= INTERVALS_MIN).then_some(mean_s)
+    };
+    let each = intervals_s.into_iter();
+    each.filter_map(|(file, intervals_s)| Some((file, period_s(intervals_s)?)))
+        .collect()
+}
+
+/// Spacing of the shots with these rows, which are in the order of time, in a window with this region.
+fn spacing(
+    footprints: &Footprints<BodyFixed>,
+    rows: &[u32],
+    period_s: Option<f64>,
+    region: Option<&Region>,
+) -> ProfileSpacing {
+    let rows = pulses(footprints, rows);
+    let place = |row: usize| {
         spherical_to_xyz_m(
             footprints.longitude_rad[row],
             footprints.latitude_rad[row],
             footprints.radius_m[row],
         )
     };
-    // Time, and distance along the arc at the mean radius of two neighbours.
-    let intervals: Vec<(f64, f64)> = rows
-        .windows(2)
-        .map(|pair| {
-            let [one, other] = [place(&pair[0]), place(&pair[1])];
-            let radius_m = f64::midpoint(one.norm(), other.norm());
-            (
-                et_s(&pair[1]) - et_s(&pair[0]),
-                one.angle(&other) * radius_m,
-            )
-        })
-        .collect();
-    let mut times_s: Vec<f64> = intervals.iter().map(|(time_s, _)| *time_s).collect();
-    times_s.sort_by(f64::total_cmp);
-    let Some(&period_s) = times_s.get(times_s.len() / 10) else {
-        return ProfileSpacing {
-            shots,
-            missing: 0,
-            between: None,
-        };
-    };
-    let pulses = |time_s: f64| (time_s / period_s).round().max(1.0);
-    let missing: f64 = times_s.iter().map(|time_s| pulses(*time_s) - 1.0).sum();
-    let consecutive = intervals
-        .iter()
-        .filter(|(time_s, _)| pulses(*time_s) <= 1.0);
-    let mut spacings_m: Vec<f64> = consecutive.map(|(_, distance_m)| *distance_m).collect();
-    let distances_m = intervals.iter().map(|(_, distance_m)| *distance_m);
-    ProfileSpacing {
-        shots,
-        missing: missing as u32,
-        between: Some(Neighbours {
-            period_s,
-            spacing_m: median(&mut spacings_m),
-            gap_m: distances_m.fold(0.0, f64::max),
-        }),
+    let (mut missing, mut gap_m, mut spacings_m) = (0, None, Vec::new());
+    for pair in rows.windows(2) {
+        let [one, other] = [place(pair[0]), place(pair[1])];
+        // Along the arc at the mean radius.
+        let distance_m = one.angle(&other) * f64::midpoint(one.norm(), other.norm());
+        let time_s = footprints.et_s[pair[1]] - footprints.et_s[pair[0]];
+        let pulses = period_s.map_or(1.0, |period_s| (time_s / period_s).round().max(1.0));
+        let lost = pulses as u32 - 1;
+        let inside = (1..=lost).filter(|pulse| {
+            let at = one.lerp(&other, f64::from(*pulse) / pulses);
+            region.is_none_or(|region| contains(region, &at))
+        });
+        let inside = u32::try_from(inside.count()).unwrap_or(u32::MAX);
+        if lost == 0 {
+            spacings_m.push(distance_m);
+        }
+        missing += inside;
+        let inside_m = distance_m * f64::from(inside + 1) / pulses;
+        gap_m = Some(gap_m.map_or(inside_m, |gap_m: f64| gap_m.max(inside_m)));
     }
+    ProfileSpacing {
+        shots: u32::try_from(rows.len()).unwrap_or(u32::MAX),
+        by_period: period_s.map(|period_s| ByPeriod {
+            period_s,
+            missing,
+            spacing_m: (!spacings_m.is_empty()).then(|| median(&mut spacings_m)),
+        }),
+        gap_m,
+    }
+}
+
+/// Whether a region contains the point below or above `place`.
+fn contains(region: &Region, place: &Vector3<f64>) -> bool {
+    let longitude_rad = place.y.atan2(place.x).rem_euclid(TAU);
+    region.contains(longitude_rad, (place.z / place.norm()).asin())
 }
 
 /// The profiles of a site with their spacing.
@@ -158,7 +236,7 @@ fn spacings<'a>(site: &SiteProducts<'a>) -> Result<Vec<(&'a Profile, &'a Profile
 
 static DOCUMENT: Declaration = Declaration {
     path: "spacing.json",
-    what: "spacing of the shots of every profile, its largest gap, and the shots that are missing",
+    what: "for every profile: spacing of its shots, largest gap, and number of missing shots",
     readers: "scripts",
     rows: "profiles",
     role: Role::Metadata,
@@ -196,15 +274,17 @@ struct Entry<'a> {
     profile: &'a str,
     /// Number of shots; spots of one pulse count once.
     shots: u32,
-    /// Number of pulses without a shot between the first and the last one.
-    missing: u32,
-    /// Period of the altimeter.
+    /// Number of pulses inside the window, between the first and the last shot, that have no shot in the products; omitted
+    /// where the period is not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    missing: Option<u32>,
+    /// Interval between pulses: of MOLA by its specification, of other altimeters estimated from the shots.
     #[serde(skip_serializing_if = "Option::is_none")]
     period_s: Option<f64>,
     /// Median distance on the ground between shots of consecutive pulses.
     #[serde(skip_serializing_if = "Option::is_none")]
     spacing_m: Option<f64>,
-    /// Largest distance on the ground between neighbouring shots.
+    /// Largest distance on the ground between consecutive shots of the profile, as far as it is inside the window.
     #[serde(skip_serializing_if = "Option::is_none")]
     gap_m: Option<f64>,
 }
@@ -214,10 +294,10 @@ impl<'a> Document<'a> {
         let profiles = spacings(site)?.into_iter().map(|(profile, of)| Entry {
             profile: &profile.id,
             shots: of.shots,
-            missing: of.missing,
-            period_s: of.between.map(|of| of.period_s),
-            spacing_m: of.between.map(|of| of.spacing_m),
-            gap_m: of.between.map(|of| of.gap_m),
+            missing: of.by_period.map(|of| of.missing),
+            period_s: of.by_period.map(|of| of.period_s),
+            spacing_m: of.by_period.and_then(|of| of.spacing_m),
+            gap_m: of.gap_m,
         });
         Ok(Self {
             format: "areograph spacing 1",
@@ -246,115 +326,67 @@ fn write(site: &SiteProducts) -> Result<String> {
             Column::Number("largest gap (m)"),
         ],
     );
-    let mut any = false;
+    let limit = site.config.limits.missing_shots_max;
+    let mut is_sparse = false;
     for (index, (profile, of)) in spacings(site)?.into_iter().enumerate() {
-        let is_dense = of.missing_share() <= MISSING_SHARE_MAX;
-        any |= !is_dense;
+        is_sparse |= of.missing_share() > limit;
         let count = |count: u32, place: &str| Cell::from(whole(count)).traced(place);
+        let missing = of.by_period.map(|of| count(of.missing, "/missing"));
         let metres = |value: Option<f64>, place: &str| {
             let known = value.map(|value| Cell::from(label(value, 0)).traced(place));
             known.unwrap_or_else(|| Cell::from("–"))
         };
         table.row_of(
             &format!("spacing.json#/profiles/{index}"),
-            is_dense,
+            true,
             [
                 (*profile.id).into(),
                 count(of.shots, "/shots"),
-                count(of.missing, "/missing"),
-                metres(of.between.map(|of| of.spacing_m), "/spacing_m"),
-                metres(of.between.map(|of| of.gap_m), "/gap_m"),
+                missing.unwrap_or_else(|| Cell::from("–")),
+                metres(of.by_period.and_then(|of| of.spacing_m), "/spacing_m"),
+                metres(of.gap_m, "/gap_m"),
             ],
         );
     }
     let words = paragraph(
-        "Missing shots are pulses between the first and the last shot of the profile without a shot in the products. The \
-         ground in a gap is interpolated.",
+        "A shot is missing if the products contain none for a pulse inside the window, between the first and the last shot of \
+         the profile: it had no return, or pedr.filter rejected it. Heights in a gap are interpolated between its two edges.",
     );
-    Ok(words + &folded_unless(any, "Profiles", &table.finish()))
+    Ok(words + &folded_unless(is_sparse, "Profiles", &table.finish()))
 }
 
 /// The profile with the largest share of missing shots.
-fn findings(_config: &SiteConfig, book: &Book) -> Result<Findings> {
+fn findings(config: &SiteConfig, book: &Book) -> Result<Findings> {
+    let limit = config.limits.missing_shots_max;
     let profiles = book.of::<Vec<Profile>>()?.iter();
-    let spacings = book.of::<Vec<ProfileSpacing>>()?;
-    let checks = profiles.clone().zip(spacings).map(|(profile, of)| {
+    let all = profiles.zip(book.of::<Vec<ProfileSpacing>>()?);
+    let checks = all.clone().map(|(profile, of)| {
         let share = of.missing_share();
-        Check::of_share(
-            CheckKind::ShotsMissing,
-            &*profile.id,
-            share,
-            MISSING_SHARE_MAX,
-            Warning,
-        )
+        Check::of_share(CheckKind::ShotsMissing, &*profile.id, share, limit, Warning)
     });
-    let sparse = profiles.zip(spacings);
-    let sparse = sparse.filter(|(_, of)| of.missing_share() > MISSING_SHARE_MAX);
-    let remarks = sparse.map(|(profile, of)| {
+    let by_share = |one: &&ProfileSpacing, other: &&ProfileSpacing| {
+        one.missing_share().total_cmp(&other.missing_share())
+    };
+    let sparse = || all.clone().filter(|(_, of)| of.missing_share() > limit);
+    let worst = sparse().max_by(|(_, one), (_, other)| by_share(one, other));
+    let remark = worst.map(|(profile, of)| {
+        let more = match sparse().count() - 1 {
+            0 => String::new(),
+            more => format!(" (and {more} more profiles)"),
+        };
+        let missing = of.by_period.map_or(0, |of| of.missing);
         format!(
-            "profile {}: {} of {} shots are missing, expected at most {:.0} %",
+            "profile {}: {:.0} % of the pulses have no shot ({missing} of {}), expected at most {:.0} %; check \
+             pedr.filter and the outline of the window{more}",
             profile.id,
-            of.missing,
-            of.shots + of.missing,
-            100.0 * MISSING_SHARE_MAX
+            100.0 * of.missing_share(),
+            of.shots + missing,
+            100.0 * limit
         )
     });
     Ok(Findings {
-        remarks: remarks.collect(),
+        remarks: remark.into_iter().collect(),
         checks: Check::worst(checks).into_iter().collect(),
         ..Findings::default()
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const RADIUS_M: f64 = 3.396e6;
-
-    /// Shots of these numbers of a pulse each 0.1 s, 300 m apart along a meridian of a sphere of 3,396 km.
-    fn shots(pulses: &[u32]) -> (Footprints<BodyFixed>, Vec<u32>) {
-        let mut footprints = Footprints::new(Vec::new());
-        for pulse in pulses.iter().copied().map(f64::from) {
-            footprints.et_s.push(0.1 * pulse);
-            footprints.longitude_rad.push(0.0);
-            footprints.latitude_rad.push(300.0 / RADIUS_M * pulse);
-            footprints.radius_m.push(RADIUS_M);
-        }
-        let rows = 0..u32::try_from(pulses.len()).unwrap();
-        (footprints, rows.collect())
-    }
-
-    #[test]
-    fn missing_shots_are_counted_and_the_largest_gap_is_measured() {
-        let (footprints, rows) = shots(&[0, 1, 2, 3, 7, 8, 10, 11, 12, 13]);
-        let of = spacing(&footprints, &rows);
-        assert_eq!((of.shots, of.missing), (10, 4));
-        let between = of.between.unwrap();
-        // Rounding of angles of 1e-4 rad times the radius, metres.
-        assert!((between.spacing_m - 300.0).abs() < 1e-3);
-        assert!((between.gap_m - 1_200.0).abs() < 1e-3);
-        assert!((between.period_s - 0.1).abs() < 1e-9);
-    }
-
-    #[test]
-    fn spots_of_a_pulse_count_once_and_a_single_shot_has_no_spacing() {
-        let (footprints, rows) = shots(&[0, 0, 0, 1, 1, 2]);
-        let of = spacing(&footprints, &rows);
-        assert_eq!((of.shots, of.missing), (3, 0));
-        let (footprints, rows) = shots(&[5]);
-        let single = spacing(&footprints, &rows);
-        assert_eq!((single.shots, single.between), (1, None));
-        assert_eq!(spacing(&footprints, &[]).shots, 0);
-    }
-
-    #[test]
-    fn the_period_holds_while_most_shots_are_missing() {
-        // One shot in three, in pairs: 40 of 60 pulses are missing but for the end.
-        let pulses: Vec<u32> = (0..60).filter(|pulse| pulse % 6 < 2).collect();
-        let (footprints, rows) = shots(&pulses);
-        let of = spacing(&footprints, &rows);
-        assert_eq!((of.shots, of.missing), (20, 36));
-        assert!(of.missing_share() > MISSING_SHARE_MAX);
-    }
 }

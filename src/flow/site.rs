@@ -295,6 +295,8 @@ pub(super) fn orient<D: SiteDriver>(
     let spacing = flow.stage(&MeasureSpacing {
         converted: &converted,
         profiles: &profiles,
+        windows: &config.windows,
+        has_tables: &!config.shots.is_empty(),
     })?;
     // One session at a time: the session of the positions ends here.
     let ranges = {

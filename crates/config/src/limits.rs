@@ -8,9 +8,12 @@ use super::{
 };
 
 declare_table! {
-    /// Limits on tie points, their adjustment and a terrain model that make a site valid or invalid. Independent data
+    /// Limits on shots, tie points, their adjustment and a terrain model that make a site valid or invalid. Independent data
     /// are checked first: heights against MOLA, then the agreement of images with each other.
     pub struct LimitsConfig: Deserialize {
+        /// Largest share of the pulses of a profile without a shot; above it most of the profile is interpolated, and the
+        /// site receives a remark.
+        missing_shots_max: f64 = key(from_to(0.0, 1.0)).or(0.5),
         /// Largest |median| height of tie points above the MOLA surface before the adjustment. A priori the height of a
         /// pair is known to some 500 m; the default is five times that.
         height_before_max_m: f64 = key(above_to(0.0, 1e6)).or(2500.0),

@@ -1,9 +1,9 @@
 //! The book of a site's outputs as a product: the page can be made again from it without other files.
 //!
 //! Tables and documents are written for their readers, with the digits and the selection that these need. The page
-//! shows more: surfaces, histograms, spans of kernels. The outputs are therefore kept completely. Tables for camera
-//! models and pixels of maps, which no page shows, are left out, and of many images the points of those without plots:
-//! a site of a thousand images had a quarter of a gigabyte of them.
+//! shows more: surfaces, histograms, spans of kernels. The outputs are therefore kept completely. Camera tables and map
+//! pixels, which no page shows, are omitted. So are the points of images without plots: at a site of a thousand images
+//! they amounted to a quarter of a gigabyte.
 
 use std::path::{Path, PathBuf};
 
@@ -28,6 +28,9 @@ use areograph_store::{
     book::Book,
     files::{file_name, hash_file},
 };
+
+/// Types of the outputs and their layout. The number is raised when one of them changes without a new version.
+const LAYOUT: &str = concat!("version ", env!("CARGO_PKG_VERSION"), ", layout 2");
 
 /// Its path below a site's folder.
 pub const PAGE_DATA: &str = "report/page.postcard";
@@ -66,7 +69,7 @@ impl PageData {
     /// A file of kind input that this version did not write; an error of the disk.
     pub fn read(site_folder: &Path) -> Result<Self> {
         let path = site_folder.join(PAGE_DATA);
-        let book = Book::open(&path)?;
+        let book = Book::open(&path, LAYOUT)?;
         let stored = book.of::<PageConfig>().in_file(&path)?;
         let mut config: SiteConfig = toml::from_str(&stored.config)
             .map_err(ReadError::unreadable("a configuration"))
@@ -125,7 +128,7 @@ fn page_book(site: &SiteProducts) -> Result<Book> {
 fn write(path: &Path, site: &SiteProducts) -> Result<()> {
     let book = page_book(site).in_file(path)?;
     let mut file = create(path)?;
-    let hash = book.write(&mut file).in_file(path)?;
+    let hash = book.write(LAYOUT, &mut file).in_file(path)?;
     finish(path, file)?;
     if hash_file(path)?.0 == *hash.to_hex() {
         return Ok(());

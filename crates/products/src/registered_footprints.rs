@@ -2,7 +2,8 @@
 //! after the adjustment.
 //!
 //! The other tables are complete and separate: all footprints (`footprints`), all of them in all images
-//! (`registration`), those in the adjustment (`adjusted_footprints`). A user of footprints on images needs a part of each.
+//! (`registration`), those in the adjustment (`adjusted_footprints`). Users who place footprints in images need columns of
+//! all three.
 
 use std::collections::BTreeMap;
 
@@ -28,7 +29,7 @@ use areograph_stages::{
 const ISIS_OFFSET: f64 = 0.5;
 /// Sites with these products.
 const SITES: &str = "a site with footprints inside its images";
-const WHAT: &str = "every footprint that an image shows, on the ground and in the image, before and after the adjustment";
+const WHAT: &str = "footprints inside images: ground coordinates, and image coordinates before and after the adjustment";
 
 pub(super) static PARQUET: Declaration = Declaration {
     path: "registered_footprints.parquet",
@@ -117,6 +118,7 @@ struct Place {
     line: f64,
     sample: f64,
     inside: bool,
+    extrapolated: bool,
 }
 
 impl Place {
@@ -125,6 +127,7 @@ impl Place {
             line: points.line[at],
             sample: points.sample[at],
             inside: points.inside[at],
+            extrapolated: points.extrapolated[at],
         }
     }
 }
@@ -255,7 +258,7 @@ fn shot<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "profile",
             Unit::None,
-            "profile: window, orbit and crossing",
+            "profile: window, orbit and crossing; of a footprint in several windows, the profile in the first window",
             |row: &Row| {
                 let profile = row.site.profiles.get(row.profile);
                 profile.map_or_else(String::new, |profile| profile.id.clone())
@@ -270,7 +273,7 @@ fn shot<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "record",
             Unit::None,
-            "record of the PEDR file, counted from 1 with its label records",
+            "record of the PEDR file, counted from 1 with its label records; in a table of shots, the row",
             |row: &Row| row.site.footprints.record[row.footprint],
         ),
         column(
@@ -278,18 +281,22 @@ fn shot<'a>() -> Vec<Column<Row<'a>>> {
             Unit::None,
             "number of the shot in its frame, 1 to 20",
             |row: &Row| u32::from(row.site.footprints.shot[row.footprint]),
-        ),
+        )
+        .between(1, 20),
         column(
             "footprint_row",
             Unit::None,
             "row of the footprint in footprints.parquet, counted from 0",
             |row: &Row| u32::try_from(row.footprint).unwrap_or(u32::MAX),
         ),
+        column("utc", Unit::None, "time et_s in UTC", |row: &Row| {
+            Utc::of(&row.site.utc[row.footprint])
+        }),
         column(
-            "utc",
-            Unit::None,
-            "time of the shot after the MOLA clock correction, UTC",
-            |row: &Row| Utc::of(&row.site.utc[row.footprint]),
+            "et_s",
+            Unit::Second,
+            "time of the shot after the MOLA clock correction, TDB seconds past J2000",
+            |row: &Row| row.site.footprints.et_s[row.footprint],
         ),
     ]
 }
@@ -310,21 +317,21 @@ fn ground<'a>() -> Vec<Column<Row<'a>>> {
             |row: &Row| degrees(row.site.footprints.latitude_rad[row.footprint]),
         ),
         column(
-            "radius_m",
+            "ground_radius_m",
             Unit::Metre,
-            "radius of the ground: the one that all stages use, metres",
+            "radius of the ground that all stages use, crossover-corrected or raw as configured, metres",
             |row: &Row| row.site.footprints.ground_radius_m(row.footprint),
         ),
         column(
             "height_m",
             Unit::Metre,
-            "the same above the sphere of the body's maps, metres",
+            "radius of the ground minus the radius of the map sphere, metres",
             Row::height_m,
         ),
         column(
             "topography_m",
             Unit::Metre,
-            "radius after the crossover correction minus areoid radius, metres",
+            "crossover-corrected radius minus areoid radius, metres",
             |row: &Row| row.site.footprints.row(row.footprint).topography_m(),
         ),
     ]
@@ -333,8 +340,8 @@ fn ground<'a>() -> Vec<Column<Row<'a>>> {
 /// Place in the image.
 fn image<'a>() -> Vec<Column<Row<'a>>> {
     type Of = fn(Place) -> f64;
-    let ours = "0 at the start of the first line and the outer edge of the first pixel, 0.5 at their centres";
-    let isis = "1 at the centre of the first line and the first pixel, as in ISIS";
+    let ours = "coordinate in the image, 0 at the leading edge of the first line or pixel, 0.5 at its centre";
+    let isis = "the same as in ISIS: 1 at the centre of the first line or pixel";
     let of: [([&'static str; 2], Unit, Of, &'static str); 4] = [
         (
             ["before_line", "adjusted_line"],
@@ -374,19 +381,25 @@ fn image<'a>() -> Vec<Column<Row<'a>>> {
     columns.push(column(
         "before_inside",
         Unit::None,
-        "whether the delivered image shows the footprint with the orientation of the kernels",
+        "whether the footprint lies inside the delivered image with the orientation of the kernels",
         inside(0),
     ));
     columns.push(column(
         "adjusted_inside",
         Unit::None,
-        "the same with the adjusted orientation; false without an adjustment",
+        "whether it does with the adjusted orientation; false if the site has no adjustment",
         inside(1),
+    ));
+    columns.push(column(
+        "extrapolated",
+        Unit::None,
+        "whether one of these places lies beyond the first or last header line, where the orientation is extrapolated",
+        |row: &Row| row.places.iter().flatten().any(|place| place.extrapolated),
     ));
     columns.push(column(
         "moved_px",
         Unit::Pixel,
-        "distance between both places in the image, pixels",
+        "distance between the image points before and after the adjustment, pixels",
         Row::moved_px,
     ));
     columns
@@ -396,7 +409,7 @@ fn image<'a>() -> Vec<Column<Row<'a>>> {
 fn adjusted<'a>() -> Vec<Column<Row<'a>>> {
     let names = ["sigma_east_m", "sigma_north_m", "sigma_up_m"];
     let columns = names.into_iter().enumerate().map(|(axis, name)| {
-        let meaning = "standard deviation of the adjusted footprint towards east, north or up, metres, with the shift of its \
+        let meaning = "standard deviation towards east, north or up after the adjustment, metres, including that of the shift of its \
                        profile; missing for footprints that are not part of the adjustment";
         column(name, Unit::Metre, meaning, move |row: &Row| {
             Some(row.adjusted?.local_sigmas_m()[axis])

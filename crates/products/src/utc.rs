@@ -1,4 +1,4 @@
-//! Instants of UTC in tables.
+//! UTC times in tables.
 
 use std::{fmt, ops::Range};
 
@@ -9,11 +9,11 @@ use chrono::{DateTime, NaiveDate, NaiveTime};
 pub(super) struct Utc(pub(super) i64);
 
 impl Utc {
-    /// An instant that no table may contain.
+    /// Marks an invalid instant; a table that contains it is refused.
     pub(super) const UNKNOWN: Self = Self(i64::MIN);
 
-    /// Of an ISO 8601 text with a fraction of the second and without a zone letter. A leap second becomes the second after it; a table
-    /// with any other text is refused.
+    /// Of an ISO 8601 text with a fraction of the second and without a zone letter. A leap second
+    /// maps to the following second. Any other text makes its table invalid.
     pub(super) fn of(text: &str) -> Self {
         Self::parsed(text).unwrap_or(Self::UNKNOWN)
     }
@@ -44,17 +44,29 @@ impl Utc {
         let date = NaiveDate::from_ymd_opt(year, number(5..7)?, number(8..10)?)?;
         let midnight = date.and_time(NaiveTime::MIN).and_utc().timestamp_micros();
         let [hours, minutes, seconds] = [number(11..13)?, number(14..16)?, number(17..19)?];
-        let is_time = hours < 24 && minutes < 60 && seconds <= 60;
+        let is_leap = [hours, minutes, seconds] == [23, 59, 60];
+        let is_time = hours < 24 && minutes < 60 && (seconds < 60 || is_leap);
         let second_of_day = i64::from((hours * 60 + minutes) * 60 + seconds);
         let fraction = i64::from(number(20..text.len())? * scale);
         is_time.then_some(Self(midnight + 1_000_000 * second_of_day + fraction))
     }
 }
 
+impl Utc {
+    /// The instant as a `GeoPackage` has it, to a millisecond.
+    pub(super) fn to_milliseconds(self) -> String {
+        self.written("%Y-%m-%dT%H:%M:%S%.3fZ")
+    }
+
+    fn written(self, form: &str) -> String {
+        let time = DateTime::from_timestamp_micros(self.0).unwrap_or_default();
+        time.format(form).to_string()
+    }
+}
+
 impl fmt::Display for Utc {
     fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let time = DateTime::from_timestamp_micros(self.0).unwrap_or_default();
-        write!(to, "{}", time.format("%Y-%m-%dT%H:%M:%S%.6fZ"))
+        to.write_str(&self.written("%Y-%m-%dT%H:%M:%S%.6fZ"))
     }
 }
 
@@ -76,6 +88,7 @@ mod tests {
             "1999-08-24 14:12:13.046",
             "1999-02-30T14:12:13.046",
             "1999-08-24T25:12:13.046",
+            "1999-08-24T14:12:60.046",
             "1999-08-24T14:12:13.0460000",
             "1999-08-24T14:12:13,046",
             "1999-08-24T+4:12:13.046",

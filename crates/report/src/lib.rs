@@ -137,7 +137,7 @@ pub fn page(site: &SiteProducts, of_capabilities: &[Section]) -> Result<String> 
 }
 
 /// Every section of a site's page, in its order.
-fn sections(of_capabilities: &[Section]) -> impl Iterator<Item = &Section> {
+pub fn sections(of_capabilities: &[Section]) -> impl Iterator<Item = &Section> {
     FIRST_SECTIONS
         .iter()
         .chain(of_capabilities)

@@ -12,6 +12,7 @@ use std::{
     collections::BTreeMap,
     fmt,
     io::Write,
+    path::PathBuf,
     sync::{Arc, OnceLock},
 };
 
@@ -32,9 +33,11 @@ impl<T: Serialize + DeserializeOwned + Send + Sync + 'static> Entered for T {}
 #[derive(Clone, Default)]
 pub struct Book {
     entries: BTreeMap<Key, Entry>,
+    /// The file from which the book was opened.
+    opened: Option<PathBuf>,
 }
 
-/// Type and round of an output. Two types with one name would exclude each other.
+/// Type and round of an output. Type names must be unique.
 type Key = (String, Round);
 
 /// A list of outputs of one type.
@@ -59,10 +62,10 @@ type WritePart = fn(&dyn Any, usize, &mut dyn Write) -> Result<Option<()>>;
 /// An output that the book does not have, or has twice.
 #[derive(Debug, thiserror::Error, Cause)]
 enum Misuse {
-    #[error("no {0} was entered in the book of outputs")]
+    #[error("the outputs contain no {0}")]
     #[cause(Bug: "this is a bug in areograph; please report it with the configuration")]
     Missing(&'static str),
-    #[error("{0} was entered twice in the book of outputs: as {1:?} and as {2:?}")]
+    #[error("the outputs contain {0} twice: as {1:?} and as {2:?}")]
     #[cause(Bug: "this is a bug in areograph; please report it with the configuration")]
     Twice(&'static str, Vec<String>, Vec<String>),
 }
@@ -88,8 +91,9 @@ impl Book {
     ) -> Result<()> {
         self.enter(round, output)?;
         let lighten = move |entry: &Entry| entry.changed(|_, value| Some(shown(value)));
-        let entry = self.entries.get_mut(&key::<T>(round));
-        entry.map(|entry| entry.lighten = Some(Arc::new(lighten)));
+        if let Some(entry) = self.entries.get_mut(&key::<T>(round)) {
+            entry.lighten = Some(Arc::new(lighten));
+        }
         Ok(())
     }
 
@@ -103,8 +107,10 @@ impl Book {
             let light = lighten.map_or_else(|| Ok(entry.clone()), |lighten| lighten(entry))?;
             Ok((key.clone(), light))
         });
-        let entries = entries.collect::<Result<_>>()?;
-        Ok(Self { entries })
+        Ok(Self {
+            entries: entries.collect::<Result<_>>()?,
+            opened: None,
+        })
     }
 
     /// Enters a value that is no output of a stage, under this label.
@@ -161,8 +167,11 @@ impl Book {
     /// # Errors
     /// As [`Book::output`]; a bug in areograph: it was not entered.
     pub fn require<T: Entered>(&self, round: Round) -> Result<&Output<T>> {
-        let found = self.output(round)?;
-        found.ok_or_else(|| Misuse::Missing(type_name::<T>()).into())
+        let missing = || match &self.opened {
+            Some(path) => Self::is_without(path, type_name::<T>()),
+            None => Misuse::Missing(type_name::<T>()).into(),
+        };
+        self.output(round)?.ok_or_else(missing)
     }
 
     /// The value of the output of this type; `None` if the site does not have it.
@@ -278,6 +287,7 @@ mod tests {
     use std::fs;
 
     use super::*;
+    use areograph_base::error::Kind;
 
     fn known(label: &str, value: u32) -> Output<u32> {
         valued(label.to_owned(), value)
@@ -309,9 +319,12 @@ mod tests {
     fn a_written_book_is_opened_again_and_its_labels_remain() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("book");
-        let hash = book().write(fs::File::create(&path).unwrap()).unwrap();
+        let file = fs::File::create(&path).unwrap();
+        let hash = book().write("layout 1", file).unwrap();
         assert_eq!(hash, blake3::hash(&fs::read(&path).unwrap()));
-        let opened = Book::open(&path).unwrap();
+        let opened = Book::open(&path, "layout 1").unwrap();
+        let unread = opened.write("layout 1", Vec::new()).unwrap_err();
+        assert_eq!(unread.kind(), Kind::Bug);
         assert_whole(&opened);
         assert_eq!(format!("{opened:?}"), format!("{:?}", book()));
     }
@@ -320,22 +333,30 @@ mod tests {
     fn a_damaged_file_is_an_error_of_the_input() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("book");
-        book().write(fs::File::create(&path).unwrap()).unwrap();
+        let file = fs::File::create(&path).unwrap();
+        book().write("layout 1", file).unwrap();
+        let other = Book::open(&path, "layout 2").unwrap_err();
+        assert_eq!(other.kind(), Kind::Input);
         let bytes = fs::read(&path).unwrap();
         for length in [0, 7, 8, bytes.len() - 1] {
             fs::write(&path, &bytes[..length]).unwrap();
-            let error = Book::open(&path).unwrap_err();
-            assert_eq!(error.kind(), areograph_base::error::Kind::Input, "{length}");
+            let error = Book::open(&path, "layout 1").unwrap_err();
+            assert_eq!(error.kind(), Kind::Input, "{length}");
         }
         // The text is longer than its place.
         let text = bytes.windows(6).position(|of| of == b"\x05gusev").unwrap();
         let mut damaged = bytes;
         damaged[text] = 90;
         fs::write(&path, damaged).unwrap();
-        let opened = Book::open(&path).unwrap();
+        let opened = Book::open(&path, "layout 1").unwrap();
         assert_eq!(opened.of::<u32>().unwrap(), &1);
-        let error = opened.of::<String>().unwrap_err();
-        assert_eq!(error.file.as_deref(), Some(&*path));
+        for error in [
+            opened.of::<String>().unwrap_err(),
+            opened.of::<u64>().unwrap_err(),
+        ] {
+            assert_eq!(error.kind(), Kind::Input);
+            assert_eq!(error.file.as_deref(), Some(&*path));
+        }
     }
 
     #[test]
@@ -371,7 +392,7 @@ mod tests {
     fn a_missing_a_second_and_a_pending_output_are_errors() {
         let mut book = Book::default();
         let missing = book.of::<u32>().unwrap_err().to_string();
-        assert!(missing.contains("no u32 was entered"), "{missing}");
+        assert!(missing.contains("no u32"), "{missing}");
         book.enter::<u32>(Round::Initial, Output::pending("count".to_owned()))
             .unwrap();
         let pending = book.of::<u32>().unwrap_err().to_string();

@@ -30,7 +30,7 @@ pub enum CheckKind {
     RangeOutliers,
     /// Shots of the longest profile.
     Shots,
-    /// Share of the shots of a profile that are missing.
+    /// Share of the pulses of a profile that have no shot.
     ShotsMissing,
     /// Clock correction of least spread minus the configured one.
     ClockCorrection,

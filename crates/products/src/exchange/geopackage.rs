@@ -119,7 +119,7 @@ fn value(values: &Values, row: usize) -> Value {
         Values::Natural(of) => Value::Integer(of[row].into()),
         Values::Integer(of) => Value::Integer(of[row].into()),
         Values::Flag(of) => Value::Integer(of[row].into()),
-        Values::Time(of) => Value::Text(of[row].to_string()),
+        Values::Time(of) => Value::Text(of[row].to_milliseconds()),
         Values::Text(of) => Value::Text(of[row].clone()),
         Values::Bytes(of) => Value::Blob(of[row].clone()),
     }

@@ -1,4 +1,4 @@
-//! A book in a file: the outputs one after the other, then the table of contents and its length.
+//! A book in a file: its layout, the outputs one after the other, then the table of contents and its length.
 //!
 //! Outputs are read one by one, when they are used. The layout of the outputs is that of this version of areograph.
 
@@ -28,9 +28,12 @@ const TAIL_BYTES: u64 = 8;
 /// A file that is no book, or an output that cannot be written or read.
 #[derive(Debug, thiserror::Error, Cause)]
 enum BookError {
-    #[error("cannot be read as the outputs of a site: {0}")]
-    #[cause(Input: "regenerate products of another version of areograph with this version")]
+    #[error("these are not outputs of this version of areograph: {0}")]
+    #[cause(Input: "run the site again with this version")]
     Unreadable(String),
+    #[error("outputs of an opened file were written again before they were read: {0}")]
+    #[cause(Bug: "this is a bug in areograph; please report it with the configuration")]
+    Unread(String),
     #[error("{name} cannot be stored: {source}")]
     #[cause(Bug: "this is a bug in areograph; please report it with the configuration")]
     Unstorable {
@@ -74,12 +77,14 @@ impl Written {
 impl Book {
     /// Writes all outputs to `to`, and returns the BLAKE3 of what was written.
     ///
+    /// * `layout` – names the types of the outputs and their layout; a file is opened by the same name only
+    ///
     /// # Errors
     /// Errors of `to`; an output that is not known or cannot be stored.
-    pub fn write(&self, to: impl Write) -> Result<blake3::Hash> {
+    pub fn write(&self, layout: &str, to: impl Write) -> Result<blake3::Hash> {
         // Numbers are encoded one by one, and hashed in pieces.
         let mut to = BufWriter::with_capacity(PIECE_BYTES, Hashed::new(to));
-        let written = self.write_all(&mut to);
+        let written = self.write_all(layout, &mut to);
         let flushed = to.flush();
         if let Some(refusal) = to.get_mut().refusal.take() {
             return Err(IoError::on("write")(refusal).into());
@@ -89,13 +94,15 @@ impl Book {
         Ok(to.get_ref().hash.finalize())
     }
 
-    fn write_all(&self, to: &mut BufWriter<Hashed<impl Write>>) -> Result<()> {
+    fn write_all(&self, layout: &str, to: &mut BufWriter<Hashed<impl Write>>) -> Result<()> {
+        to.write_all(head(layout).as_bytes())
+            .map_err(IoError::on("write"))?;
         let mut lines = Vec::new();
         for ((name, round), entry) in &self.entries {
             // An entry of an opened file has no type before it is used.
-            let Some((outputs, write)) = entry.outputs.get().zip(entry.write) else {
-                continue;
-            };
+            let unread = || BookError::Unread(name.clone());
+            let known = entry.outputs.get().zip(entry.write);
+            let (outputs, write) = known.ok_or_else(unread)?;
             let mut ends = Vec::new();
             while write(&**outputs, ends.len(), to)?.is_some() {
                 ends.push(to.get_ref().bytes + to.buffer().len() as u64);
@@ -118,14 +125,19 @@ impl Book {
     /// Opens the book in the file `path`; its outputs are read when they are used.
     ///
     /// # Errors
-    /// A file of kind input that this version did not write; an error of the disk.
-    pub fn open(path: &Path) -> Result<Self> {
+    /// A file of kind input that was not written with this `layout`; an error of the disk.
+    pub fn open(path: &Path, layout: &str) -> Result<Self> {
         let file = File::open(path)
             .map_err(IoError::on("open"))
             .in_file(path)?;
-        let lines = contents(&file).in_file(path)?;
+        let head = head(layout);
+        let start = head.len() as u64;
+        if bytes_of(&file, 0, start).in_file(path)? != head.as_bytes() {
+            return Err(unreadable("its first line is another one")).in_file(path);
+        }
+        let lines = contents(&file, start).in_file(path)?;
         let file = Arc::new((path.to_owned(), file));
-        let (mut entries, mut start) = (BTreeMap::new(), 0);
+        let (mut entries, mut start) = (BTreeMap::new(), start);
         for line in lines {
             let written = Written {
                 file: Arc::clone(&file),
@@ -142,14 +154,28 @@ impl Book {
             };
             entries.insert((line.name, line.round), entry);
         }
-        Ok(Self { entries })
+        Ok(Self {
+            entries,
+            opened: Some(path.to_owned()),
+        })
+    }
+
+    /// The error for an output that an opened file does not have.
+    pub(super) fn is_without(path: &Path, name: &str) -> Error {
+        let failure: Result<()> = Err(unreadable(format!("there is no {name}"))).in_file(path);
+        failure.err().unwrap_or_else(|| unreadable(name))
     }
 }
 
-/// The table of contents.
-fn contents(file: &File) -> Result<Vec<Line>> {
+/// The first line of a file.
+fn head(layout: &str) -> String {
+    format!("areograph outputs, {layout}\n")
+}
+
+/// The table of contents; outputs begin at `first`.
+fn contents(file: &File, first: u64) -> Result<Vec<Line>> {
     let bytes = file.metadata().map_err(IoError::on("read"))?.len();
-    let short = || unreadable("it is too short");
+    let short = || unreadable("its table of contents is invalid");
     let end = bytes.checked_sub(TAIL_BYTES).ok_or_else(short)?;
     let tail = bytes_of(file, end, bytes)?;
     let length = tail.try_into().map_or(u64::MAX, u64::from_le_bytes);
@@ -157,14 +183,16 @@ fn contents(file: &File) -> Result<Vec<Line>> {
     let lines: Vec<Line> =
         postcard::from_bytes(&bytes_of(file, start, end)?).map_err(unreadable)?;
     let ends = lines.iter().flat_map(|line| &line.ends);
-    let is_sorted = ends.clone().is_sorted() && ends.max().is_none_or(|end| *end <= start);
+    let is_sorted = ends.clone().is_sorted()
+        && ends.clone().min().is_none_or(|end| *end >= first)
+        && ends.max().is_none_or(|end| *end <= start);
     let is_whole = lines
         .iter()
         .all(|line| line.labels.len() == line.ends.len());
     if is_sorted && is_whole {
         return Ok(lines);
     }
-    Err(unreadable("its table of contents is inconsistent"))
+    Err(unreadable("its table of contents is invalid"))
 }
 
 /// The bytes from `start` to `end`.
