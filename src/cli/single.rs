@@ -15,6 +15,7 @@ use crate::{
 
 /// Options that every such run has.
 #[derive(Debug, Args)]
+#[allow(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(super) struct RunArguments {
     /// Stop after this stage; an unknown name lists the stages.
     #[arg(long, value_name = "STAGE", default_value = PUBLISH, hide_default_value = true)]

@@ -165,23 +165,17 @@ struct ArchivePublication<'a> {
 
 impl Publication for ArchivePublication<'_> {
     fn inputs(&self, _folder: &Path, _ledger: &Ledger) -> Inputs {
-        match &*self.checked.borrow() {
-            Some((ranges, _)) => self.archive.publish_inputs(ranges),
-            None => {
-                let mut inputs = self.archive.inputs();
-                inputs.output(STAGE, None);
-                for prefix in [
-                    "key files",
-                    "key copies",
-                    "key failures",
-                    "key allow_uncovered",
-                ] {
-                    inputs.not_known_yet(&format!("output of {STAGE}"), prefix);
-                }
-                inputs.setting("(layout)", &LAYOUT);
-                inputs
-            }
+        if let Some((ranges, _)) = &*self.checked.borrow() {
+            return self.archive.publish_inputs(ranges);
         }
+        let mut inputs = self.archive.inputs();
+        inputs.setting("(layout)", &LAYOUT);
+        // The other inputs of products are results.
+        let name = format!("output of {STAGE}");
+        for prefix in ["files", "copies", "failures", "allow_uncovered"] {
+            inputs.not_known_yet(&name, &format!("key {prefix}"));
+        }
+        inputs
     }
 
     fn verdict(&self) -> Result<Verdict> {

@@ -74,16 +74,12 @@ impl<'a> CameraLines<'a> {
     /// # Errors
     /// The calibration is not known yet.
     pub fn support(&self) -> Result<Vec<SupportSource<'a>>> {
-        Ok(match self.calibrated {
-            Some(calibrated) => {
-                let cameras = calibrated.value()?.cameras.iter();
-                cameras.map(|of| SupportSource::Text(&of.isd)).collect()
-            }
-            None => {
-                let files = self.given.iter();
-                files.map(|of| SupportSource::File(&of.path)).collect()
-            }
-        })
+        if let Some(calibrated) = self.calibrated {
+            let cameras = calibrated.value()?.cameras.iter();
+            return Ok(cameras.map(|of| SupportSource::Text(&of.isd)).collect());
+        }
+        let files = self.given.iter();
+        Ok(files.map(|of| SupportSource::File(&of.path)).collect())
     }
 
     /// The lines.
