@@ -392,6 +392,7 @@ fn declarations_are_complete() {
         "limits.profiles_apart_max_sigma",
         "limits.correction_max_sigma",
         "limits.sigma0_max",
+        "limits.missing_shots_max",
         "limits.ties_min",
         "limits.rejected_share_max",
         "limits.surface_filled_min",

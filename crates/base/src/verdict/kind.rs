@@ -30,8 +30,6 @@ pub enum CheckKind {
     RangeOutliers,
     /// Shots of the longest profile.
     Shots,
-    /// Share of the pulses of a profile that have no shot.
-    ShotsMissing,
     /// Clock correction of least spread minus the configured one.
     ClockCorrection,
     /// Footprints of simultaneous shots in an image, of those that the mountings of camera and laser place in it.
@@ -145,6 +143,8 @@ pub enum CheckKind {
     OtherOrbitsOffset,
     /// Share of withheld stretches of profiles beyond the interval that contains 99.7 % of them as stated.
     WithheldStretches,
+    /// Share of the pulses of a profile that have no shot.
+    ShotsMissing,
 }
 
 impl CheckKind {
