@@ -66,7 +66,7 @@ fn a_turned_ck_is_found_and_nothing_else() {
     assert_eq!(names(&found["kernels"]["changed"]), ["mgs_sc_scene.bc"]);
     assert_eq!(found["kernels"]["changed"][0]["role"], "CK");
     assert_eq!(names(&found["stages"]["changed"]), ran);
-    assert_eq!(found["stages"]["unchanged"], 7);
+    assert_eq!(found["stages"]["unchanged"], 8);
     assert_eq!(found["configuration_changed"], false);
     assert_eq!(found["footprints"]["only_in_a"], 0);
     assert_eq!(found["footprints"]["only_in_b"], 0);

@@ -35,7 +35,7 @@ fn run(case: &Case) -> Vec<String> {
 
 fn fresh() -> Case {
     let case = Case::new();
-    assert_eq!(run(&case).len(), 13);
+    assert_eq!(run(&case).len(), 14);
     assert_eq!(plan(&case), BTreeMap::new());
     assert_eq!(run(&case), [""; 0]);
     case
