@@ -9,6 +9,12 @@
 //! do not state the period; it is then estimated from the intervals between the shots of a table. Only pulses inside the
 //! window count, since a track may leave a window and return.
 
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "pulses are counted, three thousand in the longest pause, and casts of floats saturate"
+)]
+
 #[cfg(test)]
 mod tests;
 

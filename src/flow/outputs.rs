@@ -51,9 +51,10 @@ impl Site {
     /// # Errors
     /// As [`Site::images`].
     pub(super) fn best_images(&self) -> Result<Vec<SiteImage>> {
-        let round = match self.is_adjusted()? {
-            true => Round::Adjusted,
-            false => Round::Initial,
+        let round = if self.is_adjusted()? {
+            Round::Adjusted
+        } else {
+            Round::Initial
         };
         SiteImage::all(&self.book, round)
     }

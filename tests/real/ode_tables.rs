@@ -552,8 +552,6 @@ fn as_served(shots: &RecordBatch) -> String {
     .map(|name| numbers(shots, name));
     let orbits = shots.column_by_name("orbit").unwrap();
     let orbits = orbits.as_primitive::<arrow_array::types::UInt32Type>();
-    let utc = shots.column_by_name("utc");
-    assert!(utc.is_none(), "UTC is only in GIS formats");
     let mut text = format!("{CAPITALS}\r\n");
     for row in 0..shots.num_rows() {
         let [east, north, topography, range, radius, et] =

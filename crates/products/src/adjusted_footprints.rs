@@ -19,7 +19,7 @@ pub(super) static TABLE: Declaration = Declaration {
     write: Write::Adjustment(|path, of, _, adjustment| {
         let table = Table::new(shot_columns(), shots(adjustment.adjusted))
             .in_words(&of.site.config.wording());
-        parquet::write(path, table, light_time::metadata(of.site)).map(Some)
+        parquet::write(path, &table, light_time::metadata(of.site)).map(Some)
     }),
     uses: &[],
 };

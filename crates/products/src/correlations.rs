@@ -17,7 +17,7 @@ pub(super) static TABLE: Declaration = Declaration {
     content: Content::Table(|| meanings(&columns())),
     write: Write::Adjustment(|path, of, _, adjustment| {
         let table = Table::new(columns(), rows(adjustment)).in_words(&of.site.config.wording());
-        parquet::write(path, table, Vec::new()).map(Some)
+        parquet::write(path, &table, Vec::new()).map(Some)
     }),
     uses: &[],
 };

@@ -37,6 +37,9 @@ pub(super) fn finish(path: &Path, mut file: BufWriter<File>) -> Result<()> {
 }
 
 /// Writes `bytes` to `path`, its folder made where missing, through to the disk.
+///
+/// # Errors
+/// Errors of the disk.
 pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut file = create(path)?;
     file.write_all(bytes)
@@ -63,6 +66,9 @@ pub(super) fn write_text(path: &Path, text: &str) -> Result<()> {
 }
 
 /// All bytes of `path`.
+///
+/// # Errors
+/// Errors of the disk.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?

@@ -63,7 +63,7 @@ pub(super) static PARQUET: Declaration = Declaration {
         ];
         let choice = of.site.footprints.ground_choice();
         metadata.extend(choice.map(|of| ("ground_radius", of.words().to_owned())));
-        parquet::write(path, table(of.site), metadata).map(Some)
+        parquet::write(path, &table(of.site), metadata).map(Some)
     }),
     uses: &[Use {
         program: Program::Gis,

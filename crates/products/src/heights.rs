@@ -28,7 +28,7 @@ pub(super) static TABLE: Declaration = Declaration {
     content: Content::Table(|| meanings(&columns())),
     write: Write::Ties(|path, of, geometric| {
         let table = Table::new(columns(), rows(geometric)).in_words(&of.site.config.wording());
-        parquet::write(path, table, light_time::metadata(of.site))
+        parquet::write(path, &table, light_time::metadata(of.site))
     }),
     uses: &[],
 };

@@ -199,7 +199,7 @@ fn write_table(path: &Path, of: &Context, image: &ImageProducts) -> Result<u64> 
     let quaternions = continuous_quaternions(rotations);
     let rows = samples.iter().zip(quaternions);
     let table = Table::new(columns(), rows.collect()).in_words(&of.site.config.wording());
-    parquet::write(path, table, light_time::metadata(of.site))
+    parquet::write(path, &table, light_time::metadata(of.site))
 }
 
 fn write_document(path: &Path, of: &Context, image: &ImageProducts) -> Result<u64> {

@@ -32,11 +32,11 @@ const UTC: &str = "UTC";
 ///
 /// # Errors
 /// Numbers that are not finite; errors of the disk; columns and values that are read back differently.
-pub(super) fn write(path: &Path, table: Table, metadata: Vec<(&str, String)>) -> Result<u64> {
+pub(super) fn write(path: &Path, table: &Table, metadata: Vec<(&str, String)>) -> Result<u64> {
     let mut file = create(path)?;
-    encode(&mut file, &table, metadata).in_file(path)?;
+    encode(&mut file, table, metadata).in_file(path)?;
     finish(path, file)?;
-    read_back(path, &table).in_file(path)?;
+    read_back(path, table).in_file(path)?;
     Ok(table.rows() as u64)
 }
 

@@ -188,7 +188,7 @@ pub(super) static TABLE: Declaration = Declaration {
         let site = of.site;
         let shots = (0..site.ranges.shots.len()).map(|at| RangedShot { site, at });
         let table = Table::new(columns(), shots.collect()).in_words(&of.site.config.wording());
-        parquet::write(path, table, Vec::new()).map(Some)
+        parquet::write(path, &table, Vec::new()).map(Some)
     }),
     uses: &[],
 };

@@ -50,7 +50,7 @@ pub(super) static PARQUET: Declaration = Declaration {
                 ("geo", geo_metadata(body, bounds, None).to_string()),
                 ("frame", frame(body).to_owned()),
             ];
-            parquet::write(path, table(of.site, rows), metadata)
+            parquet::write(path, &table(of.site, rows), metadata)
         },
     },
     uses: &[Use {

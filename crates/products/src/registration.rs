@@ -139,7 +139,7 @@ pub(super) static TABLE: Declaration = Declaration {
     content: Content::Table(|| meanings(&columns())),
     write: Write::Site(|path, of| {
         let metadata = light_time::metadata(of.site);
-        parquet::write(path, table(of.site, of.site.images), metadata).map(Some)
+        parquet::write(path, &table(of.site, of.site.images), metadata).map(Some)
     }),
     uses: &[],
 };
@@ -167,7 +167,7 @@ pub(super) static ADJUSTED: Declaration = Declaration {
     content: Content::Table(|| meanings(&columns())),
     write: Write::Adjustment(|path, of, _, adjustment| {
         let table = table(of.site, adjustment.images);
-        parquet::write(path, table, light_time::metadata(of.site)).map(Some)
+        parquet::write(path, &table, light_time::metadata(of.site)).map(Some)
     }),
     uses: &[],
 };

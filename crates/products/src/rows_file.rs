@@ -8,7 +8,7 @@ use std::{
 
 use ::parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use arrow_array::{Array, ArrayRef, RecordBatch, cast::AsArray as _, types};
-use arrow_schema::{DataType, FieldRef, SchemaRef};
+use arrow_schema::{DataType, FieldRef, SchemaRef, TimeUnit};
 use rayon::prelude::*;
 
 use super::{
@@ -20,6 +20,7 @@ use super::{
     parquet_file::ParquetFile,
     table::{ROWS_OF_A_TASK, Values, pieces},
     text_table,
+    utc::Utc,
 };
 use areograph_base::{
     body::Body,
@@ -320,6 +321,10 @@ fn values_of(name: &str, array: &ArrayRef) -> Result<Values> {
         }
         DataType::Boolean if is_whole => {
             Values::Flag(array.as_boolean().iter().flatten().collect())
+        }
+        DataType::Timestamp(TimeUnit::Microsecond, Some(_)) if is_whole => {
+            let times = array.as_primitive::<types::TimestampMicrosecondType>();
+            Values::Time(times.values().iter().map(|of| Utc(*of)).collect())
         }
         DataType::Utf8 => {
             let texts = array.as_string::<i32>().iter();

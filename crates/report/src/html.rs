@@ -17,6 +17,7 @@ const ROWS_TOGETHER: usize = 10;
 const COLUMNS_NARROW: usize = 2;
 
 /// `text` with the five characters that HTML reads as markup replaced.
+#[must_use]
 pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
@@ -142,6 +143,7 @@ pub(super) fn folded(title: &str, html: &str) -> String {
 }
 
 /// A folded section, unfolded from the start where it `matters`.
+#[must_use]
 pub fn folded_unless(matters: bool, title: &str, html: &str) -> String {
     if html.is_empty() {
         return String::new();
@@ -154,6 +156,7 @@ pub fn folded_unless(matters: bool, title: &str, html: &str) -> String {
 }
 
 /// A paragraph of text.
+#[must_use]
 pub fn paragraph(text: &str) -> String {
     if text.is_empty() {
         return String::new();
@@ -162,6 +165,7 @@ pub fn paragraph(text: &str) -> String {
 }
 
 /// A link to `place` named `text`, as HTML.
+#[must_use]
 pub fn link(place: &str, text: &str) -> String {
     format!("<a href=\"{}\">{}</a>", escape(place), escape(text))
 }
@@ -212,6 +216,7 @@ pub enum Cell {
 
 impl Cell {
     /// The cell with the places of its numbers in the products, below the place of its row.
+    #[must_use]
     pub fn traced(self, places: impl Into<String>) -> Self {
         Self::Traced(Box::new(self), places.into())
     }
@@ -246,6 +251,7 @@ pub struct Table {
 
 impl Table {
     /// A table with a caption and column heads.
+    #[must_use]
     pub fn new(caption: &str, columns: &'static [Column]) -> Self {
         let heads: String = columns
             .iter()
@@ -339,6 +345,7 @@ impl Table {
     }
 
     /// The finished table.
+    #[must_use]
     pub fn finish(self) -> String {
         let html = self.html + "</tbody>\n</table></div>\n";
         let kind = match (

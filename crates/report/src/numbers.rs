@@ -20,6 +20,7 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
 }
 
 /// A number with a sign on positive values too.
+#[must_use]
 pub fn signed(value: f64, decimals: usize) -> String {
     let text = number(value, decimals);
     let zero = !text.contains(|digit| matches!(digit, '1'..='9'));

@@ -283,6 +283,10 @@ impl fmt::Debug for Book {
 }
 
 #[cfg(test)]
+#[allow(
+    clippy::disallowed_methods,
+    reason = "tests may write files that nobody else reads"
+)]
 mod tests {
     use std::fs;
 

@@ -1,5 +1,11 @@
 //! Orthoimages: their cells, the uncertainty of positions in them, and pictures.
 
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "brightnesses and cells are small numbers, and casts of floats saturate"
+)]
+
 use super::products::orthoimages;
 use crate::{
     error::Result,

@@ -19,7 +19,7 @@ pub(super) static TABLE: Declaration<WriteArchive> = Declaration {
     content: Content::Table(|| meanings(&columns())),
     write: |path, of| {
         let archive = ("archive", of.ranges.files.len().to_string() + " files");
-        parquet::write(path, table(of), vec![archive])
+        parquet::write(path, &table(of), vec![archive])
     },
     uses: &[],
 };

@@ -29,7 +29,7 @@ pub(crate) static SHOTS: Declaration<WriteShots> = Declaration {
     content: Content::Table(|| meanings(&columns())),
     write: |path, profile, shots| {
         let table = Table::new(columns(), shots.to_vec());
-        parquet::write(path, table, vec![("profile", profile.id())])
+        parquet::write(path, &table, vec![("profile", profile.id())])
     },
     uses: &[],
 };

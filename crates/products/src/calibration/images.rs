@@ -14,7 +14,7 @@ pub(super) static TABLE: Declaration<WriteCalibration> = Declaration {
     rows: "image positions",
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),
-    write: |path, of| write_parquet(path, of, table(of)),
+    write: |path, of| write_parquet(path, of, &table(of)),
     uses: &[],
 };
 

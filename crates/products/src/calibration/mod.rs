@@ -98,7 +98,7 @@ pub fn write_calibration_products(
 }
 
 /// Writes a table as Parquet with its metadata.
-fn write_parquet(path: &Path, of: &CalibrationProducts, table: Table) -> Result<u64> {
+fn write_parquet(path: &Path, of: &CalibrationProducts, table: &Table) -> Result<u64> {
     let about = vec![("calibration", of.config.calibration.clone())];
     parquet::write(path, table, about)
 }

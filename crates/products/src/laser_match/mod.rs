@@ -66,7 +66,7 @@ pub fn write_match_products(directory: &Path, of: &MatchProducts) -> Result<Vec<
 }
 
 /// Writes a table as Parquet with its metadata.
-fn write_parquet(path: &Path, of: &MatchProducts, table: Table) -> Result<u64> {
+fn write_parquet(path: &Path, of: &MatchProducts, table: &Table) -> Result<u64> {
     let similarity = of.result.similarity.word().to_owned();
     let about = vec![
         ("similarity", similarity),

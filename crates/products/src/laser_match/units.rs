@@ -18,7 +18,7 @@ pub(super) static TABLE: Declaration<WriteMatch> = Declaration {
     rows: "units",
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),
-    write: |path, of| write_parquet(path, of, table(of)),
+    write: |path, of| write_parquet(path, of, &table(of)),
     uses: &[],
 };
 

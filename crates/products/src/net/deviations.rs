@@ -14,7 +14,7 @@ pub(super) static TABLE: Declaration<WriteNet> = Declaration {
     rows: "measurements",
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),
-    write: |path, of| write_parquet(path, of, table(of)),
+    write: |path, of| write_parquet(path, of, &table(of)),
     uses: &[],
 };
 

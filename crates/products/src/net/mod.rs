@@ -85,7 +85,7 @@ pub fn write_net_products(directory: &Path, net: &NetProducts) -> Result<Vec<Pro
 }
 
 /// Writes a table as Parquet with its metadata.
-fn write_parquet(path: &Path, net: &NetProducts, table: Table) -> Result<u64> {
+fn write_parquet(path: &Path, net: &NetProducts, table: &Table) -> Result<u64> {
     parquet::write(path, table, vec![("net", net.config.net.clone())])
 }
 

@@ -50,6 +50,7 @@ pub(crate) fn draw_text<'a>(
 }
 
 /// A number of an axis or a table, see [`number`].
+#[must_use]
 pub fn label(value: f64, decimals: usize) -> String {
     number(value, decimals)
 }

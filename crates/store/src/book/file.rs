@@ -5,6 +5,7 @@
 use std::{
     any::{Any, type_name},
     collections::BTreeMap,
+    fmt::Display,
     fs::File,
     io::{self, BufWriter, Read as _, Seek as _, SeekFrom, Write},
     path::{Path, PathBuf},
@@ -68,9 +69,9 @@ impl Written {
             .map_or(self.start, |before| self.ends[before]);
         let (path, file) = &*self.file;
         let bytes = bytes_of(file, start, self.ends[part]).in_file(path)?;
-        Ok(postcard::from_bytes(&bytes)
-            .map_err(unreadable)
-            .in_file(path)?)
+        postcard::from_bytes(&bytes)
+            .map_err(|error| unreadable(&error))
+            .in_file(path)
     }
 }
 
@@ -133,7 +134,7 @@ impl Book {
         let head = head(layout);
         let start = head.len() as u64;
         if bytes_of(&file, 0, start).in_file(path)? != head.as_bytes() {
-            return Err(unreadable("its first line is another one")).in_file(path);
+            return Err(unreadable(&"its first line is another one")).in_file(path);
         }
         let lines = contents(&file, start).in_file(path)?;
         let file = Arc::new((path.to_owned(), file));
@@ -162,8 +163,8 @@ impl Book {
 
     /// The error for an output that an opened file does not have.
     pub(super) fn is_without(path: &Path, name: &str) -> Error {
-        let failure: Result<()> = Err(unreadable(format!("there is no {name}"))).in_file(path);
-        failure.err().unwrap_or_else(|| unreadable(name))
+        let failure: Result<()> = Err(unreadable(&format!("there is no {name}"))).in_file(path);
+        failure.err().unwrap_or_else(|| unreadable(&name))
     }
 }
 
@@ -175,13 +176,13 @@ fn head(layout: &str) -> String {
 /// The table of contents; outputs begin at `first`.
 fn contents(file: &File, first: u64) -> Result<Vec<Line>> {
     let bytes = file.metadata().map_err(IoError::on("read"))?.len();
-    let short = || unreadable("its table of contents is invalid");
+    let short = || unreadable(&"its table of contents is invalid");
     let end = bytes.checked_sub(TAIL_BYTES).ok_or_else(short)?;
     let tail = bytes_of(file, end, bytes)?;
     let length = tail.try_into().map_or(u64::MAX, u64::from_le_bytes);
     let start = end.checked_sub(length).ok_or_else(short)?;
     let lines: Vec<Line> =
-        postcard::from_bytes(&bytes_of(file, start, end)?).map_err(unreadable)?;
+        postcard::from_bytes(&bytes_of(file, start, end)?).map_err(|error| unreadable(&error))?;
     let ends = lines.iter().flat_map(|line| &line.ends);
     let is_sorted = ends.clone().is_sorted()
         && ends.clone().min().is_none_or(|end| *end >= first)
@@ -192,7 +193,7 @@ fn contents(file: &File, first: u64) -> Result<Vec<Line>> {
     if is_sorted && is_whole {
         return Ok(lines);
     }
-    Err(unreadable("its table of contents is invalid"))
+    Err(unreadable(&"its table of contents is invalid"))
 }
 
 /// The bytes from `start` to `end`.
@@ -204,7 +205,7 @@ fn bytes_of(mut file: &File, start: u64, end: u64) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-fn unreadable(reason: impl ToString) -> Error {
+fn unreadable(reason: &dyn Display) -> Error {
     BookError::Unreadable(reason.to_string()).into()
 }
 
