@@ -9,10 +9,8 @@ pub use areograph_base::style::STYLE;
 
 /// Letters up to which a cell stays on one line.
 const SHORT: usize = 28;
-
 /// Rows up to which a table is not broken between two sheets of paper.
 const ROWS_TOGETHER: usize = 10;
-
 /// Columns up to which a long table is set beside itself on paper.
 const COLUMNS_NARROW: usize = 2;
 

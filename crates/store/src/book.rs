@@ -283,10 +283,7 @@ impl fmt::Debug for Book {
 }
 
 #[cfg(test)]
-#[allow(
-    clippy::disallowed_methods,
-    reason = "tests may write files that nobody else reads"
-)]
+#[allow(clippy::disallowed_methods, reason = "tests write files of their own")]
 mod tests {
     use std::fs;
 
