@@ -1,7 +1,7 @@
 //! What a stage adds to the products, the page and the verdict of a site.
 //!
 //! A capability declares its products, its section of the page, its findings for the verdict and its counts of the
-//! manifest in one folder; each of them asks the book of outputs for what it needs. [`CAPABILITIES`] lists it once, and
+//! manifest in one folder; each of them asks the book of outputs for what it needs. `CAPABILITIES` lists it once, and
 //! files, catalogue, documentation, page and verdict follow. The flow (`flow/site.rs`) calls its stage. Stages that
 //! many products use have these in the crates `products`, `report` and `stages/judge`.
 

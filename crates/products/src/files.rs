@@ -81,7 +81,7 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
 /// Writes `document` as indented JSON and reads it back.
 ///
 /// # Errors
-/// As [`to_value`]; errors of the disk; a document that is read back differently.
+/// Numbers that are not finite; errors of the disk; a document that is read back differently.
 pub fn write_json(path: &Path, document: &impl Serialize) -> Result<()> {
     let written = to_value(document).in_file(path)?;
     let text = serde_json::to_string_pretty(document)

@@ -44,7 +44,7 @@ pub(super) fn write_each<W>(
 /// A product, declared once: the files, the STAC item, `exchange/README.txt` and `docs/products.md` follow. `W` is how
 /// it is written: for a site by [`Write`].
 pub struct Declaration<W = Write> {
-    /// Path below the site's folder; [`IMAGE`] stands for an image's identifier.
+    /// Path below the site's folder; `<image>` stands for an image's identifier.
     pub path: &'static str,
     /// Contents of the file.
     pub what: &'static str,
@@ -201,7 +201,7 @@ pub enum Program {
     Catalogue,
 }
 
-/// Use of a product by a program: lines for `exchange/README.txt`, equal for every image but for [`IMAGE`].
+/// Use of a product by a program: lines for `exchange/README.txt`, equal for every image but for `<image>`.
 pub struct Use {
     /// The program.
     pub program: Program,

@@ -208,7 +208,7 @@ pub enum Cell {
     Limited(String, f64),
     /// HTML.
     Html(String),
-    /// A cell whose numbers are from products, see [`super::source`].
+    /// A cell whose numbers are from products, see `source.rs`.
     Traced(Box<Self>, String),
 }
 
@@ -371,7 +371,7 @@ fn limited(class: &str, from: &str, text: &str, share: f64) -> String {
     }
 }
 
-/// The attribute of an element whose numbers are those at `places` of the products; see [`super::source`].
+/// The attribute of an element whose numbers are those at `places` of the products; see `source.rs`.
 pub(super) fn from_places(places: &str) -> String {
     format!(" data-from=\"{}\"", escape(places))
 }

@@ -49,7 +49,7 @@ pub(crate) fn draw_text<'a>(
     area.draw_text(text, &style, at)
 }
 
-/// A number of an axis or a table, see [`number`].
+/// A number of an axis or a table, as `numbers.rs` writes it.
 #[must_use]
 pub fn label(value: f64, decimals: usize) -> String {
     number(value, decimals)
