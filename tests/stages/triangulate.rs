@@ -619,7 +619,8 @@ fn products_of_something_else_are_left_alone() {
     // As if a site of the same name had been published there.
     let path = outcome.folder.join("manifest.json");
     let text = fs::read_to_string(&path).unwrap();
-    fs::write(&path, text.replace("\"triangulate\"", "\"convert_datum\"")).unwrap();
+    let other = text.replace("\"triangulate\"", "\"convert_datum\"");
+    fs::write(&path, other.replace("\"net\":", "\"site\":")).unwrap();
     let before = fs::read_to_string(&path).unwrap();
     let refused = run(folder.path(), true).unwrap_err().to_string();
     assert!(
@@ -629,4 +630,7 @@ fn products_of_something_else_are_left_alone() {
     assert!(refused.contains("made by convert_datum"), "{refused}");
     assert_eq!(fs::read_to_string(&path).unwrap(), before);
     assert!(outcome.folder.join("report/index.html").is_file());
+    // Products of a net remain replaceable when its stages have other names.
+    fs::write(&path, other).unwrap();
+    run(folder.path(), true).unwrap();
 }

@@ -175,16 +175,32 @@ struct OtherKind {
     stage: String,
 }
 
-/// Ensures that existing products in the folder were made by the same flow, identified by one of its stages.
+/// Keys by one of which a configuration names what it describes. Matches and archives have no configuration.
+const NAMING_KEYS: [&str; 3] = ["site", "net", "calibration"];
+
+/// Whether two manifests are of one flow: by the key that names what they describe, or by a stage.
+fn is_same_kind(standing: &Manifest, next: &Manifest) -> bool {
+    let kinds = [standing, next].map(|of| {
+        let mut keys = NAMING_KEYS.iter();
+        keys.find(|key| of.configuration.keys.contains_key(**key))
+    });
+    if let [Some(standing), Some(next)] = kinds {
+        return standing == next;
+    }
+    let own = standing.stages.iter().filter(|of| of.name != PUBLISH);
+    let mut own = own.map(|of| &of.name);
+    own.any(|name| next.stages.iter().any(|of| of.name == *name))
+}
+
+/// Ensures that existing products in the folder were made by the same flow.
 fn require_same_kind(site_folder: &Path, next: &Manifest) -> Result<()> {
     let Some(standing) = read_manifest(site_folder) else {
         return Ok(());
     };
-    let own = standing.stages.iter().filter(|stage| stage.name != PUBLISH);
-    let is_shared = |name: &str| next.stages.iter().any(|stage| stage.name == name);
-    if own.clone().any(|stage| is_shared(&stage.name)) {
+    if is_same_kind(&standing, next) {
         return Ok(());
     }
+    let own = standing.stages.iter().filter(|stage| stage.name != PUBLISH);
     match own.into_iter().next() {
         Some(stage) => Err(OtherKind {
             name: standing.site.clone(),
