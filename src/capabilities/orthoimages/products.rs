@@ -30,9 +30,10 @@ pub(super) static ORTHOIMAGE: Declaration = Declaration {
     content: Content::Foreign,
     write: Write::ImageWhere {
         images: IMAGES,
-        has: |site, image| orthoimage(site, image).is_some(),
+        has: has_orthoimage,
         write: |path, of, image| {
-            orthoimage(of.site, image).map_or(Ok(0), |image| write_brightness(path, of, image))
+            let made = orthoimage(of.site, image)?;
+            made.map_or(Ok(0), |image| write_brightness(path, of, image))
         },
     },
     uses: &[],
@@ -48,11 +49,11 @@ pub(super) static SIGMAS: Declaration = Declaration {
     content: Content::Foreign,
     write: Write::ImageWhere {
         images: IMAGES,
-        has: |site, image| orthoimage(site, image).is_some(),
+        has: has_orthoimage,
         write: |path, of, image| {
             let what = "standard deviation of the horizontal position, metres";
             let terrain = of.site.find::<Surface>()?;
-            let made = orthoimage(of.site, image).zip(terrain);
+            let made = orthoimage(of.site, image)?.zip(terrain);
             made.map_or(Ok(0), |(image, Surface { model, .. })| {
                 let numbers = (what, &*image.sigmas_m);
                 write_map(path, of, &model.heights, numbers, model.parallel_rad)
@@ -71,24 +72,34 @@ pub(super) static DOCUMENT: Declaration = Declaration {
     content: Content::Document(|| DocumentSchema::of::<Document>("orthoimages")),
     write: Write::Where {
         sites: SITES,
-        has: |site| !orthoimages(site).is_empty(),
+        has: has_orthoimages,
         write: |path, of| {
-            write_json(path, &Document::of(of.site))?;
-            Ok(orthoimages(of.site).len() as u64)
+            let orthoimages = orthoimages(of.site)?;
+            write_json(path, &Document::of(of.site, orthoimages))?;
+            Ok(orthoimages.len() as u64)
         },
     },
     uses: &[],
 };
 
-fn orthoimage<'a>(site: &SiteProducts<'a>, image: usize) -> Option<&'a Orthoimage> {
-    let mut all = orthoimages(site).iter();
-    all.find(|of| of.account.image == image)
+/// The orthoimages of a site; empty if it requests none.
+pub(super) fn orthoimages<'a>(site: &SiteProducts<'a>) -> Result<&'a [Orthoimage]> {
+    let found = site.find::<Vec<Orthoimage>>()?;
+    Ok(found.map_or(&[], Vec::as_slice))
 }
 
-/// The orthoimages of a site; empty if it requests none.
-pub(super) fn orthoimages<'a>(site: &SiteProducts<'a>) -> &'a [Orthoimage] {
-    let found = site.find::<Vec<Orthoimage>>().ok().flatten();
-    found.map_or(&[], Vec::as_slice)
+fn orthoimage<'a>(site: &SiteProducts<'a>, image: usize) -> Result<Option<&'a Orthoimage>> {
+    let mut all = orthoimages(site)?.iter();
+    Ok(all.find(|of| of.account.image == image))
+}
+
+/// Whether a site has orthoimages. The writer reports an output that cannot be read, here and below.
+pub(super) fn has_orthoimages(site: &SiteProducts) -> bool {
+    !matches!(orthoimages(site), Ok([]))
+}
+
+fn has_orthoimage(site: &SiteProducts, image: usize) -> bool {
+    !matches!(orthoimage(site, image), Ok(None))
 }
 
 /// Writes the brightness of all cells, and reads it back.
@@ -163,8 +174,8 @@ struct Entry<'a> {
 }
 
 impl<'a> Document<'a> {
-    fn of(site: &SiteProducts<'a>) -> Self {
-        let orthoimages = orthoimages(site).iter().map(|of| {
+    fn of(site: &SiteProducts<'a>, orthoimages: &'a [Orthoimage]) -> Self {
+        let orthoimages = orthoimages.iter().map(|of| {
             let of = &of.account;
             let [rows, columns] = of.map.size;
             Entry {

@@ -6,7 +6,7 @@
     reason = "brightnesses and cells are small numbers, and casts of floats saturate"
 )]
 
-use super::products::orthoimages;
+use super::products::{has_orthoimages, orthoimages};
 use crate::{
     error::Result,
     products::SiteProducts,
@@ -14,7 +14,7 @@ use crate::{
         Section,
         parts::{Cell, Column, Table, escape, label, link, paragraph, picture_of, whole},
     },
-    stages::rectify_images::{OrthoimageAccount, OrthoimageLook},
+    stages::rectify_images::{Orthoimage, OrthoimageAccount, OrthoimageLook},
 };
 
 /// Share of the darkest and of the brightest cells that are shown as black and as white.
@@ -24,16 +24,15 @@ pub(super) const SECTION: Section = Section {
     title: "Orthoimages",
     anchor: "orthoimages",
     checks: &[],
-    appears: |site| !orthoimages(site).is_empty(),
+    appears: has_orthoimages,
     write,
 };
 
 fn write(site: &SiteProducts) -> Result<String> {
-    let pictures = orthoimages(site)
-        .iter()
-        .map(|of| picture(site, &of.account));
+    let orthoimages = orthoimages(site)?;
+    let pictures = orthoimages.iter().map(|of| picture(site, &of.account));
     let pictures: String = pictures.collect::<Result<_>>()?;
-    Ok(table(site)
+    Ok(table(site, orthoimages)
         + &paragraph(
             "Cells in wide holes of the terrain model, on ground that relief hides from the camera, or with missing pixels are \
              empty. Heights in narrow holes are interpolated; off nadir their σ is larger. σ is the standard deviation of the \
@@ -44,7 +43,7 @@ fn write(site: &SiteProducts) -> Result<String> {
         + &format!("<div class=\"pieces\">\n{pictures}</div>\n"))
 }
 
-fn table(site: &SiteProducts) -> String {
+fn table(site: &SiteProducts, orthoimages: &[Orthoimage]) -> String {
     let mut table = Table::new(
         "Orthoimages on the terrain model",
         &[
@@ -62,7 +61,7 @@ fn table(site: &SiteProducts) -> String {
             Column::Number("σ, shared: east, north (m)"),
         ],
     );
-    for (index, of) in orthoimages(site).iter().enumerate() {
+    for (index, of) in orthoimages.iter().enumerate() {
         let of = &of.account;
         let number = |value: f64, decimals: usize, place: &str| {
             Cell::from(label(value, decimals)).traced(place)

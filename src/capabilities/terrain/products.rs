@@ -25,19 +25,10 @@ pub(super) static HEIGHTS: Declaration = Declaration {
     content: Content::Foreign,
     write: Write::Where {
         sites: WITH_A_MODEL,
-        has: |site| significant(site).is_some(),
+        has: has_model,
         write: |path, of| {
             let what = "height above the sphere, metres";
-            let model = significant(of.site);
-            model.map_or(Ok(0), |model| {
-                write_map(
-                    path,
-                    of,
-                    &model.heights,
-                    (what, &model.heights.heights_m),
-                    model.parallel_rad,
-                )
-            })
+            write_cells(path, of, what, |model| &model.heights.heights_m)
         },
     },
     uses: &[],
@@ -53,19 +44,10 @@ pub(super) static SIGMAS: Declaration = Declaration {
     content: Content::Foreign,
     write: Write::Where {
         sites: WITH_A_MODEL,
-        has: |site| significant(site).is_some(),
+        has: has_model,
         write: |path, of| {
             let what = "standard deviation of the height about the common offset, metres";
-            let model = significant(of.site);
-            model.map_or(Ok(0), |model| {
-                write_map(
-                    path,
-                    of,
-                    &model.heights,
-                    (what, &model.sigmas_m),
-                    model.parallel_rad,
-                )
-            })
+            write_cells(path, of, what, |model| &model.sigmas_m)
         },
     },
     uses: &[],
@@ -96,9 +78,29 @@ pub(super) static DOCUMENT: Declaration = Declaration {
 const WITH_A_MODEL: &str = "a site with a terrain model";
 
 /// The terrain model of a site, where enough cells matched.
-fn significant<'a>(site: &SiteProducts<'a>) -> Option<&'a SurfaceModel> {
-    let surface = site.find::<Surface>().ok().flatten()?;
-    (!surface.account.is_refused).then_some(&surface.model)
+fn significant<'a>(site: &SiteProducts<'a>) -> Result<Option<&'a SurfaceModel>> {
+    let surface = site.find::<Surface>()?;
+    let significant = surface.filter(|surface| !surface.account.is_refused);
+    Ok(significant.map(|surface| &surface.model))
+}
+
+/// Whether the site has one. The writer reports an output that cannot be read.
+fn has_model(site: &SiteProducts) -> bool {
+    !matches!(significant(site), Ok(None))
+}
+
+/// Writes numbers of all cells of the model.
+fn write_cells(
+    path: &Path,
+    of: &Context,
+    what: &str,
+    numbers: fn(&SurfaceModel) -> &[f32],
+) -> Result<u64> {
+    let Some(model) = significant(of.site)? else {
+        return Ok(0);
+    };
+    let numbers = (what, numbers(model));
+    write_map(path, of, &model.heights, numbers, model.parallel_rad)
 }
 
 /// Writes numbers of all cells, and reads them back as every terrain model is read.
