@@ -1,5 +1,5 @@
-//! Progress of a run: on a terminal a live line for each site, net, calibration, match or archive; elsewhere a line for each stage, and lines at
-//! intervals during long stages.
+//! Progress of a run: on a terminal a live line for each site, net, calibration, match or archive; elsewhere a line for
+//! each stage, and lines at intervals during long stages.
 
 use std::{
     fmt,

@@ -16,7 +16,7 @@ use super::{
     plan,
     progress::Progress,
     report,
-    single::{stopped_after, untested},
+    single::{RunFlags, stopped_after, untested},
     stop::on_signals,
 };
 use crate::{
@@ -39,7 +39,6 @@ use crate::{
 ///   areograph run sites/gusev.toml --out products --open
 ///   areograph run sites/gusev.toml --out products --until register -v
 #[derive(Debug, Clone, Args)]
-#[allow(clippy::struct_excessive_bools, reason = "flags of a command line")]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
     /// Site files (TOML).
@@ -63,18 +62,8 @@ pub(super) struct Arguments {
         value_parser = PossibleValuesParser::new(STAGES)
     )]
     until: String,
-    /// Run every stage, even if its stored output is up to date.
-    #[arg(long)]
-    force: bool,
-    /// Read all input files, stored outputs and products again, even if unchanged.
-    #[arg(long)]
-    rehash: bool,
-    /// Show the stages that would run, with the reasons; write no products.
-    #[arg(long)]
-    dry_run: bool,
-    /// Print JSON.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    flags: RunFlags,
     /// Open the page in the browser: the report of a single site, or the overview of several.
     #[arg(long)]
     open: bool,
@@ -90,7 +79,7 @@ impl Arguments {
         RunOptions {
             out: self.out.clone(),
             until: &self.until,
-            force: self.force,
+            force: self.flags.force,
             stop,
             hashes,
             roots: &[],
@@ -108,12 +97,12 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     if let Err(failure) = check_out(&arguments.out, &sites) {
         return report(&failure);
     }
-    let hashes = HashCache::in_folder(&arguments.out, arguments.rehash);
-    if arguments.dry_run {
+    let hashes = HashCache::in_folder(&arguments.out, arguments.flags.rehash);
+    if arguments.flags.dry_run {
         let never = AtomicBool::new(false);
         let options = arguments.options(&never, &hashes, &());
         let tasks: Vec<Task<'_>> = sites.iter().map(Task::Site).collect();
-        return super::finish(plan::print(&tasks, &options, arguments.json));
+        return super::finish(plan::print(&tasks, &options, arguments.flags.json));
     }
     if let Some(threads) = arguments.threads {
         // The only failure is an existing pool, which keeps its size.
@@ -126,14 +115,14 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
         Err(error) => return report(&crate::error::IoError::on("start threads")(error).into()),
     };
     let outcomes = runtime.block_on(run_all(sites, arguments, &hashes));
-    print(&outcomes, arguments.json);
+    print(&outcomes, arguments.flags.json);
     // If the folder could not be created, the run has already reported it.
     let page = arguments
         .out
         .is_dir()
         .then(|| publish_sites(&arguments.out));
     match &page {
-        Some(Ok(page)) if !arguments.json && outcomes.len() > 1 => {
+        Some(Ok(page)) if !arguments.flags.json && outcomes.len() > 1 => {
             output::line(format_args!("all sites: {}", page.display()));
         }
         Some(Err(failure)) => output::error(failure),

@@ -13,25 +13,32 @@ use crate::{
     verdict::{NOT_TESTED, Verdict},
 };
 
-/// Options that every such run has.
+/// Options of such a run.
 #[derive(Debug, Args)]
-#[allow(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(super) struct RunArguments {
     /// Stop after this stage; an unknown name lists the stages.
     #[arg(long, value_name = "STAGE", default_value = PUBLISH, hide_default_value = true)]
     until: String,
+    #[command(flatten)]
+    flags: RunFlags,
+}
+
+/// Flags of every run, that of a site too.
+#[derive(Debug, Clone, Args)]
+#[allow(clippy::struct_excessive_bools, reason = "flags of a command line")]
+pub(super) struct RunFlags {
     /// Run every stage, even if its stored output is up to date.
     #[arg(long)]
-    force: bool,
+    pub(super) force: bool,
     /// Read all input files, stored outputs and products again, even if unchanged.
     #[arg(long)]
-    rehash: bool,
+    pub(super) rehash: bool,
     /// Show the stages that would run, with the reasons; write no products.
     #[arg(long)]
-    dry_run: bool,
+    pub(super) dry_run: bool,
     /// Print JSON.
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 /// Runs a task, or shows its plan, and reports the outcome, with its counts in words.
@@ -45,7 +52,7 @@ pub(super) fn run(
     words: impl Fn(&dyn Fn(&str) -> u64) -> String,
 ) -> ExitCode {
     match ran(task, out, arguments) {
-        Ok(Some(outcome)) => answer(task.kind(), name, &outcome, arguments.json, words),
+        Ok(Some(outcome)) => answer(task.kind(), name, &outcome, arguments.flags.json, words),
         Ok(None) => ExitCode::SUCCESS,
         Err(failure) => report(&failure),
     }
@@ -53,19 +60,19 @@ pub(super) fn run(
 
 /// The outcome of a run; `None` of a plan, which is printed.
 fn ran(task: Task<'_>, out: &Path, arguments: &RunArguments) -> Result<Option<RunOutcome>> {
-    let signals = Signals::heard()?;
-    let hashes = HashCache::in_folder(out, arguments.rehash);
+    let (signals, flags) = (Signals::heard()?, &arguments.flags);
+    let hashes = HashCache::in_folder(out, flags.rehash);
     let options = |observer| RunOptions {
         out: out.to_owned(),
         until: &arguments.until,
-        force: arguments.force,
+        force: flags.force,
         stop: signals.stop(),
         hashes: &hashes,
         roots: &[],
         observer,
     };
-    if arguments.dry_run {
-        plan::print(&[task], &options(&()), arguments.json)?;
+    if flags.dry_run {
+        plan::print(&[task], &options(&()), flags.json)?;
         return Ok(None);
     }
     run_task(task, &options(&Progress::of(task))).map(Some)
