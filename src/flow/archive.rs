@@ -38,7 +38,7 @@ use super::driver::{Driver, Flow, Ledger, MadeFrom, Publication};
 use crate::{
     altimetry::{MolaClock, ShotFilter},
     config::RangeCheckConfig,
-    error::{Cause, Error, Kind, Result},
+    error::{Cause, Error, Kind, Result, Stopped},
     files::{Identity, InputFiles, file_name},
     pds::{archive::Listing, pedr::RULES},
     products::{
@@ -187,7 +187,7 @@ impl Publication for ArchivePublication<'_> {
     fn publish(&self, from: &MadeFrom<'_>) -> Result<Manifest> {
         let mut checked = self.checked.borrow_mut();
         let (ranges, failures) = checked.as_mut().ok_or(NotChecked)?;
-        self.archive.publish(from.folder, ranges, failures)
+        self.archive.publish(from, ranges, failures)
     }
 }
 
@@ -353,13 +353,15 @@ impl Archive<'_> {
     /// Publishes, and adds the failures of files that could not be read again for it.
     fn publish(
         &self,
-        folder: &Path,
+        from: &MadeFrom<'_>,
         ranges: &mut ArchiveRanges,
         failures: &mut Vec<Error>,
     ) -> Result<Manifest> {
+        let folder = from.folder;
         let staging = staging(folder)?;
         let (mut written, mut shots) = (Vec::new(), Vec::new());
         for (file, profile) in ranges.worst(WORST) {
+            Stopped::check(from.stop)?;
             match self.shots_of(file, profile, &staging)? {
                 Ok(product) => {
                     shots.push(Some(product.path.to_string_lossy().into_owned()));

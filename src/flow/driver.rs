@@ -80,6 +80,8 @@ pub(super) struct MadeFrom<'a> {
     /// The number of the method of each stage.
     pub(super) methods: &'a [(String, u32)],
     pub(super) inputs: &'a Inputs,
+    /// Set from outside to stop before products are published.
+    pub(super) stop: &'a AtomicBool,
 }
 
 /// Carries out the description of a flow: run, plan, check, or list of names.

@@ -119,6 +119,7 @@ fn publish(config: &SiteConfig, site: &Site, from: &MadeFrom<'_>) -> Result<Mani
         ledger,
         methods,
         inputs,
+        ..
     } = *from;
     let none = KernelSet::default();
     let kernels = site.kernels.as_ref().unwrap_or(&none);

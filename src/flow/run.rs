@@ -358,6 +358,7 @@ impl Driver for Run<'_> {
                     ledger: &self.ledger,
                     methods: &self.methods,
                     inputs: &inputs,
+                    stop: self.bounds.stop,
                 };
                 let manifest = publication.publish(&made_from).in_stage(PUBLISH)?;
                 // Publishing may leave out further inputs.
