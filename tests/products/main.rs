@@ -17,3 +17,4 @@ mod report_geometric;
 mod report_many;
 mod report_page;
 mod report_products;
+mod spacing;
