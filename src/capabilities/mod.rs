@@ -78,7 +78,7 @@ pub fn page(site: &SiteProducts) -> Result<String> {
 ///
 /// # Errors
 /// An output that is not known or cannot be read.
-pub fn findings(config: &SiteConfig, book: &Book) -> Result<Vec<Findings>> {
+pub(crate) fn findings(config: &SiteConfig, book: &Book) -> Result<Vec<Findings>> {
     let judges = CAPABILITIES.iter().filter_map(|of| of.judge);
     judges.map(|judge| judge(config, book)).collect()
 }
@@ -87,7 +87,7 @@ pub fn findings(config: &SiteConfig, book: &Book) -> Result<Vec<Findings>> {
 ///
 /// # Errors
 /// As [`findings`].
-pub fn counts(book: &Book) -> Result<BTreeMap<String, u64>> {
+pub(crate) fn counts(book: &Book) -> Result<BTreeMap<String, u64>> {
     let mut counts = BTreeMap::new();
     for count in CAPABILITIES.iter().filter_map(|of| of.count) {
         counts.extend(

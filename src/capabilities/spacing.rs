@@ -376,9 +376,9 @@ fn findings(config: &SiteConfig, book: &Book) -> Result<Findings> {
     let sparse = || all.clone().filter(|(_, of)| of.missing_share() > limit);
     let worst = sparse().max_by(|(_, one), (_, other)| by_share(one, other));
     let remark = worst.map(|(profile, of)| {
-        let more = match sparse().count() - 1 {
-            0 => String::new(),
-            more => format!(" (and {more} more profiles)"),
+        let more = match sparse().count() {
+            0 | 1 => String::new(),
+            count => format!(" ({count} profiles exceed the limit)"),
         };
         let missing = of.by_period.map_or(0, |of| of.missing);
         format!(

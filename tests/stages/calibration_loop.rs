@@ -34,7 +34,7 @@ use areograph::{
 use common::{
     assert_keeps_schema,
     flows::{ran, run_into, run_observed, would_run},
-    json, long,
+    json, long, long_test,
     mission::{areograph, products, succeed},
     number,
 };
@@ -316,18 +316,15 @@ fn signalled(out: &Path, signal: &str, round: u32) -> Option<i32> {
     child.wait().unwrap().code()
 }
 
+/// The test above and the one below are its short relatives.
 #[test]
 fn a_calibration_that_was_killed_goes_on_at_the_round_where_it_was() {
-    let (round, out) = (if long() { 3 } else { 1 }, SCENE.path().join("killed"));
-    assert_eq!(signalled(&out, "-KILL", round), None);
-    let stage = format!("map_surface/round-{round}");
-    if long() {
-        assert_resumes(&out, &stage);
-    } else {
-        // The test above goes on.
-        let config = whole();
-        assert_eq!(would_run(Task::Calibration(&config), &out)[0].0, stage);
+    if !long_test("a killed calibration") {
+        return;
     }
+    let out = SCENE.path().join("killed");
+    assert_eq!(signalled(&out, "-KILL", 3), None);
+    assert_resumes(&out, "map_surface/round-3");
 }
 
 #[test]

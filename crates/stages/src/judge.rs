@@ -1,4 +1,4 @@
-//! The verdict on a site: the one place where it is made.
+//! The verdict on a site: the one place where it is made, with the findings of capabilities.
 //!
 //! Reasons, remarks and `checks` come from the same evidence and limits; for every limit the largest use is listed. The
 //! manifest stores them; pages, messages and run comparisons show them and judge nothing.

@@ -163,8 +163,7 @@ impl Book {
 
     /// The error for an output that an opened file does not have.
     pub(super) fn is_without(path: &Path, name: &str) -> Error {
-        let failure: Result<()> = Err(unreadable(&format!("there is no {name}"))).in_file(path);
-        failure.err().unwrap_or_else(|| unreadable(&name))
+        unreadable(&format!("there is no {name}")).in_file(path)
     }
 }
 
