@@ -14,6 +14,7 @@ use crate::{
     footprints::SourceFile,
     geom::pushbroom::CameraModel,
     instruments::Instrument,
+    minus::with_minus,
     stage::Round,
     stages::{
         adjust::accuracy_withheld,
@@ -27,7 +28,6 @@ use crate::{
         tag_times::ImageTimes,
     },
     store::book::Book,
-    wording::with_minus,
 };
 
 /// The verdict, and whether the images of every pair agree at their tie points after the adjustment.
@@ -59,7 +59,7 @@ pub(super) fn judged(
     let findings = findings(config, book)?;
     let searched = config.has_shots();
     let verdict = judge(&Evidence {
-        wording: config.wording(),
+        terms: config.terms(),
         footprints: searched.then_some(site.book.of::<Converted>()?.footprints.len()),
         rejected: &book.of::<SearchResult>()?.rejected,
         ground: site.book.of::<Converted>()?.footprints.ground_choice(),
@@ -248,8 +248,9 @@ fn empty_pedr_files(config: &SiteConfig, site: &Site) -> Result<Option<String>> 
         .collect();
     Ok((!empty.is_empty()).then(|| {
         format!(
-            "no shot in the windows comes from {}: check that each is a PEDR file of this site's orbits",
-            empty.join(", ")
+            "no shot in the windows comes from {}: check that each is a {} of this site's orbits",
+            empty.join(", "),
+            config.terms().shot_file()
         )
     }))
 }
@@ -266,7 +267,7 @@ fn judged_images(book: &Book, round: Round) -> Result<Vec<JudgedImage<'_>>> {
 }
 
 /// Notes for a reader of the products, one sentence each.
-pub(super) fn notes(config: &SiteConfig, site: &Site) -> Result<Vec<String>> {
+pub(super) fn notes(site: &Site) -> Result<Vec<String>> {
     let mut notes = Vec::new();
     let book = &site.book;
     if let Some(choice) = book.find::<KernelChoice>(Round::Initial)? {
@@ -286,10 +287,7 @@ pub(super) fn notes(config: &SiteConfig, site: &Site) -> Result<Vec<String>> {
     if let Some(ties) = book.find::<Ties>(Round::Initial)? {
         notes.extend(ties.notes());
     }
-    let said = notes
-        .iter()
-        .map(|note| with_minus(&config.wording().of(&**note)));
-    Ok(said.collect())
+    Ok(notes.iter().map(|note| with_minus(note)).collect())
 }
 
 /// Complaints about pixel files, one sentence each, and their total number.

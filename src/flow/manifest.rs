@@ -216,18 +216,21 @@ fn figures_of(site: &Site) -> Result<BTreeMap<String, f64>> {
 }
 
 fn biases(config: &SiteConfig, site: &Site) -> Result<Vec<BiasEntry>> {
+    let terms = config.terms();
     let scope = match config.altimeter_clock.scope {
-        BiasScope::SpkLookup => "spacecraft position in the range check",
-        BiasScope::Rotation => "rotation of Mars into IAU 2000",
-        BiasScope::Both => {
-            "spacecraft position in the range check, and rotation of Mars into IAU 2000"
-        }
-        BiasScope::None => "nothing",
+        BiasScope::SpkLookup => "spacecraft position in the range check".to_owned(),
+        BiasScope::Rotation => format!("rotation of {} into {}", terms.body(), terms.frame()),
+        BiasScope::Both => format!(
+            "spacecraft position in the range check, and rotation of {} into {}",
+            terms.body(),
+            terms.frame()
+        ),
+        BiasScope::None => "nothing".to_owned(),
     };
     let clock = BiasEntry {
         name: "mola_clock".to_owned(),
         correction_s: config.altimeter_clock.correction_s(),
-        scope: scope.to_owned(),
+        scope,
         source: config.altimeter_clock.source.clone(),
     };
     let images = site.book.parts(Round::Initial)?;

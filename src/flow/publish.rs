@@ -178,7 +178,7 @@ fn statements(
         images_agree,
         rejected: rejected(site)?,
         complaints,
-        notes: notes(config, site)?,
+        notes: notes(site)?,
         program: Program {
             cspice: Session::version_of_cspice()?,
             methods: methods.to_vec(),

@@ -223,7 +223,7 @@ impl Site {
         let searched = !self.config.pedr.files.is_empty();
         let profile_check = self.profile_check();
         let verdict = judge(&Evidence {
-            wording: self.config.wording(),
+            terms: self.config.terms(),
             footprints: searched.then_some(self.footprints.len()),
             ground: self.footprints.ground_choice(),
             ranges: &self.ranges,

@@ -218,11 +218,54 @@ fn products_are_of_the_moon(out: &Path) {
     );
     let item = json(&out.join("exchange/stac_item.json"));
     assert_eq!(item["properties"]["ssys:targets"][0], "Moon");
-    let readme = text("exchange/README.txt");
-    assert!(readme.contains("planetocentric") && !readme.contains("areocentric"));
+    assert!(text("exchange/README.txt").contains("planetocentric"));
     let isd = json(&out.join("images/one/adjusted_isd.json"));
     assert_eq!(isd["naif_keywords"]["BODY_CODE"], 301);
+    texts_use_the_terms_of_the_site(out);
     assert!((number(&isd["radii"]["semimajor"]) - 1737.4).abs() < 1e-9);
+}
+
+/// Words of other sites.
+const FOREIGN: [&str; 8] = [
+    "MOLA",
+    "PEDR",
+    "Mars",
+    "MARS",
+    "IAU 2000",
+    "areo",
+    "{body}",
+    "{altimeter}",
+];
+
+/// Pages, documents, tables with their metadata, and text: none contains a word of another body or altimeter.
+fn texts_use_the_terms_of_the_site(out: &Path) {
+    let mut read = 0;
+    let mut folders = vec![out.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+                continue;
+            }
+            let kind = path.extension().and_then(|of| of.to_str());
+            let bytes = std::fs::read(&path).unwrap();
+            let is_read = matches!(
+                kind,
+                Some("html" | "json" | "geojson" | "txt" | "csv" | "xml" | "parquet" | "svg")
+            );
+            // Names of the program and of its folders are no terms.
+            let text = String::from_utf8_lossy(&bytes).replace("areograph", "");
+            for word in FOREIGN.iter().filter(|_| is_read) {
+                let at = text.find(word);
+                let near = at.map(|at| text[..at].chars().rev().take(60).collect::<String>());
+                let near = near.map(|near| near.chars().rev().collect::<String>());
+                assert!(at.is_none(), "{}: …{near:?}{word}", path.display());
+            }
+            read += usize::from(is_read);
+        }
+    }
+    assert!(read > 20, "{read} files");
 }
 
 /// What is refused, by a change of the site file, and what the message holds.

@@ -27,14 +27,15 @@ pub mod instruments;
 pub mod kernel_names;
 pub mod kernel_source;
 pub mod line_times;
+pub mod minus;
 #[cfg(feature = "schema")]
 pub mod schema;
 pub mod season;
 pub mod stored;
 pub mod style;
+pub mod terms;
 pub mod ties;
 pub mod time;
 pub mod units;
 pub mod verdict;
 pub mod watch;
-pub mod wording;

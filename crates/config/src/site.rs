@@ -13,8 +13,8 @@ use areograph_base::{
     body::Body,
     instruments::{Altimeter, Instrument},
     kernel_source::KernelSource,
+    terms::Terms,
     time::PointingBias,
-    wording::Wording,
 };
 
 use super::{
@@ -105,10 +105,10 @@ declare_table! {
 }
 
 impl SiteConfig {
-    /// The words of its texts.
+    /// The terms of its texts.
     #[must_use]
-    pub fn wording(&self) -> Wording<'_> {
-        Wording {
+    pub fn terms(&self) -> Terms<'_> {
+        Terms {
             body: self.body,
             altimeter: &self.altimeter.name,
             has_tables: !self.shots.is_empty(),

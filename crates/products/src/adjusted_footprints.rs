@@ -18,7 +18,7 @@ pub(super) static TABLE: Declaration = Declaration {
     content: Content::Table(|| meanings(&shot_columns())),
     write: Write::Adjustment(|path, of, _, adjustment| {
         let table = Table::new(shot_columns(), shots(adjustment.adjusted))
-            .in_words(&of.site.config.wording());
+            .in_terms(&of.site.config.terms());
         parquet::write(path, &table, light_time::metadata(of.site)).map(Some)
     }),
     uses: &[],
@@ -68,13 +68,13 @@ fn shot_columns<'a>() -> Vec<Column<Shot<'a>>> {
         columns.push(column(
             initial,
             Unit::Metre,
-            "coordinate of the footprint, IAU 2000, metres",
+            "coordinate of the footprint, {frame}, metres",
             move |shot: &Shot| shot.0.initial.xyz_m[axis],
         ));
         columns.push(column(
             adjusted,
             Unit::Metre,
-            "coordinate of the adjusted footprint, IAU 2000, metres",
+            "coordinate of the adjusted footprint, {frame}, metres",
             move |shot: &Shot| shot.0.ground.xyz_m[axis],
         ));
         columns.push(column(

@@ -16,7 +16,7 @@ pub(super) static TABLE: Declaration = Declaration {
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),
     write: Write::Adjustment(|path, of, _, adjustment| {
-        let table = Table::new(columns(), rows(adjustment)).in_words(&of.site.config.wording());
+        let table = Table::new(columns(), rows(adjustment)).in_terms(&of.site.config.terms());
         parquet::write(path, &table, Vec::new()).map(Some)
     }),
     uses: &[],

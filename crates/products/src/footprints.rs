@@ -21,7 +21,7 @@ use areograph_geom::{
 
 pub(super) static CSV: Declaration = Declaration {
     path: "footprints.csv",
-    what: "laser shots inside the windows, IAU 2000",
+    what: "laser shots inside the windows, {frame}",
     readers: "scripts",
     rows: "shots",
     role: Role::Data,
@@ -175,7 +175,7 @@ impl<'a> Shot<'a> {
 
 /// All footprints of a site.
 pub(super) fn table<'a>(site: &'a SiteProducts<'a>) -> Table<'a> {
-    Table::new(columns(), Shot::all(site)).in_words(&site.config.wording())
+    Table::new(columns(), Shot::all(site)).in_terms(&site.config.terms())
 }
 
 /// The footprints of a site for GIS.
@@ -206,7 +206,7 @@ pub(super) fn schema() -> DocumentSchema {
     let table = Table::new(columns(), Vec::new()).for_gis();
     let schema = geojson::schema(
         "Footprints as GeoJSON",
-        "footprints.geojson of areograph: laser shots inside the windows, Mars sphere, areocentric; west > east in \
+        "footprints.geojson of areograph: laser shots inside the windows, on the sphere of the body, latitudes at its centre; west > east in \
          bbox when it crosses the antimeridian.",
         &table.columns().cloned().collect::<Vec<_>>(),
     );
@@ -230,7 +230,7 @@ pub(super) fn columns<'a>() -> Vec<Column<Shot<'a>>> {
     columns.push(column(
         "geometry",
         Unit::None,
-        "point, longitude (-180..180) and areocentric latitude in degrees, well-known binary",
+        "point, longitude (-180..180) and {latitude} latitude in degrees, well-known binary",
         |shot: &Shot| well_known_binary(shot.point_deg()),
     ));
     columns
@@ -248,7 +248,7 @@ fn identity<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "et_s",
             Unit::Second,
-            "time of the shot after the MOLA clock correction, TDB seconds past J2000",
+            "time of the shot after the {altimeter} clock correction, TDB seconds past J2000",
             |shot: &Shot| shot.get(|footprints| &footprints.et_s),
         )
         .in_gis()
@@ -266,7 +266,7 @@ fn identity<'a>() -> Vec<Column<Shot<'a>>> {
         )
         .in_gis()
         .in_dbase("orbit", 10, 0),
-        column("source_file", Unit::None, "PEDR file", |shot: &Shot| {
+        column("source_file", Unit::None, "{shot_file}", |shot: &Shot| {
             shot.file_name()
         })
         .in_gis()
@@ -274,7 +274,7 @@ fn identity<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "record",
             Unit::None,
-            "record of the PEDR file, counted from 1 with its label records",
+            "record of the {shot_file}, counted from 1 with its label records",
             |shot: &Shot| shot.get(|footprints| &footprints.record),
         )
         .in_gis()
@@ -312,7 +312,7 @@ fn quality<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "orbit_quality",
             Unit::None,
-            "0 orbit from JPL, 1 or more: MOLA team's gravity model number",
+            "0 orbit from JPL, 1 or more: {altimeter} team's gravity model number",
             |shot: &Shot| u32::from(shot.get(|footprints| &footprints.orbit_quality)),
         ),
         column(
@@ -331,21 +331,21 @@ fn ground<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "longitude_deg",
             Unit::Degree,
-            "east longitude, 0..360 degrees, IAU 2000",
+            "east longitude, 0..360 degrees, {frame}",
             |shot: &Shot| degrees(shot.get(|footprints| &footprints.longitude_rad)),
         )
         .in_dbase("lon_deg", 14, 9),
         column(
             "latitude_deg",
             Unit::Degree,
-            "areocentric latitude, degrees, IAU 2000",
+            "{latitude} latitude, degrees, {frame}",
             |shot: &Shot| degrees(shot.get(|footprints| &footprints.latitude_rad)),
         )
         .in_dbase("lat_deg", 14, 9),
         column(
             "latitude_areographic_deg",
             Unit::Degree,
-            "areographic latitude, degrees, IAU 2000 radii; as on older maps",
+            "{latitude_of_maps} latitude, degrees, {frame} radii; as on older maps",
             Shot::areographic_deg,
         ),
     ]
@@ -373,13 +373,13 @@ fn heights<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "areoid_radius_m",
             Unit::Metre,
-            "areoid radius, metres",
+            "radius of the {areoid}, metres",
             |shot: &Shot| shot.get(|footprints| &footprints.areoid_radius_m),
         ),
         column(
             "topography_m",
             Unit::Metre,
-            "radius after the crossover correction minus areoid radius, metres",
+            "radius after the crossover correction minus the radius of the {areoid}, metres",
             Shot::topography_m,
         )
         .in_gis()
@@ -387,19 +387,19 @@ fn heights<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "x_m",
             Unit::Metre,
-            "IAU 2000 body-fixed X of the ground: with the radius that all stages use, metres",
+            "{frame} body-fixed X of the ground: with the radius that all stages use, metres",
             |shot: &Shot| shot.xyz_m(0),
         ),
         column(
             "y_m",
             Unit::Metre,
-            "IAU 2000 body-fixed Y of the ground: with the radius that all stages use, metres",
+            "{frame} body-fixed Y of the ground: with the radius that all stages use, metres",
             |shot: &Shot| shot.xyz_m(1),
         ),
         column(
             "z_m",
             Unit::Metre,
-            "IAU 2000 body-fixed Z of the ground: with the radius that all stages use, metres",
+            "{frame} body-fixed Z of the ground: with the radius that all stages use, metres",
             |shot: &Shot| shot.xyz_m(2),
         ),
     ]
@@ -418,19 +418,19 @@ fn spacecraft<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "spacecraft_longitude_deg",
             Unit::Degree,
-            "east longitude of the spacecraft, the file's orbit, IAU 2000",
+            "east longitude of the spacecraft, the file's orbit, {frame}",
             |shot: &Shot| degrees(shot.get(|footprints| &footprints.spacecraft_longitude_rad)),
         ),
         column(
             "spacecraft_latitude_deg",
             Unit::Degree,
-            "areocentric latitude of the spacecraft, the file's orbit",
+            "{latitude} latitude of the spacecraft, the file's orbit",
             |shot: &Shot| degrees(shot.get(|footprints| &footprints.spacecraft_latitude_rad)),
         ),
         column(
             "spacecraft_radius_m",
             Unit::Metre,
-            "distance of the spacecraft from the centre of Mars, the file's orbit",
+            "distance of the spacecraft from the centre of {body}, the file's orbit",
             |shot: &Shot| shot.get(|footprints| &footprints.spacecraft_radius_m),
         ),
         column(

@@ -25,6 +25,7 @@ use areograph_base::{
     error::{Locate, Result},
     footprints::{AsRead, Footprints, SourceFile},
     frames::BodyFixed,
+    terms::Terms,
 };
 use areograph_pds::archive::WindowLists;
 use areograph_stages::convert_datum::convert_at_tags;
@@ -74,7 +75,9 @@ impl FoundShots<'_> {
 
 /// Columns of shots in a format: without UTC, which is unknown in a search without kernels.
 fn table(rows: Vec<Shot<'_>>, format: RowsFormat) -> Table<'_> {
-    let table = Table::new(columns(), rows).without("utc");
+    let table = Table::new(columns(), rows)
+        .in_terms(&Terms::MARS)
+        .without("utc");
     match format {
         RowsFormat::Parquet => table,
         RowsFormat::Csv => table.for_text(),

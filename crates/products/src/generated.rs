@@ -10,7 +10,7 @@ use super::{
     product::{Content, Declaration},
     table::{Kind, Meaning},
 };
-use areograph_base::schema::DocumentSchema;
+use areograph_base::{schema::DocumentSchema, terms::Terms};
 
 /// JSON Schemas of the documents, each once; `of_sites` are all products of sites.
 #[must_use]
@@ -54,7 +54,7 @@ pub fn documentation(of_sites: &[&'static Declaration]) -> String {
             text,
             "| `{}` | {} | {} | {} | {} | {} |",
             product.path,
-            product.what,
+            Terms::MARS.fill(product.what),
             product.readers,
             product.when(),
             product.rows,
@@ -136,7 +136,7 @@ fn line_of<W>(product: &Declaration<W>) -> String {
     format!(
         "| `{}` | {} | {} | {} | {} |\n",
         product.path,
-        product.what,
+        Terms::MARS.fill(product.what),
         product.readers,
         product.rows,
         schema_link(product),
@@ -179,7 +179,7 @@ fn row(column: &Meaning) -> String {
         column.name,
         if column.optional { " ?" } else { "" },
         column.unit.symbol().unwrap_or_default(),
-        column.description.replace('|', "\\|"),
+        Terms::MARS.fill(&column.description).replace('|', "\\|"),
     )
 }
 
@@ -188,6 +188,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
+    use areograph_base::body::Body;
 
     #[test]
     fn names_of_our_columns_end_in_their_unit() {
@@ -206,6 +207,32 @@ mod tests {
                 _ => None,
             };
             assert!(foreign || ending == column.unit.symbol(), "{}", column.name);
+        }
+    }
+
+    #[test]
+    fn declared_texts_name_only_terms_of_the_site() {
+        let lunar = Terms {
+            body: Body::Moon,
+            altimeter: "LOLA",
+            has_tables: true,
+            has_areoid: false,
+        };
+        let texts = crate::declarations(&[]).into_iter().flat_map(|product| {
+            let columns = match product.content {
+                Content::Table(columns) => columns(),
+                _ => Vec::new(),
+            };
+            let columns = columns.into_iter().map(|column| column.description);
+            let uses = product.uses.iter().map(|of| of.lines.into());
+            columns.chain(uses).chain([product.what.into()])
+        });
+        for text in texts {
+            let text = lunar.fill(&text).replace("areograph", "");
+            assert!(!Terms::is_unfilled(&text), "{text}");
+            for word in ["MOLA", "PEDR", "Mars", "MARS", "IAU 2000", "areo"] {
+                assert!(!text.contains(word), "{text}");
+            }
         }
     }
 

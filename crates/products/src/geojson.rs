@@ -19,8 +19,8 @@ use super::{
     gis::Features,
     table::{Kind, Meaning, Values},
 };
-use areograph_base::body::Body;
 use areograph_base::error::{IoError, Locate, Result};
+use areograph_base::{body::Body, terms::Terms};
 
 /// Name of the CRS of `body` in the `crs` member of GeoJSON 2008, which GIS still reads: RFC 7946 knows the Earth only.
 pub(super) fn crs_urn(body: Body) -> String {
@@ -165,7 +165,7 @@ fn attribute(column: &Meaning) -> Value {
         Kind::Time => json!({ "type": "string", "format": "date-time" }),
         Kind::Text | Kind::Bytes => json!({ "type": "string" }),
     };
-    schema["description"] = json!(column.description);
+    schema["description"] = json!(Terms::MARS.fill(&column.description));
     if let Some([least, greatest]) = column.limits {
         schema["minimum"] = json!(least);
         schema["maximum"] = json!(greatest);

@@ -20,14 +20,14 @@ use areograph_stages::{
 
 pub(super) static TABLE: Declaration = Declaration {
     path: "height_check.parquet",
-    what: "heights of tie points against the MOLA surface, and of footprints that both images of a pair show, \
+    what: "heights of tie points against the {altimeter} surface, and of footprints that both images of a pair show, \
            before and after the adjustment",
     readers: "scripts",
     rows: "tie points and footprints",
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),
     write: Write::Ties(|path, of, geometric| {
-        let table = Table::new(columns(), rows(geometric)).in_words(&of.site.config.wording());
+        let table = Table::new(columns(), rows(geometric)).in_terms(&of.site.config.terms());
         parquet::write(path, &table, light_time::metadata(of.site))
     }),
     uses: &[],
@@ -189,7 +189,7 @@ fn columns() -> Vec<Column<Compared>> {
         column(
             "latitude_deg",
             Unit::Degree,
-            "areocentric latitude, degrees: of the adjusted point, or else of the intersected point",
+            "{latitude} latitude, degrees: of the adjusted point, or else of the intersected point",
             |row: &Compared| Some(degrees(row.place()?.latitude.0)),
         ),
         column(
@@ -201,19 +201,19 @@ fn columns() -> Vec<Column<Compared>> {
         column(
             "surface_sigma_m",
             Unit::Metre,
-            "standard deviation of the MOLA surface at this point, metres; missing for footprints, which are its shots",
+            "standard deviation of the {altimeter} surface at this point, metres; missing for footprints, which are its shots",
             |row: &Compared| row.latest()?.surface_sigma_m,
         ),
         column(
             "height_m",
             Unit::Metre,
-            "height of the intersected point above the ellipsoid of IAU 2000 along the radius, metres",
+            "height of the intersected point above the ellipsoid of {frame} along the radius, metres",
             |row: &Compared| Some(row.before?.height_m),
         ),
         column(
             "above_surface_m",
             Unit::Metre,
-            "height of the intersected point above the MOLA surface, or above the footprint, metres",
+            "height of the intersected point above the {altimeter} surface, or above the footprint, metres",
             |row: &Compared| Some(row.before?.above_m),
         ),
         column(
@@ -225,7 +225,7 @@ fn columns() -> Vec<Column<Compared>> {
         column(
             "adjusted_above_surface_m",
             Unit::Metre,
-            "height of the adjusted point above the MOLA surface, or above the footprint, metres",
+            "height of the adjusted point above the {altimeter} surface, or above the footprint, metres",
             |row: &Compared| Some(row.after?.above_m),
         ),
     ]

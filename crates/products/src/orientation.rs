@@ -17,8 +17,8 @@ use areograph_base::{
     error::Result,
     line_times::{LinePiece, LineTimes},
     schema::DocumentSchema,
+    terms::Terms,
     units::RADIANS_PER_ARCSECOND,
-    wording::Wording,
 };
 use areograph_geom::{attitude::continuous_quaternions, polynomial::Fit};
 use areograph_stages::{
@@ -30,14 +30,14 @@ use areograph_stages::{
 };
 
 const CONVENTIONS: [&str; 6] = [
-    "frame: Mars body-fixed, IAU 2000, metres; straight rays to the ground start at the positions, see light_time",
+    "frame: {body_name} body-fixed, {frame}, metres; straight rays to the ground start at the positions, see light_time",
     "abscissa x: lines from the middle of the header image, positive along flight; x = (t - t_middle) / line period",
     "polynomial: value = c0 + c1 x + c2 x^2, coefficients from the constant upwards; residual = sample - polynomial; \
      RMSE divides by the number of samples (Shan et al. 2005, Table 4)",
-    "angles: camera to Mars = [kappa]3 [phi]2 [omega]1, rotations of the frame; the matrix M from Mars to camera has \
+    "angles: camera to {body} = [kappa]3 [phi]2 [omega]1, rotations of the frame; the matrix M from {body} to camera has \
      m13 = sin phi, m23 = -sin omega cos phi, m12 = -cos phi sin kappa; radians, continuous over the image",
-    "quaternions: (w, x, y, z) in SPICE's convention, camera to Mars, continuous over the image",
-    "rotation vector: M(x) = exp([r(x)]x) M_reference, M from Mars to camera components; positions as in the second \
+    "quaternions: (w, x, y, z) in SPICE's convention, camera to {body}, continuous over the image",
+    "rotation vector: M(x) = exp([r(x)]x) M_reference, M from {body} to camera components; positions as in the second \
      order; to be used near gimbal lock, where |cos phi| < 0.1 leaves omega and kappa poorly determined",
 ];
 
@@ -198,12 +198,12 @@ fn write_table(path: &Path, of: &Context, image: &ImageProducts) -> Result<u64> 
     let rotations = samples.iter().map(|sample| sample.camera_to_mars.matrix());
     let quaternions = continuous_quaternions(rotations);
     let rows = samples.iter().zip(quaternions);
-    let table = Table::new(columns(), rows.collect()).in_words(&of.site.config.wording());
+    let table = Table::new(columns(), rows.collect()).in_terms(&of.site.config.terms());
     parquet::write(path, &table, light_time::metadata(of.site))
 }
 
 fn write_document(path: &Path, of: &Context, image: &ImageProducts) -> Result<u64> {
-    write_json(path, &document(image, &of.site.config.wording()))?;
+    write_json(path, &document(image, &of.site.config.terms()))?;
     Ok(image.orientation.samples.len() as u64)
 }
 
@@ -242,19 +242,19 @@ fn columns<'a>() -> Vec<Column<Sample<'a>>> {
         column(
             "x_m",
             Unit::Metre,
-            "perspective centre, IAU 2000 X, metres",
+            "perspective centre, {frame} X, metres",
             |s: &Sample| s.0.position.xyz_m.x,
         ),
         column(
             "y_m",
             Unit::Metre,
-            "perspective centre, IAU 2000 Y, metres",
+            "perspective centre, {frame} Y, metres",
             |s: &Sample| s.0.position.xyz_m.y,
         ),
         column(
             "z_m",
             Unit::Metre,
-            "perspective centre, IAU 2000 Z, metres",
+            "perspective centre, {frame} Z, metres",
             |s: &Sample| s.0.position.xyz_m.z,
         ),
         column("omega_rad", Unit::Radian, "omega, radians", |s: &Sample| {
@@ -269,25 +269,25 @@ fn columns<'a>() -> Vec<Column<Sample<'a>>> {
         column(
             "quaternion_w",
             Unit::None,
-            "camera to Mars, SPICE convention, w",
+            "camera to {body}, SPICE convention, w",
             |s: &Sample| s.1[0],
         ),
         column(
             "quaternion_x",
             Unit::None,
-            "camera to Mars, SPICE convention, x",
+            "camera to {body}, SPICE convention, x",
             |s: &Sample| s.1[1],
         ),
         column(
             "quaternion_y",
             Unit::None,
-            "camera to Mars, SPICE convention, y",
+            "camera to {body}, SPICE convention, y",
             |s: &Sample| s.1[2],
         ),
         column(
             "quaternion_z",
             Unit::None,
-            "camera to Mars, SPICE convention, z",
+            "camera to {body}, SPICE convention, z",
             |s: &Sample| s.1[3],
         ),
         boresight(
@@ -299,7 +299,7 @@ fn columns<'a>() -> Vec<Column<Sample<'a>>> {
         boresight(
             "boresight_latitude_deg",
             Unit::Degree,
-            "areocentric latitude where the boresight meets the ellipsoid",
+            "{latitude} latitude where the boresight meets the ellipsoid",
             |ground| degrees(ground.latitude_rad),
         ),
         boresight(
@@ -317,7 +317,7 @@ fn columns<'a>() -> Vec<Column<Sample<'a>>> {
     ]
 }
 
-fn document<'a>(image: &ImageProducts<'a>, wording: &Wording) -> Document<'a> {
+fn document<'a>(image: &ImageProducts<'a>, terms: &Terms) -> Document<'a> {
     let model: &SensorModel = image.model;
     Document {
         format: "areograph orientation 1",
@@ -325,7 +325,7 @@ fn document<'a>(image: &ImageProducts<'a>, wording: &Wording) -> Document<'a> {
         valid: image.invalid_because().is_empty(),
         invalid_because: image.invalid_because(),
         times: times(image.times),
-        conventions: CONVENTIONS.map(|convention| wording.of(convention)),
+        conventions: CONVENTIONS.map(|convention| terms.fill(convention)),
         light_time: &image.orientation.light_time,
         samples: image.orientation.samples.len(),
         outline_deg: outline_deg(image.orientation),

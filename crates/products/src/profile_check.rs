@@ -105,7 +105,7 @@ struct Withheld<'a> {
 impl<'a> Document<'a> {
     fn of(site: &SiteProducts<'a>) -> Self {
         let check = site.profile_check;
-        let wording = site.config.wording();
+        let terms = site.config.terms();
         let crossovers = check.crossovers.iter().map(|crossover| {
             let place = Spherical::from_xyz_m(&crossover.ground.xyz_m);
             Crossover {
@@ -125,7 +125,7 @@ impl<'a> Document<'a> {
                 .iter()
                 .map(|(of, is)| Definition {
                     of,
-                    is: wording.of(*is).into_owned(),
+                    is: terms.fill(*is).into_owned(),
                 })
                 .collect(),
             ground_radius: site.footprints.ground_choice(),

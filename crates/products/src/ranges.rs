@@ -30,7 +30,7 @@ use areograph_stages::{
 const DEFINITIONS: [(&str, &str); 7] = [
     (
         "range_minus_distance",
-        "measured range minus |spacecraft in the kernels - footprint with the raw radius|, both in IAU 2000, as in \
+        "measured range minus |spacecraft in the kernels - footprint with the raw radius|, both in {frame}, as in \
          Table 3 of the paper; the sign is a convention of areograph",
     ),
     (
@@ -39,13 +39,13 @@ const DEFINITIONS: [(&str, &str); 7] = [
     ),
     (
         "decoding",
-        "measured range minus |spacecraft in the PEDR file - footprint with the raw radius|: tests \
+        "measured range minus |spacecraft in the {shot_file} - footprint with the raw radius|: tests \
         the reading of the file without kernels",
     ),
     (
         "spacecraft_radial, _along, _cross",
-        "spacecraft in the PEDR file minus spacecraft in the kernels: away \
-        from Mars, along the flight, along the orbit's angular momentum",
+        "spacecraft in the {shot_file} minus spacecraft in the kernels: away \
+        from {body}, along the flight, along the orbit's angular momentum",
     ),
     (
         "trend",
@@ -187,7 +187,7 @@ pub(super) static TABLE: Declaration = Declaration {
     write: Write::Site(|path, of| {
         let site = of.site;
         let shots = (0..site.ranges.shots.len()).map(|at| RangedShot { site, at });
-        let table = Table::new(columns(), shots.collect()).in_words(&of.site.config.wording());
+        let table = Table::new(columns(), shots.collect()).in_terms(&of.site.config.terms());
         parquet::write(path, &table, Vec::new()).map(Some)
     }),
     uses: &[],
@@ -266,7 +266,7 @@ fn columns<'a>() -> Vec<Column<RangedShot<'a>>> {
         column(
             "et_s",
             Unit::Second,
-            "time of the shot after the MOLA clock correction, TDB seconds past J2000",
+            "time of the shot after the {altimeter} clock correction, TDB seconds past J2000",
             |shot: &RangedShot| shot.footprint().et_s,
         ),
         column("orbit", Unit::None, "orbit number", |shot: &RangedShot| {
@@ -320,7 +320,7 @@ fn document<'a>(site: &SiteProducts<'a>) -> Document<'a> {
             .iter()
             .map(|(residual, is)| Definition {
                 residual,
-                is: site.config.wording().of(*is),
+                is: site.config.terms().fill(*is),
             })
             .collect(),
         mola_clock: Clock {

@@ -204,7 +204,7 @@ fn places(
 }
 
 fn table<'a>(site: &SiteProducts<'a>, rows: Vec<Row<'a>>) -> Table<'a> {
-    Table::new(columns(), rows).in_words(&site.config.wording())
+    Table::new(columns(), rows).in_terms(&site.config.terms())
 }
 
 /// The columns of the CSV file.
@@ -243,7 +243,7 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
     columns.push(column(
         "geometry",
         Unit::None,
-        "point, longitude (-180..180) and areocentric latitude in degrees, well-known binary",
+        "point, longitude (-180..180) and {latitude} latitude in degrees, well-known binary",
         |row: &Row| well_known_binary(row.point_deg()),
     ));
     columns
@@ -273,7 +273,7 @@ fn shot<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "record",
             Unit::None,
-            "record of the PEDR file, counted from 1 with its label records; in a table of shots, the row",
+            "record of the {shot_file}, counted from 1 with its label records; in a table of shots, the row",
             |row: &Row| row.site.footprints.record[row.footprint],
         ),
         column(
@@ -295,7 +295,7 @@ fn shot<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "et_s",
             Unit::Second,
-            "time of the shot after the MOLA clock correction, TDB seconds past J2000",
+            "time of the shot after the {altimeter} clock correction, TDB seconds past J2000",
             |row: &Row| row.site.footprints.et_s[row.footprint],
         ),
     ]
@@ -307,13 +307,13 @@ fn ground<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "longitude_deg",
             Unit::Degree,
-            "east longitude, 0..360 degrees, IAU 2000",
+            "east longitude, 0..360 degrees, {frame}",
             |row: &Row| degrees(row.site.footprints.longitude_rad[row.footprint]),
         ),
         column(
             "latitude_deg",
             Unit::Degree,
-            "areocentric latitude, degrees, IAU 2000",
+            "{latitude} latitude, degrees, {frame}",
             |row: &Row| degrees(row.site.footprints.latitude_rad[row.footprint]),
         ),
         column(
@@ -331,7 +331,7 @@ fn ground<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "topography_m",
             Unit::Metre,
-            "crossover-corrected radius minus areoid radius, metres",
+            "crossover-corrected radius minus the radius of the {areoid}, metres",
             |row: &Row| row.site.footprints.row(row.footprint).topography_m(),
         ),
     ]

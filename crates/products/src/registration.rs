@@ -198,8 +198,7 @@ fn table<'a>(site: &'a SiteProducts<'a>, images: &'a [ImageProducts<'a>]) -> Tab
         let points = 0..image.registration.points.len();
         points.map(move |at| Registered { site, image, at })
     };
-    Table::new(columns(), images.iter().flat_map(of_image).collect())
-        .in_words(&site.config.wording())
+    Table::new(columns(), images.iter().flat_map(of_image).collect()).in_terms(&site.config.terms())
 }
 
 fn columns<'a>() -> Vec<Column<Registered<'a>>> {

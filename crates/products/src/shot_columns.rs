@@ -15,6 +15,7 @@ use super::{
 use areograph_base::{
     error::Result,
     footprints::{AsRead, Footprints, SourceFile},
+    terms::Terms,
 };
 use areograph_sql::Columns;
 use areograph_stages::convert_datum::convert_at_tags;
@@ -42,6 +43,7 @@ impl ShotNames for Nameless {
 
 fn table(shots: Vec<Shot<'_>>) -> Table<'_> {
     Table::new(columns(), shots)
+        .in_terms(&Terms::MARS)
         .without("utc")
         .without("windows")
 }

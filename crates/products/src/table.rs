@@ -10,7 +10,7 @@ use std::{borrow::Cow, ops::Range};
 use rayon::prelude::*;
 
 use super::{error::ProductError, utc::Utc};
-use areograph_base::wording::Wording;
+use areograph_base::terms::Terms;
 
 /// Rows whose values are in memory at once.
 const ROWS_AT_ONCE: usize = 65_536;
@@ -89,6 +89,7 @@ pub(super) struct DbaseField {
 pub struct Meaning {
     pub(super) name: &'static str,
     pub(super) unit: Unit,
+    /// With terms of the site in braces, until the table is described in them.
     pub(super) description: Cow<'static, str>,
     pub(super) kind: Kind,
     /// Whether rows may lack a value.
@@ -103,8 +104,8 @@ pub struct Meaning {
 
 impl Meaning {
     /// Describes the column in the terms of a site.
-    pub(super) fn say(&mut self, wording: &Wording<'_>) {
-        self.description = wording.of(std::mem::take(&mut self.description));
+    fn describe_in(&mut self, terms: &Terms<'_>) {
+        self.description = Cow::Owned(terms.fill(&self.description).into_owned());
     }
 }
 
@@ -256,9 +257,9 @@ impl<'a> Table<'a> {
     }
 
     /// With descriptions in the terms of a site.
-    pub(super) fn in_words(mut self, wording: &Wording<'_>) -> Self {
+    pub(super) fn in_terms(mut self, terms: &Terms<'_>) -> Self {
         for (_, column) in &mut self.columns {
-            column.say(wording);
+            column.describe_in(terms);
         }
         self
     }

@@ -27,7 +27,7 @@ pub(super) static TABLE: Declaration = Declaration {
     content: Content::Table(|| meanings(&tie_columns())),
     write: Write::Ties(|path, of, geometric| {
         let table = Table::new(tie_columns(), measurements(of.site, geometric))
-            .in_words(&of.site.config.wording());
+            .in_terms(&of.site.config.terms());
         parquet::write(path, &table, light_time::metadata(of.site))
     }),
     uses: &[],
@@ -185,19 +185,19 @@ fn intersected_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "x_m",
             Unit::Metre,
-            "X of the point intersected with the orientation of the kernels, IAU 2000, metres",
+            "X of the point intersected with the orientation of the kernels, {frame}, metres",
             |row: &Measurement| Some(row.before?.0.ground.xyz_m[0]),
         ),
         column(
             "y_m",
             Unit::Metre,
-            "Y of the point intersected with the orientation of the kernels, IAU 2000, metres",
+            "Y of the point intersected with the orientation of the kernels, {frame}, metres",
             |row: &Measurement| Some(row.before?.0.ground.xyz_m[1]),
         ),
         column(
             "z_m",
             Unit::Metre,
-            "Z of the point intersected with the orientation of the kernels, IAU 2000, metres",
+            "Z of the point intersected with the orientation of the kernels, {frame}, metres",
             |row: &Measurement| Some(row.before?.0.ground.xyz_m[2]),
         ),
         column(
@@ -238,19 +238,19 @@ fn adjusted_point_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "adjusted_x_m",
             Unit::Metre,
-            "X of the adjusted point, IAU 2000, metres",
+            "X of the adjusted point, {frame}, metres",
             |row: &Measurement| Some(row.adjusted?.0.ground.xyz_m[0]),
         ),
         column(
             "adjusted_y_m",
             Unit::Metre,
-            "Y of the adjusted point, IAU 2000, metres",
+            "Y of the adjusted point, {frame}, metres",
             |row: &Measurement| Some(row.adjusted?.0.ground.xyz_m[1]),
         ),
         column(
             "adjusted_z_m",
             Unit::Metre,
-            "Z of the adjusted point, IAU 2000, metres",
+            "Z of the adjusted point, {frame}, metres",
             |row: &Measurement| Some(row.adjusted?.0.ground.xyz_m[2]),
         ),
         column(
@@ -262,13 +262,13 @@ fn adjusted_point_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "adjusted_latitude_deg",
             Unit::Degree,
-            "areocentric latitude of the adjusted point, degrees",
+            "{latitude} latitude of the adjusted point, degrees",
             |row: &Measurement| Some(degrees(spherical(row.adjusted?.0).latitude.0)),
         ),
         column(
             "adjusted_radius_m",
             Unit::Metre,
-            "distance of the adjusted point from the centre of Mars, metres",
+            "distance of the adjusted point from the centre of {body}, metres",
             |row: &Measurement| Some(spherical(row.adjusted?.0).radius_m),
         ),
     ]

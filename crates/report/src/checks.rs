@@ -17,8 +17,8 @@ pub(super) fn table(site: &SiteProducts, sections: &[&Section]) -> String {
         let more = all.find(|section| section.checks.contains(&check.kind));
         let more = more.filter(|section| (section.appears)(site));
         let what = more.map_or_else(
-            || escape(check.words()),
-            |section| link(&format!("#{}", section.anchor), check.words()),
+            || escape(&check.words()),
+            |section| link(&format!("#{}", section.anchor), &check.words()),
         );
         row(&mut table, check, what, &place(index));
     }
@@ -29,7 +29,7 @@ pub(super) fn table(site: &SiteProducts, sections: &[&Section]) -> String {
 pub(super) fn listed(checks: &[Check]) -> String {
     let mut table = empty();
     for check in checks {
-        row(&mut table, check, escape(check.words()), "");
+        row(&mut table, check, escape(&check.words()), "");
     }
     table.finish()
 }

@@ -1,6 +1,6 @@
 //! Format of numbers on pages: one minus sign, grouped thousands, no sign on zero.
 
-use areograph_base::wording::MINUS;
+use areograph_base::minus::MINUS;
 
 /// Separator of thousands: narrow and non-breaking.
 const APART: char = '\u{202f}';

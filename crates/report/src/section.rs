@@ -29,9 +29,12 @@ impl Section {
         if !(self.appears)(site) {
             return Ok(None);
         }
-        let wording = site.config.wording();
-        let body = wording.of((self.write)(site)?).into_owned();
-        let title = wording.of(self.title);
-        Ok(Some(html::Section::named(self.anchor, title, body)))
+        let terms = site.config.terms();
+        let title = terms.fill(self.title);
+        Ok(Some(html::Section::named(
+            self.anchor,
+            title,
+            (self.write)(site)?,
+        )))
     }
 }

@@ -50,7 +50,7 @@ pub(super) fn lead(site: &SiteProducts, sections: &[&Section]) -> Result<String>
         map::first(site)?,
     );
     // The user's text is not changed.
-    Ok(about(site) + &site.config.wording().of(found))
+    Ok(about(site) + &found)
 }
 
 fn headline(site: &SiteProducts) -> String {

@@ -18,7 +18,7 @@ use areograph_base::{
     error::Result,
     footprints::Footprints,
     frames::{BodyFixed, Position},
-    wording::signed,
+    minus::signed,
 };
 use areograph_config::MolaSurfaceConfig;
 use areograph_geom::{

@@ -29,7 +29,8 @@ use super::{
 };
 use areograph_base::{
     altimetry::GroundRadius,
-    wording::{Wording, signed, with_minus},
+    minus::{signed, with_minus},
+    terms::Terms,
 };
 use areograph_config::{LimitsConfig, OrientationConfig, RangeCheckConfig};
 use areograph_pds::archive::ShotRejection;
@@ -37,8 +38,8 @@ use areograph_pds::archive::ShotRejection;
 /// The evidence on which a site is judged.
 #[derive(Debug, Clone, Copy)]
 pub struct Evidence<'a> {
-    /// The words of sentences and checks.
-    pub wording: Wording<'a>,
+    /// The terms of sentences and checks.
+    pub terms: Terms<'a>,
     /// Footprints in the windows; `None` for a site without PEDR files.
     pub footprints: Option<usize>,
     /// Shots in the windows that were left out, by reason.
@@ -132,10 +133,10 @@ pub struct AdjustmentEvidence<'a> {
 pub fn judge(evidence: &Evidence<'_>) -> Verdict {
     let mut checks = checks::checks(evidence);
     for check in &mut checks {
-        check.say(&evidence.wording);
+        check.name_in(&evidence.terms);
     }
     let verdict = Verdict::of(evidence.invalid_because(), evidence.remarks(), checks);
-    let said = |sentence: String| with_minus(&evidence.wording.of(sentence));
+    let said = |sentence: String| with_minus(&sentence);
     Verdict {
         reasons: verdict.reasons.into_iter().map(said).collect(),
         remarks: verdict.remarks.into_iter().map(said).collect(),
@@ -193,7 +194,7 @@ impl Evidence<'_> {
         reasons.extend(
             self.adjustment
                 .iter()
-                .flat_map(|of| of.invalid_because(self.limits)),
+                .flat_map(|of| of.invalid_because(self)),
         );
         reasons.extend(self.findings.iter().flat_map(|of| of.reasons.clone()));
         let failed = self.adjustment_failure;
@@ -226,11 +227,7 @@ impl Evidence<'_> {
                 .and_then(|scan| doubt(scan, configured_s));
             remarks.extend(doubt.map(|doubt| format!("profile {}: {doubt}", ranges.profile)));
         }
-        remarks.extend(
-            self.adjustment
-                .iter()
-                .flat_map(|of| of.remarks(self.limits)),
-        );
+        remarks.extend(self.adjustment.iter().flat_map(|of| of.remarks(self)));
         remarks.extend(self.findings.iter().flat_map(|of| of.remarks.clone()));
         remarks
     }

@@ -52,7 +52,7 @@ const DEFINITIONS: [(&str, &str); 7] = [
     ),
     (
         "mola_takes_part",
-        "whether MOLA controlled heights of the adjustment: then its mean difference is not an independent test, but the \
+        "whether {altimeter} controlled heights of the adjustment: then its mean difference is not an independent test, but the \
          spread about it is",
     ),
 ];
@@ -146,10 +146,10 @@ impl<'a> Document<'a> {
     pub(super) fn of(of: &Context<'a>, surface: &'a Surface) -> Self {
         let account = &surface.account;
         let [rows, columns] = surface.model.heights.size;
-        let wording = of.site.config.wording();
+        let terms = of.site.config.terms();
         let definitions = DEFINITIONS.iter().map(|(of, is)| Definition {
             of,
-            is: wording.of(*is),
+            is: terms.fill(*is),
         });
         let unfilled = account.unfilled.iter();
         Self {

@@ -3,6 +3,7 @@
 use crate::{
     config::{LimitsConfig, SiteConfig},
     error::Result,
+    minus::signed,
     stage::Round,
     stages::{
         judge::Findings,
@@ -13,7 +14,6 @@ use crate::{
         Check, CheckKind,
         CheckOutcome::{Fail, Warning},
     },
-    wording::signed,
 };
 
 /// A mean height within this many of its standard deviations is no contradiction.
@@ -39,15 +39,16 @@ pub(super) fn findings(config: &SiteConfig, book: &Book) -> Result<Findings> {
     let surface = book.find::<Surface>(Round::Initial)?;
     Ok(surface.map_or_else(Findings::default, |surface| {
         let (limits, surface) = (&config.limits, &surface.account);
+        let altimeter = config.terms().altimeter;
         Findings {
-            reasons: invalid_because(limits, surface),
-            remarks: remark(surface).into_iter().collect(),
-            checks: checks(limits, surface),
+            reasons: invalid_because(limits, surface, altimeter),
+            remarks: remark(surface, altimeter).into_iter().collect(),
+            checks: checks(limits, surface, altimeter),
         }
     }))
 }
 
-fn checks(limits: &LimitsConfig, surface: &SurfaceAccount) -> Vec<Check> {
+fn checks(limits: &LimitsConfig, surface: &SurfaceAccount, altimeter: &str) -> Vec<Check> {
     let share = if surface.is_refused {
         0.0
     } else {
@@ -60,8 +61,9 @@ fn checks(limits: &LimitsConfig, surface: &SurfaceAccount) -> Vec<Check> {
         return vec![filled];
     }
     let of_shots = if has_shots(surface) {
+        let takes_part = format!("{altimeter} takes part");
         let subject = if surface.shots_take_part {
-            "MOLA takes part"
+            &*takes_part
         } else {
             ""
         };
@@ -95,7 +97,11 @@ fn checks(limits: &LimitsConfig, surface: &SurfaceAccount) -> Vec<Check> {
 }
 
 /// Reasons why a terrain model makes its site invalid, one sentence each.
-fn invalid_because(limits: &LimitsConfig, surface: &SurfaceAccount) -> Vec<String> {
+fn invalid_because(
+    limits: &LimitsConfig,
+    surface: &SurfaceAccount,
+    altimeter: &str,
+) -> Vec<String> {
     let (filled, searched) = (surface.filled, surface.searched());
     if surface.is_refused {
         return vec![format!(
@@ -119,7 +125,7 @@ fn invalid_because(limits: &LimitsConfig, surface: &SurfaceAccount) -> Vec<Strin
     let height_max_m = height_max_m(limits, surface);
     if !(shots.above_m.median.abs() <= height_max_m) {
         reasons.push(format!(
-            "terrain model: MOLA lies {} m above it (median of {} shots), expected at most {height_max_m:.1} m",
+            "terrain model: {altimeter} lies {} m above it (median of {} shots), expected at most {height_max_m:.1} m",
             signed(shots.above_m.median, 1),
             shots.above_m.n
         ));
@@ -127,7 +133,7 @@ fn invalid_because(limits: &LimitsConfig, surface: &SurfaceAccount) -> Vec<Strin
     let spread_max = limits.surface_spread_max_sigma;
     if !(shots.spread_sigmas <= spread_max) {
         reasons.push(format!(
-            "terrain model: MOLA scatters about it by {:.1} standard deviations, expected at most {spread_max:.1}",
+            "terrain model: {altimeter} scatters about it by {:.1} standard deviations, expected at most {spread_max:.1}",
             shots.spread_sigmas
         ));
     }
@@ -135,7 +141,7 @@ fn invalid_because(limits: &LimitsConfig, surface: &SurfaceAccount) -> Vec<Strin
 }
 
 /// Remark on a terrain model.
-fn remark(surface: &SurfaceAccount) -> Option<String> {
+fn remark(surface: &SurfaceAccount, altimeter: &str) -> Option<String> {
     let shots = &surface.shots;
     if surface.is_refused {
         return None;
@@ -143,7 +149,7 @@ fn remark(surface: &SurfaceAccount) -> Option<String> {
     if !has_shots(surface) {
         let n = shots.above_m.n;
         return Some(format!(
-            "terrain model: {n} of MOLA's shots lie on it, too few to validate its heights"
+            "terrain model: {n} of {altimeter}'s shots lie on it, too few to validate its heights"
         ));
     }
     (shots.attitude_sigma_m > 0.0).then(|| {

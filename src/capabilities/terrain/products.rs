@@ -55,7 +55,7 @@ pub(super) static SIGMAS: Declaration = Declaration {
 
 pub(super) static DOCUMENT: Declaration = Declaration {
     path: "surface.json",
-    what: "how the terrain model was made, statistics of its cells, and its differences from MOLA, profile by profile",
+    what: "how the terrain model was made, statistics of its cells, and its differences from {altimeter}, profile by profile",
     readers: "scripts",
     rows: "profiles on it",
     role: Role::Metadata,

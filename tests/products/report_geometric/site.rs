@@ -202,7 +202,7 @@ impl Site {
             adjusted_heights: &self.adjusted_heights,
         };
         let evidence = Evidence {
-            wording: self.config.wording(),
+            terms: self.config.terms(),
             footprints: Some(self.converted.footprints.len()),
             ground: None,
             limits: &self.config.limits,

@@ -1,13 +1,13 @@
 //! One check of a site: the value, the limit and the outcome.
 
-use std::fmt;
+use std::{borrow::Cow, fmt};
 
 #[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::kind::CheckKind;
-use crate::wording::Wording;
+use crate::terms::Terms;
 
 /// Maximum number of decimals.
 const DECIMALS_MAX: usize = 9;
@@ -68,7 +68,7 @@ impl Check {
         };
         Self {
             kind,
-            what: kind.words().to_owned(),
+            what: Terms::MARS.fill(kind.words()).into_owned(),
             outcome: if kept { CheckOutcome::Pass } else { broken },
             subject: subject.into(),
             value: Some(value).filter(|value| value.is_finite()),
@@ -104,7 +104,7 @@ impl Check {
     ) -> Self {
         Self {
             kind,
-            what: kind.words().to_owned(),
+            what: Terms::MARS.fill(kind.words()).into_owned(),
             outcome,
             subject: subject.into(),
             value: None,
@@ -113,19 +113,18 @@ impl Check {
         }
     }
 
-    /// Sets the name of the check in the words of a site.
-    pub fn say(&mut self, wording: &Wording<'_>) {
-        self.what = wording.of(self.kind.words()).into_owned();
-        self.subject = wording.of(&*self.subject).into_owned();
+    /// Names the check in the terms of a site.
+    pub fn name_in(&mut self, terms: &Terms<'_>) {
+        self.what = terms.fill(self.kind.words()).into_owned();
     }
 
     /// Name of the check; manifests of earlier versions contain only its kind.
     #[must_use]
-    pub fn words(&self) -> &str {
+    pub fn words(&self) -> Cow<'_, str> {
         if self.what.is_empty() {
-            self.kind.words()
+            Terms::MARS.fill(self.kind.words())
         } else {
-            &self.what
+            Cow::Borrowed(&self.what)
         }
     }
 
@@ -192,7 +191,7 @@ impl fmt::Display for Check {
             };
             return write!(formatter, "{words}: {what}");
         };
-        formatter.write_str(words)?;
+        formatter.write_str(&words)?;
         if !subject.is_empty() {
             write!(formatter, ", {subject}")?;
         }

@@ -148,32 +148,32 @@ pub enum CheckKind {
 }
 
 impl CheckKind {
-    /// Name of the check.
+    /// Name of the check, with terms of the site in braces.
     pub(super) const fn words(self) -> &'static str {
         match self {
             Self::Contradiction => "Inputs consistent",
             Self::Footprints => "Footprints in the windows",
             Self::AdjustmentMade => "Adjustment converged",
-            Self::HeightAfter => "Tie points above MOLA, adjusted (median)",
-            Self::HeightBefore => "Tie points above MOLA, before (median)",
-            Self::HeightOutliers => "Tie points beyond 3.29 σ of MOLA",
-            Self::ProfilesApart => "Disagreement of MOLA profiles",
+            Self::HeightAfter => "Tie points above {altimeter}, adjusted (median)",
+            Self::HeightBefore => "Tie points above {altimeter}, before (median)",
+            Self::HeightOutliers => "Tie points beyond 3.29 σ of {altimeter}",
+            Self::ProfilesApart => "Disagreement of {altimeter} profiles",
             Self::WithheldStretches => "Withheld profiles beyond the stated 99.7 %",
             Self::SurfaceFilled => "Terrain model, completeness",
-            Self::SurfaceHeight => "MOLA above the terrain model (median)",
-            Self::SurfaceSpread => "Spread of MOLA about the terrain model",
+            Self::SurfaceHeight => "{altimeter} above the terrain model (median)",
+            Self::SurfaceSpread => "Spread of {altimeter} about the terrain model",
             Self::ImagesJoined => "Images joined by tie points",
             Self::PairsJoined => "Pairs joined by tie points",
             Self::HeightSigma => "Uncertainty of the mean height",
             Self::RangeMean => "Range − distance (mean)",
-            Self::OrbitsApart => "Orbit of the PEDR against kernels",
-            Self::Decoding => "Range − distance, orbit of the PEDR",
+            Self::OrbitsApart => "Orbit of the {shot_source} against kernels",
+            Self::Decoding => "Range − distance, orbit of the {shot_source}",
             Self::RangeOutliers => "Outliers among ranges",
             Self::Shots => "Shots in the longest profile",
             Self::ShotsMissing => "Missing shots of a profile",
             Self::ClockCorrection => "Clock correction, best − configured",
             Self::FootprintsInside => "Simultaneous footprints in the image",
-            Self::SupportPosition => "Position in support data against the PEDR",
+            Self::SupportPosition => "Position in support data against the {shot_source}",
             Self::BeamAlong => "Laser beam by the attitude, along track",
             Self::BeamAcross => "Laser beam by the attitude, across track",
             Self::BoresightMeets => "Boresight meets the body (epochs)",

@@ -17,7 +17,7 @@ pub(super) const DEFINITIONS: [(&str, &str); 15] = [
     ),
     (
         "heights",
-        "tie points above the MOLA surface, metres: before the adjustment a test of the orientation, after it the fit of the \
+        "tie points above the {altimeter} surface, metres: before the adjustment a test of the orientation, after it the fit of the \
          adjustment to its control",
     ),
     (
@@ -41,7 +41,7 @@ pub(super) const DEFINITIONS: [(&str, &str); 15] = [
     ),
     (
         "correction, sigmas",
-        "X, Y and Z position in IAU 2000, metres, then rotations about the camera's x, y and z axis, radians; of each \
+        "X, Y and Z position in {frame}, metres, then rotations about the camera's x, y and z axis, radians; of each \
          the coefficients of 1, t and t², t = 0 in the middle of the image and 1 at its end. M = exp([rotation]x) M before",
     ),
     (

@@ -6,6 +6,7 @@ use crate::{
     product::{Content, Declaration, Role},
     table::{Column, Table, Unit, column, meanings},
 };
+use areograph_base::terms::Terms;
 use areograph_stages::calibrate::PointResult;
 
 pub(super) static TABLE: Declaration<WriteCalibration> = Declaration {
@@ -31,7 +32,11 @@ pub(super) static CSV: Declaration<WriteCalibration> = Declaration {
 };
 
 fn table<'a>(of: &CalibrationProducts<'a>) -> Table<'a> {
-    Table::new(columns(), of.result.points.iter().collect())
+    let terms = Terms {
+        body: of.config.body,
+        ..Terms::MARS
+    };
+    Table::new(columns(), of.result.points.iter().collect()).in_terms(&terms)
 }
 
 type Row<'a> = &'a PointResult;
@@ -62,7 +67,7 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "latitude_deg",
             Unit::Degree,
-            "areocentric latitude of the intersection, degrees",
+            "{latitude} latitude of the intersection, degrees",
             |row: &Row| row.place.map(|place| degrees(place[1])),
         ),
         column(

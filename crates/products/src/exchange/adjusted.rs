@@ -67,7 +67,7 @@ pub(crate) static CONTROL: Declaration = Declaration {
     uses: &[Use {
         program: Program::StereoPipeline,
         lines: "# Standard deviations along x, y, z, so not with --use-lon-lat-height-gcp-error:\n\
-                bundle_adjust --datum D_MARS IMAGES CAMERAS adjusted.gcp -o run/out",
+                bundle_adjust --datum {asp_datum} IMAGES CAMERAS adjusted.gcp -o run/out",
     }],
 };
 

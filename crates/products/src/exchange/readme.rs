@@ -10,7 +10,7 @@ use crate::{
     product::{Content, Context, Declaration, IMAGE, Program, Role, Write},
     site::SiteProducts,
 };
-use areograph_base::body::Body;
+use areograph_base::terms::Terms;
 use areograph_geom::light_time::LightTime;
 
 pub(crate) static README: Declaration = Declaration {
@@ -20,9 +20,7 @@ pub(crate) static README: Declaration = Declaration {
     rows: "",
     role: Role::Metadata,
     content: Content::Foreign,
-    write: Write::Site(|path, of| {
-        write_text(path, &of.site.config.wording().of(text(of))).map(|()| Some(0))
-    }),
+    write: Write::Site(|path, of| write_text(path, &text(of)).map(|()| Some(0))),
     uses: &[],
 };
 
@@ -41,6 +39,7 @@ const NAME_WIDTH: usize = 20;
 
 fn text(of: &Context) -> String {
     let site = of.site;
+    let terms = site.config.terms();
     let mut text = format!(
         "Products of the site {} for other programs. Commands are given for this folder.\n\n\
          Frame: {}.\n\n",
@@ -58,7 +57,7 @@ fn text(of: &Context) -> String {
     let files = files(of);
     for file in &files {
         if let Some(name) = file.path.strip_prefix("exchange/") {
-            let _infallible = writeln!(text, "{name:NAME_WIDTH$} {}", file.what);
+            let _infallible = writeln!(text, "{name:NAME_WIDTH$} {}", terms.fill(file.what));
         }
     }
     for program in PROGRAMS {
@@ -70,7 +69,7 @@ fn text(of: &Context) -> String {
         if lines.is_empty() {
             continue;
         }
-        let _infallible = write!(text, "\n{}\n", about(program, site.config.body));
+        let _infallible = write!(text, "\n{}\n", about(program, &terms));
         for line in lines {
             for line in for_images(line, of) {
                 let _infallible = writeln!(text, "  {line}");
@@ -91,11 +90,15 @@ fn light_time(site: &SiteProducts) -> String {
     }
     let others = match site.config.orientation.light_time {
         LightTime::Surface | LightTime::None | LightTime::Support => {
-            "ISIS and ALE see the spacecraft from the centre of Mars instead (LT+S), about 10 lines away: the files for them, lidar\n\
-             data, ground control and adjusted kernels, fit after a run with light_time = \"centre\"."
+            format!(
+                "ISIS and ALE see the spacecraft from the centre of {} instead (LT+S), about 10 lines away: the files for them, lidar\n\
+                 data, ground control and adjusted kernels, fit after a run with light_time = \"centre\".",
+                site.config.terms().body()
+            )
         }
         LightTime::Centre => {
             "ISIS and ALE do the same; other programs see the ground about 10 lines away."
+                .to_owned()
         }
     };
     format!(
@@ -130,13 +133,9 @@ fn files(of: &Context) -> Vec<&'static Declaration> {
 
 /// The line, once per image for a file of images.
 fn for_images(line: &str, of: &Context) -> Vec<String> {
-    // Commands are declared for Mars.
-    let line = line.replace(
-        &*Body::Mars.map().asp_datum,
-        &of.site.config.body.map().asp_datum,
-    );
+    let line = of.site.config.terms().fill(line);
     if !line.contains(IMAGE) {
-        return vec![line];
+        return vec![line.into_owned()];
     }
     let images = of.site.images.iter();
     images
@@ -145,7 +144,8 @@ fn for_images(line: &str, of: &Context) -> Vec<String> {
 }
 
 /// Notes for users of a program, before its commands.
-fn about(program: Program, body: Body) -> String {
+fn about(program: Program, terms: &Terms<'_>) -> String {
+    let body = terms.body;
     match program {
         Program::StereoPipeline => format!(
             "\
@@ -157,10 +157,11 @@ fn about(program: Program, body: Body) -> String {
         ),
         Program::Isis => "ISIS (cubes need spiceinit first)".to_owned(),
         Program::Gis => format!(
-            "GIS: {}, longitudes -180..180, areocentric latitudes; {}.\n\
+            "GIS: {}, longitudes -180..180, {} latitudes; {}.\n\
              The dates inside the GeoPackage and the shapefile are those of the newest shot.\n\
              QGIS: Layer > Add Layer > Add Vector Layer, any of these.",
             crs_code(body),
+            terms.latitude(),
             point_z_height(body)
         ),
         Program::CameraModel => "\

@@ -199,7 +199,7 @@ fn assets(of: &Context) -> Result<Value> {
         let relative = slashes(&product.path);
         let mut asset = json!({
             "href": format!("../{relative}"),
-            "description": of.site.config.wording().of(declaration.what),
+            "description": of.site.config.terms().fill(declaration.what),
             "roles": [declaration.role.name()],
             "file:size": bytes,
             "file:checksum": format!("{BLAKE3_MULTIHASH}{blake3}"),

@@ -31,12 +31,12 @@ pub(crate) static LOLA_LIKE: Declaration = Declaration {
     uses: &[
         Use {
             program: Program::StereoPipeline,
-            lines: "pc_align --max-displacement 1000 --csv-format '2:lon 3:lat 4:radius_km' --datum D_MARS \\\n  \
+            lines: "pc_align --max-displacement 1000 --csv-format '2:lon 3:lat 4:radius_km' --datum {asp_datum} \\\n  \
                     dem.tif lola_like.csv -o run/out",
         },
         Use {
             program: Program::Isis,
-            lines: "lrolola2isis from=lola_like.csv cubes=cubes.lis pointid=MOLA???? to=lidar.json\n\
+            lines: "lrolola2isis from=lola_like.csv cubes=cubes.lis pointid={altimeter}???? to=lidar.json\n\
                     # Lidar points of ISIS need the line and sample at which each image sees the shot, which lrolola2isis\n\
                     # computes (a site with tie points has them ready in lidar.json). It reads column 4, the radius after the\n\
                     # crossover correction; the measured range of column 5 belongs to the radius before it, column 6. For\n\
@@ -78,7 +78,7 @@ pub(crate) static ODE: Declaration = Declaration {
     }),
     uses: &[Use {
         program: Program::StereoPipeline,
-        lines: "pc_align --max-displacement 1000 --csv-format '1:lon 2:lat 5:radius_m' --datum D_MARS \\\n  \
+        lines: "pc_align --max-displacement 1000 --csv-format '1:lon 2:lat 5:radius_m' --datum {asp_datum} \\\n  \
                 dem.tif ode_pts.csv -o run/out",
     }],
 };
@@ -103,11 +103,11 @@ pub(crate) static ODE_SIDECAR: Declaration = Declaration {
     uses: &[],
 };
 
-const LOLA_LIKE_RADIUS: &str = "column 4 is the distance from the centre of Mars after the crossover correction, kilometres: \
+const LOLA_LIKE_RADIUS: &str = "column 4 is the distance from the centre of {body} after the crossover correction, kilometres: \
      for heights; column 6 is the distance before this correction, to which the range of column 5 belongs: for range \
      constraints; no column is a height";
-const ODE_RADIUS: &str = "column 5 is the distance from the centre of Mars after the crossover correction, metres; \
-     column 3 is this distance minus the radius of the areoid, not a height above a sphere";
+const ODE_RADIUS: &str = "column 5 is the distance from the centre of {body} after the crossover correction, metres; \
+     column 3 is this distance minus the radius of the {areoid}, not a height above a sphere";
 
 /// Description of a CSV file for its readers.
 #[derive(Serialize, JsonSchema)]
@@ -139,7 +139,7 @@ struct SidecarColumn {
     name: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
     unit: Option<&'static str>,
-    meaning: Cow<'static, str>,
+    meaning: String,
 }
 
 impl Sidecar {
@@ -150,18 +150,18 @@ impl Sidecar {
         radius: &'static str,
         columns: &[Column<Shot>],
     ) -> Self {
-        let (body, wording) = (site.config.body, site.config.wording());
+        let (body, terms) = (site.config.body, site.config.terms());
         let columns = meanings(columns).into_iter().map(|column| SidecarColumn {
             name: column.name,
             unit: column.unit.symbol(),
-            meaning: wording.of(column.description),
+            meaning: terms.fill(&column.description).into_owned(),
         });
         Self {
             file,
             csv_format,
             datum: &body.map().asp_datum,
             datum_radius_m: body.map().radius_m,
-            radius: wording.of(radius),
+            radius: terms.fill(radius),
             frame: frame(body),
             longitudes: "east, 0..360",
             header_lines: 1,
@@ -176,7 +176,7 @@ pub(crate) fn schema() -> DocumentSchema {
 }
 
 fn table<'a>(site: &'a SiteProducts<'a>, columns: Vec<Column<Shot<'a>>>) -> Table<'a> {
-    Table::new(columns, Shot::all(site)).in_words(&site.config.wording())
+    Table::new(columns, Shot::all(site)).in_terms(&site.config.terms())
 }
 
 /// Columns 1 to 5, in the order that ISIS `lrolola2isis` reads.
@@ -198,7 +198,7 @@ fn lola_like<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "latitude_deg",
             Unit::Degree,
-            "areocentric latitude, degrees",
+            "{latitude} latitude, degrees",
             |shot: &Shot| degrees(shot.get(|footprints| &footprints.latitude_rad)),
         )
         .decimals(DEGREE_DECIMALS),
@@ -252,14 +252,14 @@ fn ode_points<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "LAT_NORTH",
             Unit::Degree,
-            "areocentric latitude, degrees",
+            "{latitude} latitude, degrees",
             |shot: &Shot| degrees(shot.get(|footprints| &footprints.latitude_rad)),
         )
         .decimals(DEGREE_DECIMALS),
         column(
             "TOPOGRAPHY",
             Unit::Metre,
-            "radius after the crossover correction minus areoid radius, metres",
+            "radius after the crossover correction minus the radius of the {areoid}, metres",
             Shot::topography_m,
         )
         .decimals(METRE_DECIMALS),

@@ -33,7 +33,10 @@ pub(super) fn changed(site: &RunDifference) -> String {
     for (words, before, after) in rows {
         let fails = after.is_some_and(|check| check.outcome == CheckOutcome::Fail);
         let [before, after] = [before, after].map(|check| check.map_or("–".to_owned(), in_words));
-        table.row(!fails, [words.into(), before.into(), after.into()]);
+        table.row(
+            !fails,
+            [words.into_owned().into(), before.into(), after.into()],
+        );
     }
     table.finish()
 }

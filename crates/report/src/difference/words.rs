@@ -7,7 +7,7 @@ use super::{
     items::{Item, Items},
     movement::{Component, ROUNDING, Size},
 };
-use areograph_base::wording::{self, MINUS};
+use areograph_base::minus::{self, MINUS};
 use areograph_geom::statistics::largest;
 use areograph_store::manifest::Verdict;
 
@@ -272,11 +272,7 @@ impl RunDifference {
             .map(|profile| match (&profile.a, &profile.b) {
                 (Some(a), Some(b)) => {
                     let change_m = b.range_minus_distance_m.mean - a.range_minus_distance_m.mean;
-                    format!(
-                        "{} mean {} m",
-                        profile.profile,
-                        wording::signed(change_m, 3)
-                    )
+                    format!("{} mean {} m", profile.profile, minus::signed(change_m, 3))
                 }
                 (Some(_), None) => format!("{} only in A", profile.profile),
                 _ => format!("{} only in B", profile.profile),

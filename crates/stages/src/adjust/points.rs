@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use areograph_base::wording::signed;
+use areograph_base::minus::signed;
 
 /// The kinds of point.
 #[derive(
@@ -47,7 +47,7 @@ pub enum RejectionReason {
         standardised: f64,
     },
     /// Its height is implausible.
-    #[error("{} m from the MOLA surface, standardised {standardised:.1}", signed(*above_m, 0))]
+    #[error("{} m from the laser surface, standardised {standardised:.1}", signed(*above_m, 0))]
     Height {
         /// Height above the surface without the part that tie points share, metres.
         above_m: f64,

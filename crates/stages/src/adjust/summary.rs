@@ -56,17 +56,17 @@ pub enum ObservationType {
 }
 
 impl ObservationType {
-    /// The kind in words.
+    /// The kind in words, with terms of the site in braces.
     #[must_use]
     pub const fn words(self) -> &'static str {
         match self {
             Self::TieAlong => "tie points in images, along the track",
             Self::TieAcross => "tie points in images, across the track",
-            Self::MolaHeight => "heights from the MOLA surface",
-            Self::MolaImage => "image coordinates of MOLA",
-            Self::MolaRange => "MOLA ranges",
+            Self::MolaHeight => "heights from the {altimeter} surface",
+            Self::MolaImage => "image coordinates of {altimeter}",
+            Self::MolaRange => "{altimeter} ranges",
             Self::Orientation => "initial orientation",
-            Self::MolaGround => "ground coordinates of MOLA",
+            Self::MolaGround => "ground coordinates of {altimeter}",
             Self::TieGround => "given coordinates of tie points",
             Self::Bias => "time and range biases",
             Self::LaserSpot => "laser spots in simultaneous images, from the mounting",

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use areograph_base::wording::signed;
+use areograph_base::minus::signed;
 use areograph_config::RangeCheckConfig;
 use areograph_geom::statistics::largest;
 
@@ -98,7 +98,7 @@ impl RangeFigures {
         // Written so that NaN breaks the limit.
         (!(apart_m <= limit_m)).then(|| {
             format!(
-                "the spacecraft position of the PEDR differs by {apart_m:.0} m from the kernels' ({} m up, {} m along \
+                "the spacecraft position stated with the shots differs by {apart_m:.0} m from the kernels' ({} m up, {} m along \
                  the flight, {} m across it); limit {limit_m} m: {}",
                 signed(radial, 0),
                 signed(along, 0),

@@ -10,7 +10,7 @@ use areograph_base::{
     body::{Body, Datum},
     footprints::Footprints,
     frames::BodyFixed,
-    wording::signed,
+    minus::signed,
 };
 use areograph_geom::{
     body_rotation::{body_matrix, body_rotation},

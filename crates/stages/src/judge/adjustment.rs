@@ -1,11 +1,11 @@
 //! Verdict on an adjustment: by MOLA first, then by agreement between the images, then by a priori values.
 
-use super::{AdjustmentEvidence, JudgedImage};
+use super::{AdjustmentEvidence, Evidence, JudgedImage};
 use crate::{
     adjust::{HEIGHTS_MIN, HeightSummary, ObservationType, PointKind, TypeSummary},
     compare_pairs::PairComparison,
 };
-use areograph_base::{footprints::AdjustmentModel, wording::signed};
+use areograph_base::{footprints::AdjustmentModel, minus::signed, terms::Terms};
 use areograph_config::LimitsConfig;
 use areograph_geom::statistics::{NORMAL_MAD, median};
 
@@ -26,8 +26,9 @@ const HEIGHT_SIGMAS: f64 = 3.0;
 impl AdjustmentEvidence<'_> {
     /// Reasons why the adjusted orientation is invalid, one sentence each: MOLA first, then agreement between the
     /// images, then a priori values.
-    pub(super) fn invalid_because(&self, limits: &LimitsConfig) -> Vec<String> {
-        let mut invalid = self.heights_off(limits);
+    pub(super) fn invalid_because(&self, evidence: &Evidence<'_>) -> Vec<String> {
+        let limits = evidence.limits;
+        let mut invalid = self.heights_off(evidence);
         let reasons = |image: &JudgedImage| -> Vec<String> {
             let id = image.id();
             // Faults of the orientation of the kernels are reported with it.
@@ -57,7 +58,7 @@ impl AdjustmentEvidence<'_> {
         let heights = self.adjusted.heights.iter();
         let spread =
             heights.filter(|heights| !(heights.beyond_share() <= limits.height_outliers_max));
-        invalid.extend(spread.map(heights_beyond));
+        invalid.extend(spread.map(|heights| heights_beyond(heights, &evidence.terms)));
         for (round, pairs, limit_m) in rounds {
             for pair in pairs.iter().filter(|pair| !is_together(pair, limit_m)) {
                 invalid.push(format!(
@@ -126,7 +127,8 @@ impl AdjustmentEvidence<'_> {
     }
 
     /// Contradictions between MOLA and the heights of tie points.
-    fn heights_off(&self, limits: &LimitsConfig) -> Vec<String> {
+    fn heights_off(&self, evidence: &Evidence<'_>) -> Vec<String> {
+        let (limits, altimeter) = (evidence.limits, evidence.terms.altimeter);
         let after_max_m = self.height_after_max_m(limits);
         let rounds = [
             ("before", self.heights, limits.height_before_max_m),
@@ -137,7 +139,7 @@ impl AdjustmentEvidence<'_> {
             // Written so that NaN counts.
             if check.surface.is_ok() && !(check.above_m.median.abs() <= limit_m) {
                 reasons.push(format!(
-                    "tie points lie {} m from the MOLA surface {round} the adjustment (median of {}), expected at most \
+                    "tie points lie {} m from the {altimeter} surface {round} the adjustment (median of {}), expected at most \
                      {limit_m:.1} m",
                     signed(check.above_m.median, 1),
                     check.above_m.n
@@ -160,28 +162,28 @@ impl AdjustmentEvidence<'_> {
     }
 
     /// Remarks on heights that MOLA controls, but not well.
-    fn heights_loose(&self, limits: &LimitsConfig) -> Vec<String> {
+    fn heights_loose(&self, evidence: &Evidence<'_>) -> Vec<String> {
         let Some(heights) = &self.adjusted.heights else {
             return Vec::new();
         };
+        let (limits, altimeter) = (evidence.limits, evidence.terms.altimeter);
         let mut remarks = Vec::new();
         if !heights.settled {
-            remarks.push(
-                "heights of tie points, and the MOLA surface under them, had not converged when the adjustment ended: \
-                 they are less certain than stated"
-                    .to_owned(),
-            );
+            remarks.push(format!(
+                "heights of tie points, and the {altimeter} surface under them, had not converged when the adjustment \
+                 ended: they are less certain than stated"
+            ));
         }
         let [_, _, up_m] = heights.mean_sigma_m;
         if !(up_m <= HEIGHT_LOOSE_M) {
             remarks.push(format!(
-                "MOLA controls heights only to ±{up_m:.0} m: the tie points lie far from its shots, or the a priori \
+                "{altimeter} controls heights only to ±{up_m:.0} m: the tie points lie far from its shots, or the a priori \
                  standard deviations in laser_surface are large"
             ));
         }
         let share = heights.beyond_share();
         if share > HEIGHT_OUTLIERS_FEW && share <= limits.height_outliers_max {
-            remarks.push(heights_beyond(heights));
+            remarks.push(heights_beyond(heights, &evidence.terms));
         }
         if heights.compared < HEIGHTS_MIN {
             remarks.push(format!(
@@ -247,14 +249,14 @@ impl AdjustmentEvidence<'_> {
     }
 
     /// Kinds of observation whose residuals are larger than chance explains.
-    fn components_above(&self) -> impl Iterator<Item = String> {
+    fn components_above(&self, terms: &Terms<'_>) -> impl Iterator<Item = String> {
         let above = self.other_components().filter(|of| of.is_above_chance());
         above.map(|of| {
             let [_, most] = of.variance_component_limits;
             format!(
                 "residuals of {} are {:.2} times their a priori standard deviations, by chance at most {most:.2}: these are too \
                  small, or a model does not hold",
-                of.kind.words(),
+                terms.fill(of.kind.words()),
                 of.variance_component
             )
         })
@@ -294,15 +296,17 @@ impl AdjustmentEvidence<'_> {
     }
 
     /// Points that the reader must weigh, one sentence each.
-    pub(super) fn remarks(&self, limits: &LimitsConfig) -> Vec<String> {
+    pub(super) fn remarks(&self, evidence: &Evidence<'_>) -> Vec<String> {
+        let limits = evidence.limits;
         let mut remarks = Vec::new();
         let both = self.heights.surface.as_ref();
         match both.and(self.adjusted_heights.surface.as_ref()) {
             Err(reason) => remarks.push(format!(
-                "heights of tie points are not controlled by MOLA ({reason}): they are only as accurate as the a \
-                 priori orbit and attitude"
+                "heights of tie points are not controlled by {} ({reason}): they are only as accurate as the a \
+                 priori orbit and attitude",
+                evidence.terms.altimeter
             )),
-            Ok(_) => remarks.extend(self.heights_loose(limits)),
+            Ok(_) => remarks.extend(self.heights_loose(evidence)),
         }
         if self.adjusted.summary.model == AdjustmentModel::Published {
             remarks.push(
@@ -322,8 +326,8 @@ impl AdjustmentEvidence<'_> {
         if matches!(self.adjusted.boresight, Some(Ok(_))) {
             remarks.push(
                 "across-track positions depend on adjustment.common_bus, which assumes that footprints do not carry \
-                 the attitude error of these kernels: PEDR files made with the same attitude would agree with them \
-                 whatever its error"
+                 the attitude error of these kernels: footprints computed with the same attitude would agree with \
+                 them whatever its error"
                     .to_owned(),
             );
         }
@@ -370,7 +374,7 @@ impl AdjustmentEvidence<'_> {
             ));
         }
         remarks.extend(self.drifts(limits));
-        remarks.extend(self.components_above());
+        remarks.extend(self.components_above(&evidence.terms));
         for image in self.untied() {
             remarks.push(format!(
                 "image {image} has no tie point in the adjustment: no measurement tests or corrects its orientation"
@@ -385,14 +389,14 @@ fn is_together(pair: &PairComparison, limit_m: f64) -> bool {
     pair.along_track_parallax_m.abs() <= limit_m
 }
 
-fn heights_beyond(heights: &HeightSummary) -> String {
+fn heights_beyond(heights: &HeightSummary, terms: &Terms<'_>) -> String {
     let rejected = match heights.rejected {
         0 => String::new(),
         count => format!(", {count} more were rejected for this reason"),
     };
     format!(
-        "{} of {} tie points lie farther from the MOLA surface than their standard deviations allow{rejected}: \
+        "{} of {} tie points lie farther from the {} surface than their standard deviations allow{rejected}: \
          across-track measurement errors shift heights by more than stated; height_check.parquet lists them",
-        heights.beyond_limit, heights.compared
+        heights.beyond_limit, heights.compared, terms.altimeter
     )
 }

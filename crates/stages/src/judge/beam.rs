@@ -6,7 +6,7 @@ use super::{
     Evidence,
 };
 use crate::check_beam::{Beam, ImageBeam};
-use areograph_base::{units::METRES_PER_KM, wording::signed};
+use areograph_base::{minus::signed, terms::Terms, units::METRES_PER_KM};
 use areograph_config::{AdjustmentConfig, MolaSurfaceConfig};
 use areograph_geom::statistics::BAARDA_LIMIT;
 
@@ -84,7 +84,7 @@ impl Deviation {
     }
 
     /// One sentence; `limit` states the limit.
-    fn text(&self, limit: &str) -> String {
+    fn text(&self, limit: &str, terms: &Terms<'_>) -> String {
         let (images, whose) = match &*self.subjects {
             [one] => (format!("image {one}"), "its orientation"),
             all => (on_average(all.len()), "the orientation of the images"),
@@ -96,8 +96,10 @@ impl Deviation {
             format!("{:.1} km", ground_m / METRES_PER_KM)
         };
         format!(
-            "{images}: the beam of MOLA in the PEDR lies {} mrad {} from its mounting according to {whose}, {ground} \
+            "{images}: the beam of {} in the {} lies {} mrad {} from its mounting according to {whose}, {ground} \
              on the ground ({} shots), {limit}",
+            terms.altimeter,
+            terms.shot_source(),
             signed(PER_MILLI * self.angle_rad, 2),
             AXES[self.axis].1,
             self.shots
@@ -302,10 +304,13 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
     let mut reasons: Vec<String> = far
         .map(|deviation| {
             let limit = PER_MILLI * limit_sigma * deviation.sigma_rad;
-            deviation.text(&format!(
+            deviation.text(
+                &format!(
                 "expected at most {limit:.2} mrad; check the C-kernels, pointing.ck_bias_s, altimeter_clock, and that the shots are \
                  of this orbit"
-            ))
+                ),
+                &evidence.terms,
+            )
         })
         .collect();
     for (image, of, least) in evidence.beam.places() {
@@ -317,11 +322,12 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
             ));
         }
     }
+    let source = evidence.terms.shot_source();
     for (image, apart_m, limit_m) in support_positions(evidence) {
         // Written so that NaN counts.
         if !(apart_m <= limit_m) {
             reasons.push(format!(
-                "image {image}: its support data place the spacecraft {apart_m:.0} m from its position in the PEDR, expected \
+                "image {image}: its support data place the spacecraft {apart_m:.0} m from its position in the {source}, expected \
                  at most {limit_m:.0} m; check that they belong to this image, and check their frame"
             ));
         }
@@ -349,9 +355,12 @@ pub(super) fn remarks(evidence: &Evidence<'_>) -> Vec<String> {
     let mut remarks: Vec<String> = doubtful
         .map(|deviation| {
             let sigmas = deviation.angle_rad.abs() / deviation.sigma_rad;
-            deviation.text(&format!(
-                "{sigmas:.1} standard deviations: the position is less certain than stated"
-            ))
+            deviation.text(
+                &format!(
+                    "{sigmas:.1} standard deviations: the position is less certain than stated"
+                ),
+                &evidence.terms,
+            )
         })
         .collect();
     for image in evidence.images {

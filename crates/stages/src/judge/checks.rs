@@ -11,7 +11,7 @@ use crate::{
     check_heights::HeightCheck, check_ranges::ProfileRanges, compare_pairs::PairComparison,
     orientation::InterpolationCheck,
 };
-use areograph_base::units::RADIANS_PER_ARCSECOND;
+use areograph_base::{terms::Terms, units::RADIANS_PER_ARCSECOND};
 use areograph_config::LimitsConfig;
 use areograph_geom::surface::WithheldScore;
 
@@ -58,8 +58,8 @@ pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
         .flat_map(|adjustment| adjustment.images);
     checks.extend(of_images(evidence, adjusted));
     if let Some(adjustment) = &evidence.adjustment {
-        checks.extend(of_heights(adjustment, evidence.limits));
-        checks.extend(of_ties(adjustment, evidence.limits));
+        checks.extend(of_heights(adjustment, evidence));
+        checks.extend(of_ties(adjustment, evidence));
     }
     checks.extend(evidence.findings.iter().flat_map(|of| of.checks.clone()));
     let skipped = evidence.complaints.len();
@@ -240,14 +240,19 @@ fn of_images<'a>(
     checks
 }
 
-fn of_heights(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> {
+fn of_heights(of: &AdjustmentEvidence<'_>, evidence: &Evidence<'_>) -> Vec<Check> {
+    let (limits, altimeter) = (evidence.limits, evidence.terms.altimeter);
     let median = |kind: CheckKind, check: &HeightCheck, limit_m: f64| match &check.surface {
         Ok(_) => {
             let takes_part = kind == CheckKind::HeightAfter && of.adjusted.heights.is_some();
-            let subject = if takes_part { "MOLA takes part" } else { "" };
+            let subject = if takes_part {
+                format!("{altimeter} takes part")
+            } else {
+                String::new()
+            };
             Check::new(kind, subject, check.above_m.median, limit_m, Fail)
         }
-        Err(_) => Check::without_number(kind, "no MOLA surface", Warning),
+        Err(_) => Check::without_number(kind, format!("no {altimeter} surface"), Warning),
     };
     let mut checks = vec![
         median(
@@ -290,7 +295,8 @@ fn of_heights(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> 
     checks
 }
 
-fn of_ties(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> {
+fn of_ties(of: &AdjustmentEvidence<'_>, evidence: &Evidence<'_>) -> Vec<Check> {
+    let limits = evidence.limits;
     let apart = |kind: CheckKind, pairs: &[PairComparison], limit_m: f64| {
         Check::worst(pairs.iter().map(|pair| {
             let name = pair.images.join(" and ");
@@ -317,7 +323,7 @@ fn of_ties(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> {
         Some(found) => Check::new(kind, "", found, limits.sigma0_max, Warning),
         None => Check::without_number(kind, "untested: no redundancy", Warning),
     }));
-    checks.extend(components(of));
+    checks.extend(components(of, &evidence.terms));
     checks.extend(joined(of));
     let share = of.left_out() as f64 / of.ties.multi_image().max(1) as f64;
     let broken = if share > REJECTED_SHARE_FAIL {
@@ -341,7 +347,7 @@ fn of_ties(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> {
 
 /// The variance component, among the other kinds of observation, that uses the largest share of what chance explains.
 /// The subject also has the components below their interval: these are no fault, but the page shows them.
-fn components(of: &AdjustmentEvidence<'_>) -> Option<Check> {
+fn components(of: &AdjustmentEvidence<'_>, terms: &Terms<'_>) -> Option<Check> {
     let kind = CheckKind::VarianceComponents;
     let below: Vec<String> = of
         .other_components()
@@ -351,7 +357,7 @@ fn components(of: &AdjustmentEvidence<'_>) -> Option<Check> {
             let value = found.variance_component;
             format!(
                 "{} {value:.3}, by chance at least {least:.2}",
-                found.kind.words()
+                terms.fill(found.kind.words())
             )
         })
         .collect();
@@ -359,7 +365,7 @@ fn components(of: &AdjustmentEvidence<'_>) -> Option<Check> {
         let [_, most] = found.variance_component_limits;
         Check::new(
             kind,
-            found.kind.words(),
+            terms.fill(found.kind.words()),
             found.variance_component,
             most,
             Warning,

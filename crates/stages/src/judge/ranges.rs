@@ -2,7 +2,7 @@
 
 use super::Evidence;
 use crate::check_ranges::ProfileRanges;
-use areograph_base::wording::signed;
+use areograph_base::minus::signed;
 use areograph_config::RangeCheckConfig;
 
 /// Short profiles named in a remark; all are counted.

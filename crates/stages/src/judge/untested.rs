@@ -175,8 +175,8 @@ fn shots(evidence: &Evidence<'_>, is_attitude_tested: bool) -> Group {
     }
     if is_attitude_tested {
         group = group.with(
-            "an attitude error that the images share with the footprints of the PEDR, which do not state the attitude they \
-             were computed from",
+            "an attitude error that the images share with the footprints, whose files do not state the attitude they were \
+             computed from",
         );
     }
     group

@@ -11,9 +11,9 @@ pub(super) fn findings(
     spoiled_shots: u64,
 ) -> Vec<String> {
     let said = counts.values().sum::<u64>();
-    let first = complaints
-        .first()
-        .map(|complaint| format!("complaints about PEDR files: {said}, the first: {complaint}"));
+    let first = complaints.first().map(|complaint| {
+        format!("complaints about records of shots: {said}, the first: {complaint}")
+    });
     let spoiled = (spoiled_shots > 0).then(|| {
         format!("shots in the windows omitted because of invalid values: {spoiled_shots}")
     });
