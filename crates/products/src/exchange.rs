@@ -9,6 +9,7 @@ pub(super) mod jigsaw;
 mod lidar_data;
 pub(super) mod matched;
 mod points;
+pub(super) mod qgis;
 pub(super) mod readme;
 pub(super) mod shapefile;
 pub(super) mod stac;

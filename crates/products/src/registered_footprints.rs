@@ -29,6 +29,8 @@ use areograph_stages::{
 const ISIS_OFFSET: f64 = 0.5;
 /// Sites with these products.
 const SITES: &str = "a site with footprints inside its images";
+/// Table of the GeoPackage.
+const LAYER: &str = "registered_footprints";
 const WHAT: &str = "footprints inside images: ground coordinates, and image coordinates before and after the adjustment";
 
 pub(super) static PARQUET: Declaration = Declaration {
@@ -74,7 +76,7 @@ pub(super) static CSV: Declaration = Declaration {
     uses: &[],
 };
 
-pub(super) static GEOPACKAGE: Declaration = Declaration {
+pub(crate) static GEOPACKAGE: Declaration = Declaration {
     path: "exchange/registered_footprints.gpkg",
     what: WHAT,
     readers: "GIS",
@@ -82,8 +84,8 @@ pub(super) static GEOPACKAGE: Declaration = Declaration {
     role: Role::Data,
     content: Content::Foreign,
     write: Write::Where {
-        sites: "a site with footprints inside its images, format `gpkg`",
-        has: |site| site.has_footprints_in(ShotFormat::Gpkg) && has(site),
+        sites: SITES,
+        has,
         write: |path, of| geopackage::write(path, features(of, rows(of.site))),
     },
     uses: &[Use {
@@ -97,6 +99,11 @@ fn has(site: &SiteProducts) -> bool {
     let adjusted = site.adjustment().map(|(_, of)| of.images);
     let mut images = site.images.iter().chain(adjusted.unwrap_or_default());
     !site.footprints.is_empty() && images.any(|image| image.registration.points.inside_count() > 0)
+}
+
+/// Table of the `GeoPackage`, and the heights in it, metres.
+pub(super) fn heights_m(site: &SiteProducts) -> (&'static str, Vec<f64>) {
+    (LAYER, rows(site).iter().map(Row::height_m).collect())
 }
 
 /// A footprint that an image shows.
@@ -224,7 +231,7 @@ fn features<'a>(of: &Context<'a>, rows: Vec<Row<'a>>) -> Features<'a> {
     let newest_utc = site.utc.iter().max().map_or("", String::as_str);
     let name = &site.config.site;
     Features {
-        table: "registered_footprints",
+        table: LAYER,
         z: format!(
             "z: radius of the ground minus {} m, metres",
             body.map().radius_m

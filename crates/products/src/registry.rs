@@ -2,7 +2,7 @@
 
 use super::{
     adjusted_footprints, adjusted_kernels, adjustment, correlations,
-    exchange::{adjusted, geopackage, jigsaw, matched, readme, shapefile, stac, tables},
+    exchange::{adjusted, geopackage, jigsaw, matched, qgis, readme, shapefile, stac, tables},
     figures, footprints, heights, isd, kernel_report, orientation, overlays, page, page_data,
     product::Declaration,
     profile_check, ranges, registered_footprints, registration, ties,
@@ -68,6 +68,9 @@ static LAST: &[&Declaration] = &[
     &jigsaw::POINTS,
     &jigsaw::IMAGES,
     &kernel_report::KERNELS,
+    &qgis::OUTLINES,
+    &qgis::RESIDUALS,
+    &qgis::PROJECT,
     &readme::README,
     &stac::ITEM,
 ];

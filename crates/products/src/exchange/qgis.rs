@@ -1,0 +1,311 @@
+//! A QGIS project of a site: footprints by height, residuals of tie points, outlines of images, orthoimages and terrain
+//! model on one map, ready to open.
+//!
+//! The project refers to products by relative paths, so that the folder of a site may be moved as a whole. It is a zip
+//! archive with one document (QGIS 3, `QgsProject`); `project.rs` writes the document, `map.rs` has its projection, and
+//! `vectors.rs` the layers that no other product contains.
+
+mod map;
+mod project;
+mod vectors;
+
+use std::{
+    io::{Cursor, Read as _, Write as _},
+    path::{Component, Path},
+};
+
+use areograph_base::error::{Locate as _, Result};
+use areograph_stages::{map_surface::Surface, rectify_images::Orthoimage};
+use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter, write::SimpleFileOptions};
+
+use self::{
+    map::{Map, equirectangular_wkt},
+    project::{Form, Layer},
+};
+use crate::{
+    error::ProductError,
+    exchange::geopackage::GEOPACKAGE,
+    files::{read_bytes, write_bytes, write_json},
+    gis::crs_wkt,
+    product::{Content, Context, Declaration, Program, Role, Use, Write},
+    registered_footprints,
+    site::SiteProducts,
+};
+
+/// Name of the document inside the project.
+const DOCUMENT: &str = "site.qgs";
+/// The terrain model among the products.
+const TERRAIN: &str = "surface.tif";
+/// Shares of the pixels of an orthoimage that are black and white on the map.
+const STRETCH: [f64; 2] = [0.02, 0.98];
+
+pub(crate) static PROJECT: Declaration = Declaration {
+    path: "exchange/site.qgz",
+    what: "QGIS project of the site: footprints by height, residuals of tie points, outlines, orthoimages, terrain model",
+    readers: "QGIS",
+    rows: "",
+    role: Role::Overview,
+    content: Content::Foreign,
+    write: Write::Where {
+        sites: "a site with images",
+        has: has_outlines,
+        write: |path, of| write(path, of).map(|()| 0),
+    },
+    uses: &[Use {
+        program: Program::Gis,
+        lines: "qgis site.qgz                                    QGIS project with all layers",
+    }],
+};
+
+pub(crate) static OUTLINES: Declaration = Declaration {
+    path: "exchange/image_outlines.geojson",
+    what: "outlines of the images on the ellipsoid with the orientation of the kernels, as GeoJSON",
+    readers: "GIS",
+    rows: "images with an outline",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::Where {
+        sites: "a site with images",
+        has: has_outlines,
+        write: |path, of| {
+            let outlines = vectors::outlines(of.site);
+            write_json(path, &outlines)?;
+            Ok(outlines.features.len() as u64)
+        },
+    },
+    uses: &[],
+};
+
+pub(crate) static RESIDUALS: Declaration = Declaration {
+    path: "exchange/tie_residuals.geojson",
+    what: "measurements of adjusted tie points at their ground points, with residuals in the image and on the ground, as GeoJSON",
+    readers: "GIS",
+    rows: "measurements",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::Where {
+        sites: "a site with images and an adjustment",
+        has: |site| has_outlines(site) && site.adjustment().is_some(),
+        write: |path, of| {
+            let residuals = vectors::residuals(of.site);
+            write_json(path, &residuals)?;
+            Ok(residuals.features.len() as u64)
+        },
+    },
+    uses: &[],
+};
+
+fn has_outlines(site: &SiteProducts) -> bool {
+    let mut images = site.images.iter();
+    images.any(|image| image.orientation.outline.is_some())
+}
+
+/// Writes the project and reads it back.
+fn write(path: &Path, of: &Context) -> Result<()> {
+    let document = project::document(&of.site.config.site, &Map::of(of.site), &layers(of)?);
+    let bytes = archive(&document)
+        .map_err(ProductError::refused("write QGIS project"))
+        .in_file(path)?;
+    write_bytes(path, &bytes)?;
+    let read = document_of(&read_bytes(path)?)
+        .map_err(ProductError::unreadable)
+        .in_file(path)?;
+    if read != document {
+        let what = format!("{} characters of the project", document.len());
+        return Err(ProductError::ReadBack { what }).in_file(path);
+    }
+    Ok(())
+}
+
+/// The archive; its date is the first that the format knows, since a clock would give different bytes each time.
+fn archive(document: &str) -> zip::result::ZipResult<Vec<u8>> {
+    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Stored)
+        .last_modified_time(DateTime::DEFAULT);
+    archive.start_file(DOCUMENT, options)?;
+    archive.write_all(document.as_bytes())?;
+    Ok(archive.finish()?.into_inner())
+}
+
+fn document_of(bytes: &[u8]) -> zip::result::ZipResult<String> {
+    let mut archive = ZipArchive::new(Cursor::new(bytes))?;
+    let mut document = String::new();
+    archive.by_name(DOCUMENT)?.read_to_string(&mut document)?;
+    Ok(document)
+}
+
+/// The layers of the products that were written, from the top of the map to its bottom.
+fn layers(of: &Context) -> Result<Vec<Layer>> {
+    let site = of.site;
+    let terms = site.config.terms();
+    let geographic = || crs_wkt(site.config.body);
+    let mut layers = Vec::new();
+    if is_written(of, RESIDUALS.path) {
+        layers.push(Layer {
+            name: "Residuals of tie points".to_owned(),
+            source: source(RESIDUALS.path),
+            wkt: geographic(),
+            is_shown: true,
+            form: Form::Arrows {
+                magnification: vectors::magnification(site),
+            },
+        });
+    }
+    if is_written(of, registered_footprints::GEOPACKAGE.path) {
+        let (table, heights_m) = registered_footprints::heights_m(site);
+        layers.push(Layer {
+            name: format!("{} footprints inside images, height in m", terms.altimeter),
+            source: format!(
+                "{}|layername={table}",
+                source(registered_footprints::GEOPACKAGE.path)
+            ),
+            wkt: geographic(),
+            is_shown: true,
+            form: Form::Heights {
+                column: "height_m",
+                range: range(heights_m.into_iter()),
+            },
+        });
+    }
+    if is_written(of, GEOPACKAGE.path) {
+        layers.push(Layer {
+            name: format!("{} footprints, all", terms.altimeter),
+            source: format!("{}|layername=footprints", source(GEOPACKAGE.path)),
+            wkt: geographic(),
+            is_shown: false,
+            form: Form::Points,
+        });
+    }
+    layers.push(Layer {
+        name: "Outlines of images".to_owned(),
+        source: source(OUTLINES.path),
+        wkt: geographic(),
+        is_shown: true,
+        form: Form::Outlines { label: "image" },
+    });
+    for orthoimage in site.find::<Vec<Orthoimage>>()?.into_iter().flatten() {
+        let id = &site.images[orthoimage.account.image].times.id;
+        let path = format!("images/{id}/orthoimage.tif");
+        if !is_written(of, &path) {
+            continue;
+        }
+        layers.push(Layer {
+            name: format!("Orthoimage {id}"),
+            source: source(&path),
+            wkt: equirectangular_wkt(site.config.body, orthoimage.account.parallel_rad),
+            is_shown: true,
+            form: Form::Brightness {
+                range: stretch(&orthoimage.brightness),
+            },
+        });
+    }
+    if let Some(terrain) = site.find::<Surface>()?.filter(|_| is_written(of, TERRAIN)) {
+        let heights = terrain.model.heights.heights_m.iter();
+        let range = range(
+            heights
+                .filter(|height| height.is_finite())
+                .map(|height| f64::from(*height)),
+        );
+        let heights = source(TERRAIN);
+        let wkt = equirectangular_wkt(site.config.body, terrain.model.parallel_rad);
+        layers.push(Layer {
+            name: "Terrain model, height in m".to_owned(),
+            source: heights.clone(),
+            wkt: wkt.clone(),
+            is_shown: true,
+            form: Form::Terrain { range },
+        });
+        layers.push(Layer {
+            name: "Terrain model, shaded".to_owned(),
+            source: heights,
+            wkt,
+            is_shown: true,
+            form: Form::Shaded,
+        });
+    }
+    Ok(layers)
+}
+
+fn is_written(of: &Context, path: &str) -> bool {
+    of.written
+        .iter()
+        .any(|(product, _)| product.path == Path::new(path))
+}
+
+/// Path of a product from the folder of the project.
+fn source(product: &str) -> String {
+    let folder = Path::new(PROJECT.path).parent().unwrap_or(Path::new(""));
+    let product = Path::new(product);
+    if let Ok(inside) = product.strip_prefix(folder) {
+        return format!("./{}", inside.display());
+    }
+    let up = folder
+        .components()
+        .filter(|part| matches!(part, Component::Normal(_)));
+    let up: String = up.map(|_| "../").collect();
+    up + &product.display().to_string()
+}
+
+/// Least and greatest; 0 and 1 without a value.
+fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let ends = values.fold(None, |ends: Option<[f64; 2]>, value| {
+        Some(ends.map_or([value; 2], |[least, most]| {
+            [least.min(value), most.max(value)]
+        }))
+    });
+    ends.unwrap_or([0.0, 1.0])
+}
+
+/// Brightness that is black, and that is white, on the map: empty cells, of brightness 0, do not count.
+#[allow(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "cells are counted"
+)]
+fn stretch(brightness: &[u8]) -> [f64; 2] {
+    let mut counts = [0_u64; 256];
+    for value in brightness {
+        counts[usize::from(*value)] += 1;
+    }
+    let filled: u64 = counts[1..].iter().sum();
+    STRETCH.map(|share| {
+        let wanted = (share * filled as f64) as u64;
+        let mut below = 0;
+        let found = (1..=u8::MAX).find(|value| {
+            below += counts[usize::from(*value)];
+            below > wanted
+        });
+        f64::from(found.unwrap_or(u8::MAX))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_lead_from_the_project_to_the_products() {
+        assert_eq!(source("exchange/a.gpkg"), "./a.gpkg");
+        assert_eq!(
+            source("images/E02-00665/orthoimage.tif"),
+            "../images/E02-00665/orthoimage.tif"
+        );
+    }
+
+    #[test]
+    fn empty_cells_do_not_change_the_stretch() {
+        let mut brightness = vec![0; 10_000];
+        brightness.extend(100..=199);
+        assert_eq!(stretch(&brightness), [102.0, 198.0]);
+        assert_eq!(stretch(&[0, 0]), [255.0, 255.0]);
+    }
+
+    #[test]
+    fn the_archive_contains_the_document_and_no_clock() {
+        let bytes = archive("<qgis/>").unwrap();
+        assert_eq!(document_of(&bytes).unwrap(), "<qgis/>");
+        assert_eq!(archive("<qgis/>").unwrap(), bytes);
+    }
+}
