@@ -1,8 +1,10 @@
 //! The combined adjustment: convergence, observations, corrections, reliability.
 
+use maud::{Markup, html};
+
 use super::{
     corrections, correlation,
-    html::{Cell, Column, Table, counted, folded, heading, paragraph},
+    html::{Cell, Column, Table, counted, folded},
     many,
     numbers::whole,
     plots::{Extent, Panel, Plot, Series, figure, label},
@@ -43,38 +45,29 @@ fn write(
     site: &SiteProducts,
     geometric: &GeometricProducts,
     adjustment: &AdjustmentProducts,
-) -> Result<String> {
+) -> Result<Markup> {
     let adjusted = adjustment.adjusted;
     let summary = &adjusted.summary;
-    let mut html = overview(adjusted);
-    html += &reliability::absolute(site, geometric, adjustment);
-    html += &format!(
-        "<div class=\"plots\">\n{}</div>\n",
-        residuals::distribution(adjusted)?
-    );
-    html += &many::some_of_all(site);
-    html += &residuals::images(site, adjusted);
-    html += &folded(
-        "Observations by kind, and convergence",
-        &format!(
-            "{}<div class=\"plots\">\n{}</div>\n",
-            observations(summary),
-            figure(&convergence(adjusted))?
-        ),
-    );
-    html += &folded(
-        "Corrections to the orientation, ranges and biases",
-        &corrections::tables(site, adjusted),
-    );
-    html += &heading("Reliability");
-    html += &reliability::redundancy(site, adjusted);
-    html += &reliability::correlations(summary);
-    html += &correlation::figures(site, adjusted)?;
-    html += &reliability::rejected(adjusted);
-    Ok(html)
+    Ok(html! {
+        (overview(adjusted))
+        (reliability::absolute(site, geometric, adjustment))
+        div.plots { (residuals::distribution(adjusted)?) }
+        (many::some_of_all(site))
+        (residuals::images(site, adjusted))
+        (folded("Observations by kind, and convergence", &html! {
+            (observations(summary))
+            div.plots { (figure(&convergence(adjusted))?) }
+        }))
+        (folded("Corrections to the orientation, ranges and biases", &corrections::tables(site, adjusted)))
+        h3 { "Reliability" }
+        (reliability::redundancy(site, adjusted))
+        (reliability::correlations(summary))
+        (correlation::figures(site, adjusted)?)
+        (reliability::rejected(adjusted))
+    })
 }
 
-fn overview(adjusted: &Adjusted) -> String {
+fn overview(adjusted: &Adjusted) -> Markup {
     let summary = &adjusted.summary;
     let [along, across] = summary.tie_components;
     let against_configured = |component: f64| {
@@ -114,21 +107,21 @@ fn overview(adjusted: &Adjusted) -> String {
         against_configured(across),
         (label(summary.sigma0, 3), at("/sigma0")),
     ];
-    let mut html = sentence(
+    let words = sentence(
         "{}, {} and {} adjusted together in {}; {} degrees of freedom. Unit-weight σ of tie points {} along track ({}), {} \
          across ({}). σ0 of all observations: {}.",
         &numbers
             .each_ref()
             .map(|(number, place)| (number.clone(), &**place)),
     );
-    if summary.tie_scatter_px > 0.0 {
-        html += &sentence(
+    let scatter = (summary.tie_scatter_px > 0.0).then(|| {
+        sentence(
             "Tie points scatter by {} px along the track in addition to their stated σ, as expected from attitude \
              jitter. The σ of the adjustment include this scatter, and 1.4 times as much (at most 1.5 px) across the track, where residuals do not show it.",
             &[(label(summary.tie_scatter_px, 2), &*at("/tie_scatter_px"))],
-        );
-    }
-    html
+        )
+    });
+    html! { (words) (scatter.unwrap_or_default()) }
 }
 
 /// The weighted sum of squares from iteration to iteration.
@@ -169,7 +162,7 @@ fn convergence(adjusted: &Adjusted) -> Plot {
     }
 }
 
-fn observations(summary: &AdjustmentSummary) -> String {
+fn observations(summary: &AdjustmentSummary) -> Markup {
     let mut table = Table::new(
         "Observations by kind",
         &[
@@ -224,11 +217,11 @@ fn observations(summary: &AdjustmentSummary) -> String {
         "Variance component: √(vᵀPv / redundancy), 1 where the a priori σ is right; by chance: its 99 % interval, lower for \
          heights with robust weights. Beyond {BAARDA_LIMIT}: failed Baarda's test, by chance 1 in 1000."
     );
-    table.finish() + &paragraph(&words) + &outside(summary)
+    html! { (table.finish()) p { (words) } (outside(summary)) }
 }
 
 /// The components that are outside their own interval, and what follows.
-fn outside(summary: &AdjustmentSummary) -> String {
+fn outside(summary: &AdjustmentSummary) -> Markup {
     let listed = |is_outside: fn(&TypeSummary) -> bool| {
         let found = summary.types.iter().filter(|of| is_outside(of));
         let found =
@@ -246,8 +239,9 @@ fn outside(summary: &AdjustmentSummary) -> String {
              it; covariances are not reduced",
         ),
     ];
-    let found = sentences.into_iter().filter(|(kinds, _)| !kinds.is_empty());
-    found
-        .map(|(kinds, words)| paragraph(&format!("{words}: {kinds}.")))
-        .collect()
+    html! {
+        @for (kinds, words) in sentences {
+            @if !kinds.is_empty() { p { (words) ": " (kinds) "." } }
+        }
+    }
 }

@@ -5,8 +5,10 @@ mod profile;
 mod readings;
 mod relief;
 
+use maud::{Markup, html};
+
 use super::{
-    html::{Cell, Column, Table, counted, folded, heading, paragraph},
+    html::{Cell, Column, Table, counted, folded, paragraph},
     misregistration::BeforeAfter,
     numbers::whole,
     plots::{figure, label},
@@ -33,30 +35,27 @@ pub(super) const SECTION: Section = Section {
     ],
     appears: |site| site.geometric.is_some(),
     write: |site| {
-        let geometric = site.geometric.iter();
-        geometric.map(|geometric| write(site, geometric)).collect()
+        let geometric = site.geometric.as_ref();
+        let written = geometric.map(|geometric| write(site, geometric));
+        Ok(written.transpose()?.unwrap_or_default())
     },
 };
 
-fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
+fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<Markup> {
     let adjustment = geometric.adjustment.as_ref();
-    let mut html = adjustment.map_or_else(String::new, |adjustment| {
-        statements(site, geometric, adjustment)
-    });
-    if let Ok(surface) = &geometric.heights.surface {
-        html += &heading("Heights against the MOLA surface");
-        html += &compared(geometric);
-        html += &apart(geometric.heights);
-        html += &format!(
-            "<div class=\"plots\">\n{}</div>\n",
-            figure(&profile::plot(site, geometric))?
-        );
-        html += &folded(
-            "The surface, and heights of footprints by images",
-            &(surface_in_words(surface) + &footprints(geometric)),
-        );
-    }
-    Ok(html)
+    Ok(html! {
+        @if let Some(adjustment) = adjustment { (statements(site, geometric, adjustment)) }
+        @if let Ok(surface) = &geometric.heights.surface {
+            h3 { "Heights against the MOLA surface" }
+            (compared(geometric))
+            (apart(geometric.heights))
+            div.plots { (figure(&profile::plot(site, geometric))?) }
+            (folded("The surface, and heights of footprints by images", &html! {
+                (surface_in_words(surface))
+                (footprints(geometric))
+            }))
+        }
+    })
 }
 
 /// Reason why absolute accuracies are withheld.
@@ -68,7 +67,7 @@ fn statements(
     site: &SiteProducts,
     geometric: &GeometricProducts,
     adjustment: &AdjustmentProducts,
-) -> String {
+) -> Markup {
     let mut table = Table::new(
         "Accuracy of the tie points",
         &[
@@ -129,10 +128,12 @@ fn statements(
     } else {
         relief::relief(adjustment.adjusted, known_beforehand(geometric))
     };
-    table.finish()
-        + &relief
-        + &boresight::boresight(adjustment.adjusted)
-        + &readings::two_readings(adjustment.adjusted, is_withheld)
+    html! {
+        (table.finish())
+        (relief)
+        (boresight::boresight(adjustment.adjusted))
+        (readings::two_readings(adjustment.adjusted, is_withheld))
+    }
 }
 
 fn place_says(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
@@ -273,7 +274,7 @@ fn single_sigmas_m(adjustment: &AdjustmentProducts) -> [f64; 2] {
     })
 }
 
-fn surface_in_words(surface: &SurfaceFigures) -> String {
+fn surface_in_words(surface: &SurfaceFigures) -> Markup {
     const OF: [&str; 4] = [
         "adjustment.json#/before/heights/surface/shots",
         "adjustment.json#/before/heights/surface/profiles",
@@ -292,7 +293,7 @@ fn surface_in_words(surface: &SurfaceFigures) -> String {
     )
 }
 
-fn compared(geometric: &GeometricProducts) -> String {
+fn compared(geometric: &GeometricProducts) -> Markup {
     let mut table = Table::new(
         "Heights of tie points above the MOLA surface, metres",
         &[
@@ -337,7 +338,7 @@ fn compared(geometric: &GeometricProducts) -> String {
 }
 
 /// Heights of footprints that both images of a pair show.
-fn footprints(geometric: &GeometricProducts) -> String {
+fn footprints(geometric: &GeometricProducts) -> Markup {
     let mut table = Table::new(
         "Heights of footprints by the images that show them, above MOLA, metres",
         &[
@@ -385,14 +386,14 @@ fn footprints(geometric: &GeometricProducts) -> String {
         }
     }
     if rows == 0 {
-        return String::new();
+        return Markup::default();
     }
     let words = "Relief between tie points affects single heights; where it has one sign along a profile, it affects \
                  the median as well.";
-    BeforeAfter::some_of_all(geometric) + &table.finish() + &paragraph(words)
+    html! { (BeforeAfter::some_of_all(geometric)) (table.finish()) p { (words) } }
 }
 
-fn apart(check: &HeightCheck) -> String {
+fn apart(check: &HeightCheck) -> Markup {
     const OF: [&str; 2] = [
         "|adjustment.json#/before/heights/profiles_apart/mean_m",
         "adjustment.json#/before/heights/profiles_apart/sigma_m",

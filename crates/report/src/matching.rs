@@ -1,5 +1,7 @@
 //! Tie points measured by areograph: the number of places tried, and their outcomes.
 
+use maud::{Markup, html};
+
 use super::{
     html::{Column, Table, paragraph},
     misregistration::PAIRS_TABLED,
@@ -40,9 +42,9 @@ fn tabled(pairs: &[MatchedPair]) -> Vec<&MatchedPair> {
     tabled.into_iter().map(|(_, pair)| pair).collect()
 }
 
-fn some_of_all(all: &[MatchedPair], tabled: &[&MatchedPair]) -> String {
+fn some_of_all(all: &[MatchedPair], tabled: &[&MatchedPair]) -> Markup {
     if tabled.len() == all.len() {
-        return String::new();
+        return Markup::default();
     }
     paragraph(&format!(
         "The table lists {} of {} pairs: rejected pairs first, then those with the fewest tie points.",
@@ -51,7 +53,7 @@ fn some_of_all(all: &[MatchedPair], tabled: &[&MatchedPair]) -> String {
     ))
 }
 
-fn write(site: &SiteProducts, ties: &Ties) -> String {
+fn write(site: &SiteProducts, ties: &Ties) -> Markup {
     let mut table = Table::new(
         "Matched pairs",
         &[
@@ -85,10 +87,13 @@ fn write(site: &SiteProducts, ties: &Ties) -> String {
             ],
         );
     }
-    paragraph(
+    html! {
+        p {
         "In each cell of common ground the point with the strongest texture was matched to the other image and back. \
          σ: medians of \
-         single matches, in the second image. The table shows the second pass, which starts from the adjusted orientation.",
-    ) + &some_of_all(&ties.matched, &matched)
-        + &table.finish()
+         single matches, in the second image. The table shows the second pass, which starts from the adjusted orientation."
+        }
+        (some_of_all(&ties.matched, &matched))
+        (table.finish())
+    }
 }

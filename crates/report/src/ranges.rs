@@ -2,8 +2,10 @@
 
 mod plots;
 
+use maud::{Markup, html};
+
 use super::{
-    html::{Cell, Column, Table, escape, folded, folded_unless, heading, paragraph},
+    html::{Cell, Column, Table, folded, folded_unless, paragraph},
     numbers::{number, whole},
     plots::label,
     section::Section,
@@ -30,7 +32,7 @@ pub(super) const SECTION: Section = Section {
     write,
 };
 
-fn write(site: &SiteProducts) -> Result<String> {
+fn write(site: &SiteProducts) -> Result<Markup> {
     if site.profiles.is_empty() {
         return Ok(paragraph("No profile."));
     }
@@ -42,26 +44,29 @@ fn write(site: &SiteProducts) -> Result<String> {
     {
         return Ok(untested(site));
     }
-    let figures = format!("<div class=\"plots\">\n{}</div>\n", plots::figures(site)?);
+    let figures = html! { div.plots { (plots::figures(site)?) } };
     if many(site) {
         let title = format!("Tables of all {} profiles", whole(site.profiles.len()));
-        let tables = statistics(site) + &limits(site) + &three_ways(site);
-        return Ok(all_profiles(site) + &figures + &folded(&title, &tables));
+        let tables = html! { (statistics(site)) (limits(site)) (three_ways(site)) };
+        return Ok(html! { (all_profiles(site)) (figures) (folded(&title, &tables)) });
     }
     let profiles = &site.ranges.profiles;
     let invalid = profiles
         .iter()
         .any(|profile| !profile.invalid_because.is_empty());
-    let ways = folded_unless(
-        invalid,
-        "Limits, and three ways to check a range",
-        &(limits(site) + &three_ways(site)),
-    );
-    Ok(statistics(site) + &ways + &heading("Along the profiles") + &figures)
+    Ok(html! {
+        (statistics(site))
+        (folded_unless(invalid, "Limits, and three ways to check a range", &html! {
+            (limits(site))
+            (three_ways(site))
+        }))
+        h3 { "Along the profiles" }
+        (figures)
+    })
 }
 
 /// Statement where no range is compared with anything.
-fn untested(site: &SiteProducts) -> String {
+fn untested(site: &SiteProducts) -> Markup {
     let mut table = Table::new(
         "Profiles whose ranges are not tested",
         &[
@@ -74,11 +79,14 @@ fn untested(site: &SiteProducts) -> String {
         true,
         [whole(site.profiles.len()).into(), whole(shots).into()],
     );
-    paragraph(
+    html! {
+        p {
         "The ranges are not tested: the tables contain no position of the spacecraft, and no kernels cover the shots. The \
          spacecraft is placed on the radius through the footprint at the range (nadir by range); its distance from the \
-         footprint is the range.",
-    ) + &table.finish()
+         footprint is the range."
+        }
+        (table.finish())
+    }
 }
 
 /// Millimetres suffice for ranges recorded in centimetres.
@@ -87,7 +95,7 @@ pub(super) fn metres(value: f64) -> String {
 }
 
 /// All profiles in one row.
-fn all_profiles(site: &SiteProducts) -> String {
+fn all_profiles(site: &SiteProducts) -> Markup {
     let mut table = Table::new(
         "Range − distance of all profiles, metres",
         &[
@@ -142,7 +150,7 @@ fn all_profiles(site: &SiteProducts) -> String {
     table.finish()
 }
 
-fn statistics(site: &SiteProducts) -> String {
+fn statistics(site: &SiteProducts) -> Markup {
     let limits = &site.config.range_check;
     let mut table = Table::new(
         "Range − distance per profile (Table 3 of Shan et al. 2005), metres",
@@ -209,7 +217,7 @@ fn statistics(site: &SiteProducts) -> String {
 }
 
 /// Limits of the table of the profiles.
-fn limits(site: &SiteProducts) -> String {
+fn limits(site: &SiteProducts) -> Markup {
     let limits = &site.config.range_check;
     sentence(
         "Judged: profiles of at least {} shots. Limits: at most {} % outliers (beyond {} robust σ of the median). Bars: share of a limit that is used.",
@@ -270,7 +278,7 @@ fn known(of: &Summary, name: &str) -> Cell {
     }
 }
 
-fn three_ways(site: &SiteProducts) -> String {
+fn three_ways(site: &SiteProducts) -> Markup {
     let limits = &site.config.range_check;
     let mut table = Table::new(
         "The three ways to check a range, means in metres",
@@ -325,37 +333,38 @@ fn three_ways(site: &SiteProducts) -> String {
             ],
         );
     }
-    let mut words = vec!["Limits apply to means without outliers.".to_owned()];
-    if site.config.shots.is_empty() {
-        words.push(escape(
-            "Crossover radius: the MOLA team's adjustment, which moves footprints, not ranges.",
-        ));
-    }
-    words.push(filled(
+    let own = filled(
         "PEDR's own orbit: without kernels; a mean beyond ±{} m indicates a reading error.",
         &[(
             limits.decoding_max_m.to_string(),
             "ranges.json#/limits/decoding_max_m",
         )],
-    ));
-    let mut orbits = filled(
+    );
+    let orbits = filled(
         "PEDR − kernels: spacecraft positions, inertial axes; beyond {} m orbit, clock or datum differ.",
         &[(
             limits.orbit_max_m.to_string(),
             "ranges.json#/limits/orbit_max_m",
         )],
     );
-    // A table's own spacecraft and the spacecraft of support data are not tabulated.
-    if site.ranges.trajectory_error_m > 0.0 {
-        orbits += &filled(
-            " Trajectory tabulated to {} mm.",
-            &[(
-                number(1e3 * site.ranges.trajectory_error_m, 3),
-                "ranges.json#/trajectory_error_m*1000",
-            )],
-        );
+    let error_m = site.ranges.trajectory_error_m;
+    let tabulated = filled(
+        " Trajectory tabulated to {} mm.",
+        &[(
+            number(1e3 * error_m, 3),
+            "ranges.json#/trajectory_error_m*1000",
+        )],
+    );
+    html! {
+        (table.finish())
+        ul {
+            li { "Limits apply to means without outliers." }
+            @if site.config.shots.is_empty() {
+                li { "Crossover radius: the MOLA team's adjustment, which moves footprints, not ranges." }
+            }
+            li { (own) }
+            // A table's own spacecraft and the spacecraft of support data are not tabulated.
+            li { (orbits) @if error_m > 0.0 { (tabulated) } }
+        }
     }
-    words.push(orbits);
-    let words: Vec<String> = words.iter().map(|of| format!("<li>{of}</li>\n")).collect();
-    table.finish() + &format!("<ul>\n{}</ul>\n", words.concat())
 }

@@ -1,6 +1,8 @@
 //! Reliability of the adjustment: absolute position, gross errors that no
 //! residual shows, unknowns that cannot be separated, and rejected points.
 
+use maud::{Markup, html};
+
 use super::{
     heights::{WITHHELD_BECAUSE, known_beforehand, place_by},
     html::{Cell, Column, Table, counted, folded, paragraph},
@@ -34,7 +36,7 @@ pub(super) fn absolute(
     site: &SiteProducts,
     geometric: &GeometricProducts,
     adjustment: &AdjustmentProducts,
-) -> String {
+) -> Markup {
     const MOVED: [&str; 3] = [
         "adjustment.json#/adjustment/summary/ties/corrections_m/0/mean",
         "adjustment.json#/adjustment/summary/ties/corrections_m/1/mean",
@@ -168,7 +170,7 @@ impl Controlled {
 }
 
 /// Share of a gross error visible in its own residual.
-pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
+pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> Markup {
     let all = Controlled::all(site, adjusted);
     let mut table = Table::new(
         "Redundancy: fraction of a gross error visible in its own residual",
@@ -181,7 +183,7 @@ pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
             Column::Number("smallest detectable error"),
         ],
     );
-    let mut sentences = String::new();
+    let mut sentences = Vec::new();
     for of in &all {
         let found = Summary::of(&of.redundancies);
         let [mean, least, most] = [found.mean, found.min, found.max].map(per_cent);
@@ -192,7 +194,7 @@ pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
             "only large ones are detected"
         };
         if found.mean < SHOWN {
-            sentences += &paragraph(&format!(
+            sentences.push(format!(
                 "A gross error in a {} shows only {mean} in its residual: {consequence}.",
                 of.name
             ));
@@ -210,8 +212,11 @@ pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
         );
     }
     let words = "Shown: the redundancy number r; detectable by Baarda's test (3.29, power 80 %): 4.13 σ/√r.";
-    let table = table.finish() + &paragraph(words);
-    sentences + &folded("Redundancy by kind of observation", &table)
+    let table = html! { (table.finish()) p { (words) } };
+    html! {
+        @for sentence in sentences { p { (sentence) } }
+        (folded("Redundancy by kind of observation", &table))
+    }
 }
 
 /// A share; one that rounds to zero is still shown.
@@ -224,19 +229,19 @@ fn per_cent(share: f64) -> String {
 }
 
 /// Unknowns that cannot be separated.
-pub(super) fn correlations(summary: &AdjustmentSummary) -> String {
+pub(super) fn correlations(summary: &AdjustmentSummary) -> Markup {
     let mut all: Vec<_> = summary.correlated.iter().enumerate().collect();
     all.sort_by(|(_, a), (_, b)| b.2.abs().total_cmp(&a.2.abs()));
     let Some((_, (first, second, largest))) = all.first() else {
         return paragraph("No two unknowns of the adjustment correlate by more than 0.95.");
     };
     let sum = if *largest < 0.0 { "sum" } else { "difference" };
-    let mut html = paragraph(&format!(
+    let words = format!(
         "{} correlate by more than 0.95, most of all {first} and {second} ({}): only their {sum}, each over its σ, is determined. \
          Do not interpret the single values.",
         counted(all.len(), "pair") + " of unknowns",
         label(*largest, 4)
-    ));
+    );
     let columns = &[
         Column::Number("correlation"),
         Column::Text("unknown"),
@@ -251,19 +256,15 @@ pub(super) fn correlations(summary: &AdjustmentSummary) -> String {
             [coefficient, first.into(), second.into()],
         );
     }
-    html += &table.finish();
-    html + &rest(all.len(), CORRELATED_SHOWN)
+    html! { p { (words) } (table.finish()) (rest(all.len(), CORRELATED_SHOWN)) }
 }
 
-fn rest(all: usize, shown: usize) -> String {
-    if all <= shown {
-        return String::new();
-    }
-    paragraph(&format!("And {} more.", all - shown))
+fn rest(all: usize, shown: usize) -> Markup {
+    html! { @if all > shown { p { "And " (all - shown) " more." } } }
 }
 
 /// Points that the adjustment rejected.
-pub(super) fn rejected(adjusted: &Adjusted) -> String {
+pub(super) fn rejected(adjusted: &Adjusted) -> Markup {
     let mut blunders = Vec::new();
     let mut undetermined = [0_usize; 2];
     for point in &adjusted.rejected {
@@ -278,17 +279,13 @@ pub(super) fn rejected(adjusted: &Adjusted) -> String {
             RejectionReason::NotIntersected => {}
         }
     }
-    let mut html = String::new();
-    for (count, what) in undetermined.into_iter().zip(["footprint", "tie point"]) {
-        if count > 0 {
-            html += &paragraph(&format!(
-                "{} rejected as not determined.",
-                counted(count, what)
-            ));
+    let undetermined = html! {
+        @for (count, what) in undetermined.into_iter().zip(["footprint", "tie point"]) {
+            @if count > 0 { p { (counted(count, what)) " rejected as not determined." } }
         }
-    }
+    };
     if blunders.is_empty() {
-        return html + &paragraph("No tie point was rejected as a blunder.");
+        return html! { (undetermined) p { "No tie point was rejected as a blunder." } };
     }
     let columns = &[
         Column::Text("tie point"),
@@ -298,5 +295,5 @@ pub(super) fn rejected(adjusted: &Adjusted) -> String {
     for (id, standardised) in blunders.iter().take(BLUNDERS_SHOWN) {
         table.row(true, [(*id).into(), label(*standardised, 1).into()]);
     }
-    html + &table.finish() + &rest(blunders.len(), BLUNDERS_SHOWN)
+    html! { (undetermined) (table.finish()) (rest(blunders.len(), BLUNDERS_SHOWN)) }
 }

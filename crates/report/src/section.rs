@@ -1,5 +1,7 @@
 //! Declaration of a section of a site's page.
 
+use maud::{Markup, PreEscaped};
+
 use super::html;
 use areograph_base::{error::Result, verdict::CheckKind};
 use areograph_products::SiteProducts;
@@ -16,8 +18,8 @@ pub struct Section {
     pub checks: &'static [CheckKind],
     /// Whether the page of this site has it.
     pub appears: fn(&SiteProducts) -> bool,
-    /// Its body as HTML; fails if a plot cannot be drawn.
-    pub write: fn(&SiteProducts) -> Result<String>,
+    /// Its body; fails if a plot cannot be drawn.
+    pub write: fn(&SiteProducts) -> Result<Markup>,
 }
 
 impl Section {
@@ -30,7 +32,7 @@ impl Section {
             return Ok(None);
         }
         let wording = site.config.wording();
-        let body = wording.of((self.write)(site)?).into_owned();
+        let body = PreEscaped(wording.of((self.write)(site)?.0).into_owned());
         let title = wording.of(self.title);
         Ok(Some(html::Section::named(self.anchor, title, body)))
     }

@@ -4,6 +4,7 @@ mod features;
 
 use std::{f64::consts::TAU, fmt::Write as _};
 
+use maud::Markup;
 use plotters::{prelude::*, style::text_anchor::HPos};
 
 use self::features::{FEATURES, Feature, Kind};
@@ -54,9 +55,9 @@ pub(super) struct Place<'a> {
 ///
 /// # Errors
 /// A drawing that cannot be made.
-pub(super) fn figure(body: Body, places: &[Place]) -> Result<String> {
+pub(super) fn figure(body: Body, places: &[Place]) -> Result<Markup> {
     if places.is_empty() {
-        return Ok(String::new());
+        return Ok(Markup::default());
     }
     let features: Vec<&Feature> = FEATURES.iter().filter(|of| of.body == body).collect();
     let (names, unnamed) = names(places, &features);

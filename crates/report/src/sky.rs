@@ -2,6 +2,7 @@
 
 use std::{f64::consts::TAU, fmt::Write as _};
 
+use maud::Markup;
 use nalgebra::Vector3;
 use plotters::prelude::*;
 
@@ -44,11 +45,11 @@ struct Seen<'a> {
 ///
 /// # Errors
 /// A drawing that cannot be made.
-pub(super) fn figure(site: &SiteProducts) -> Result<String> {
+pub(super) fn figure(site: &SiteProducts) -> Result<Markup> {
     let drawn_images = many::drawn(site);
     let seen: Vec<Seen> = drawn_images.iter().filter_map(seen).collect();
     if seen.len() < 2 {
-        return Ok(String::new());
+        return Ok(Markup::default());
     }
     let sky = Sky::of(&seen);
     let svg = drawn(HEIGHT, |area| sky.draw(area))?;

@@ -2,6 +2,8 @@
 
 use std::collections::{HashMap, HashSet};
 
+use maud::Markup;
+
 use super::super::{
     html::{Cell, paragraph},
     numbers::whole,
@@ -72,13 +74,13 @@ impl<'a> BeforeAfter<'a> {
     }
 
     /// A paragraph that states that rows are of some pairs only; empty where they are of all.
-    pub(crate) fn some_of_all(geometric: &GeometricProducts) -> String {
+    pub(crate) fn some_of_all(geometric: &GeometricProducts) -> Markup {
         match geometric.pairs.len() {
             all if all > PAIRS_TABLED => paragraph(&format!(
                 "Rows are of the {PAIRS_TABLED} of {} pairs with the largest along-track parallax; adjustment.json has all.",
                 whole(all)
             )),
-            _ => String::new(),
+            _ => Markup::default(),
         }
     }
 

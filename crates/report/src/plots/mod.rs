@@ -18,6 +18,7 @@ pub(super) use palette::{COLOURS, GREY, GRID, INK, MARK, SOFT};
 
 use std::fmt::Write as _;
 
+use maud::Markup;
 use plotters::{
     coord::{ranged1d::Ranged as _, types::RangedCoordf64},
     style::RGBColor,
@@ -228,7 +229,7 @@ pub(super) fn quoted(text: &str) -> String {
 ///
 /// # Errors
 /// A plot that the library rejects, which is a bug in areograph.
-pub(super) fn figure(plot: &Plot) -> Result<String> {
+pub(super) fn figure(plot: &Plot) -> Result<Markup> {
     if plot.drawn().next().is_none() {
         return Ok(paragraph(&format!(
             "{}: {}",
