@@ -1,16 +1,14 @@
 //! The combined adjustment: convergence, observations, corrections, reliability.
 
-use maud::{Markup, html};
-
 use super::{
     corrections, correlation,
-    html::{Cell, Column, Table, counted, folded},
+    html::{Cell, Column, Markup, Table, counted, folded, html},
     many,
     numbers::whole,
     plots::{Extent, Panel, Plot, Series, figure, label},
     reliability, residuals,
     section::Section,
-    source::sentence,
+    source::traced,
 };
 use areograph_base::{error::Result, verdict::CheckKind};
 use areograph_geom::statistics::BAARDA_LIMIT;
@@ -71,7 +69,7 @@ fn overview(adjusted: &Adjusted) -> Markup {
     let summary = &adjusted.summary;
     let [along, across] = summary.tie_components;
     let against_configured = |component: f64| {
-        let words = if summary.degrees_of_freedom == 0 {
+        if summary.degrees_of_freedom == 0 {
             "no redundancy"
         } else if component < WORSE_THAN_CONFIGURED.recip() {
             "better than configured"
@@ -79,49 +77,34 @@ fn overview(adjusted: &Adjusted) -> Markup {
             "as configured"
         } else {
             "worse than configured"
-        };
-        (words.to_owned(), String::new())
+        }
     };
-    let at = |pointer: &str| format!("adjustment.json#/adjustment/summary{pointer}");
-    let numbers = [
-        (
-            counted(adjusted.images.len(), "image"),
-            "manifest.json#/counts/images".to_owned(),
-        ),
-        (
-            counted(summary.shots.corrections_m[0].n as usize, "footprint"),
-            at("/shots/corrections_m/0/n"),
-        ),
-        (
-            counted(summary.ties.corrections_m[0].n as usize, "tie point"),
-            at("/ties/corrections_m/0/n"),
-        ),
-        (counted(summary.steps, "iteration"), at("/steps")),
-        (
-            summary.degrees_of_freedom.to_string(),
-            at("/degrees_of_freedom"),
-        ),
-        (label(along, 3), at("/tie_components/0")),
-        against_configured(along),
-        (label(across, 3), at("/tie_components/1")),
-        against_configured(across),
-        (label(summary.sigma0, 3), at("/sigma0")),
-    ];
-    let words = sentence(
-        "{}, {} and {} adjusted together in {}; {} degrees of freedom. Unit-weight σ of tie points {} along track ({}), {} \
-         across ({}). σ0 of all observations: {}.",
-        &numbers
-            .each_ref()
-            .map(|(number, place)| (number.clone(), &**place)),
-    );
-    let scatter = (summary.tie_scatter_px > 0.0).then(|| {
-        sentence(
-            "Tie points scatter by {} px along the track in addition to their stated σ, as expected from attitude \
-             jitter. The σ of the adjustment include this scatter, and 1.4 times as much (at most 1.5 px) across the track, where residuals do not show it.",
-            &[(label(summary.tie_scatter_px, 2), &*at("/tie_scatter_px"))],
+    let of = |text: &str, pointer: &str| {
+        traced(
+            text,
+            &format!("adjustment.json#/adjustment/summary{pointer}"),
         )
-    });
-    html! { (words) (scatter.unwrap_or_default()) }
+    };
+    html! {
+        p {
+            (traced(&counted(adjusted.images.len(), "image"), "manifest.json#/counts/images")) ", "
+            (of(&counted(summary.shots.corrections_m[0].n as usize, "footprint"), "/shots/corrections_m/0/n")) " and "
+            (of(&counted(summary.ties.corrections_m[0].n as usize, "tie point"), "/ties/corrections_m/0/n"))
+            " adjusted together in " (of(&counted(summary.steps, "iteration"), "/steps")) "; "
+            (of(&summary.degrees_of_freedom.to_string(), "/degrees_of_freedom"))
+            " degrees of freedom. Unit-weight σ of tie points " (of(&label(along, 3), "/tie_components/0"))
+            " along track (" (against_configured(along)) "), " (of(&label(across, 3), "/tie_components/1"))
+            " across (" (against_configured(across)) "). σ0 of all observations: "
+            (of(&label(summary.sigma0, 3), "/sigma0")) "."
+        }
+        @if summary.tie_scatter_px > 0.0 {
+            p {
+                "Tie points scatter by " (of(&label(summary.tie_scatter_px, 2), "/tie_scatter_px"))
+                " px along the track in addition to their stated σ, as expected from attitude \
+                 jitter. The σ of the adjustment include this scatter, and 1.4 times as much (at most 1.5 px) across the track, where residuals do not show it."
+            }
+        }
+    }
 }
 
 /// The weighted sum of squares from iteration to iteration.

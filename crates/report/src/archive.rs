@@ -2,11 +2,11 @@
 
 mod worst;
 
-use maud::{Markup, html};
-
 use self::worst::worst_profiles;
 use super::{
-    html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, verdict},
+    html::{
+        Cell, Column, Markup, Section, Table, Tone, counted, html, list, page, paragraph, verdict,
+    },
     plots::{Extent, GREY, Panel, Plot, Series, Style, figure, label, thinned},
 };
 use areograph_base::{
@@ -283,25 +283,13 @@ fn not_checked(ranges: &ArchiveRanges) -> Markup {
             grouped(ranges.sum(|file| file.not_covered))
         )
     };
-    let failures: Vec<String> = ranges
-        .failures
-        .iter()
-        .take(LISTED)
-        .map(|failure| format!("{}: {}", failure.file, failure.why))
-        .collect();
-    let complaints: Vec<String> = ranges
+    let complaints = ranges
         .files
         .iter()
-        .filter(|file| file.found.complaint_count > 0)
-        .take(LISTED)
-        .map(|file| {
-            let first = file.found.complaints.first().map_or("", String::as_str);
-            format!(
-                "{} problems, the first: {first}",
-                file.found.complaint_count
-            )
-        })
-        .collect();
+        .map(|file| &file.found)
+        .filter(|found| found.complaint_count > 0)
+        .take(LISTED);
+    let complaints: Vec<_> = complaints.collect();
     let mut rejected = std::collections::BTreeMap::new();
     for (reason, count) in ranges.files.iter().flat_map(|file| &file.found.rejected) {
         *rejected.entry(reason.to_string()).or_insert(0) += count;
@@ -312,31 +300,28 @@ fn not_checked(ranges: &ArchiveRanges) -> Markup {
         .collect();
     html! {
         p { (coverage) }
-        @if !failures.is_empty() {
+        @if !ranges.failures.is_empty() {
             p { "Not read, or not read again, " (ranges.failures.len()) " in all:" }
-            (list(&failures))
+            ul {
+                @for failure in ranges.failures.iter().take(LISTED) { li { (failure.file) ": " (failure.why) } }
+            }
         }
         @if !complaints.is_empty() {
             p { "Records inconsistent internally or with neighbours were rejected:" }
-            (list(&complaints))
+            ul {
+                @for found in complaints {
+                    li {
+                        (found.complaint_count) " problems, the first: "
+                        (found.complaints.first().map_or("", String::as_str))
+                    }
+                }
+            }
         }
         @if !rejected.is_empty() { p { "Shots rejected by the filter: " (rejected.join(", ")) "." } }
     }
 }
 
 fn how(ranges: &ArchiveRanges) -> Markup {
-    let kernels: Vec<String> = ranges
-        .kernels
-        .iter()
-        .map(|kernel| {
-            format!(
-                "{} ({}), BLAKE3 {}…",
-                kernel.name,
-                kernel.role,
-                short(&kernel.blake3)
-            )
-        })
-        .collect();
     let positions = format!(
         "Positions are interpolated by Chebyshev polynomials within {TRAJECTORY_TOLERANCE_M} m of CSPICE; the \
          largest difference at independent instants is {:.1e} m. States are geometric.",
@@ -347,7 +332,13 @@ fn how(ranges: &ArchiveRanges) -> Markup {
         label(ranges.clock.correction_s(), 3),
         ranges.clock.source
     );
-    html! { p { (positions) } p { (clock) } p { "Kernels:" } (list(&kernels)) }
+    html! { p { (positions) } p { (clock) } p { "Kernels:" }
+        ul {
+            @for kernel in &ranges.kernels {
+                li { (kernel.name) " (" (kernel.role) "), BLAKE3 " (short(&kernel.blake3)) "…" }
+            }
+        }
+    }
 }
 
 fn short(hash: &str) -> &str {

@@ -1,11 +1,11 @@
 //! The page of a calibration: verdict, figures of every step, directions not determined by ties, cameras, other orbits.
 
-use maud::{Markup, html};
-
 use super::{
     calibration_rounds::rounds as rounds_of,
     checks,
-    html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, verdict},
+    html::{
+        Cell, Column, Markup, Section, Table, Tone, counted, html, list, page, paragraph, verdict,
+    },
     numbers::signed,
     plots::{Panel, Plot, Series, figure, label, thinned},
 };
@@ -152,12 +152,10 @@ fn steps(of: &Calibration) -> Markup {
             table.row(true, cells);
         }
     }
-    let free: Vec<String> = of
-        .steps
-        .iter()
-        .map(|step| format!("{}: adjusted {}", step.step, step.free))
-        .collect();
-    html! { (table.finish()) (list(&free)) }
+    html! {
+        (table.finish())
+        ul { @for step in &of.steps { li { (step.step) ": adjusted " (step.free) } } }
+    }
 }
 
 fn residuals(of: &Calibration) -> Result<Markup> {

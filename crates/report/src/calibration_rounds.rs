@@ -1,9 +1,7 @@
 //! The rounds of a calibration from pixels: a table and a figure.
 
-use maud::{Markup, html};
-
 use super::{
-    html::{Cell, Column, Table},
+    html::{Cell, Column, Markup, Table, html},
     numbers::signed,
     plots::{Panel, Plot, Series, figure, label},
 };

@@ -1,9 +1,7 @@
 //! The table of the first screen: every limit of the site with the value that uses most of it, the worst first.
 
-use maud::{Markup, html};
-
 use super::{
-    html::{Cell, Column, Table, Tone, link, list},
+    html::{Cell, Column, Markup, Table, Tone, html, link, list},
     numbers::{number, signed, whole},
     section::Section,
 };

@@ -1,9 +1,7 @@
 //! The clock corrections and the datum as used, with their sources.
 
-use maud::{Markup, html};
-
 use super::{
-    html::{Column, Table, counted, folded},
+    html::{Column, Markup, Table, counted, folded, html},
     many,
     numbers::{number as label, signed, whole},
     section::Section,

@@ -1,9 +1,7 @@
 //! The page of a comparison of rival kernel sets.
 
-use maud::{Markup, html};
-
 use super::{
-    html::{Cell, Column, Section, Table, Tone, list, page, paragraph, verdict},
+    html::{Cell, Column, Markup, Section, Table, Tone, html, list, page, paragraph, verdict},
     numbers::{signed, whole},
     plots::{Panel, Plot, Series, Style, figure, label, thinned},
 };

@@ -1,9 +1,7 @@
 //! Appendix: cost of the published iterations from ground to image, figure 4 of Shan et al. 2005 for this site.
 
-use maud::{Markup, html};
-
 use super::{
-    html::{Cell, Column, Table, folded},
+    html::{Cell, Column, Markup, Table, folded, html},
     many,
     numbers::whole,
     plots::{Panel, Plot, Series, figure, label},

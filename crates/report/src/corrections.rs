@@ -2,11 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use maud::{Markup, html};
 use nalgebra::Vector3;
 
 use super::{
-    html::{Cell, Column, Table, paragraph},
+    html::{Cell, Column, Markup, Table, html, paragraph},
     many,
     plots::label,
 };
@@ -95,14 +94,14 @@ fn positions(site: &SiteProducts, adjusted: &Adjusted) -> Markup {
 fn line_times(adjusted: &Adjusted) -> Markup {
     let largest_s = adjusted.images.iter().map(|image| image.line_time_sigma_s);
     let largest_s = largest_s.fold(0.0, f64::max);
-    if largest_s > 0.0 {
-        paragraph(&format!(
-            "±: for the camera at the exposure of a line. Line times are known to ±{} ms; along the track they cannot be \
-             separated from position and rotation, which are to be used together.",
-            label(largest_s / SECONDS_PER_MS, 0)
-        ))
-    } else {
-        Markup::default()
+    html! {
+        @if largest_s > 0.0 {
+            p {
+                "±: for the camera at the exposure of a line. Line times are known to ±"
+                (label(largest_s / SECONDS_PER_MS, 0)) " ms; along the track they cannot be \
+                 separated from position and rotation, which are to be used together."
+            }
+        }
     }
 }
 
@@ -219,14 +218,14 @@ fn checked_ranges(site: &SiteProducts) -> BTreeMap<(usize, usize), f64> {
 
 /// Offset of the attitude's clock, if it is an unknown.
 fn attitude_clock(adjusted: &Adjusted) -> Markup {
-    adjusted.attitude_clock_s
-        .map_or_else(Markup::default, |(offset_s, sigma_s)| {
-            paragraph(&format!(
-                "Offset of the attitude's clock, all images: {} ± {} s; the rotations above include it.",
-                label(offset_s, 3),
-                label(sigma_s, 3)
-            ))
-        })
+    html! {
+        @if let Some((offset_s, sigma_s)) = adjusted.attitude_clock_s {
+            p {
+                "Offset of the attitude's clock, all images: " (label(offset_s, 3)) " ± " (label(sigma_s, 3))
+                " s; the rotations above include it."
+            }
+        }
+    }
 }
 
 fn biases(adjusted: &Adjusted) -> Markup {

@@ -2,11 +2,10 @@
 
 use std::fmt::Write as _;
 
-use maud::{Markup, html};
 use plotters::{prelude::*, style::text_anchor::HPos};
 
 use super::{
-    html::folded_unless,
+    html::{Markup, folded_unless, html},
     map::labels::{LETTERS, write},
     plots::{Canvas, Drawn, INK, Key, WIDTH, drawn, figure_html, label, quoted},
 };

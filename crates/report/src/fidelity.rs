@@ -1,8 +1,6 @@
 //! The page that compares every number of the papers with areograph's.
 
-use maud::{Markup, html};
-
-use super::html::{Cell, Column, Section, Table, embedded_style, page, paragraph};
+use super::html::{Cell, Column, Markup, Section, Table, embedded_style, html, page, paragraph};
 
 /// The page of this version, which `tests/products/fidelity.rs` makes and checks; it has the style of all pages, by a
 /// link.

@@ -5,15 +5,13 @@ mod profile;
 mod readings;
 mod relief;
 
-use maud::{Markup, html};
-
 use super::{
-    html::{Cell, Column, Table, counted, folded, paragraph},
+    html::{Cell, Column, Markup, Table, counted, folded, html, paragraph},
     misregistration::BeforeAfter,
     numbers::whole,
     plots::{figure, label},
     section::Section,
-    source::sentence,
+    source::traced,
 };
 use areograph_base::{error::Result, footprints::AdjustmentModel, verdict::CheckKind};
 use areograph_products::{AdjustmentProducts, GeometricProducts, SiteProducts};
@@ -122,9 +120,7 @@ fn statements(
         table.row(true, cells.map(Cell::from));
     }
     let relief = if is_withheld && adjustment.adjusted.heights.is_some() {
-        paragraph(&format!(
-            "The accuracy of position by relief is withheld: {WITHHELD_BECAUSE}."
-        ))
+        html! { p { "The accuracy of position by relief is withheld: " (WITHHELD_BECAUSE) "." } }
     } else {
         relief::relief(adjustment.adjusted, known_beforehand(geometric))
     };
@@ -275,22 +271,20 @@ fn single_sigmas_m(adjustment: &AdjustmentProducts) -> [f64; 2] {
 }
 
 fn surface_in_words(surface: &SurfaceFigures) -> Markup {
-    const OF: [&str; 4] = [
-        "adjustment.json#/before/heights/surface/shots",
-        "adjustment.json#/before/heights/surface/profiles",
-        "adjustment.json#/before/heights/surface/roughness_m",
-        "adjustment.json#/before/heights/surface/slope",
-    ];
-    sentence(
-        "Surface kriged from {} shots of {}; {} m RMS over 300 m, slope {} per axis. Errors at \
-         neighbouring tie points are correlated, so averaging reduces them little.",
-        &[
-            (whole(surface.shots), OF[0]),
-            (counted(surface.profiles, "profile"), OF[1]),
-            (label(surface.roughness_m, 1), OF[2]),
-            (label(surface.slope, 3), OF[3]),
-        ],
-    )
+    let of = |text: &str, name: &str| {
+        traced(
+            text,
+            &format!("adjustment.json#/before/heights/surface/{name}"),
+        )
+    };
+    html! {
+        p {
+            "Surface kriged from " (of(&whole(surface.shots), "shots")) " shots of "
+            (of(&counted(surface.profiles, "profile"), "profiles")) "; " (of(&label(surface.roughness_m, 1), "roughness_m"))
+            " m RMS over 300 m, slope " (of(&label(surface.slope, 3), "slope")) " per axis. Errors at \
+             neighbouring tie points are correlated, so averaging reduces them little."
+        }
+    }
 }
 
 fn compared(geometric: &GeometricProducts) -> Markup {
@@ -394,10 +388,6 @@ fn footprints(geometric: &GeometricProducts) -> Markup {
 }
 
 fn apart(check: &HeightCheck) -> Markup {
-    const OF: [&str; 2] = [
-        "|adjustment.json#/before/heights/profiles_apart/mean_m",
-        "adjustment.json#/before/heights/profiles_apart/sigma_m",
-    ];
     let Some(apart) = &check.apart else {
         return paragraph("A single profile provides no independent test of the surface.");
     };
@@ -407,13 +397,13 @@ fn apart(check: &HeightCheck) -> Markup {
     } else {
         (first, second)
     };
-    sentence(
-        "At the tie points the surface interpolated from {} alone lies {} m above that from {} alone (expected σ {} m).",
-        &[
-            (upper.clone(), ""),
-            (label(apart.mean_m.abs(), 1), OF[0]),
-            (lower.clone(), ""),
-            (label(apart.sigma_m, 1), OF[1]),
-        ],
-    )
+    let mean_m = label(apart.mean_m.abs(), 1);
+    html! {
+        p {
+            "At the tie points the surface interpolated from " (upper) " alone lies "
+            (traced(&mean_m, "|adjustment.json#/before/heights/profiles_apart/mean_m"))
+            " m above that from " (lower) " alone (expected σ "
+            (traced(&label(apart.sigma_m, 1), "adjustment.json#/before/heights/profiles_apart/sigma_m")) " m)."
+        }
+    }
 }

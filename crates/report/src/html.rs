@@ -1,8 +1,9 @@
-//! Pieces of HTML.
+//! Pieces of HTML; `html!` escapes every text.
 
 use std::borrow::Cow;
 
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::DOCTYPE;
+pub(super) use maud::{Markup, PreEscaped, html};
 
 use super::numbers::whole;
 

@@ -1,9 +1,7 @@
 //! Exterior orientation: Table 4 and figure 3 of Shan et al. 2005.
 
-use maud::{Markup, html};
-
 use super::{
-    html::{Cell, Column, Table, folded_unless, paragraph},
+    html::{Cell, Column, Markup, Table, folded_unless, html, paragraph},
     many,
     numbers::whole,
     plots::{GREY, Panel, Plot, Series, figure, label},

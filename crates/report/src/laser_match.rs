@@ -3,11 +3,9 @@
 
 mod similarity;
 
-use maud::{Markup, html};
-
 use super::{
     checks,
-    html::{Cell, Column, Section, Table, Tone, counted, list, page, verdict},
+    html::{Cell, Column, Markup, Section, Table, Tone, counted, html, list, page, verdict},
     numbers::signed,
     plots::{Arrow, Arrows, GREY, Panel, Plot, Series, figure, label, magnification},
 };

@@ -5,7 +5,6 @@
 
 #![allow(
     clippy::format_push_string,
-    clippy::format_collect,
     reason = "pages are put together once from small pieces"
 )]
 #![allow(

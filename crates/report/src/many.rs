@@ -3,10 +3,8 @@
 //! The selection is made with the products ([`SiteProducts::shown_images`]), because the data of the page contain
 //! the points of no others.
 
-use maud::{Markup, html};
-
 use super::{
-    html::{Cell, Column, Table, folded, link},
+    html::{Cell, Column, Markup, Table, folded, html, link},
     numbers::whole,
     plots::{GREY, Panel, Plot, Series, Style, figure, label, thinned},
 };

@@ -12,7 +12,6 @@ mod words;
 use std::collections::BTreeMap;
 
 use geo::Simplify as _;
-use maud::{Markup, html};
 use plotters::prelude::*;
 
 use self::{
@@ -24,7 +23,7 @@ use self::{
 };
 use super::{
     graticule::{View, graticule},
-    html::{counted, paragraph},
+    html::{Markup, counted, html},
     many,
     plots::{COLOURS, Canvas, Drawn, GRID, INK, WIDTH, drawn, figure_html, thinned},
     section::Section,
@@ -90,9 +89,7 @@ fn without_outline(site: &SiteProducts) -> Markup {
         count if many::are_many(site) => counted(count, "image"),
         _ => missing.join(", "),
     };
-    paragraph(&format!(
-        "Not drawn, because a corner sees no ground: {named}."
-    ))
+    html! { p { "Not drawn, because a corner sees no ground: " (named) "." } }
 }
 
 fn figure(site: &SiteProducts, shown: Shown, only: bool) -> Result<Markup> {

@@ -1,9 +1,7 @@
 //! Tie points measured by areograph: the number of places tried, and their outcomes.
 
-use maud::{Markup, html};
-
 use super::{
-    html::{Column, Table, paragraph},
+    html::{Column, Markup, Table, html},
     misregistration::PAIRS_TABLED,
     numbers::whole,
     plots::label,
@@ -43,14 +41,14 @@ fn tabled(pairs: &[MatchedPair]) -> Vec<&MatchedPair> {
 }
 
 fn some_of_all(all: &[MatchedPair], tabled: &[&MatchedPair]) -> Markup {
-    if tabled.len() == all.len() {
-        return Markup::default();
+    html! {
+        @if tabled.len() < all.len() {
+            p {
+                "The table lists " (tabled.len()) " of " (whole(all.len()))
+                " pairs: rejected pairs first, then those with the fewest tie points."
+            }
+        }
     }
-    paragraph(&format!(
-        "The table lists {} of {} pairs: rejected pairs first, then those with the fewest tie points.",
-        tabled.len(),
-        whole(all.len())
-    ))
 }
 
 fn write(site: &SiteProducts, ties: &Ties) -> Markup {
@@ -89,9 +87,9 @@ fn write(site: &SiteProducts, ties: &Ties) -> Markup {
     }
     html! {
         p {
-        "In each cell of common ground the point with the strongest texture was matched to the other image and back. \
-         σ: medians of \
-         single matches, in the second image. The table shows the second pass, which starts from the adjusted orientation."
+            "In each cell of common ground the point with the strongest texture was matched to the other image and back. \
+             σ: medians of \
+             single matches, in the second image. The table shows the second pass, which starts from the adjusted orientation."
         }
         (some_of_all(&ties.matched, &matched))
         (table.finish())

@@ -4,15 +4,13 @@ mod pair;
 
 use std::collections::BTreeMap;
 
-use maud::{Markup, html};
-
 use super::{
-    html::{Cell, Column, Table, counted, folded, paragraph},
+    html::{Cell, Column, Markup, Table, counted, folded, html, paragraph},
     moved,
     numbers::whole,
     plots::label,
     section::Section,
-    source::filled,
+    source::traced,
 };
 use areograph_base::{error::Result, units::RADIANS_PER_DEGREE, verdict::CheckKind};
 use areograph_geom::intersection::Unintersected;
@@ -72,50 +70,29 @@ fn read(geometric: &GeometricProducts) -> Markup {
     let points = &geometric.intersected.points;
     let elsewhere: u64 = ties.elsewhere.values().sum();
     let outliers = points.iter().filter(|point| point.outlier).count();
-    let adjusted = geometric.adjustment.map_or_else(
-        || html! { "; the adjustment failed" },
-        |adjustment| {
-            let number = adjustment.intersected.points.len().to_string();
-            filled(
-                ", {} with the adjusted one",
-                &[(number, "adjustment.json#/after/intersected")],
-            )
-        },
-    );
-    let words = filled(
-        "{} read, {} in two or more images; {} intersect with the kernels' orientation",
-        &[
-            (
-                counted(ties.points.len(), "tie point"),
-                "adjustment.json#/ties/points",
-            ),
-            (
-                ties.multi_image().to_string(),
-                "adjustment.json#/ties/multi_image",
-            ),
-            (
-                points.len().to_string(),
-                "adjustment.json#/before/intersected",
-            ),
-        ],
-    );
+    let adjusted = geometric.adjustment;
+    let adjusted = adjusted.map(|adjustment| adjustment.intersected.points.len().to_string());
     let counts = [
         (elsewhere, "measurements are in other images."),
         (ties.ignored, "are marked to be ignored."),
         (ties.complaint_count, "records could not be read."),
     ];
-    let excluded = filled(
-        " {}, excluded from the pair statistics.",
-        &[(
-            counted(outliers, "reprojection outlier"),
-            "adjustment.json#/before/outliers",
-        )],
-    );
     html! {
         p {
-            (words) (adjusted) "."
+            (traced(&counted(ties.points.len(), "tie point"), "adjustment.json#/ties/points")) " read, "
+            (traced(&ties.multi_image().to_string(), "adjustment.json#/ties/multi_image")) " in two or more images; "
+            (traced(&points.len().to_string(), "adjustment.json#/before/intersected"))
+            " intersect with the kernels' orientation"
+            @if let Some(number) = adjusted {
+                ", " (traced(&number, "adjustment.json#/after/intersected")) " with the adjusted one."
+            } @else {
+                "; the adjustment failed."
+            }
             @for (count, what) in counts { @if count > 0 { " " (count) " " (what) } }
-            @if outliers > 0 { (excluded) }
+            @if outliers > 0 {
+                " " (traced(&counted(outliers, "reprojection outlier"), "adjustment.json#/before/outliers"))
+                ", excluded from the pair statistics."
+            }
         }
         (rejected(geometric))
     }

@@ -2,9 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use maud::{Markup, html};
-
-use super::html::counted;
+use super::html::{Markup, counted, html};
 use super::many;
 use super::numbers::whole;
 use super::plots::{

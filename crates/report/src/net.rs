@@ -1,10 +1,10 @@
 //! The page of a triangulated net: verdict, bricks, blunders, controls, and vectors of all of them on a map.
 
-use maud::{Markup, html};
-
 use super::{
     checks,
-    html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, verdict},
+    html::{
+        Cell, Column, Markup, Section, Table, Tone, counted, html, list, page, paragraph, verdict,
+    },
     plots::{
         Arrow, Arrows, Extent, GREY, Panel, Plot, Series, figure, label, magnification, thinned,
     },

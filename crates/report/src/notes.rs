@@ -1,8 +1,10 @@
 //! Notes, and problems in the input.
 
-use maud::{Markup, html};
-
-use super::{html::list, numbers::whole, section::Section};
+use super::{
+    html::{Markup, html, list},
+    numbers::whole,
+    section::Section,
+};
 use areograph_base::verdict::CheckKind;
 use areograph_products::SiteProducts;
 

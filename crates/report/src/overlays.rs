@@ -3,10 +3,9 @@
 use std::fmt::Write as _;
 
 use base64::{Engine as _, engine::general_purpose::STANDARD};
-use maud::{Markup, html};
 
 use super::{
-    html::{self, link, list},
+    html::{self, Markup, html, link, list},
     many,
     map::relief,
     numbers::whole,

@@ -1,9 +1,7 @@
 //! The surface between shots, tested on the site's own shots: withheld profiles, crossovers, profiles left out.
 
-use maud::{Markup, html};
-
 use super::{
-    html::{Cell, Column, Table, paragraph},
+    html::{Cell, Column, Markup, Table, html, paragraph},
     numbers::whole,
     plots::{Extent, GREY, Panel, Plot, Series, Style, figure, label, thinned},
     section::Section,
@@ -31,15 +29,15 @@ fn write(site: &SiteProducts) -> Result<Markup> {
     let check = site.profile_check;
     Ok(html! {
         p {
-        "Every stretch of a profile is withheld in turn and predicted from the other profiles, in the same way as the ground \
-         under tie points. The stretch takes no part in its prediction."
+            "Every stretch of a profile is withheld in turn and predicted from the other profiles, in the same way as the ground \
+             under tie points. The stretch takes no part in its prediction."
         }
         @if let Some(score) = &check.score {
             (table(score))
             (figure(&plot(&check.stretches))?)
         } @else {
             p {
-            "No stretch of a profile can be predicted from other profiles: the surface is not tested."
+                "No stretch of a profile can be predicted from other profiles: the surface is not tested."
             }
         }
         (crossovers(check))

@@ -1,9 +1,7 @@
 //! Program, configuration, and the files that were read.
 
-use maud::{Markup, html};
-
 use super::{
-    html::{Cell, Column, Table, folded, link},
+    html::{Cell, Column, Markup, Table, folded, html, link},
     many,
     numbers::whole,
     section::Section,

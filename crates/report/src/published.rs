@@ -1,9 +1,7 @@
 //! Appendix: tables 2, 3 and 4 of Yoon & Shan 2004 for this site.
 
-use maud::{Markup, html};
-
 use super::{
-    html::{Cell, Column, Table, folded},
+    html::{Cell, Column, Markup, Table, folded, html},
     many,
     numbers::whole,
     plots::label,

@@ -2,14 +2,12 @@
 
 mod plots;
 
-use maud::{Markup, html};
-
 use super::{
-    html::{Cell, Column, Table, folded, folded_unless, paragraph},
+    html::{Cell, Column, Markup, Table, folded, folded_unless, html, paragraph},
     numbers::{number, whole},
     plots::label,
     section::Section,
-    source::{filled, sentence},
+    source::traced,
 };
 use areograph_base::{error::Result, verdict::CheckKind};
 use areograph_geom::statistics::Summary;
@@ -81,9 +79,9 @@ fn untested(site: &SiteProducts) -> Markup {
     );
     html! {
         p {
-        "The ranges are not tested: the tables contain no position of the spacecraft, and no kernels cover the shots. The \
-         spacecraft is placed on the radius through the footprint at the range (nadir by range); its distance from the \
-         footprint is the range."
+            "The ranges are not tested: the tables contain no position of the spacecraft, and no kernels cover the shots. The \
+             spacecraft is placed on the radius through the footprint at the range (nadir by range); its distance from the \
+             footprint is the range."
         }
         (table.finish())
     }
@@ -219,23 +217,15 @@ fn statistics(site: &SiteProducts) -> Markup {
 /// Limits of the table of the profiles.
 fn limits(site: &SiteProducts) -> Markup {
     let limits = &site.config.range_check;
-    sentence(
-        "Judged: profiles of at least {} shots. Limits: at most {} % outliers (beyond {} robust σ of the median). Bars: share of a limit that is used.",
-        &[
-            (
-                limits.shots_min.to_string(),
-                "ranges.json#/limits/shots_min",
-            ),
-            (
-                number(100.0 * limits.outlier_share_max, 1),
-                "ranges.json#/limits/outlier_share_max*100",
-            ),
-            (
-                limits.outlier_sigma.to_string(),
-                "ranges.json#/limits/outlier_sigma",
-            ),
-        ],
-    )
+    html! {
+        p {
+            "Judged: profiles of at least " (traced(&limits.shots_min.to_string(), "ranges.json#/limits/shots_min"))
+            " shots. Limits: at most "
+            (traced(&number(100.0 * limits.outlier_share_max, 1), "ranges.json#/limits/outlier_share_max*100"))
+            " % outliers (beyond " (traced(&limits.outlier_sigma.to_string(), "ranges.json#/limits/outlier_sigma"))
+            " robust σ of the median). Bars: share of a limit that is used."
+        }
+    }
 }
 
 /// Used share of a limit that may be 0: then 0 uses nothing of it, and all other values are beyond it.
@@ -333,28 +323,7 @@ fn three_ways(site: &SiteProducts) -> Markup {
             ],
         );
     }
-    let own = filled(
-        "PEDR's own orbit: without kernels; a mean beyond ±{} m indicates a reading error.",
-        &[(
-            limits.decoding_max_m.to_string(),
-            "ranges.json#/limits/decoding_max_m",
-        )],
-    );
-    let orbits = filled(
-        "PEDR − kernels: spacecraft positions, inertial axes; beyond {} m orbit, clock or datum differ.",
-        &[(
-            limits.orbit_max_m.to_string(),
-            "ranges.json#/limits/orbit_max_m",
-        )],
-    );
     let error_m = site.ranges.trajectory_error_m;
-    let tabulated = filled(
-        " Trajectory tabulated to {} mm.",
-        &[(
-            number(1e3 * error_m, 3),
-            "ranges.json#/trajectory_error_m*1000",
-        )],
-    );
     html! {
         (table.finish())
         ul {
@@ -362,9 +331,21 @@ fn three_ways(site: &SiteProducts) -> Markup {
             @if site.config.shots.is_empty() {
                 li { "Crossover radius: the MOLA team's adjustment, which moves footprints, not ranges." }
             }
-            li { (own) }
-            // A table's own spacecraft and the spacecraft of support data are not tabulated.
-            li { (orbits) @if error_m > 0.0 { (tabulated) } }
+            li {
+                "PEDR's own orbit: without kernels; a mean beyond ±"
+                (traced(&limits.decoding_max_m.to_string(), "ranges.json#/limits/decoding_max_m"))
+                " m indicates a reading error."
+            }
+            li {
+                "PEDR − kernels: spacecraft positions, inertial axes; beyond "
+                (traced(&limits.orbit_max_m.to_string(), "ranges.json#/limits/orbit_max_m"))
+                " m orbit, clock or datum differ."
+                // A table's own spacecraft and the spacecraft of support data are not tabulated.
+                @if error_m > 0.0 {
+                    " Trajectory tabulated to "
+                    (traced(&number(1e3 * error_m, 3), "ranges.json#/trajectory_error_m*1000")) " mm."
+                }
+            }
         }
     }
 }

@@ -1,9 +1,7 @@
 //! Registration: profiles on the image plane.
 
-use maud::{Markup, html};
-
 use super::{
-    html::{Cell, Column, Table, counted, folded, paragraph},
+    html::{Cell, Column, Markup, Table, counted, folded, html, paragraph},
     many,
     numbers::whole,
     plots::{COLOURS, Extent, GREY, INK, Mark, Panel, Plot, Series, Style, figure, label, thinned},

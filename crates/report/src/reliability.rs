@@ -1,14 +1,12 @@
 //! Reliability of the adjustment: absolute position, gross errors that no
 //! residual shows, unknowns that cannot be separated, and rejected points.
 
-use maud::{Markup, html};
-
 use super::{
     heights::{WITHHELD_BECAUSE, known_beforehand, place_by},
-    html::{Cell, Column, Table, counted, folded, paragraph},
+    html::{Cell, Column, Markup, Table, counted, folded, html, paragraph},
     numbers::whole,
     plots::label,
-    source::sentence,
+    source::traced,
 };
 use areograph_base::footprints::AdjustmentModel;
 use areograph_geom::statistics::Summary;
@@ -37,16 +35,6 @@ pub(super) fn absolute(
     geometric: &GeometricProducts,
     adjustment: &AdjustmentProducts,
 ) -> Markup {
-    const MOVED: [&str; 3] = [
-        "adjustment.json#/adjustment/summary/ties/corrections_m/0/mean",
-        "adjustment.json#/adjustment/summary/ties/corrections_m/1/mean",
-        "adjustment.json#/adjustment/summary/ties/corrections_m/2/mean",
-    ];
-    const SIGMA: [&str; 3] = [
-        "adjustment.json#/adjustment/heights/mean_sigma_m/0",
-        "adjustment.json#/adjustment/heights/mean_sigma_m/1",
-        "adjustment.json#/adjustment/heights/mean_sigma_m/2",
-    ];
     let summary = &adjustment.adjusted.summary;
     let ties = &summary.ties;
     if ties.corrections_m[0].n == 0 {
@@ -57,39 +45,36 @@ pub(super) fn absolute(
     } else {
         "Relative registration is not corrected"
     };
-    let axes = ties.corrections_m.iter().zip(MOVED);
-    let mut numbers: Vec<(String, &str)> = axes
-        .map(|(axis, place)| (label(axis.mean, 1), place))
-        .collect();
-    numbers.push((registration.to_owned(), ""));
+    let moved = |axis: usize| {
+        let place = format!("adjustment.json#/adjustment/summary/ties/corrections_m/{axis}/mean");
+        traced(&label(ties.corrections_m[axis].mean, 1), &place)
+    };
     let determined = match &adjustment.adjusted.heights {
-        Some(_) if site.accuracy_withheld().is_some() => {
-            numbers.push((WITHHELD_BECAUSE.to_owned(), ""));
-            "heights follow MOLA; absolute accuracies are withheld: {}"
-        }
+        Some(_) if site.accuracy_withheld().is_some() => html! {
+            "heights follow MOLA; absolute accuracies are withheld: " (WITHHELD_BECAUSE)
+        },
         Some(heights) => {
-            let [east_m, north_m, up_m] = heights.mean_sigma_m;
-            numbers.push((label(up_m, 1), SIGMA[2]));
-            numbers.push((label(east_m, 0), SIGMA[0]));
-            numbers.push((label(north_m, 0), SIGMA[1]));
-            numbers.push((place_by(geometric, adjustment), ""));
-            "heights follow MOLA to {} m on average; position is known to {} m east and {} m north, by {}"
+            let sigma = |axis: usize, decimals: usize| {
+                let place = format!("adjustment.json#/adjustment/heights/mean_sigma_m/{axis}");
+                traced(&label(heights.mean_sigma_m[axis], decimals), &place)
+            };
+            html! {
+                "heights follow MOLA to " (sigma(2, 1)) " m on average; position is known to " (sigma(0, 0))
+                " m east and " (sigma(1, 0)) " m north, by " (place_by(geometric, adjustment))
+            }
         }
-        None if summary.model == AdjustmentModel::Published => {
+        None if summary.model == AdjustmentModel::Published => html! {
             "heights and position are not determined: image coordinates of footprints come from the orientation that is \
              adjusted"
-        }
-        None => {
-            numbers.push((known_beforehand(geometric).to_owned(), ""));
-            "heights and position are a priori, from {}"
-        }
+        },
+        None => html! { "heights and position are a priori, from " (known_beforehand(geometric)) },
     };
-    sentence(
-        &format!(
-            "Tie points moved by {{}}, {{}}, {{}} m in X, Y, Z on average. {{}}; {determined}."
-        ),
-        &numbers,
-    )
+    html! {
+        p {
+            "Tie points moved by " (moved(0)) ", " (moved(1)) ", " (moved(2)) " m in X, Y, Z on average. "
+            (registration) "; " (determined) "."
+        }
+    }
 }
 
 /// Observations of one kind along one axis.

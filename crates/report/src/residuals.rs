@@ -1,9 +1,7 @@
 //! Distribution of tie point residuals, in their own standard deviations, against the normal distribution.
 
-use maud::Markup;
-
 use super::{
-    html::{Column, Table},
+    html::{Column, Markup, Table},
     many,
     numbers::whole,
     plots::{Extent, GREY, Panel, Plot, Series, figure, label},

@@ -1,9 +1,7 @@
 //! MOLA clock by the ranges: spread of the residuals against the assumed correction.
 
-use maud::{Markup, html};
-
 use super::{
-    html::{Cell, Column, Table, folded, paragraph},
+    html::{Cell, Column, Markup, Table, folded, html, paragraph},
     numbers::{number, signed},
     plots::{COLOURS, MARK, Mark, Panel, Plot, Series, figure},
     ranges::{many, place, plotted},

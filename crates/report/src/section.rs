@@ -1,8 +1,6 @@
 //! Declaration of a section of a site's page.
 
-use maud::{Markup, PreEscaped};
-
-use super::html;
+use super::html::{self, Markup, PreEscaped};
 use areograph_base::{error::Result, verdict::CheckKind};
 use areograph_products::SiteProducts;
 

@@ -1,9 +1,7 @@
 //! Windows and filters, and the shots that they rejected.
 
-use maud::{Markup, html};
-
 use super::{
-    html::{Cell, Column, Table, paragraph},
+    html::{Cell, Column, Markup, Table, html, paragraph},
     numbers::{number, whole},
     section::Section,
     source::member,

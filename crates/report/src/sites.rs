@@ -1,11 +1,10 @@
 //! The page of all sites in an output folder.
 
 use chrono::{DateTime, FixedOffset};
-use maud::{Markup, html};
 
 use super::{
     fidelity::FIDELITY_FILE,
-    html::{Cell, Column, Table, Tone, counted, link, page, verdict},
+    html::{Cell, Column, Markup, Table, Tone, counted, html, link, page, verdict},
     numbers::{number, whole},
     sites_map::{self, Place},
     source::traced,

@@ -4,12 +4,11 @@ mod features;
 
 use std::{f64::consts::TAU, fmt::Write as _};
 
-use maud::Markup;
 use plotters::{prelude::*, style::text_anchor::HPos};
 
 use self::features::{FEATURES, Feature, Kind};
 use super::{
-    html::Tone,
+    html::{Markup, Tone},
     map::labels::{self, LETTERS, Labels, write},
     plots::{
         COLOURS, Canvas, Drawn, GREY, GRID, INK, Key, MARK, SOFT, WIDTH, drawn, figure_html, quoted,

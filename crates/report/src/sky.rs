@@ -2,12 +2,11 @@
 
 use std::{f64::consts::TAU, fmt::Write as _};
 
-use maud::Markup;
 use nalgebra::Vector3;
 use plotters::prelude::*;
 
 use super::{
-    html::counted,
+    html::{Markup, counted},
     many::{self, DrawnImage},
     map::labels::{self, Labels},
     misregistration::BeforeAfter,

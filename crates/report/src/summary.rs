@@ -1,11 +1,9 @@
 //! The first screen of a site's page: verdict, key numbers, every check, the map.
 
-use maud::{Markup, PreEscaped, html};
-
 use super::{
     checks,
     heights::{WITHHELD_BECAUSE, is_open, place_by},
-    html::{Tone, counted, folded_unless, list, verdict},
+    html::{Markup, PreEscaped, Tone, counted, folded_unless, html, list, verdict},
     map,
     misregistration::{BeforeAfter, by_footprints},
     numbers::{number, signed, whole},

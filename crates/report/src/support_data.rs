@@ -1,9 +1,7 @@
 //! Images by support data: contents of their files, to which nothing is applied.
 
-use maud::{Markup, html};
-
 use super::{
-    html::{Column, Table, counted},
+    html::{Column, Markup, Table, counted, html},
     many,
     numbers::whole,
     section::Section,

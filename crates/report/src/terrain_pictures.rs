@@ -3,10 +3,10 @@
 use std::fmt::Write as _;
 
 use base64::{Engine as _, engine::general_purpose::STANDARD};
-use maud::{Markup, html};
 use plotters::prelude::*;
 
 use super::{
+    html::{Markup, html},
     map::{
         keys::{ColourBar, draw_scale},
         relief, round_length_m,

@@ -1,11 +1,10 @@
 //! Coverage of every kernel against the required coverage of the site: gaps over time.
 
 use chrono::{DateTime, TimeDelta};
-use maud::{Markup, html};
 use plotters::{prelude::*, style::text_anchor::HPos};
 
 use super::{
-    html::{Column, Table, folded_unless},
+    html::{Column, Markup, Table, folded_unless, html},
     plots::{COLOURS, Canvas, Drawn, INK, Key, MARK, WIDTH, draw_text, drawn, figure_html, quoted},
     section::Section,
 };

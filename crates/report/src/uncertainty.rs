@@ -1,9 +1,7 @@
 //! The budget of eq. 5 to 9 of Shan et al. 2005: the distance between the two footprints of one point.
 
-use maud::{Markup, html};
-
 use super::{
-    html::{Cell, Column, Table, counted, folded},
+    html::{Cell, Column, Markup, Table, counted, folded, html},
     misregistration::BeforeAfter,
     plots::label,
     section::Section,

@@ -1,9 +1,7 @@
 //! The worst profiles, and commands that find their shots.
 
-use maud::{Markup, html};
-
 use crate::{
-    html::{Cell, Column, Table, link, paragraph},
+    html::{Cell, Column, Markup, Table, html, link, paragraph},
     numbers::whole,
     plots::label,
 };

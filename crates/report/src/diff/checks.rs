@@ -1,10 +1,8 @@
 //! The checks of both runs whose outcome changed.
 
-use maud::Markup;
-
 use super::super::{
     checks::{limit, value},
-    html::{Column, Table},
+    html::{Column, Markup, Table},
 };
 use crate::difference::RunDifference;
 use areograph_stages::judge::{Check, CheckOutcome};

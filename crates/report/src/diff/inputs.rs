@@ -1,10 +1,8 @@
 //! Statistics, values, kernels, stages and products that differ.
 
-use maud::{Markup, html};
-
 use crate::{
     difference::{Change, Item, Items, RunDifference, Texts, text},
-    html::{Cell, Column, Table, counted, list},
+    html::{Cell, Column, Markup, Table, counted, html, list},
     numbers::{self, number, whole},
 };
 use areograph_products::read::ProfileDocument;

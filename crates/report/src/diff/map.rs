@@ -1,10 +1,10 @@
 //! A map of movements on the ground: footprints, tie points and boresights, each from A to B.
 
-use maud::Markup;
 use nalgebra::Vector3;
 
 use crate::{
     difference::{Moved, RunDifference},
+    html::Markup,
     numbers::whole,
     plots::{Arrow, Arrows, Extent, Panel, Plot, Series, WIDTH, figure, magnification},
 };

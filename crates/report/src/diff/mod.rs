@@ -7,9 +7,7 @@ mod movement;
 
 use std::cmp::Reverse;
 
-use maud::{Markup, html};
-
-use super::html::{self, Section, Tone, list};
+use super::html::{self, Markup, Section, Tone, html, list};
 use crate::difference::{Outcome, RunDifference};
 use areograph_base::error::Result;
 

@@ -1,13 +1,11 @@
 //! Movements in tables and plots.
 
-use maud::{Markup, html};
-
 use crate::{
     difference::{
         FootprintsMovement, ImageDifference, ImageMovement, Limits, RunDifference, SampleMovement,
         quantity,
     },
-    html::{Cell, Column, Table},
+    html::{Cell, Column, Markup, Table, html},
     plots::{Panel, Plot, Series, figure},
 };
 use areograph_base::error::Result;

@@ -1,10 +1,8 @@
 //! Position by a laser on the bus of the cameras.
 
-use maud::{Markup, html};
-
 use super::{
     super::{
-        html::{Cell, Column, Table, paragraph},
+        html::{Cell, Column, Markup, Table, html, paragraph},
         plots::label,
     },
     relief::profiles,

@@ -1,9 +1,7 @@
 //! Two readings of the along-track disagreement of images, and the positions of tie points by each.
 
-use maud::{Markup, html};
-
 use super::super::{
-    html::{Cell, Column, Table, paragraph},
+    html::{Cell, Column, Markup, Table, html, paragraph},
     plots::label,
 };
 use areograph_stages::adjust::{Adjusted, OtherReading};

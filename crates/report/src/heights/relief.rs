@@ -1,9 +1,7 @@
 //! Position by relief.
 
-use maud::{Markup, html};
-
 use super::super::{
-    html::{Cell, Column, Table, paragraph},
+    html::{Cell, Column, Markup, Table, html, paragraph},
     plots::label,
 };
 use areograph_stages::adjust::{Adjusted, HeightSummary, ProfileOffset};

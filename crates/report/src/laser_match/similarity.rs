@@ -1,11 +1,10 @@
 //! Similarity of heights of every unit over the shifts, as small pictures at one scale.
 
 use base64::{Engine as _, engine::general_purpose::STANDARD};
-use maud::{Markup, PreEscaped, html};
 use png::{BitDepth, ColorType, Encoder, EncodingError};
 
 use super::super::{
-    html::{counted, paragraph},
+    html::{Markup, PreEscaped, counted, html, paragraph},
     map::{keys::ColourBar, relief},
     numbers::signed,
     plots::{drawn, label},

@@ -1,9 +1,8 @@
 //! A figure of a page: heading, picture, legend, caption, and its data for download.
 
-use maud::{Markup, PreEscaped, html};
 use plotters::style::RGBColor;
 
-use super::super::html::slug;
+use super::super::html::{Markup, PreEscaped, html, slug};
 
 /// An entry of a legend.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -18,13 +18,12 @@ pub(super) use palette::{COLOURS, GREY, GRID, INK, MARK, SOFT};
 
 use std::fmt::Write as _;
 
-use maud::Markup;
 use plotters::{
     coord::{ranged1d::Ranged as _, types::RangedCoordf64},
     style::RGBColor,
 };
 
-use super::html::paragraph;
+use super::html::{Markup, html};
 use areograph_base::error::Result;
 
 /// Width of a plot in its own units; pages show about half as many pixels, so that lines stay fine.
@@ -231,11 +230,7 @@ pub(super) fn quoted(text: &str) -> String {
 /// A plot that the library rejects, which is a bug in areograph.
 pub(super) fn figure(plot: &Plot) -> Result<Markup> {
     if plot.drawn().next().is_none() {
-        return Ok(paragraph(&format!(
-            "{}: {}",
-            plot.title,
-            plot.description()
-        )));
+        return Ok(html! { p { (plot.title) ": " (plot.description()) } });
     }
     let height = plot.drawn().map(|panel| panel.height).sum::<u32>() + draw::FOOT;
     let svg = drawn(height, |area| draw::plot(plot, area))?;

@@ -1,11 +1,9 @@
 //! Residuals along the profiles, figure 2 of Shan et al. 2005: of every profile, or of all together and the worst
 //! separately.
 
-use maud::{Markup, html};
-
 use super::{
     super::{
-        html::counted,
+        html::{Markup, counted, html},
         numbers::whole,
         plots::{Extent, Panel, Plot, Series, Style, figure, label, thinned},
     },
