@@ -20,6 +20,7 @@ mod tests;
 
 use std::{collections::BTreeMap, f64::consts::TAU, sync::atomic::AtomicBool};
 
+use maud::{Markup, html};
 use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -321,7 +322,7 @@ const SECTION: Section = Section {
     write,
 };
 
-fn write(site: &SiteProducts) -> Result<String> {
+fn write(site: &SiteProducts) -> Result<Markup> {
     let mut table = Table::new(
         "Shots of every profile",
         &[
@@ -358,7 +359,7 @@ fn write(site: &SiteProducts) -> Result<String> {
         "A shot is missing if the products contain none for a pulse inside the window, between the first and the last shot of \
          the profile: it had no return, or pedr.filter rejected it. Heights in a gap are interpolated between its two edges.",
     );
-    Ok(words + &folded_unless(is_sparse, "Profiles", &table.finish()))
+    Ok(html! { (words) (folded_unless(is_sparse, "Profiles", &table.finish())) })
 }
 
 /// The profile with the largest share of missing shots.

@@ -336,7 +336,7 @@ fn products_keep_their_schemas_and_lead_to_the_shots() {
     }
     // The command line of the worst profile finds its shots, and no others.
     let command = page.split("areograph pedr search").nth(1).unwrap();
-    let command = command.split('\n').next().unwrap().replace("&#39;", "");
+    let command = command.split('\n').next().unwrap().replace('\'', "");
     let arguments = command.split_whitespace().map(|argument| match argument {
         "parquet" => "count",
         other => other,

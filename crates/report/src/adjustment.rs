@@ -2,13 +2,13 @@
 
 use super::{
     corrections, correlation,
-    html::{Cell, Column, Table, counted, folded, heading, paragraph},
+    html::{Cell, Column, Markup, Table, counted, folded, html},
     many,
     numbers::whole,
     plots::{Extent, Panel, Plot, Series, figure, label},
     reliability, residuals,
     section::Section,
-    source::sentence,
+    source::traced,
 };
 use areograph_base::{error::Result, verdict::CheckKind};
 use areograph_geom::statistics::BAARDA_LIMIT;
@@ -43,42 +43,33 @@ fn write(
     site: &SiteProducts,
     geometric: &GeometricProducts,
     adjustment: &AdjustmentProducts,
-) -> Result<String> {
+) -> Result<Markup> {
     let adjusted = adjustment.adjusted;
     let summary = &adjusted.summary;
-    let mut html = overview(adjusted);
-    html += &reliability::absolute(site, geometric, adjustment);
-    html += &format!(
-        "<div class=\"plots\">\n{}</div>\n",
-        residuals::distribution(adjusted)?
-    );
-    html += &many::some_of_all(site);
-    html += &residuals::images(site, adjusted);
-    html += &folded(
-        "Observations by kind, and convergence",
-        &format!(
-            "{}<div class=\"plots\">\n{}</div>\n",
-            observations(summary),
-            figure(&convergence(adjusted))?
-        ),
-    );
-    html += &folded(
-        "Corrections to the orientation, ranges and biases",
-        &corrections::tables(site, adjusted),
-    );
-    html += &heading("Reliability");
-    html += &reliability::redundancy(site, adjusted);
-    html += &reliability::correlations(summary);
-    html += &correlation::figures(site, adjusted)?;
-    html += &reliability::rejected(adjusted);
-    Ok(html)
+    Ok(html! {
+        (overview(adjusted))
+        (reliability::absolute(site, geometric, adjustment))
+        div.plots { (residuals::distribution(adjusted)?) }
+        (many::some_of_all(site))
+        (residuals::images(site, adjusted))
+        (folded("Observations by kind, and convergence", &html! {
+            (observations(summary))
+            div.plots { (figure(&convergence(adjusted))?) }
+        }))
+        (folded("Corrections to the orientation, ranges and biases", &corrections::tables(site, adjusted)))
+        h3 { "Reliability" }
+        (reliability::redundancy(site, adjusted))
+        (reliability::correlations(summary))
+        (correlation::figures(site, adjusted)?)
+        (reliability::rejected(adjusted))
+    })
 }
 
-fn overview(adjusted: &Adjusted) -> String {
+fn overview(adjusted: &Adjusted) -> Markup {
     let summary = &adjusted.summary;
     let [along, across] = summary.tie_components;
     let against_configured = |component: f64| {
-        let words = if summary.degrees_of_freedom == 0 {
+        if summary.degrees_of_freedom == 0 {
             "no redundancy"
         } else if component < WORSE_THAN_CONFIGURED.recip() {
             "better than configured"
@@ -86,49 +77,34 @@ fn overview(adjusted: &Adjusted) -> String {
             "as configured"
         } else {
             "worse than configured"
-        };
-        (words.to_owned(), String::new())
+        }
     };
-    let at = |pointer: &str| format!("adjustment.json#/adjustment/summary{pointer}");
-    let numbers = [
-        (
-            counted(adjusted.images.len(), "image"),
-            "manifest.json#/counts/images".to_owned(),
-        ),
-        (
-            counted(summary.shots.corrections_m[0].n as usize, "footprint"),
-            at("/shots/corrections_m/0/n"),
-        ),
-        (
-            counted(summary.ties.corrections_m[0].n as usize, "tie point"),
-            at("/ties/corrections_m/0/n"),
-        ),
-        (counted(summary.steps, "iteration"), at("/steps")),
-        (
-            summary.degrees_of_freedom.to_string(),
-            at("/degrees_of_freedom"),
-        ),
-        (label(along, 3), at("/tie_components/0")),
-        against_configured(along),
-        (label(across, 3), at("/tie_components/1")),
-        against_configured(across),
-        (label(summary.sigma0, 3), at("/sigma0")),
-    ];
-    let mut html = sentence(
-        "{}, {} and {} adjusted together in {}; {} degrees of freedom. Unit-weight σ of tie points {} along track ({}), {} \
-         across ({}). σ0 of all observations: {}.",
-        &numbers
-            .each_ref()
-            .map(|(number, place)| (number.clone(), &**place)),
-    );
-    if summary.tie_scatter_px > 0.0 {
-        html += &sentence(
-            "Tie points scatter by {} px along the track in addition to their stated σ, as expected from attitude \
-             jitter. The σ of the adjustment include this scatter, and 1.4 times as much (at most 1.5 px) across the track, where residuals do not show it.",
-            &[(label(summary.tie_scatter_px, 2), &*at("/tie_scatter_px"))],
-        );
+    let of = |text: &str, pointer: &str| {
+        traced(
+            text,
+            &format!("adjustment.json#/adjustment/summary{pointer}"),
+        )
+    };
+    html! {
+        p {
+            (traced(&counted(adjusted.images.len(), "image"), "manifest.json#/counts/images")) ", "
+            (of(&counted(summary.shots.corrections_m[0].n as usize, "footprint"), "/shots/corrections_m/0/n")) " and "
+            (of(&counted(summary.ties.corrections_m[0].n as usize, "tie point"), "/ties/corrections_m/0/n"))
+            " adjusted together in " (of(&counted(summary.steps, "iteration"), "/steps")) "; "
+            (of(&summary.degrees_of_freedom.to_string(), "/degrees_of_freedom"))
+            " degrees of freedom. Unit-weight σ of tie points " (of(&label(along, 3), "/tie_components/0"))
+            " along track (" (against_configured(along)) "), " (of(&label(across, 3), "/tie_components/1"))
+            " across (" (against_configured(across)) "). σ0 of all observations: "
+            (of(&label(summary.sigma0, 3), "/sigma0")) "."
+        }
+        @if summary.tie_scatter_px > 0.0 {
+            p {
+                "Tie points scatter by " (of(&label(summary.tie_scatter_px, 2), "/tie_scatter_px"))
+                " px along the track in addition to their stated σ, as expected from attitude \
+                 jitter. The σ of the adjustment include this scatter, and 1.4 times as much (at most 1.5 px) across the track, where residuals do not show it."
+            }
+        }
     }
-    html
 }
 
 /// The weighted sum of squares from iteration to iteration.
@@ -169,7 +145,7 @@ fn convergence(adjusted: &Adjusted) -> Plot {
     }
 }
 
-fn observations(summary: &AdjustmentSummary) -> String {
+fn observations(summary: &AdjustmentSummary) -> Markup {
     let mut table = Table::new(
         "Observations by kind",
         &[
@@ -224,11 +200,11 @@ fn observations(summary: &AdjustmentSummary) -> String {
         "Variance component: √(vᵀPv / redundancy), 1 where the a priori σ is right; by chance: its 99 % interval, lower for \
          heights with robust weights. Beyond {BAARDA_LIMIT}: failed Baarda's test, by chance 1 in 1000."
     );
-    table.finish() + &paragraph(&words) + &outside(summary)
+    html! { (table.finish()) p { (words) } (outside(summary)) }
 }
 
 /// The components that are outside their own interval, and what follows.
-fn outside(summary: &AdjustmentSummary) -> String {
+fn outside(summary: &AdjustmentSummary) -> Markup {
     let listed = |is_outside: fn(&TypeSummary) -> bool| {
         let found = summary.types.iter().filter(|of| is_outside(of));
         let found =
@@ -246,8 +222,9 @@ fn outside(summary: &AdjustmentSummary) -> String {
              it; covariances are not reduced",
         ),
     ];
-    let found = sentences.into_iter().filter(|(kinds, _)| !kinds.is_empty());
-    found
-        .map(|(kinds, words)| paragraph(&format!("{words}: {kinds}.")))
-        .collect()
+    html! {
+        @for (kinds, words) in sentences {
+            @if !kinds.is_empty() { p { (words) ": " (kinds) "." } }
+        }
+    }
 }

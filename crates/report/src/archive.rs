@@ -4,7 +4,9 @@ mod worst;
 
 use self::worst::worst_profiles;
 use super::{
-    html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, verdict},
+    html::{
+        Cell, Column, Markup, Section, Table, Tone, counted, html, list, page, paragraph, verdict,
+    },
     plots::{Extent, GREY, Panel, Plot, Series, Style, figure, label, thinned},
 };
 use areograph_base::{
@@ -47,7 +49,7 @@ pub fn archive_page(
     Ok(page("Ranges of the archive", &lead, &sections))
 }
 
-fn lead(ranges: &ArchiveRanges, judgement: &Judgement) -> String {
+fn lead(ranges: &ArchiveRanges, judgement: &Judgement) -> Markup {
     let (tone, word) = Tone::of(judgement.valid, !judgement.remarks.is_empty());
     let beyond = ranges.profiles();
     let beyond = beyond
@@ -64,7 +66,7 @@ fn lead(ranges: &ArchiveRanges, judgement: &Judgement) -> String {
         grouped(ranges.sum(|file| file.shots)),
         label(ranges.clock.correction_s(), 3),
     );
-    let body = paragraph(&words) + &list(&judgement.reasons) + &list(&judgement.remarks);
+    let body = html! { p { (words) } (list(&judgement.reasons)) (list(&judgement.remarks)) };
     verdict(tone, &headline, &body)
 }
 
@@ -84,7 +86,7 @@ fn grouped(count: u64) -> String {
 /// A figure of a profile.
 type Figure = fn(&ArchiveProfile) -> f64;
 
-fn over_time(ranges: &ArchiveRanges) -> Result<String> {
+fn over_time(ranges: &ArchiveRanges) -> Result<Markup> {
     let checked: Vec<&ArchiveProfile> = ranges
         .profiles()
         .filter(|profile| profile.is_judged())
@@ -170,18 +172,12 @@ fn over_time(ranges: &ArchiveRanges) -> Result<String> {
             )
         }],
     );
-    let figures = [
-        figure(&ranges_plot)?,
-        figure(&orbits_plot)?,
-        figure(&scan_plot)?,
-    ];
-    Ok(format!(
-        "<div class=\"plots\">\n{}</div>\n",
-        figures.concat()
-    ))
+    Ok(html! {
+        div.plots { (figure(&ranges_plot)?) (figure(&orbits_plot)?) (figure(&scan_plot)?) }
+    })
 }
 
-fn over_off_nadir(ranges: &ArchiveRanges) -> Result<String> {
+fn over_off_nadir(ranges: &ArchiveRanges) -> Result<Markup> {
     let mut table = Table::new(
         "Range − distance by off-nadir angle: profiles within the limits, without outliers",
         &[
@@ -233,14 +229,10 @@ fn over_off_nadir(ranges: &ArchiveRanges) -> Result<String> {
             ],
         )],
     );
-    Ok(format!(
-        "{}<div class=\"plots\">\n{}</div>\n",
-        table.finish(),
-        figure(&plot)?
-    ))
+    Ok(html! { (table.finish()) div.plots { (figure(&plot)?) } })
 }
 
-fn map(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>]) -> Result<String> {
+fn map(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>]) -> Result<Markup> {
     let places = |of: &ArchiveProfile| {
         of.places_deg
             .iter()
@@ -277,10 +269,10 @@ fn map(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>]) -> Result<String> {
         low: -90.0,
         high: 90.0,
     };
-    Ok(format!("<div class=\"plots\">\n{}</div>\n", figure(&plot)?))
+    Ok(html! { div.plots { (figure(&plot)?) } })
 }
 
-fn not_checked(ranges: &ArchiveRanges) -> String {
+fn not_checked(ranges: &ArchiveRanges) -> Markup {
     let [without, partly] = ranges.not_covered();
     let coverage = if without + partly == 0 {
         "The kernels have a position for every shot.".to_owned()
@@ -291,35 +283,13 @@ fn not_checked(ranges: &ArchiveRanges) -> String {
             grouped(ranges.sum(|file| file.not_covered))
         )
     };
-    let failures: Vec<String> = ranges
-        .failures
-        .iter()
-        .take(LISTED)
-        .map(|failure| format!("{}: {}", failure.file, failure.why))
-        .collect();
-    let mut body = paragraph(&coverage);
-    if !failures.is_empty() {
-        let count = ranges.failures.len();
-        body += &paragraph(&format!("Not read, or not read again, {count} in all:"));
-        body += &list(&failures);
-    }
-    let complaints: Vec<String> = ranges
+    let complaints = ranges
         .files
         .iter()
-        .filter(|file| file.found.complaint_count > 0)
-        .take(LISTED)
-        .map(|file| {
-            let first = file.found.complaints.first().map_or("", String::as_str);
-            format!(
-                "{} problems, the first: {first}",
-                file.found.complaint_count
-            )
-        })
-        .collect();
-    if !complaints.is_empty() {
-        body += &paragraph("Records inconsistent internally or with neighbours were rejected:");
-        body += &list(&complaints);
-    }
+        .map(|file| &file.found)
+        .filter(|found| found.complaint_count > 0)
+        .take(LISTED);
+    let complaints: Vec<_> = complaints.collect();
     let mut rejected = std::collections::BTreeMap::new();
     for (reason, count) in ranges.files.iter().flat_map(|file| &file.found.rejected) {
         *rejected.entry(reason.to_string()).or_insert(0) += count;
@@ -328,28 +298,30 @@ fn not_checked(ranges: &ArchiveRanges) -> String {
         .iter()
         .map(|(reason, count)| format!("{reason}: {}", grouped(*count)))
         .collect();
-    if !rejected.is_empty() {
-        body += &paragraph(&format!(
-            "Shots rejected by the filter: {}.",
-            rejected.join(", ")
-        ));
+    html! {
+        p { (coverage) }
+        @if !ranges.failures.is_empty() {
+            p { "Not read, or not read again, " (ranges.failures.len()) " in all:" }
+            ul {
+                @for failure in ranges.failures.iter().take(LISTED) { li { (failure.file) ": " (failure.why) } }
+            }
+        }
+        @if !complaints.is_empty() {
+            p { "Records inconsistent internally or with neighbours were rejected:" }
+            ul {
+                @for found in complaints {
+                    li {
+                        (found.complaint_count) " problems, the first: "
+                        (found.complaints.first().map_or("", String::as_str))
+                    }
+                }
+            }
+        }
+        @if !rejected.is_empty() { p { "Shots rejected by the filter: " (rejected.join(", ")) "." } }
     }
-    body
 }
 
-fn how(ranges: &ArchiveRanges) -> String {
-    let kernels: Vec<String> = ranges
-        .kernels
-        .iter()
-        .map(|kernel| {
-            format!(
-                "{} ({}), BLAKE3 {}…",
-                kernel.name,
-                kernel.role,
-                short(&kernel.blake3)
-            )
-        })
-        .collect();
+fn how(ranges: &ArchiveRanges) -> Markup {
     let positions = format!(
         "Positions are interpolated by Chebyshev polynomials within {TRAJECTORY_TOLERANCE_M} m of CSPICE; the \
          largest difference at independent instants is {:.1e} m. States are geometric.",
@@ -360,13 +332,13 @@ fn how(ranges: &ArchiveRanges) -> String {
         label(ranges.clock.correction_s(), 3),
         ranges.clock.source
     );
-    [
-        paragraph(&positions),
-        paragraph(&clock),
-        paragraph("Kernels:"),
-        list(&kernels),
-    ]
-    .concat()
+    html! { p { (positions) } p { (clock) } p { "Kernels:" }
+        ul {
+            @for kernel in &ranges.kernels {
+                li { (kernel.name) " (" (kernel.role) "), BLAKE3 " (short(&kernel.blake3)) "…" }
+            }
+        }
+    }
 }
 
 fn short(hash: &str) -> &str {

@@ -3,7 +3,9 @@
 use super::{
     calibration_rounds::rounds as rounds_of,
     checks,
-    html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, verdict},
+    html::{
+        Cell, Column, Markup, Section, Table, Tone, counted, html, list, page, paragraph, verdict,
+    },
     numbers::signed,
     plots::{Panel, Plot, Series, figure, label, thinned},
 };
@@ -38,7 +40,7 @@ pub fn calibration_page(config: &CalibrationConfig, of: &Calibration) -> Result<
     Ok(page(&config.calibration, &lead(config, of), &sections))
 }
 
-fn lead(config: &CalibrationConfig, of: &Calibration) -> String {
+fn lead(config: &CalibrationConfig, of: &Calibration) -> Markup {
     let (tone, word) = Tone::of(of.verdict.valid, !of.verdict.remarks.is_empty());
     let headline = format!(
         "{word}: {}, {}.",
@@ -60,10 +62,12 @@ fn lead(config: &CalibrationConfig, of: &Calibration) -> String {
     if !config.description.is_empty() {
         words = format!("{}. {words}", config.description);
     }
-    let body = paragraph(&words) + &list(&of.verdict.reasons) + &list(&of.verdict.remarks);
-    verdict(tone, &headline, &body)
-        + &checks::untested(&of.verdict.untested)
-        + &checks::listed(&of.verdict.checks)
+    let body = html! { p { (words) } (list(&of.verdict.reasons)) (list(&of.verdict.remarks)) };
+    html! {
+        (verdict(tone, &headline, &body))
+        (checks::untested(&of.verdict.untested))
+        (checks::listed(&of.verdict.checks))
+    }
 }
 
 fn stated(of: &HeldBack) -> String {
@@ -122,7 +126,7 @@ fn control_cells(of: &ControlFigures) -> [Cell; 3] {
     ]
 }
 
-fn steps(of: &Calibration) -> String {
+fn steps(of: &Calibration) -> Markup {
     let mut table = Table::new(
         "Root mean squares, as in table 5 of Li et al. 2023; of ties the worst line, of control line by line",
         &[
@@ -148,15 +152,13 @@ fn steps(of: &Calibration) -> String {
             table.row(true, cells);
         }
     }
-    let free: Vec<String> = of
-        .steps
-        .iter()
-        .map(|step| format!("{}: adjusted {}", step.step, step.free))
-        .collect();
-    table.finish() + &list(&free)
+    html! {
+        (table.finish())
+        ul { @for step in &of.steps { li { (step.step) ": adjusted " (step.free) } } }
+    }
 }
 
-fn residuals(of: &Calibration) -> Result<String> {
+fn residuals(of: &Calibration) -> Result<Markup> {
     let dots = |kind: PointKind, after: bool| -> Vec<(f64, f64)> {
         let images = of
             .images
@@ -193,10 +195,10 @@ fn residuals(of: &Calibration) -> Result<String> {
         "line",
         panels.into_iter().flatten().collect(),
     );
-    Ok(format!("<div class=\"plots\">\n{}</div>\n", figure(&plot)?))
+    Ok(html! { div.plots { (figure(&plot)?) } })
 }
 
-fn sight(of: &Calibration) -> String {
+fn sight(of: &Calibration) -> Markup {
     let unseen = usize::try_from(of.tie_sight.unseen).unwrap_or(usize::MAX);
     let words = format!(
         "Of {} angles of the lines, ties leave {} undetermined: {}. They are constrained by a priori values; an \
@@ -223,11 +225,11 @@ fn sight(of: &Calibration) -> String {
         };
         table.row(true, [shares.join(" ").into(), sigma.into()]);
     }
-    paragraph(&words) + &table.finish() + &on_ground(of)
+    html! { p { (words) } (table.finish()) (on_ground(of)) }
 }
 
 /// The test of ties against the ground.
-fn on_ground(of: &Calibration) -> String {
+fn on_ground(of: &Calibration) -> Markup {
     let Some((ground, limit_m)) = of
         .tie_ground
         .and_then(|tie_ground| Some((tie_ground, tie_ground.limit_m?)))
@@ -251,7 +253,7 @@ fn significant(value: f64) -> String {
     label(value, decimals.map_or(12, |of| of.unsigned_abs() as usize))
 }
 
-fn cameras(of: &Calibration) -> String {
+fn cameras(of: &Calibration) -> Markup {
     let mut table = Table::new(
         "Offset angles with standard deviations, and what the calibration changes",
         &[
@@ -291,10 +293,10 @@ fn cameras(of: &Calibration) -> String {
          Support data describe a straight line of equal samples; the last column states their residual.",
         drift.join(", ")
     );
-    table.finish() + &paragraph(&words)
+    html! { (table.finish()) p { (words) } }
 }
 
-fn validation(of: &Calibration) -> String {
+fn validation(of: &Calibration) -> Markup {
     if of.validation.is_empty() {
         return paragraph(
             "No other orbit was given ([[validation]]). An error common to all laser points is not tested.",
@@ -319,11 +321,11 @@ fn validation(of: &Calibration) -> String {
             table.row(true, cells);
         }
     }
-    table.finish() + &offsets(of)
+    html! { (table.finish()) (offsets(of)) }
 }
 
 /// Mean offsets of control, and the errors that they leave untested.
-fn offsets(of: &Calibration) -> String {
+fn offsets(of: &Calibration) -> Markup {
     let mut table = Table::new(
         "Mean offset of control with the calibration",
         &[
@@ -347,5 +349,5 @@ fn offsets(of: &Calibration) -> String {
     let words = "The σ of the mean contains measurement and laser. The limit allows for constant errors of the \
                  orbits. An \
                  error common to the laser points of all orbits, such as another reference sphere, is not tested.";
-    table.finish() + &paragraph(words)
+    html! { (table.finish()) p { (words) } }
 }

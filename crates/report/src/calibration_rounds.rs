@@ -1,7 +1,7 @@
 //! The rounds of a calibration from pixels: a table and a figure.
 
 use super::{
-    html::{Cell, Column, Table, paragraph},
+    html::{Cell, Column, Markup, Table, html},
     numbers::signed,
     plots::{Panel, Plot, Series, figure, label},
 };
@@ -12,7 +12,7 @@ use areograph_stages::calibrate::{CalibrationRound, CameraResult, Rounds, Scatte
 ///
 /// # Errors
 /// A plot that cannot be drawn, which is a bug in areograph.
-pub(super) fn rounds(of: &Rounds, cameras: &[CameraResult]) -> Result<String> {
+pub(super) fn rounds(of: &Rounds, cameras: &[CameraResult]) -> Result<Markup> {
     let words = format!(
         "A round measures tie points, makes the lines consistent with them, matches a terrain model with cells of {} m to the laser, \
          and calibrates with both; the next round starts from its cameras. Rounds end when half of the units are \
@@ -21,7 +21,7 @@ pub(super) fn rounds(of: &Rounds, cameras: &[CameraResult]) -> Result<String> {
         label(of.cell_m, 0),
         of.rounds_max
     );
-    Ok(paragraph(&words) + &numbers(of) + &angles(of, cameras) + &plot(of)?)
+    Ok(html! { p { (words) } (numbers(of)) (angles(of, cameras)) (plot(of)?) })
 }
 
 fn text(value: Option<f64>, decimals: usize) -> Cell {
@@ -30,7 +30,7 @@ fn text(value: Option<f64>, decimals: usize) -> Cell {
         .into()
 }
 
-fn numbers(of: &Rounds) -> String {
+fn numbers(of: &Rounds) -> Markup {
     let mut table = Table::new(
         "Every round; control and ties as root mean squares, of ties the worst line",
         &[
@@ -75,7 +75,7 @@ fn numbers(of: &Rounds) -> String {
     table.finish()
 }
 
-fn angles(of: &Rounds, cameras: &[CameraResult]) -> String {
+fn angles(of: &Rounds, cameras: &[CameraResult]) -> Markup {
     let mut table = Table::new(
         "Offset angles after every round",
         &[
@@ -97,7 +97,7 @@ fn angles(of: &Rounds, cameras: &[CameraResult]) -> String {
     table.finish()
 }
 
-fn plot(of: &Rounds) -> Result<String> {
+fn plot(of: &Rounds) -> Result<Markup> {
     let dots = |value: &dyn Fn(&CalibrationRound) -> Option<f64>| -> Vec<(f64, f64)> {
         let rounds = of.rounds.iter();
         let dots = rounds.filter_map(|round| Some((f64::from(round.round), value(round)?)));
@@ -127,5 +127,5 @@ fn plot(of: &Rounds) -> Result<String> {
         "round",
         panels,
     );
-    Ok(format!("<div class=\"plots\">\n{}</div>\n", figure(&plot)?))
+    Ok(html! { div.plots { (figure(&plot)?) } })
 }

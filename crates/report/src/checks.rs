@@ -1,7 +1,7 @@
 //! The table of the first screen: every limit of the site with the value that uses most of it, the worst first.
 
 use super::{
-    html::{Cell, Column, Table, Tone, escape, link, list},
+    html::{Cell, Column, Markup, Table, Tone, html, link, list},
     numbers::{number, signed, whole},
     section::Section,
 };
@@ -10,26 +10,26 @@ use areograph_products::SiteProducts;
 use areograph_stages::judge::{Check, CheckOutcome};
 
 /// The table of the checks of a site, with links to the `sections` that have details.
-pub(super) fn table(site: &SiteProducts, sections: &[&Section]) -> String {
+pub(super) fn table(site: &SiteProducts, sections: &[&Section]) -> Markup {
     let mut table = empty();
     for (index, check) in site.verdict.checks.iter().enumerate() {
         let mut all = sections.iter();
         let more = all.find(|section| section.checks.contains(&check.kind));
         let more = more.filter(|section| (section.appears)(site));
         let what = more.map_or_else(
-            || escape(&check.words()),
+            || html! { (check.words()) },
             |section| link(&format!("#{}", section.anchor), &check.words()),
         );
-        row(&mut table, check, what, &place(index));
+        row(&mut table, check, &what, &place(index));
     }
     table.finish()
 }
 
 /// The table of the checks of a net, a calibration or a match.
-pub(super) fn listed(checks: &[Check]) -> String {
+pub(super) fn listed(checks: &[Check]) -> Markup {
     let mut table = empty();
     for check in checks {
-        row(&mut table, check, escape(&check.words()), "");
+        row(&mut table, check, &html! { (check.words()) }, "");
     }
     table.finish()
 }
@@ -46,11 +46,9 @@ fn empty() -> Table {
     )
 }
 
-/// A check in a table: `what` is checked, as HTML, and its `place` in the products.
-fn row(table: &mut Table, check: &Check, mut what: String, place: &str) {
-    if !check.subject.is_empty() {
-        what += &format!(" <small>{}</small>", escape(&check.subject));
-    }
+/// A check in a table: `what` is checked, and its `place` in the products.
+fn row(table: &mut Table, check: &Check, what: &Markup, place: &str) {
+    let subject = &check.subject;
     let traced = |text: String, at: &str| match place {
         "" => Cell::from(text),
         _ => Cell::from(text).traced(at),
@@ -60,7 +58,7 @@ fn row(table: &mut Table, check: &Check, mut what: String, place: &str) {
         check.outcome != CheckOutcome::Fail,
         [
             result(check.outcome),
-            Cell::Html(what),
+            html! { (what) @if !subject.is_empty() { " " small { (subject) } } }.into(),
             traced(value(check), value_place(check)),
             traced(limit(check), "/limit"),
         ],
@@ -88,10 +86,7 @@ fn result(outcome: CheckOutcome) -> Cell {
         CheckOutcome::Warning => (Tone::Remarks, "!", "warning"),
         CheckOutcome::Pass => (Tone::Good, "✓", "pass"),
     };
-    Cell::Html(format!(
-        "<span class=\"outcome {}\"><b aria-hidden=\"true\">{mark}</b> {word}</span>",
-        tone.class()
-    ))
+    html! { span.outcome.(tone.class()) { b aria-hidden="true" { (mark) } " " (word) } }.into()
 }
 
 /// The value found, with its unit; a dash if it is not a number.
@@ -131,14 +126,10 @@ pub(super) fn limit(check: &Check) -> String {
 }
 
 /// Errors that no datum can show.
-pub(super) fn untested(phrases: &[String]) -> String {
-    if phrases.is_empty() {
-        return String::new();
+pub(super) fn untested(phrases: &[String]) -> Markup {
+    html! {
+        @if !phrases.is_empty() { p.about { b { (NOT_TESTED) } } (list(phrases)) }
     }
-    format!(
-        "<p class=\"about\"><b>{NOT_TESTED}</b></p>\n{}",
-        list(phrases)
-    )
 }
 
 #[cfg(test)]

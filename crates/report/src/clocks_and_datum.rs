@@ -1,7 +1,7 @@
 //! The clock corrections and the datum as used, with their sources.
 
 use super::{
-    html::{Column, Table, counted, folded, paragraph},
+    html::{Column, Markup, Table, counted, folded, html},
     many,
     numbers::{number as label, signed, whole},
     section::Section,
@@ -14,10 +14,10 @@ pub(super) const SECTION: Section = Section {
     anchor: "clock-corrections-and-datum",
     checks: &[],
     appears: |_| true,
-    write: |site| Ok(biases(site) + &datum(site)),
+    write: |site| Ok(html! { (biases(site)) (datum(site)) }),
 };
 
-fn biases(site: &SiteProducts) -> String {
+fn biases(site: &SiteProducts) -> Markup {
     let clock = &site.config.altimeter_clock;
     let sign = match clock.sign {
         TagSign::Late => "tags are late",
@@ -100,9 +100,9 @@ const fn datum_columns(file: &'static str) -> [Column; 8] {
     ]
 }
 
-fn datum(site: &SiteProducts) -> String {
+fn datum(site: &SiteProducts) -> Markup {
     if site.footprints.files.is_empty() {
-        return String::new();
+        return Markup::default();
     }
     let decided = match site.config.pedr.datum {
         _ if !site.config.shots.is_empty() => "from the configuration of the tables".to_owned(),
@@ -148,5 +148,5 @@ fn datum(site: &SiteProducts) -> String {
         site.config.body.names().short_frame,
         site.config.body.model().meridian_deg
     );
-    paragraph(&words) + &folded("Datum, file by file", &table.finish())
+    html! { p { (words) } (folded("Datum, file by file", &table.finish())) }
 }

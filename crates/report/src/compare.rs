@@ -1,7 +1,7 @@
 //! The page of a comparison of rival kernel sets.
 
 use super::{
-    html::{Cell, Column, Section, Table, Tone, list, page, paragraph, verdict},
+    html::{Cell, Column, Markup, Section, Table, Tone, html, list, page, paragraph, verdict},
     numbers::{signed, whole},
     plots::{Panel, Plot, Series, Style, figure, label, thinned},
 };
@@ -50,13 +50,15 @@ pub fn comparison_page(comparison: &KernelComparison) -> Result<String> {
             "Attitude",
             comparison
                 .attitude
-                .map_or_else(|| Ok(String::new()), attitude)?,
+                .map(attitude)
+                .transpose()?
+                .unwrap_or_default(),
         ),
     ];
     Ok(page("Kernel sets compared", &lead(comparison), &sections))
 }
 
-fn lead(comparison: &KernelComparison) -> String {
+fn lead(comparison: &KernelComparison) -> Markup {
     let orbit = comparison.orbit;
     let closest = orbit.closest();
     let distance = format!("root mean square distance {:.3} m", closest.size.rms);
@@ -117,12 +119,8 @@ fn lead(comparison: &KernelComparison) -> String {
         comparison.utc[1],
         SPACECRAFT.name,
     );
-    let words = words + &elsewhere(orbit);
-    verdict(
-        tone,
-        &headline,
-        &(paragraph(&words) + &list(comparison.remarks)),
-    )
+    let body = html! { p { (words) (elsewhere(orbit)) } (list(comparison.remarks)) };
+    verdict(tone, &headline, &body)
 }
 
 /// Stretches in which another set is closer than the one that is closest overall.
@@ -147,7 +145,7 @@ fn elsewhere(orbit: &Comparison) -> String {
     others.collect()
 }
 
-fn orbit(orbit: &Comparison) -> Result<String> {
+fn orbit(orbit: &Comparison) -> Result<Markup> {
     let columns = &[
         Column::Text("set"),
         Column::Number("radial, m"),
@@ -158,10 +156,10 @@ fn orbit(orbit: &Comparison) -> Result<String> {
     ];
     let labels = ["radial, m", "along track, m", "cross track, m"];
     let title = "Orbits minus their mean";
-    Ok(tables(orbit, columns, 1.0) + &figures(title, orbit, labels, 1.0, None)?)
+    Ok(html! { (tables(orbit, columns, 1.0)) (figures(title, orbit, labels, 1.0, None)?) })
 }
 
-fn attitude(attitude: &AttitudeComparison) -> Result<String> {
+fn attitude(attitude: &AttitudeComparison) -> Result<Markup> {
     let columns = &[
         Column::Text("set"),
         Column::Number("about radial, ″"),
@@ -178,16 +176,15 @@ fn attitude(attitude: &AttitudeComparison) -> Result<String> {
          the ellipsoid.",
     );
     let title = "Attitudes against their mean";
-    Ok([
-        words,
-        tables(turns, columns, RADIANS_PER_ARCSECOND),
-        figures(title, turns, labels, RADIANS_PER_ARCSECOND, Some(attitude))?,
-    ]
-    .concat())
+    Ok(html! {
+        (words)
+        (tables(turns, columns, RADIANS_PER_ARCSECOND))
+        (figures(title, turns, labels, RADIANS_PER_ARCSECOND, Some(attitude))?)
+    })
 }
 
 /// Deviations of the sets, then differences of each two, in units of `unit`.
-fn tables(comparison: &Comparison, columns: &'static [Column], unit: f64) -> String {
+fn tables(comparison: &Comparison, columns: &'static [Column], unit: f64) -> Markup {
     let caption = "Set minus mean of all: mean ± standard deviation";
     let mut deviations = Table::new(caption, columns);
     for deviation in &comparison.deviations {
@@ -200,7 +197,7 @@ fn tables(comparison: &Comparison, columns: &'static [Column], unit: f64) -> Str
         let size = comparison.difference(first, second);
         differences.row(true, cells(&format!("{of} − {minus}"), &size, unit));
     }
-    deviations.finish() + &differences.finish()
+    html! { (deviations.finish()) (differences.finish()) }
 }
 
 fn cells(name: &str, size: &Size, unit: f64) -> Vec<Cell> {
@@ -234,10 +231,10 @@ fn figures(
     labels: [&'static str; 3],
     unit: f64,
     ground: Option<&AttitudeComparison>,
-) -> Result<String> {
+) -> Result<Markup> {
     let stretches = stretches(&comparison.epochs);
     let drawn = stretches.len().min(PICTURES);
-    let mut html = String::new();
+    let mut plots = Vec::new();
     for (index, stretch) in stretches.iter().take(PICTURES).enumerate() {
         let over = Over::new(*stretch, POINTS_MAX / drawn);
         let mut panels: Vec<Panel> = labels
@@ -271,17 +268,14 @@ fn figures(
             "Each set minus the mean of all; the stretch begins {begins_h:.3} h after the first epoch. `areograph kernels compare \
              --json` gives every epoch."
         );
-        html += &figure(&Plot::of(title, caption, over.x_label(), panels))?;
+        plots.push(figure(&Plot::of(title, caption, over.x_label(), panels))?);
     }
-    let html = format!("<div class=\"plots\">\n{html}</div>\n");
-    if stretches.len() > drawn {
-        let words = format!(
-            "The first {drawn} of {} stretches are drawn.",
-            stretches.len()
-        );
-        return Ok(html + &paragraph(&words));
-    }
-    Ok(html)
+    Ok(html! {
+        div.plots { @for plot in plots { (plot) } }
+        @if stretches.len() > drawn {
+            p { "The first " (drawn) " of " (stretches.len()) " stretches are drawn." }
+        }
+    })
 }
 
 /// Layout of one stretch.

@@ -1,7 +1,7 @@
 //! Appendix: cost of the published iterations from ground to image, figure 4 of Shan et al. 2005 for this site.
 
 use super::{
-    html::{Cell, Column, Table, folded, paragraph},
+    html::{Cell, Column, Markup, Table, folded, html},
     many,
     numbers::whole,
     plots::{Panel, Plot, Series, figure, label},
@@ -21,18 +21,16 @@ pub(super) const SECTION: Section = Section {
     write,
 };
 
-fn write(site: &SiteProducts) -> Result<String> {
-    let mut figures = String::new();
+fn write(site: &SiteProducts) -> Result<Markup> {
     let images = many::shown(site).into_iter();
-    for (_, image) in images.filter(|(_, image)| converges(image)) {
-        figures += &figure(&convergence_plot(image))?;
-    }
-    let html = format!(
-        "{}{}<div class=\"plots\">\n{figures}</div>\n",
-        many::some_of_all(site),
-        methods(site)
-    );
-    Ok(folded("Cost of the published iterations", &html))
+    let body = html! {
+        (many::some_of_all(site))
+        (methods(site))
+        div.plots {
+            @for (_, image) in images.filter(|(_, image)| converges(image)) { (figure(&convergence_plot(image))?) }
+        }
+    };
+    Ok(folded("Cost of the published iterations", &body))
 }
 
 fn name(run: &MethodRun) -> String {
@@ -51,7 +49,7 @@ const fn order(model: CameraModel) -> &'static str {
 }
 
 /// Cost of the published iterations on this site's footprints.
-fn methods(site: &SiteProducts) -> String {
+fn methods(site: &SiteProducts) -> Markup {
     let mut table = Table::new(
         "Iterations per footprint within the image's lines",
         &[
@@ -89,7 +87,7 @@ fn methods(site: &SiteProducts) -> String {
         "Tolerance {} lines, at most {} steps. Frame first diverges where pixels are more than twice as long as wide.",
         site.config.registration.tolerance_lines, site.config.registration.steps_max
     );
-    table.finish() + &paragraph(&words)
+    html! { (table.finish()) p { (words) } }
 }
 
 /// Whether an iteration has steps to draw.

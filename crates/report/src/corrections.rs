@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use super::{
-    html::{Cell, Column, Table, paragraph},
+    html::{Cell, Column, Markup, Table, html, paragraph},
     many,
     plots::label,
 };
@@ -15,15 +15,14 @@ use areograph_products::{ImageProducts, SiteProducts};
 use areograph_stages::adjust::{Adjusted, CorrectedImage};
 
 /// Corrections at the middle of each image, ranges, biases.
-pub(super) fn tables(site: &SiteProducts, adjusted: &Adjusted) -> String {
-    [
-        positions(site, adjusted),
-        rotations(site, adjusted),
-        ranges(site, adjusted),
-        biases(adjusted),
-        attitude_clock(adjusted),
-    ]
-    .concat()
+pub(super) fn tables(site: &SiteProducts, adjusted: &Adjusted) -> Markup {
+    html! {
+        (positions(site, adjusted))
+        (rotations(site, adjusted))
+        (ranges(site, adjusted))
+        (biases(adjusted))
+        (attitude_clock(adjusted))
+    }
 }
 
 /// Coefficients of power 0 from quantity `first` on, with their standard deviations.
@@ -49,7 +48,7 @@ fn of_image(index: usize) -> String {
     format!("adjustment.json#/adjustment/images/{index}")
 }
 
-fn positions(site: &SiteProducts, adjusted: &Adjusted) -> String {
+fn positions(site: &SiteProducts, adjusted: &Adjusted) -> Markup {
     let mut table = Table::new(
         "Shift of the camera at the middle of the image, metres",
         &[
@@ -79,28 +78,30 @@ fn positions(site: &SiteProducts, adjusted: &Adjusted) -> String {
         }));
         table.row_of(&of_image(index), true, cells);
     }
-    let mut words = line_times(adjusted);
-    if starts_at_pedr {
-        words += &paragraph(
-            "Relative to the orbit of the kernels; with a simultaneous profile the expected orbit is from the PEDR \
-             (adjustment.orbit_of_pedr).",
-        );
+    html! {
+        (table.finish())
+        (line_times(adjusted))
+        @if starts_at_pedr {
+            p {
+                "Relative to the orbit of the kernels; with a simultaneous profile the expected orbit is from the PEDR \
+                 (adjustment.orbit_of_pedr)."
+            }
+        }
     }
-    table.finish() + &words
 }
 
 /// Contribution of line times to the standard deviations of positions.
-fn line_times(adjusted: &Adjusted) -> String {
+fn line_times(adjusted: &Adjusted) -> Markup {
     let largest_s = adjusted.images.iter().map(|image| image.line_time_sigma_s);
     let largest_s = largest_s.fold(0.0, f64::max);
-    if largest_s > 0.0 {
-        paragraph(&format!(
-            "±: for the camera at the exposure of a line. Line times are known to ±{} ms; along the track they cannot be \
-             separated from position and rotation, which are to be used together.",
-            label(largest_s / SECONDS_PER_MS, 0)
-        ))
-    } else {
-        String::new()
+    html! {
+        @if largest_s > 0.0 {
+            p {
+                "±: for the camera at the exposure of a line. Line times are known to ±"
+                (label(largest_s / SECONDS_PER_MS, 0)) " ms; along the track they cannot be \
+                 separated from position and rotation, which are to be used together."
+            }
+        }
     }
 }
 
@@ -115,7 +116,7 @@ fn orbit_axes(image: &ImageProducts, shift_m: Vector3<f64>) -> Option<Vector3<f6
     (advance_m.norm() > 0.0).then(|| axes.transpose() * shift_m)
 }
 
-fn rotations(site: &SiteProducts, adjusted: &Adjusted) -> String {
+fn rotations(site: &SiteProducts, adjusted: &Adjusted) -> Markup {
     let mut table = Table::new(
         "Rotation of the camera at the middle of the image, arcseconds",
         &[
@@ -153,11 +154,11 @@ fn rotations(site: &SiteProducts, adjusted: &Adjusted) -> String {
     } else {
         " In a narrow field of view position and rotation are nearly indistinguishable."
     };
-    table.finish() + &paragraph(&format!("±: a posteriori σ.{inseparable}"))
+    html! { (table.finish()) p { "±: a posteriori σ." (inseparable) } }
 }
 
 /// Range residuals of the same shots with the orbit of the kernels and after the adjustment.
-fn ranges(site: &SiteProducts, adjusted: &Adjusted) -> String {
+fn ranges(site: &SiteProducts, adjusted: &Adjusted) -> Markup {
     if adjusted.ranges.is_empty() {
         return paragraph(
             "No shot was fired during an exposure, so that no range enters the adjustment.",
@@ -202,7 +203,7 @@ fn ranges(site: &SiteProducts, adjusted: &Adjusted) -> String {
         }
         table.row(true, cells);
     }
-    table.finish() + &paragraph("Before: as in the range check.")
+    html! { (table.finish()) p { "Before: as in the range check." } }
 }
 
 /// Range − distance of the shots by profile and row.
@@ -216,21 +217,21 @@ fn checked_ranges(site: &SiteProducts) -> BTreeMap<(usize, usize), f64> {
 }
 
 /// Offset of the attitude's clock, if it is an unknown.
-fn attitude_clock(adjusted: &Adjusted) -> String {
-    adjusted.attitude_clock_s
-        .map_or_else(String::new, |(offset_s, sigma_s)| {
-            paragraph(&format!(
-                "Offset of the attitude's clock, all images: {} ± {} s; the rotations above include it.",
-                label(offset_s, 3),
-                label(sigma_s, 3)
-            ))
-        })
+fn attitude_clock(adjusted: &Adjusted) -> Markup {
+    html! {
+        @if let Some((offset_s, sigma_s)) = adjusted.attitude_clock_s {
+            p {
+                "Offset of the attitude's clock, all images: " (label(offset_s, 3)) " ± " (label(sigma_s, 3))
+                " s; the rotations above include it."
+            }
+        }
+    }
 }
 
-fn biases(adjusted: &Adjusted) -> String {
+fn biases(adjusted: &Adjusted) -> Markup {
     let biases = &adjusted.summary.range_biases_m;
     if biases.is_empty() {
-        return String::new();
+        return Markup::default();
     }
     let columns = &[Column::Text("profile"), Column::Number("range bias, m")];
     let mut table = Table::new("Range biases", columns);

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use plotters::{prelude::*, style::text_anchor::HPos};
 
 use super::{
-    html::folded_unless,
+    html::{Markup, folded_unless, html},
     map::labels::{LETTERS, write},
     plots::{Canvas, Drawn, INK, Key, WIDTH, drawn, figure_html, label, quoted},
 };
@@ -31,19 +31,15 @@ const COLOURS: [[f64; 3]; 3] = [
 ///
 /// # Errors
 /// A drawing that cannot be made.
-pub(super) fn figures(site: &SiteProducts, adjusted: &Adjusted) -> Result<String> {
+pub(super) fn figures(site: &SiteProducts, adjusted: &Adjusted) -> Result<Markup> {
     let images = site.shown_images().into_iter().take(IMAGES_DRAWN);
     let matrices: Vec<Matrix> = images
         .filter_map(|index| Matrix::of(index, adjusted.images.get(index)?))
         .collect();
     let largest = matrices.iter().filter_map(Matrix::largest);
     let largest = largest.fold(0.0, |most: f64, (_, value)| most.max(value.abs()));
-    let figures = matrices
-        .iter()
-        .map(Matrix::figure)
-        .collect::<Result<String>>()?;
-    if figures.is_empty() {
-        return Ok(figures);
+    if matrices.is_empty() {
+        return Ok(Markup::default());
     }
     Ok(folded_unless(
         largest >= OF_INTEREST,
@@ -51,7 +47,7 @@ pub(super) fn figures(site: &SiteProducts, adjusted: &Adjusted) -> Result<String
             "Correlations within an image, at most {}",
             label(largest, 2)
         ),
-        &format!("<div class=\"plots\">\n{figures}</div>\n"),
+        &html! { div.plots { @for matrix in matrices { (matrix.figure()?) } } },
     ))
 }
 
@@ -115,7 +111,7 @@ impl<'a> Matrix<'a> {
         self.cell().clamp(LETTERS + 4, 60)
     }
 
-    fn figure(&self) -> Result<String> {
+    fn figure(&self) -> Result<Markup> {
         let height = self.count() as i32 * self.row() + 20;
         let svg = drawn(height as u32, |area| self.draw(area))?;
         let keys = [("−1", -1.0), ("0", 0.0), ("1", 1.0)].map(|(name, value)| {

@@ -1,6 +1,6 @@
 //! The page that compares every number of the papers with areograph's.
 
-use super::html::{Cell, Column, STYLE, Section, Table, escape, page, paragraph};
+use super::html::{Cell, Column, Markup, Section, Table, embedded_style, html, page, paragraph};
 
 /// The page of this version, which `tests/products/fidelity.rs` makes and checks; it has the style of all pages, by a
 /// link.
@@ -79,24 +79,22 @@ pub struct FidelityRow {
 /// The page for the folder of the page of all sites: in one file.
 #[must_use]
 pub fn published_fidelity_page() -> String {
-    FIDELITY_PAGE.replacen(LINKED_STYLE, &embedded_style(), 1)
-}
-
-fn embedded_style() -> String {
-    format!("<style>\n{STYLE}</style>\n")
+    FIDELITY_PAGE.replacen(LINKED_STYLE, &embedded_style().0, 1)
 }
 
 /// The page for `docs/`.
 #[must_use]
 pub fn fidelity_page(fidelity: &Fidelity) -> String {
-    let rules: String = fidelity.rules.iter().map(|rule| paragraph(rule)).collect();
     let sections: Vec<Section> = fidelity.papers.iter().map(section).collect();
-    let lead = rules + &kinds(fidelity);
+    let lead = html! {
+        @for rule in &fidelity.rules { (paragraph(rule)) }
+        (kinds(fidelity))
+    };
     let page = page("Fidelity to the papers", &lead, &sections);
-    page.replacen(&embedded_style(), LINKED_STYLE, 1)
+    page.replacen(&embedded_style().0, LINKED_STYLE, 1)
 }
 
-fn kinds(fidelity: &Fidelity) -> String {
+fn kinds(fidelity: &Fidelity) -> Markup {
     let mut table = Table::new(
         "Rows by kind",
         &[
@@ -126,7 +124,7 @@ fn kinds(fidelity: &Fidelity) -> String {
     }
     let all: usize = fidelity.kinds.iter().map(FidelityKind::rows).sum();
     table.row(true, ["all".into(), all.to_string().into()]);
-    format!("<div class=\"stacked\">\n{}</div>\n", table.finish())
+    html! { div.stacked { (table.finish()) } }
 }
 
 fn section(paper: &FidelityPaper) -> Section {
@@ -159,29 +157,20 @@ fn section(paper: &FidelityPaper) -> Section {
         );
     }
     // On a narrow screen the cells of a row are stacked.
-    let rows = format!(
-        "<div class=\"stacked columns\">\n{}</div>\n",
-        table.finish()
-    );
-    Section::new(paper.name, paragraph(paper.citation) + &rows)
+    let body = html! { (paragraph(paper.citation)) div.stacked.columns { (table.finish()) } };
+    Section::new(paper.name, body)
 }
 
 /// A cell with a line for each number.
 fn lines(label: &str, numbers: &[String]) -> Cell {
-    let numbers: Vec<String> = numbers.iter().map(|number| escape(number)).collect();
-    let numbers = numbers.join("<br>");
-    Cell::Html(if label.is_empty() || numbers.is_empty() {
-        numbers
-    } else {
-        format!("<span class=\"label\">{label}: </span>{numbers}")
-    })
+    html! {
+        @if !label.is_empty() && !numbers.is_empty() { span.label { (label) ": " } }
+        @for (place, number) in numbers.iter().enumerate() { @if place > 0 { br; } (number) }
+    }
+    .into()
 }
 
 /// A cell with a label for layouts without column heads.
 fn labelled(label: &str, text: &str) -> Cell {
-    Cell::Html(if text.is_empty() {
-        String::new()
-    } else {
-        format!("<span class=\"label\">{label}: </span>{}", escape(text))
-    })
+    html! { @if !text.is_empty() { span.label { (label) ": " } (text) } }.into()
 }

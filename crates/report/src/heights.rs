@@ -6,12 +6,12 @@ mod readings;
 mod relief;
 
 use super::{
-    html::{Cell, Column, Table, counted, folded, heading, paragraph},
+    html::{Cell, Column, Markup, Table, counted, folded, html, paragraph},
     misregistration::BeforeAfter,
     numbers::whole,
     plots::{figure, label},
     section::Section,
-    source::sentence,
+    source::traced,
 };
 use areograph_base::{error::Result, footprints::AdjustmentModel, verdict::CheckKind};
 use areograph_products::{AdjustmentProducts, GeometricProducts, SiteProducts};
@@ -33,30 +33,27 @@ pub(super) const SECTION: Section = Section {
     ],
     appears: |site| site.geometric.is_some(),
     write: |site| {
-        let geometric = site.geometric.iter();
-        geometric.map(|geometric| write(site, geometric)).collect()
+        let geometric = site.geometric.as_ref();
+        let written = geometric.map(|geometric| write(site, geometric));
+        Ok(written.transpose()?.unwrap_or_default())
     },
 };
 
-fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
+fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<Markup> {
     let adjustment = geometric.adjustment.as_ref();
-    let mut html = adjustment.map_or_else(String::new, |adjustment| {
-        statements(site, geometric, adjustment)
-    });
-    if let Ok(surface) = &geometric.heights.surface {
-        html += &heading("Heights against the MOLA surface");
-        html += &compared(geometric);
-        html += &apart(geometric.heights);
-        html += &format!(
-            "<div class=\"plots\">\n{}</div>\n",
-            figure(&profile::plot(site, geometric))?
-        );
-        html += &folded(
-            "The surface, and heights of footprints by images",
-            &(surface_in_words(surface) + &footprints(geometric)),
-        );
-    }
-    Ok(html)
+    Ok(html! {
+        @if let Some(adjustment) = adjustment { (statements(site, geometric, adjustment)) }
+        @if let Ok(surface) = &geometric.heights.surface {
+            h3 { "Heights against the MOLA surface" }
+            (compared(geometric))
+            (apart(geometric.heights))
+            div.plots { (figure(&profile::plot(site, geometric))?) }
+            (folded("The surface, and heights of footprints by images", &html! {
+                (surface_in_words(surface))
+                (footprints(geometric))
+            }))
+        }
+    })
 }
 
 /// Reason why absolute accuracies are withheld.
@@ -68,7 +65,7 @@ fn statements(
     site: &SiteProducts,
     geometric: &GeometricProducts,
     adjustment: &AdjustmentProducts,
-) -> String {
+) -> Markup {
     let mut table = Table::new(
         "Accuracy of the tie points",
         &[
@@ -123,16 +120,16 @@ fn statements(
         table.row(true, cells.map(Cell::from));
     }
     let relief = if is_withheld && adjustment.adjusted.heights.is_some() {
-        paragraph(&format!(
-            "The accuracy of position by relief is withheld: {WITHHELD_BECAUSE}."
-        ))
+        html! { p { "The accuracy of position by relief is withheld: " (WITHHELD_BECAUSE) "." } }
     } else {
         relief::relief(adjustment.adjusted, known_beforehand(geometric))
     };
-    table.finish()
-        + &relief
-        + &boresight::boresight(adjustment.adjusted)
-        + &readings::two_readings(adjustment.adjusted, is_withheld)
+    html! {
+        (table.finish())
+        (relief)
+        (boresight::boresight(adjustment.adjusted))
+        (readings::two_readings(adjustment.adjusted, is_withheld))
+    }
 }
 
 fn place_says(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
@@ -273,26 +270,24 @@ fn single_sigmas_m(adjustment: &AdjustmentProducts) -> [f64; 2] {
     })
 }
 
-fn surface_in_words(surface: &SurfaceFigures) -> String {
-    const OF: [&str; 4] = [
-        "adjustment.json#/before/heights/surface/shots",
-        "adjustment.json#/before/heights/surface/profiles",
-        "adjustment.json#/before/heights/surface/roughness_m",
-        "adjustment.json#/before/heights/surface/slope",
-    ];
-    sentence(
-        "Surface kriged from {} shots of {}; {} m RMS over 300 m, slope {} per axis. Errors at \
-         neighbouring tie points are correlated, so averaging reduces them little.",
-        &[
-            (whole(surface.shots), OF[0]),
-            (counted(surface.profiles, "profile"), OF[1]),
-            (label(surface.roughness_m, 1), OF[2]),
-            (label(surface.slope, 3), OF[3]),
-        ],
-    )
+fn surface_in_words(surface: &SurfaceFigures) -> Markup {
+    let of = |text: &str, name: &str| {
+        traced(
+            text,
+            &format!("adjustment.json#/before/heights/surface/{name}"),
+        )
+    };
+    html! {
+        p {
+            "Surface kriged from " (of(&whole(surface.shots), "shots")) " shots of "
+            (of(&counted(surface.profiles, "profile"), "profiles")) "; " (of(&label(surface.roughness_m, 1), "roughness_m"))
+            " m RMS over 300 m, slope " (of(&label(surface.slope, 3), "slope")) " per axis. Errors at \
+             neighbouring tie points are correlated, so averaging reduces them little."
+        }
+    }
 }
 
-fn compared(geometric: &GeometricProducts) -> String {
+fn compared(geometric: &GeometricProducts) -> Markup {
     let mut table = Table::new(
         "Heights of tie points above the MOLA surface, metres",
         &[
@@ -337,7 +332,7 @@ fn compared(geometric: &GeometricProducts) -> String {
 }
 
 /// Heights of footprints that both images of a pair show.
-fn footprints(geometric: &GeometricProducts) -> String {
+fn footprints(geometric: &GeometricProducts) -> Markup {
     let mut table = Table::new(
         "Heights of footprints by the images that show them, above MOLA, metres",
         &[
@@ -385,18 +380,14 @@ fn footprints(geometric: &GeometricProducts) -> String {
         }
     }
     if rows == 0 {
-        return String::new();
+        return Markup::default();
     }
     let words = "Relief between tie points affects single heights; where it has one sign along a profile, it affects \
                  the median as well.";
-    BeforeAfter::some_of_all(geometric) + &table.finish() + &paragraph(words)
+    html! { (BeforeAfter::some_of_all(geometric)) (table.finish()) p { (words) } }
 }
 
-fn apart(check: &HeightCheck) -> String {
-    const OF: [&str; 2] = [
-        "|adjustment.json#/before/heights/profiles_apart/mean_m",
-        "adjustment.json#/before/heights/profiles_apart/sigma_m",
-    ];
+fn apart(check: &HeightCheck) -> Markup {
     let Some(apart) = &check.apart else {
         return paragraph("A single profile provides no independent test of the surface.");
     };
@@ -406,13 +397,13 @@ fn apart(check: &HeightCheck) -> String {
     } else {
         (first, second)
     };
-    sentence(
-        "At the tie points the surface interpolated from {} alone lies {} m above that from {} alone (expected σ {} m).",
-        &[
-            (upper.clone(), ""),
-            (label(apart.mean_m.abs(), 1), OF[0]),
-            (lower.clone(), ""),
-            (label(apart.sigma_m, 1), OF[1]),
-        ],
-    )
+    let mean_m = label(apart.mean_m.abs(), 1);
+    html! {
+        p {
+            "At the tie points the surface interpolated from " (upper) " alone lies "
+            (traced(&mean_m, "|adjustment.json#/before/heights/profiles_apart/mean_m"))
+            " m above that from " (lower) " alone (expected σ "
+            (traced(&label(apart.sigma_m, 1), "adjustment.json#/before/heights/profiles_apart/sigma_m")) " m)."
+        }
+    }
 }

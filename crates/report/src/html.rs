@@ -1,6 +1,9 @@
-//! Pieces of HTML: every text passes through [`escape`].
+//! Pieces of HTML; `html!` escapes every text.
 
-use std::{borrow::Cow, fmt::Write as _};
+use std::borrow::Cow;
+
+use maud::DOCTYPE;
+pub(super) use maud::{Markup, PreEscaped, html};
 
 use super::numbers::whole;
 
@@ -13,23 +16,6 @@ const SHORT: usize = 28;
 const ROWS_TOGETHER: usize = 10;
 /// Columns up to which a long table is set beside itself on paper.
 const COLUMNS_NARROW: usize = 2;
-
-/// `text` with the five characters that HTML reads as markup replaced.
-#[must_use]
-pub fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            '\'' => escaped.push_str("&#39;"),
-            _ => escaped.push(character),
-        }
-    }
-    escaped
-}
 
 /// Rating, for colours; words state the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,17 +49,17 @@ pub(super) struct Section {
     /// Name in links.
     anchor: String,
     heading: Cow<'static, str>,
-    body: String,
+    body: Markup,
 }
 
 impl Section {
-    /// A section with `body` as HTML, named after its heading in links.
-    pub(super) fn new(heading: &'static str, body: String) -> Self {
+    /// A section named after its heading in links.
+    pub(super) fn new(heading: &'static str, body: Markup) -> Self {
         Self::named(&slug(heading), heading, body)
     }
 
     /// A section with its own name in links.
-    pub(super) fn named(anchor: &str, heading: impl Into<Cow<'static, str>>, body: String) -> Self {
+    pub(super) fn named(anchor: &str, heading: impl Into<Cow<'static, str>>, body: Markup) -> Self {
         Self {
             anchor: anchor.to_owned(),
             heading: heading.into(),
@@ -82,102 +68,81 @@ impl Section {
     }
 }
 
-/// The page: title, lead (HTML), then the sections that are not empty.
-pub(super) fn page(title: &str, lead: &str, sections: &[Section]) -> String {
-    let title = escape(title);
-    let version = env!("CARGO_PKG_VERSION");
-    let shown = || sections.iter().filter(|section| !section.body.is_empty());
-    let contents: String = shown()
-        .map(|section| {
-            format!(
-                "<li><a href=\"#{}\">{}</a></li>\n",
-                section.anchor,
-                escape(&section.heading)
-            )
-        })
-        .collect();
-    let body: String = shown()
-        .map(|section| {
-            format!(
-                "<section id=\"{}\">\n<h2>{}</h2>\n{}</section>\n",
-                section.anchor,
-                escape(&section.heading),
-                section.body
-            )
-        })
-        .collect();
-    let nav = if contents.is_empty() {
-        String::new()
-    } else {
-        format!("<nav aria-label=\"Contents\"><ul>\n{contents}</ul></nav>\n")
+/// The page: title, lead, then the sections that are not empty.
+pub(super) fn page(title: &str, lead: &Markup, sections: &[Section]) -> String {
+    let shown = sections.iter().filter(|section| !section.body.0.is_empty());
+    let shown: Vec<&Section> = shown.collect();
+    let page = html! {
+        (DOCTYPE) "\n"
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                link rel="icon" href="data:,";
+                title { (title) " – areograph" }
+                (embedded_style())
+            }
+            body {
+                header { h1 { (title) } }
+                main {
+                    (lead)
+                    @if !shown.is_empty() {
+                        nav aria-label="Contents" {
+                            ul { @for section in &shown { li { (link(&format!("#{}", section.anchor), &section.heading)) } } }
+                        }
+                    }
+                    @for Section { anchor, heading, body } in &shown {
+                        "\n" section id=(anchor) { h2 { (heading) } (body) }
+                    }
+                }
+                "\n" footer { "Made by areograph " (env!("CARGO_PKG_VERSION")) "." }
+            }
+        }
+        "\n"
     };
-    format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <link rel=\"icon\" href=\"data:,\">\n\
-         <title>{title} – areograph</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
-         <header>\n<h1>{title}</h1>\n</header>\n<main>\n{lead}{nav}{body}</main>\n\
-         <footer>Made by areograph {version}.</footer>\n</body>\n</html>\n"
-    )
+    page.into_string()
 }
 
-/// The box that is read first: a headline, then paragraphs and lists as HTML.
-pub(super) fn verdict(tone: Tone, headline: &str, body: &str) -> String {
-    format!(
-        "<div class=\"verdict {}\">\n<p><strong>{}</strong></p>\n{body}</div>\n",
-        tone.class(),
-        escape(headline)
-    )
+/// The style inside a page.
+pub(super) fn embedded_style() -> Markup {
+    html! { style { "\n" (PreEscaped(STYLE)) } "\n" }
 }
 
-/// A heading inside a section.
-pub(super) fn heading(text: &str) -> String {
-    format!("<h3>{}</h3>\n", escape(text))
+/// The box that is read first: a headline, then paragraphs and lists.
+pub(super) fn verdict(tone: Tone, headline: &str, body: &Markup) -> Markup {
+    html! { div.verdict.(tone.class()) { p { strong { (headline) } } (body) } }
 }
 
-/// HTML that is unfolded on request, and on paper: evidence rather than result. Empty for empty HTML.
-pub(super) fn folded(title: &str, html: &str) -> String {
-    folded_unless(false, title, html)
+/// A part that is unfolded on request, and on paper: evidence rather than result. Empty for an empty one.
+pub(super) fn folded(title: &str, body: &Markup) -> Markup {
+    folded_unless(false, title, body)
 }
 
-/// A folded section, unfolded from the start where it `matters`.
+/// A folded part, unfolded from the start where it `matters`.
 #[must_use]
-pub fn folded_unless(matters: bool, title: &str, html: &str) -> String {
-    if html.is_empty() {
-        return String::new();
+pub fn folded_unless(matters: bool, title: &str, body: &Markup) -> Markup {
+    html! {
+        @if !body.0.is_empty() {
+            details.more open[matters] { summary { (title) } (body) }
+        }
     }
-    let open = if matters { " open" } else { "" };
-    format!(
-        "<details class=\"more\"{open}><summary>{}</summary>\n{html}</details>\n",
-        escape(title)
-    )
 }
 
-/// A paragraph of text.
+/// A paragraph of text; empty for an empty one.
 #[must_use]
-pub fn paragraph(text: &str) -> String {
-    if text.is_empty() {
-        return String::new();
-    }
-    format!("<p>{}</p>\n", escape(text))
+pub fn paragraph(text: &str) -> Markup {
+    html! { @if !text.is_empty() { p { (text) } } }
 }
 
-/// A link to `place` named `text`, as HTML.
+/// A link to `place` named `text`.
 #[must_use]
-pub fn link(place: &str, text: &str) -> String {
-    format!("<a href=\"{}\">{}</a>", escape(place), escape(text))
+pub fn link(place: &str, text: &str) -> Markup {
+    html! { a href=(place) { (text) } }
 }
 
-/// A list of texts; an empty string for an empty list.
-pub(super) fn list<T: AsRef<str>>(items: &[T]) -> String {
-    if items.is_empty() {
-        return String::new();
-    }
-    let items: Vec<String> = items
-        .iter()
-        .map(|item| format!("<li>{}</li>\n", escape(item.as_ref())))
-        .collect();
-    format!("<ul>\n{}</ul>\n", items.concat())
+/// A list of texts; empty for no texts.
+pub(super) fn list<T: AsRef<str>>(items: &[T]) -> Markup {
+    html! { @if !items.is_empty() { ul { @for item in items { li { (item.as_ref()) } } } } }
 }
 
 /// Letters and digits of `text` in lower case, the rest as hyphens: a name inside a page or file.
@@ -206,8 +171,8 @@ pub enum Cell {
     Plain(String),
     /// A value with a limit: the used share of it, above 1 (or NaN) beyond it.
     Limited(String, f64),
-    /// HTML.
-    Html(String),
+    /// Other elements.
+    Html(Markup),
     /// A cell whose numbers are from products, see `source.rs`.
     Traced(Box<Self>, String),
 }
@@ -238,11 +203,17 @@ impl From<String> for Cell {
     }
 }
 
+impl From<Markup> for Cell {
+    fn from(html: Markup) -> Self {
+        Self::Html(html)
+    }
+}
+
 /// A table being filled row by row; the first cell of a row is its head.
 pub struct Table {
-    html: String,
+    caption: String,
     columns: &'static [Column],
-    rows: usize,
+    rows: Vec<Markup>,
     /// Whether cells carry their heads, for stacked layouts.
     cards: bool,
 }
@@ -251,37 +222,20 @@ impl Table {
     /// A table with a caption and column heads.
     #[must_use]
     pub fn new(caption: &str, columns: &'static [Column]) -> Self {
-        let heads: String = columns
-            .iter()
-            .map(|column| match column {
-                Column::Text(head) => format!("<th scope=\"col\">{}</th>", escape(head)),
-                Column::Number(head) => {
-                    format!("<th scope=\"col\" class=\"number\">{}</th>", escape(head))
-                }
-            })
-            .collect();
-        let caption = escape(caption);
-        // Scrolling elements must be reachable by keyboard, and then need a name.
-        let html = format!(
-            "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"{caption}\"><table>\n\
-             <caption>{caption}</caption>\n<thead><tr>{heads}</tr></thead>\n<tbody>\n"
-        );
         Self {
-            html,
+            caption: caption.to_owned(),
             columns,
-            rows: 0,
+            rows: Vec::new(),
             cards: false,
         }
     }
 
     /// A table whose rows become cards on a narrow screen.
     pub(super) fn of_cards(caption: &str, columns: &'static [Column]) -> Self {
-        let mut table = Self::new(caption, columns);
-        table.html = table
-            .html
-            .replacen("class=\"wide\"", "class=\"wide cards\"", 1);
-        table.cards = true;
-        table
+        Self {
+            cards: true,
+            ..Self::new(caption, columns)
+        }
     }
 
     /// Adds a row, tinted when it is not `valid`.
@@ -291,97 +245,82 @@ impl Table {
 
     /// Adds a row whose cells are from `place` in the products.
     pub fn row_of(&mut self, place: &str, valid: bool, cells: impl IntoIterator<Item = Cell>) {
-        self.rows += 1;
-        let class = if valid { "" } else { " class=\"invalid\"" };
-        let class = class.to_owned() + &within(place);
-        let cells: String = cells
-            .into_iter()
-            .enumerate()
-            .map(|(place, cell)| match cell {
-                Cell::Traced(cell, places) => self.cell(place, *cell, &from_places(&places)),
-                cell => self.cell(place, cell, ""),
-            })
-            .collect();
-        // Writing to a string cannot fail.
-        let _ = writeln!(self.html, "<tr{class}>{cells}</tr>");
+        let within = Some(place).filter(|place| !place.is_empty());
+        let class = (!valid).then_some("invalid");
+        self.rows.push(html! {
+            tr class=[class] data-in=[within] {
+                @for (place, cell) in cells.into_iter().enumerate() { (self.cell(place, cell, None)) }
+            }
+        });
     }
 
-    /// A cell, with the attribute that gives the source of its numbers.
-    fn cell(&self, place: usize, cell: Cell, from: &str) -> String {
-        let class = match self.columns.get(place) {
-            Some(Column::Number(_)) => "number",
-            _ => "",
+    /// A cell, with the places of its numbers in the products.
+    fn cell(&self, place: usize, cell: Cell, from: Option<&str>) -> Markup {
+        let column = self.columns.get(place);
+        let mut class = match column {
+            Some(Column::Number(_)) => "number".to_owned(),
+            _ => String::new(),
         };
-        let (tag, mut scope) = if place == 0 {
-            ("th", " scope=\"row\"".to_owned())
-        } else {
-            ("td", String::new())
-        };
-        if let Some(Column::Text(head) | Column::Number(head)) =
-            self.columns.get(place).filter(|_| self.cards && place > 0)
-        {
-            scope = format!(" data-head=\"{}\"", escape(head));
-        }
-        match cell {
-            Cell::Limited(text, share) => limited(class, from, &text, share),
-            Cell::Html(html) => format!("<{tag}{scope} class=\"{class}\"{from}>{html}</{tag}>"),
+        let mut style = None;
+        let body = match cell {
+            // Nested marks count once.
+            Cell::Traced(cell, places) => return self.cell(place, *cell, from.or(Some(&places))),
+            Cell::Html(html) => html,
             Cell::Plain(text) => {
                 // Times and names are hard to read when broken; sentences must break.
-                let short = if text.chars().count() <= SHORT {
-                    " short"
-                } else {
-                    ""
-                };
-                format!(
-                    "<{tag}{scope} class=\"{class}{short}\"{from}>{}</{tag}>",
-                    escape(&text)
-                )
+                if text.chars().count() <= SHORT {
+                    class += " short";
+                }
+                html! { (text) }
             }
-            // Nested marks count once.
-            Cell::Traced(cell, _) => self.cell(place, *cell, from),
+            // Written so that NaN is beyond.
+            Cell::Limited(text, share) if share <= 1.0 => {
+                class += " limited";
+                style = Some(format!("--share:{}%", (100.0 * share.max(0.0)).round()));
+                html! { (text) }
+            }
+            Cell::Limited(text, _) => {
+                class += " beyond";
+                html! { span.hidden { "beyond the limit: " } "✗ " (text) }
+            }
+        };
+        let head = column.filter(|_| self.cards);
+        let head = head.map(|(Column::Text(head) | Column::Number(head))| head);
+        html! {
+            @if place == 0 {
+                th scope="row" class=(class) data-from=[from] style=[style] { (body) }
+            } @else {
+                td data-head=[head] class=(class) data-from=[from] style=[style] { (body) }
+            }
         }
     }
 
     /// The finished table.
     #[must_use]
-    pub fn finish(self) -> String {
-        let html = self.html + "</tbody>\n</table></div>\n";
-        let kind = match (
-            self.rows > ROWS_TOGETHER,
-            self.columns.len() > COLUMNS_NARROW,
-        ) {
-            (false, _) => "brief",
-            (true, false) => "narrow",
-            (true, true) => return html,
-        };
-        html.replacen("class=\"wide", &format!("class=\"wide {kind}"), 1)
+    pub fn finish(self) -> Markup {
+        let is_long = self.rows.len() > ROWS_TOGETHER;
+        let is_narrow = is_long && self.columns.len() <= COLUMNS_NARROW;
+        html! {
+            // Scrolling elements must be reachable by keyboard, and then need a name.
+            div.wide.brief[!is_long].narrow[is_narrow].cards[self.cards]
+                tabindex="0" role="region" aria-label=(self.caption) {
+                table {
+                    caption { (self.caption) }
+                    thead {
+                        tr {
+                            @for column in self.columns {
+                                @match column {
+                                    Column::Text(head) => { th scope="col" { (head) } }
+                                    Column::Number(head) => { th.number scope="col" { (head) } }
+                                }
+                            }
+                        }
+                    }
+                    tbody { @for row in self.rows { "\n" (row) } }
+                }
+            }
+        }
     }
-}
-
-fn limited(class: &str, from: &str, text: &str, share: f64) -> String {
-    let text = escape(text);
-    // Written so that NaN is beyond.
-    if share <= 1.0 {
-        let per_cent = (100.0 * share.max(0.0)).round();
-        format!("<td class=\"{class} limited\"{from} style=\"--share:{per_cent}%\">{text}</td>")
-    } else {
-        format!(
-            "<td class=\"{class} beyond\"{from}><span class=\"hidden\">beyond the limit: </span>✗ {text}</td>"
-        )
-    }
-}
-
-/// The attribute of an element whose numbers are those at `places` of the products; see `source.rs`.
-pub(super) fn from_places(places: &str) -> String {
-    format!(" data-from=\"{}\"", escape(places))
-}
-
-/// The attribute of a row whose cells are from `place`; empty without a place.
-fn within(place: &str) -> String {
-    if place.is_empty() {
-        return String::new();
-    }
-    format!(" data-in=\"{}\"", escape(place))
 }
 
 /// A number of things, in the plural where there are several.
@@ -402,9 +341,9 @@ mod tests {
     fn text_stays_text() {
         let mut table = Table::new("<i>", &[Column::Number("<b>")]);
         table.row(false, ["<script>alert('&\"')</script>".into()]);
-        let html = table.finish();
+        let html = table.finish().0;
         assert!(!html.contains("<script") && !html.contains("<b>") && !html.contains("<i>"));
-        assert!(html.contains("&lt;script&gt;alert(&#39;&amp;&quot;&#39;)&lt;/script&gt;"));
+        assert!(html.contains("&lt;script&gt;alert('&amp;&quot;')&lt;/script&gt;"));
         assert!(html.contains("<tr class=\"invalid\">"));
     }
 
@@ -416,18 +355,19 @@ mod tests {
         table.row(true, cells(0.5));
         table.row(false, cells(1.01));
         table.row(false, cells(f64::NAN));
-        let html = table.finish();
+        let html = table.finish().0;
         assert_eq!(html.matches("beyond the limit").count(), 2);
         assert_eq!(html.matches("--share:50%").count(), 1);
     }
 
     #[test]
     fn evidence_is_folded_unless_it_matters() {
-        assert_eq!(folded("Tables", ""), "");
-        assert!(
-            folded("a & b", "<p>c</p>").starts_with("<details class=\"more\"><summary>a &amp; b")
-        );
-        assert!(folded_unless(true, "a", "<p>c</p>").starts_with("<details class=\"more\" open>"));
+        let body = html! { p { "c" } };
+        assert_eq!(folded("Tables", &Markup::default()).0, "");
+        let folded = folded("a & b", &body).0;
+        assert!(folded.starts_with("<details class=\"more\"><summary>a &amp; b"));
+        let unfolded = folded_unless(true, "a", &body).0;
+        assert!(unfolded.starts_with("<details class=\"more\" open>"));
     }
 
     #[test]
@@ -440,10 +380,10 @@ mod tests {
     #[test]
     fn empty_sections_are_not_listed() {
         let sections = [
-            Section::new("One", "<p>1</p>".to_owned()),
-            Section::new("Two words", String::new()),
+            Section::new("One", html! { p { "1" } }),
+            Section::new("Two words", Markup::default()),
         ];
-        let page = page("T", "", &sections);
+        let page = page("T", &Markup::default(), &sections);
         assert!(page.contains("href=\"#one\"") && !page.contains("two-words"));
     }
 }

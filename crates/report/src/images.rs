@@ -1,7 +1,7 @@
 //! Exterior orientation: Table 4 and figure 3 of Shan et al. 2005.
 
 use super::{
-    html::{Cell, Column, Table, folded_unless, paragraph},
+    html::{Cell, Column, Markup, Table, folded_unless, html, paragraph},
     many,
     numbers::whole,
     plots::{GREY, Panel, Plot, Series, figure, label},
@@ -34,29 +34,26 @@ pub(super) const SECTION: Section = Section {
     write,
 };
 
-fn write(site: &SiteProducts) -> Result<String> {
-    let figures = many::shown(site)
-        .into_iter()
-        .map(|(_, image)| figure(&residual_plot(image)))
-        .collect::<Result<String>>()?;
-    Ok(many::overview(site)?
-        + &taken(site)
-        + &sky::figure(site)?
-        + &folded_unless(
-            site.images
-                .iter()
-                .any(|image| !image.invalid_because().is_empty()),
-            "Light time, polynomials of the orientation, and their residuals",
-            &format!(
-                "{}{}<div class=\"plots\">\n{figures}</div>\n",
-                light_time(site),
-                models(site)
-            ),
-        ))
+fn write(site: &SiteProducts) -> Result<Markup> {
+    let evidence = html! {
+        (light_time(site))
+        (models(site))
+        div.plots { @for (_, image) in many::shown(site) { (figure(&residual_plot(image))?) } }
+    };
+    let invalid = site
+        .images
+        .iter()
+        .any(|image| !image.invalid_because().is_empty());
+    Ok(html! {
+        (many::overview(site)?)
+        (taken(site))
+        (sky::figure(site)?)
+        (folded_unless(invalid, "Light time, polynomials of the orientation, and their residuals", &evidence))
+    })
 }
 
 /// Times and geometry of the images: Table 2.
-fn taken(site: &SiteProducts) -> String {
+fn taken(site: &SiteProducts) -> Markup {
     let mut table = Table::new(
         "Images (Table 2 of Shan et al. 2005)",
         &[
@@ -109,14 +106,14 @@ fn taken(site: &SiteProducts) -> String {
 }
 
 /// The site's convention of camera positions, and the offsets of the others.
-fn light_time(site: &SiteProducts) -> String {
+fn light_time(site: &SiteProducts) -> Markup {
     let convention = site.config.orientation.light_time;
     if site
         .images
         .iter()
         .all(|image| image.times.support.is_some())
     {
-        return String::new();
+        return Markup::default();
     }
     let effects = site
         .images
@@ -172,7 +169,7 @@ fn place(image: &str) -> String {
 }
 
 /// RMSE per image: Table 4.
-fn models(site: &SiteProducts) -> String {
+fn models(site: &SiteProducts) -> Markup {
     let limits = &site.config.orientation;
     let mut table = Table::new(
         "RMSE of the polynomials over all samples (Table 4 of Shan et al. 2005)",
@@ -245,7 +242,7 @@ fn models(site: &SiteProducts) -> String {
             );
         }
     }
-    table.finish() + &paragraph(&words)
+    html! { (table.finish()) p { (words) } }
 }
 
 /// A row: image, order, six RMSE including those with limits.

@@ -5,7 +5,7 @@ mod similarity;
 
 use super::{
     checks,
-    html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, verdict},
+    html::{Cell, Column, Markup, Section, Table, Tone, counted, html, list, page, verdict},
     numbers::signed,
     plots::{Arrow, Arrows, GREY, Panel, Plot, Series, figure, label, magnification},
 };
@@ -34,7 +34,7 @@ pub fn match_page(of: &LaserMatch) -> Result<String> {
     ))
 }
 
-fn lead(of: &LaserMatch) -> String {
+fn lead(of: &LaserMatch) -> Markup {
     let (tone, word) = Tone::of(of.verdict.valid, !of.verdict.remarks.is_empty());
     let headline = format!(
         "{word}: {} of {} kept.",
@@ -76,11 +76,13 @@ fn lead(of: &LaserMatch) -> String {
         of.radius_m,
         of.similarity.word(),
     );
-    let body = paragraph(&(judged + &bias + &known))
-        + &paragraph(&made)
-        + &list(&of.verdict.reasons)
-        + &list(&of.verdict.remarks);
-    verdict(tone, &headline, &body) + &checks::listed(&of.verdict.checks)
+    let body = html! {
+        p { (judged) (bias) (known) }
+        p { (made) }
+        (list(&of.verdict.reasons))
+        (list(&of.verdict.remarks))
+    };
+    html! { (verdict(tone, &headline, &body)) (checks::listed(&of.verdict.checks)) }
 }
 
 fn kept(of: &LaserMatch) -> impl Iterator<Item = &UnitResult> {
@@ -94,7 +96,7 @@ fn place_deg(of: &LaserMatch, unit: &UnitResult) -> (f64, f64) {
     (longitude_rad.to_degrees(), unit.place_rad[1].to_degrees())
 }
 
-fn map(of: &LaserMatch) -> Result<String> {
+fn map(of: &LaserMatch) -> Result<Markup> {
     let arrow = |unit: &UnitResult| {
         let [east_rad, north_rad] = unit.found?.shift_rad;
         Some(Arrow {
@@ -129,10 +131,10 @@ fn map(of: &LaserMatch) -> Result<String> {
     plot.panels[0].y = y.with(tips().map(|tip| tip.1));
     plot.panels[0].arrows.push(arrows);
     plot.panels[0].height = 620;
-    Ok(format!("<div class=\"plots\">\n{}</div>\n", figure(&plot)?))
+    Ok(html! { div.plots { (figure(&plot)?) } })
 }
 
-fn held_out(of: &LaserMatch) -> Result<String> {
+fn held_out(of: &LaserMatch) -> Result<Markup> {
     let points = |after: bool| -> Vec<(f64, f64)> {
         let judged = kept(of).filter_map(|unit| Some((unit.unit, unit.held_out?)));
         judged
@@ -143,7 +145,7 @@ fn held_out(of: &LaserMatch) -> Result<String> {
             .collect()
     };
     if points(true).is_empty() {
-        return Ok(String::new());
+        return Ok(Markup::default());
     }
     let series = vec![
         Series::dots("without the shift", 1, points(false)),
@@ -156,10 +158,10 @@ fn held_out(of: &LaserMatch) -> Result<String> {
         "unit",
         vec![Panel::of("root mean square, m", series)],
     );
-    Ok(format!("<div class=\"plots\">\n{}</div>\n", figure(&plot)?))
+    Ok(html! { div.plots { (figure(&plot)?) } })
 }
 
-fn units(of: &LaserMatch) -> String {
+fn units(of: &LaserMatch) -> Markup {
     let mut table = Table::new(
         "Every unit; shifts are offsets of the model from the laser",
         &[

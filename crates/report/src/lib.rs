@@ -5,7 +5,6 @@
 
 #![allow(
     clippy::format_push_string,
-    clippy::format_collect,
     reason = "pages are put together once from small pieces"
 )]
 #![allow(
@@ -86,7 +85,7 @@ pub use terrain_pictures::terrain_pictures;
 /// Parts of sections that are declared outside this crate.
 pub mod parts {
     pub use super::{
-        html::{Cell, Column, Table, escape, folded_unless, link, paragraph},
+        html::{Cell, Column, Table, folded_unless, link, paragraph},
         numbers::{signed, whole},
         overlays::picture_of,
         plots::label,

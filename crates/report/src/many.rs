@@ -4,7 +4,7 @@
 //! the points of no others.
 
 use super::{
-    html::{Cell, Column, Table, folded, link, paragraph},
+    html::{Cell, Column, Markup, Table, folded, html, link},
     numbers::whole,
     plots::{GREY, Panel, Plot, Series, Style, figure, label, thinned},
 };
@@ -66,16 +66,15 @@ pub(super) fn drawn_in_words(site: &SiteProducts) -> String {
 }
 
 /// A paragraph that states that rows and plots of a section are of some images only; empty where they are of all.
-pub(super) fn some_of_all(site: &SiteProducts) -> String {
-    if !are_many(site) {
-        return String::new();
+pub(super) fn some_of_all(site: &SiteProducts) -> Markup {
+    html! {
+        @if are_many(site) {
+            p {
+                "Rows and plots are of " (IMAGES_SHOWN) " of " (whole(site.images.len())) " images, chosen under "
+                (link("#exterior-orientation", "Exterior orientation")) "."
+            }
+        }
     }
-    format!(
-        "<p>Rows and plots are of {} of {} images, chosen under {}.</p>\n",
-        IMAGES_SHOWN,
-        whole(site.images.len()),
-        link("#exterior-orientation", "Exterior orientation")
-    )
 }
 
 /// For many images: the choice of those shown, a table and a plot over all, and links to the files of each; empty for a
@@ -83,9 +82,9 @@ pub(super) fn some_of_all(site: &SiteProducts) -> String {
 ///
 /// # Errors
 /// A plot that cannot be drawn.
-pub(super) fn overview(site: &SiteProducts) -> Result<String> {
+pub(super) fn overview(site: &SiteProducts) -> Result<Markup> {
     if !are_many(site) {
-        return Ok(String::new());
+        return Ok(Markup::default());
     }
     let words = format!(
         "Rows and plots on this page are of {} of {} images: first those that are not valid, then those with the largest \
@@ -94,16 +93,12 @@ pub(super) fn overview(site: &SiteProducts) -> Result<String> {
         whole(site.images.len())
     );
     let quantities = quantities(site);
-    Ok([
-        paragraph(&words),
-        table(site, &quantities),
-        format!(
-            "<div class=\"plots\">\n{}</div>\n",
-            figure(&plot(site, &quantities))?
-        ),
-        files(site),
-    ]
-    .concat())
+    Ok(html! {
+        p { (words) }
+        (table(site, &quantities))
+        div.plots { (figure(&plot(site, &quantities))?) }
+        (files(site))
+    })
 }
 
 /// A number of every image.
@@ -155,7 +150,7 @@ fn quantities(site: &SiteProducts) -> Vec<Quantity> {
 }
 
 /// Least, median and largest number, and the image that has it.
-fn table(site: &SiteProducts, quantities: &[Quantity]) -> String {
+fn table(site: &SiteProducts, quantities: &[Quantity]) -> Markup {
     let mut table = Table::new(
         "All images",
         &[
@@ -192,15 +187,15 @@ fn table(site: &SiteProducts, quantities: &[Quantity]) -> String {
     }
     let invalid = site.images.iter();
     let invalid = invalid.filter(|image| !image.invalid_because().is_empty());
-    table.finish()
-        + &paragraph(&match invalid.count() {
-            0 => "All images are valid.".to_owned(),
-            count => format!(
-                "{} of {} images are not valid.",
-                whole(count),
-                whole(site.images.len())
-            ),
-        })
+    let words = match invalid.count() {
+        0 => "All images are valid.".to_owned(),
+        count => format!(
+            "{} of {} images are not valid.",
+            whole(count),
+            whole(site.images.len())
+        ),
+    };
+    html! { (table.finish()) p { (words) } }
 }
 
 /// The quantities over the number of the image.
@@ -240,16 +235,18 @@ fn plot(site: &SiteProducts, quantities: &[Quantity]) -> Plot {
 }
 
 /// Links to the file of every image.
-fn files(site: &SiteProducts) -> String {
-    let links = site.images.iter().map(|image| {
-        let id = &image.times.id;
-        link(&format!("../images/{id}/orientation.json"), id)
-    });
-    let links: Vec<String> = links.collect();
+fn files(site: &SiteProducts) -> Markup {
+    let ids = site.images.iter().map(|image| &image.times.id);
     let words =
         "Samples, polynomials and residuals of each image; registration.json has its footprints:";
-    folded(
-        "Files of all images",
-        &format!("<p>{words} {}.</p>\n", links.join(",\n")),
-    )
+    let files = html! {
+        p {
+            (words)
+            @for (place, id) in ids.enumerate() {
+                @if place > 0 { "," } " " (link(&format!("../images/{id}/orientation.json"), id))
+            }
+            "."
+        }
+    };
+    folded("Files of all images", &files)
 }

@@ -23,7 +23,7 @@ use self::{
 };
 use super::{
     graticule::{View, graticule},
-    html::{counted, paragraph},
+    html::{Markup, counted, html},
     many,
     plots::{COLOURS, Canvas, Drawn, GRID, INK, WIDTH, drawn, figure_html, thinned},
     section::Section,
@@ -55,11 +55,8 @@ pub(super) const SECTION: Section = Section {
     checks: &[],
     appears: |site| sheets(site).len() > 1,
     write: |site| {
-        let mut html = String::new();
-        for shown in sheets(site).into_iter().skip(1) {
-            html += &figure(site, shown, false)?;
-        }
-        Ok(format!("<div class=\"plots\">\n{html}</div>\n"))
+        let further = sheets(site).into_iter().skip(1);
+        Ok(html! { div.plots { @for shown in further { (figure(site, shown, false)?) } } })
     },
 };
 
@@ -67,19 +64,20 @@ pub(super) const SECTION: Section = Section {
 ///
 /// # Errors
 /// The map cannot be drawn.
-pub(super) fn first(site: &SiteProducts) -> Result<String> {
+pub(super) fn first(site: &SiteProducts) -> Result<Markup> {
     let mut all = sheets(site).into_iter();
     let shown = all.next().filter(|shown| {
         !(shown.windows.is_empty() && shown.images.is_empty() && shown.rows.is_empty())
     });
     let Some(shown) = shown else {
-        return Ok(String::new());
+        return Ok(Markup::default());
     };
-    Ok(figure(site, shown, all.next().is_none())? + &without_outline(site))
+    let only = all.next().is_none();
+    Ok(html! { (figure(site, shown, only)?) (without_outline(site)) })
 }
 
 /// The images that are not on any map.
-fn without_outline(site: &SiteProducts) -> String {
+fn without_outline(site: &SiteProducts) -> Markup {
     let missing: Vec<&str> = site
         .images
         .iter()
@@ -87,16 +85,14 @@ fn without_outline(site: &SiteProducts) -> String {
         .map(|image| &*image.times.id)
         .collect();
     let named = match missing.len() {
-        0 => return String::new(),
+        0 => return Markup::default(),
         count if many::are_many(site) => counted(count, "image"),
         _ => missing.join(", "),
     };
-    paragraph(&format!(
-        "Not drawn, because a corner sees no ground: {named}."
-    ))
+    html! { p { "Not drawn, because a corner sees no ground: " (named) "." } }
 }
 
-fn figure(site: &SiteProducts, shown: Shown, only: bool) -> Result<String> {
+fn figure(site: &SiteProducts, shown: Shown, only: bool) -> Result<Markup> {
     let sheet = Sheet::of(site, shown);
     let relief = sheet.relief(site);
     let mut svg = drawn((sheet.height() + STRIP) as u32, |area| sheet.draw(area))?;

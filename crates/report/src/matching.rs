@@ -1,7 +1,7 @@
 //! Tie points measured by areograph: the number of places tried, and their outcomes.
 
 use super::{
-    html::{Column, Table, paragraph},
+    html::{Column, Markup, Table, html},
     misregistration::PAIRS_TABLED,
     numbers::whole,
     plots::label,
@@ -40,18 +40,18 @@ fn tabled(pairs: &[MatchedPair]) -> Vec<&MatchedPair> {
     tabled.into_iter().map(|(_, pair)| pair).collect()
 }
 
-fn some_of_all(all: &[MatchedPair], tabled: &[&MatchedPair]) -> String {
-    if tabled.len() == all.len() {
-        return String::new();
+fn some_of_all(all: &[MatchedPair], tabled: &[&MatchedPair]) -> Markup {
+    html! {
+        @if tabled.len() < all.len() {
+            p {
+                "The table lists " (tabled.len()) " of " (whole(all.len()))
+                " pairs: rejected pairs first, then those with the fewest tie points."
+            }
+        }
     }
-    paragraph(&format!(
-        "The table lists {} of {} pairs: rejected pairs first, then those with the fewest tie points.",
-        tabled.len(),
-        whole(all.len())
-    ))
 }
 
-fn write(site: &SiteProducts, ties: &Ties) -> String {
+fn write(site: &SiteProducts, ties: &Ties) -> Markup {
     let mut table = Table::new(
         "Matched pairs",
         &[
@@ -85,10 +85,13 @@ fn write(site: &SiteProducts, ties: &Ties) -> String {
             ],
         );
     }
-    paragraph(
-        "In each cell of common ground the point with the strongest texture was matched to the other image and back. \
-         σ: medians of \
-         single matches, in the second image. The table shows the second pass, which starts from the adjusted orientation.",
-    ) + &some_of_all(&ties.matched, &matched)
-        + &table.finish()
+    html! {
+        p {
+            "In each cell of common ground the point with the strongest texture was matched to the other image and back. \
+             σ: medians of \
+             single matches, in the second image. The table shows the second pass, which starts from the adjusted orientation."
+        }
+        (some_of_all(&ties.matched, &matched))
+        (table.finish())
+    }
 }

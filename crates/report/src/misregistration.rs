@@ -5,12 +5,12 @@ mod pair;
 use std::collections::BTreeMap;
 
 use super::{
-    html::{Cell, Column, Table, counted, folded, heading, paragraph},
+    html::{Cell, Column, Markup, Table, counted, folded, html, paragraph},
     moved,
     numbers::whole,
     plots::label,
     section::Section,
-    source::filled,
+    source::traced,
 };
 use areograph_base::{error::Result, units::RADIANS_PER_DEGREE, verdict::CheckKind};
 use areograph_geom::intersection::Unintersected;
@@ -32,92 +32,74 @@ pub(super) const SECTION: Section = Section {
     checks: &[CheckKind::ParallaxAfter, CheckKind::ParallaxBefore],
     appears: |site| site.geometric.is_some(),
     write: |site| {
-        let geometric = site.geometric.iter();
-        geometric.map(|geometric| write(site, geometric)).collect()
+        let geometric = site.geometric.as_ref();
+        let written = geometric.map(|geometric| write(site, geometric));
+        Ok(written.transpose()?.unwrap_or_default())
     },
 };
 
-fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
+fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<Markup> {
     let pairs = BeforeAfter::all(geometric);
-    let shown = pairs.iter().take(PAIRS_SHOWN);
-    let mut html: String = shown.map(|pair| paragraph(&pair.sentence())).collect();
-    if pairs.is_empty() {
-        html += &paragraph("No two images share tie points that could be intersected.");
-    }
-    html += &read(geometric);
-    if !pairs.is_empty() {
-        let pairs = BeforeAfter::tabled(pairs);
-        let tables = BeforeAfter::some_of_all(geometric)
-            + &geometry(&pairs)
-            + &reprojection(&pairs)
-            + &footprints(&pairs);
-        html += &folded("Tables of the pairs", &tables);
-    }
-    html += &heading(match geometric.adjustment {
-        Some(_) => "Before and after on the image planes",
-        None => "On the image planes",
-    });
-    html += &moved::figures(site, geometric)?;
-    Ok(html)
+    let sentences = pairs.iter().take(PAIRS_SHOWN).map(BeforeAfter::sentence);
+    let sentences: Vec<String> = sentences.collect();
+    let pairs = BeforeAfter::tabled(pairs);
+    Ok(html! {
+        @for sentence in sentences { p { (sentence) } }
+        @if pairs.is_empty() { p { "No two images share tie points that could be intersected." } }
+        (read(geometric))
+        @if !pairs.is_empty() {
+            (folded("Tables of the pairs", &html! {
+                (BeforeAfter::some_of_all(geometric))
+                (geometry(&pairs))
+                (reprojection(&pairs))
+                (footprints(&pairs))
+            }))
+        }
+        @if geometric.adjustment.is_some() {
+            h3 { "Before and after on the image planes" }
+        } @else {
+            h3 { "On the image planes" }
+        }
+        (moved::figures(site, geometric)?)
+    })
 }
 
 /// Number of tie points, and of those without information.
-fn read(geometric: &GeometricProducts) -> String {
+fn read(geometric: &GeometricProducts) -> Markup {
     let ties = geometric.ties;
     let points = &geometric.intersected.points;
     let elsewhere: u64 = ties.elsewhere.values().sum();
     let outliers = points.iter().filter(|point| point.outlier).count();
-    let adjusted = geometric.adjustment.map_or_else(
-        || "; the adjustment failed".to_owned(),
-        |adjustment| {
-            let number = adjustment.intersected.points.len().to_string();
-            filled(
-                ", {} with the adjusted one",
-                &[(number, "adjustment.json#/after/intersected")],
-            )
-        },
-    );
-    let mut words = filled(
-        "{} read, {} in two or more images; {} intersect with the kernels' orientation",
-        &[
-            (
-                counted(ties.points.len(), "tie point"),
-                "adjustment.json#/ties/points",
-            ),
-            (
-                ties.multi_image().to_string(),
-                "adjustment.json#/ties/multi_image",
-            ),
-            (
-                points.len().to_string(),
-                "adjustment.json#/before/intersected",
-            ),
-        ],
-    ) + &adjusted
-        + ".";
-    for (count, what) in [
+    let adjusted = geometric.adjustment;
+    let adjusted = adjusted.map(|adjustment| adjustment.intersected.points.len().to_string());
+    let counts = [
         (elsewhere, "measurements are in other images."),
         (ties.ignored, "are marked to be ignored."),
         (ties.complaint_count, "records could not be read."),
-    ] {
-        if count > 0 {
-            words += &format!(" {count} {what}");
+    ];
+    html! {
+        p {
+            (traced(&counted(ties.points.len(), "tie point"), "adjustment.json#/ties/points")) " read, "
+            (traced(&ties.multi_image().to_string(), "adjustment.json#/ties/multi_image")) " in two or more images; "
+            (traced(&points.len().to_string(), "adjustment.json#/before/intersected"))
+            " intersect with the kernels' orientation"
+            @if let Some(number) = adjusted {
+                ", " (traced(&number, "adjustment.json#/after/intersected")) " with the adjusted one."
+            } @else {
+                "; the adjustment failed."
+            }
+            @for (count, what) in counts { @if count > 0 { " " (count) " " (what) } }
+            @if outliers > 0 {
+                " " (traced(&counted(outliers, "reprojection outlier"), "adjustment.json#/before/outliers"))
+                ", excluded from the pair statistics."
+            }
         }
+        (rejected(geometric))
     }
-    if outliers > 0 {
-        words += &filled(
-            " {}, excluded from the pair statistics.",
-            &[(
-                counted(outliers, "reprojection outlier"),
-                "adjustment.json#/before/outliers",
-            )],
-        );
-    }
-    format!("<p>{words}</p>\n") + &rejected(geometric)
 }
 
 /// Tie points by the reason for their rejection.
-fn rejected(geometric: &GeometricProducts) -> String {
+fn rejected(geometric: &GeometricProducts) -> Markup {
     let mut reasons: BTreeMap<(&str, &str), u64> = BTreeMap::new();
     for tie in &geometric.intersected.rejected {
         *reasons
@@ -172,7 +154,7 @@ const fn rejection(reason: TieRejection) -> &'static str {
     }
 }
 
-fn geometry(pairs: &[BeforeAfter]) -> String {
+fn geometry(pairs: &[BeforeAfter]) -> Markup {
     let mut table = Table::new(
         "Pairs of images",
         &[
@@ -208,7 +190,7 @@ fn geometry(pairs: &[BeforeAfter]) -> String {
     table.finish()
 }
 
-fn reprojection(pairs: &[BeforeAfter]) -> String {
+fn reprojection(pairs: &[BeforeAfter]) -> Markup {
     let mut table = Table::new(
         "Reprojection residuals of tie points (Table 5 of Shan et al. 2005), x in lines, y in pixels",
         &[
@@ -243,10 +225,10 @@ fn reprojection(pairs: &[BeforeAfter]) -> String {
         }
     }
     let words = "Measured minus projected: M mean, σ standard deviation; x along track, y across (against the samples).";
-    table.finish() + &paragraph(words)
+    html! { (table.finish()) p { (words) } }
 }
 
-fn footprints(pairs: &[BeforeAfter]) -> String {
+fn footprints(pairs: &[BeforeAfter]) -> Markup {
     let mut table = Table::new(
         "Footprints between the images, by tie points; positive along track; samples include relief parallax",
         &[
@@ -265,10 +247,10 @@ fn footprints(pairs: &[BeforeAfter]) -> String {
             Column::Number("after"),
         ],
     );
-    let mut notes = String::new();
+    let mut notes = Vec::new();
     for pair in pairs {
         let Some(found) = &pair.before.footprints else {
-            notes += &paragraph(&format!(
+            notes.push(format!(
                 "{}: tie points do not determine a transformation between the images.",
                 pair.name()
             ));
@@ -286,7 +268,7 @@ fn footprints(pairs: &[BeforeAfter]) -> String {
         }
         let spacing = pair.before.mola_spacing_m;
         let spacing = spacing.map(|metres| format!(" One MOLA spacing: {} m.", label(metres, 1)));
-        notes += &paragraph(&format!(
+        notes.push(format!(
             "{}: by a polynomial of order {} through {} tie points ({} rejected), σ {} lines and {} samples. {}{}",
             pair.name(),
             found.order,
@@ -298,7 +280,7 @@ fn footprints(pairs: &[BeforeAfter]) -> String {
             spacing.unwrap_or_default()
         ));
     }
-    table.finish() + &notes
+    html! { (table.finish()) @for note in notes { p { (note) } } }
 }
 
 /// Footprints omitted from the table.

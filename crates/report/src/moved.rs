@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::html::counted;
+use super::html::{Markup, counted, html};
 use super::many;
 use super::numbers::whole;
 use super::plots::{
@@ -38,8 +38,8 @@ const AFTER: usize = 0;
 ///
 /// # Errors
 /// A plot that cannot be drawn.
-pub(super) fn figures(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
-    let mut html = String::new();
+pub(super) fn figures(site: &SiteProducts, geometric: &GeometricProducts) -> Result<Markup> {
+    let mut plots = Vec::new();
     let shown = many::shown(site);
     let panels = 2 * shown.len().max(1);
     let most = if many::are_many(site) {
@@ -53,14 +53,10 @@ pub(super) fn figures(site: &SiteProducts, geometric: &GeometricProducts) -> Res
         .map_or(&[][..], |adjustment| adjustment.images);
     for (index, image) in shown {
         let after = adjusted.get(index);
-        if let Some(plot) = after.and_then(|after| footprints(image, after)) {
-            html += &figure(&plot)?;
-        }
-        if let Some(plot) = vectors(image, index, geometric, limit) {
-            html += &figure(&plot)?;
-        }
+        plots.extend(after.and_then(|after| footprints(image, after)));
+        plots.extend(vectors(image, index, geometric, limit));
     }
-    Ok(many::some_of_all(site) + &format!("<div class=\"plots\">\n{html}</div>\n"))
+    Ok(html! { (many::some_of_all(site)) div.plots { @for plot in plots { (figure(&plot)?) } } })
 }
 
 /// Footprints around the middle one with the orientation of the kernels and with the adjusted one, so close that

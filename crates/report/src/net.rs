@@ -2,7 +2,9 @@
 
 use super::{
     checks,
-    html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, verdict},
+    html::{
+        Cell, Column, Markup, Section, Table, Tone, counted, html, list, page, paragraph, verdict,
+    },
     plots::{
         Arrow, Arrows, Extent, GREY, Panel, Plot, Series, figure, label, magnification, thinned,
     },
@@ -40,7 +42,7 @@ pub fn net_page(config: &NetConfig, net: &Triangulation) -> Result<String> {
     Ok(page(&config.net, &lead(config, net), &sections))
 }
 
-fn lead(config: &NetConfig, net: &Triangulation) -> String {
+fn lead(config: &NetConfig, net: &Triangulation) -> Markup {
     let (tone, word) = Tone::of(net.verdict.valid, !net.verdict.remarks.is_empty());
     let totals = &net.totals;
     let headline = format!(
@@ -62,10 +64,12 @@ fn lead(config: &NetConfig, net: &Triangulation) -> String {
     if !config.description.is_empty() {
         words = format!("{}. {words}", config.description);
     }
-    let body = paragraph(&words) + &list(&net.verdict.reasons) + &list(&net.verdict.remarks);
-    verdict(tone, &headline, &body)
-        + &checks::untested(&net.verdict.untested)
-        + &checks::listed(&net.verdict.checks)
+    let body = html! { p { (words) } (list(&net.verdict.reasons)) (list(&net.verdict.remarks)) };
+    html! {
+        (verdict(tone, &headline, &body))
+        (checks::untested(&net.verdict.untested))
+        (checks::listed(&net.verdict.checks))
+    }
 }
 
 /// Steps of the method, by the paper's names.
@@ -86,7 +90,7 @@ fn km(of_m: [f64; 2]) -> (f64, f64) {
 }
 
 /// A map of `arrows` over `series`, both axes to one scale.
-fn map(title: &str, caption: &str, mut arrows: Vec<Arrows>, series: Vec<Series>) -> Result<String> {
+fn map(title: &str, caption: &str, mut arrows: Vec<Arrows>, series: Vec<Series>) -> Result<Markup> {
     let mut panel = Panel::of("north, km", series);
     let mut plot = Plot::of(title.to_owned(), caption.to_owned(), "east, km", Vec::new());
     let points = || panel.series.iter().flat_map(|series| &series.points);
@@ -106,10 +110,10 @@ fn map(title: &str, caption: &str, mut arrows: Vec<Arrows>, series: Vec<Series>)
         .filter(|arrow| !arrow.each.is_empty())
         .collect();
     plot.panels.push(panel);
-    Ok(format!("<div class=\"plots\">\n{}</div>\n", figure(&plot)?))
+    Ok(html! { div.plots { (figure(&plot)?) } })
 }
 
-fn deviations(net: &Triangulation) -> Result<String> {
+fn deviations(net: &Triangulation) -> Result<Markup> {
     let tied: Vec<&MeasurementResult> = net
         .measurements
         .iter()
@@ -176,7 +180,7 @@ fn metres(value: f64) -> Cell {
     label(value, 1).into()
 }
 
-fn bricks(net: &Triangulation) -> String {
+fn bricks(net: &Triangulation) -> Markup {
     let mut table = Table::new(
         "Deviations within each brick and between them, as in table 1 of Arthur & McMacken 1977",
         &[
@@ -205,7 +209,6 @@ fn bricks(net: &Triangulation) -> String {
         cells.extend([brick.removed, brick.flagged].map(|of| of.to_string().into()));
         table.row(true, cells);
     }
-    let mut words = String::new();
     if let Some(seams) = &net.seams {
         let mut row = |name: &str, largest_m: Option<[f64; 2]>, rms_m: [f64; 2]| {
             let mut cells: Vec<Cell> = vec![
@@ -239,19 +242,19 @@ fn bricks(net: &Triangulation) -> String {
     let strongest = of_bricks
         .chain(of_seams)
         .min_by(|(_, a), (_, b)| a.factor.total_cmp(&b.factor));
-    if let Some((what, ShrinkageResult { factor, law })) = strongest {
-        words = paragraph(&format!(
+    let words = strongest.map(|(what, ShrinkageResult { factor, law })| {
+        paragraph(&format!(
             "Two controls without redundancy shrink the figure between them, since residuals of ties shrink with it. \
              The largest effect is at {what}: {:.1} parts in a million; the law L′/L = 1 / (1 + 2T / (w L²)) gives \
              {:.1}. It is removed everywhere before SCALE.",
             1e6 * (1.0 - factor),
             1e6 * (1.0 - law)
-        ));
-    }
-    table.finish() + &words
+        ))
+    });
+    html! { (table.finish()) (words.unwrap_or_default()) }
 }
 
-fn blunders(net: &Triangulation) -> String {
+fn blunders(net: &Triangulation) -> Markup {
     let mut worst: Vec<&MeasurementResult> = net
         .measurements
         .iter()
@@ -306,10 +309,10 @@ fn blunders(net: &Triangulation) -> String {
     let words = "Flagged measurements are beyond 3.5 robust standard deviations (by the median) of their brick. One is \
         rejected when its deviation in the adjustment of the whole net, divided by its own standard deviation, exceeds the \
         largest expected by chance in one net of a hundred.";
-    table.finish() + &paragraph(&format!("{words}{both_go}"))
+    html! { (table.finish()) p { (words) (both_go) } }
 }
 
-fn controls(net: &Triangulation) -> Result<String> {
+fn controls(net: &Triangulation) -> Result<Markup> {
     let mut table = Table::new(
         "Controls: given minus computed",
         &[
@@ -361,10 +364,10 @@ fn controls(net: &Triangulation) -> Result<String> {
         ],
         vec![Series::dots("controls", GREY, places)],
     )?;
-    Ok(table.finish() + &figure)
+    Ok(html! { (table.finish()) (figure) })
 }
 
-fn precision(config: &NetConfig, net: &Triangulation) -> String {
+fn precision(config: &NetConfig, net: &Triangulation) -> Markup {
     let totals = &net.totals;
     let sigma = match totals.tie_sigma_m {
         None => "The standard deviation of an image is not determined: there is no redundancy."
@@ -401,15 +404,10 @@ fn precision(config: &NetConfig, net: &Triangulation) -> String {
     } else {
         " Standard deviations of points come from the adjustment of all pictures and kept controls at once, by their weights."
     };
-    [
-        paragraph(&(sigma + &scale + sigmas)),
-        paragraph(&redundancy),
-        paragraph(&floor),
-    ]
-    .concat()
+    html! { p { (sigma) (scale) (sigmas) } p { (redundancy) } p { (floor) } }
 }
 
-fn pictures(net: &Triangulation) -> String {
+fn pictures(net: &Triangulation) -> Markup {
     let mut table = Table::new(
         "Pictures; full list in pictures.csv",
         &[

@@ -1,7 +1,7 @@
 //! Notes, and problems in the input.
 
 use super::{
-    html::{heading, list, paragraph},
+    html::{Markup, html, list},
     numbers::whole,
     section::Section,
 };
@@ -21,25 +21,18 @@ pub(super) const SECTION: Section = Section {
     write: |site| Ok(write(site)),
 };
 
-fn write(site: &SiteProducts) -> String {
+fn write(site: &SiteProducts) -> Markup {
     let notes = &site.notes[..site.notes.len().min(NOTES_SHOWN)];
-    let mut body = list(notes);
-    if notes.len() < site.notes.len() {
-        body += &paragraph(&format!(
-            "{} of {} shown; manifest.json has all.",
-            notes.len(),
-            whole(site.notes.len())
-        ));
+    let shown = &site.complaints[..site.complaints.len().min(COMPLAINTS_SHOWN)];
+    html! {
+        (list(notes))
+        @if notes.len() < site.notes.len() {
+            p { (notes.len()) " of " (whole(site.notes.len())) " shown; manifest.json has all." }
+        }
+        @if !shown.is_empty() {
+            h3 { "Problems in the input" }
+            (list(shown))
+            p { (shown.len()) " of " (site.complaints.len()) " shown." }
+        }
     }
-    if !site.complaints.is_empty() {
-        let shown = &site.complaints[..site.complaints.len().min(COMPLAINTS_SHOWN)];
-        body += &heading("Problems in the input");
-        body += &list(shown);
-        body += &paragraph(&format!(
-            "{} of {} shown.",
-            shown.len(),
-            site.complaints.len()
-        ));
-    }
-    body
 }

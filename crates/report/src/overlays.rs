@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use base64::{Engine as _, engine::general_purpose::STANDARD};
 
 use super::{
-    html::{self, escape, link, list, paragraph},
+    html::{self, Markup, html, link, list},
     many,
     map::relief,
     numbers::whole,
@@ -30,9 +30,9 @@ pub(super) const SECTION: Section = Section {
 };
 
 /// Contents of the other page, and the position of each image on it.
-fn write(site: &SiteProducts) -> Result<String> {
+fn write(site: &SiteProducts) -> Result<Markup> {
     let Some(overlays) = site.overlays else {
-        return Ok(String::new());
+        return Ok(Markup::default());
     };
     let words = format!(
         "{} with footprints and tie points on their pixels, before and after the adjustment, and {} of the ground in pairs of \
@@ -40,31 +40,23 @@ fn write(site: &SiteProducts) -> Result<String> {
         html::counted(overlays.images.len(), "image"),
         html::counted(overlays.places.len(), "place"),
     );
-    let page = link("overlays.html", "overlays.html");
     let own = site.shown_images();
     let images = overlays.images.iter();
     let images = images.filter(|shown| own.binary_search(&shown.image).is_ok());
-    let images = images.map(|shown| {
-        let id = &site.images[shown.image].times.id;
-        let picture = link(&format!("../images/{id}/overlay.png"), "picture");
-        let layer = link(
-            &format!("../images/{id}/overlay.geojson"),
-            "marks as a layer",
-        );
-        format!("<li>{}: {picture}, {layer}</li>\n", escape(id))
-    });
-    let images: String = images.collect();
-    let first = overlays
-        .places
-        .first()
-        .map(|place| figure(site, place))
-        .transpose()?;
-    Ok(format!(
-        "<p>{}{page}.</p>\n{}<ul>\n{images}</ul>\n{}",
-        escape(&words),
-        many::some_of_all(site),
-        first.unwrap_or_default()
-    ))
+    let ids = images.map(|shown| &site.images[shown.image].times.id);
+    Ok(html! {
+        p { (words) (link("overlays.html", "overlays.html")) "." }
+        (many::some_of_all(site))
+        ul {
+            @for id in ids {
+                li {
+                    (id) ": " (link(&format!("../images/{id}/overlay.png"), "picture")) ", "
+                    (link(&format!("../images/{id}/overlay.geojson"), "marks as a layer"))
+                }
+            }
+        }
+        @if let Some(place) = overlays.places.first() { (figure(site, place)?) }
+    })
 }
 
 /// The page of a site whose images have pixels; `None` without any.
@@ -76,10 +68,8 @@ pub fn overlays_page(site: &SiteProducts) -> Result<Option<String>> {
         return Ok(None);
     };
     let is_tie = |place: &&Place| matches!(place.subject, Subject::Tie { .. });
-    let figures = |places: Vec<&Place>| {
-        let figures = places.into_iter().map(|place| figure(site, place));
-        figures.collect::<Result<String>>()
-    };
+    let figures =
+        |places: Vec<&Place>| Result::Ok(html! { @for place in places { (figure(site, place)?) } });
     let (ties, footprints): (Vec<&Place>, Vec<&Place>) = overlays.places.iter().partition(is_tie);
     let sections = [
         html::Section::new("Images", images(site, overlays)?),
@@ -90,11 +80,7 @@ pub fn overlays_page(site: &SiteProducts) -> Result<Option<String>> {
     Ok(Some(html::page(&title, &lead(site), &sections)))
 }
 
-fn lead(site: &SiteProducts) -> String {
-    let report = format!(
-        "<p class=\"about\">{}</p>\n",
-        link("index.html", "Report of the site")
-    );
+fn lead(site: &SiteProducts) -> Markup {
     let mut keys = vec!["blue circle: the point from the orientation of the kernels"];
     if site.adjustment().is_some() {
         keys.push("orange upright cross: the point from the adjusted orientation");
@@ -102,27 +88,29 @@ fn lead(site: &SiteProducts) -> String {
     } else if site.geometric.is_some() {
         keys.push("yellow diagonal cross: a measured tie point");
     }
-    report
-        + &list(&keys)
-        + &paragraph(
+    html! {
+        p.about { (link("index.html", "Report of the site")) }
+        (list(&keys))
+        p {
             "Numbers count the shots of a profile, from 1. The middle of each mark is open. Image patches show the \
              same ground at the same place, north up; dark violet marks areas beyond the image or without data. In \
-             composites of two images the first is red and the second cyan, so that coincident ground is grey.",
-        )
-}
-
-fn images(site: &SiteProducts, overlays: &Overlays) -> Result<String> {
-    let each = STRIP_PIXELS / overlays.images.len().max(1) as u64;
-    let mut html = "<div class=\"strips\">\n".to_owned();
-    for shown in &overlays.images {
-        if let Some(picture) = strip(site, shown.image, each)? {
-            html += &strip_figure(site, shown, &picture);
+             composites of two images the first is red and the second cyan, so that coincident ground is grey."
         }
     }
-    Ok(html + "</div>\n")
 }
 
-fn strip_figure(site: &SiteProducts, shown: &ShownImage, picture: &Picture) -> String {
+fn images(site: &SiteProducts, overlays: &Overlays) -> Result<Markup> {
+    let each = STRIP_PIXELS / overlays.images.len().max(1) as u64;
+    Ok(html! {
+        div.strips {
+            @for shown in &overlays.images {
+                @if let Some(picture) = strip(site, shown.image, each)? { (strip_figure(site, shown, &picture)) }
+            }
+        }
+    })
+}
+
+fn strip_figure(site: &SiteProducts, shown: &ShownImage, picture: &Picture) -> Markup {
     let image = &site.images[shown.image];
     let id = &image.times.id;
     let inside = image.registration.points.inside_count();
@@ -149,17 +137,16 @@ fn strip_figure(site: &SiteProducts, shown: &ShownImage, picture: &Picture) -> S
         }
     }
     let alt = format!("{id} with its footprints");
-    let name = escape(&alt);
-    format!(
-        "<figure>\n<div class=\"strip\" tabindex=\"0\" role=\"region\" aria-label=\"{name}\">{}</div>\n\
-         <figcaption>{}</figcaption>\n</figure>\n",
-        img(picture, &alt),
-        escape(&words)
-    )
+    html! {
+        figure {
+            div.strip tabindex="0" role="region" aria-label=(alt) { (img(picture, &alt)) }
+            figcaption { (words) }
+        }
+    }
 }
 
 /// A place in its images, side by side and superposed.
-fn figure(site: &SiteProducts, place: &Place) -> Result<String> {
+fn figure(site: &SiteProducts, place: &Place) -> Result<Markup> {
     let id = |view: &PlaceView| &*site.images[view.image].times.id;
     let title = title(site, &place.subject);
     let mut cells = Vec::new();
@@ -184,17 +171,13 @@ fn figure(site: &SiteProducts, place: &Place) -> Result<String> {
             cells.push((img(&anaglyph(first, second)?, &alt), state.to_owned()));
         }
     }
-    let cells: String = cells
-        .into_iter()
-        .map(|(img, words)| format!("<div>{img}<p>{}</p></div>\n", escape(&words)))
-        .collect();
-    let anchor = html::slug(&title);
-    Ok(format!(
-        "<figure class=\"place\" id=\"{anchor}\">\n<h3>{}</h3>\n<div class=\"pieces\">\n{cells}</div>\n\
-         <figcaption>{}</figcaption>\n</figure>\n",
-        escape(&title),
-        escape(&caption(site, place))
-    ))
+    Ok(html! {
+        figure.place #(html::slug(&title)) {
+            h3 { (title) }
+            div.pieces { @for (img, words) in cells { div { (img) p { (words) } } } }
+            figcaption { (caption(site, place)) }
+        }
+    })
 }
 
 fn title(site: &SiteProducts, subject: &Subject) -> String {
@@ -241,7 +224,7 @@ fn caption(site: &SiteProducts, place: &Place) -> String {
 ///
 /// # Errors
 /// A picture that the library rejects, which is a bug in areograph.
-pub fn picture_of(pixels: &[u8], [rows, columns]: [usize; 2], alt: &str) -> Result<String> {
+pub fn picture_of(pixels: &[u8], [rows, columns]: [usize; 2], alt: &str) -> Result<Markup> {
     let size = |of: usize| u32::try_from(of).unwrap_or(u32::MAX);
     let png = relief::png(pixels, size(columns), size(rows))
         .map_err(ProductError::refused("draw a picture"))?;
@@ -256,12 +239,9 @@ pub fn picture_of(pixels: &[u8], [rows, columns]: [usize; 2], alt: &str) -> Resu
 }
 
 /// A picture inside the page.
-fn img(picture: &Picture, alt: &str) -> String {
-    format!(
-        "<img src=\"data:image/png;base64,{}\" width=\"{}\" height=\"{}\" alt=\"{}\">",
-        STANDARD.encode(&picture.png),
-        picture.width,
-        picture.height,
-        escape(alt)
-    )
+fn img(picture: &Picture, alt: &str) -> Markup {
+    let png = STANDARD.encode(&picture.png);
+    html! {
+        img src={ "data:image/png;base64," (png) } width=(picture.width) height=(picture.height) alt=(alt);
+    }
 }

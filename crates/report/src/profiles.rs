@@ -1,7 +1,7 @@
 //! The surface between shots, tested on the site's own shots: withheld profiles, crossovers, profiles left out.
 
 use super::{
-    html::{Cell, Column, Table, paragraph},
+    html::{Cell, Column, Markup, Table, html, paragraph},
     numbers::whole,
     plots::{Extent, GREY, Panel, Plot, Series, Style, figure, label, thinned},
     section::Section,
@@ -25,25 +25,28 @@ pub(super) const SECTION: Section = Section {
     write,
 };
 
-fn write(site: &SiteProducts) -> Result<String> {
+fn write(site: &SiteProducts) -> Result<Markup> {
     let check = site.profile_check;
-    let mut body = paragraph(
-        "Every stretch of a profile is withheld in turn and predicted from the other profiles, in the same way as the ground \
-         under tie points. The stretch takes no part in its prediction.",
-    );
-    if let Some(score) = &check.score {
-        body += &table(score);
-        body += &figure(&plot(&check.stretches))?;
-    } else {
-        body += &paragraph(
-            "No stretch of a profile can be predicted from other profiles: the surface is not tested.",
-        );
-    }
-    Ok(body + &crossovers(check) + &left_out(check))
+    Ok(html! {
+        p {
+            "Every stretch of a profile is withheld in turn and predicted from the other profiles, in the same way as the ground \
+             under tie points. The stretch takes no part in its prediction."
+        }
+        @if let Some(score) = &check.score {
+            (table(score))
+            (figure(&plot(&check.stretches))?)
+        } @else {
+            p {
+                "No stretch of a profile can be predicted from other profiles: the surface is not tested."
+            }
+        }
+        (crossovers(check))
+        (left_out(check))
+    })
 }
 
 /// Stated and found shares.
-fn table(score: &WithheldScore) -> String {
+fn table(score: &WithheldScore) -> Markup {
     let mut table = Table::new(
         "Withheld stretches: shares inside the stated intervals",
         &[
@@ -111,7 +114,7 @@ fn plot(stretches: &[WithheldStretch]) -> Plot {
     }
 }
 
-fn crossovers(check: &ProfileCheck) -> String {
+fn crossovers(check: &ProfileCheck) -> Markup {
     let differences = &check.differences_m;
     if differences.n == 0 {
         return paragraph(
@@ -138,9 +141,9 @@ fn crossovers(check: &ProfileCheck) -> String {
     table.finish()
 }
 
-fn left_out(check: &ProfileCheck) -> String {
+fn left_out(check: &ProfileCheck) -> Markup {
     if check.left_out.is_empty() {
-        return String::new();
+        return Markup::default();
     }
     let mut table = Table::new(
         "Profiles left out",

@@ -1,7 +1,7 @@
 //! Program, configuration, and the files that were read.
 
 use super::{
-    html::{Cell, Column, Table, escape, folded, link, paragraph},
+    html::{Cell, Column, Markup, Table, folded, html, link},
     many,
     numbers::whole,
     section::Section,
@@ -19,11 +19,11 @@ pub(super) const SECTION: Section = Section {
     write: |site| Ok(write(site)),
 };
 
-fn write(site: &SiteProducts) -> String {
+fn write(site: &SiteProducts) -> Markup {
     let config = site.config;
-    let file = areograph_store::files::file_name(&config.file);
+    let file_name = areograph_store::files::file_name(&config.file);
     let words = format!(
-        "Cite as: areograph {}, site {}, configuration {file} (BLAKE3 of its keys {}). Computed with {}.",
+        "Cite as: areograph {}, site {}, configuration {file_name} (BLAKE3 of its keys {}). Computed with {}.",
         env!("CARGO_PKG_VERSION"),
         config.site,
         config.blake3,
@@ -75,22 +75,26 @@ fn write(site: &SiteProducts) -> String {
             ],
         );
     }
-    let made = format!(
-        "<p>Made by <code>areograph run {0}</code>; <code>areograph report {1}</code> makes this page again.</p>\n",
-        escape(&file),
-        escape(&config.site)
-    );
-    paragraph(&words)
-        + &made
-        + LINKS
-        + &folded("Files that were read", &files.finish())
-        + &settings(site)
-        + &methods(site)
-        + &products(site)
+    html! {
+        p { (words) }
+        p {
+            "Made by " code { "areograph run " (file_name) } "; " code { "areograph report " (config.site) }
+            " makes this page again."
+        }
+        p {
+            (link("../manifest.json", "manifest.json")) ": verdict, checks, figures and hashes for programs. "
+            (link("../kernels.tm", "kernels.tm")) " loads the same kernels. "
+            (link("../../index.html", "All sites")) "."
+        }
+        (folded("Files that were read", &files.finish()))
+        (settings(site))
+        (methods(site))
+        (products(site))
+    }
 }
 
 /// The number of each stage's method.
-fn methods(site: &SiteProducts) -> String {
+fn methods(site: &SiteProducts) -> Markup {
     let columns = &[Column::Text("stage"), Column::Number("method")];
     let mut table = Table::new(
         "Stages; the number increases when the method of a stage changes",
@@ -102,13 +106,8 @@ fn methods(site: &SiteProducts) -> String {
     folded("Methods", &table.finish())
 }
 
-/// Links to the other files, from the folder of the page.
-const LINKS: &str = "<p><a href=\"../manifest.json\">manifest.json</a>: verdict, checks, figures and hashes for programs. \
-    <a href=\"../kernels.tm\">kernels.tm</a> loads the same kernels. \
-    <a href=\"../../index.html\">All sites</a>.</p>\n";
-
 /// Every file beside the page.
-fn products(site: &SiteProducts) -> String {
+fn products(site: &SiteProducts) -> Markup {
     let columns = &[
         Column::Text("file"),
         Column::Text("content"),
@@ -123,19 +122,22 @@ fn products(site: &SiteProducts) -> String {
         table.row(
             true,
             [
-                Cell::Html(link(&place, &product.path)),
+                link(&place, &product.path).into(),
                 product.what.into(),
                 product.readers.into(),
             ],
         );
     }
-    folded("Products", &(table.finish() + &many_have_the_same(site)))
+    folded(
+        "Products",
+        &html! { (table.finish()) (many_have_the_same(site)) },
+    )
 }
 
 /// The written keys of the configuration beside their defaults; all other keys have the defaults.
-fn settings(site: &SiteProducts) -> String {
+fn settings(site: &SiteProducts) -> Markup {
     if site.config.keys.is_empty() {
-        return String::new();
+        return Markup::default();
     }
     let columns = &[
         Column::Text("key"),
@@ -155,15 +157,19 @@ fn settings(site: &SiteProducts) -> String {
         let default = default.map_or_else(|| "–".to_owned(), ToString::to_string);
         table.row(true, [key.into(), value.into(), default.into()]);
     }
-    folded("Settings", &(table.finish() + &many_have_the_same(site)))
+    folded(
+        "Settings",
+        &html! { (table.finish()) (many_have_the_same(site)) },
+    )
 }
 
 /// A paragraph for tables that list some images of many.
-fn many_have_the_same(site: &SiteProducts) -> String {
-    if !many::are_many(site) {
-        return String::new();
+fn many_have_the_same(site: &SiteProducts) -> Markup {
+    html! {
+        @if many::are_many(site) {
+            p { "Only images with individual plots are listed; manifest.json lists all images." }
+        }
     }
-    paragraph("Only images with individual plots are listed; manifest.json lists all images.")
 }
 
 /// Names of the images without separate rows.
@@ -193,7 +199,7 @@ fn is_of(key: &str, declared: &str) -> bool {
 
 /// A hash in a monospaced font.
 fn hash(blake3: &str) -> Cell {
-    Cell::Html(format!("<span class=\"hash\">{}</span>", escape(blake3)))
+    html! { span.hash { (blake3) } }.into()
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Appendix: tables 2, 3 and 4 of Yoon & Shan 2004 for this site.
 
 use super::{
-    html::{Cell, Column, Table, folded, paragraph},
+    html::{Cell, Column, Markup, Table, folded, html},
     many,
     numbers::whole,
     plots::label,
@@ -19,7 +19,7 @@ pub(super) const SECTION: Section = Section {
     appears: |site| site.adjustment().is_some(),
     write: |site| {
         let adjustment = site.adjustment();
-        Ok(adjustment.map_or_else(String::new, |(_, of)| write(site, &of.adjusted.summary)))
+        Ok(adjustment.map_or_else(Markup::default, |(_, of)| write(site, &of.adjusted.summary)))
     },
 };
 
@@ -38,9 +38,12 @@ fn departure(summary: &AdjustmentSummary) -> &'static str {
     }
 }
 
-fn write(site: &SiteProducts, summary: &AdjustmentSummary) -> String {
-    let tables =
-        ground_corrections(summary) + &image_coordinates(site, summary) + &ground_sigmas(summary);
+fn write(site: &SiteProducts, summary: &AdjustmentSummary) -> Markup {
+    let tables = html! {
+        (ground_corrections(summary))
+        (image_coordinates(site, summary))
+        (ground_sigmas(summary))
+    };
     folded("Tables 2, 3 and 4 for this site", &tables)
 }
 
@@ -67,7 +70,7 @@ const fn kinds(summary: &AdjustmentSummary) -> [(&'static str, &'static str, &Gr
     ]
 }
 
-fn ground_corrections(summary: &AdjustmentSummary) -> String {
+fn ground_corrections(summary: &AdjustmentSummary) -> Markup {
     let mut table = Table::new(
         "Corrections of ground points (Table 2 of Yoon & Shan 2004), metres",
         &[
@@ -88,13 +91,15 @@ fn ground_corrections(summary: &AdjustmentSummary) -> String {
         cells.extend(axes.flat_map(|(at, axis)| moments(axis, &format!("/corrections_m/{at}"))));
         table.row_of(&format!("{PLACE}/{place}"), true, cells);
     }
-    table.finish()
-        + &paragraph(
-            "Adjusted minus initial, Mars-fixed axes. The paper's RMS is the standard deviation about the mean.",
-        )
+    html! {
+        (table.finish())
+        p {
+            "Adjusted minus initial, Mars-fixed axes. The paper's RMS is the standard deviation about the mean."
+        }
+    }
 }
 
-fn image_coordinates(site: &SiteProducts, summary: &AdjustmentSummary) -> String {
+fn image_coordinates(site: &SiteProducts, summary: &AdjustmentSummary) -> Markup {
     let mut table = Table::new(
         "Image coordinates (Table 3 of Yoon & Shan 2004): corrections of MOLA, residuals of tie points",
         &[
@@ -123,10 +128,10 @@ fn image_coordinates(site: &SiteProducts, summary: &AdjustmentSummary) -> String
             table.row_of(&format!("{PLACE}/images/{index}/{place}"), true, cells);
         }
     }
-    many::some_of_all(site) + &table.finish() + &paragraph(departure(summary))
+    html! { (many::some_of_all(site)) (table.finish()) p { (departure(summary)) } }
 }
 
-fn ground_sigmas(summary: &AdjustmentSummary) -> String {
+fn ground_sigmas(summary: &AdjustmentSummary) -> Markup {
     let mut table = Table::new(
         "A posteriori standard deviations of ground points (Table 4 of Yoon & Shan 2004), metres, means",
         &[

@@ -3,11 +3,11 @@
 mod plots;
 
 use super::{
-    html::{Cell, Column, Table, escape, folded, folded_unless, heading, paragraph},
+    html::{Cell, Column, Markup, Table, folded, folded_unless, html, paragraph},
     numbers::{number, whole},
     plots::label,
     section::Section,
-    source::{filled, sentence},
+    source::traced,
 };
 use areograph_base::{error::Result, verdict::CheckKind};
 use areograph_geom::statistics::Summary;
@@ -30,7 +30,7 @@ pub(super) const SECTION: Section = Section {
     write,
 };
 
-fn write(site: &SiteProducts) -> Result<String> {
+fn write(site: &SiteProducts) -> Result<Markup> {
     if site.profiles.is_empty() {
         return Ok(paragraph("No profile."));
     }
@@ -42,26 +42,29 @@ fn write(site: &SiteProducts) -> Result<String> {
     {
         return Ok(untested(site));
     }
-    let figures = format!("<div class=\"plots\">\n{}</div>\n", plots::figures(site)?);
+    let figures = html! { div.plots { (plots::figures(site)?) } };
     if many(site) {
         let title = format!("Tables of all {} profiles", whole(site.profiles.len()));
-        let tables = statistics(site) + &limits(site) + &three_ways(site);
-        return Ok(all_profiles(site) + &figures + &folded(&title, &tables));
+        let tables = html! { (statistics(site)) (limits(site)) (three_ways(site)) };
+        return Ok(html! { (all_profiles(site)) (figures) (folded(&title, &tables)) });
     }
     let profiles = &site.ranges.profiles;
     let invalid = profiles
         .iter()
         .any(|profile| !profile.invalid_because.is_empty());
-    let ways = folded_unless(
-        invalid,
-        "Limits, and three ways to check a range",
-        &(limits(site) + &three_ways(site)),
-    );
-    Ok(statistics(site) + &ways + &heading("Along the profiles") + &figures)
+    Ok(html! {
+        (statistics(site))
+        (folded_unless(invalid, "Limits, and three ways to check a range", &html! {
+            (limits(site))
+            (three_ways(site))
+        }))
+        h3 { "Along the profiles" }
+        (figures)
+    })
 }
 
 /// Statement where no range is compared with anything.
-fn untested(site: &SiteProducts) -> String {
+fn untested(site: &SiteProducts) -> Markup {
     let mut table = Table::new(
         "Profiles whose ranges are not tested",
         &[
@@ -74,11 +77,14 @@ fn untested(site: &SiteProducts) -> String {
         true,
         [whole(site.profiles.len()).into(), whole(shots).into()],
     );
-    paragraph(
-        "The ranges are not tested: the tables contain no position of the spacecraft, and no kernels cover the shots. The \
-         spacecraft is placed on the radius through the footprint at the range (nadir by range); its distance from the \
-         footprint is the range.",
-    ) + &table.finish()
+    html! {
+        p {
+            "The ranges are not tested: the tables contain no position of the spacecraft, and no kernels cover the shots. The \
+             spacecraft is placed on the radius through the footprint at the range (nadir by range); its distance from the \
+             footprint is the range."
+        }
+        (table.finish())
+    }
 }
 
 /// Millimetres suffice for ranges recorded in centimetres.
@@ -87,7 +93,7 @@ pub(super) fn metres(value: f64) -> String {
 }
 
 /// All profiles in one row.
-fn all_profiles(site: &SiteProducts) -> String {
+fn all_profiles(site: &SiteProducts) -> Markup {
     let mut table = Table::new(
         "Range − distance of all profiles, metres",
         &[
@@ -142,7 +148,7 @@ fn all_profiles(site: &SiteProducts) -> String {
     table.finish()
 }
 
-fn statistics(site: &SiteProducts) -> String {
+fn statistics(site: &SiteProducts) -> Markup {
     let limits = &site.config.range_check;
     let mut table = Table::new(
         "Range − distance per profile (Table 3 of Shan et al. 2005), metres",
@@ -209,25 +215,17 @@ fn statistics(site: &SiteProducts) -> String {
 }
 
 /// Limits of the table of the profiles.
-fn limits(site: &SiteProducts) -> String {
+fn limits(site: &SiteProducts) -> Markup {
     let limits = &site.config.range_check;
-    sentence(
-        "Judged: profiles of at least {} shots. Limits: at most {} % outliers (beyond {} robust σ of the median). Bars: share of a limit that is used.",
-        &[
-            (
-                limits.shots_min.to_string(),
-                "ranges.json#/limits/shots_min",
-            ),
-            (
-                number(100.0 * limits.outlier_share_max, 1),
-                "ranges.json#/limits/outlier_share_max*100",
-            ),
-            (
-                limits.outlier_sigma.to_string(),
-                "ranges.json#/limits/outlier_sigma",
-            ),
-        ],
-    )
+    html! {
+        p {
+            "Judged: profiles of at least " (traced(&limits.shots_min.to_string(), "ranges.json#/limits/shots_min"))
+            " shots. Limits: at most "
+            (traced(&number(100.0 * limits.outlier_share_max, 1), "ranges.json#/limits/outlier_share_max*100"))
+            " % outliers (beyond " (traced(&limits.outlier_sigma.to_string(), "ranges.json#/limits/outlier_sigma"))
+            " robust σ of the median). Bars: share of a limit that is used."
+        }
+    }
 }
 
 /// Used share of a limit that may be 0: then 0 uses nothing of it, and all other values are beyond it.
@@ -270,7 +268,7 @@ fn known(of: &Summary, name: &str) -> Cell {
     }
 }
 
-fn three_ways(site: &SiteProducts) -> String {
+fn three_ways(site: &SiteProducts) -> Markup {
     let limits = &site.config.range_check;
     let mut table = Table::new(
         "The three ways to check a range, means in metres",
@@ -325,37 +323,29 @@ fn three_ways(site: &SiteProducts) -> String {
             ],
         );
     }
-    let mut words = vec!["Limits apply to means without outliers.".to_owned()];
-    if site.config.shots.is_empty() {
-        words.push(escape(
-            "Crossover radius: the MOLA team's adjustment, which moves footprints, not ranges.",
-        ));
+    let error_m = site.ranges.trajectory_error_m;
+    html! {
+        (table.finish())
+        ul {
+            li { "Limits apply to means without outliers." }
+            @if site.config.shots.is_empty() {
+                li { "Crossover radius: the MOLA team's adjustment, which moves footprints, not ranges." }
+            }
+            li {
+                "PEDR's own orbit: without kernels; a mean beyond ±"
+                (traced(&limits.decoding_max_m.to_string(), "ranges.json#/limits/decoding_max_m"))
+                " m indicates a reading error."
+            }
+            li {
+                "PEDR − kernels: spacecraft positions, inertial axes; beyond "
+                (traced(&limits.orbit_max_m.to_string(), "ranges.json#/limits/orbit_max_m"))
+                " m orbit, clock or datum differ."
+                // A table's own spacecraft and the spacecraft of support data are not tabulated.
+                @if error_m > 0.0 {
+                    " Trajectory tabulated to "
+                    (traced(&number(1e3 * error_m, 3), "ranges.json#/trajectory_error_m*1000")) " mm."
+                }
+            }
+        }
     }
-    words.push(filled(
-        "PEDR's own orbit: without kernels; a mean beyond ±{} m indicates a reading error.",
-        &[(
-            limits.decoding_max_m.to_string(),
-            "ranges.json#/limits/decoding_max_m",
-        )],
-    ));
-    let mut orbits = filled(
-        "PEDR − kernels: spacecraft positions, inertial axes; beyond {} m orbit, clock or datum differ.",
-        &[(
-            limits.orbit_max_m.to_string(),
-            "ranges.json#/limits/orbit_max_m",
-        )],
-    );
-    // A table's own spacecraft and the spacecraft of support data are not tabulated.
-    if site.ranges.trajectory_error_m > 0.0 {
-        orbits += &filled(
-            " Trajectory tabulated to {} mm.",
-            &[(
-                number(1e3 * site.ranges.trajectory_error_m, 3),
-                "ranges.json#/trajectory_error_m*1000",
-            )],
-        );
-    }
-    words.push(orbits);
-    let words: Vec<String> = words.iter().map(|of| format!("<li>{of}</li>\n")).collect();
-    table.finish() + &format!("<ul>\n{}</ul>\n", words.concat())
 }

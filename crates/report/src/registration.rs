@@ -1,7 +1,7 @@
 //! Registration: profiles on the image plane.
 
 use super::{
-    html::{Cell, Column, Table, counted, folded, paragraph},
+    html::{Cell, Column, Markup, Table, counted, folded, html, paragraph},
     many,
     numbers::whole,
     plots::{COLOURS, Extent, GREY, INK, Mark, Panel, Plot, Series, Style, figure, label, thinned},
@@ -35,21 +35,18 @@ pub(super) fn registered(image: &ImageProducts) -> bool {
     image.registration.has_points()
 }
 
-fn write(site: &SiteProducts) -> Result<String> {
+fn write(site: &SiteProducts) -> Result<Markup> {
     let images = many::shown(site).into_iter();
     let images: Vec<Indexed> = images.filter(|(_, image)| registered(image)).collect();
-    let mut planes = String::new();
-    for (_, image) in &images {
-        planes += &figure(&plane(site.profiles, image))?;
-    }
-    let planes = format!("<div class=\"plots\">\n{planes}</div>\n");
-    let evidence = planes + &models(&images);
-    Ok(many::some_of_all(site)
-        + &profiles(site, &images)
-        + &folded(
-            "Footprints over the lines, and the effect of other camera models",
-            &evidence,
-        ))
+    let evidence = html! {
+        div.plots { @for (_, image) in &images { (figure(&plane(site.profiles, image))?) } }
+        (models(&images))
+    };
+    Ok(html! {
+        (many::some_of_all(site))
+        (profiles(site, &images))
+        (folded("Footprints over the lines, and the effect of other camera models", &evidence))
+    })
 }
 
 /// Place of the image with this index in the products.
@@ -58,7 +55,7 @@ pub(super) fn place(index: usize) -> String {
 }
 
 /// Profiles in the images, and their positions.
-fn profiles(site: &SiteProducts, images: &[Indexed]) -> String {
+fn profiles(site: &SiteProducts, images: &[Indexed]) -> Markup {
     let mut table = Table::new(
         "Profiles in the images",
         &[
@@ -127,7 +124,7 @@ fn profiles(site: &SiteProducts, images: &[Indexed]) -> String {
             "{rejected} footprints cannot be projected (behind the camera or beyond the horizon)."
         ));
     }
-    table.finish() + &paragraph(&words.join(" "))
+    html! { (table.finish()) (paragraph(&words.join(" "))) }
 }
 
 /// Samples of the footprints near the image, against their lines.
@@ -204,7 +201,7 @@ fn plane(profiles: &[Profile], image: &ImageProducts) -> Plot {
 }
 
 /// Effect of the choice of the model.
-fn models(images: &[Indexed]) -> String {
+fn models(images: &[Indexed]) -> Markup {
     let mut table = Table::new(
         "Other models compared with the one used, for footprints within the image's lines",
         &[

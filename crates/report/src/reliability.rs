@@ -3,10 +3,10 @@
 
 use super::{
     heights::{WITHHELD_BECAUSE, known_beforehand, place_by},
-    html::{Cell, Column, Table, counted, folded, paragraph},
+    html::{Cell, Column, Markup, Table, counted, folded, html, paragraph},
     numbers::whole,
     plots::label,
-    source::sentence,
+    source::traced,
 };
 use areograph_base::footprints::AdjustmentModel;
 use areograph_geom::statistics::Summary;
@@ -34,17 +34,7 @@ pub(super) fn absolute(
     site: &SiteProducts,
     geometric: &GeometricProducts,
     adjustment: &AdjustmentProducts,
-) -> String {
-    const MOVED: [&str; 3] = [
-        "adjustment.json#/adjustment/summary/ties/corrections_m/0/mean",
-        "adjustment.json#/adjustment/summary/ties/corrections_m/1/mean",
-        "adjustment.json#/adjustment/summary/ties/corrections_m/2/mean",
-    ];
-    const SIGMA: [&str; 3] = [
-        "adjustment.json#/adjustment/heights/mean_sigma_m/0",
-        "adjustment.json#/adjustment/heights/mean_sigma_m/1",
-        "adjustment.json#/adjustment/heights/mean_sigma_m/2",
-    ];
+) -> Markup {
     let summary = &adjustment.adjusted.summary;
     let ties = &summary.ties;
     if ties.corrections_m[0].n == 0 {
@@ -55,39 +45,36 @@ pub(super) fn absolute(
     } else {
         "Relative registration is not corrected"
     };
-    let axes = ties.corrections_m.iter().zip(MOVED);
-    let mut numbers: Vec<(String, &str)> = axes
-        .map(|(axis, place)| (label(axis.mean, 1), place))
-        .collect();
-    numbers.push((registration.to_owned(), ""));
+    let moved = |axis: usize| {
+        let place = format!("adjustment.json#/adjustment/summary/ties/corrections_m/{axis}/mean");
+        traced(&label(ties.corrections_m[axis].mean, 1), &place)
+    };
     let determined = match &adjustment.adjusted.heights {
-        Some(_) if site.accuracy_withheld().is_some() => {
-            numbers.push((WITHHELD_BECAUSE.to_owned(), ""));
-            "heights follow MOLA; absolute accuracies are withheld: {}"
-        }
+        Some(_) if site.accuracy_withheld().is_some() => html! {
+            "heights follow MOLA; absolute accuracies are withheld: " (WITHHELD_BECAUSE)
+        },
         Some(heights) => {
-            let [east_m, north_m, up_m] = heights.mean_sigma_m;
-            numbers.push((label(up_m, 1), SIGMA[2]));
-            numbers.push((label(east_m, 0), SIGMA[0]));
-            numbers.push((label(north_m, 0), SIGMA[1]));
-            numbers.push((place_by(geometric, adjustment), ""));
-            "heights follow MOLA to {} m on average; position is known to {} m east and {} m north, by {}"
+            let sigma = |axis: usize, decimals: usize| {
+                let place = format!("adjustment.json#/adjustment/heights/mean_sigma_m/{axis}");
+                traced(&label(heights.mean_sigma_m[axis], decimals), &place)
+            };
+            html! {
+                "heights follow MOLA to " (sigma(2, 1)) " m on average; position is known to " (sigma(0, 0))
+                " m east and " (sigma(1, 0)) " m north, by " (place_by(geometric, adjustment))
+            }
         }
-        None if summary.model == AdjustmentModel::Published => {
+        None if summary.model == AdjustmentModel::Published => html! {
             "heights and position are not determined: image coordinates of footprints come from the orientation that is \
              adjusted"
-        }
-        None => {
-            numbers.push((known_beforehand(geometric).to_owned(), ""));
-            "heights and position are a priori, from {}"
-        }
+        },
+        None => html! { "heights and position are a priori, from " (known_beforehand(geometric)) },
     };
-    sentence(
-        &format!(
-            "Tie points moved by {{}}, {{}}, {{}} m in X, Y, Z on average. {{}}; {determined}."
-        ),
-        &numbers,
-    )
+    html! {
+        p {
+            "Tie points moved by " (moved(0)) ", " (moved(1)) ", " (moved(2)) " m in X, Y, Z on average. "
+            (registration) "; " (determined) "."
+        }
+    }
 }
 
 /// Observations of one kind along one axis.
@@ -168,7 +155,7 @@ impl Controlled {
 }
 
 /// Share of a gross error visible in its own residual.
-pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
+pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> Markup {
     let all = Controlled::all(site, adjusted);
     let mut table = Table::new(
         "Redundancy: fraction of a gross error visible in its own residual",
@@ -181,7 +168,7 @@ pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
             Column::Number("smallest detectable error"),
         ],
     );
-    let mut sentences = String::new();
+    let mut sentences = Vec::new();
     for of in &all {
         let found = Summary::of(&of.redundancies);
         let [mean, least, most] = [found.mean, found.min, found.max].map(per_cent);
@@ -192,7 +179,7 @@ pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
             "only large ones are detected"
         };
         if found.mean < SHOWN {
-            sentences += &paragraph(&format!(
+            sentences.push(format!(
                 "A gross error in a {} shows only {mean} in its residual: {consequence}.",
                 of.name
             ));
@@ -210,8 +197,11 @@ pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
         );
     }
     let words = "Shown: the redundancy number r; detectable by Baarda's test (3.29, power 80 %): 4.13 σ/√r.";
-    let table = table.finish() + &paragraph(words);
-    sentences + &folded("Redundancy by kind of observation", &table)
+    let table = html! { (table.finish()) p { (words) } };
+    html! {
+        @for sentence in sentences { p { (sentence) } }
+        (folded("Redundancy by kind of observation", &table))
+    }
 }
 
 /// A share; one that rounds to zero is still shown.
@@ -224,19 +214,19 @@ fn per_cent(share: f64) -> String {
 }
 
 /// Unknowns that cannot be separated.
-pub(super) fn correlations(summary: &AdjustmentSummary) -> String {
+pub(super) fn correlations(summary: &AdjustmentSummary) -> Markup {
     let mut all: Vec<_> = summary.correlated.iter().enumerate().collect();
     all.sort_by(|(_, a), (_, b)| b.2.abs().total_cmp(&a.2.abs()));
     let Some((_, (first, second, largest))) = all.first() else {
         return paragraph("No two unknowns of the adjustment correlate by more than 0.95.");
     };
     let sum = if *largest < 0.0 { "sum" } else { "difference" };
-    let mut html = paragraph(&format!(
+    let words = format!(
         "{} correlate by more than 0.95, most of all {first} and {second} ({}): only their {sum}, each over its σ, is determined. \
          Do not interpret the single values.",
         counted(all.len(), "pair") + " of unknowns",
         label(*largest, 4)
-    ));
+    );
     let columns = &[
         Column::Number("correlation"),
         Column::Text("unknown"),
@@ -251,19 +241,15 @@ pub(super) fn correlations(summary: &AdjustmentSummary) -> String {
             [coefficient, first.into(), second.into()],
         );
     }
-    html += &table.finish();
-    html + &rest(all.len(), CORRELATED_SHOWN)
+    html! { p { (words) } (table.finish()) (rest(all.len(), CORRELATED_SHOWN)) }
 }
 
-fn rest(all: usize, shown: usize) -> String {
-    if all <= shown {
-        return String::new();
-    }
-    paragraph(&format!("And {} more.", all - shown))
+fn rest(all: usize, shown: usize) -> Markup {
+    html! { @if all > shown { p { "And " (all - shown) " more." } } }
 }
 
 /// Points that the adjustment rejected.
-pub(super) fn rejected(adjusted: &Adjusted) -> String {
+pub(super) fn rejected(adjusted: &Adjusted) -> Markup {
     let mut blunders = Vec::new();
     let mut undetermined = [0_usize; 2];
     for point in &adjusted.rejected {
@@ -278,17 +264,13 @@ pub(super) fn rejected(adjusted: &Adjusted) -> String {
             RejectionReason::NotIntersected => {}
         }
     }
-    let mut html = String::new();
-    for (count, what) in undetermined.into_iter().zip(["footprint", "tie point"]) {
-        if count > 0 {
-            html += &paragraph(&format!(
-                "{} rejected as not determined.",
-                counted(count, what)
-            ));
+    let undetermined = html! {
+        @for (count, what) in undetermined.into_iter().zip(["footprint", "tie point"]) {
+            @if count > 0 { p { (counted(count, what)) " rejected as not determined." } }
         }
-    }
+    };
     if blunders.is_empty() {
-        return html + &paragraph("No tie point was rejected as a blunder.");
+        return html! { (undetermined) p { "No tie point was rejected as a blunder." } };
     }
     let columns = &[
         Column::Text("tie point"),
@@ -298,5 +280,5 @@ pub(super) fn rejected(adjusted: &Adjusted) -> String {
     for (id, standardised) in blunders.iter().take(BLUNDERS_SHOWN) {
         table.row(true, [(*id).into(), label(*standardised, 1).into()]);
     }
-    html + &table.finish() + &rest(blunders.len(), BLUNDERS_SHOWN)
+    html! { (undetermined) (table.finish()) (rest(blunders.len(), BLUNDERS_SHOWN)) }
 }

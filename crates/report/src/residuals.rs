@@ -1,7 +1,7 @@
 //! Distribution of tie point residuals, in their own standard deviations, against the normal distribution.
 
 use super::{
-    html::{Column, Table},
+    html::{Column, Markup, Table},
     many,
     numbers::whole,
     plots::{Extent, GREY, Panel, Plot, Series, figure, label},
@@ -17,7 +17,7 @@ const POINTS: usize = 240;
 const SHOWN: f64 = 5.0;
 
 /// One row per image: its tie points, their residuals, and the correction at its middle.
-pub(super) fn images(site: &SiteProducts, adjusted: &Adjusted) -> String {
+pub(super) fn images(site: &SiteProducts, adjusted: &Adjusted) -> Markup {
     let mut table = Table::new(
         "Images, one row each",
         &[
@@ -79,11 +79,11 @@ pub(super) fn images(site: &SiteProducts, adjusted: &Adjusted) -> String {
 ///
 /// # Errors
 /// A plot that cannot be drawn.
-pub(super) fn distribution(adjusted: &Adjusted) -> Result<String> {
+pub(super) fn distribution(adjusted: &Adjusted) -> Result<Markup> {
     let along = standardised(adjusted, |view| view.along_px);
     let across = standardised(adjusted, |view| view.across_px);
     if along.is_empty() && across.is_empty() {
-        return Ok(String::new());
+        return Ok(Markup::default());
     }
     let series = vec![
         Series::line("along the track", 0, curve(&along)),

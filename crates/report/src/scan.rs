@@ -1,7 +1,7 @@
 //! MOLA clock by the ranges: spread of the residuals against the assumed correction.
 
 use super::{
-    html::{Cell, Column, Table, folded, paragraph},
+    html::{Cell, Column, Markup, Table, folded, html, paragraph},
     numbers::{number, signed},
     plots::{COLOURS, MARK, Mark, Panel, Plot, Series, figure},
     ranges::{many, place, plotted},
@@ -22,24 +22,26 @@ pub(super) const SECTION: Section = Section {
     write,
 };
 
-fn write(site: &SiteProducts) -> Result<String> {
-    let mut figures = String::new();
-    for index in plotted(site) {
-        if let Some(plot) = scan_plot(site, index) {
-            figures += &figure(&plot)?;
-        }
-    }
+fn write(site: &SiteProducts) -> Result<Markup> {
     let words = paragraph(
         "The time-tag correction that minimises the spread of the residuals, with raw or crossover-corrected radii, whichever gives the smaller scatter. Nadir profiles constrain it poorly.",
     );
-    let figures = format!("<div class=\"plots\">\n{figures}</div>\n");
-    if many(site) {
-        return Ok(words + &figures + &folded("Table of all profiles", &table(site)));
-    }
-    Ok(words + &table(site) + &folded("Spread against correction", &figures))
+    let plots = plotted(site).into_iter();
+    let plots = plots.filter_map(|index| scan_plot(site, index));
+    let figures = html! { div.plots { @for plot in plots { (figure(&plot)?) } } };
+    Ok(html! {
+        (words)
+        @if many(site) {
+            (figures)
+            (folded("Table of all profiles", &table(site)))
+        } @else {
+            (table(site))
+            (folded("Spread against correction", &figures))
+        }
+    })
 }
 
-fn table(site: &SiteProducts) -> String {
+fn table(site: &SiteProducts) -> Markup {
     let configured_s = site.config.altimeter_clock.correction_s();
     let mut table = Table::new(
         "Correction of least spread, seconds",

@@ -1,6 +1,6 @@
 //! Declaration of a section of a site's page.
 
-use super::html;
+use super::html::{self, Markup};
 use areograph_base::{error::Result, verdict::CheckKind};
 use areograph_products::SiteProducts;
 
@@ -16,8 +16,8 @@ pub struct Section {
     pub checks: &'static [CheckKind],
     /// Whether the page of this site has it.
     pub appears: fn(&SiteProducts) -> bool,
-    /// Its body as HTML; fails if a plot cannot be drawn.
-    pub write: fn(&SiteProducts) -> Result<String>,
+    /// Its body; fails if a plot cannot be drawn.
+    pub write: fn(&SiteProducts) -> Result<Markup>,
 }
 
 impl Section {

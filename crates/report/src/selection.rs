@@ -1,7 +1,7 @@
 //! Windows and filters, and the shots that they rejected.
 
 use super::{
-    html::{Cell, Column, Table, paragraph},
+    html::{Cell, Column, Markup, Table, html, paragraph},
     numbers::{number, whole},
     section::Section,
     source::member,
@@ -34,7 +34,7 @@ const fn columns(outline: &'static str) -> [Column; 3] {
     ]
 }
 
-fn write(site: &SiteProducts) -> String {
+fn write(site: &SiteProducts) -> Markup {
     let columns = match site.config.body {
         Body::Mars => &AT_MARS,
         Body::Moon => &AT_THE_MOON,
@@ -52,7 +52,7 @@ fn write(site: &SiteProducts) -> String {
             ],
         );
     }
-    windows.finish() + &paragraph(&filter(site)) + &rejects(site)
+    html! { (windows.finish()) p { (filter(site)) } (rejects(site)) }
 }
 
 fn filter(site: &SiteProducts) -> String {
@@ -83,7 +83,7 @@ fn filter(site: &SiteProducts) -> String {
     )
 }
 
-fn rejects(site: &SiteProducts) -> String {
+fn rejects(site: &SiteProducts) -> Markup {
     if site.rejected.is_empty() {
         return paragraph("No shot inside a window was rejected.");
     }

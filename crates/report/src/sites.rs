@@ -4,7 +4,7 @@ use chrono::{DateTime, FixedOffset};
 
 use super::{
     fidelity::FIDELITY_FILE,
-    html::{Cell, Column, Table, Tone, counted, escape, link, page, paragraph, verdict},
+    html::{Cell, Column, Markup, Table, Tone, counted, html, link, page, verdict},
     numbers::{number, whole},
     sites_map::{self, Place},
     source::traced,
@@ -94,28 +94,22 @@ pub fn sites_page(sites: &[SiteLine]) -> Result<String> {
     } else {
         Tone::Good
     };
-    let fidelity = format!(
-        "<p>{}: published numbers with the results of areograph, by kind of evidence.</p>\n",
-        link(FIDELITY_FILE, "Fidelity to the papers")
-    );
-    let words = paragraph(
-        "Heights off: median height of the tie points against the laser surface. Images apart: along track, the worst pair. \
-         Range − distance: the largest mean of a profile.",
-    );
+    let words = "Heights off: median height of the tie points against the laser surface. Images apart: along track, the worst pair. \
+         Range − distance: the largest mean of a profile.";
     let budgets = sites.iter().filter_map(|site| site.products.as_ref());
     let budgets: Vec<UncertaintyBudget> = budgets.flat_map(|of| of.budgets.clone()).collect();
-    let maps = Body::WORDS.map(|(_, body)| sites_map::figure(body, &places(sites, body)));
-    let maps: String = maps.into_iter().collect::<Result<_>>()?;
-    let maps = format!("<div class=\"plots\">\n{maps}</div>\n");
-    let lead = [
-        verdict(overall, &headline, ""),
-        maps,
-        table(sites),
-        words,
-        uncertainty::of_sites(&budgets),
-        fidelity,
-    ];
-    Ok(page("Sites", &lead.concat(), &[]))
+    let lead = html! {
+        (verdict(overall, &headline, &Markup::default()))
+        div.plots { @for (_, body) in Body::WORDS { (sites_map::figure(body, &places(sites, body))?) } }
+        (table(sites))
+        p { (words) }
+        (uncertainty::of_sites(&budgets))
+        p {
+            (link(FIDELITY_FILE, "Fidelity to the papers"))
+            ": published numbers with the results of areograph, by kind of evidence."
+        }
+    };
+    Ok(page("Sites", &lead, &[]))
 }
 
 /// The sites on a body with a known position.
@@ -144,7 +138,7 @@ fn tone(site: &SiteLine) -> Tone {
     }
 }
 
-fn table(sites: &[SiteLine]) -> String {
+fn table(sites: &[SiteLine]) -> Markup {
     let mut table = Table::of_cards(
         "Sites",
         &[
@@ -215,43 +209,34 @@ impl SiteSummary {
         ];
         let pairs = before.figures_m.into_iter().zip(now_m).zip(HEADLINES);
         let mut moves = pairs.filter_map(|((before_m, now_m), of)| Some((before_m?, now_m?, of)));
-        let number = moves
-            .next()
-            .map_or_else(String::new, |(before_m, now_m, (what, name))| {
-                let [was, is] = [before_m, now_m].map(|metres| number(metres, 2));
-                let now = figure_place(name, now_m);
-                let moved = if was == is {
-                    traced(&format!("{what} {is} m"), &now)
-                } else {
-                    let places =
-                        format!("{}#{} {now}", before.manifest, figure_place(name, before_m));
-                    traced(&format!("{what} {was} → {is} m"), &places)
-                };
-                format!("<br><small>{moved}</small>")
-            });
-        let since = format!(
-            "<br><small>since {}</small>",
-            escape(&minute(&before.finished_utc))
-        );
-        Cell::Html(escape(&verdict) + &number + &since)
+        let number = moves.next().map(|(before_m, now_m, (what, name))| {
+            let [was, is] = [before_m, now_m].map(|metres| number(metres, 2));
+            let now = figure_place(name, now_m);
+            if was == is {
+                return traced(&format!("{what} {is} m"), &now);
+            }
+            let places = format!("{}#{} {now}", before.manifest, figure_place(name, before_m));
+            traced(&format!("{what} {was} → {is} m"), &places)
+        });
+        html! {
+            (verdict)
+            @if let Some(number) = number { br; small { (number) } }
+            br; small { "since " (minute(&before.finished_utc)) }
+        }
+        .into()
     }
 }
 
 fn cells(site: &SiteLine, newest: Option<DateTime<FixedOffset>>) -> Vec<Cell> {
-    let traced = |word: &str, why: &str| {
-        let why = if why.is_empty() {
-            String::new()
-        } else {
-            format!("<br><small>{}</small>", escape(why))
-        };
-        Cell::Html(format!("{}{why}", escape(word)))
+    let explained = |word: &str, why: &str| -> Cell {
+        html! { (word) @if !why.is_empty() { br; small { (why) } } }.into()
     };
     let Some(summary) = &site.products else {
         let because = site
             .failure
             .as_deref()
             .map_or("the last run did not finish; see its log", first_line);
-        return vec![(&site.folder).into(), traced("no products", because)];
+        return vec![(&site.folder).into(), explained("no products", because)];
     };
     let (word, why) = match &site.failure {
         Some(failure) => (
@@ -261,11 +246,8 @@ fn cells(site: &SiteLine, newest: Option<DateTime<FixedOffset>>) -> Vec<Cell> {
         None => (summary.verdict, because(summary)),
     };
     let mut cells = vec![
-        Cell::Html(link(
-            &format!("{}/report/index.html", site.folder),
-            &site.folder,
-        )),
-        traced(word, &why),
+        link(&format!("{}/report/index.html", site.folder), &site.folder).into(),
+        explained(word, &why),
     ];
     let counts = summary
         .counts
@@ -281,12 +263,11 @@ fn cells(site: &SiteLine, newest: Option<DateTime<FixedOffset>>) -> Vec<Cell> {
         |mean_m| Cell::from(number(mean_m, 2)).traced(figure_place("range_mean_m", mean_m)),
     ));
     cells.push(summary.trend());
-    cells.push(Cell::Html(format!(
-        "<span class=\"short\">{}</span><br><small>{}, areograph {}</small>",
-        escape(&minute(&summary.finished_utc)),
-        summary.age(newest),
-        escape(&summary.version)
-    )));
+    let published = html! {
+        span.short { (minute(&summary.finished_utc)) }
+        br; small { (summary.age(newest)) ", areograph " (summary.version) }
+    };
+    cells.push(published.into());
     cells
 }
 

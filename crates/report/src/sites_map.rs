@@ -8,7 +8,7 @@ use plotters::{prelude::*, style::text_anchor::HPos};
 
 use self::features::{FEATURES, Feature, Kind};
 use super::{
-    html::Tone,
+    html::{Markup, Tone},
     map::labels::{self, LETTERS, Labels, write},
     plots::{
         COLOURS, Canvas, Drawn, GREY, GRID, INK, Key, MARK, SOFT, WIDTH, drawn, figure_html, quoted,
@@ -54,9 +54,9 @@ pub(super) struct Place<'a> {
 ///
 /// # Errors
 /// A drawing that cannot be made.
-pub(super) fn figure(body: Body, places: &[Place]) -> Result<String> {
+pub(super) fn figure(body: Body, places: &[Place]) -> Result<Markup> {
     if places.is_empty() {
-        return Ok(String::new());
+        return Ok(Markup::default());
     }
     let features: Vec<&Feature> = FEATURES.iter().filter(|of| of.body == body).collect();
     let (names, unnamed) = names(places, &features);

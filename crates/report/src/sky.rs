@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use plotters::prelude::*;
 
 use super::{
-    html::counted,
+    html::{Markup, counted},
     many::{self, DrawnImage},
     map::labels::{self, Labels},
     misregistration::BeforeAfter,
@@ -44,11 +44,11 @@ struct Seen<'a> {
 ///
 /// # Errors
 /// A drawing that cannot be made.
-pub(super) fn figure(site: &SiteProducts) -> Result<String> {
+pub(super) fn figure(site: &SiteProducts) -> Result<Markup> {
     let drawn_images = many::drawn(site);
     let seen: Vec<Seen> = drawn_images.iter().filter_map(seen).collect();
     if seen.len() < 2 {
-        return Ok(String::new());
+        return Ok(Markup::default());
     }
     let sky = Sky::of(&seen);
     let svg = drawn(HEIGHT, |area| sky.draw(area))?;

@@ -4,31 +4,11 @@
 //! page: `<document>#<JSON pointer>`, or the pointer alone, below the `data-in` of the table's row. A leading `|`
 //! stands for the size of the value, a trailing `*<factor>` for another unit. A missing value is a dash.
 
-use super::html::{Cell, escape, from_places};
+use super::html::{Cell, Markup, html};
 
-/// `text`, whose numbers are those at `places`, as HTML.
-pub(super) fn traced(text: &str, places: &str) -> String {
-    format!("<span{}>{}</span>", from_places(places), escape(text))
-}
-
-/// A paragraph of `words` with a number at each `{}`, with its place in the products; a number without a place is
-/// a word.
-pub(super) fn sentence(words: &str, numbers: &[(String, &str)]) -> String {
-    format!("<p>{}</p>\n", filled(words, numbers))
-}
-
-/// A sentence as a part of a text, in HTML.
-pub(super) fn filled(words: &str, numbers: &[(String, &str)]) -> String {
-    let mut pieces = words.split("{}");
-    let mut html = escape(pieces.next().unwrap_or_default());
-    for (piece, (number, place)) in pieces.zip(numbers) {
-        html += &match *place {
-            "" => escape(number),
-            place => traced(number, place),
-        };
-        html += &escape(piece);
-    }
-    html
+/// `text`, whose numbers are those at `places`.
+pub(super) fn traced(text: &str, places: &str) -> Markup {
+    html! { span data-from=(places) { (text) } }
 }
 
 /// `cell` without its places, for a number that no product has.

@@ -3,7 +3,7 @@
 use super::{
     checks,
     heights::{WITHHELD_BECAUSE, is_open, place_by},
-    html::{Tone, counted, escape, list, paragraph, verdict},
+    html::{Markup, Tone, counted, folded_unless, html, list, verdict},
     map,
     misregistration::{BeforeAfter, by_footprints},
     numbers::{number, signed, whole},
@@ -24,33 +24,26 @@ const REASONS_SHOWN: usize = 4;
 ///
 /// # Errors
 /// A map that cannot be drawn.
-pub(super) fn lead(site: &SiteProducts, sections: &[&Section]) -> Result<String> {
+pub(super) fn lead(site: &SiteProducts, sections: &[&Section]) -> Result<Markup> {
     let (reasons, remarks) = (&site.verdict.reasons, &site.verdict.remarks);
     let tone = match (reasons.len(), remarks.len()) {
         (0, 0) => Tone::Good,
         (0, _) => Tone::Remarks,
         _ => Tone::Bad,
     };
-    let remarks = if remarks.is_empty() {
-        String::new()
-    } else {
-        format!(
-            "<details class=\"more\"{}><summary>{}</summary>\n{}</details>\n",
-            if reasons.is_empty() { " open" } else { "" },
-            counted(remarks.len(), "remark"),
-            first_of(remarks)
-        )
+    let listed = first_of(remarks);
+    let found = html! {
+        (verdict(tone, &headline(site), &first_of(reasons)))
+        (numbers(site))
+        (checks::untested(&site.verdict.untested))
+        div.first {
+            div { (checks::table(site, sections)) }
+            div { (map::first(site)?) }
+        }
+        (folded_unless(reasons.is_empty(), &counted(remarks.len(), "remark"), &listed))
     };
-    let found = format!(
-        "{}{}{}<div class=\"first\">\n<div>{}</div>\n<div>{}</div>\n</div>\n{remarks}",
-        verdict(tone, &headline(site), &first_of(reasons)),
-        numbers(site),
-        checks::untested(&site.verdict.untested),
-        checks::table(site, sections),
-        map::first(site)?,
-    );
     // The user's text is not changed.
-    Ok(about(site) + &found)
+    Ok(html! { (about(site)) (found) })
 }
 
 fn headline(site: &SiteProducts) -> String {
@@ -64,8 +57,7 @@ fn headline(site: &SiteProducts) -> String {
 }
 
 /// Subject of the page: description, dates of the data, counts.
-fn about(site: &SiteProducts) -> String {
-    let mut parts = Vec::new();
+fn about(site: &SiteProducts) -> Markup {
     let days = |dates: &mut dyn Iterator<Item = &str>| {
         let mut days: Vec<String> = dates
             .filter_map(|utc| Some(utc.get(..10)?.to_owned()))
@@ -77,39 +69,32 @@ fn about(site: &SiteProducts) -> String {
             _ => String::new(),
         }
     };
-    if !site.images.is_empty() {
-        let taken = days(&mut site.images.iter().map(|image| &*image.times.utc_start));
-        let images = counted(site.images.len(), "image");
-        parts.push(traced(&images, "manifest.json#/counts/images") + &escape(&taken));
-    }
+    let taken = days(&mut site.images.iter().map(|image| &*image.times.utc_start));
+    let images = counted(site.images.len(), "image");
     let shot = days(&mut site.utc.iter().map(String::as_str));
     let footprints = counted(site.footprints.len(), "footprint");
     let profiles = counted(site.profiles.len(), "profile");
-    parts.push(format!(
-        "{} in {}{}",
-        traced(&footprints, "manifest.json#/counts/footprints"),
-        traced(&profiles, "manifest.json#/counts/profiles"),
-        escape(&shot)
-    ));
-    let mut words = escape(site.config.description.trim_end_matches('.'));
-    if !words.is_empty() {
-        words += ". ";
+    let description = site.config.description.trim_end_matches('.');
+    html! {
+        p.about {
+            @if !description.is_empty() { (description) ". " }
+            @if !site.images.is_empty() { (traced(&images, "manifest.json#/counts/images")) (taken) "; " }
+            (traced(&footprints, "manifest.json#/counts/footprints"))
+            " in " (traced(&profiles, "manifest.json#/counts/profiles")) (shot) "."
+        }
     }
-    words += &(parts.join("; ") + ".");
-    format!("<p class=\"about\">{words}</p>\n")
 }
 
 /// A key number: its name, its value, and a note.
 struct KeyNumber {
     what: &'static str,
-    /// As HTML, like the note.
-    value: String,
-    note: String,
+    value: Markup,
+    note: Markup,
 }
 
 /// The accuracy of the products: by MOLA, between the images, absolutely; without tie points by
 /// the ranges.
-fn numbers(site: &SiteProducts) -> String {
+fn numbers(site: &SiteProducts) -> Markup {
     let numbers: Vec<KeyNumber> = [
         by_mola(site),
         between_images(site),
@@ -119,21 +104,15 @@ fn numbers(site: &SiteProducts) -> String {
     .into_iter()
     .flatten()
     .collect();
-    if numbers.is_empty() {
-        return String::new();
+    html! {
+        @if !numbers.is_empty() {
+            dl.numbers {
+                @for KeyNumber { what, value, note } in numbers {
+                    div { dt { (what) } dd { b { (value) } " " (note) } }
+                }
+            }
+        }
     }
-    let items: String = numbers
-        .iter()
-        .map(|number| {
-            format!(
-                "<div><dt>{}</dt><dd><b>{}</b> {}</dd></div>\n",
-                escape(number.what),
-                number.value,
-                number.note
-            )
-        })
-        .collect();
-    format!("<dl class=\"numbers\">\n{items}</dl>\n")
 }
 
 /// A check with its number, if it has one, and the place of that in the products.
@@ -161,12 +140,12 @@ fn by_mola(site: &SiteProducts) -> Option<KeyNumber> {
         value: traced(&format!("{} m", signed(after_m, 1)), &after_place),
         // Data that control a result cannot test it: then only the number before does.
         note: match site.config.adjustment.model {
-            AdjustmentModel::MolaSurface => format!(
-                "median of {ties}, controlled by MOLA; {before_m} m of {all} before, independent of it"
-            ),
-            AdjustmentModel::Published => {
-                format!("median of {ties}; {before_m} m of {all} before the adjustment")
-            }
+            AdjustmentModel::MolaSurface => html! {
+                "median of " (ties) ", controlled by MOLA; " (before_m) " m of " (all) " before, independent of it"
+            },
+            AdjustmentModel::Published => html! {
+                "median of " (ties) "; " (before_m) " m of " (all) " before the adjustment"
+            },
         },
     })
 }
@@ -187,17 +166,15 @@ fn between_images(site: &SiteProducts) -> Option<KeyNumber> {
             ),
             &format!("|{place}"),
         ),
-        note: format!(
-            "at the tie points of {}, which the adjustment fits; {} m before{}",
-            escape(&after.subject),
-            traced(&number(before_m, 0), &before_place),
-            at_footprints(pair)
-        ),
+        note: html! {
+            "at the tie points of " (after.subject) ", which the adjustment fits; "
+            (traced(&number(before_m, 0), &before_place)) " m before" (at_footprints(pair))
+        },
     })
 }
 
 /// Disagreement of the same images on footprints, which are not fitted, and its precision by the tie points.
-fn at_footprints(pair: &BeforeAfter) -> String {
+fn at_footprints(pair: &BeforeAfter) -> Markup {
     let of = |state: &str, pair_of: &PairComparison| {
         let [apart_m, sigma_m] = by_footprints(pair_of)?;
         let place = format!("{}/footprints", pair.place(state));
@@ -207,11 +184,12 @@ fn at_footprints(pair: &BeforeAfter) -> String {
     let [before, after] = [("before", Some(pair.before)), ("after", pair.after)]
         .map(|(state, found)| of(state, found?));
     let (Some([before_m, before_sigma_m]), Some([after_m, sigma_m])) = (before, after) else {
-        return String::new();
+        return Markup::default();
     };
-    format!(
-        ". Footprints, not fitted: {after_m} m (σ {sigma_m} m), before {before_m} m (σ {before_sigma_m} m)"
-    )
+    html! {
+        ". Footprints, not fitted: " (after_m) " m (σ " (sigma_m) " m), before "
+        (before_m) " m (σ " (before_sigma_m) " m)"
+    }
 }
 
 /// Place of heights in the products.
@@ -224,11 +202,12 @@ fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
     if site.accuracy_withheld().is_some() {
         return Some(KeyNumber {
             what: "Absolute accuracy, 1 σ",
-            value: "withheld".to_owned(),
-            note: format!("{WITHHELD_BECAUSE}; see the remarks"),
+            value: html! { "withheld" },
+            note: html! { (WITHHELD_BECAUSE) "; see the remarks" },
         });
     }
     let [east_m, north_m, up_m] = heights.mean_sigma_m;
+    let by = place_by(&geometric, &adjustment);
     Some(KeyNumber {
         what: "Absolute accuracy, 1 σ",
         value: traced(
@@ -240,19 +219,14 @@ fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
             ),
             &format!("{HEIGHTS}/mean_sigma_m/0 {HEIGHTS}/mean_sigma_m/1 {HEIGHTS}/mean_sigma_m/2"),
         ),
-        note: escape(
-            &(if is_open(&geometric, &adjustment) {
-                format!(
-                    "by {}; see accuracy for open points",
-                    place_by(&geometric, &adjustment)
-                )
-            } else {
-                format!(
-                    "position by {}, height by MOLA",
-                    place_by(&geometric, &adjustment)
-                )
-            } + &untested_attitude(site)),
-        ),
+        note: html! {
+            @if is_open(&geometric, &adjustment) {
+                "by " (by) "; see accuracy for open points"
+            } @else {
+                "position by " (by) ", height by MOLA"
+            }
+            (untested_attitude(site))
+        },
     })
 }
 
@@ -269,30 +243,27 @@ fn untested_attitude(site: &SiteProducts) -> String {
 /// Ranges, if there are profiles.
 fn by_ranges(site: &SiteProducts) -> Option<KeyNumber> {
     let (check, mean_m, place) = checked(site, CheckKind::RangeMean)?;
-    let profile = escape(&check.subject);
+    let profile = &check.subject;
     Some(KeyNumber {
         what: "Range − distance",
         value: traced(&format!("{} m", signed(mean_m, 2)), &place),
         note: match site.profiles.len() {
-            1 => format!("mean of profile {profile}"),
+            1 => html! { "mean of profile " (profile) },
             count => {
                 let profiles = counted(count, "profile");
                 let profiles = traced(&profiles, "manifest.json#/counts/profiles");
-                format!("largest mean of {profiles}, {profile}")
+                html! { "largest mean of " (profiles) ", " (profile) }
             }
         },
     })
 }
 
 /// As many sentences as keep the verdict on one screen; the manifest has all.
-fn first_of(sentences: &[String]) -> String {
+fn first_of(sentences: &[String]) -> Markup {
     let shown = &sentences[..sentences.len().min(REASONS_SHOWN)];
-    let mut html = list(shown);
-    if shown.len() < sentences.len() {
-        let more = sentences.len() - shown.len();
-        html += &paragraph(&format!(
-            "And {more} more, all of them in ../manifest.json."
-        ));
+    let more = sentences.len() - shown.len();
+    html! {
+        (list(shown))
+        @if more > 0 { p { "And " (more) " more, all of them in ../manifest.json." } }
     }
-    html
 }

@@ -1,7 +1,7 @@
 //! Images by support data: contents of their files, to which nothing is applied.
 
 use super::{
-    html::{Column, Table, counted, paragraph},
+    html::{Column, Markup, Table, counted, html},
     many,
     numbers::whole,
     section::Section,
@@ -26,7 +26,7 @@ fn supported<'a>(
     images.filter_map(|image| Some((image.times, image.times.support.as_ref()?)))
 }
 
-fn write(site: &SiteProducts) -> String {
+fn write(site: &SiteProducts) -> Markup {
     let ids: Vec<&str> = supported(site).map(|(times, _)| &*times.id).collect();
     let named = |ids: &[&str]| match ids.len() {
         count if many::are_many(site) => counted(count, "image"),
@@ -94,7 +94,7 @@ fn write(site: &SiteProducts) -> String {
             ],
         );
     }
-    paragraph(&words) + &many::some_of_all(site) + &table.finish()
+    html! { p { (words) } (many::some_of_all(site)) (table.finish()) }
 }
 
 const fn distortion(model: &DistortionModel) -> &'static str {

@@ -6,6 +6,7 @@ use base64::{Engine as _, engine::general_purpose::STANDARD};
 use plotters::prelude::*;
 
 use super::{
+    html::{Markup, html},
     map::{
         keys::{ColourBar, draw_scale},
         relief, round_length_m,
@@ -47,11 +48,11 @@ struct Bar {
     colour: fn(f64) -> [u8; 3],
 }
 
-/// The three pictures: shaded heights, standard deviations, and the altimeter's shots on the model, as HTML.
+/// The three pictures: shaded heights, standard deviations, and the altimeter's shots on the model.
 ///
 /// # Errors
 /// A picture that the library rejects, which is a bug in areograph.
-pub fn terrain_pictures(account: &SurfaceAccount, body: Body) -> Result<String> {
+pub fn terrain_pictures(account: &SurfaceAccount, body: Body) -> Result<Markup> {
     let frame = Frame::of(&account.look);
     let exaggeration = frame.exaggeration();
     let heights = &account.look.heights.heights_m;
@@ -91,7 +92,7 @@ pub fn terrain_pictures(account: &SurfaceAccount, body: Body) -> Result<String> 
         &[],
     )?;
     if account.shots.shots.is_empty() {
-        return Ok(shaded + &of_sigmas);
+        return Ok(html! { (shaded) (of_sigmas) });
     }
     let above_m: Vec<f32> = account
         .shots
@@ -118,7 +119,7 @@ pub fn terrain_pictures(account: &SurfaceAccount, body: Body) -> Result<String> 
         |at| lit([GROUND; 3], light(at)),
         &account.shots.shots,
     )?;
-    Ok(shaded + &of_sigmas + &compared)
+    Ok(html! { (shaded) (of_sigmas) (compared) })
 }
 
 /// Placement of a model on the drawing.
@@ -201,7 +202,7 @@ impl<'a> Frame<'a> {
         bar: &Bar,
         colour: impl Fn(usize) -> [u8; 3],
         shots: &[ShotOnSurface],
-    ) -> Result<String> {
+    ) -> Result<Markup> {
         let heights = &self.look.heights;
         let mut pixels = vec![0_u8; 4 * heights.heights_m.len()];
         for (at, pixel) in pixels.chunks_exact_mut(4).enumerate() {

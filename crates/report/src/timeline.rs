@@ -4,7 +4,7 @@ use chrono::{DateTime, TimeDelta};
 use plotters::{prelude::*, style::text_anchor::HPos};
 
 use super::{
-    html::{Column, Table, folded_unless, paragraph},
+    html::{Column, Markup, Table, folded_unless, html},
     plots::{COLOURS, Canvas, Drawn, INK, Key, MARK, WIDTH, draw_text, drawn, figure_html, quoted},
     section::Section,
 };
@@ -41,22 +41,15 @@ pub(super) const SECTION: Section = Section {
     write,
 };
 
-fn write(site: &SiteProducts) -> Result<String> {
+fn write(site: &SiteProducts) -> Result<Markup> {
     let stretches = stretches(site);
-    let figures = stretches
-        .iter()
-        .take(PICTURES)
-        .map(|stretch| picture(site, *stretch))
-        .collect::<Result<String>>()?;
-    let mut body = format!("<div class=\"plots\">\n{figures}</div>\n");
-    if stretches.len() > PICTURES {
-        let words = format!(
-            "The first {PICTURES} of {} stretches are drawn.",
-            stretches.len()
-        );
-        body += &paragraph(&words);
-    }
-    body += &table(site);
+    let body = html! {
+        div.plots { @for stretch in stretches.iter().take(PICTURES) { (picture(site, *stretch)?) } }
+        @if stretches.len() > PICTURES {
+            p { "The first " (PICTURES) " of " (stretches.len()) " stretches are drawn." }
+        }
+        (table(site))
+    };
     let missing_s: f64 = stretches
         .iter()
         .map(|stretch| missing_s(site, *stretch))
@@ -67,7 +60,7 @@ fn write(site: &SiteProducts) -> Result<String> {
         "Everything requested is covered.".to_owned()
     };
     let kernels = folded_unless(missing_s > 0.0, "Coverage of every kernel", &body);
-    Ok(paragraph(&words) + &kernels)
+    Ok(html! { p { (words) } (kernels) })
 }
 
 /// Required time that is not covered.
@@ -145,7 +138,7 @@ fn held(kernel: &KernelLine) -> &[Interval] {
     kernel.held.as_ref().map_or(&[], Intervals::as_slice)
 }
 
-fn picture(site: &SiteProducts, stretch: Interval) -> Result<String> {
+fn picture(site: &SiteProducts, stretch: Interval) -> Result<Markup> {
     let rows = rows(site, stretch);
     let height = u32::try_from(rows.len()).unwrap_or(u32::MAX) * ROW + 50;
     let svg = drawn(height, |area| draw(&rows, stretch, area))?;
@@ -240,7 +233,7 @@ fn csv(rows: &[Row]) -> String {
     csv
 }
 
-fn table(site: &SiteProducts) -> String {
+fn table(site: &SiteProducts) -> Markup {
     let names = site.spacecraft_of_kernels().into_iter();
     let names: Vec<&str> = names.map(|spacecraft| &*spacecraft.name).collect();
     let [positions, attitudes] = site.required.of_all();

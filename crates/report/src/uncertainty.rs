@@ -1,7 +1,7 @@
 //! The budget of eq. 5 to 9 of Shan et al. 2005: the distance between the two footprints of one point.
 
 use super::{
-    html::{Cell, Column, Table, counted, folded, paragraph},
+    html::{Cell, Column, Markup, Table, counted, folded, html},
     misregistration::BeforeAfter,
     plots::label,
     section::Section,
@@ -18,31 +18,25 @@ pub(super) const SECTION: Section = Section {
         let pairs = site.geometric.as_ref().map(|geometric| geometric.pairs);
         pairs.is_some_and(|pairs| !pairs.is_empty())
     },
-    write: |site| Ok(site.geometric.iter().map(write).collect()),
+    write: |site| Ok(site.geometric.as_ref().map(write).unwrap_or_default()),
 };
 
-fn write(geometric: &GeometricProducts) -> String {
+fn write(geometric: &GeometricProducts) -> Markup {
     let pairs = BeforeAfter::all(geometric);
     let before = pairs
         .iter()
         .filter_map(|pair| pair.before.budget.clone().ok());
     let before: Vec<UncertaintyBudget> = before.collect();
     let pairs = BeforeAfter::tabled(pairs);
-    let without: String = pairs.iter().map(without_budget).collect();
-    let html = [
-        BeforeAfter::some_of_all(geometric),
-        rows(TITLE, COLUMNS, (&pairs, &before), as_published),
-        paragraph(WORDS),
-        rows(
-            SIGNED_TITLE,
-            SIGNED_COLUMNS,
-            (&pairs, &before),
-            by_equation_5,
-        ),
-        paragraph(SIGNED_WORDS),
-        without,
-    ];
-    folded("The budget by eq. 5 to 9", &html.concat())
+    let body = html! {
+        (BeforeAfter::some_of_all(geometric))
+        (rows(TITLE, COLUMNS, (&pairs, &before), as_published))
+        p { (WORDS) }
+        (rows(SIGNED_TITLE, SIGNED_COLUMNS, (&pairs, &before), by_equation_5))
+        p { (SIGNED_WORDS) }
+        @for pair in &pairs { (without_budget(pair)) }
+    };
+    folded("The budget by eq. 5 to 9", &body)
 }
 
 /// The equations as the paper computes with them.
@@ -84,7 +78,7 @@ fn rows<const N: usize>(
     columns: &'static [Column],
     (pairs, before): (&[BeforeAfter], &[UncertaintyBudget]),
     cells: fn(&UncertaintyBudget, bool) -> [Cell; N],
-) -> String {
+) -> Markup {
     let mut table = Table::new(title, columns);
     for pair in pairs {
         for (index, (state, found)) in pair.states().enumerate() {
@@ -118,23 +112,23 @@ fn pooled<const N: usize>(
 }
 
 /// The budget of the pairs of the sites with a budget before their adjustments, as the paper pools its three.
-pub(super) fn of_sites(budgets: &[UncertaintyBudget]) -> String {
+pub(super) fn of_sites(budgets: &[UncertaintyBudget]) -> Markup {
     if budgets.len() < 2 {
-        return String::new();
+        return Markup::default();
     }
     let mut published = Table::new(TITLE, COLUMNS);
     pooled(&mut published, budgets, as_published);
     let mut signed = Table::new(SIGNED_TITLE, SIGNED_COLUMNS);
     pooled(&mut signed, budgets, by_equation_5);
-    let html = [
-        published.finish(),
-        paragraph(WORDS),
-        signed.finish(),
-        paragraph(SIGNED_WORDS),
-    ];
+    let body = html! {
+        (published.finish())
+        p { (WORDS) }
+        (signed.finish())
+        p { (SIGNED_WORDS) }
+    };
     folded(
         "Uncertainty budget of Shan et al. 2005, sites with a budget",
-        &html.concat(),
+        &body,
     )
 }
 
@@ -185,17 +179,14 @@ fn of(value: f64, name: &str) -> Cell {
 }
 
 /// Reason why a pair has no budget.
-fn without_budget(pair: &BeforeAfter) -> String {
-    let mut html = String::new();
-    for (state, found) in pair.states() {
-        if let Err(reason) = &found.budget {
-            let name = pair.name();
-            html += &paragraph(&format!(
-                "{name} has no budget {state} the adjustment: {reason}."
-            ));
+fn without_budget(pair: &BeforeAfter) -> Markup {
+    html! {
+        @for (state, found) in pair.states() {
+            @if let Err(reason) = &found.budget {
+                p { (pair.name()) " has no budget " (state) " the adjustment: " (maud::display(reason)) "." }
+            }
         }
     }
-    html
 }
 
 #[cfg(test)]
@@ -229,7 +220,7 @@ mod tests {
     #[test]
     fn sites_are_pooled_by_their_squares() {
         // √((30² + 40²) / 2) = 35.36, and by eq. 7 that over √2.
-        let html = of_sites(&[budget(30.0), budget(40.0)]);
+        let html = of_sites(&[budget(30.0), budget(40.0)]).0;
         assert!(html.contains("2005, sites with a budget<"), "{html}");
         assert!(html.contains("all: 2 pairs"), "{html}");
         assert!(
@@ -238,6 +229,6 @@ mod tests {
         );
         // No product has these numbers.
         assert!(!html.contains("data-from"), "{html}");
-        assert_eq!(of_sites(&[budget(30.0)]), "");
+        assert_eq!(of_sites(&[budget(30.0)]).0, "");
     }
 }

@@ -6,13 +6,15 @@
     reason = "brightnesses and cells are small numbers, and casts of floats saturate"
 )]
 
+use maud::{Markup, html};
+
 use super::products::{has_orthoimages, orthoimages};
 use crate::{
     error::Result,
     products::SiteProducts,
     report::{
         Section,
-        parts::{Cell, Column, Table, escape, label, link, paragraph, picture_of, whole},
+        parts::{Cell, Column, Table, label, link, picture_of, whole},
     },
     stages::rectify_images::{Orthoimage, OrthoimageAccount, OrthoimageLook},
 };
@@ -28,22 +30,22 @@ pub(super) const SECTION: Section = Section {
     write,
 };
 
-fn write(site: &SiteProducts) -> Result<String> {
+fn write(site: &SiteProducts) -> Result<Markup> {
     let orthoimages = orthoimages(site)?;
-    let pictures = orthoimages.iter().map(|of| picture(site, &of.account));
-    let pictures: String = pictures.collect::<Result<_>>()?;
-    Ok(table(site, orthoimages)
-        + &paragraph(
+    Ok(html! {
+        (table(site, orthoimages))
+        p {
             "Cells in wide holes of the terrain model, on ground that relief hides from the camera, or with missing pixels are \
              empty. Heights in narrow holes are interpolated; off nadir their σ is larger. σ is the standard deviation of the \
              horizontal position of a cell, both axes together, without the shared error. Its parts are height errors, jitter (where \
              the scatter of tie points shows it), and drift (errors of the orientation that change along the image). The adjustment \
-             states the σ of the shared error on each axis. Images without tie points are not rectified in an adjusted site.",
-        )
-        + &format!("<div class=\"pieces\">\n{pictures}</div>\n"))
+             states the σ of the shared error on each axis. Images without tie points are not rectified in an adjusted site."
+        }
+        div.pieces { @for of in orthoimages { (picture(site, &of.account)?) } }
+    })
 }
 
-fn table(site: &SiteProducts, orthoimages: &[Orthoimage]) -> String {
+fn table(site: &SiteProducts, orthoimages: &[Orthoimage]) -> Markup {
     let mut table = Table::new(
         "Orthoimages on the terrain model",
         &[
@@ -101,20 +103,15 @@ fn table(site: &SiteProducts, orthoimages: &[Orthoimage]) -> String {
 }
 
 /// An orthoimage, north up, with links to its files.
-fn picture(site: &SiteProducts, of: &OrthoimageAccount) -> Result<String> {
+fn picture(site: &SiteProducts, of: &OrthoimageAccount) -> Result<Markup> {
     let id = &site.images[of.image].times.id;
     let alt = format!("Orthoimage of {id}, north up");
     let picture = picture_of(&grey(&of.look), of.look.size, &alt)?;
-    let files = ["orthoimage.tif", "orthoimage_sigma.tif"].map(|name| {
+    let [image, sigma] = ["orthoimage.tif", "orthoimage_sigma.tif"].map(|name| {
         let path = format!("../images/{id}/{name}");
         link(&path, name)
     });
-    Ok(format!(
-        "<div>{picture}<p>{}: {}, {}</p></div>\n",
-        escape(id),
-        files[0],
-        files[1]
-    ))
+    Ok(html! { div { (picture) p { (id) ": " (image) ", " (sigma) } } })
 }
 
 /// Pixels of four bytes, the last of them the opacity, stretched between the darkest and the brightest cells.

@@ -1,5 +1,7 @@
 //! The terrain model of a pair of images: statistics, comparison with MOLA, and pictures.
 
+use maud::{Markup, html};
+
 use crate::{
     error::Result,
     geom::statistics::Summary,
@@ -29,27 +31,31 @@ pub(super) const SECTION: Section = Section {
     appears: |site| site.has::<Surface>(),
     write: |site| {
         let surface = site.find::<Surface>()?;
-        surface.map_or_else(|| Ok(String::new()), |of| write(site, &of.account))
+        let written = surface.map(|of| write(site, &of.account));
+        Ok(written.transpose()?.unwrap_or_default())
     },
 };
 
-fn write(site: &SiteProducts, account: &SurfaceAccount) -> Result<String> {
+fn write(site: &SiteProducts, account: &SurfaceAccount) -> Result<Markup> {
     let table = made(site, account);
     if account.is_refused {
         let words = "Too few cells matched to be significant; no model was produced.";
-        return Ok(paragraph(words) + &table);
+        return Ok(html! { p { (words) } (table) });
     }
-    let model = link("../surface.tif", "surface.tif");
-    let sigmas = link("../surface_sigma.tif", "surface_sigma.tif");
-    let files = format!(
-        "<p>Heights above the sphere of the body's maps: {model}; their standard deviations: {sigmas}.</p>\n"
-    );
     let pictures = terrain_pictures(account, site.config.body)?;
-    Ok(files + &table + &compared(account) + &format!("<div class=\"plots\">\n{pictures}</div>\n"))
+    Ok(html! {
+        p {
+            "Heights above the sphere of the body's maps: " (link("../surface.tif", "surface.tif"))
+            "; their standard deviations: " (link("../surface_sigma.tif", "surface_sigma.tif")) "."
+        }
+        (table)
+        (compared(account))
+        div.plots { (pictures) }
+    })
 }
 
 /// Making of the model, and outcomes of its cells.
-fn made(site: &SiteProducts, account: &SurfaceAccount) -> String {
+fn made(site: &SiteProducts, account: &SurfaceAccount) -> Markup {
     let mut table = Table::new(
         "Terrain model of a pair of images",
         &[
@@ -94,22 +100,21 @@ fn made(site: &SiteProducts, account: &SurfaceAccount) -> String {
             of(account.correlation, 2, "/matching/correlation"),
         ],
     );
-    let unfilled = match &*reasons(&account.unfilled) {
-        "" => String::new(),
-        reasons => paragraph(&format!("Cells without a height: {reasons}.")),
-    };
-    table.finish()
-        + &unfilled
-        + &paragraph(
+    let reasons = reasons(&account.unfilled);
+    html! {
+        (table.finish())
+        @if !reasons.is_empty() { p { "Cells without a height: " (reasons) "." } }
+        p {
             "σ of a cell: of one height against the others, from the residuals of its match, from jitter of the images \
              (the scatter of their shifts across the parallax, where no height moves them), and from the relief inside the \
              compared square. Errors that all heights share are stated separately (σ, common, from the adjustment). \
-             Neighbouring heights within the compared square are correlated.",
-        )
+             Neighbouring heights within the compared square are correlated."
+        }
+    }
 }
 
 /// Shots against the model.
-fn compared(account: &SurfaceAccount) -> String {
+fn compared(account: &SurfaceAccount) -> Markup {
     let ShotComparison {
         above_m,
         attitude_sigma_m,
@@ -173,7 +178,7 @@ fn compared(account: &SurfaceAccount) -> String {
     } else {
         String::new()
     };
-    all.finish() + &paragraph(&format!("{words} {spread}{attitude}")) + &single
+    html! { (all.finish()) p { (words) " " (spread) (attitude) } (single) }
 }
 
 fn shots_table(caption: &str) -> Table {

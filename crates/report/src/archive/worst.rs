@@ -1,7 +1,7 @@
 //! The worst profiles, and commands that find their shots.
 
 use crate::{
-    html::{Cell, Column, Table, escape, link, paragraph},
+    html::{Cell, Column, Markup, Table, html, link, paragraph},
     numbers::whole,
     plots::label,
 };
@@ -10,7 +10,7 @@ use areograph_products::{WorstProfile, profile_name};
 use areograph_stages::check_archive::{ArchiveProfile, ArchiveRanges};
 
 /// The worst profiles in a table, each with a link to its shots.
-pub(super) fn worst_profiles(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>]) -> String {
+pub(super) fn worst_profiles(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>]) -> Markup {
     if worst.is_empty() {
         return paragraph("No profile was checked.");
     }
@@ -55,14 +55,14 @@ pub(super) fn worst_profiles(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>])
                  position of the file minus the position in the kernels; it reveals a different orbit, clock or datum. The \
                  best correction of time tags is the one that minimises the spread of ranges, with raw radii or with radii \
                  corrected by crossovers. All profiles are in profiles.parquet and profiles.csv.";
-    table.finish() + &paragraph(words) + &commands(worst)
+    html! { (table.finish()) p { (words) } (commands(worst)) }
 }
 
 /// The profile, with a link if its shots could be written.
 fn named(of: &WorstProfile<'_>) -> Cell {
     let id = of.profile.id();
     match &of.shots {
-        Some(shots) => Cell::Html(link(&format!("../{shots}"), &id)),
+        Some(shots) => link(&format!("../{shots}"), &id).into(),
         None => id.into(),
     }
 }
@@ -84,13 +84,14 @@ fn correction(profile: &ArchiveProfile) -> String {
 }
 
 /// Command lines that find the shots of profiles.
-fn commands(worst: &[WorstProfile<'_>]) -> String {
+fn commands(worst: &[WorstProfile<'_>]) -> Markup {
     let lines: Vec<String> = worst.iter().map(command).collect();
-    format!(
-        "<details><summary>Commands that find these shots in the archive</summary>\n\
-         <div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Commands\"><pre>{}</pre></div></details>\n",
-        escape(&lines.join("\n"))
-    )
+    html! {
+        details {
+            summary { "Commands that find these shots in the archive" }
+            div.wide tabindex="0" role="region" aria-label="Commands" { pre { (lines.join("\n")) } }
+        }
+    }
 }
 
 /// The command line that finds the shots of a profile, without clouds.

@@ -2,17 +2,17 @@
 
 use super::super::{
     checks::{limit, value},
-    html::{Column, Table},
+    html::{Column, Markup, Table},
 };
 use crate::difference::RunDifference;
 use areograph_stages::judge::{Check, CheckOutcome};
 
 /// The table; empty if no outcome changed.
-pub(super) fn changed(site: &RunDifference) -> String {
+pub(super) fn changed(site: &RunDifference) -> Markup {
     let (a, b) = (&site.a.verdict.checks, &site.b.verdict.checks);
     // Products of older versions have no checks.
     if a.is_empty() || b.is_empty() {
-        return String::new();
+        return Markup::default();
     }
     let mut rows = Vec::new();
     for after in b {
@@ -26,7 +26,7 @@ pub(super) fn changed(site: &RunDifference) -> String {
         .filter(|before| b.iter().all(|after| after.kind != before.kind));
     rows.extend(gone.map(|before| (before.words(), Some(before), None)));
     if rows.is_empty() {
-        return String::new();
+        return Markup::default();
     }
     let columns = &[Column::Text("check"), Column::Text("A"), Column::Text("B")];
     let mut table = Table::new("Checks that changed", columns);

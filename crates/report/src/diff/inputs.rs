@@ -2,17 +2,17 @@
 
 use crate::{
     difference::{Change, Item, Items, RunDifference, Texts, text},
-    html::{Cell, Column, Table, counted, list, paragraph},
+    html::{Cell, Column, Markup, Table, counted, html, list},
     numbers::{self, number, whole},
 };
 use areograph_products::read::ProfileDocument;
 use areograph_store::files::short_hash;
 
 /// Range residuals of the profiles that differ.
-pub(super) fn profiles(site: &RunDifference) -> String {
+pub(super) fn profiles(site: &RunDifference) -> Markup {
     let changed = || site.profiles.iter().filter(|profile| profile.changed);
     if changed().next().is_none() {
-        return String::new();
+        return Markup::default();
     }
     let mut table = Table::new(
         "Range − distance to the spacecraft in the kernels",
@@ -62,7 +62,7 @@ pub(super) fn profiles(site: &RunDifference) -> String {
         table.row(valid[1] != Some(false), cells.into_iter().map(Cell::from));
     }
     let same = site.profiles.len() - changed().count();
-    table.finish() + &paragraph(&format!("The same in both: {same}."))
+    html! { (table.finish()) p { "The same in both: " (same) "." } }
 }
 
 /// A difference in the fewest digits that show it.
@@ -75,7 +75,7 @@ fn signed(difference: f64) -> String {
 }
 
 /// Keys, corrections, counts, times and model statistics that differ.
-pub(super) fn values(site: &RunDifference) -> String {
+pub(super) fn values(site: &RunDifference) -> Markup {
     let mut table = Table::new(
         "Values that differ",
         &[
@@ -125,33 +125,26 @@ pub(super) fn values(site: &RunDifference) -> String {
             ],
         );
     }
-    let not_listed = if rounding == 0 {
-        String::new()
-    } else {
-        paragraph(&format!(
-            "Not listed: {} that differ by less than one part in a million.",
-            counted(rounding, "value")
-        ))
-    };
-    if rows == 0 {
-        return not_listed;
+    html! {
+        @if rows > 0 { (table.finish()) }
+        @if rounding > 0 {
+            p { "Not listed: " (counted(rounding, "value")) " that differ by less than one part in a million." }
+        }
     }
-    table.finish() + &not_listed
 }
 
 /// Kernels, stages and products that differ.
-pub(super) fn items(site: &RunDifference) -> String {
-    let mut body = String::new();
-    for (what, items) in [
+pub(super) fn items(site: &RunDifference) -> Markup {
+    let kinds = [
         ("Kernels", &site.kernels),
         ("Stages, by their inputs", &site.stages),
         ("Products", &site.products),
-    ] {
-        if !items.is_empty() {
-            body += &item_table(what, items);
+    ];
+    html! {
+        @for (what, items) in kinds {
+            @if !items.is_empty() { (item_table(what, items)) }
         }
     }
-    body
 }
 
 /// Columns of differing items.
@@ -169,7 +162,7 @@ const ROLES: &[Column] = &[
     Column::Text("B"),
 ];
 
-fn item_table(what: &str, items: &Items) -> String {
+fn item_table(what: &str, items: &Items) -> Markup {
     let changed = items.changed.iter().map(|item| &item.role);
     let others = items.removed.iter().chain(&items.added);
     // Only kernels have roles.
@@ -205,16 +198,17 @@ fn item_table(what: &str, items: &Items) -> String {
     } else {
         ""
     };
-    table.finish() + &paragraph(&format!("The same in both: {}{order}.", items.unchanged))
+    html! { (table.finish()) p { "The same in both: " (items.unchanged) (order) "." } }
 }
 
 /// Notes and problems of one run only.
-pub(super) fn texts(site: &RunDifference) -> String {
-    let folded_list = |texts: &Texts, what: &str| {
-        let runs = [(&texts.only_in_a, "A"), (&texts.only_in_b, "B")].into_iter();
-        runs.filter(|(texts, _)| !texts.is_empty())
-            .map(|(texts, whose)| paragraph(&format!("{what} only in {whose}:")) + &list(texts))
-            .collect::<String>()
-    };
-    folded_list(&site.notes, "Notes") + &folded_list(&site.complaints, "Problems")
+pub(super) fn texts(site: &RunDifference) -> Markup {
+    let all = [("Notes", &site.notes), ("Problems", &site.complaints)];
+    html! {
+        @for (what, Texts { only_in_a, only_in_b }) in all {
+            @for (texts, whose) in [(only_in_a, "A"), (only_in_b, "B")] {
+                @if !texts.is_empty() { p { (what) " only in " (whose) ":" } (list(texts)) }
+            }
+        }
+    }
 }

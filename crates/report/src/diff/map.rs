@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use crate::{
     difference::{Moved, RunDifference},
+    html::Markup,
     numbers::whole,
     plots::{Arrow, Arrows, Extent, Panel, Plot, Series, WIDTH, figure, magnification},
 };
@@ -22,11 +23,11 @@ const HEIGHTS: [f64; 2] = [300.0, 1_000.0];
 ///
 /// # Errors
 /// A plot that cannot be drawn, which is a bug in areograph.
-pub(super) fn figure_of(site: &RunDifference) -> Result<String> {
+pub(super) fn figure_of(site: &RunDifference) -> Result<Markup> {
     let kinds = kinds(site);
     let moved = |[from, to]: &Moved| (to - from).norm() > DRAWN_FROM_M;
     if !kinds.iter().any(|(_, places)| places.iter().any(moved)) {
-        return Ok(String::new());
+        return Ok(Markup::default());
     }
     let all = || kinds.iter().flat_map(|(_, places)| places);
     let middle = all().fold(Vector3::zeros(), |sum, [from, _]| sum + from);

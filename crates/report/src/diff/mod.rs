@@ -7,7 +7,7 @@ mod movement;
 
 use std::cmp::Reverse;
 
-use super::html::{self, Section, Tone, heading, list, paragraph};
+use super::html::{self, Markup, Section, Tone, html, list};
 use crate::difference::{Outcome, RunDifference};
 use areograph_base::error::Result;
 
@@ -23,16 +23,12 @@ pub fn difference_page(sites: &[&RunDifference], not_compared: &[String]) -> Res
     let mut sites = sites.to_vec();
     sites.sort_by_key(|site| Reverse(site.severity()));
     let sites = &*sites;
-    let lead = lead(sites);
+    let lead = html! { (lead(sites)) (list(not_compared)) };
     let sections = [
         of_each("Checks", sites, |site| Ok(checks::changed(site)))?,
         of_each("Movement", sites, |site| {
             let moved = matches!(site.outcome, Outcome::Moved | Outcome::BeyondLimit);
-            Ok(if moved {
-                movement::tables(site) + &map::figure_of(site)?
-            } else {
-                String::new()
-            })
+            Ok(html! { @if moved { (movement::tables(site)) (map::figure_of(site)?) } })
         })?,
         of_each("Movement along the images", sites, movement::plots)?,
         of_each("Range residuals", sites, |site| Ok(inputs::profiles(site)))?,
@@ -42,47 +38,43 @@ pub fn difference_page(sites: &[&RunDifference], not_compared: &[String]) -> Res
         })?,
         of_each("Notes and problems", sites, |site| Ok(inputs::texts(site)))?,
     ];
-    Ok(html::page(&title, &(lead + &list(not_compared)), &sections))
+    Ok(html::page(&title, &lead, &sections))
 }
 
 /// A section with the part of every site that has one, under the site's name if there are several.
 fn of_each(
     name: &'static str,
     sites: &[&RunDifference],
-    part: impl Fn(&RunDifference) -> Result<String>,
+    part: impl Fn(&RunDifference) -> Result<Markup>,
 ) -> Result<Section> {
-    let mut body = String::new();
-    for site in sites {
-        let part = part(site)?;
-        if !part.is_empty() && sites.len() > 1 {
-            body += &heading(&site.site);
+    let parts = sites.iter().map(|site| Ok((&site.site, part(site)?)));
+    let parts: Vec<(&String, Markup)> = parts.collect::<Result<_>>()?;
+    let body = html! {
+        @for (name, part) in parts {
+            @if !part.0.is_empty() && sites.len() > 1 { h3 { (name) } }
+            (part)
         }
-        body += &part;
-    }
+    };
     Ok(Section::new(name, body))
 }
 
 /// Changed verdicts first, on their own; then movements; of several sites the unchanged ones in one line.
-fn lead(sites: &[&RunDifference]) -> String {
-    let verdicts = sites.iter().map(|site| changed_verdict(site));
-    if let [one] = sites {
-        return verdicts.collect::<String>() + &moved(one);
+fn lead(sites: &[&RunDifference]) -> Markup {
+    let (unchanged, changed): (Vec<&RunDifference>, Vec<&RunDifference>) = sites
+        .iter()
+        .partition(|site| sites.len() > 1 && site.is_unchanged());
+    let names: Vec<&str> = unchanged.iter().map(|site| &*site.site).collect();
+    html! {
+        @for site in sites { (changed_verdict(site)) }
+        @for site in changed { (moved(site)) }
+        @if !names.is_empty() { p { "Unchanged: " (names.join(", ")) "." } }
     }
-    let (unchanged, changed): (Vec<&RunDifference>, Vec<&RunDifference>) =
-        sites.iter().partition(|site| site.is_unchanged());
-    let moved = changed.iter().map(|site| moved(site));
-    let mut lead: String = verdicts.chain(moved).collect();
-    if !unchanged.is_empty() {
-        let names: Vec<&str> = unchanged.iter().map(|site| &*site.site).collect();
-        lead += &paragraph(&format!("Unchanged: {}.", names.join(", ")));
-    }
-    lead
 }
 
-fn changed_verdict(site: &RunDifference) -> String {
+fn changed_verdict(site: &RunDifference) -> Markup {
     let (a, b) = (&site.a.verdict, &site.b.verdict);
     if a.word() == b.word() {
-        return String::new();
+        return Markup::default();
     }
     let tone = match (b.valid, b.remarks.is_empty()) {
         (false, _) => Tone::Bad,
@@ -90,10 +82,14 @@ fn changed_verdict(site: &RunDifference) -> String {
         (true, true) => Tone::Good,
     };
     let headline = format!("{}: {} → {}", site.site, a.word(), b.word());
-    html::verdict(tone, &headline, &(list(&b.reasons) + &list(&b.remarks)))
+    html::verdict(
+        tone,
+        &headline,
+        &html! { (list(&b.reasons)) (list(&b.remarks)) },
+    )
 }
 
-fn moved(site: &RunDifference) -> String {
+fn moved(site: &RunDifference) -> Markup {
     let tone = match site.outcome {
         _ if !site.b.verdict.valid => Tone::Bad,
         Outcome::NothingChanged | Outcome::NothingMoved => Tone::Good,
@@ -105,7 +101,7 @@ fn moved(site: &RunDifference) -> String {
         "A was published at {}, B at {}; a movement is B − A.",
         site.a.finished_utc, site.b.finished_utc
     );
-    let body = list(&site.first_sentences()) + &paragraph(&limits(site)) + &paragraph(&runs);
+    let body = html! { (list(&site.first_sentences())) p { (limits(site)) } p { (runs) } };
     html::verdict(tone, &headline, &body)
 }
 

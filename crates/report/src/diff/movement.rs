@@ -5,29 +5,27 @@ use crate::{
         FootprintsMovement, ImageDifference, ImageMovement, Limits, RunDifference, SampleMovement,
         quantity,
     },
-    html::{Cell, Column, Table, paragraph},
+    html::{Cell, Column, Markup, Table, html},
     plots::{Panel, Plot, Series, figure},
 };
 use areograph_base::error::Result;
 
 /// Footprints, then cameras.
-pub(super) fn tables(site: &RunDifference) -> String {
-    let mut body = String::new();
-    if site.footprints.moved() {
-        body += &footprints(site);
-    }
+pub(super) fn tables(site: &RunDifference) -> Markup {
     let images: Vec<&ImageDifference> =
         site.images.iter().filter(|image| image.differs()).collect();
-    if !images.is_empty() {
-        body += &positions(&images, &site.limits);
-        body += &pointing(&images, &site.limits);
-        body += &paragraph(
-            "Samples are matched by image line. Radial (up), along the flight and cross (angular momentum) are axes of A's \
-             orbit; signed columns are means. Turns are about the camera's axes; z is the boresight. Pointing alone: turn × \
-             range. Ground point: where the boresight meets the ellipsoid.",
-        );
+    html! {
+        @if site.footprints.moved() { (footprints(site)) }
+        @if !images.is_empty() {
+            (positions(&images, &site.limits))
+            (pointing(&images, &site.limits))
+            p {
+                "Samples are matched by image line. Radial (up), along the flight and cross (angular momentum) are axes of A's \
+                 orbit; signed columns are means. Turns are about the camera's axes; z is the boresight. Pointing alone: turn × \
+                 range. Ground point: where the boresight meets the ellipsoid."
+            }
+        }
     }
-    body
 }
 
 fn unknown() -> Cell {
@@ -42,7 +40,7 @@ fn limited(value: f64, limit: Option<f64>) -> Cell {
     }
 }
 
-fn footprints(site: &RunDifference) -> String {
+fn footprints(site: &RunDifference) -> Markup {
     let found = &site.footprints;
     let mut table = Table::new(
         "Footprints, matched by file, orbit, record and shot",
@@ -78,7 +76,7 @@ fn footprints(site: &RunDifference) -> String {
     table.finish()
 }
 
-fn positions(images: &[&ImageDifference], limits: &Limits) -> String {
+fn positions(images: &[&ImageDifference], limits: &Limits) -> Markup {
     let mut table = Table::new(
         "Camera positions",
         &[
@@ -118,7 +116,7 @@ fn positions(images: &[&ImageDifference], limits: &Limits) -> String {
     table.finish()
 }
 
-fn pointing(images: &[&ImageDifference], limits: &Limits) -> String {
+fn pointing(images: &[&ImageDifference], limits: &Limits) -> Markup {
     let mut table = Table::new(
         "Camera pointing",
         &[
@@ -173,8 +171,8 @@ const POINTING: [Curve; 3] = [
 ];
 
 /// Movement along each image that moved.
-pub(super) fn plots(site: &RunDifference) -> Result<String> {
-    let mut figures = String::new();
+pub(super) fn plots(site: &RunDifference) -> Result<Markup> {
+    let mut figures = Vec::new();
     for image in &site.images {
         let Some(movement) = &image.movement else {
             continue;
@@ -188,19 +186,18 @@ pub(super) fn plots(site: &RunDifference) -> Result<String> {
             panels.push(panel("camera turned, arcsec", movement, POINTING, 3));
         }
         if !panels.is_empty() {
-            figures += &figure(&Plot::of(
+            figures.push(figure(&Plot::of(
                 format!("{}: image {}", site.site, image.image),
                 "Movement of the camera along the image, B − A, at the samples of both runs."
                     .to_owned(),
                 "lines from the middle of the header image",
                 panels,
-            ))?;
+            ))?);
         }
     }
-    if figures.is_empty() {
-        return Ok(figures);
-    }
-    Ok(format!("<div class=\"plots\">\n{figures}</div>\n"))
+    Ok(html! {
+        @if !figures.is_empty() { div.plots { @for figure in figures { (figure) } } }
+    })
 }
 
 fn panel(

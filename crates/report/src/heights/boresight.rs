@@ -2,7 +2,7 @@
 
 use super::{
     super::{
-        html::{Cell, Column, Table, paragraph},
+        html::{Cell, Column, Markup, Table, html, paragraph},
         plots::label,
     },
     relief::profiles,
@@ -13,18 +13,18 @@ use areograph_stages::adjust::{Adjusted, BoresightSummary, SpotsOfImage};
 const MRAD_PER_RADIAN: f64 = 1e3;
 
 /// Pointing of the laser in simultaneous images, if requested.
-pub(super) fn boresight(adjusted: &Adjusted) -> String {
+pub(super) fn boresight(adjusted: &Adjusted) -> Markup {
     match &adjusted.boresight {
-        None => String::new(),
+        None => Markup::default(),
         Some(Err(reason)) => paragraph(&format!("adjustment.common_bus has no effect: {reason}.")),
         Some(Ok(found)) => {
             let caption = "Recorded profiles against their positions by laser and images, metres";
-            words(found) + &table(&found.images) + &profiles(caption, &found.profile_shifts)
+            html! { (words(found)) (table(&found.images)) (profiles(caption, &found.profile_shifts)) }
         }
     }
 }
 
-fn words(found: &BoresightSummary) -> String {
+fn words(found: &BoresightSummary) -> Markup {
     let angle = |axis: usize| {
         let [value, sigma] = [found.angles_rad[axis], found.sigma_rad[axis]]
             .map(|radians| label(MRAD_PER_RADIAN * radians, 3));
@@ -45,7 +45,7 @@ fn words(found: &BoresightSummary) -> String {
     ))
 }
 
-fn table(images: &[SpotsOfImage]) -> String {
+fn table(images: &[SpotsOfImage]) -> Markup {
     let mut table = Table::new(
         "Shots in simultaneous images: footprints from the kernels minus laser positions from the mounting",
         &[

@@ -1,20 +1,20 @@
 //! Two readings of the along-track disagreement of images, and the positions of tie points by each.
 
 use super::super::{
-    html::{Cell, Column, Table, paragraph},
+    html::{Cell, Column, Markup, Table, html, paragraph},
     plots::label,
 };
 use areograph_stages::adjust::{Adjusted, OtherReading};
 
 /// Both readings side by side, if the images disagree significantly; without standard deviations where the accuracy
 /// `is_withheld`.
-pub(super) fn two_readings(adjusted: &Adjusted, is_withheld: bool) -> String {
+pub(super) fn two_readings(adjusted: &Adjusted, is_withheld: bool) -> Markup {
     match &adjusted.other_reading {
-        None => String::new(),
+        None => Markup::default(),
         Some(Err(reason)) => paragraph(&format!(
             "The other reading of the along-track disagreement (adjustment.attitude_clock) gave no result: {reason}."
         )),
-        Some(Ok(other)) => table(adjusted, other, is_withheld) + &paragraph(WORDS),
+        Some(Ok(other)) => html! { (table(adjusted, other, is_withheld)) p { (WORDS) } },
     }
 }
 
@@ -22,7 +22,7 @@ const WORDS: &str = "Tie points show the offset between images, but not which im
                      rotates nadir-tracking images but not \
     inertially held ones.";
 
-fn table(adjusted: &Adjusted, other: &OtherReading, is_withheld: bool) -> String {
+fn table(adjusted: &Adjusted, other: &OtherReading, is_withheld: bool) -> Markup {
     let mut table = Table::new(
         "Two readings of the along-track disagreement, metres",
         &[

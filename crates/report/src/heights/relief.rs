@@ -1,7 +1,7 @@
 //! Position by relief.
 
 use super::super::{
-    html::{Cell, Column, Table, paragraph},
+    html::{Cell, Column, Markup, Table, html, paragraph},
     plots::label,
 };
 use areograph_stages::adjust::{Adjusted, HeightSummary, ProfileOffset};
@@ -12,9 +12,9 @@ const SHARE_OF_USE: f64 = 0.5;
 const BEYOND_USE_M: f64 = 1e3;
 
 /// Precision of the position by relief, whether it is useful, and the result if it is used.
-pub(super) fn relief(adjusted: &Adjusted, beforehand: &str) -> String {
+pub(super) fn relief(adjusted: &Adjusted, beforehand: &str) -> Markup {
     let Some(heights) = &adjusted.heights else {
-        return String::new();
+        return Markup::default();
     };
     let Some(relief) = &adjusted.relief else {
         return paragraph(
@@ -24,14 +24,11 @@ pub(super) fn relief(adjusted: &Adjusted, beforehand: &str) -> String {
     let [east_m, north_m] = relief.sigma_m;
     let axes = format!("±{} m E, ±{} m N", label(east_m, 0), label(north_m, 0));
     if relief.used {
-        let used = format!(
-            "Relief alone determines the position to {axes}; it is used (adjustment.relief_for_plan)."
-        );
-        return paragraph(&used)
-            + &profiles(
-                "Recorded profiles against their positions by relief and images, metres",
-                &relief.profile_shifts,
-            );
+        let caption = "Recorded profiles against their positions by relief and images, metres";
+        return html! {
+            p { "Relief alone determines the position to " (axes) "; it is used (adjustment.relief_for_plan)." }
+            (profiles(caption, &relief.profile_shifts))
+        };
     }
     if !(east_m.max(north_m) <= BEYOND_USE_M) {
         return paragraph("Relief does not determine the position here.");
@@ -55,9 +52,9 @@ fn is_of_use(relief_m: [f64; 2], heights: &HeightSummary) -> bool {
 }
 
 /// Shifts of profiles; empty without any.
-pub(super) fn profiles(caption: &str, offsets: &[ProfileOffset]) -> String {
+pub(super) fn profiles(caption: &str, offsets: &[ProfileOffset]) -> Markup {
     if offsets.is_empty() {
-        return String::new();
+        return Markup::default();
     }
     let mut table = Table::new(
         caption,

@@ -4,7 +4,7 @@ use base64::{Engine as _, engine::general_purpose::STANDARD};
 use png::{BitDepth, ColorType, Encoder, EncodingError};
 
 use super::super::{
-    html::{counted, escape, paragraph},
+    html::{Markup, PreEscaped, counted, html, paragraph},
     map::{keys::ColourBar, relief},
     numbers::signed,
     plots::{drawn, label},
@@ -32,19 +32,21 @@ const MARKS: &str = "<g id=\"similarity-none\"><path d=\"M-6 0H6M0-6V6\" stroke=
 ///
 /// # Errors
 /// A picture that the library rejects, which is a bug in areograph.
-pub(super) fn pictures(of: &LaserMatch) -> Result<String> {
+pub(super) fn pictures(of: &LaserMatch) -> Result<Markup> {
     let shown = of.units.iter().filter_map(Shown::of);
     let shown: Vec<Shown> = shown.collect();
     let Some(first) = shown.first() else {
-        return Ok(String::new());
+        return Ok(Markup::default());
     };
     let (kept, refused): (Vec<&Shown>, Vec<&Shown>) =
         shown.iter().partition(|shown| shown.unit.is_kept());
-    Ok(words(of, first.surface)
-        + &definitions(first.surface)
-        + &bar()?
-        + &figure("Units that are kept", &kept)?
-        + &figure("Units that are not kept", &refused)?)
+    Ok(html! {
+        (words(of, first.surface))
+        (definitions(first.surface))
+        (bar()?)
+        (figure("Units that are kept", &kept)?)
+        (figure("Units that are not kept", &refused)?)
+    })
 }
 
 /// A unit that was searched.
@@ -73,28 +75,33 @@ impl<'a> Shown<'a> {
     }
 
     /// The picture with its name above it, and below it the result, and why it is not kept.
-    fn html(&self) -> Result<String> {
+    fn html(&self) -> Result<Markup> {
         let png = png(self.surface).map_err(ProductError::refused("draw similarities"))?;
         let [east, north] = self.found.shift_cells;
         let [x, y] = place(self.surface, self.found.shift_cells);
         let (name, score) = (self.name(), label(self.found.score, 3));
         let (right, up) = (signed(east, 1), signed(north, 1));
         let [width, height] = SIZE;
-        let found = format!("{score} at {right}, {up}");
-        Ok(format!(
-            "<div>\n<p><b>{name}</b></p>\n<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{name}: similarity over the shifts, \
+        let picture = format!(
+            "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{name}: similarity over the shifts, \
              best {score} at {right} cells east, {up} cells north\"><image x=\"{LEFT}\" y=\"{TOP}\" width=\"{EDGE}\" \
              height=\"{EDGE}\" href=\"data:image/png;base64,{}\"/><use href=\"#similarity-axes\"/>\
-             <use href=\"#similarity-best\" x=\"{x:.1}\" y=\"{y:.1}\"/></svg>\n{}{}</div>\n",
-            STANDARD.encode(png),
-            paragraph(&found),
-            paragraph(&self.unit.refused_because)
-        ))
+             <use href=\"#similarity-best\" x=\"{x:.1}\" y=\"{y:.1}\"/></svg>",
+            STANDARD.encode(png)
+        );
+        Ok(html! {
+            div {
+                p { b { (name) } }
+                (PreEscaped(picture))
+                p { (score) " at " (right) ", " (up) }
+                (paragraph(&self.unit.refused_because))
+            }
+        })
     }
 }
 
 /// The caption.
-fn words(of: &LaserMatch, surface: &SimilaritySurface) -> String {
+fn words(of: &LaserMatch, surface: &SimilaritySurface) -> Markup {
     let pixels = match surface.step_cells {
         1 => String::new(),
         step => format!(" A pixel is the best of {step} by {step} shifts."),
@@ -118,7 +125,7 @@ fn place(surface: &SimilaritySurface, [east, north]: [f64; 2]) -> [f64; 2] {
 }
 
 /// Common parts of all pictures: axes and marks. All searches of a match have the same range.
-fn definitions(surface: &SimilaritySurface) -> String {
+fn definitions(surface: &SimilaritySurface) -> Markup {
     let reach = f64::from(surface.reach * surface.step_cells);
     let [middle_x, middle_y] = place(surface, [0.0; 2]);
     let bottom = TOP + EDGE;
@@ -134,16 +141,16 @@ fn definitions(surface: &SimilaritySurface) -> String {
             y + 4.0
         )
     });
-    format!(
+    PreEscaped(format!(
         "<svg class=\"hidden\" aria-hidden=\"true\"><defs>\n{MARKS}<g id=\"similarity-axes\">\
          <rect x=\"{LEFT}\" y=\"{TOP}\" width=\"{EDGE}\" height=\"{EDGE}\" fill=\"none\"/>{}\
          <use href=\"#similarity-none\" x=\"{middle_x}\" y=\"{middle_y}\"/></g>\n</defs></svg>\n",
         labels.concat()
-    )
+    ))
 }
 
 /// The colours of all pictures, and the meaning of marks.
-fn bar() -> Result<String> {
+fn bar() -> Result<Markup> {
     let [width, height] = BAR;
     let svg = drawn(height, |area| {
         let bar = ColourBar {
@@ -156,34 +163,36 @@ fn bar() -> Result<String> {
         bar.draw(&[0.0, 0.2, 0.4, 0.6, 0.8, 1.0], area)
     })?;
     let (_, drawing) = svg.split_once('>').unwrap_or_default();
-    let keys = [("none", "no shift"), ("best", "the best shift")].map(|(mark, words)| {
-        format!(
-            "<li><svg viewBox=\"-9 -9 18 18\" aria-hidden=\"true\"><use href=\"#similarity-{mark}\"/></svg>{words}</li>"
-        )
-    });
-    Ok(format!(
-        "<div class=\"shifts\">\n<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"Colours of similarity, from \
-         dark for 0 and below to light for 1\">{drawing}<ul class=\"keys\">{}</ul>\n</div>\n",
-        keys.concat()
-    ))
+    let key = |mark: &str| {
+        let href = format!("#similarity-{mark}");
+        html! { svg viewBox="-9 -9 18 18" aria-hidden="true" { use href=(href); } }
+    };
+    Ok(html! {
+        div.shifts {
+            (PreEscaped(format!(
+                "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"Colours of similarity, from \
+                 dark for 0 and below to light for 1\">{drawing}"
+            )))
+            ul.keys { li { (key("none")) "no shift" } li { (key("best")) "the best shift" } }
+        }
+    })
 }
 
-fn figure(title: &str, shown: &[&Shown]) -> Result<String> {
+fn figure(title: &str, shown: &[&Shown]) -> Result<Markup> {
     if shown.is_empty() {
-        return Ok(String::new());
+        return Ok(Markup::default());
     }
-    let pictures = shown.iter().map(|shown| shown.html());
-    let pictures: String = pictures.collect::<Result<_>>()?;
     let caption = format!(
         "Similarity over the shifts of {}, with the best shift, cells east and north.",
         counted(shown.len(), "unit")
     );
-    Ok(format!(
-        "<figure class=\"shifts\">\n<p class=\"title\">{}</p>\n<div class=\"thumbs\">\n{pictures}</div>\n\
-         <figcaption>{}</figcaption>\n</figure>\n",
-        escape(title),
-        escape(&caption)
-    ))
+    Ok(html! {
+        figure.shifts {
+            p.title { (title) }
+            div.thumbs { @for shown in shown { (shown.html()?) } }
+            figcaption { (caption) }
+        }
+    })
 }
 
 /// A surface as a picture; the first entry of its palette is transparent.

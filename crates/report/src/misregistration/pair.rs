@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use super::super::{
-    html::{Cell, paragraph},
+    html::{Cell, Markup, html},
     numbers::whole,
     plots::label,
 };
@@ -72,13 +72,15 @@ impl<'a> BeforeAfter<'a> {
     }
 
     /// A paragraph that states that rows are of some pairs only; empty where they are of all.
-    pub(crate) fn some_of_all(geometric: &GeometricProducts) -> String {
-        match geometric.pairs.len() {
-            all if all > PAIRS_TABLED => paragraph(&format!(
-                "Rows are of the {PAIRS_TABLED} of {} pairs with the largest along-track parallax; adjustment.json has all.",
-                whole(all)
-            )),
-            _ => String::new(),
+    pub(crate) fn some_of_all(geometric: &GeometricProducts) -> Markup {
+        let all = geometric.pairs.len();
+        html! {
+            @if all > PAIRS_TABLED {
+                p {
+                    "Rows are of the " (PAIRS_TABLED) " of " (whole(all))
+                    " pairs with the largest along-track parallax; adjustment.json has all."
+                }
+            }
         }
     }
 

@@ -2,7 +2,7 @@
 
 use plotters::style::RGBColor;
 
-use super::super::html::{escape, slug};
+use super::super::html::{Markup, PreEscaped, html, slug};
 
 /// An entry of a legend.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -43,14 +43,18 @@ impl Key {
         }
     }
 
-    fn html(&self) -> String {
-        let (label, colour) = (escape(&self.label), &self.colour);
-        let look = match self.class.as_str() {
-            "" => format!("style=\"background:{colour}\""),
-            class => format!("class=\"{class}\""),
+    fn html(&self) -> Markup {
+        let Self {
+            label,
+            class,
+            colour,
+        } = self;
+        let (class, style) = match &**class {
+            "" => (None, Some(format!("background:{colour}"))),
+            class => (Some(class), None),
         };
         // Read from the page to draw the figure separately.
-        format!("<li><i {look} data-colour=\"{colour}\"></i>{label}</li>")
+        html! { li { i class=[class] style=[style] data-colour=(colour) {} (label) } }
     }
 }
 
@@ -65,14 +69,8 @@ pub(crate) fn figure_html(
     keys: &[Key],
     caption: &str,
     csv: &str,
-) -> String {
+) -> Markup {
     let id = slug(title);
-    let keys: String = keys.iter().map(Key::html).collect();
-    let keys = if keys.is_empty() {
-        keys
-    } else {
-        format!("<ul class=\"keys\">{keys}</ul>\n")
-    };
     // The drawing library states its size in pixels; the page decides that.
     let svg = svg.find("viewBox").map_or_else(
         || svg.to_owned(),
@@ -84,13 +82,14 @@ pub(crate) fn figure_html(
             format!("<svg role=\"img\" aria-labelledby=\"{id}-title {id}-words\" {drawing}")
         },
     );
-    format!(
-        "<figure id=\"{id}\">\n<p class=\"title\" id=\"{id}-title\">{}</p>\n{svg}{keys}\
-         <figcaption><span id=\"{id}-words\">{}</span> {}</figcaption>\n</figure>\n",
-        escape(title),
-        escape(caption),
-        data_link(&id, csv)
-    )
+    html! {
+        figure #(id) {
+            p.title id={ (id) "-title" } { (title) }
+            (PreEscaped(svg))
+            @if !keys.is_empty() { ul.keys { @for key in keys { (key.html()) } } }
+            figcaption { span id={ (id) "-words" } { (caption) } " " (data_link(&id, csv)) }
+        }
+    }
 }
 
 /// The page with a link to the file of every figure, which the products contain beside it.
@@ -107,7 +106,7 @@ pub(crate) fn with_files(page: &str) -> String {
 }
 
 /// A link that downloads `csv` as `<name>.csv` from inside the page.
-pub(crate) fn data_link(name: &str, csv: &str) -> String {
+pub(crate) fn data_link(name: &str, csv: &str) -> Markup {
     let mut encoded = String::with_capacity(csv.len() + csv.len() / 8);
     for byte in csv.bytes() {
         match byte {
@@ -117,9 +116,9 @@ pub(crate) fn data_link(name: &str, csv: &str) -> String {
             _ => encoded.push_str(&format!("%{byte:02X}")),
         }
     }
-    format!(
-        "<a class=\"data\" download=\"{name}.csv\" href=\"data:text/csv;charset=utf-8,{encoded}\">Data (CSV)</a>"
-    )
+    html! {
+        a.data download={ (name) ".csv" } href={ "data:text/csv;charset=utf-8," (encoded) } { "Data (CSV)" }
+    }
 }
 
 #[cfg(test)]
@@ -129,7 +128,7 @@ mod tests {
     #[test]
     fn data_can_be_decoded_again() {
         let csv = "a,\"µ% #\"\n1,-2.5e-3\n";
-        let link = data_link("x", csv);
+        let link = data_link("x", csv).0;
         let start = link.find("utf-8,").unwrap() + "utf-8,".len();
         let encoded = &link[start..link[start..].find('"').unwrap() + start];
         let mut bytes = Vec::new();

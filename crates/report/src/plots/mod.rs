@@ -23,7 +23,7 @@ use plotters::{
     style::RGBColor,
 };
 
-use super::html::paragraph;
+use super::html::{Markup, html};
 use areograph_base::error::Result;
 
 /// Width of a plot in its own units; pages show about half as many pixels, so that lines stay fine.
@@ -228,13 +228,9 @@ pub(super) fn quoted(text: &str) -> String {
 ///
 /// # Errors
 /// A plot that the library rejects, which is a bug in areograph.
-pub(super) fn figure(plot: &Plot) -> Result<String> {
+pub(super) fn figure(plot: &Plot) -> Result<Markup> {
     if plot.drawn().next().is_none() {
-        return Ok(paragraph(&format!(
-            "{}: {}",
-            plot.title,
-            plot.description()
-        )));
+        return Ok(html! { p { (plot.title) ": " (plot.description()) } });
     }
     let height = plot.drawn().map(|panel| panel.height).sum::<u32>() + draw::FOOT;
     let svg = drawn(height, |area| draw::plot(plot, area))?;

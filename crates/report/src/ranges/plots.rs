@@ -3,7 +3,7 @@
 
 use super::{
     super::{
-        html::counted,
+        html::{Markup, counted, html},
         numbers::whole,
         plots::{Extent, Panel, Plot, Series, Style, figure, label, thinned},
     },
@@ -44,17 +44,13 @@ pub(crate) fn plotted(site: &SiteProducts) -> Vec<usize> {
 ///
 /// # Errors
 /// A plot that cannot be drawn.
-pub(super) fn figures(site: &SiteProducts) -> Result<String> {
+pub(super) fn figures(site: &SiteProducts) -> Result<Markup> {
     let plotted = plotted(site);
     let limit = (RESIDUAL_POINTS / plotted.len().max(1)).clamp(20, PROFILE_POINTS);
-    let mut html = String::new();
-    if many(site) {
-        html += &figure(&all_profiles(site))?;
-    }
-    for index in plotted {
-        html += &figure(&profile_plot(site, index, limit))?;
-    }
-    Ok(html)
+    Ok(html! {
+        @if many(site) { (figure(&all_profiles(site))?) }
+        @for index in plotted { (figure(&profile_plot(site, index, limit))?) }
+    })
 }
 
 /// Mean and spread of every profile.
