@@ -10,7 +10,7 @@ use super::{
     section::Section,
     source::traced,
 };
-use areograph_base::{error::Result, verdict::CheckKind};
+use areograph_base::{error::Result, terms::Terms, verdict::CheckKind};
 use areograph_geom::statistics::BAARDA_LIMIT;
 use areograph_products::{AdjustmentProducts, GeometricProducts, SiteProducts};
 use areograph_stages::adjust::{Adjusted, AdjustmentSummary, TypeSummary, WORSE_THAN_CONFIGURED};
@@ -53,7 +53,7 @@ fn write(
         (many::some_of_all(site))
         (residuals::images(site, adjusted))
         (folded("Observations by kind, and convergence", &html! {
-            (observations(summary))
+            (observations(summary, &site.config.terms()))
             div.plots { (figure(&convergence(adjusted))?) }
         }))
         (folded("Corrections to the orientation, ranges and biases", &corrections::tables(site, adjusted)))
@@ -145,7 +145,7 @@ fn convergence(adjusted: &Adjusted) -> Plot {
     }
 }
 
-fn observations(summary: &AdjustmentSummary) -> Markup {
+fn observations(summary: &AdjustmentSummary, terms: &Terms<'_>) -> Markup {
     let mut table = Table::new(
         "Observations by kind",
         &[
@@ -181,7 +181,7 @@ fn observations(summary: &AdjustmentSummary) -> Markup {
             &format!("adjustment.json#/adjustment/summary/types/{index}"),
             true,
             [
-                of.kind.words().into(),
+                terms.fill(of.kind.words()).into_owned().into(),
                 Cell::from(whole(of.observations)).traced("/observations"),
                 Cell::from(label(of.redundancy, 1)).traced("/redundancy"),
                 format!("{} %", label(each, 1)).into(),
@@ -200,15 +200,20 @@ fn observations(summary: &AdjustmentSummary) -> Markup {
         "Variance component: √(vᵀPv / redundancy), 1 where the a priori σ is right; by chance: its 99 % interval, lower for \
          heights with robust weights. Beyond {BAARDA_LIMIT}: failed Baarda's test, by chance 1 in 1000."
     );
-    html! { (table.finish()) p { (words) } (outside(summary)) }
+    html! { (table.finish()) p { (words) } (outside(summary, terms)) }
 }
 
 /// The components that are outside their own interval, and what follows.
-fn outside(summary: &AdjustmentSummary) -> Markup {
+fn outside(summary: &AdjustmentSummary, terms: &Terms<'_>) -> Markup {
     let listed = |is_outside: fn(&TypeSummary) -> bool| {
         let found = summary.types.iter().filter(|of| is_outside(of));
-        let found =
-            found.map(|of| format!("{} {}", of.kind.words(), label(of.variance_component, 3)));
+        let found = found.map(|of| {
+            format!(
+                "{} {}",
+                terms.fill(of.kind.words()),
+                label(of.variance_component, 3)
+            )
+        });
         found.collect::<Vec<String>>().join(", ")
     };
     let sentences = [

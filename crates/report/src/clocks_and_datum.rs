@@ -23,11 +23,15 @@ fn biases(site: &SiteProducts) -> Markup {
         TagSign::Late => "tags are late",
         TagSign::Early => "tags are early",
     };
+    let terms = site.config.terms();
+    let body = terms.body();
     let scope = match clock.scope {
-        BiasScope::SpkLookup => "the spacecraft's position in the range check",
-        BiasScope::Rotation => "the rotation of Mars into IAU 2000",
-        BiasScope::Both => "the spacecraft's position in the range check and the rotation of Mars",
-        BiasScope::None => "nothing (switched off)",
+        BiasScope::SpkLookup => "the spacecraft's position in the range check".to_owned(),
+        BiasScope::Rotation => format!("the rotation of {body} into {}", terms.frame()),
+        BiasScope::Both => {
+            format!("the spacecraft's position in the range check and the rotation of {body}")
+        }
+        BiasScope::None => "nothing (switched off)".to_owned(),
     };
     let mut table = Table::new(
         "Clock corrections",
@@ -49,7 +53,10 @@ fn biases(site: &SiteProducts) -> Markup {
             [
                 name.into(),
                 signed(of.bias.seconds(), 3).into(),
-                "the time at which attitude is read; position and Mars stay at the exposure".into(),
+                format!(
+                    "the time at which attitude is read; position and {body} stay at the exposure"
+                )
+                .into(),
                 of.source.into(),
             ],
         );

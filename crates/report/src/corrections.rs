@@ -56,7 +56,7 @@ fn positions(site: &SiteProducts, adjusted: &Adjusted) -> Markup {
             Column::Number("X"),
             Column::Number("Y"),
             Column::Number("Z"),
-            Column::Number("along track, Mars-fixed"),
+            Column::Number("along track, body-fixed"),
             Column::Number("cross track"),
             Column::Number("radial"),
         ],
@@ -83,7 +83,7 @@ fn positions(site: &SiteProducts, adjusted: &Adjusted) -> Markup {
         (line_times(adjusted))
         @if starts_at_pedr {
             p {
-                "Relative to the orbit of the kernels; with a simultaneous profile the expected orbit is from the PEDR \
+                "Relative to the orbit of the kernels; with a simultaneous profile the expected orbit is that of the shots \
                  (adjustment.orbit_of_pedr)."
             }
         }

@@ -21,7 +21,7 @@ use areograph_stages::{
 };
 
 pub(super) const SECTION: Section = Section {
-    title: "Accuracy, and agreement with MOLA",
+    title: "Accuracy, and agreement with {altimeter}",
     anchor: "accuracy",
     checks: &[
         CheckKind::HeightAfter,
@@ -41,16 +41,17 @@ pub(super) const SECTION: Section = Section {
 
 fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<Markup> {
     let adjustment = geometric.adjustment.as_ref();
+    let altimeter = site.config.terms().altimeter;
     Ok(html! {
         @if let Some(adjustment) = adjustment { (statements(site, geometric, adjustment)) }
         @if let Ok(surface) = &geometric.heights.surface {
-            h3 { "Heights against the MOLA surface" }
-            (compared(geometric))
+            h3 { "Heights against the " (altimeter) " surface" }
+            (compared(geometric, altimeter))
             (apart(geometric.heights))
             div.plots { (figure(&profile::plot(site, geometric))?) }
             (folded("The surface, and heights of footprints by images", &html! {
                 (surface_in_words(surface))
-                (footprints(geometric))
+                (footprints(geometric, altimeter))
             }))
         }
     })
@@ -75,6 +76,7 @@ fn statements(
             Column::Text("meaning"),
         ],
     );
+    let altimeter = site.config.terms().altimeter;
     let nothing = || "–".to_owned();
     let pairs = BeforeAfter::all(geometric);
     let worst = BeforeAfter::worst(&pairs);
@@ -98,10 +100,10 @@ fn statements(
             "agreement of the images along track; not a measure of height or position".to_owned(),
         ],
         [
-            "agreement with MOLA, height".to_owned(),
+            format!("agreement with {altimeter}, height"),
             agreement(geometric.heights),
             agreement(adjustment.heights),
-            agreement_says(adjustment).to_owned(),
+            agreement_says(adjustment, altimeter),
         ],
         [
             "absolute, height".to_owned(),
@@ -185,11 +187,11 @@ fn agreement(check: &HeightCheck) -> String {
     }
 }
 
-const fn agreement_says(adjustment: &AdjustmentProducts) -> &'static str {
+fn agreement_says(adjustment: &AdjustmentProducts, altimeter: &str) -> String {
     if adjustment.adjusted.heights.is_some() {
-        "before: an independent test; after: fit of the adjustment to its control"
+        "before: an independent test; after: fit of the adjustment to its control".to_owned()
     } else {
-        "a test of heights: the MOLA surface did not control them"
+        format!("a test of heights: the {altimeter} surface did not control them")
     }
 }
 
@@ -287,9 +289,9 @@ fn surface_in_words(surface: &SurfaceFigures) -> Markup {
     }
 }
 
-fn compared(geometric: &GeometricProducts) -> Markup {
+fn compared(geometric: &GeometricProducts, altimeter: &str) -> Markup {
     let mut table = Table::new(
-        "Heights of tie points above the MOLA surface, metres",
+        &format!("Heights of tie points above the {altimeter} surface, metres"),
         &[
             Column::Text("adjustment"),
             Column::Number("tie points"),
@@ -332,9 +334,9 @@ fn compared(geometric: &GeometricProducts) -> Markup {
 }
 
 /// Heights of footprints that both images of a pair show.
-fn footprints(geometric: &GeometricProducts) -> Markup {
+fn footprints(geometric: &GeometricProducts, altimeter: &str) -> Markup {
     let mut table = Table::new(
-        "Heights of footprints by the images that show them, above MOLA, metres",
+        &format!("Heights of footprints by the images that show them, above {altimeter}, metres"),
         &[
             Column::Text("adjustment"),
             Column::Text("pair"),

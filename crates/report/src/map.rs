@@ -131,11 +131,15 @@ struct Sheet {
     ellipses: Ellipses,
     /// Lowest and highest shot, including those not drawn.
     heights_m: (f64, f64),
+    /// Surface that heights refer to.
+    areoid: &'static str,
+    /// Frame and kind of latitudes.
+    frame: String,
 }
 
 impl Sheet {
     fn of(site: &SiteProducts, shown: Shown) -> Self {
-        let footprints = site.footprints;
+        let (footprints, terms) = (site.footprints, site.config.terms());
         let place_rad = |row: usize| (footprints.longitude_rad[row], footprints.latitude_rad[row]);
         let height_m = |row: usize| footprints.row(row).topography_m();
         let shots: Vec<Shot> = thinned(&shown.rows, MAP_SHOTS)
@@ -181,6 +185,8 @@ impl Sheet {
             shown,
             shots,
             heights_m,
+            areoid: terms.areoid(),
+            frame: format!("{}, {}", terms.frame(), terms.latitude()),
         }
     }
 
@@ -249,6 +255,7 @@ impl Sheet {
             top: self.height(),
             view: &self.view,
             heights_m: has_shots.then_some(self.heights_m),
+            areoid: self.areoid,
             centre_rad: (self.map.longitude_rad(), self.map.latitude_rad()),
         };
         legend.draw(area)

@@ -115,7 +115,7 @@ fn rejected(geometric: &GeometricProducts) -> Markup {
             RejectionReason::Undetermined => "not determined",
             RejectionReason::Blunder { .. } => "blunder: its standardised residual is too large",
             RejectionReason::Height { .. } => {
-                "blunder: no ground explains its height above the MOLA surface"
+                "blunder: no ground explains its height above the laser surface"
             }
         };
         *reasons.entry(("adjustment", reason)).or_insert(0) += 1;
@@ -241,7 +241,7 @@ fn footprints(pairs: &[BeforeAfter]) -> Markup {
             Column::Number("after"),
             Column::Number("σ, m, before"),
             Column::Number("after"),
-            Column::Number("MOLA spacings, before"),
+            Column::Number("shot spacings, before"),
             Column::Number("after"),
             Column::Number("samples, before"),
             Column::Number("after"),
@@ -267,7 +267,7 @@ fn footprints(pairs: &[BeforeAfter]) -> Markup {
             table.row(true, cells);
         }
         let spacing = pair.before.mola_spacing_m;
-        let spacing = spacing.map(|metres| format!(" One MOLA spacing: {} m.", label(metres, 1)));
+        let spacing = spacing.map(|metres| format!(" One shot spacing: {} m.", label(metres, 1)));
         notes.push(format!(
             "{}: by a polynomial of order {} through {} tie points ({} rejected), σ {} lines and {} samples. {}{}",
             pair.name(),

@@ -69,7 +69,7 @@ fn write(site: &SiteProducts) -> Markup {
             true,
             [
                 (&file.name).into(),
-                "PEDR".into(),
+                site.config.terms().shot_source().into(),
                 "–".into(),
                 hash(&file.blake3),
             ],

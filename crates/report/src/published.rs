@@ -32,7 +32,7 @@ fn departure(summary: &AdjustmentSummary) -> &'static str {
              are the skew of the flight in the measured line and vanish here; its σ0 of 1.01 to 1.06 is not comparable."
         }
         AdjustmentModel::MolaSurface => {
-            "In this model image coordinates of MOLA are not observations; their rows are empty. The published model \
+            "In this model image coordinates of footprints are not observations; their rows are empty. The published model \
              (adjustment.model) fills them."
         }
     }
@@ -65,7 +65,7 @@ fn moments(of: &Summary, place: &str) -> [Cell; 2] {
 /// Footprints and tie points, each with its place below the summary.
 const fn kinds(summary: &AdjustmentSummary) -> [(&'static str, &'static str, &GroundSummary); 2] {
     [
-        ("MOLA", "shots", &summary.shots),
+        ("footprints", "shots", &summary.shots),
         ("tie points", "ties", &summary.ties),
     ]
 }
@@ -94,14 +94,14 @@ fn ground_corrections(summary: &AdjustmentSummary) -> Markup {
     html! {
         (table.finish())
         p {
-            "Adjusted minus initial, Mars-fixed axes. The paper's RMS is the standard deviation about the mean."
+            "Adjusted minus initial, body-fixed axes. The paper's RMS is the standard deviation about the mean."
         }
     }
 }
 
 fn image_coordinates(site: &SiteProducts, summary: &AdjustmentSummary) -> Markup {
     let mut table = Table::new(
-        "Image coordinates (Table 3 of Yoon & Shan 2004): corrections of MOLA, residuals of tie points",
+        "Image coordinates (Table 3 of Yoon & Shan 2004): corrections of footprints, residuals of tie points",
         &[
             Column::Text("image"),
             Column::Text("points"),
@@ -118,7 +118,7 @@ fn image_coordinates(site: &SiteProducts, summary: &AdjustmentSummary) -> Markup
         };
         let [shots, ties] = ["mola_corrections", "tie_residuals_px"];
         for (name, place, of) in [
-            ("MOLA, lines and px", shots, &image.mola_corrections),
+            ("footprints, lines and px", shots, &image.mola_corrections),
             ("tie points, focal-plane px", ties, &image.tie_residuals_px),
         ] {
             let count = Cell::from(whole(of[0].n)).traced("/0/n");

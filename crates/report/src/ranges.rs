@@ -277,9 +277,9 @@ fn three_ways(site: &SiteProducts) -> Markup {
             Column::Number("range − distance, kernels"),
             Column::Number("without outliers"),
             Column::Number("with crossover radius"),
-            Column::Number("range − distance, PEDR's own orbit"),
+            Column::Number("range − distance, orbit of the shots"),
             Column::Number("without outliers"),
-            Column::Number("PEDR − kernels, radial"),
+            Column::Number("shots − kernels, radial"),
             Column::Number("along-track"),
             Column::Number("cross-track"),
         ],
@@ -332,12 +332,12 @@ fn three_ways(site: &SiteProducts) -> Markup {
                 li { "Crossover radius: the MOLA team's adjustment, which moves footprints, not ranges." }
             }
             li {
-                "PEDR's own orbit: without kernels; a mean beyond ±"
+                "Orbit of the shots: the orbit in the " (site.config.terms().shot_source()) ", without kernels; a mean beyond ±"
                 (traced(&limits.decoding_max_m.to_string(), "ranges.json#/limits/decoding_max_m"))
                 " m indicates a reading error."
             }
             li {
-                "PEDR − kernels: spacecraft positions, inertial axes; beyond "
+                "Shots − kernels: spacecraft positions, inertial axes; beyond "
                 (traced(&limits.orbit_max_m.to_string(), "ranges.json#/limits/orbit_max_m"))
                 " m orbit, clock or datum differ."
                 // A table's own spacecraft and the spacecraft of support data are not tabulated.

@@ -49,9 +49,10 @@ pub(super) fn absolute(
         let place = format!("adjustment.json#/adjustment/summary/ties/corrections_m/{axis}/mean");
         traced(&label(ties.corrections_m[axis].mean, 1), &place)
     };
+    let altimeter = site.config.terms().altimeter;
     let determined = match &adjustment.adjusted.heights {
         Some(_) if site.accuracy_withheld().is_some() => html! {
-            "heights follow MOLA; absolute accuracies are withheld: " (WITHHELD_BECAUSE)
+            "heights follow " (altimeter) "; absolute accuracies are withheld: " (WITHHELD_BECAUSE)
         },
         Some(heights) => {
             let sigma = |axis: usize, decimals: usize| {
@@ -59,7 +60,7 @@ pub(super) fn absolute(
                 traced(&label(heights.mean_sigma_m[axis], decimals), &place)
             };
             html! {
-                "heights follow MOLA to " (sigma(2, 1)) " m on average; position is known to " (sigma(0, 0))
+                "heights follow " (altimeter) " to " (sigma(2, 1)) " m on average; position is known to " (sigma(0, 0))
                 " m east and " (sigma(1, 0)) " m north, by " (place_by(geometric, adjustment))
             }
         }
@@ -111,19 +112,19 @@ impl Controlled {
                 views(PointKind::Tie, across),
             ),
             (
-                "MOLA image point along the track",
+                "footprint in the image, along the track",
                 "px",
                 options.footprint_sigma_px[0],
                 views(PointKind::Shot, along),
             ),
             (
-                "MOLA image point across the track",
+                "footprint in the image, across the track",
                 "px",
                 options.footprint_sigma_px[1],
                 views(PointKind::Shot, across),
             ),
             (
-                "MOLA range",
+                "laser range",
                 "m",
                 options.range_sigma_m,
                 ranges.map(|range| range.residual_m.redundancy).collect(),

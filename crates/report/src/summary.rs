@@ -1,5 +1,7 @@
 //! The first screen of a site's page: verdict, key numbers, every check, the map.
 
+use std::borrow::Cow;
+
 use super::{
     checks,
     heights::{WITHHELD_BECAUSE, is_open, place_by},
@@ -87,7 +89,7 @@ fn about(site: &SiteProducts) -> Markup {
 
 /// A key number: its name, its value, and a note.
 struct KeyNumber {
-    what: &'static str,
+    what: Cow<'static, str>,
     value: Markup,
     note: Markup,
 }
@@ -96,7 +98,7 @@ struct KeyNumber {
 /// the ranges.
 fn numbers(site: &SiteProducts) -> Markup {
     let numbers: Vec<KeyNumber> = [
-        by_mola(site),
+        by_altimeter(site),
         between_images(site),
         in_place(site),
         by_ranges(site),
@@ -126,7 +128,7 @@ fn checked<'a>(site: &SiteProducts<'a>, kind: CheckKind) -> Option<(&'a Check, f
     ))
 }
 
-fn by_mola(site: &SiteProducts) -> Option<KeyNumber> {
+fn by_altimeter(site: &SiteProducts) -> Option<KeyNumber> {
     let (_, after_m, after_place) = checked(site, CheckKind::HeightAfter)?;
     let (_, before_m, before_place) = checked(site, CheckKind::HeightBefore)?;
     let (geometric, adjustment) = site.adjustment()?;
@@ -135,13 +137,14 @@ fn by_mola(site: &SiteProducts) -> Option<KeyNumber> {
     let ties = traced(&ties, &of("after"));
     let all = traced(&whole(geometric.heights.above_m.n), &of("before"));
     let before_m = traced(&signed(before_m, 1), &before_place);
+    let altimeter = site.config.terms().altimeter;
     Some(KeyNumber {
-        what: "Heights against MOLA",
+        what: format!("Heights against {altimeter}").into(),
         value: traced(&format!("{} m", signed(after_m, 1)), &after_place),
         // Data that control a result cannot test it: then only the number before does.
         note: match site.config.adjustment.model {
             AdjustmentModel::MolaSurface => html! {
-                "median of " (ties) ", controlled by MOLA; " (before_m) " m of " (all) " before, independent of it"
+                "median of " (ties) ", controlled by " (altimeter) "; " (before_m) " m of " (all) " before, independent of it"
             },
             AdjustmentModel::Published => html! {
                 "median of " (ties) "; " (before_m) " m of " (all) " before the adjustment"
@@ -158,7 +161,7 @@ fn between_images(site: &SiteProducts) -> Option<KeyNumber> {
     let before_m = pair.before.along_track_parallax_m.abs();
     let before_place = format!("|{}/along_track_parallax_m", pair.place("before"));
     Some(KeyNumber {
-        what: "Between images, along track",
+        what: "Between images, along track".into(),
         value: traced(
             &format!(
                 "{} m",
@@ -201,7 +204,7 @@ fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
     let heights = adjustment.adjusted.heights.as_ref()?;
     if site.accuracy_withheld().is_some() {
         return Some(KeyNumber {
-            what: "Absolute accuracy, 1 σ",
+            what: "Absolute accuracy, 1 σ".into(),
             value: html! { "withheld" },
             note: html! { (WITHHELD_BECAUSE) "; see the remarks" },
         });
@@ -209,7 +212,7 @@ fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
     let [east_m, north_m, up_m] = heights.mean_sigma_m;
     let by = place_by(&geometric, &adjustment);
     Some(KeyNumber {
-        what: "Absolute accuracy, 1 σ",
+        what: "Absolute accuracy, 1 σ".into(),
         value: traced(
             &format!(
                 "±{} m east, ±{} m north, ±{} m height",
@@ -223,7 +226,7 @@ fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
             @if is_open(&geometric, &adjustment) {
                 "by " (by) "; see accuracy for open points"
             } @else {
-                "position by " (by) ", height by MOLA"
+                "position by " (by) ", height by " (site.config.terms().altimeter)
             }
             (untested_attitude(site))
         },
@@ -245,7 +248,7 @@ fn by_ranges(site: &SiteProducts) -> Option<KeyNumber> {
     let (check, mean_m, place) = checked(site, CheckKind::RangeMean)?;
     let profile = &check.subject;
     Some(KeyNumber {
-        what: "Range − distance",
+        what: "Range − distance".into(),
         value: traced(&format!("{} m", signed(mean_m, 2)), &place),
         note: match site.profiles.len() {
             1 => html! { "mean of profile " (profile) },

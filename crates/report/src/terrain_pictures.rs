@@ -13,7 +13,7 @@ use super::{
     },
     plots::{Canvas, Drawn, INK, WIDTH, drawn, figure_html, label, thinned},
 };
-use areograph_base::{body::Body, error::Result, units::RADIANS_PER_DEGREE};
+use areograph_base::{error::Result, terms::Terms, units::RADIANS_PER_DEGREE};
 use areograph_products::error::ProductError;
 use areograph_stages::map_surface::{ShotOnSurface, SurfaceAccount, SurfaceLook};
 
@@ -52,7 +52,8 @@ struct Bar {
 ///
 /// # Errors
 /// A picture that the library rejects, which is a bug in areograph.
-pub fn terrain_pictures(account: &SurfaceAccount, body: Body) -> Result<Markup> {
+pub fn terrain_pictures(account: &SurfaceAccount, terms: &Terms<'_>) -> Result<Markup> {
+    let body = terms.body;
     let frame = Frame::of(&account.look);
     let exaggeration = frame.exaggeration();
     let heights = &account.look.heights.heights_m;
@@ -104,11 +105,11 @@ pub fn terrain_pictures(account: &SurfaceAccount, body: Body) -> Result<Markup> 
     let most_m = low.abs().max(high.abs());
     let bar = Bar {
         ends: [-most_m, most_m],
-        words: "MOLA minus the model, m",
+        words: "shots minus the model, m",
         colour: difference,
     };
     let compared = frame.figure(
-        "MOLA minus the terrain model",
+        &format!("{} minus the terrain model", terms.altimeter),
         &format!(
             "{} footprints on the model. Median {} m, robust spread {} m.",
             account.shots.above_m.n,

@@ -42,14 +42,14 @@ fn write(site: &SiteProducts, account: &SurfaceAccount) -> Result<Markup> {
         let words = "Too few cells matched to be significant; no model was produced.";
         return Ok(html! { p { (words) } (table) });
     }
-    let pictures = terrain_pictures(account, site.config.body)?;
+    let pictures = terrain_pictures(account, &site.config.terms())?;
     Ok(html! {
         p {
             "Heights above the sphere of the body's maps: " (link("../surface.tif", "surface.tif"))
             "; their standard deviations: " (link("../surface_sigma.tif", "surface_sigma.tif")) "."
         }
         (table)
-        (compared(account))
+        (compared(account, site.config.terms().altimeter))
         div.plots { (pictures) }
     })
 }
@@ -114,7 +114,7 @@ fn made(site: &SiteProducts, account: &SurfaceAccount) -> Markup {
 }
 
 /// Shots against the model.
-fn compared(account: &SurfaceAccount) -> Markup {
+fn compared(account: &SurfaceAccount, altimeter: &str) -> Markup {
     let ShotComparison {
         above_m,
         attitude_sigma_m,
@@ -124,11 +124,13 @@ fn compared(account: &SurfaceAccount) -> Markup {
         ..
     } = &account.shots;
     if profiles.is_empty() {
-        return paragraph(
-            "No footprint of MOLA lies on the model, so that its heights have no independent test.",
-        );
+        return paragraph(&format!(
+            "No footprint of {altimeter} lies on the model, so that its heights have no independent test."
+        ));
     }
-    let mut single = shots_table("MOLA minus the terrain model by profile, metres");
+    let mut single = shots_table(&format!(
+        "{altimeter} minus the terrain model by profile, metres"
+    ));
     for (index, profile) in profiles.iter().enumerate() {
         let id = &profile.profile;
         let name = if profile.attitude_sigma_m > 0.0 {
@@ -147,7 +149,7 @@ fn compared(account: &SurfaceAccount) -> Markup {
         "Single profiles",
         &single.finish(),
     );
-    let mut all = shots_table("MOLA minus the terrain model, metres");
+    let mut all = shots_table(&format!("{altimeter} minus the terrain model, metres"));
     let name = if *attitude_sigma_m > 0.0 {
         "all profiles"
     } else {
@@ -159,10 +161,12 @@ fn compared(account: &SurfaceAccount) -> Markup {
         summary_row(name, above_m),
     );
     let words = if account.shots_take_part {
-        "MOLA controlled heights of the adjustment: the mean shows how well that control was met; the scatter about it is \
-         an independent test."
+        format!(
+            "{altimeter} controlled heights of the adjustment: the mean shows how well that control was met; the scatter \
+             about it is an independent test."
+        )
     } else {
-        "MOLA did not control the heights: an independent test."
+        format!("{altimeter} did not control the heights: an independent test.")
     };
     let spread = format!(
         "Expected about the median: {} m (σ of height, shot, profile, and of their places on its slopes); found: {} of it.",

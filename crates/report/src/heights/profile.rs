@@ -24,6 +24,7 @@ pub(super) fn plot(site: &SiteProducts, geometric: &GeometricProducts) -> Plot {
     } else {
         POINTS_SHOWN
     };
+    let altimeter = site.config.terms().altimeter;
     let after = geometric.adjustment.map(|adjustment| adjustment.heights);
     // The surface is drawn below the points that it controls.
     let latest = after.unwrap_or(geometric.heights);
@@ -47,7 +48,7 @@ pub(super) fn plot(site: &SiteProducts, geometric: &GeometricProducts) -> Plot {
     };
     let bars = |ends: [fn(&TieHeight) -> f64; 2]| Series {
         style: Style::Bars,
-        ..Series::line("MOLA surface ± 1 σ", SURFACE, {
+        ..Series::line(format!("{altimeter} surface ± 1 σ"), SURFACE, {
             let [low, high] = ends.map(|value| points(latest, value));
             low.into_iter().zip(high).flat_map(<[_; 2]>::from).collect()
         })
@@ -67,13 +68,13 @@ pub(super) fn plot(site: &SiteProducts, geometric: &GeometricProducts) -> Plot {
         Panel {
             height: 300,
             y: without_extremes(&differences),
-            ..Panel::of("above MOLA, m", differences)
+            ..Panel::of("above the surface, m", differences)
         },
     ];
-    let title = "Heights of tie points and of the MOLA surface".to_owned();
+    let title = format!("Heights of tie points and of the {altimeter} surface");
     Plot::of(
         title,
-        words(geometric, points_shown),
+        words(geometric, altimeter, points_shown),
         "north of the middle, km",
         panels,
     )
@@ -90,7 +91,7 @@ fn without_extremes(series: &[Series]) -> Extent {
     Extent::of(values[outermost..values.len() - outermost].iter().copied())
 }
 
-fn words(geometric: &GeometricProducts, points_shown: usize) -> String {
+fn words(geometric: &GeometricProducts, altimeter: &str, points_shown: usize) -> String {
     let after = geometric.adjustment.map(|adjustment| adjustment.heights);
     let median = |check: &HeightCheck| label(check.above_m.median, 1);
     let sigmas: Vec<f64> = geometric
@@ -116,7 +117,7 @@ fn words(geometric: &GeometricProducts, points_shown: usize) -> String {
         String::new()
     };
     format!(
-        "Tie points above the ellipsoid, south to north; below, above the MOLA surface: {medians}. Grey: surface ± 1 σ \
+        "Tie points above the ellipsoid, south to north; below, above the {altimeter} surface: {medians}. Grey: surface ± 1 σ \
          (median {} m).{thinned}",
         label(Summary::of(&sigmas).median, 1)
     )

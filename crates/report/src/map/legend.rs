@@ -27,6 +27,8 @@ pub(super) struct Legend<'a> {
     pub(super) view: &'a View,
     /// Heights of the first and last colour, metres; `None` without shots.
     pub(super) heights_m: Option<(f64, f64)>,
+    /// Surface that they refer to.
+    pub(super) areoid: &'static str,
     /// East longitude and areocentric latitude of the map's centre, radians.
     pub(super) centre_rad: (f64, f64),
 }
@@ -51,7 +53,7 @@ impl Legend<'_> {
         let bar = ColourBar {
             ends: BAR,
             top: self.top + 62,
-            words: "height above the areoid, m",
+            words: &format!("height above the {}, m", self.areoid),
             numbers: [low, high],
             colour: relief::colour,
         };

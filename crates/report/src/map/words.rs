@@ -34,10 +34,11 @@ impl Sheet {
         }
         if !self.shown.rows.is_empty() {
             words += &format!(
-                "{} (dots, profiles named by orbit), {} to {} m above the areoid. ",
+                "{} (dots, profiles named by orbit), {} to {} m above the {}. ",
                 counted(self.shown.rows.len(), "footprint"),
                 label(self.heights_m.0, 0),
-                label(self.heights_m.1, 0)
+                label(self.heights_m.1, 0),
+                self.areoid
             );
             if self.shots.len() < self.shown.rows.len() {
                 words += &format!(
@@ -61,7 +62,8 @@ impl Sheet {
         let south = self.map.latitude_rad() < 0.0;
         words
             + &format!(
-                "IAU 2000, areocentric; equal-area projection about {:.2}° E {:.2}° {}.",
+                "{}; equal-area projection about {:.2}° E {:.2}° {}.",
+                self.frame,
                 self.map.longitude_rad() / RADIANS_PER_DEGREE,
                 self.map.latitude_rad().abs() / RADIANS_PER_DEGREE,
                 if south { "S" } else { "N" }

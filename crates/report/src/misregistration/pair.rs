@@ -188,7 +188,7 @@ impl Apart {
             || metres.clone(),
             |spacings| {
                 let decimals = if spacings < 0.1 { 3 } else { 2 };
-                format!("{} MOLA spacings ({metres})", label(spacings, decimals))
+                format!("{} shot spacings ({metres})", label(spacings, decimals))
             },
         )
     }
