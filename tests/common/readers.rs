@@ -51,6 +51,22 @@ pub(crate) fn python(script: &str, test: &str) -> Option<Command> {
     Some(command)
 }
 
+/// A Python script of this folder for Debian's Python, if that has the module.
+pub(crate) fn system_python(script: &str, module: &str, test: &str) -> Option<Command> {
+    let python = "/usr/bin/python3";
+    let import = format!("import {module}");
+    let found = Command::new(python).args(["-c", &import]).output();
+    if !found.is_ok_and(|found| found.status.success()) {
+        outside::skipped(test, &format!("no {module} (run scripts/readers)"));
+        return None;
+    }
+    outside::found(test);
+    let mut command = Command::new(python);
+    let path = format!("{}/tests/exchange/{script}", env!("CARGO_MANIFEST_DIR"));
+    command.arg("-B").arg(path);
+    Some(command)
+}
+
 /// What the program prints; it must succeed.
 pub(crate) fn output(command: &mut Command) -> String {
     let output = command.output().unwrap();

@@ -12,6 +12,7 @@ mod generated;
 mod methods;
 mod orthoimages;
 mod products_site;
+mod qgis;
 mod registered_footprints;
 mod report_geometric;
 mod report_many;
