@@ -213,10 +213,12 @@ fn labels(column: &str) -> Markup {
     html! {
         labeling type="simple" {
             settings calloutType="simple" {
-                text-style fieldName=(column) isExpression="0" fontSize="9" fontSizeUnit="Point" textColor="227,26,28,255" {
-                    text-buffer bufferDraw="1" bufferSize="0.8" bufferSizeUnits="MM" bufferColor="255,255,255,255" {}
+                text-style fieldName=(column) isExpression="0" fontSize="9" fontSizeUnit="Point" textColor="227,26,28,255"
+                    textOpacity="1" {
+                    text-buffer bufferDraw="1" bufferSize="0.8" bufferSizeUnits="MM" bufferColor="255,255,255,255" bufferOpacity="1" {}
                 }
-                placement placement="1" layerType="PolygonGeometry" {}
+                placement placement="1" quadOffset="4" priority="5" polygonPlacementFlags="2" layerType="PolygonGeometry" {}
+                rendering drawLabels="1" obstacle="1" fontMaxPixelSize="10000" maxNumLabels="2000" {}
             }
         }
     }
