@@ -21,7 +21,7 @@ use crate::{
 /// Products go to `<out>/<calibration>`, with calibrated support data (ISD) of every line. Angles that ties cannot determine
 /// are detected and reported.
 ///
-/// Example: `areograph scene hrsc --calibration --images && areograph calibrate hrsc/calibration.toml --out products`
+/// Example: `areograph scene calibration hrsc --images && areograph calibrate hrsc/calibration.toml --out products`
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {

@@ -17,7 +17,7 @@ use crate::{
 ///
 /// Products go to `<out>/<net>`. Blunders and gross errors of controls are detected and reported.
 ///
-/// Example: `areograph scene net --plane && areograph triangulate net/net.toml --out products`
+/// Example: `areograph scene net net && areograph triangulate net/net.toml --out products`
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {

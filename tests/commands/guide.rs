@@ -31,7 +31,7 @@ const ELSEWHERE: [(&str, &str); 15] = [
     ("scripts/", "continuous integration"),
     ("cargo run", "compiled as an example with the tests"),
     (
-        "areograph scene mission ",
+        "areograph scene mission mission ",
         "every test that uses the mission",
     ),
     ("areograph serve --init service-demo ", "tests/service"),
@@ -40,12 +40,18 @@ const ELSEWHERE: [(&str, &str); 15] = [
         "tests/service",
     ),
     ("areograph pedr sql", "tests/sql, with its feature"),
-    ("areograph scene pixels", "tests/stages/calibration_loop.rs"),
+    (
+        "areograph scene calibration pixels",
+        "tests/stages/calibration_loop.rs",
+    ),
     (
         "areograph calibrate pixels",
         "tests/stages/calibration_loop.rs",
     ),
-    ("areograph scene mission-images", "crates/scene: matching"),
+    (
+        "areograph scene mission mission-images",
+        "crates/scene: matching",
+    ),
     ("areograph image", "tests/commands/image_commands.rs"),
     (
         "areograph init gale --place",

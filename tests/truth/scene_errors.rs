@@ -534,7 +534,7 @@ fn options_without_realistic_or_out_of_range_are_refused() {
     let refused = |arguments: &[&str], code: i32, words: &str| {
         let target = folder.path().join("mission");
         let output = areograph()
-            .arg("scene")
+            .args(["scene", "mission"])
             .arg(&target)
             .args(arguments)
             .output()

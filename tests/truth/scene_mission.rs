@@ -525,7 +525,7 @@ fn a_flight_along_real_kernels_gives_shots_that_fit_them() {
         &mission,
         &metakernel,
         &[data.join("m0402852_isis.lbl")],
-        &SHORT,
+        SHORT.seed,
     )
     .unwrap();
     println!("{summary}");

@@ -99,7 +99,7 @@ const HEIGHTS_M: [[f64; 2]; 3] = [[477.180, 66.032], [471.415, 80.013], [682.407
 /// What the text takes for a pixel, metres.
 const TEXT_PIXEL_M: f64 = 30.0;
 
-/// The synthetic lines of `areograph scene --calibration`, and what `areograph calibrate` makes of them.
+/// The synthetic lines of `areograph scene calibration`, and what `areograph calibrate` makes of them.
 static SCENE: LazyLock<(CalibrationConfig, Calibration)> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
     let lines = folder.path().join("lines");
@@ -442,7 +442,7 @@ static ROWS: [Row; 25] = [
         place: "section 3.3",
         what: "tie points and laser control points",
         account: Account::Input {
-            from: "`areograph scene --calibration`",
+            from: "`areograph scene calibration`",
             ours: points,
             test: "tests/stages/calibrate.rs::every_step_has_the_size_of_the_paper",
         },
