@@ -14,7 +14,7 @@ use std::{
     process::Command,
 };
 
-use areograph::config;
+use areograph::config::{Document as _, SiteConfig};
 use areograph_testing::checkout;
 
 use crate::common::mission::{areograph, mission};
@@ -236,7 +236,7 @@ fn site_files_of_the_front_pages_are_valid() {
             format!("{whole}\n{SECOND_IMAGE}\n{block}")
         };
         // The files that an example names do not exist.
-        let failure = config::parse(&site, &checkout().join("sites/site.toml")).unwrap_err();
+        let failure = SiteConfig::parse(&site, &checkout().join("sites/site.toml")).unwrap_err();
         let failure = failure.to_string();
         let of_files = |line: &&str| {
             let file = [

@@ -3,7 +3,7 @@
 use std::sync::{LazyLock, atomic::AtomicBool};
 
 use areograph::{
-    config::{CalibrationConfig, all_instruments, load_calibration},
+    config::{CalibrationConfig, Document as _, all_instruments},
     scene::write_calibration_scene,
     stage::Stage as _,
     stages::calibrate::{
@@ -104,9 +104,9 @@ static SCENE: LazyLock<(CalibrationConfig, Calibration)> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
     let lines = folder.path().join("lines");
     write_calibration_scene(&lines, 1).unwrap();
-    let config = load_calibration(&lines.join("calibration.toml"))
+    let config = CalibrationConfig::load(&lines.join("calibration.toml"))
         .unwrap()
-        .calibration;
+        .config;
     let stage = Calibrate {
         calibration: CalibrationKeys(&config),
         files: CalibrationFiles(&[]),

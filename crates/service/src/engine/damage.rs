@@ -205,7 +205,7 @@ mod tests {
         Database,
         runs::{RunRow, due_run, put_removed, put_run},
     };
-    use areograph_config::parse_service;
+    use areograph_config::Document as _;
 
     fn run(id: &str) -> RunRow {
         RunRow {
@@ -234,7 +234,9 @@ mod tests {
     fn a_run_that_was_removed_during_its_check_is_not_damaged() {
         let folder = tempfile::tempdir().unwrap();
         let text = "[inputs]\nsites = [\".\"]\nkernels = [\"kernels\"]\ndata = [\"data\"]\n";
-        let config = parse_service(text, &folder.path().join("areograph.toml")).unwrap();
+        let config = ServiceConfig::parse(text, &folder.path().join("areograph.toml"))
+            .unwrap()
+            .config;
         let database = Database::open(folder.path()).unwrap();
         let check = |id: &'static str, removed: bool| {
             database.write(|transaction| {
@@ -248,7 +250,7 @@ mod tests {
                     products: 2,
                     what: "`footprints.csv` cannot be read",
                 };
-                let existed = note_check(transaction, &config.service, 2, &damage)?;
+                let existed = note_check(transaction, &config, 2, &damage)?;
                 Ok((existed, damaged_products(transaction, id)?))
             })
         };
