@@ -276,7 +276,10 @@ mod tests {
     #[test]
     fn usage_names_every_scene() {
         let mut command = Arguments::augment_args(clap::Command::new("scene"));
-        let names: Vec<&str> = command.get_subcommands().map(|of| of.get_name()).collect();
+        let names: Vec<&str> = command
+            .get_subcommands()
+            .map(clap::Command::get_name)
+            .collect();
         let names = format!("<{}>", names.join("|"));
         let usage = command.render_usage().to_string();
         assert!(usage.ends_with(&names), "{usage}");
