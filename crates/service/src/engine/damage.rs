@@ -198,35 +198,23 @@ fn published_manifest(folder: &Path, blake3: &str) -> Option<Manifest> {
 
 #[cfg(test)]
 mod tests {
-    use serde_json::json;
 
     use super::*;
     use crate::database::{
         Database,
-        runs::{RunRow, due_run, put_removed, put_run},
+        runs::{Run, due_run, put_removed, put_run},
     };
     use areograph_config::Document as _;
 
-    fn run(id: &str) -> RunRow {
-        RunRow {
+    fn run(id: &str) -> Run {
+        Run {
             id: id.to_owned(),
             site: "eos".to_owned(),
             job: 1,
             attempt: 1,
-            version: String::new(),
-            manifest_blake3: String::new(),
             valid: true,
             verdict: "valid".to_owned(),
-            reasons: json!([]),
-            because: json!([]),
-            stages: json!([]),
-            counts: json!({}),
-            figures: json!({}),
-            kernels: json!([]),
-            predecessor: None,
-            published_ms: 0,
-            pinned: false,
-            removed_ms: None,
+            ..Run::default()
         }
     }
 
