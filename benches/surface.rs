@@ -15,7 +15,7 @@ use std::{fs, path::Path, sync::atomic::AtomicBool, time::Instant};
 use areograph::{
     altimetry::{GroundRadius, ShotFilter},
     body::Body,
-    config::load_calibration,
+    config::{CalibrationConfig, Document as _},
     flow::{PUBLISH, RunOptions, Task, run_task},
     pds::pixel_file::{PixelFile, Pyramid},
     scene::{write_calibration_loop_scene, write_terrain_model_scene},
@@ -50,7 +50,9 @@ fn timed<T>(run: impl Fn() -> T) -> (f64, T) {
 fn terrain_models(folder: &Path) {
     let scene = folder.join("lines");
     write_calibration_loop_scene(&scene, 1).unwrap();
-    let config = load_calibration(&scene.join("calibration.toml")).unwrap();
+    let config = CalibrationConfig::load(&scene.join("calibration.toml"))
+        .unwrap()
+        .config;
     let out = folder.join("calibrated");
     let options = RunOptions {
         out: out.clone(),
@@ -61,7 +63,7 @@ fn terrain_models(folder: &Path) {
         roots: &[],
         observer: &(),
     };
-    let run = run_task(Task::Calibration(&config.calibration), &options).unwrap();
+    let run = run_task(Task::Calibration(&config), &options).unwrap();
     let cameras = LINES.map(|line| {
         let isd = run.folder.join(format!("cameras/{line}/isd.json"));
         LineCamera::read(&isd, line, Body::Mars).unwrap()

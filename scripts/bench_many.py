@@ -93,7 +93,7 @@ def main():
     wish = arguments.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         mission, out = pathlib.Path(folder) / "mission", f"{folder}/out"
-        subprocess.run([wish.program, "--quiet", "scene", mission], check=True, stdout=subprocess.DEVNULL)
+        subprocess.run([wish.program, "--quiet", "scene", "mission", mission], check=True, stdout=subprocess.DEVNULL)
         for count in wish.images:
             measure(wish.program, many_images(mission, count), out)
         for count in wish.ties:

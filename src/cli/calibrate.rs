@@ -5,13 +5,10 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::Args;
 
 use super::{
-    report,
+    load, report,
     single::{self, RunArguments},
 };
-use crate::{
-    config::{LoadedCalibration, load_calibration},
-    flow::Task,
-};
+use crate::{config::CalibrationConfig, flow::Task};
 
 /// Calibrates the lines of a camera in orbit: ties between them, then laser points, part of which are withheld for validation.
 ///
@@ -21,7 +18,7 @@ use crate::{
 /// Products go to `<out>/<calibration>`, with calibrated support data (ISD) of every line. Angles that ties cannot determine
 /// are detected and reported.
 ///
-/// Example: `areograph scene hrsc --calibration --images && areograph calibrate hrsc/calibration.toml --out products`
+/// Example: `areograph scene calibration hrsc --images && areograph calibrate hrsc/calibration.toml --out products`
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
@@ -37,17 +34,10 @@ pub(super) struct Arguments {
 
 /// Runs the calibration and reports the outcome.
 pub(super) fn run(arguments: &Arguments) -> ExitCode {
-    let loaded = match load_calibration(&arguments.calibration) {
-        Ok(loaded) => loaded,
+    let calibration: CalibrationConfig = match load(&arguments.calibration) {
+        Ok(calibration) => calibration,
         Err(failure) => return report(&failure),
     };
-    let LoadedCalibration {
-        calibration,
-        warnings,
-    } = loaded;
-    for warning in warnings {
-        tracing::warn!("{warning}");
-    }
     let (task, name) = (Task::Calibration(&calibration), &calibration.calibration);
     single::run(task, name, &arguments.out, &arguments.run, |count| {
         format!(

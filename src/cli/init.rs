@@ -13,7 +13,7 @@ use clap::Args;
 
 use super::{output, windows::edges};
 use crate::{
-    config::{NewSite, built_in_instruments, parse},
+    config::{Document as _, NewSite, SiteConfig, built_in_instruments},
     error::{Cause, Error, IoError, Locate as _},
     files::file_name,
     pds::{product_named, read_label},
@@ -113,7 +113,7 @@ fn write(answers: &Answers, folder: &Path, file: &Path) -> Result<(), Error> {
     // Checked as the future file, so that paths are relative to its folder.
     if answers.is_placed_by_tables() {
         site.edges_deg = Some([0.0, 360.0, -90.0, 90.0]);
-        let anywhere = parse(&site.text(), file)?.site;
+        let anywhere = SiteConfig::parse(&site.text(), file)?.config;
         let read: Vec<PathBuf> = anywhere
             .shots
             .into_iter()
@@ -122,7 +122,7 @@ fn write(answers: &Answers, folder: &Path, file: &Path) -> Result<(), Error> {
         site.edges_deg = Some(tables::box_around_deg(&read)?);
     }
     let text = site.text();
-    let loaded = parse(&text, file)?;
+    let loaded = SiteConfig::parse(&text, file)?;
     for warning in loaded.warnings {
         tracing::warn!("{warning}");
     }

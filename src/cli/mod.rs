@@ -28,13 +28,16 @@ mod triangulate;
 mod windows;
 mod worker;
 
-use std::process::ExitCode;
+use std::{
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
 
 use clap::{ArgAction, Parser, Subcommand, ValueEnum};
 use tracing::level_filters::LevelFilter;
 
 use crate::{
-    config::{Loaded, SiteConfig, check_sites, load},
+    config::{Document, SiteConfig, check_sites},
     error::Error,
 };
 
@@ -191,18 +194,22 @@ fn report(failure: &Error) -> ExitCode {
     ExitCode::from(failure.kind().exit_code())
 }
 
+/// Loads a configuration; its warnings go to the log.
+fn load<T: Document>(path: &Path) -> Result<T, Error> {
+    let loaded = T::load(path)?;
+    for warning in loaded.warnings {
+        tracing::warn!("{warning}");
+    }
+    Ok(loaded.config)
+}
+
 /// Loads site files; every problem of every file is reported before the first failure is returned.
-fn load_sites(paths: &[std::path::PathBuf]) -> Result<Vec<SiteConfig>, Error> {
+fn load_sites(paths: &[PathBuf]) -> Result<Vec<SiteConfig>, Error> {
     let mut sites = Vec::with_capacity(paths.len());
     let mut first_failure = None;
     for path in paths {
         match load(path) {
-            Ok(Loaded { site, warnings, .. }) => {
-                for warning in warnings {
-                    tracing::warn!("{warning}");
-                }
-                sites.push(site);
-            }
+            Ok(site) => sites.push(site),
             Err(failure) => {
                 if let Some(earlier) = first_failure.replace(failure) {
                     output::error(&earlier);

@@ -66,7 +66,7 @@ fn nightly(arguments: &Arguments) -> Result<u8, Error> {
     });
     let night = night.in_file(&state)?;
     runtime.shutdown_background();
-    let Some(night) = night.filter(|night| night.ended_ms.is_some()) else {
+    let Some(night) = night.filter(|night| night.ended_utc.is_some()) else {
         return Ok(Kind::Interrupted.exit_code());
     };
     output::line(night.words());
@@ -83,7 +83,7 @@ async fn through_the_night(
     loop {
         engine.turn()?;
         let night = engine.night(id)?;
-        let over = night.as_ref().is_none_or(|night| night.ended_ms.is_some());
+        let over = night.as_ref().is_none_or(|night| night.ended_utc.is_some());
         // Messages that cannot be delivered now wait for the next night.
         if shared.ending.is_cancelled() || (over && engine.is_idle()) {
             engine.stop().await;

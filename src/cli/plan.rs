@@ -9,9 +9,9 @@ use std::{
 use clap::Args;
 use serde_json::json;
 
-use super::{load_sites, output};
+use super::{load, load_sites, output};
 use crate::{
-    config::{CalibrationConfig, NetConfig, load_calibration, load_net},
+    config::{CalibrationConfig, NetConfig},
     error::Error,
     flow::{PUBLISH, RunOptions, StageReason, Task, check_out, plan_task},
     store::hashes::HashCache,
@@ -53,20 +53,12 @@ impl Files {
     fn of(paths: &[PathBuf]) -> Result<Self, Error> {
         let mut files = Self::default();
         for path in paths {
-            let warnings = if has_key(path, "net") {
-                let loaded = load_net(path)?;
-                files.nets.push(loaded.net);
-                loaded.warnings
+            if has_key(path, "net") {
+                files.nets.push(load(path)?);
             } else if has_key(path, "calibration") {
-                let loaded = load_calibration(path)?;
-                files.calibrations.push(loaded.calibration);
-                loaded.warnings
+                files.calibrations.push(load(path)?);
             } else {
                 files.sites.push(path.clone());
-                Vec::new()
-            };
-            for warning in warnings {
-                tracing::warn!("{warning}");
             }
         }
         Ok(files)

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::{Args, Subcommand, ValueEnum};
 
 use super::output;
 use crate::{
@@ -15,28 +15,55 @@ use crate::{
     units::SECONDS_PER_DAY,
 };
 
-/// Writes a synthetic mission: kernels, PEDR files, labels, site files, and the truth behind them.
+/// Writes synthetic input with known truth: a mission, a net, a calibration, a terrain model or an archive.
 ///
-/// Example: `areograph scene demo && areograph run demo/sites/*.toml --out products`
+/// Example: `areograph scene mission demo && areograph run demo/sites/*.toml --out products`
 #[derive(Debug, Args)]
-#[allow(
-    clippy::struct_excessive_bools,
-    reason = "each is a flag of the command line"
+#[command(
+    verbatim_doc_comment,
+    // Errors print the usage alone: it names all scenes.
+    subcommand_value_name = "mission|along|net|calibration|terrain-model|archive"
 )]
-#[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Mission(MissionArguments),
+    Along(AlongArguments),
+    Net(NetArguments),
+    Calibration(CalibrationArguments),
+    TerrainModel(TerrainModelArguments),
+    Archive(ArchiveArguments),
+}
+
+/// What every scene needs.
+#[derive(Debug, Args)]
+struct Target {
     /// Folder to write; an earlier scene in it is replaced if nothing was added or changed.
     directory: PathBuf,
     /// Seed of terrain and noise; the same seed gives the same bytes.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+}
+
+/// Writes a mission: kernels, PEDR files, labels, site files, and the truth behind them.
+///
+/// Example: `areograph scene mission demo && areograph run demo/sites/*.toml --out products`
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+struct MissionArguments {
+    #[command(flatten)]
+    target: Target,
     /// Seconds of shots in the files of whole days, 600 to 90000; images and windows fit into 600.
-    #[arg(long, value_name = "SECONDS", default_value_t = SECONDS_PER_DAY, conflicts_with = "along")]
+    #[arg(long, value_name = "SECONDS", default_value_t = SECONDS_PER_DAY)]
     day_s: f64,
     /// Draw errors of the size that the real mission may have had, instead of those of the worked example: line times,
     /// attitude and jitter, orbit, camera, boresight of the laser, shifted MOLA profiles, noisy shots over rough ground. Their
     /// sizes are drawn as well, and are not those that areograph assumes.
-    #[arg(long, conflicts_with = "along")]
+    #[arg(long)]
     realistic: bool,
     /// With --realistic: roughness of the ground (heights 300 m apart differ by 5, 10 or 25 m).
     #[arg(long, value_enum, default_value_t = Ground::Plains, requires = "realistic")]
@@ -52,35 +79,85 @@ pub(super) struct Arguments {
     /// With --realistic: one offset of the attitude's clock for all images instead of line times of each.
     #[arg(long, requires = "realistic")]
     attitude_clock: bool,
-    /// Also render the narrow-angle images, `images/*.imq`, which takes minutes; with --calibration `images/*.tif`.
-    #[arg(long, conflicts_with_all = ["along", "plane"])]
+    /// Also render the narrow-angle images, `images/*.imq`, which takes minutes.
+    #[arg(long)]
     images: bool,
     /// With --images: coding of the images; the transform coding is lossy, as it was on board.
-    #[arg(long, value_enum, default_value_t = Code::Predictive, requires = "images", conflicts_with = "calibration")]
+    #[arg(long, value_enum, default_value_t = Code::Predictive, requires = "images")]
     coder: Code,
-    /// Use these kernels instead of the synthetic orbit.
-    #[arg(long, value_name = "KERNELS.tm")]
-    along: Option<PathBuf>,
-    /// A net of rectified pictures for `areograph triangulate` instead of a mission.
-    #[arg(long, conflicts_with_all = ["along", "realistic", "day_s"])]
-    plane: bool,
-    /// Two stereo lines of a camera for `areograph calibrate` instead of a mission; with --images three lines of one orbit,
-    /// with their pixels and laser passes instead of tables of points.
-    #[arg(long, conflicts_with_all = ["along", "realistic", "day_s", "plane"])]
-    calibration: bool,
-    /// A terrain model and laser passes over it for `areograph pedr match` instead of a mission.
-    #[arg(long, conflicts_with_all = ["along", "realistic", "day_s", "images", "plane", "calibration"])]
-    terrain_model: bool,
-    /// An archive of this number of PEDR files, about a day each, with its kernels, instead of a mission: input of
-    /// `areograph pedr`.
-    #[arg(long, value_name = "FILES", conflicts_with_all = ["along", "realistic", "day_s", "plane", "calibration", "terrain_model"])]
-    days: Option<u32>,
-    /// An archive of about this many gigabytes of PEDR files, with its kernels, instead of a mission.
-    #[arg(long, value_name = "GB", conflicts_with_all = ["along", "realistic", "day_s", "plane", "calibration", "terrain_model", "days"])]
-    gb: Option<f64>,
-    /// With --along: labels of images to put into the site file.
-    #[arg(long, value_name = "FILE", requires = "along")]
+}
+
+/// Writes a mission along the orbit and attitude of existing kernels.
+///
+/// Example: `areograph scene along nav.tm demo --label m0402852.lbl && areograph run demo/sites/*.toml --out products`
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+struct AlongArguments {
+    /// Metakernel with orbit and attitude.
+    #[arg(value_name = "KERNELS.tm")]
+    kernels: PathBuf,
+    #[command(flatten)]
+    target: Target,
+    /// Labels of images to put into the site file.
+    #[arg(long, value_name = "FILE")]
     label: Vec<PathBuf>,
+}
+
+/// Writes a net of rectified pictures for `areograph triangulate`.
+///
+/// Example: `areograph scene net demo && areograph triangulate demo/net.toml --out products`
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+struct NetArguments {
+    #[command(flatten)]
+    target: Target,
+}
+
+/// Writes two stereo lines of a camera for `areograph calibrate`, with tables of points.
+///
+/// Example: `areograph scene calibration demo && areograph calibrate demo/calibration.toml --out products`
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+struct CalibrationArguments {
+    #[command(flatten)]
+    target: Target,
+    /// Three lines of one orbit, with their pixels, `images/*.tif`, and laser passes instead of tables of points.
+    #[arg(long)]
+    images: bool,
+}
+
+/// Writes a terrain model and laser passes over it for `areograph pedr match`.
+///
+/// Example: areograph scene terrain-model demo && areograph pedr match demo/model.tif demo/pedr --isd s1=demo/isd/s1.json --isd s2=demo/isd/s2.json --out control
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+struct TerrainModelArguments {
+    #[command(flatten)]
+    target: Target,
+}
+
+/// Writes an archive of PEDR files, about a day each, with its kernels: input of `areograph pedr`.
+///
+/// Example: `areograph scene archive demo --days 5 && areograph pedr qa demo/pedr --kernels demo/kernels/archive.tm --out qa`
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+struct ArchiveArguments {
+    #[command(flatten)]
+    target: Target,
+    #[command(flatten)]
+    size: ArchiveSize,
+}
+
+/// Size of an archive, one of the two.
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+struct ArchiveSize {
+    /// This number of PEDR files.
+    #[arg(long, value_name = "FILES")]
+    days: Option<u32>,
+    /// About this many gigabytes of PEDR files.
+    #[arg(long, value_name = "GB")]
+    gb: Option<f64>,
 }
 
 /// Roughness of the ground, as typed.
@@ -108,15 +185,7 @@ impl Code {
     }
 }
 
-impl Arguments {
-    /// The requested archive, if any.
-    fn archive(&self) -> Option<ArchiveOptions> {
-        let seed = self.seed;
-        let of_size = || Some(ArchiveOptions::of_size(seed, self.gb?));
-        let of_days = self.days.map(|days| ArchiveOptions { seed, days });
-        of_days.or_else(of_size)
-    }
-
+impl MissionArguments {
     fn errors(&self) -> SceneErrors {
         if !self.realistic {
             return SceneErrors::demo();
@@ -134,51 +203,85 @@ impl Arguments {
         };
         SceneErrors {
             tie_noise_px: self.tie_noise_px,
-            ..drawn.with_drawn_sizes(self.seed)
+            ..drawn.with_drawn_sizes(self.target.seed)
         }
     }
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
-    if arguments.plane {
-        output::line(write_plane_scene(&arguments.directory, arguments.seed)?);
-        return Ok(());
+    match &arguments.command {
+        Command::Mission(arguments) => mission(arguments),
+        Command::Along(arguments) => along(arguments),
+        Command::Net(NetArguments { target }) => {
+            output::line(write_plane_scene(&target.directory, target.seed)?);
+            Ok(())
+        }
+        Command::Calibration(CalibrationArguments { target, images }) => {
+            let write = if *images {
+                write_calibration_loop_scene
+            } else {
+                write_calibration_scene
+            };
+            output::line(write(&target.directory, target.seed)?);
+            Ok(())
+        }
+        Command::TerrainModel(TerrainModelArguments { target }) => {
+            output::line(write_terrain_model_scene(&target.directory, target.seed)?);
+            Ok(())
+        }
+        Command::Archive(arguments) => archive(arguments),
     }
-    if arguments.calibration {
-        let write = if arguments.images {
-            write_calibration_loop_scene
-        } else {
-            write_calibration_scene
-        };
-        output::line(write(&arguments.directory, arguments.seed)?);
-        return Ok(());
-    }
-    if arguments.terrain_model {
-        output::line(write_terrain_model_scene(
-            &arguments.directory,
-            arguments.seed,
-        )?);
-        return Ok(());
-    }
-    if let Some(archive) = arguments.archive() {
-        output::line(write_archive(&arguments.directory, &archive)?);
-        return Ok(());
-    }
+}
+
+fn mission(arguments: &MissionArguments) -> Result<(), Error> {
+    let Target { directory, seed } = &arguments.target;
     let options = SceneOptions {
-        seed: arguments.seed,
+        seed: *seed,
         day_s: arguments.day_s,
         errors: arguments.errors(),
     };
-    let summary = match &arguments.along {
-        None if arguments.images => {
-            let coder = arguments.coder.coder();
-            write_scene_with_images(&arguments.directory, &options, coder)?
-        }
-        None => write_scene(&arguments.directory, &options)?,
-        Some(kernels) => {
-            write_scene_along(&arguments.directory, kernels, &arguments.label, &options)?
-        }
-    };
-    output::line(summary);
+    output::line(if arguments.images {
+        write_scene_with_images(directory, &options, arguments.coder.coder())?
+    } else {
+        write_scene(directory, &options)?
+    });
     Ok(())
+}
+
+fn along(arguments: &AlongArguments) -> Result<(), Error> {
+    let Target { directory, seed } = &arguments.target;
+    let AlongArguments { kernels, label, .. } = arguments;
+    output::line(write_scene_along(directory, kernels, label, *seed)?);
+    Ok(())
+}
+
+fn archive(arguments: &ArchiveArguments) -> Result<(), Error> {
+    let ArchiveArguments { target, size } = arguments;
+    let seed = target.seed;
+    // Exactly one of the two is present.
+    let options = match size.days {
+        Some(days) => ArchiveOptions { seed, days },
+        None => ArchiveOptions::of_size(seed, size.gb.unwrap_or_default()),
+    };
+    output::line(write_archive(&target.directory, &options)?);
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Args as _;
+
+    use super::Arguments;
+
+    #[test]
+    fn usage_names_every_scene() {
+        let mut command = Arguments::augment_args(clap::Command::new("scene"));
+        let names: Vec<&str> = command
+            .get_subcommands()
+            .map(clap::Command::get_name)
+            .collect();
+        let names = format!("<{}>", names.join("|"));
+        let usage = command.render_usage().to_string();
+        assert!(usage.ends_with(&names), "{usage}");
+    }
 }

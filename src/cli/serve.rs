@@ -19,7 +19,7 @@ use tokio::{
 
 use super::{output, panicked::flatten, report};
 use crate::{
-    config::service_example,
+    config::{Document as _, ServiceConfig},
     error::{Cause, Error, IoError, Locate as _},
     scene::{SceneOptions, write_scene},
     service::{
@@ -93,7 +93,7 @@ fn init(folder: &Path) -> Result<(), Error> {
 
 /// The example, with short intervals for a demonstration.
 fn demonstration() -> String {
-    let mut text = service_example();
+    let mut text = ServiceConfig::example();
     for (from, to) in [
         ("name = \"areograph\"", "name = \"demonstration\""),
         ("scan_interval_s = 60.0", "scan_interval_s = 2.0"),

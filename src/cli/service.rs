@@ -6,7 +6,7 @@ use clap::{Args, Subcommand, ValueEnum};
 
 use super::output;
 use crate::{
-    config::{ServiceConfig, load_service},
+    config::{Document as _, ServiceConfig},
     error::{Cause, Error, Locate as _},
     service::{
         clock::{Clock, utc_text},
@@ -137,7 +137,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
 }
 
 fn load(path: &std::path::Path) -> Result<ServiceConfig, Error> {
-    Ok(load_service(path)?.service)
+    Ok(ServiceConfig::load(path)?.config)
 }
 
 fn database(config: &ServiceConfig) -> Result<Database, Error> {

@@ -5,19 +5,16 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::Args;
 
 use super::{
-    report,
+    load, report,
     single::{self, RunArguments},
 };
-use crate::{
-    config::{LoadedNet, load_net},
-    flow::Task,
-};
+use crate::{config::NetConfig, flow::Task};
 
 /// Triangulates a net of rectified pictures in the plane: four unknowns per picture, no kernels.
 ///
 /// Products go to `<out>/<net>`. Blunders and gross errors of controls are detected and reported.
 ///
-/// Example: `areograph scene net --plane && areograph triangulate net/net.toml --out products`
+/// Example: `areograph scene net net && areograph triangulate net/net.toml --out products`
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
@@ -33,14 +30,10 @@ pub(super) struct Arguments {
 
 /// Runs the net and reports the outcome.
 pub(super) fn run(arguments: &Arguments) -> ExitCode {
-    let loaded = match load_net(&arguments.net) {
-        Ok(loaded) => loaded,
+    let net: NetConfig = match load(&arguments.net) {
+        Ok(net) => net,
         Err(failure) => return report(&failure),
     };
-    let LoadedNet { net, warnings } = loaded;
-    for warning in warnings {
-        tracing::warn!("{warning}");
-    }
     let (task, name) = (Task::Net(&net), &net.net);
     single::run(task, name, &arguments.out, &arguments.run, |count| {
         format!(

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::Worker;
 use crate::{
-    config::{Loaded, load_within},
+    config::{Document as _, Loaded, SiteConfig},
     error::{Cause, Locate, Result},
     files::HashedFile,
     flow::{Ending, PUBLISH, RunOptions, StageReason, check_out, plan_site, run_site},
@@ -47,7 +47,7 @@ impl Worker {
         else {
             return Err(NoProducts("another task".to_owned()).into());
         };
-        let site = self.load(site_file)?.site;
+        let site = self.load(site_file)?.config;
         if site.blake3 != *config_blake3 {
             let (is, seen) = (site.blake3, config_blake3.clone());
             return Err(OtherKeys { is, seen })
@@ -85,7 +85,11 @@ impl Worker {
 
     /// Reports the plan of a run, and its inputs.
     pub(super) fn plan(&self, site_file: &Path, out: &Path) -> Result<PlanAnswer> {
-        let Loaded { site, files, .. } = self.load(site_file)?;
+        let Loaded {
+            config: site,
+            files,
+            ..
+        } = self.load(site_file)?;
         let plan = plan_site(&site, &self.options(out, false))?;
         let mut read = plan.files;
         read.extend(self.others(&files, &read)?);
@@ -110,8 +114,8 @@ impl Worker {
         })
     }
 
-    fn load(&self, site_file: &Path) -> Result<Loaded> {
-        let loaded = load_within(site_file, &self.roots)?;
+    fn load(&self, site_file: &Path) -> Result<Loaded<SiteConfig>> {
+        let loaded = SiteConfig::load_within(site_file, &self.roots)?;
         for warning in &loaded.warnings {
             tracing::warn!("{warning}");
         }

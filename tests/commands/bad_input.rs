@@ -452,13 +452,13 @@ const CASES: &[(&str, Spoil)] = &[
     }),
     ("scene_over_a_foreign_folder", |case| {
         let mut command = case.areograph();
-        command.args(["--quiet", "scene", "kernels"]);
+        command.args(["--quiet", "scene", "mission", "kernels"]);
         command
     }),
     ("scene_along_kernels_without_attitude", |case| {
         case.replace("kernels/nav.tm", "'mgs_sc_scene.bc'", "");
         let mut command = case.areograph();
-        command.args(["--quiet", "scene", "flown", "--along", "kernels/nav.tm"]);
+        command.args(["--quiet", "scene", "along", "kernels/nav.tm", "flown"]);
         command
     }),
 ];
@@ -705,7 +705,7 @@ fn a_full_disk_leaves_nothing_half_made() {
 
 #[test]
 fn a_scene_on_a_full_disk_names_the_file_that_did_not_fit() {
-    let script = "\"$0\" --quiet scene small/scene; code=$?; ls -A small; exit $code";
+    let script = "\"$0\" --quiet scene mission small/scene; code=$?; ls -A small; exit $code";
     // Full at a text kernel, at the start and in the middle of the C-kernel, and at a PEDR file.
     let sizes = [
         ("30k", "kernels/nav.tm"),

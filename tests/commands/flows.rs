@@ -10,7 +10,7 @@ use crate::common::{case::Case, mission::succeed};
 /// A net and a calibration from tables.
 fn written() -> Case {
     let case = Case::empty();
-    for scene in [["net", "--plane"], ["lines", "--calibration"]] {
+    for scene in [["net", "net"], ["calibration", "lines"]] {
         succeed(case.areograph().args(["--quiet", "scene"]).args(scene));
     }
     case

@@ -14,7 +14,7 @@ use std::{
     process::Command,
 };
 
-use areograph::config;
+use areograph::config::{Document as _, SiteConfig};
 use areograph_testing::checkout;
 
 use crate::common::mission::{areograph, mission};
@@ -31,7 +31,7 @@ const ELSEWHERE: [(&str, &str); 15] = [
     ("scripts/", "continuous integration"),
     ("cargo run", "compiled as an example with the tests"),
     (
-        "areograph scene mission ",
+        "areograph scene mission mission ",
         "every test that uses the mission",
     ),
     ("areograph serve --init service-demo ", "tests/service"),
@@ -40,12 +40,18 @@ const ELSEWHERE: [(&str, &str); 15] = [
         "tests/service",
     ),
     ("areograph pedr sql", "tests/sql, with its feature"),
-    ("areograph scene pixels", "tests/stages/calibration_loop.rs"),
+    (
+        "areograph scene calibration pixels",
+        "tests/stages/calibration_loop.rs",
+    ),
     (
         "areograph calibrate pixels",
         "tests/stages/calibration_loop.rs",
     ),
-    ("areograph scene mission-images", "crates/scene: matching"),
+    (
+        "areograph scene mission mission-images",
+        "crates/scene: matching",
+    ),
     ("areograph image", "tests/commands/image_commands.rs"),
     (
         "areograph init gale --place",
@@ -230,7 +236,7 @@ fn site_files_of_the_front_pages_are_valid() {
             format!("{whole}\n{SECOND_IMAGE}\n{block}")
         };
         // The files that an example names do not exist.
-        let failure = config::parse(&site, &checkout().join("sites/site.toml")).unwrap_err();
+        let failure = SiteConfig::parse(&site, &checkout().join("sites/site.toml")).unwrap_err();
         let failure = failure.to_string();
         let of_files = |line: &&str| {
             let file = [

@@ -124,7 +124,7 @@ fn a_killed_scene_gives_the_older_one_back() {
     let scene = |name: &str| {
         let mut command = areograph();
         command
-            .args(["--quiet", "scene", "--plane"])
+            .args(["--quiet", "scene", "net"])
             .arg(root.join(name));
         command
     };

@@ -12,7 +12,7 @@ use std::{fs, path::PathBuf, sync::atomic::AtomicBool};
 use areograph::{
     altimetry::BiasScope,
     body::Body,
-    config::{SiteConfig, load, usual_instrument},
+    config::{Document as _, SiteConfig, usual_instrument},
     footprints::Footprints,
     frames::BodyFixed,
     geom::{
@@ -40,9 +40,9 @@ static RUN_ON: AtomicBool = AtomicBool::new(false);
 const SITES: [&str; 3] = ["eos_chasma", "gusev_crater", "isidis"];
 
 fn site(name: &str) -> SiteConfig {
-    load(&mission().join(format!("sites/{name}.toml")))
+    SiteConfig::load(&mission().join(format!("sites/{name}.toml")))
         .unwrap()
-        .site
+        .config
 }
 
 fn truth() -> Value {

@@ -890,7 +890,7 @@ fn the_same_archive_has_the_same_bytes() {
     let mut command = areograph();
     command
         .env("RAYON_NUM_THREADS", "1")
-        .args(["--quiet", "scene", "--days", "1"]);
+        .args(["--quiet", "scene", "archive", "--days", "1"]);
     succeed(command.arg(&again));
     let [one, other] = [archive(), again].map(|of| fs::read(of.join("pedr/ap10001l.b")).unwrap());
     assert!(one == other);

@@ -16,7 +16,11 @@ pub(crate) fn areograph() -> Command {
 pub(crate) fn mission() -> PathBuf {
     static MISSION: OnceLock<PathBuf> = OnceLock::new();
     let write = |folder: &Path| {
-        succeed(areograph().arg("--quiet").arg("scene").arg(folder));
+        succeed(
+            areograph()
+                .args(["--quiet", "scene", "mission"])
+                .arg(folder),
+        );
     };
     MISSION.get_or_init(|| once("mission", write)).clone()
 }

@@ -15,7 +15,7 @@ use std::{
 };
 
 use areograph::{
-    config::{self, DeclaredKey, ValueKind},
+    config::{self, DeclaredKey, Document as _, SiteConfig, ValueKind},
     flow::{Ending, PUBLISH, RunOptions, STAGES, StageReason, plan_site, run_site},
     stage::Reason,
     store::hashes::HashCache,
@@ -89,18 +89,19 @@ impl Walk {
 
     /// Runs into a folder; the stages with their reasons.
     fn run(&self, out: &str, until: &str) -> Result<(Vec<StageReason>, Ending), String> {
-        let config =
-            config::load(&self.case.path("site.toml")).map_err(|failure| failure.to_string())?;
+        let config = SiteConfig::load(&self.case.path("site.toml"))
+            .map_err(|failure| failure.to_string())?
+            .config;
         let out = self.case.path(out);
         let hashes = HashCache::in_folder(&out, false);
         let options = options(&out, until, &hashes);
-        let outcome = run_site(&config.site, &options).map_err(|failure| failure.to_string())?;
+        let outcome = run_site(&config, &options).map_err(|failure| failure.to_string())?;
         Ok((outcome.stages, outcome.ending))
     }
 
     /// What a run into `out` would do; nothing of a site that cannot be planned.
     fn plan(&self, until: &str) -> Option<Vec<StageReason>> {
-        let config = config::load(&self.case.path("site.toml")).ok()?.site;
+        let config = SiteConfig::load(&self.case.path("site.toml")).ok()?.config;
         let out = self.case.path("out");
         let hashes = HashCache::in_folder(&out, false);
         let plan = plan_site(&config, &options(&out, until, &hashes)).ok()?;
@@ -133,7 +134,7 @@ impl Walk {
 
     /// Plans and runs over what is there: the plan tells what the run does. A failure is that of a run from nothing.
     fn step(&mut self, what: &str, until: &str) -> Step {
-        if let Err(failure) = config::load(&self.case.path("site.toml")) {
+        if let Err(failure) = SiteConfig::load(&self.case.path("site.toml")) {
             return Err(failure.to_string());
         }
         let before = products(&self.case.path("out"));
@@ -652,7 +653,7 @@ fn accepted(walk: &Walk, site: &Table, key: &DeclaredKey) -> Vec<Table> {
     let mut ways = changed(site, key, &NAMES);
     ways.retain(|changed| {
         walk.write(changed);
-        config::load(&walk.case.path("site.toml")).is_ok()
+        SiteConfig::load(&walk.case.path("site.toml")).is_ok()
     });
     ways
 }

@@ -38,7 +38,7 @@ impl Inputs {
     fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
-        for (name, kind) in [("net", "--plane"), ("lines", "--calibration")] {
+        for (name, kind) in [("net", "net"), ("lines", "calibration")] {
             succeed(areograph().args(["--quiet", "scene", kind]).arg(at(name)));
         }
         let mut copy = Command::new("cp");
@@ -67,7 +67,7 @@ type Writer = (&'static str, fn(&Inputs, &mut Command));
 /// and `fetch` have tests of their own.
 const WRITERS: [Writer; 12] = [
     ("scene", |_, command| {
-        command.args(["scene", "scene", "--plane"]);
+        command.args(["scene", "net", "scene"]);
     }),
     ("init", |_, command| {
         command.args(["init", "gale", "--box", "137.0,138.0,-5.5,-4.0"]);

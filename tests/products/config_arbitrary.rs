@@ -2,13 +2,13 @@
 
 use std::{path::Path, time::Instant};
 
-use areograph::config;
+use areograph::config::{Document as _, SiteConfig};
 use proptest::prelude::*;
 
 const EXAMPLE: &str = include_str!("../../config/sites/example.toml");
 
 fn answer(text: &str) -> String {
-    match config::parse(text, Path::new("nowhere/site.toml")) {
+    match SiteConfig::parse(text, Path::new("nowhere/site.toml")) {
         Ok(_) => String::new(),
         Err(problems) => problems.to_string(),
     }

@@ -13,7 +13,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use areograph::{config, error::Kind};
+use areograph::{
+    config::{Document as _, ServiceConfig, SiteConfig},
+    error::Kind,
+};
 use common::golden::{Golden, assert_messages};
 
 const OPEN_RING: &str = r#"{"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, 1], [0, 1]]]}"#;
@@ -54,7 +57,7 @@ fn every_bad_file_has_its_exact_message() {
     for path in files {
         let text = fs::read_to_string(&path).unwrap();
         let copy = folder.path().join(path.file_name().unwrap());
-        let found = match config::parse(&text, &copy) {
+        let found = match SiteConfig::parse(&text, &copy) {
             Ok(_) => "accepted".to_owned(),
             Err(problems) => problems.to_string().replace(&prefix, ""),
         };
@@ -72,7 +75,7 @@ fn files_that_are_no_text_are_refused_before_they_are_parsed() {
         if let Some(bytes) = bytes {
             fs::write(&path, bytes).unwrap();
         }
-        let failure = config::load(&path).unwrap_err();
+        let failure = SiteConfig::load(&path).unwrap_err();
         let message = failure.to_string().replace(&prefix, "");
         (failure.kind(), (name.to_owned(), message))
     };
@@ -98,7 +101,7 @@ fn a_folder_of_the_service_is_one_or_is_away() {
         let text = format!(
             "[inputs]\nsites = [{sites:?}]\nkernels = [\"not_mounted\"]\ndata = [\"not_there\"]\n"
         );
-        let found = config::parse_service(&text, &folder.path().join("areograph.toml"));
+        let found = ServiceConfig::parse(&text, &folder.path().join("areograph.toml"));
         found.err().map(|problems| problems.to_string())
     };
     assert_eq!(told("."), None);

@@ -14,7 +14,9 @@ use std::{
 };
 
 use areograph::{
-    config::{self, Loaded, SiteConfig, ValueKind},
+    config::{
+        self, CalibrationConfig, Document, Loaded, NetConfig, ServiceConfig, SiteConfig, ValueKind,
+    },
     geom::window::WindowShape,
 };
 use serde_json::Value;
@@ -48,8 +50,8 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-fn parse_in(folder: &tempfile::TempDir, text: &str) -> Loaded {
-    config::parse(text, &folder.path().join("sites/site.toml")).unwrap()
+fn parse_in(folder: &tempfile::TempDir, text: &str) -> Loaded<SiteConfig> {
+    SiteConfig::parse(text, &folder.path().join("sites/site.toml")).unwrap()
 }
 
 fn as_json(text: &str) -> Value {
@@ -73,7 +75,7 @@ fn shipped_configurations_are_accepted_without_warnings() {
             .extension()
             .is_some_and(|extension| extension == "toml")
         {
-            let loaded = config::load(&copy).unwrap();
+            let loaded = SiteConfig::load(&copy).unwrap();
             assert_eq!(loaded.warnings, Vec::<String>::new(), "{}", path.display());
             files += 1;
         }
@@ -84,14 +86,14 @@ fn shipped_configurations_are_accepted_without_warnings() {
 #[test]
 fn the_example_says_the_defaults_and_means_si_units() {
     let folder = folder();
-    let example = parse_in(&folder, &example_text()).site;
+    let example = parse_in(&folder, &example_text()).config;
     let least = r#"
         site = "eos_chasma"
         kernels.metakernel = "../kernels/scene.tm"
         pedr.files = ["../pedr/*.b", "../sites/../pedr/ap19019k.b"]
         windows = [{ id = "site", longitude_deg = [-42, -41.3], latitude_deg = [-14, -12.9] }]
     "#;
-    let least = parse_in(&folder, least).site;
+    let least = parse_in(&folder, least).config;
     let with_defaults = SiteConfig {
         description: example.description.clone(),
         blake3: example.blake3.clone(),
@@ -140,7 +142,7 @@ fn the_example_says_the_defaults_and_means_si_units() {
 #[test]
 fn the_hash_follows_values_and_nothing_else() {
     let folder = folder();
-    let hash = |text: &str| parse_in(&folder, text).site.blake3;
+    let hash = |text: &str| parse_in(&folder, text).config.blake3;
     let text = "site = 's'\nkernels.metakernel = '../kernels/scene.tm'\nimages = [{ id = 'i', label = '../labels/e0202855.lbl' }]\n";
     let same = "# a comment\n[kernels]\nmetakernel = \"../kernels/scene.tm\"\n";
     let same = format!(
@@ -160,7 +162,7 @@ fn parse_with(folder: &tempfile::TempDir, lines: &str, images: &str) -> SiteConf
          sclk_start = '619971158:28'\nexposure_ms = 0.4821\ndowntrack_summing = 8\nlines_header = 1536\n\
          samples = 256\n{images}\n"
     );
-    parse_in(folder, &text).site
+    parse_in(folder, &text).config
 }
 
 #[test]
@@ -261,7 +263,7 @@ fn a_window_that_goes_more_than_half_round_mars_is_named() {
 #[test]
 fn two_files_of_one_site_are_both_named() {
     let folder = folder();
-    let one = parse_in(&folder, &example_text()).site;
+    let one = parse_in(&folder, &example_text()).config;
     let other = SiteConfig {
         site: "other".to_owned(),
         ..one.clone()
@@ -323,23 +325,17 @@ fn the_schema_takes_the_example_and_refuses_what_the_loader_refuses() {
 /// both files anew.
 #[test]
 fn example_and_schema_are_made_from_the_declarations() {
-    let schema = serde_json::to_string_pretty(&config::schema()).unwrap() + "\n";
-    let net_schema = serde_json::to_string_pretty(&config::net_schema()).unwrap() + "\n";
-    let calibration_schema =
-        serde_json::to_string_pretty(&config::calibration_schema()).unwrap() + "\n";
-    let service_schema = serde_json::to_string_pretty(&config::service_schema()).unwrap() + "\n";
+    made_from_declarations::<SiteConfig>("site");
+    made_from_declarations::<NetConfig>("net");
+    made_from_declarations::<CalibrationConfig>("calibration");
+    made_from_declarations::<ServiceConfig>("service");
+}
+
+fn made_from_declarations<T: Document>(kind: &str) {
+    let schema = serde_json::to_string_pretty(&T::schema()).unwrap() + "\n";
     for (path, made) in [
-        ("config/sites/example.toml", config::example()),
-        ("config/schema/site.schema.json", schema),
-        ("config/nets/example.toml", config::net_example()),
-        ("config/schema/net.schema.json", net_schema),
-        (
-            "config/calibrations/example.toml",
-            config::calibration_example(),
-        ),
-        ("config/schema/calibration.schema.json", calibration_schema),
-        ("config/areograph.toml", config::service_example()),
-        ("config/schema/service.schema.json", service_schema),
+        (T::EXAMPLE, T::example()),
+        (&format!("config/schema/{kind}.schema.json"), schema),
     ] {
         let committed = Data::read_from(&below_package(path), None).raw();
         Assert::new()
@@ -452,7 +448,7 @@ fn former_names_are_understood() {
         ),
     );
     // Also what the manifest keeps: nothing is computed anew because of a name.
-    assert_eq!(before.site, now.site);
+    assert_eq!(before.config, now.config);
     let prefix = format!("{}/sites/", folder.path().display());
     assert_eq!(
         before.warnings.join("\n").replace(&prefix, ""),
@@ -481,17 +477,17 @@ fn former_names_of_tables_are_understood() {
     assert_eq!(now.warnings, Vec::<String>::new());
     let before = parse_in(&folder, &text("mola_clock", "mola_surface"));
     // The written bias, not that of the altimeter file; and what the manifest keeps.
-    assert!((before.site.altimeter_clock.bias_s - 0.25).abs() < f64::EPSILON);
-    assert_eq!(before.site.altimeter_clock.source, "own");
-    assert!((before.site.laser_surface.shot_sigma_m - 2.0).abs() < f64::EPSILON);
-    assert_eq!(before.site, now.site);
+    assert!((before.config.altimeter_clock.bias_s - 0.25).abs() < f64::EPSILON);
+    assert_eq!(before.config.altimeter_clock.source, "own");
+    assert!((before.config.laser_surface.shot_sigma_m - 2.0).abs() < f64::EPSILON);
+    assert_eq!(before.config, now.config);
     let prefix = format!("{}/sites/", folder.path().display());
     assert_eq!(
         before.warnings.join("\n").replace(&prefix, ""),
         "site.toml:6:2: mola_clock is now called altimeter_clock\n\
          site.toml:9:2: mola_surface is now called laser_surface"
     );
-    let example = config::example();
+    let example = SiteConfig::example();
     let has_table = |table: &str| example.lines().any(|line| line == format!("[{table}]"));
     assert!(has_table("altimeter_clock") && has_table("laser_surface"));
     assert!(!has_table("mola_clock") && !has_table("mola_surface"));

@@ -60,7 +60,7 @@ fn a_site_on_real_kernels_ends_valid_and_stays() {
     let kernels = metakernel(folder.path(), &data);
     let scene = folder.path().join("scene");
     let mut along = areograph();
-    along.arg("scene").arg(&scene).arg("--along").arg(&kernels);
+    along.args(["scene", "along"]).arg(&kernels).arg(&scene);
     succeed(along.arg("--label").arg(data.join("m0402852_isis.lbl")));
     let site = scene.join("sites/m04-02852.toml");
     let out = folder.path().join("out");

@@ -124,7 +124,7 @@ impl Runs {
     fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let mut scene = areograph();
-        scene.args(["--quiet", "scene", "--day-s", "600"]);
+        scene.args(["--quiet", "scene", "mission", "--day-s", "600"]);
         succeed(scene.arg(folder.path().join("mission")));
         Self { folder }
     }

@@ -17,7 +17,7 @@ use std::{
 };
 
 use areograph::{
-    config::parse_service,
+    config::{Document as _, ServiceConfig},
     service::{
         clock::Clock,
         database::Database,
@@ -82,11 +82,13 @@ impl World {
             "[inputs]\nsites = [\"sites\"]\nkernels = [\"kernels\"]\ndata = [\"data\"]\n[outputs]\n[schedule]\nzone = \
              \"Europe/Berlin\"\n[workers]\nmin_free_mib = 0\n[http]\n{http}\n"
         );
-        let config = parse_service(&text, &folder.path().join("areograph.toml")).unwrap();
+        let config = ServiceConfig::parse(&text, &folder.path().join("areograph.toml"))
+            .unwrap()
+            .config;
         let database = Database::open(&folder.path().join("state")).unwrap();
         let clock = Clock::set_to(now_ms);
         let program = PathBuf::from(env!("CARGO_BIN_EXE_areograph"));
-        let shared = Shared::new(config.service, database, clock.clone(), program).unwrap();
+        let shared = Shared::new(config, database, clock.clone(), program).unwrap();
         let shared = Arc::new(shared);
         let tokens = tokens(&shared);
         fill(&shared, folder.path());

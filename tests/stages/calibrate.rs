@@ -17,7 +17,7 @@ mod refused;
 use std::{fs, path::Path, sync::atomic::AtomicBool};
 
 use areograph::{
-    config::load_calibration,
+    config::{CalibrationConfig, Document as _},
     error::Error,
     flow::{RunOutcome, Task},
     geom::{ellipsoid::local_axes, pushbroom::Detector},
@@ -79,12 +79,12 @@ fn edited(folder: &Path, file: &str, change: impl Fn(usize, &mut Vec<String>)) {
 }
 
 fn run(folder: &Path, force: bool) -> Result<RunOutcome, Error> {
-    let config = load_calibration(&folder.join("lines/calibration.toml"))?.calibration;
+    let config = CalibrationConfig::load(&folder.join("lines/calibration.toml"))?.config;
     run_into(Task::Calibration(&config), &folder.join("out"), force)
 }
 
 fn calibrated(folder: &Path) -> Result<Calibration, Error> {
-    let config = load_calibration(&folder.join("lines/calibration.toml"))?.calibration;
+    let config = CalibrationConfig::load(&folder.join("lines/calibration.toml"))?.config;
     let stage = Calibrate {
         calibration: CalibrationKeys(&config),
         files: CalibrationFiles(&[]),

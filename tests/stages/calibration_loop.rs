@@ -23,7 +23,7 @@ use std::{
 
 use areograph::{
     body::Body,
-    config::{CalibrationConfig, load_calibration, parse_calibration},
+    config::{CalibrationConfig, Document as _},
     error::{Error, Kind},
     flow::{Observer, RunOutcome, StageEvent, Task},
     geom::ellipsoid::local_axes,
@@ -74,7 +74,7 @@ fn run_in(folder: &Path, name: &str, replaced: &[(&str, &str)]) -> Result<RunOut
     }
     let path = folder.join("lines").join(format!("{name}.toml"));
     fs::write(&path, text).unwrap();
-    let config = load_calibration(&path)?.calibration;
+    let config = CalibrationConfig::load(&path)?.config;
     run_into(Task::Calibration(&config), &folder.join(name), false)
 }
 
@@ -213,11 +213,13 @@ fn places_are_as_near_as_stated_to_where_they_truly_are() {
 #[test]
 fn a_second_run_has_nothing_to_do() {
     let finished = RUN.manifest().unwrap().finished_utc.clone();
-    let config = load_calibration(&SCENE.path().join("lines/whole.toml")).unwrap();
+    let config = CalibrationConfig::load(&SCENE.path().join("lines/whole.toml"))
+        .unwrap()
+        .config;
     let stored = stored_at(&RUN.folder);
     assert!(!stored.is_empty());
     let again = run_into(
-        Task::Calibration(&config.calibration),
+        Task::Calibration(&config),
         &SCENE.path().join("whole"),
         false,
     )
@@ -254,7 +256,7 @@ impl Observer for StopAt {
 fn whole() -> CalibrationConfig {
     LazyLock::force(&RUN);
     let path = SCENE.path().join("lines/whole.toml");
-    load_calibration(&path).unwrap().calibration
+    CalibrationConfig::load(&path).unwrap().config
 }
 
 /// The stages that [`RUN`] ran, from `first` on.
@@ -438,7 +440,7 @@ fn input_that_is_missing_or_of_another_place_is_told() {
         ("rounds_max", {
             let text =
                 "calibration = \"c\"\n[ties]\nmatch = true\n[laser]\ncell_m = 0\nrounds_max = 0\n";
-            parse_calibration(text, Path::new("c.toml"))
+            CalibrationConfig::parse(text, Path::new("c.toml"))
                 .unwrap_err()
                 .to_string()
         }),

@@ -22,7 +22,7 @@ use std::{
 };
 
 use areograph::{
-    config::{load_net, parse_net},
+    config::{Document as _, NetConfig},
     error::Error,
     flow::{RunOutcome, Task},
     geom::plane::{CornerZero, Place},
@@ -54,12 +54,12 @@ fn scene(replaced: &[(&str, &str)]) -> tempfile::TempDir {
 }
 
 fn run(folder: &Path, force: bool) -> Result<RunOutcome, Error> {
-    let net = load_net(&folder.join("net/net.toml"))?.net;
+    let net = NetConfig::load(&folder.join("net/net.toml"))?.config;
     run_into(Task::Net(&net), &folder.join("out"), force)
 }
 
 fn triangulated(folder: &Path) -> Result<Triangulation, Error> {
-    let net = load_net(&folder.join("net/net.toml"))?.net;
+    let net = NetConfig::load(&folder.join("net/net.toml"))?.config;
     let stage = Triangulate {
         net: NetKeys(&net),
         files: NetFiles(&[]),
@@ -514,7 +514,7 @@ fn every_problem_of_a_net_file_is_told_with_its_place() {
     let path = folder.path().join("bad.toml");
     let prefix = format!("{}/", folder.path().display());
     let message = |text: &str| {
-        parse_net(text, &path)
+        NetConfig::parse(text, &path)
             .unwrap_err()
             .to_string()
             .replace(&prefix, "")
@@ -524,7 +524,7 @@ fn every_problem_of_a_net_file_is_told_with_its_place() {
         ("nothing", message("")),
         (
             "advice",
-            areograph::error::Error::from(parse_net("", &path).unwrap_err())
+            areograph::error::Error::from(NetConfig::parse("", &path).unwrap_err())
                 .to_string()
                 .replace(&prefix, ""),
         ),
@@ -585,7 +585,7 @@ fn a_file_under_another_key_is_another_net() {
     assert!(outcome.manifest().unwrap().counts["controls"] > 0);
     let toml = folder.path().join("net/net.toml");
     let text = fs::read_to_string(&toml).unwrap();
-    let net = load_net(&toml).unwrap().net;
+    let net = NetConfig::load(&toml).unwrap().config;
     let moved = net.controls.files[0]
         .file_name()
         .unwrap()

@@ -11,7 +11,7 @@ use crate::common;
 use std::{collections::BTreeMap, fs, path::Path};
 
 use areograph::{
-    config::{SiteConfig, load},
+    config::{Document as _, SiteConfig},
     geom::{
         attitude::{matrix_of_spice_quaternion, rotation_vector},
         light_time::LightTime,
@@ -30,7 +30,7 @@ use serde_json::Value;
 
 fn site() -> SiteConfig {
     let path = mission().join("sites/gusev_context.toml");
-    load(&path).unwrap().site
+    SiteConfig::load(&path).unwrap().config
 }
 
 fn truth() -> Value {

@@ -16,7 +16,7 @@ use std::{
 };
 
 use areograph::{
-    config::load,
+    config::{Document as _, SiteConfig},
     footprints::Footprint,
     geom::{
         attitude::matrix_of_spice_quaternion,
@@ -85,9 +85,9 @@ impl Mission {
     /// The shots of one file in the window of its site, as areograph reads them.
     fn shots(&self, profile: &Value) -> Vec<Footprint> {
         let site = profile["window"].as_str().unwrap();
-        let config = load(&self.path(&format!("sites/{site}.toml")))
+        let config = SiteConfig::load(&self.path(&format!("sites/{site}.toml")))
             .unwrap()
-            .site;
+            .config;
         let correction_s = config.altimeter_clock.correction_s();
         let searched =
             search_footprints(&config.pedr, &config.windows, correction_s, &RUN_ON).unwrap();
@@ -511,9 +511,9 @@ fn site_files_tell_the_noise_of_their_ties() {
     };
     let mission = Mission::of(15, errors);
     for site in SITES {
-        let loaded = load(&mission.path(&format!("sites/{site}.toml"))).unwrap();
+        let loaded = SiteConfig::load(&mission.path(&format!("sites/{site}.toml"))).unwrap();
         assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
-        let sigma_px = loaded.site.adjustment.tie_sigma_px;
+        let sigma_px = loaded.config.adjustment.tie_sigma_px;
         assert!((sigma_px[1] - 0.22).abs() < 1e-12);
         // A line is 1.03 to 1.63 focal-plane pixels; that of a pair is its mean.
         let along = sigma_px[0] / 0.22;
@@ -534,7 +534,7 @@ fn options_without_realistic_or_out_of_range_are_refused() {
     let refused = |arguments: &[&str], code: i32, words: &str| {
         let target = folder.path().join("mission");
         let output = areograph()
-            .arg("scene")
+            .args(["scene", "mission"])
             .arg(&target)
             .args(arguments)
             .output()

@@ -11,7 +11,7 @@ use crate::common;
 use std::{collections::BTreeMap, fs};
 
 use areograph::{
-    config::{SiteConfig, load, usual_instrument},
+    config::{Document as _, SiteConfig, usual_instrument},
     geom::{
         ellipsoid::spherical_to_xyz_m,
         intersection::Weighting,
@@ -60,9 +60,9 @@ struct Pair {
 
 impl Pair {
     fn of(site: &str, orbit: &str) -> Self {
-        let config = load(&mission().join(format!("sites/{site}.toml")))
+        let config = SiteConfig::load(&mission().join(format!("sites/{site}.toml")))
             .unwrap()
-            .site;
+            .config;
         let metakernel = mission().join(format!("kernels/{orbit}.tm"));
         let session = Session::open(&KernelSet::from_metakernel(&metakernel).unwrap()).unwrap();
         let times = tag_times(&config.images, &session).unwrap();

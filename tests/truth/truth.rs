@@ -260,6 +260,7 @@ pub(crate) fn scene(folder: &Path, seed: u32, options: &[&str]) -> PathBuf {
     scene.args([
         "--quiet",
         "scene",
+        "mission",
         "--day-s",
         "600",
         "--seed",

@@ -2,7 +2,7 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
-    path::{Path, PathBuf},
+    path::PathBuf,
 };
 
 use schemars::JsonSchema;
@@ -12,38 +12,19 @@ use areograph_base::{
     altimetry::{GroundRadius, ShotFilter},
     body::Body,
     constants::{CONTROL_SIGMA_MAX_M, SIGMA_MIN},
-    error::Error,
     units::RADIANS_PER_DEGREE,
 };
 
 use super::{
-    declare::{
-        Declare as _, Keys, Many, declare_table, example, key, of_the_file, schema, table, tables,
-    },
-    described,
+    declare::{Declare as _, Keys, Many, declare_table, key, of_the_file, table, tables},
+    document::Document,
     forms::{
         Switch, above_to, any_text, from_to, identifier, lower_case_identifier, whole_from_to,
         words,
     },
-    parse_file,
     paths::{FILE, Globs},
     pedr::ground_radius,
-    problems::Problems,
-    read,
 };
-
-/// Where every key is documented.
-pub(super) const CALIBRATION_EXAMPLE: &str = "config/calibrations/example.toml";
-
-const HEADER: &str = "\
-# A calibration of the lines of a camera for `areograph calibrate`, every key with its unit, range and default.
-#
-# Only `calibration`, two [[cameras]] and [ties] are required; a key that is left out has the default given
-# here. Without [control] absolute pointing is not determined, and the result is marked invalid. If every camera has
-# `pixels`, ties.match and [laser] replace tables of points. Relative paths are relative to the folder of this file.
-# Schema: ../schema/calibration.schema.json
-
-";
 
 /// Lines of a camera: the HRSC has nine.
 const CAMERAS: Many = Many {
@@ -86,6 +67,33 @@ declare_table! {
         validation: Vec<ValidationConfig> = tables(Many::ANY),
     }
     check across_tables
+}
+
+impl Document for CalibrationConfig {
+    const EXAMPLE: &'static str = "config/calibrations/example.toml";
+    const HEADER: &'static str = "\
+# A calibration of the lines of a camera for `areograph calibrate`, every key with its unit, range and default.
+#
+# Only `calibration`, two [[cameras]] and [ties] are required; a key that is left out has the default given
+# here. Without [control] absolute pointing is not determined, and the result is marked invalid. If every camera has
+# `pixels`, ties.match and [laser] replace tables of points. Relative paths are relative to the folder of this file.
+# Schema: ../schema/calibration.schema.json
+
+";
+    const SCHEMA: [&'static str; 2] = [
+        "Calibration of the lines of a camera by areograph",
+        "The TOML file of one calibration as JSON. areograph checks more than a schema can: existence of files, \
+         agreement between keys.",
+    ];
+
+    fn with_file(self, file: PathBuf, blake3: String, keys: BTreeMap<String, String>) -> Self {
+        Self {
+            file,
+            blake3,
+            keys,
+            ..self
+        }
+    }
 }
 
 /// Required entries.
@@ -339,57 +347,4 @@ pub enum CalibrationMode {
     Differential,
     /// All angles of all cameras.
     AsPublished,
-}
-
-/// A calibration that passed every check, with its warnings.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LoadedCalibration {
-    /// The valid form.
-    pub calibration: CalibrationConfig,
-    /// Entries that are never used, each with its place.
-    pub warnings: Vec<String>,
-}
-
-/// Reads and checks the calibration `path`; relative paths in it are relative to its folder.
-///
-/// # Errors
-/// [`Problems`] with everything that is wrong, or [`IoError`](areograph_base::error::IoError) when the file cannot be read.
-pub fn load_calibration(path: &Path) -> Result<LoadedCalibration, Error> {
-    let text = read(path)?;
-    Ok(parse_calibration(&text, path)?)
-}
-
-/// Checks the calibration `text` of `file`.
-///
-/// # Errors
-/// [`Problems`] with everything that is wrong.
-pub fn parse_calibration(text: &str, file: &Path) -> Result<LoadedCalibration, Problems> {
-    let ((calibration, written), warnings) =
-        parse_file::<CalibrationConfig>(text, file, CALIBRATION_EXAMPLE)?;
-    Ok(LoadedCalibration {
-        calibration: CalibrationConfig {
-            file: file.to_owned(),
-            blake3: written.blake3,
-            keys: written.keys,
-            ..calibration
-        },
-        warnings,
-    })
-}
-
-/// The example of a calibration, `config/calibrations/example.toml`.
-#[must_use]
-pub fn calibration_example() -> String {
-    example(HEADER, &described::<CalibrationConfig>())
-}
-
-/// The JSON Schema of a calibration, `config/schema/calibration.schema.json`.
-#[must_use]
-pub fn calibration_schema() -> impl Serialize {
-    schema(
-        "Calibration of the lines of a camera by areograph",
-        "The TOML file of one calibration as JSON. areograph checks more than a schema can: existence of files, \
-         agreement between keys.",
-        &described::<CalibrationConfig>(),
-    )
 }

@@ -10,7 +10,9 @@
 //! ```
 //! use std::path::Path;
 //!
-//! let problems = areograph_config::parse("site = \"gusev\"\nwindow = 3\n", Path::new("gusev.toml"));
+//! use areograph_config::{Document as _, SiteConfig};
+//!
+//! let problems = SiteConfig::parse("site = \"gusev\"\nwindow = 3\n", Path::new("gusev.toml"));
 //! // The unknown key, and what is missing, each with its line.
 //! assert!(problems.unwrap_err().to_string().contains("gusev.toml:2"));
 //! ```
@@ -19,6 +21,7 @@ mod adjustment;
 mod calibration;
 mod data_file;
 mod declare;
+mod document;
 mod exposures;
 mod forms;
 mod geojson;
@@ -48,21 +51,16 @@ mod written;
 
 use std::{
     collections::BTreeMap,
-    fs::File,
-    io::Read as _,
     path::{Path, PathBuf},
 };
-
-use serde::Serialize;
-use toml::de::DeTable;
 
 pub use adjustment::{AdjustmentConfig, OrientationPrior};
 pub use calibration::{
     APrioriConfig, CalibrationConfig, CalibrationLaserConfig, CalibrationMode, CameraConfig,
-    LoadedCalibration, SolutionConfig, ValidationConfig, calibration_example, calibration_schema,
-    load_calibration, parse_calibration,
+    SolutionConfig, ValidationConfig,
 };
 pub use declare::{Accept, DeclaredKey, ValueKind, Word};
+pub use document::{Document, Loaded};
 pub use exposures::{ExposurePiece, line_times_of};
 pub use images::ImageConfig;
 pub use instruments::{
@@ -72,10 +70,7 @@ pub use instruments::{
 pub use kernels::KernelsConfig;
 pub use laser_surface::MolaSurfaceConfig;
 pub use limits::LimitsConfig;
-pub use net::{
-    Blunders, LoadedNet, Method, NetConfig, TriangulationConfig, YAxis, load_net, net_example,
-    net_schema, parse_net,
-};
+pub use net::{Blunders, Method, NetConfig, TriangulationConfig, YAxis};
 pub use new_site::NewSite;
 pub use orientation::{OrientationConfig, RegistrationConfig};
 pub use pedr::PedrConfig;
@@ -84,9 +79,8 @@ pub use problems::Problems;
 pub use products::{ProductsConfig, ShotFormat};
 pub use range_check::{RangeCheckConfig, SCAN_STEPS_MAX};
 pub use service::{
-    AlertKind, ChangesConfig, FetchConfig, FreshnessConfig, HookConfig, HttpConfig, LoadedService,
-    MovedConfig, RetentionConfig, ScheduleConfig, ServiceConfig, ServiceInputs, ServiceOutputs,
-    WorkersConfig, load_service, parse_service, service_example, service_schema,
+    AlertKind, ChangesConfig, FetchConfig, FreshnessConfig, HookConfig, HttpConfig, MovedConfig,
+    RetentionConfig, ScheduleConfig, ServiceConfig, ServiceInputs, ServiceOutputs, WorkersConfig,
 };
 pub use shots::{ShotColumns, ShotLayout, ShotTableConfig};
 pub use site::SiteConfig;
@@ -96,52 +90,10 @@ pub use unknowns::{PositionUnknowns, RotationUnknowns};
 pub use window_list::{load_windows, require_outlines, window_of_box, window_of_polygon};
 pub use windows::WindowConfig;
 
-use areograph_base::error::{Cause, Error, IoError, Locate as _};
-use declare::{Keys, Table, described};
+use areograph_base::error::{Cause, Error};
+use declare::described;
+use document::{read, read_table};
 use problems::Review;
-use written::Written;
-
-/// Beginning of the example of a site.
-const HEADER: &str = "\
-# Site configuration of areograph, every key with its unit, range and default.
-#
-# Only `site`, one source of kernels, and either [pedr] (or [[shots]]) with [[windows]] or [[images]] are required;
-# a key that is left out has the default given here. Relative paths are relative to the folder of this file.
-# Angles are degrees, exposures milliseconds, times seconds; longitudes are east, latitudes
-# areocentric, both in the frame of the body: IAU 2000 of Mars. Schema: ../schema/site.schema.json
-
-";
-
-/// Longest configuration file, bytes.
-const BYTES_MAX: u64 = 1 << 20;
-
-/// A configuration that passed every check.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Loaded {
-    /// The valid form.
-    pub site: SiteConfig,
-    /// Warnings, each with its place: entries that are never used.
-    pub warnings: Vec<String>,
-    /// Files, and folders of kernels, to which its keys refer.
-    pub files: Vec<PathBuf>,
-}
-
-/// Reads and checks the configuration `path`; relative paths in it are relative to its folder.
-///
-/// # Errors
-/// [`Problems`] with everything that is wrong, or [`IoError`] when the file cannot be read.
-pub fn load(path: &Path) -> Result<Loaded, Error> {
-    load_within(path, &[])
-}
-
-/// As [`load`], for a configuration that may refer only to files below `roots`, links followed.
-///
-/// # Errors
-/// As [`load`].
-pub fn load_within(path: &Path, roots: &[PathBuf]) -> Result<Loaded, Error> {
-    let text = read(path)?;
-    Ok(parse_within(&text, path, roots)?)
-}
 
 /// A configuration whose inputs may be missing, checked in all else.
 #[derive(Debug, Clone, PartialEq)]
@@ -163,16 +115,16 @@ pub struct ShotGlob {
     pub is_absent: bool,
 }
 
-/// As [`load`], for a configuration whose files, folders and globs need not exist yet.
+/// As [`Document::load`], for a configuration whose files, folders and globs need not exist yet.
 ///
 /// # Errors
-/// As [`load`], missing files excepted.
+/// As [`Document::load`], missing files excepted.
 pub fn load_unfilled(path: &Path) -> Result<Unfilled, Error> {
     let text = read(path)?;
     Ok(parse_unfilled(&text, path)?)
 }
 
-/// As [`parse`], for a configuration whose files, folders and globs need not exist yet.
+/// As [`Document::parse`], for a configuration whose files, folders and globs need not exist yet.
 ///
 /// # Errors
 /// [`Problems`] with everything that is wrong, missing files excepted.
@@ -209,122 +161,12 @@ fn shot_globs(text: &str, path: &Path, absent: &[PathBuf]) -> Vec<Vec<ShotGlob>>
     tables.into_iter().flatten().map(globs).collect()
 }
 
-/// The text of the file, of bounded length.
-fn read(path: &Path) -> Result<String, Error> {
-    let size = path.metadata().map_err(IoError::on("read")).in_file(path)?;
-    // Devices and pipes may never end.
-    if !size.is_file() {
-        return Err(Problems::of_file(path, "is not a regular file; expected a TOML file").into());
-    }
-    let mut bytes = Vec::new();
-    File::open(path)
-        .and_then(|file| file.take(BYTES_MAX + 1).read_to_end(&mut bytes))
-        .map_err(IoError::on("read"))
-        .in_file(path)?;
-    if bytes.len() as u64 > BYTES_MAX {
-        let text = format!("is longer than {BYTES_MAX} bytes; expected the TOML file of one site");
-        return Err(Problems::of_file(path, &text).into());
-    }
-    String::from_utf8(bytes).map_err(|error| {
-        let byte = error.utf8_error().valid_up_to() + 1;
-        Problems::of_file(
-            path,
-            &format!("is not UTF-8 from byte {byte}; expected text"),
-        )
-        .into()
-    })
-}
-
-/// Checks the configuration `text` of `file`.
-/// Besides the text it examines only files that the text names: whether they exist, which files globs match, and the
-/// polygons of windows.
-///
-/// # Errors
-/// [`Problems`] with all faults.
-pub fn parse(text: &str, file: &Path) -> Result<Loaded, Problems> {
-    parse_within(text, file, &[])
-}
-
-fn parse_within(text: &str, file: &Path, roots: &[PathBuf]) -> Result<Loaded, Problems> {
-    let mut review = Review::new(file, text).within(roots);
-    let read = read_table::<SiteConfig>(text, &mut review);
-    let files = review.take_files();
-    let ((site, Written { blake3, keys }), warnings) = review.finish(read)?;
-    let site = SiteConfig {
-        file: file.to_owned(),
-        blake3,
-        keys,
-        ..site
-    };
-    Ok(Loaded {
-        site,
-        warnings,
-        files,
-    })
-}
-
-/// The result of reading, with the keys as written, and warnings.
-type Parsed<T> = ((T, Written), Vec<String>);
-
-/// Checks the `text` of `file`, whose keys `T` declares and `documentation` documents.
-fn parse_file<T: Table>(
-    text: &str,
-    file: &Path,
-    documentation: &'static str,
-) -> Result<Parsed<T>, Problems> {
-    let mut review = Review::new(file, text).documented_in(documentation);
-    let read = read_table(text, &mut review);
-    review.finish(read)
-}
-
-/// The content of `text`, to be used only when `review` has found no problem.
-fn read_table<T: Table>(text: &str, review: &mut Review<'_>) -> Option<(T, Written)> {
-    let (document, syntax_errors) = DeTable::parse_recoverable(text);
-    if !syntax_errors.is_empty() {
-        for error in syntax_errors {
-            let text = format!("this is not TOML: {}", error.message());
-            review.problem(error.span(), text);
-        }
-        return None;
-    }
-    let mut keys = Keys::of_file(document.get_ref(), review);
-    let read = T::read(&mut keys);
-    keys.finish();
-    match toml::from_str(text) {
-        Ok(table) => Some((read, Written::of(table, review.renames()))),
-        // A value that TOML cannot hold, which its key has refused already.
-        Err(error) => {
-            if !review.has_problems() {
-                review.problem(error.span(), error.message().to_owned());
-            }
-            None
-        }
-    }
-}
-
 /// Every key that a site file can have, in the order of the example file.
 #[must_use]
 pub fn keys() -> Vec<DeclaredKey> {
     let mut keys = Vec::new();
     described::<SiteConfig>().walk(&mut keys);
     keys
-}
-
-/// The example file, `config/sites/example.toml`.
-#[must_use]
-pub fn example() -> String {
-    declare::example(HEADER, &described::<SiteConfig>())
-}
-
-/// The JSON Schema of a site file, `config/schema/site.schema.json`.
-#[must_use]
-pub fn schema() -> impl Serialize {
-    declare::schema(
-        "Site configuration of areograph",
-        "The TOML file of one site as JSON. areograph checks more than a schema can: existence of files, order \
-         within windows, agreement between keys.",
-        &described::<SiteConfig>(),
-    )
 }
 
 /// Two configurations name the same site, so their products would overwrite each other.

@@ -1,35 +1,18 @@
 //! The configuration of a net of rectified pictures: `areograph triangulate`.
 
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-};
+use std::{collections::BTreeMap, path::PathBuf};
 
 use serde::Serialize;
 
-use areograph_base::{body::MARS_IAU2000, error::Error, units::RADIANS_PER_DEGREE};
+use areograph_base::{body::MARS_IAU2000, units::RADIANS_PER_DEGREE};
 use areograph_geom::conformal_map::{ConformalMap, Projection};
 
 use super::{
-    declare::{Declare as _, Keys, declare_table, example, group, key, of_the_file, schema, table},
-    described,
+    declare::{Declare as _, Keys, declare_table, group, key, of_the_file, table},
+    document::Document,
     forms::{above_to, any_text, from_to, lower_case_identifier, whole_from_to, words, yes_or_no},
-    parse_file,
     paths::Globs,
-    problems::Problems,
-    read,
 };
-
-/// Where every key is documented.
-pub(super) const NET_EXAMPLE: &str = "config/nets/example.toml";
-
-const HEADER: &str = "\
-# A net of rectified pictures for `areograph triangulate`, every key with its unit, range and default.
-#
-# Only `net`, [measurements] and [controls] are required; a key that is left out has the default given
-# here. Relative paths are relative to the folder of this file. Schema: ../schema/net.schema.json
-
-";
 
 declare_table! {
     /// Everything that `areograph triangulate` needs to know about a net: every value checked, metres and radians
@@ -60,6 +43,31 @@ declare_table! {
         triangulation: TriangulationConfig = table(),
     }
     check across_tables
+}
+
+impl Document for NetConfig {
+    const EXAMPLE: &'static str = "config/nets/example.toml";
+    const HEADER: &'static str = "\
+# A net of rectified pictures for `areograph triangulate`, every key with its unit, range and default.
+#
+# Only `net`, [measurements] and [controls] are required; a key that is left out has the default given
+# here. Relative paths are relative to the folder of this file. Schema: ../schema/net.schema.json
+
+";
+    const SCHEMA: [&'static str; 2] = [
+        "Net of rectified pictures of areograph",
+        "The TOML file of one net as JSON. areograph checks more than a schema can: existence of files, agreement \
+         between keys.",
+    ];
+
+    fn with_file(self, file: PathBuf, blake3: String, keys: BTreeMap<String, String>) -> Self {
+        Self {
+            file,
+            blake3,
+            keys,
+            ..self
+        }
+    }
 }
 
 /// Required entries, and entries that are never used.
@@ -249,56 +257,4 @@ pub enum Blunders {
     Remove,
     /// Flagged and used.
     Report,
-}
-
-/// A net that passed every check, with its warnings.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LoadedNet {
-    /// The valid form.
-    pub net: NetConfig,
-    /// Entries that are never used, each with its place.
-    pub warnings: Vec<String>,
-}
-
-/// Reads and checks the net `path`; relative paths in it are relative to its folder.
-///
-/// # Errors [`Problems`] with everything that is wrong, or [`IoError`](areograph_base::error::IoError) when the file
-/// cannot be read.
-pub fn load_net(path: &Path) -> Result<LoadedNet, Error> {
-    let text = read(path)?;
-    Ok(parse_net(&text, path)?)
-}
-
-/// Checks the net `text` of `file`.
-///
-/// # Errors
-/// [`Problems`] with everything that is wrong.
-pub fn parse_net(text: &str, file: &Path) -> Result<LoadedNet, Problems> {
-    let ((net, written), warnings) = parse_file::<NetConfig>(text, file, NET_EXAMPLE)?;
-    Ok(LoadedNet {
-        net: NetConfig {
-            file: file.to_owned(),
-            blake3: written.blake3,
-            keys: written.keys,
-            ..net
-        },
-        warnings,
-    })
-}
-
-/// The example of a net, `config/nets/example.toml`.
-#[must_use]
-pub fn net_example() -> String {
-    example(HEADER, &described::<NetConfig>())
-}
-
-/// The JSON Schema of a net, `config/schema/net.schema.json`.
-#[must_use]
-pub fn net_schema() -> impl Serialize {
-    schema(
-        "Net of rectified pictures of areograph",
-        "The TOML file of one net as JSON. areograph checks more than a schema can: existence of files, agreement \
-         between keys.",
-        &described::<NetConfig>(),
-    )
 }

@@ -145,7 +145,7 @@ fn texts(paths: &[PathBuf]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parse;
+    use crate::{Document as _, SiteConfig};
 
     #[test]
     fn what_is_written_is_read_with_a_comment_above_every_first_key() {
@@ -169,13 +169,13 @@ mod tests {
             ..NewSite::default()
         };
         let file = folder.path().join("gale.toml");
-        let loaded = parse(&site.text(), &file).unwrap();
+        let loaded = SiteConfig::parse(&site.text(), &file).unwrap();
         assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
         assert_eq!(
-            loaded.site.images[1].label,
+            loaded.config.images[1].label,
             Some(folder.path().join(paths[3]))
         );
-        assert_eq!(loaded.site.windows.len(), 1);
+        assert_eq!(loaded.config.windows.len(), 1);
         let text = site.text();
         let mut above = "";
         for line in text.lines() {
@@ -186,16 +186,23 @@ mod tests {
         }
         // Without a box the windows are the outlines of the images; without PEDR files there are none.
         site.edges_deg = None;
-        assert_eq!(parse(&site.text(), &file).unwrap().site.windows.len(), 2);
+        assert_eq!(
+            SiteConfig::parse(&site.text(), &file)
+                .unwrap()
+                .config
+                .windows
+                .len(),
+            2
+        );
         site.pedr.clear();
-        let loaded = parse(&site.text(), &file).unwrap();
-        assert!(loaded.site.windows.is_empty() && loaded.warnings.len() == 1);
+        let loaded = SiteConfig::parse(&site.text(), &file).unwrap();
+        assert!(loaded.config.windows.is_empty() && loaded.warnings.len() == 1);
         site.shots = vec!["*.csv".into()];
-        let loaded = parse(&site.text(), &file).unwrap();
-        assert!(loaded.site.shots[0].layout.is_some());
-        assert_eq!(loaded.site.windows.len(), 2);
+        let loaded = SiteConfig::parse(&site.text(), &file).unwrap();
+        assert!(loaded.config.shots[0].layout.is_some());
+        assert_eq!(loaded.config.windows.len(), 2);
         site.kernels = vec![PathBuf::from(".")];
         site.kernels_are_a_folder = true;
-        parse(&site.text(), &file).unwrap();
+        SiteConfig::parse(&site.text(), &file).unwrap();
     }
 }

@@ -6,37 +6,19 @@ mod folders;
 use std::{
     collections::BTreeMap,
     net::{IpAddr, SocketAddr},
-    path::{Path, PathBuf},
+    path::PathBuf,
 };
 
 use serde::Serialize;
 
-use areograph_base::error::Error;
-
 use super::{
-    declare::{
-        Declare as _, Keys, Many, declare_table, described, example, key, of_the_file, schema,
-        table, tables,
-    },
+    declare::{Declare as _, Keys, Many, declare_table, key, of_the_file, table, tables},
+    document::Document,
     forms::{any_text, from_to, list, list_or_none, matching, text, whole_from_to, words},
-    parse_file,
     paths::MIRROR,
-    problems::Problems,
-    read,
 };
 
 pub use fetch::FetchConfig;
-
-/// Where every key is documented.
-pub(super) const SERVICE_EXAMPLE: &str = "config/areograph.toml";
-
-const HEADER: &str = "\
-# The service of areograph, `areograph serve` and `areograph nightly`: every key with its unit, range and default.
-#
-# Only the folders of [inputs] are required; a key that is left out has the default given here. Relative paths
-# are relative to the folder of this file. Schema: schema/service.schema.json
-
-";
 
 /// People read the output of hooks; more programs than this are a mistake.
 const HOOKS: Many = Many {
@@ -80,6 +62,30 @@ declare_table! {
         hooks: Vec<HookConfig> = tables(HOOKS),
     }
     check across_tables
+}
+
+impl Document for ServiceConfig {
+    const EXAMPLE: &'static str = "config/areograph.toml";
+    const HEADER: &'static str = "\
+# The service of areograph, `areograph serve` and `areograph nightly`: every key with its unit, range and default.
+#
+# Only the folders of [inputs] are required; a key that is left out has the default given here. Relative paths
+# are relative to the folder of this file. Schema: schema/service.schema.json
+
+";
+    const SCHEMA: [&'static str; 2] = [
+        "Service configuration of areograph",
+        "The TOML file of the service as JSON. areograph checks more than a schema can: agreement between keys, and existence of folders.",
+    ];
+
+    fn with_file(self, file: PathBuf, blake3: String, keys: BTreeMap<String, String>) -> Self {
+        Self {
+            file,
+            blake3,
+            keys,
+            ..self
+        }
+    }
 }
 
 declare_table! {
@@ -387,55 +393,4 @@ fn across_tables(service: &ServiceConfig, keys: &mut Keys<'_, '_>) {
         );
     }
     folders::outputs_apart(service, keys);
-}
-
-/// A configuration of the service that passed every check, with its warnings.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LoadedService {
-    /// The valid form.
-    pub service: ServiceConfig,
-    /// Entries that are never used, each with its place.
-    pub warnings: Vec<String>,
-}
-
-/// Reads and checks the configuration `path` of the service; relative paths in it are relative to its folder.
-///
-/// # Errors
-/// [`Problems`] with everything that is wrong, or [`IoError`](areograph_base::error::IoError) when the file cannot be read.
-pub fn load_service(path: &Path) -> Result<LoadedService, Error> {
-    let text = read(path)?;
-    Ok(parse_service(&text, path)?)
-}
-
-/// Checks the configuration `text` of `file`.
-///
-/// # Errors
-/// [`Problems`] with everything that is wrong.
-pub fn parse_service(text: &str, file: &Path) -> Result<LoadedService, Problems> {
-    let ((service, written), warnings) = parse_file::<ServiceConfig>(text, file, SERVICE_EXAMPLE)?;
-    Ok(LoadedService {
-        service: ServiceConfig {
-            file: file.to_owned(),
-            blake3: written.blake3,
-            keys: written.keys,
-            ..service
-        },
-        warnings,
-    })
-}
-
-/// The example of the service, `config/areograph.toml`.
-#[must_use]
-pub fn service_example() -> String {
-    example(HEADER, &described::<ServiceConfig>())
-}
-
-/// The JSON Schema of the service's configuration, `config/schema/service.schema.json`.
-#[must_use]
-pub fn service_schema() -> impl Serialize {
-    schema(
-        "Service configuration of areograph",
-        "The TOML file of the service as JSON. areograph checks more than a schema can: agreement between keys, and existence of folders.",
-        &described::<ServiceConfig>(),
-    )
 }

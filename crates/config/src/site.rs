@@ -20,6 +20,7 @@ use areograph_base::{
 use super::{
     adjustment::AdjustmentConfig,
     declare::{Keys, declare_table, key, no_repeats, of_the_file, table, tables},
+    document::Document,
     forms::{any_text, lower_case_identifier, words},
     images::{IMAGES, ImageConfig},
     instruments::{ALTIMETER, built_in_altimeters, usual_altimeter, usual_instrument},
@@ -29,6 +30,7 @@ use super::{
     orientation::{OrientationConfig, RegistrationConfig},
     pedr::PedrConfig,
     pointing::{PointingConfig, has_turned_sign},
+    problems::SITE_EXAMPLE,
     products::ProductsConfig,
     range_check::RangeCheckConfig,
     shots::{SHOTS, ShotLayout, ShotTableConfig},
@@ -102,6 +104,33 @@ declare_table! {
     }
     settle clock_of_altimeter
     check across_tables
+}
+
+impl Document for SiteConfig {
+    const EXAMPLE: &'static str = SITE_EXAMPLE;
+    const HEADER: &'static str = "\
+# Site configuration of areograph, every key with its unit, range and default.
+#
+# Only `site`, one source of kernels, and either [pedr] (or [[shots]]) with [[windows]] or [[images]] are required;
+# a key that is left out has the default given here. Relative paths are relative to the folder of this file.
+# Angles are degrees, exposures milliseconds, times seconds; longitudes are east, latitudes
+# areocentric, both in the frame of the body: IAU 2000 of Mars. Schema: ../schema/site.schema.json
+
+";
+    const SCHEMA: [&'static str; 2] = [
+        "Site configuration of areograph",
+        "The TOML file of one site as JSON. areograph checks more than a schema can: existence of files, order \
+         within windows, agreement between keys.",
+    ];
+
+    fn with_file(self, file: PathBuf, blake3: String, keys: BTreeMap<String, String>) -> Self {
+        Self {
+            file,
+            blake3,
+            keys,
+            ..self
+        }
+    }
 }
 
 impl SiteConfig {

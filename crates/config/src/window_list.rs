@@ -11,7 +11,9 @@ use areograph_store::files::file_name;
 
 use super::{
     declare::{Keys, Many, declare_table, tables},
-    geojson, parse_file, read,
+    document::{read, read_table},
+    geojson,
+    problems::Review,
     windows::{WindowConfig, wrapped_longitudes},
 };
 
@@ -21,8 +23,6 @@ const MANY: Many = Many {
     purpose: "",
     further: &[],
 };
-/// Where every key is documented.
-const DOCUMENTATION: &str = "config/sites/example.toml";
 
 declare_table! {
     /// Windows to search, as in a site file.
@@ -68,7 +68,9 @@ enum WindowError {
 /// [`Problems`](super::Problems) with everything that is wrong, or [`IoError`](areograph_base::error::IoError).
 pub fn load_windows(path: &Path) -> Result<Vec<WindowConfig>, Error> {
     let text = read(path)?;
-    let ((list, _), _) = parse_file::<WindowList>(&text, path, DOCUMENTATION)?;
+    let mut review = Review::new(path, &text);
+    let read = read_table::<WindowList>(&text, &mut review);
+    let ((list, _), _) = review.finish(read)?;
     require_outlines(&list.windows).in_file(path)?;
     Ok(list.windows)
 }

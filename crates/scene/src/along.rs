@@ -8,7 +8,7 @@ use std::{
 use nalgebra::Vector3;
 
 use super::{
-    SceneOptions, SceneSummary,
+    SceneSummary,
     arc::{Beam, Flight},
     error::SceneError,
     error_sources::{Relief, SceneErrors},
@@ -47,8 +47,7 @@ const PEDR_NAME: &str = "ap10001l.b";
 /// stretch of flight and one image per label.
 ///
 /// The laser looks along the bus's +Z. Attitude is read 1.15 s early and time tags are 0.117 s late, as in
-/// [`super::write_scene`]. Shots are exact: of the options only the seed is used. No session may be open on this
-/// thread.
+/// [`super::write_scene`]. Shots are exact. No session may be open on this thread.
 ///
 /// # Errors
 /// [`SceneError::NothingToFly`], [`SceneError::BeamMisses`]; [`SceneError::NotAScene`], [`SceneError::Foreign`] and
@@ -57,7 +56,7 @@ pub fn write_scene_along(
     directory: &Path,
     metakernel: &Path,
     labels: &[PathBuf],
-    options: &SceneOptions,
+    seed: u64,
 ) -> Result<SceneSummary> {
     let metakernel = absolute(metakernel)?;
     let images = labels
@@ -85,18 +84,18 @@ pub fn write_scene_along(
         tags: &tags,
         datum: Datum::Iau2000,
         orbit: &|_| ORBIT,
-        seed: options.seed,
+        seed,
         errors: LaserErrors {
             altimeter: SceneErrors::demo().altimeter,
             shift: ProfileShift::none(),
         },
     };
-    let terrain = Terrain::new(options.seed, &[], Relief::Gentle);
+    let terrain = Terrain::new(seed, &[], Relief::Gentle);
     let (file, kept) = write_pedr(&draft.folder("pedr")?, &flight, &terrain, &request, |_| {
         true
     })?;
 
-    let mut truth = Truth::new(options.seed, &SceneErrors::demo());
+    let mut truth = Truth::new(seed, &SceneErrors::demo());
     truth.files.push(file);
     let mut windows = Vec::new();
     for (number, stretch) in (1..).zip(&stretches) {

@@ -162,16 +162,18 @@ impl Shared {
 mod tests {
     use super::*;
     use crate::database::{About, append};
-    use areograph_config::parse_service;
+    use areograph_config::Document as _;
 
     #[test]
     fn whoever_follows_hears_of_an_event_and_of_nothing_else() {
         let folder = tempfile::tempdir().unwrap();
         let text = "[inputs]\nsites = [\".\"]\nkernels = [\"kernels\"]\ndata = [\"data\"]\n";
-        let config = parse_service(text, &folder.path().join("areograph.toml")).unwrap();
+        let config = ServiceConfig::parse(text, &folder.path().join("areograph.toml"))
+            .unwrap()
+            .config;
         let database = Database::open(folder.path()).unwrap();
         let clock = Clock::set_to(7);
-        let shared = Shared::new(config.service, database, clock, PathBuf::new()).unwrap();
+        let shared = Shared::new(config, database, clock, PathBuf::new()).unwrap();
         let mut newest = shared.follow();
         shared
             .write(|transaction| Ok(transaction.execute("INSERT INTO fact VALUES ('a', 'b')", [])?))

@@ -15,7 +15,7 @@ use super::{
     worker::process::ProcessIdentity,
 };
 use areograph_base::error::{Cause, IoError, Locate as _, Result};
-use areograph_config::{ServiceConfig, load_service};
+use areograph_config::{Document as _, ServiceConfig};
 
 /// A started service, which owns its state folder for the lifetime of this value.
 #[derive(Debug)]
@@ -60,11 +60,11 @@ pub fn configuration(
     let file = std::path::absolute(file)
         .map_err(IoError::on("resolve"))
         .in_file(file)?;
-    let loaded = load_service(&file)?;
+    let loaded = ServiceConfig::load(&file)?;
     for warning in loaded.warnings {
         tracing::warn!("{warning}");
     }
-    let mut config = loaded.service;
+    let mut config = loaded.config;
     Schedule::of(&config.schedule, now_ms).in_file(&file)?;
     if let Some(listen) = listen {
         if !listen.ip().is_loopback() && !config.http.behind_tls_proxy {

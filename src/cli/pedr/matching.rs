@@ -23,7 +23,7 @@ use crate::{
 /// to --out: units with shift and reason, a control point of every unit that is kept, a page; with --isd also control.csv for
 /// `areograph calibrate`. The exit code is 5 if too few units are kept, or if the withheld shots do not confirm them.
 ///
-/// Example: areograph scene demo --terrain-model && areograph pedr match demo/model.tif demo/pedr --isd s1=demo/isd/s1.json --isd s2=demo/isd/s2.json --out control
+/// Example: areograph scene terrain-model demo && areograph pedr match demo/model.tif demo/pedr --isd s1=demo/isd/s1.json --isd s2=demo/isd/s2.json --out control
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {

@@ -22,7 +22,7 @@ use crate::{
 /// revolution in one file. A check that was interrupted or killed resumes where it stopped, with the same result. The exit code
 /// is 5 if a profile exceeds a limit, a file could not be checked, or kernels do not cover a profile (--allow-uncovered).
 ///
-/// Example: `areograph scene demo --days 5 && areograph pedr qa demo/pedr --kernels demo/kernels/archive.tm --out qa`
+/// Example: `areograph scene archive demo --days 5 && areograph pedr qa demo/pedr --kernels demo/kernels/archive.tm --out qa`
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {

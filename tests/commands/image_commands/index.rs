@@ -3,7 +3,7 @@
 use std::{collections::BTreeSet, fmt::Write as _, fs, path::Path};
 
 use super::{areograph, stdout, text};
-use areograph::config::load;
+use areograph::config::{Document as _, SiteConfig};
 use serde_json::Value;
 
 /// A row of the archive, as a public page quotes it, with what it does not quote left empty.
@@ -222,7 +222,8 @@ fn the_quoted_row_is_found_where_it_lies_and_makes_an_image_of_a_site() {
     fs::write(&site, format!("{head}{images}")).unwrap();
     let kernels = folder.path().join("kernels");
     fs::create_dir(&kernels).unwrap();
-    let problems = load(&site).map_or_else(|failure| failure.to_string(), |_| String::new());
+    let problems =
+        SiteConfig::load(&site).map_or_else(|failure| failure.to_string(), |_| String::new());
     assert!(!problems.contains("images"), "{problems}");
     // The windows of a site are searched as a box is.
     if problems.is_empty() {

@@ -3,7 +3,7 @@
 use std::sync::{LazyLock, atomic::AtomicBool};
 
 use areograph::{
-    config::{CalibrationConfig, all_instruments, load_calibration},
+    config::{CalibrationConfig, Document as _, all_instruments},
     scene::write_calibration_scene,
     stage::Stage as _,
     stages::calibrate::{
@@ -99,14 +99,14 @@ const HEIGHTS_M: [[f64; 2]; 3] = [[477.180, 66.032], [471.415, 80.013], [682.407
 /// What the text takes for a pixel, metres.
 const TEXT_PIXEL_M: f64 = 30.0;
 
-/// The synthetic lines of `areograph scene --calibration`, and what `areograph calibrate` makes of them.
+/// The synthetic lines of `areograph scene calibration`, and what `areograph calibrate` makes of them.
 static SCENE: LazyLock<(CalibrationConfig, Calibration)> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
     let lines = folder.path().join("lines");
     write_calibration_scene(&lines, 1).unwrap();
-    let config = load_calibration(&lines.join("calibration.toml"))
+    let config = CalibrationConfig::load(&lines.join("calibration.toml"))
         .unwrap()
-        .calibration;
+        .config;
     let stage = Calibrate {
         calibration: CalibrationKeys(&config),
         files: CalibrationFiles(&[]),
@@ -442,7 +442,7 @@ static ROWS: [Row; 25] = [
         place: "section 3.3",
         what: "tie points and laser control points",
         account: Account::Input {
-            from: "`areograph scene --calibration`",
+            from: "`areograph scene calibration`",
             ours: points,
             test: "tests/stages/calibrate.rs::every_step_has_the_size_of_the_paper",
         },

@@ -9,7 +9,7 @@ use std::{
 use areograph::{
     altimetry::{BiasScope, GroundRadius, MolaClock, TagSign},
     body::Body,
-    config::{self, load_calibration, load_net},
+    config::{CalibrationConfig, Document as _, NetConfig, SiteConfig},
     flow::{ArchiveRequest, PUBLISH, Task, archive_filter},
     scene::{
         LineScene, SceneOptions, write_calibration_loop_scene, write_calibration_scene,
@@ -63,7 +63,9 @@ pub(crate) static SHORT: [Scene; 6] = [
             write_plane_scene(&folder.join("net"), 1).unwrap();
         },
         run: |folder| {
-            let net = load_net(&folder.join("net/net.toml")).unwrap().net;
+            let net = NetConfig::load(&folder.join("net/net.toml"))
+                .unwrap()
+                .config;
             run(folder, Task::Net(&net))
         },
         declared: &[(PUBLISH, "flow/net.rs")],
@@ -161,13 +163,13 @@ fn run(folder: &Path, task: Task<'_>) -> PathBuf {
 
 /// Runs a site whose file lies in `folder`.
 fn run_site_in(folder: &Path, file: &str) -> PathBuf {
-    let config = config::load(&folder.join(file)).unwrap().site;
+    let config = SiteConfig::load(&folder.join(file)).unwrap().config;
     run(folder, Task::Site(&config))
 }
 
 fn calibrated(folder: &Path) -> PathBuf {
-    let config = load_calibration(&folder.join("lines/calibration.toml"));
-    let config = config.unwrap().calibration;
+    let config = CalibrationConfig::load(&folder.join("lines/calibration.toml"));
+    let config = config.unwrap().config;
     run(folder, Task::Calibration(&config))
 }
 

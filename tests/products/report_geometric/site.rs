@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, fs, path::Path};
 
 use areograph::{
     capabilities::page,
-    config::{SiteConfig, load},
+    config::{Document as _, SiteConfig},
     products::{AdjustmentProducts, GeometricProducts, ImageProducts, Program, SiteProducts},
     spice::{KernelSet, RequiredCoverage},
     stages::{
@@ -72,9 +72,9 @@ impl Site {
     /// Gusev crater.
     pub(crate) fn gusev() -> Self {
         let folder = site_run("gusev_crater");
-        let config = load(&mission().join("sites/gusev_crater.toml"))
+        let config = SiteConfig::load(&mission().join("sites/gusev_crater.toml"))
             .unwrap()
-            .site;
+            .config;
         let ids: Vec<&str> = config.images.iter().map(|image| &*image.id).collect();
         let orientations: Vec<Orientation> = each(&folder, &ids, "reorient", "");
         let models: Vec<SensorModel> = each(&folder, &ids, "fit_sensor_model", "+adjusted");

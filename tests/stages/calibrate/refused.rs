@@ -2,7 +2,11 @@
 
 use std::{fs, path::Path};
 
-use areograph::{config::parse_calibration, error::Error, stages::calibrate::PointKind};
+use areograph::{
+    config::{CalibrationConfig, Document as _},
+    error::Error,
+    stages::calibrate::PointKind,
+};
 
 use super::{
     SAMPLES, all_errors_m, calibrated, common::golden::assert_messages, edited, errors_m, replace,
@@ -486,7 +490,7 @@ fn files_that_lost_some_bytes_are_told_or_harmless() {
 fn keys_that_are_wrong_are_told_at_once() {
     let text = "calibration = \"Lines 1\"\nbody = \"venus\"\n[[cameras]]\nid = \"s1\"\nisd = \"nowhere.json\"\n[[cameras]]\n\
                 id = \"s1\"\n[solution]\norder = 7\nmode = \"free\"\n[control]\nheld_back_every = 1\n";
-    let problems = parse_calibration(text, Path::new("calibration.toml")).unwrap_err();
+    let problems = CalibrationConfig::parse(text, Path::new("calibration.toml")).unwrap_err();
     let told = Error::new(problems).to_string();
     let folder = std::env::current_dir().unwrap();
     let told = told.replace(&format!("{}/", folder.display()), "");

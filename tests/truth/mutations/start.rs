@@ -35,15 +35,9 @@ pub(super) enum Start {
 }
 
 /// The mission's own files of a command.
-fn scene(name: &str, option: &str, case: &Case) {
+fn scene(name: &str, kind: &str, case: &Case) {
     let stored = once(name, |folder| {
-        succeed(
-            areograph()
-                .arg("--quiet")
-                .arg("scene")
-                .arg(folder)
-                .arg(option),
-        );
+        succeed(areograph().args(["--quiet", "scene", kind]).arg(folder));
     });
     copy(&stored, &case.path(""));
 }
@@ -97,8 +91,8 @@ impl Start {
                     "[[shots]]\nfiles = [\"shots.csv\"]\nlayout = \"areograph\"\n",
                 );
             }
-            Self::Net => scene("scene-of-net", "--plane", &case),
-            Self::Calibration => scene("scene-of-calibration", "--calibration", &case),
+            Self::Net => scene("scene-of-net", "net", &case),
+            Self::Calibration => scene("scene-of-calibration", "calibration", &case),
         }
         case
     }

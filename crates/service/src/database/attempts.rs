@@ -1,25 +1,45 @@
 //! Attempts: the worker processes of a job, one after the other.
 
 use rusqlite::{Connection, Row, Transaction, params};
+use serde::Serialize;
+use utoipa::ToSchema;
 
 use super::Stored;
-use crate::worker::process::ProcessIdentity;
+use crate::{instant::Instant, worker::process::ProcessIdentity};
 
-/// An attempt.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// An attempt: one worker process.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct Attempt {
-    /// Its job.
-    pub job: i64,
-    /// Its number in the job, from 1.
+    /// Its number, from 1.
     pub n: i64,
-    /// Its process, once started.
-    pub process: Option<ProcessIdentity>,
-    /// The last reported stage.
+    /// When it began.
+    pub started_utc: Instant,
+    /// Its last heartbeat.
+    pub beat_utc: Instant,
+    /// Memory in use, kibibytes.
+    pub rss_kib: Option<i64>,
+    /// Last reported stage.
     pub stage: Option<String>,
-    /// Time at which it began, milliseconds of UTC since 1970.
-    pub started_ms: i64,
-    /// Time at which it ended.
-    pub ended_ms: Option<i64>,
+    /// Progress in that stage.
+    pub done: Option<i64>,
+    /// Total of that progress.
+    pub of: Option<i64>,
+    /// Unit of the progress.
+    pub unit: Option<String>,
+    /// When it ended.
+    pub ended_utc: Option<Instant>,
+    /// How it ended.
+    pub how: Option<String>,
+    /// Exit code.
+    pub exit: Option<i64>,
+    /// Signal that ended it.
+    pub signal: Option<i64>,
+    /// Path of its log.
+    #[serde(skip)]
+    pub log: String,
+    /// Its process, once started.
+    #[serde(skip)]
+    pub process: Option<ProcessIdentity>,
 }
 
 /// Records the start of an attempt; its log is a path below the state folder.
@@ -104,13 +124,14 @@ pub fn end_attempt(
     Ok(noted > 0)
 }
 
-/// Attempts of a job, in order.
+/// The attempts of a job, at most the newest `limit`, the newest first.
 ///
 /// # Errors
 /// SQLite errors.
-pub fn attempts(connection: &Connection, job: i64) -> Stored<Vec<Attempt>> {
-    let mut query = connection.prepare_cached("SELECT * FROM attempt WHERE job = ?1 ORDER BY n")?;
-    let found = query.query_map([job], attempt_row)?;
+pub fn attempts(connection: &Connection, job: i64, limit: u32) -> Stored<Vec<Attempt>> {
+    let mut query = connection
+        .prepare_cached("SELECT * FROM attempt WHERE job = ?1 ORDER BY n DESC LIMIT ?2")?;
+    let found = query.query_map(params![job, limit], attempt_row)?;
     Ok(found.collect::<Result<_, _>>()?)
 }
 
@@ -119,15 +140,23 @@ fn attempt_row(row: &Row<'_>) -> rusqlite::Result<Attempt> {
         (row.get("pid")?, row.get("pid_start")?, row.get("boot_id")?);
     let process = pid.zip(start).zip(boot_id);
     Ok(Attempt {
-        job: row.get("job")?,
         n: row.get("n")?,
+        started_utc: row.get("started_ms")?,
+        beat_utc: row.get("beat_ms")?,
+        rss_kib: row.get("rss_kib")?,
+        stage: row.get("stage")?,
+        done: row.get("done")?,
+        of: row.get("of")?,
+        unit: row.get("unit")?,
+        ended_utc: row.get("ended_ms")?,
+        how: row.get("how")?,
+        exit: row.get("exit")?,
+        signal: row.get("signal")?,
+        log: row.get("log")?,
         process: process.map(|((pid, start), boot_id)| ProcessIdentity {
             pid,
             start: start.unsigned_abs(),
             boot_id,
         }),
-        stage: row.get("stage")?,
-        started_ms: row.get("started_ms")?,
-        ended_ms: row.get("ended_ms")?,
     })
 }

@@ -23,7 +23,8 @@ use std::{
     time::Duration,
 };
 
-use rusqlite::{Connection, OpenFlags, Transaction, TransactionBehavior};
+use rusqlite::{Connection, OpenFlags, Row, Transaction, TransactionBehavior};
+use serde_json::Value;
 
 use crate::private::{create_file, create_folder};
 use areograph_base::error::{Cause, IoError, Locate as _, Result};
@@ -259,6 +260,14 @@ fn copy(connection: &Connection, path: &Path) -> Stored<()> {
     }
     copied?;
     Ok(())
+}
+
+/// A column of JSON; invalid JSON stays text.
+fn document(row: &Row<'_>, column: &str) -> rusqlite::Result<Value> {
+    let text: Option<String> = row.get(column)?;
+    Ok(text.map_or(Value::Null, |text| {
+        serde_json::from_str(&text).unwrap_or(Value::String(text))
+    }))
 }
 
 #[cfg(test)]

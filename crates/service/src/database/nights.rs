@@ -1,9 +1,11 @@
 //! Nights: intended instants of the comparison of all sites, and their results.
 
 use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
+use serde::Serialize;
+use utoipa::ToSchema;
 
 use super::Stored;
-use crate::words::counted;
+use crate::{instant::Instant, words::counted};
 
 /// Origin of a night.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,23 +34,25 @@ impl NightHow {
 }
 
 /// A night.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct Night {
     /// Its number.
     pub id: i64,
-    /// The instant that was intended, milliseconds of UTC since 1970.
-    pub due_ms: i64,
-    /// Time at which it began.
-    pub started_ms: Option<i64>,
-    /// Time at which it ended.
-    pub ended_ms: Option<i64>,
-    /// Its origin: `due`, `caught_up`, `asked` or `missed`.
+    /// When it was due.
+    pub due_utc: Instant,
+    /// Time zone of the schedule.
+    pub zone: String,
+    /// When it began.
+    pub started_utc: Option<Instant>,
+    /// When its last job ended.
+    pub ended_utc: Option<Instant>,
+    /// `due`, `caught_up`, `asked` or `missed`.
     pub how: String,
     /// Sites whose inputs were compared.
     pub sites_checked: i64,
     /// Runs that were published.
     pub runs: i64,
-    /// Jobs that failed, were blocked or produced invalid products.
+    /// Jobs that failed.
     pub failures: i64,
 }
 
@@ -138,12 +142,13 @@ pub fn end_night(transaction: &Transaction<'_>, id: i64, now_ms: i64) -> Stored<
     night(transaction, id)
 }
 
-fn night_row(row: &Row<'_>) -> rusqlite::Result<Night> {
+pub(super) fn night_row(row: &Row<'_>) -> rusqlite::Result<Night> {
     Ok(Night {
         id: row.get("id")?,
-        due_ms: row.get("due_ms")?,
-        started_ms: row.get("started_ms")?,
-        ended_ms: row.get("ended_ms")?,
+        due_utc: row.get("due_ms")?,
+        zone: row.get("zone")?,
+        started_utc: row.get("started_ms")?,
+        ended_utc: row.get("ended_ms")?,
         how: row.get("how")?,
         sites_checked: row.get("sites_checked")?,
         runs: row.get("runs")?,

@@ -1,49 +1,58 @@
 //! Runs: publications of attempts.
 
 use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
+use serde::Serialize;
 use serde_json::Value;
+use utoipa::ToSchema;
 
-use super::Stored;
+use super::{Stored, document};
+use crate::instant::Instant;
 
 /// A run.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RunRow {
+#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
+pub struct Run {
     /// Its identifier.
     pub id: String,
     /// Its site.
     pub site: String,
-    /// Its job.
+    /// The job of the run.
     pub job: i64,
-    /// The attempt that published it.
+    /// The attempt of that job.
     pub attempt: i64,
     /// Version of areograph.
     pub version: String,
     /// BLAKE3 of its manifest.
     pub manifest_blake3: String,
-    /// Whether the products are valid.
+    /// Whether its products are valid; only then can they become current.
     pub valid: bool,
     /// The verdict in a word.
     pub verdict: String,
-    /// Reasons why the products are not valid: sentences.
+    /// Why its products are not valid.
     pub reasons: Value,
-    /// Causes of the run: sentences.
+    /// Causes of the run.
     pub because: Value,
-    /// Stages that ran, with their reasons.
+    /// Stages that ran or were kept, each with its reason.
     pub stages: Value,
-    /// Counts of the manifest.
+    /// Counts, by name.
     pub counts: Value,
-    /// Figures of the manifest.
+    /// The largest figures of the site, by name, in the unit that ends the name.
     pub figures: Value,
-    /// Name, role and hash of every kernel.
+    /// Kernels in load order with role and BLAKE3.
     pub kernels: Value,
     /// The previous current run.
     pub predecessor: Option<String>,
-    /// Time at which it was published, milliseconds of UTC since 1970.
-    pub published_ms: i64,
+    /// Changes since the predecessor: headline, sentences, whether a limit was exceeded.
+    pub moved: Value,
+    /// When it was published.
+    pub published_utc: Instant,
     /// Whether it is kept permanently.
     pub pinned: bool,
-    /// Time at which its products were removed.
-    pub removed_ms: Option<i64>,
+    /// When its products were removed because of their age.
+    pub removed_utc: Option<Instant>,
+    /// When all its products were last compared with the manifest.
+    pub checked_utc: Option<Instant>,
+    /// Products that do not match the manifest, as far as known; they are withheld.
+    pub damaged: i64,
 }
 
 /// Whether a run of the site has this manifest, by its BLAKE3.
@@ -61,7 +70,7 @@ pub fn is_run(connection: &Connection, site: &str, manifest_blake3: &str) -> Sto
 ///
 /// # Errors
 /// SQLite errors.
-pub fn put_run(transaction: &Transaction<'_>, run: &RunRow) -> Stored<()> {
+pub fn put_run(transaction: &Transaction<'_>, run: &Run) -> Stored<()> {
     transaction.execute(
         "INSERT OR IGNORE INTO run
          (id, site, job, attempt, version, manifest_blake3, valid, verdict, reasons, because, stages, counts, figures, kernels,
@@ -83,7 +92,7 @@ pub fn put_run(transaction: &Transaction<'_>, run: &RunRow) -> Stored<()> {
             run.figures.to_string(),
             run.kernels.to_string(),
             run.predecessor,
-            run.published_ms,
+            run.published_utc,
             run.pinned,
         ],
     )?;
@@ -227,7 +236,7 @@ pub fn due_run(connection: &Connection, before_ms: i64, current: bool) -> Stored
 ///
 /// # Errors
 /// SQLite errors.
-pub fn run(connection: &Connection, id: &str) -> Stored<Option<RunRow>> {
+pub fn run(connection: &Connection, id: &str) -> Stored<Option<Run>> {
     let mut query = connection.prepare_cached("SELECT * FROM run WHERE id = ?1")?;
     Ok(query.query_row([id], run_row).optional()?)
 }
@@ -236,7 +245,7 @@ pub fn run(connection: &Connection, id: &str) -> Stored<Option<RunRow>> {
 ///
 /// # Errors
 /// SQLite errors.
-pub fn kept_runs(connection: &Connection, site: &str) -> Stored<Vec<RunRow>> {
+pub fn kept_runs(connection: &Connection, site: &str) -> Stored<Vec<Run>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM run WHERE site = ?1 AND removed_ms IS NULL ORDER BY published_ms DESC, id DESC",
     )?;
@@ -248,7 +257,7 @@ pub fn kept_runs(connection: &Connection, site: &str) -> Stored<Vec<RunRow>> {
 ///
 /// # Errors
 /// SQLite errors.
-pub fn uncompared_runs(connection: &Connection) -> Stored<Vec<RunRow>> {
+pub fn uncompared_runs(connection: &Connection) -> Stored<Vec<Run>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM run WHERE moved IS NULL AND valid AND removed_ms IS NULL AND predecessor IS NOT NULL ORDER BY id",
     )?;
@@ -256,12 +265,8 @@ pub fn uncompared_runs(connection: &Connection) -> Stored<Vec<RunRow>> {
     Ok(found.collect::<Result<_, _>>()?)
 }
 
-fn run_row(row: &Row<'_>) -> rusqlite::Result<RunRow> {
-    let json = |column: &str| {
-        let text: String = row.get(column)?;
-        Ok::<_, rusqlite::Error>(serde_json::from_str(&text).unwrap_or_default())
-    };
-    Ok(RunRow {
+pub(super) fn run_row(row: &Row<'_>) -> rusqlite::Result<Run> {
+    Ok(Run {
         id: row.get("id")?,
         site: row.get("site")?,
         job: row.get("job")?,
@@ -270,15 +275,18 @@ fn run_row(row: &Row<'_>) -> rusqlite::Result<RunRow> {
         manifest_blake3: row.get("manifest_blake3")?,
         valid: row.get("valid")?,
         verdict: row.get("verdict")?,
-        reasons: json("reasons")?,
-        because: json("because")?,
-        stages: json("stages")?,
-        counts: json("counts")?,
-        figures: json("figures")?,
-        kernels: json("kernels")?,
+        reasons: document(row, "reasons")?,
+        because: document(row, "because")?,
+        stages: document(row, "stages")?,
+        counts: document(row, "counts")?,
+        figures: document(row, "figures")?,
+        kernels: document(row, "kernels")?,
         predecessor: row.get("predecessor")?,
-        published_ms: row.get("published_ms")?,
+        moved: document(row, "moved")?,
+        published_utc: row.get("published_ms")?,
         pinned: row.get("pinned")?,
-        removed_ms: row.get("removed_ms")?,
+        removed_utc: row.get("removed_ms")?,
+        checked_utc: row.get("checked_ms")?,
+        damaged: row.get("damaged")?,
     })
 }

@@ -194,23 +194,6 @@ pub struct SiteInput {
     pub blake3: Option<String>,
 }
 
-/// Files that each site reads, by site.
-///
-/// # Errors
-/// SQLite errors.
-pub fn inputs_by_site(connection: &Connection) -> Stored<BTreeMap<String, Vec<SiteInput>>> {
-    let mut query = connection.prepare_cached("SELECT * FROM site_input ORDER BY site, path")?;
-    let mut rows = query.query([])?;
-    let mut by_site: BTreeMap<String, Vec<SiteInput>> = BTreeMap::new();
-    while let Some(row) = rows.next()? {
-        by_site
-            .entry(row.get("site")?)
-            .or_default()
-            .push(input_row(row)?);
-    }
-    Ok(by_site)
-}
-
 /// Files that one site reads.
 ///
 /// # Errors

@@ -56,8 +56,8 @@ fn adopt_jobs<W: Workers>(core: &Core<W>) -> Stored<()> {
         for job in core.shared.read(|connection| jobs_in(connection, state))? {
             let rows = core
                 .shared
-                .read(|connection| attempts::attempts(connection, job.id))?;
-            let newest = rows.into_iter().next_back();
+                .read(|connection| attempts::attempts(connection, job.id, 1))?;
+            let newest = rows.into_iter().next();
             if let Some(process) = newest.as_ref().and_then(|newest| newest.process.as_ref()) {
                 end(process);
             }
@@ -94,7 +94,7 @@ fn finish_for<W: Workers>(core: &Core<W>, job: &Job, newest: Option<AttemptRow>)
         site: job.site.clone(),
         run: newest
             .as_ref()
-            .map(|newest| run_id(newest.started_ms, job.id, job.attempt))
+            .map(|newest| run_id(newest.started_utc.0, job.id, job.attempt))
             .unwrap_or_default(),
         stage: newest.and_then(|newest| newest.stage),
     };
@@ -128,7 +128,7 @@ fn adopt_runs<W: Workers>(core: &Core<W>, site: &SiteRow) -> Result<()> {
             if found.as_ref().is_some_and(|run| run.site != site.name) {
                 return Ok(());
             }
-            let since_ms = found.map_or(now_ms, |run| run.published_ms);
+            let since_ms = found.map_or(now_ms, |run| run.published_utc.0);
             put_current(transaction, &site.name, &linked, since_ms)
         })
         .in_file(&folder)

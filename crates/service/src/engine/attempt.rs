@@ -23,7 +23,7 @@ use crate::{
         About, Job, Moved, Priority, Stored, advance, append,
         attempts::{begin_attempt, put_beat, put_process},
         job, jobs_in, next_queued,
-        runs::RunRow,
+        runs::Run,
         sites::site,
     },
     state::JobState,
@@ -196,7 +196,7 @@ fn begin(
 }
 
 /// Follows an attempt to its end; returns the run that it published.
-pub async fn follow<W: Workers>(core: Arc<Core<W>>, taken: Taken) -> Option<RunRow> {
+pub async fn follow<W: Workers>(core: Arc<Core<W>>, taken: Taken) -> Option<Run> {
     let Taken {
         job,
         site_file,

@@ -198,35 +198,23 @@ fn published_manifest(folder: &Path, blake3: &str) -> Option<Manifest> {
 
 #[cfg(test)]
 mod tests {
-    use serde_json::json;
 
     use super::*;
     use crate::database::{
         Database,
-        runs::{RunRow, due_run, put_removed, put_run},
+        runs::{Run, due_run, put_removed, put_run},
     };
-    use areograph_config::parse_service;
+    use areograph_config::Document as _;
 
-    fn run(id: &str) -> RunRow {
-        RunRow {
+    fn run(id: &str) -> Run {
+        Run {
             id: id.to_owned(),
             site: "eos".to_owned(),
             job: 1,
             attempt: 1,
-            version: String::new(),
-            manifest_blake3: String::new(),
             valid: true,
             verdict: "valid".to_owned(),
-            reasons: json!([]),
-            because: json!([]),
-            stages: json!([]),
-            counts: json!({}),
-            figures: json!({}),
-            kernels: json!([]),
-            predecessor: None,
-            published_ms: 0,
-            pinned: false,
-            removed_ms: None,
+            ..Run::default()
         }
     }
 
@@ -234,7 +222,9 @@ mod tests {
     fn a_run_that_was_removed_during_its_check_is_not_damaged() {
         let folder = tempfile::tempdir().unwrap();
         let text = "[inputs]\nsites = [\".\"]\nkernels = [\"kernels\"]\ndata = [\"data\"]\n";
-        let config = parse_service(text, &folder.path().join("areograph.toml")).unwrap();
+        let config = ServiceConfig::parse(text, &folder.path().join("areograph.toml"))
+            .unwrap()
+            .config;
         let database = Database::open(folder.path()).unwrap();
         let check = |id: &'static str, removed: bool| {
             database.write(|transaction| {
@@ -248,7 +238,7 @@ mod tests {
                     products: 2,
                     what: "`footprints.csv` cannot be read",
                 };
-                let existed = note_check(transaction, &config.service, 2, &damage)?;
+                let existed = note_check(transaction, &config, 2, &damage)?;
                 Ok((existed, damaged_products(transaction, id)?))
             })
         };

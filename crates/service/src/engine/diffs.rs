@@ -12,7 +12,7 @@ use super::{
 use crate::{
     database::{
         About, Stored, append,
-        runs::{RunRow, put_moved, uncompared_runs},
+        runs::{Run, put_moved, uncompared_runs},
     },
     worker::protocol::{Answer, What},
 };
@@ -45,7 +45,7 @@ pub async fn compare_all<W: Workers>(core: &Arc<Core<W>>) -> Stored<()> {
     Ok(())
 }
 
-async fn compare<W: Workers>(core: &Arc<Core<W>>, run: &RunRow) -> Stored<()> {
+async fn compare<W: Workers>(core: &Arc<Core<W>>, run: &Run) -> Stored<()> {
     let Some(before) = &run.predecessor else {
         return Ok(());
     };

@@ -17,7 +17,7 @@ use crate::{
         About, DatabaseError, Job, Moved, Stored, advance, append,
         attempts::{AttemptEnd, end_attempt},
         causes, give_back, job,
-        runs::{RunRow, put_checked, put_current, put_run},
+        runs::{Run, put_checked, put_current, put_run},
     },
     state::JobState,
     worker::{
@@ -47,7 +47,7 @@ pub struct Attempt {
 #[derive(Debug)]
 enum Fruit {
     /// A run, checked; its row.
-    Run(Box<RunRow>),
+    Run(Box<Run>),
     /// The products were up to date.
     Unchanged,
     /// No result, and the reason.
@@ -63,7 +63,7 @@ pub fn finish<W: Workers>(
     attempt: &Attempt,
     ended: &Ended,
     cancel: Option<CancelWhy>,
-) -> Stored<Option<RunRow>> {
+) -> Stored<Option<Run>> {
     let fruit = fruit(core, attempt, ended)?;
     let config = core.shared.config();
     let now_ms = core.now_ms();
@@ -208,7 +208,7 @@ fn noted<W: Workers>(
     published: &Published,
     answer: Option<&RunAnswer>,
     before: Option<String>,
-) -> Stored<RunRow> {
+) -> Stored<Run> {
     let reasons = core
         .shared
         .read(|connection| causes(connection, attempt.job))?;
@@ -225,11 +225,7 @@ fn noted<W: Workers>(
 }
 
 /// Records a run; returns the state and outcome of its job.
-fn after_run(
-    transaction: &Transaction<'_>,
-    now_ms: i64,
-    run: &RunRow,
-) -> Stored<(JobState, Moved)> {
+fn after_run(transaction: &Transaction<'_>, now_ms: i64, run: &Run) -> Stored<(JobState, Moved)> {
     put_run(transaction, run)?;
     // Its products were read for this.
     put_checked(transaction, &run.id, now_ms)?;
@@ -241,7 +237,7 @@ fn after_run(
     let data = json!({ "valid": run.valid, "verdict": run.verdict });
     append(transaction, now_ms, "run", about, &data)?;
     if run.valid {
-        put_current(transaction, &run.site, &run.id, run.published_ms)?;
+        put_current(transaction, &run.site, &run.id, run.published_utc.0)?;
         return Ok((JobState::Succeeded, text(&run.verdict)));
     }
     let reasons = run.reasons.as_array().cloned().unwrap_or_default();

@@ -136,7 +136,7 @@ pub fn end_done<W: Workers>(core: &Core<W>, night: i64) -> Stored<Option<Night>>
         let text = format!("the night has ended: {}", night.words());
         let summary = json!({
             "night": night.id,
-            "due": utc_text(night.due_ms),
+            "due": utc_text(night.due_utc.0),
             "sites_checked": night.sites_checked,
             "runs": night.runs,
             "failures": night.failures,

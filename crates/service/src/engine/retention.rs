@@ -19,7 +19,7 @@ use crate::{
     clock::utc_text,
     database::{
         Stored, newest_event,
-        runs::{RunRow, kept_runs, put_removed},
+        runs::{Run, kept_runs, put_removed},
         sites::sites,
     },
     worker::run_folder::remove,
@@ -36,7 +36,7 @@ const SECONDS_PER_DAY: f64 = 86_400.0;
 /// Runs of a site that need not be kept; `runs` are all existing ones, the newest first.
 #[must_use]
 pub fn superfluous<'a>(
-    runs: &'a [RunRow],
+    runs: &'a [Run],
     current: Option<&str>,
     config: &RetentionConfig,
     now_ms: i64,
@@ -49,7 +49,7 @@ pub fn superfluous<'a>(
     let mut weeks = BTreeSet::new();
     let mut superfluous = Vec::new();
     for (place, run) in runs.iter().enumerate() {
-        let week = now_ms.saturating_sub(run.published_ms) / WEEK_MS;
+        let week = now_ms.saturating_sub(run.published_utc.0) / WEEK_MS;
         // The newest run of each week comes first.
         let of_its_week = week < i64::from(config.weeks) && run.valid && weeks.insert(week);
         let kept = place < newest
@@ -189,34 +189,26 @@ pub fn copy_database<W: Workers>(core: &Core<W>) -> Stored<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::Value;
+    use crate::instant::Instant;
 
-    fn run(day: i64, pinned: bool) -> RunRow {
-        RunRow {
+    fn run(day: i64, pinned: bool) -> Run {
+        Run {
             id: format!("day{day}"),
             site: "gusev".to_owned(),
             job: day,
             attempt: 1,
-            version: String::new(),
-            manifest_blake3: String::new(),
             valid: true,
             verdict: "valid".to_owned(),
-            reasons: Value::Null,
-            because: Value::Null,
-            stages: Value::Null,
-            counts: Value::Null,
-            figures: Value::Null,
-            kernels: Value::Null,
             predecessor: (day > 0).then(|| format!("day{}", day - 1)),
-            published_ms: day * DAY_MS,
+            published_utc: Instant(day * DAY_MS),
             pinned,
-            removed_ms: None,
+            ..Run::default()
         }
     }
 
     #[test]
     fn newest_weekly_pinned_and_current_runs_stay() {
-        let runs: Vec<RunRow> = (0..100).rev().map(|day| run(day, day == 41)).collect();
+        let runs: Vec<Run> = (0..100).rev().map(|day| run(day, day == 41)).collect();
         let config = RetentionConfig {
             runs: 3,
             weeks: 4,

@@ -10,7 +10,8 @@ use chrono::DateTime;
 use serde_json::{Value, json};
 
 use crate::{
-    database::runs::RunRow,
+    database::runs::Run,
+    instant::Instant,
     worker::run_folder::{RUN_RECORD, RunRecord, remove},
 };
 use areograph_base::error::{Cause, IoError, Locate as _, Result};
@@ -162,13 +163,13 @@ pub fn row(
     stages: Value,
     predecessor: Option<String>,
     published_ms: i64,
-) -> RunRow {
+) -> Run {
     let manifest = &published.manifest;
     let kernels = manifest.kernels.iter();
     let kernels: Vec<Value> = kernels
         .map(|kernel| json!({ "name": kernel.name, "role": kernel.role, "blake3": kernel.blake3 }))
         .collect();
-    RunRow {
+    Run {
         id: published.by.run.clone(),
         site: manifest.site.clone(),
         job: published.by.job,
@@ -184,9 +185,8 @@ pub fn row(
         figures: json!(manifest.figures),
         kernels: json!(kernels),
         predecessor,
-        published_ms,
-        pinned: false,
-        removed_ms: None,
+        published_utc: Instant(published_ms),
+        ..Run::default()
     }
 }
 

@@ -259,7 +259,7 @@ fn failures_are_tried_again_by_their_kind() {
     life.go_on(&world, 60, 2);
     let night = life.engine.night(night).unwrap().unwrap();
     assert_eq!((night.sites_checked, night.runs, night.failures), (2, 1, 0));
-    assert!(night.ended_ms.is_some());
+    assert!(night.ended_utc.is_some());
     let alerts = life.ask("SELECT json_extract(data, '$.alert') FROM event WHERE kind = 'alert'");
     assert_eq!(alerts, ["failed", "recovered", "night_complete"]);
 }

@@ -6,7 +6,7 @@ use clap::{ArgGroup, Args, ValueEnum};
 
 use crate::{
     cli::{numbers::above_to, windows::WindowArguments},
-    config::{WindowConfig, built_in_instruments, load, require_outlines},
+    config::{Document as _, SiteConfig, WindowConfig, built_in_instruments, require_outlines},
     error::{Cause, Locate as _, Result},
     instruments::Instrument,
     pds::image_index::IndexedImage,
@@ -111,7 +111,7 @@ impl Arguments {
     pub(super) fn windows(&self) -> Result<Vec<WindowConfig>> {
         let mut windows = self.windows.windows()?;
         for path in &self.sites {
-            let site = load(path)?.site;
+            let site = SiteConfig::load(path)?.config;
             require_outlines(&site.windows).in_file(path)?;
             windows.extend(site.windows);
         }

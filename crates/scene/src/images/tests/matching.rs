@@ -28,7 +28,7 @@ use crate::{
     ties::TrueImage,
 };
 use areograph::flow::{Ending, PUBLISH, RunOptions, run_site};
-use areograph_config::{self as config};
+use areograph_config::{Document as _, SiteConfig};
 use areograph_geom::ellipsoid::local_axes;
 use areograph_pds::ties::read_ties;
 use areograph_store::hashes::HashCache;
@@ -160,7 +160,7 @@ fn run(site: &Path, out: &Path) -> PathBuf {
 
 /// The products of a site, and whether they are valid.
 fn published(site: &Path, out: &Path) -> (PathBuf, bool) {
-    let config = config::load(site).unwrap().site;
+    let config = SiteConfig::load(site).unwrap().config;
     let hashes = HashCache::in_folder(out, false);
     let options = RunOptions {
         out: out.to_owned(),

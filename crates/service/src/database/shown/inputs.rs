@@ -5,8 +5,10 @@ use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use super::document;
-use crate::{database::Stored, instant::Instant};
+use crate::{
+    database::{Stored, document},
+    instant::Instant,
+};
 
 /// A folder of inputs.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]

@@ -1,73 +1,11 @@
-//! Attempts of jobs, and totals.
+//! Jobs of a night, and totals.
 
 use rusqlite::{Connection, OptionalExtension as _, params};
-use serde::Serialize;
-use utoipa::ToSchema;
 
 use crate::{
     database::{Job, Stored, job},
-    instant::Instant,
     state::JobState,
 };
-
-/// An attempt: one worker process.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
-pub struct Attempt {
-    /// Its number, from 1.
-    pub n: i64,
-    /// When it began.
-    pub started_utc: Instant,
-    /// Its last heartbeat.
-    pub beat_utc: Instant,
-    /// Memory in use, kibibytes.
-    pub rss_kib: Option<i64>,
-    /// Last reported stage.
-    pub stage: Option<String>,
-    /// Progress in that stage.
-    pub done: Option<i64>,
-    /// Total of that progress.
-    pub of: Option<i64>,
-    /// Unit of the progress.
-    pub unit: Option<String>,
-    /// When it ended.
-    pub ended_utc: Option<Instant>,
-    /// How it ended.
-    pub how: Option<String>,
-    /// Exit code.
-    pub exit: Option<i64>,
-    /// Signal that ended it.
-    pub signal: Option<i64>,
-    /// Path of its log.
-    #[serde(skip)]
-    pub log: String,
-}
-
-/// The attempts of a job, at most the newest `limit`, the newest first.
-///
-/// # Errors
-/// SQLite errors.
-pub fn attempts(connection: &Connection, job: i64, limit: u32) -> Stored<Vec<Attempt>> {
-    let mut query = connection
-        .prepare_cached("SELECT * FROM attempt WHERE job = ?1 ORDER BY n DESC LIMIT ?2")?;
-    let found = query.query_map(params![job, limit], |row| {
-        Ok(Attempt {
-            n: row.get("n")?,
-            started_utc: row.get("started_ms")?,
-            beat_utc: row.get("beat_ms")?,
-            rss_kib: row.get("rss_kib")?,
-            stage: row.get("stage")?,
-            done: row.get("done")?,
-            of: row.get("of")?,
-            unit: row.get("unit")?,
-            ended_utc: row.get("ended_ms")?,
-            how: row.get("how")?,
-            exit: row.get("exit")?,
-            signal: row.get("signal")?,
-            log: row.get("log")?,
-        })
-    })?;
-    Ok(found.collect::<Result<_, _>>()?)
-}
 
 /// At most `limit` jobs of a night.
 ///

@@ -22,7 +22,7 @@ use std::{
 };
 
 use areograph_base::error::Error;
-use areograph_config::{ServiceConfig, parse_service};
+use areograph_config::{Document as _, ServiceConfig};
 use areograph_service::{
     clock::Clock,
     database::{Database, Job, JobFilter, jobs},
@@ -109,9 +109,9 @@ impl World {
             "[inputs]\nsites = [\"sites\"]\nkernels = [\"kernels\"]\ndata = [\"data\"]\n{}",
             self.more
         );
-        parse_service(&text, &self.path("areograph.toml"))
+        ServiceConfig::parse(&text, &self.path("areograph.toml"))
             .unwrap()
-            .service
+            .config
     }
 
     fn key(&self, name: &str) -> String {
