@@ -15,7 +15,7 @@ use crate::{config::CalibrationConfig, flow::Task};
 /// Points are read from tables; with `ties.match` and `[laser]` they are measured in pixels, in rounds until convergence. A
 /// calibration that was stopped or killed resumes at the stage of the round that it did not complete.
 ///
-/// Products go to `<out>/<calibration>`, with calibrated support data (ISD) of every line. Angles that ties cannot determine
+/// Products go to `<out>/<calibration>`, with calibrated support data (ISD) of every line. Angles that tie points cannot determine
 /// are detected and reported.
 ///
 /// Example: `areograph scene calibration hrsc --images && areograph calibrate hrsc/calibration.toml --out products`

@@ -68,16 +68,16 @@ pub(super) struct Arguments {
     /// Table with other hosts or layouts, in the form of config/archives/mgs.toml.
     #[arg(long, value_name = "FILE")]
     archives: Option<PathBuf>,
-    /// Bring the copies of the indexes up to date, and end.
+    /// Update the copies of the indexes, and exit.
     #[arg(long, conflicts_with_all = ["plan", "verify", "audit"])]
     index: bool,
-    /// List the files with sizes and reasons, from the copies of the indexes, and end; no archive is asked.
+    /// List the files with sizes and reasons, from the copies of the indexes, and exit; no archive is contacted.
     #[arg(long, conflicts_with_all = ["verify", "audit"])]
     plan: bool,
-    /// Read every fetched file again and compare it with its record, and end.
+    /// Read every fetched file again, compare it with its record, and exit.
     #[arg(long, conflicts_with = "audit")]
     verify: bool,
-    /// Compare the folder with the copies of the indexes: what is missing, differs or is not needed, and end.
+    /// Compare the folder with the copies of the indexes: what is missing, differs or is not needed, and exit.
     #[arg(long)]
     audit: bool,
     /// Do not ask for new indexes first.

@@ -127,7 +127,7 @@ fn serve(file: &Path, listen: Option<SocketAddr>) -> Result<(), Error> {
     let workers = Processes {
         program: shared.program.clone(),
     };
-    // Pages answer from the beginning: a lost database may take minutes to be made again.
+    // Pages answer from the beginning: a lost database may take minutes to be regenerated.
     let served = pages.spawn(http::serve(listener, Arc::clone(&shared)));
     let worked: Result<(), Error> = work.block_on(async {
         tokio::spawn(obey(Arc::clone(&shared), listen));

@@ -56,7 +56,7 @@ use crate::{
     store::book::Book,
 };
 
-/// The names of all steps in their order, for `--until`.
+/// The names of all steps in order, for `--until`.
 pub const STAGES: &[&str] = &[
     LOAD_KERNELS,
     TagTimes::NAME,

@@ -39,7 +39,7 @@ pub enum TagSign {
 pub enum BiasScope {
     /// The spacecraft's position in the range check: the default, one of three readings of Shan et al. 2005.
     SpkLookup,
-    /// The rotation into IAU 2000 (the one out of the file's datum stays at the tag).
+    /// The rotation into IAU 2000 (the rotation from the file's datum remains at the time tag).
     Rotation,
     /// Both.
     Both,

@@ -292,7 +292,10 @@ impl BodyFile {
     )]
     fn model(&self, name: &'static str) -> BodyModel {
         let Some(report) = self.report.get(name) else {
-            panic!("built with a bad file: {} has no report {name}", self.id);
+            panic!(
+                "built with an invalid file: {} has no report {name}",
+                self.id
+            );
         };
         BodyModel {
             name,
@@ -315,7 +318,7 @@ impl BodyFile {
     reason = "a program built with a bad file of its own; every test on a body reads it"
 )]
 fn of_the_program<T: serde::de::DeserializeOwned>(text: &str) -> T {
-    toml::from_str(text).unwrap_or_else(|error| panic!("built with a bad file: {error}"))
+    toml::from_str(text).unwrap_or_else(|error| panic!("built with an invalid file: {error}"))
 }
 
 #[cfg(test)]

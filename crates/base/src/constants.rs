@@ -109,5 +109,5 @@ impl Spacecraft {
     reason = "a program built with a bad file of its own; every test with kernels reads it"
 )]
 fn of_the_program<T: serde::de::DeserializeOwned>(text: &str) -> T {
-    toml::from_str(text).unwrap_or_else(|error| panic!("built with a bad file: {error}"))
+    toml::from_str(text).unwrap_or_else(|error| panic!("built with an invalid file: {error}"))
 }

@@ -100,7 +100,7 @@ impl Document for CalibrationConfig {
 fn across_tables(written: &CalibrationConfig, keys: &mut Keys<'_, '_>) {
     keys.rule(|| serde_json::json!({"required": ["ties"]}));
     if written.ties.files.is_empty() && keys.span_of("ties").is_none() {
-        keys.missing("ties", "a table ties with files");
+        keys.missing("ties", "a table [ties] with files");
     }
     from_pixels(written, keys);
     let mut seen = BTreeSet::new();
@@ -309,7 +309,7 @@ declare_table! {
     pub struct SolutionConfig {
         /// Parameters that tie points estimate before control is used.
         mode: CalibrationMode = key(words([
-            ("differential", CalibrationMode::Differential, "differences of roll and scale between the cameras, which ties determine"),
+            ("differential", CalibrationMode::Differential, "differences in roll and scale between the cameras, which tie points determine"),
             (
                 "as_published",
                 CalibrationMode::AsPublished,
@@ -343,7 +343,7 @@ declare_table! {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CalibrationMode {
-    /// Differences of roll and scale between the cameras.
+    /// Differences in roll and scale between the cameras.
     Differential,
     /// All angles of all cameras.
     AsPublished,

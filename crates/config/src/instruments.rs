@@ -63,7 +63,7 @@ fn all_of<T>(files: &[(&str, &str)], read: fn(&str, &Path) -> Result<T, Problems
     reason = "a program built with a bad file of its own; a test reads them all"
 )]
 fn of_the_program<T>(read: Result<T, Problems>) -> T {
-    read.unwrap_or_else(|problems| panic!("built with a bad file: {problems}"))
+    read.unwrap_or_else(|problems| panic!("built with an invalid file: {problems}"))
 }
 
 /// The cameras on the spacecraft of the laser, whose archive the program searches.

@@ -221,7 +221,7 @@ declare_table! {
             ("remove", Blunders::Remove, "leave them out and report them"),
             ("report", Blunders::Report, "flag them and use them"),
         ])).or(Blunders::Remove),
-        /// Standard deviation of a coordinate of a measurement on the map. Without it, estimated from the deviations
+        /// Standard deviation of a coordinate of a measurement on the map. If missing, it is estimated from the deviations
         /// in bricks.
         tie_sigma_m: Option<f64> = key(above_to(0.0, 1e7)).unused("50.0"),
     }

@@ -24,7 +24,7 @@ declare_table! {
         /// read once, two versions of one orbit are refused.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs)
-            .required_as("paths or globs of PEDR files (or no table pedr at all)")
+            .required_as("paths or globs of PEDR files (or no table [pedr] at all)")
             .example(r#"["../pedr/*.b"]"#),
         /// Datum of their coordinates; a stated one must not contradict version letter or label. IAU 1991 and 1994
         /// differ by 0.033 degrees of longitude, 1.96 km at the equator; pck00006, which Shan et al. 2005 call IAU

@@ -313,7 +313,7 @@ pub enum AlertKind {
     DiskLow,
     /// A published product does not match its manifest.
     ProductDamaged,
-    /// The database was lost, and made again from the products.
+    /// The database was lost and rebuilt from the products.
     DatabaseLost,
     /// A night is over.
     NightComplete,
@@ -358,7 +358,7 @@ impl AlertKind {
         (
             "database_lost",
             Self::DatabaseLost,
-            "the database was lost, and made again from the products",
+            "the database was lost and rebuilt from the products",
         ),
         (
             "night_complete",
@@ -373,7 +373,7 @@ fn across_tables(service: &ServiceConfig, keys: &mut Keys<'_, '_>) {
     if keys.span_of("inputs").is_none() {
         keys.missing(
             "inputs",
-            "a table inputs with the folders sites, kernels and data",
+            "a table [inputs] with the folders sites, kernels and data",
         );
     }
     let http = &service.http;

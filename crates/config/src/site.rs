@@ -257,18 +257,18 @@ fn something_to_do(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         return;
     }
     if let Some(windows) = windows {
-        let text = "windows are never used: there is no table pedr";
+        let text = "windows are never used: there is no table [pedr]";
         keys.review().warn(windows, text.to_owned());
     }
     match keys.span_of("images") {
         Some(images) if !site.images.is_empty() => keys.review().warn(
             images,
-            "images without a table pedr: orientation only, no footprints and no range check"
+            "images without a table [pedr]: orientation only, no footprints and no range check"
                 .to_owned(),
         ),
         _ => keys.missing(
             "pedr",
-            "a table pedr (or tables [[shots]]), tables [[images]], or both: a site without either has nothing to do",
+            "a table [pedr] (or tables [[shots]]), tables [[images]], or both: a site without either has nothing to do",
         ),
     }
 }

@@ -35,7 +35,7 @@ fn a_cell_is_given(surface: &SurfaceConfig, keys: &mut Keys<'_, '_>) {
     if needs_model && keys.span_of("cell_m").is_none() {
         keys.missing(
             "cell_m",
-            "the edge of a cell in metres (or no table surface at all)",
+            "the edge of a cell in metres (or no table [surface] at all)",
         );
     }
 }

@@ -48,7 +48,7 @@ fn something_measures(ties: &TiesConfig, keys: &mut Keys<'_, '_>) {
     if !ties.matched && keys.span_of("files").is_none() {
         keys.missing(
             "files",
-            "paths or globs of tie point files, or match = true (or no table ties at all)",
+            "paths or globs of tie point files, or match = true (or no table [ties] at all)",
         );
     }
 }

@@ -9,7 +9,7 @@ pub(super) struct Written {
     /// BLAKE3 of them in canonical order and spacing.
     pub(super) blake3: String,
     /// Values by their keys, with dots between tables; elements of lists by their `id`, else their place.
-    /// The list itself has these names in their order. Values are in TOML, so that types are kept: two files
+    /// The list itself has these names in order. Values are in TOML, so that types are kept: two files
     /// have the same keys and values here only when they have the same hash.
     pub(super) keys: BTreeMap<String, String>,
 }

@@ -109,9 +109,9 @@ pub struct PedrArchive {
     pub url: String,
     /// Folders of files.
     pub folders: Vec<String>,
-    /// Names begin with it; five digits of the first orbit follow,
+    /// Beginning of the names, before the five digits of the first orbit.
     pub prefix: String,
-    /// and this.
+    /// End of the names, after these digits.
     pub suffix: String,
     /// Orbits with their times, in order.
     pub orbits: Vec<(u32, String)>,

@@ -8,7 +8,7 @@ use super::{
 };
 use areograph_base::line_times::LineTimes;
 
-/// An image that takes part in intersection or adjustment.
+/// An image used in intersection or adjustment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OrientedCamera<M> {
     /// Identifier that measurements name.

@@ -20,7 +20,7 @@ use areograph_base::{
     units::{METRES_PER_KM, RADIANS_PER_DEGREE, SECONDS_PER_MS},
 };
 
-/// Columns of the cumulative index of the mapping mission, in their order.
+/// Columns of the cumulative index of the mapping mission, in order.
 const COLUMNS: [&str; 53] = [
     "VOLUME_ID",
     "FILE_SPECIFICATION_NAME",

@@ -21,7 +21,7 @@ pub struct ImageLabel {
     pub utc_stop: Option<String>,
     /// Line times, where each row of the file has its own.
     pub lines: Option<RowTimes>,
-    /// Text that is no statement, and a keyword that only resembles the clock's, one sentence each.
+    /// Text that is not a statement, and a keyword that only resembles the clock's, one sentence each.
     pub remarks: Vec<String>,
 }
 

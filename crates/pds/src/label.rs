@@ -49,11 +49,11 @@ pub struct Label {
     pub entries: Vec<Entry>,
     /// Whether the statement `END` follows them.
     pub ended: bool,
-    /// The first lines before it with text that is no statement.
+    /// The first lines before it with text that is not a statement.
     pub unread: Vec<UnreadLine>,
 }
 
-/// Text in a label that is no statement.
+/// Text in a label that is not a statement.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UnreadLine {
     /// Its line, from 1.

@@ -114,13 +114,13 @@ fn shot_columns<'a>() -> Vec<Column<Shot<'a>>> {
     columns
 }
 
-/// Standard deviations towards east, north and up: of a footprint, of what its profile shares, and of the rest.
+/// Standard deviations in east, north and height: of a footprint, of what its profile shares, and of the rest.
 fn local_columns<'a>() -> Vec<Column<Shot<'a>>> {
     type Sigmas = fn(&CorrectedPoint) -> Option<[f64; 3]>;
     let kinds: [([&'static str; 3], &'static str, Sigmas); 3] = [
         (
             ["sigma_east_m", "sigma_north_m", "sigma_up_m"],
-            "standard deviation towards east, north or up, metres, with the shift of the profile",
+            "standard deviation in east, north or height, metres, with the shift of the profile",
             |point| Some(point.local_sigmas_m()),
         ),
         (

@@ -44,7 +44,7 @@ const ALSO_IN_GIS: [&str; 4] = ["channel", "class", "attitude_flag", GEOMETRY];
 /// Shots that are written together: enough for all threads, few compared with the memory of a search.
 const ROWS_AT_ONCE: usize = 32_768;
 
-/// Some shots of a search, in their order.
+/// Some shots of a search, in order.
 struct FoundShots<'a> {
     footprints: &'a Footprints<BodyFixed>,
     windows: &'a WindowLists,
@@ -108,7 +108,7 @@ impl ShotsFile {
     /// * `window_ids` – identifiers of the windows
     ///
     /// # Errors
-    /// Errors of the disk; a file that is no earlier answer of a search.
+    /// Errors of the disk; a file that is not an earlier answer of a search.
     pub fn create(
         path: &Path,
         format: RowsFormat,

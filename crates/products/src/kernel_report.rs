@@ -83,8 +83,8 @@ fn qualities(site: &SiteProducts) -> BTreeMap<String, &'static str> {
 #[derive(Serialize, JsonSchema)]
 #[schemars(
     title = "Kernels of a site",
-    description = "exchange/kernels.json of areograph: kernel names by type and qualities as SpiceQL reports them; \
-                   under areograph each kernel with size, hash and coverage.",
+    description = "exchange/kernels.json of areograph: kernel names by type, and qualities, as SpiceQL reports them; \
+                   the key `areograph` has the size, hash and coverage of each kernel.",
     extend("dependentRequired" = {
         "mgs_ck_quality": ["ck"],
         "mgs_spk_quality": ["spk"],

@@ -1,4 +1,4 @@
-//! The book of a site's outputs as a product: the page can be made again from it without other files.
+//! The book of a site's outputs as a product: the page can be regenerated from it without other files.
 //!
 //! Tables and documents are written for their readers, with the digits and the selection that these need. The page
 //! shows more: surfaces, histograms, spans of kernels. The outputs are therefore kept completely. Camera tables and map

@@ -131,7 +131,7 @@ impl PictureFile {
     /// Creates a picture beside `path`.
     ///
     /// # Errors
-    /// The folder cannot be written; an existing file that is no such picture; a TIFF of more than 4 GiB.
+    /// The folder cannot be written; an existing file that is not such a picture; a TIFF of more than 4 GiB.
     pub fn create(path: &Path, format: PictureFormat, mut head: PictureHead) -> Result<Self> {
         let software = format!("areograph {}", env!("CARGO_PKG_VERSION"));
         head.notes.insert(0, (SOFTWARE, software));

@@ -154,7 +154,7 @@ impl Row<'_> {
         radius_m - self.site.config.body.map().radius_m
     }
 
-    /// Shift in the image by the adjustment, pixels.
+    /// Shift in the image due to the adjustment, pixels.
     fn moved_px(&self) -> Option<f64> {
         let [before, after] = self.places;
         let (before, after) = (before?, after?);
@@ -416,7 +416,7 @@ fn image<'a>() -> Vec<Column<Row<'a>>> {
 fn adjusted<'a>() -> Vec<Column<Row<'a>>> {
     let names = ["sigma_east_m", "sigma_north_m", "sigma_up_m"];
     let columns = names.into_iter().enumerate().map(|(axis, name)| {
-        let meaning = "standard deviation towards east, north or up after the adjustment, metres, including that of the shift of its \
+        let meaning = "standard deviation in east, north or height after the adjustment, metres, including that of the shift of its \
                        profile; missing for footprints that are not part of the adjustment";
         column(name, Unit::Metre, meaning, move |row: &Row| {
             Some(row.adjusted?.local_sigmas_m()[axis])

@@ -128,7 +128,7 @@ impl RowsWriter {
     /// Begins a file at a path of the user, where only an earlier answer in this format is replaced.
     ///
     /// # Errors
-    /// Errors of the disk; a file that is no such answer.
+    /// Errors of the disk; a file that is not such an answer.
     pub fn replacing(path: &Path, format: RowsFormat, schema: SchemaRef) -> Result<Self> {
         Self::staged(StagedFile::replacing(path, format.mark())?, format, schema)
     }

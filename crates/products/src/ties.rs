@@ -299,14 +299,14 @@ fn adjusted_sigma_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "sigma_east_m",
             Unit::Metre,
-            "standard deviation of the adjusted point towards east, metres; in the published model only of the agreement \
+            "standard deviation of the adjusted point in east, metres; in the published model only of the agreement \
              between the images",
             |row: &Measurement| Some(row.adjusted?.0.local_sigmas_m()[0]),
         ),
         column(
             "sigma_north_m",
             Unit::Metre,
-            "standard deviation of the adjusted point towards north, metres; in the published model only of the agreement \
+            "standard deviation of the adjusted point in north, metres; in the published model only of the agreement \
              between the images",
             |row: &Measurement| Some(row.adjusted?.0.local_sigmas_m()[1]),
         ),
@@ -320,14 +320,14 @@ fn adjusted_sigma_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "relative_sigma_east_m",
             Unit::Metre,
-            "standard deviation towards east without the error that all tie points share, metres: of the difference from their mean; \
+            "standard deviation in east without the error that all tie points share, metres: of the difference from their mean; \
              the shared error does not average out and is adjustment/heights/mean_sigma_m of adjustment.json",
             |row: &Measurement| Some(row.adjusted?.0.relative_sigmas_m()?[0]),
         ),
         column(
             "relative_sigma_north_m",
             Unit::Metre,
-            "standard deviation towards north without the error that all tie points share, metres; see relative_sigma_east_m",
+            "standard deviation in north without the error that all tie points share, metres; see relative_sigma_east_m",
             |row: &Measurement| Some(row.adjusted?.0.relative_sigmas_m()?[1]),
         ),
         column(

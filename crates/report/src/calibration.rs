@@ -1,4 +1,4 @@
-//! The page of a calibration: verdict, figures of every step, directions not determined by ties, cameras, other orbits.
+//! The page of a calibration: verdict, figures of every step, directions not determined by tie points, cameras, other orbits.
 
 use super::{
     calibration_rounds::rounds as rounds_of,
@@ -228,7 +228,7 @@ fn sight(of: &Calibration) -> Markup {
     html! { p { (words) } (table.finish()) (on_ground(of)) }
 }
 
-/// The test of ties against the ground.
+/// The test of tie points against the ground.
 fn on_ground(of: &Calibration) -> Markup {
     let Some((ground, limit_m)) = of
         .tie_ground

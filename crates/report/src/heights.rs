@@ -49,7 +49,7 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<Markup> {
             (compared(geometric, altimeter))
             (apart(geometric.heights))
             div.plots { (figure(&profile::plot(site, geometric))?) }
-            (folded("The surface, and heights of footprints by images", &html! {
+            (folded("The surface, and heights of footprints from images", &html! {
                 (surface_in_words(surface))
                 (footprints(geometric, altimeter))
             }))

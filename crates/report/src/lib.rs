@@ -92,7 +92,7 @@ pub mod parts {
     };
 }
 
-/// The first sections of a site's page, in their order.
+/// The first sections of a site's page, in order.
 const FIRST_SECTIONS: &[Section] = &[
     heights::SECTION,
     misregistration::SECTION,

@@ -35,7 +35,7 @@ pub struct SiteSummary {
     pub remarks: Vec<String>,
     /// Shots, profiles, images.
     pub counts: [u64; 3],
-    /// Mean of range − distance of the profile where it is largest, metres.
+    /// Mean of range − distance for the profile with the largest |mean|, metres.
     pub range_mean_m: Option<f64>,
     /// Largest along-track parallax of two images at their tie points, with the orientation of the kernels and the
     /// adjusted one, metres.

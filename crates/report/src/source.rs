@@ -1,6 +1,6 @@
 //! Sources of the numbers of a page: marks in its HTML, by which a test compares each number with its product.
 //!
-//! An element with `data-from` lists, for each number of its text in their order, a place in the products beside the
+//! An element with `data-from` lists, for each number of its text in order, a place in the products beside the
 //! page: `<document>#<JSON pointer>`, or the pointer alone, below the `data-in` of the table's row. A leading `|`
 //! stands for the size of the value, a trailing `*<factor>` for another unit. A missing value is a dash.
 

@@ -288,7 +288,7 @@ fn write_planets(folder: &Path, span: Interval) -> Result<()> {
         ),
     ];
     let comment = format!(
-        "{SYNTHETIC}\nMars by Standish's approximate elements; the Sun is fixed at the solar system barycentre."
+        "{SYNTHETIC}\nMars from Standish's approximate elements; the Sun is fixed at the solar system barycentre."
     );
     write_spk(&folder.join(PLANETS_NAME), &segments, &comment)
 }

@@ -137,7 +137,7 @@ fn note(
     published: &[Published],
     now_ms: i64,
 ) -> Stored<()> {
-    let because = json!(["found on the disk when the database was made again"]);
+    let because = json!(["found on the disk when the database was rebuilt"]);
     let mut before = None;
     for run in published {
         let site = &run.manifest.site;

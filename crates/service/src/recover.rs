@@ -23,7 +23,7 @@ const OWNER: &str = ".areograph-service";
 const ID_BYTES: usize = 16;
 
 /// Ensures that the database belongs to the service that made the products, and marks both. A new database beside
-/// products of an earlier one is recorded as lost: [`recover`] makes it again. An empty folder beside a used database is
+/// products of an earlier one is recorded as lost: [`recover`] rebuilds it. An empty folder beside a used database is
 /// not marked: the disk of the products may not be mounted.
 ///
 /// # Errors
@@ -113,7 +113,7 @@ fn is_used(connection: &Connection) -> Stored<bool> {
     Ok(connection.query_row(rows, [], |row| row.get(0))?)
 }
 
-/// Whether the database was lost and has not been made again.
+/// Whether the database was lost and has not been rebuilt.
 ///
 /// # Errors
 /// SQLite errors.
@@ -133,7 +133,7 @@ pub fn recover(shared: &Shared) -> Result<()> {
         return Ok(());
     }
     shared.set_recovering(true);
-    tracing::warn!("the database was lost: the service makes it again from the products");
+    tracing::warn!("the database was lost: the service rebuilds it from the products");
     let stops = || {
         shared.note_progress();
         shared.ending.is_cancelled()

@@ -195,7 +195,7 @@ fn unchangeable(before: &ServiceConfig, after: &ServiceConfig) -> Result<()> {
     let what = if before.outputs != after.outputs {
         "a folder of outputs"
     } else if before.http != after.http {
-        "the table http"
+        "the table [http]"
     } else {
         return Ok(());
     };

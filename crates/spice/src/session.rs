@@ -99,7 +99,7 @@ struct Loaded {
 }
 
 impl Session {
-    /// Waits for the lock and loads `kernels` in their order.
+    /// Waits for the lock and loads `kernels` in order.
     ///
     /// # Errors
     /// [`SpiceError::Spice`] with the file that failed to load; [`SpiceError::SessionOpen`].

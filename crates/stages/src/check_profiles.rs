@@ -58,7 +58,7 @@ pub struct ProfileCrossover {
     pub profiles: [usize; 2],
     /// Position of the crossing, at the mean of both heights.
     pub ground: Position<BodyFixed>,
-    /// Height by the first minus height by the second, metres.
+    /// Height from the first minus height from the second, metres.
     pub difference_m: f64,
     /// Standard deviation of the difference by noise and interpolation, metres.
     pub sigma_m: f64,

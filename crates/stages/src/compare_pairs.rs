@@ -78,7 +78,7 @@ pub struct FootprintsByTies {
     /// Along-track misregistration of the footprints, metres: the size of `along_m`, averaged over the footprints of
     /// all profiles. `None` without any.
     pub apart_m: Option<f64>,
-    /// Its standard deviation by the scatter of the tie points, metres; the error is common to all profiles.
+    /// Its standard deviation from the scatter of the tie points, metres; the error is common to all profiles.
     pub apart_sigma_m: Option<f64>,
     /// Profiles with footprints that both images show.
     pub profiles: Vec<ProfileByTies>,
@@ -97,7 +97,7 @@ pub struct ProfileByTies {
     pub samples: Summary,
     /// The mean of `lines` on the ground, metres.
     pub along_m: f64,
-    /// Its standard deviation by the scatter of the tie points, metres.
+    /// Its standard deviation from the scatter of the tie points, metres.
     pub along_sigma_m: f64,
     /// `along_m` in units of the distance of successive footprints of the profile; `None` for a single one.
     pub along_spacings: Option<f64>,

@@ -21,7 +21,7 @@ use areograph_pds::isd::{ImageSupport, SupportSource};
 const STEP_S: f64 = 1.0;
 const SAMPLES: [f64; 2] = [64.0, 20_000.0];
 
-/// An image by its support data.
+/// An image with its support data.
 #[derive(Debug)]
 pub struct LineCamera {
     /// Orientation, detector and line times.

@@ -31,7 +31,7 @@ pub(super) struct CrossedProfiles {
 }
 
 impl MolaShots {
-    /// Standard deviations of the shift of each profile as recorded, towards east, north and up, metres: the values for
+    /// Standard deviations of the shift of each profile as recorded, in east, north and height, metres: the values for
     /// all profiles and, off nadir, the attitude error that crossovers leave there.
     #[must_use]
     pub fn profile_sigmas_m(

@@ -1,5 +1,5 @@
-//! Windows defined by the view of an image: their outlines from the image's times and the kernels, before shots are
-//! searched.
+//! Windows defined by the view of an image: their outlines from the image's times and the kernels, before the search
+//! for shots.
 
 use std::sync::atomic::AtomicBool;
 
@@ -108,7 +108,7 @@ pub struct Windows<'a> {
 }
 
 impl<'a> Windows<'a> {
-    /// The windows in their order.
+    /// The windows in order.
     ///
     /// # Errors
     /// A bug in areograph that no stage triggers; see [`Output::value`].

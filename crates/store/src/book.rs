@@ -113,7 +113,7 @@ impl Book {
         })
     }
 
-    /// Enters a value that is no output of a stage, under this label.
+    /// Enters a value that is not an output of a stage, under this label.
     ///
     /// # Errors
     /// As [`Book::enter`].

@@ -233,7 +233,7 @@ impl InputFiles {
         findings.collect()
     }
 
-    /// Several files in their order; `watch` is checked before each, and counts those that were not known before.
+    /// Several files in order; `watch` is checked before each, and counts those that were not known before.
     ///
     /// # Errors
     /// As [`Self::hash`]; [`Stopped`](areograph_base::error::Stopped).

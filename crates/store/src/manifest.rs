@@ -171,7 +171,7 @@ pub struct ConfigurationEntry {
     /// BLAKE3 of the keys and values as written; comments and layout do not change it.
     #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
     pub blake3: String,
-    /// These keys and values, with dots between tables.
+    /// The keys and values of the configuration; dots separate the names of tables and keys.
     pub keys: BTreeMap<String, String>,
 }
 

@@ -50,7 +50,7 @@ impl PagePath {
     /// Checks the path before the work whose result the page will show.
     ///
     /// # Errors
-    /// [`PageError`] for anything but a regular file, and for products; a file that is no page of areograph;
+    /// [`PageError`] for anything but a regular file, and for products; a file that is not a page of areograph;
     /// [`IoError`] if its folder cannot be found.
     pub fn new(path: &Path) -> Result<Self> {
         check(path).in_file(path)?;

@@ -89,7 +89,7 @@ fn has_model(site: &SiteProducts) -> bool {
     !matches!(significant(site), Ok(None))
 }
 
-/// Writes numbers of all cells of the model.
+/// Writes the values of all cells of the model.
 fn write_cells(
     path: &Path,
     of: &Context,
@@ -103,7 +103,7 @@ fn write_cells(
     write_map(path, of, &model.heights, numbers, model.parallel_rad)
 }
 
-/// Writes numbers of all cells, and reads them back as every terrain model is read.
+/// Writes the values of all cells, and reads them back like any terrain model.
 pub(in crate::capabilities) fn write_map(
     path: &Path,
     of: &Context,

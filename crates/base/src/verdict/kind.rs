@@ -57,7 +57,7 @@ pub enum CheckKind {
     SurfaceSpread,
     /// Images with a tie point in the adjustment.
     ImagesJoined,
-    /// Pairs of images whose tie points took part in the adjustment.
+    /// Pairs of images whose tie points were used in the adjustment.
     PairsJoined,
     /// Distance along the flight between two images at their tie points, adjusted.
     ParallaxAfter,
@@ -70,9 +70,9 @@ pub enum CheckKind {
     /// Standard deviation of unit weight of the other kinds of observation, the one that exceeds most of what chance
     /// explains.
     VarianceComponents,
-    /// Share of the tie points that took no part in the adjustment.
+    /// Share of the tie points not used in the adjustment.
     TiesRejected,
-    /// Tie points that took part in the adjustment.
+    /// Tie points used in the adjustment.
     TiesUsed,
     /// Largest correction of an image, in a priori standard deviations.
     Correction,

@@ -32,7 +32,7 @@ impl<F: Form> Key<F, Optional> {
         self.with(Default(default))
     }
 
-    /// The key must be there.
+    /// The key is required.
     pub(crate) fn required(self) -> Key<F, Required> {
         let expected = self.form.kind().to_string();
         self.with(Required { expected })
@@ -144,7 +144,7 @@ pub(crate) trait Presence<V> {
 pub(crate) struct Optional;
 /// The key may be absent; this is then its value.
 pub(crate) struct Default<V>(V);
-/// The key must be there.
+/// The key is required.
 pub(crate) struct Required {
     expected: String,
 }

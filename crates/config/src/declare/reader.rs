@@ -176,7 +176,7 @@ impl<'a, 'r> Keys<'a, 'r> {
         self.value_below(table, name).is_some()
     }
 
-    /// Whether there is something in the table's place that is no table.
+    /// Whether there is something in the table's place that is not a table.
     pub(crate) const fn is_no_table(&self) -> bool {
         self.table.is_none() && self.span.is_some()
     }

@@ -14,7 +14,7 @@ declare_table! {
     pub struct FetchConfig {
         /// Whether every night begins with the retrieval of archive files.
         nightly: bool = key(yes_or_no("", "")).or(false),
-        /// Folder of copies of the indexes and of `fetch.json`; created if missing. Site files state where their files lie.
+        /// Folder for `fetch.json` and the copies of the indexes; created if missing. Site files state where their files lie.
         folder: PathBuf = key(text()).or("fetch".to_owned()).then(|path, keys: &mut Keys<'_, '_>| keys.review().resolve(&path)),
         /// Folder for the latest leap seconds of NAIF's generic kernels; without it they are not fetched.
         generic_kernels: Option<PathBuf> = key(text()).unused(r#""kernels/generic""#).then(|path, keys: &mut Keys<'_, '_>| {

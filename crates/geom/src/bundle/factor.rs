@@ -79,7 +79,7 @@ impl Factor {
         cofactors
     }
 
-    /// `(S + Gᵀ Σ⁻¹ G)⁻¹ Gᵀ Σ⁻¹ = Z K⁻¹`, one column a height, and `K⁻¹`.
+    /// `(S + Gᵀ Σ⁻¹ G)⁻¹ Gᵀ Σ⁻¹ = Z K⁻¹`, one column per height, and `K⁻¹`.
     pub(super) fn through_heights(&self) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
         self.heights.as_ref().map(|heights| {
             let through = heights.capacity.solve(&heights.solved.transpose());

@@ -16,7 +16,7 @@ pub(super) struct Group {
     pub(super) points: Vec<usize>,
 }
 
-/// The points that take part.
+/// The points that are used.
 pub(super) struct PointGroups {
     /// All of them, ascending.
     pub(super) points: Vec<usize>,

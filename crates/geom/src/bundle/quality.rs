@@ -33,7 +33,7 @@ struct Controls {
     of_point: Vec<Option<usize>>,
     /// `u` of each.
     turned: Vec<Vector3<f64>>,
-    /// `Q Gᵀ Σ⁻¹`, one column a height, and `Σ⁻¹ − Σ⁻¹ G Q Gᵀ Σ⁻¹`.
+    /// `Q Gᵀ Σ⁻¹`, one column per height, and `Σ⁻¹ − Σ⁻¹ G Q Gᵀ Σ⁻¹`.
     through: DMatrix<f64>,
     left: DMatrix<f64>,
 }

@@ -26,7 +26,7 @@ pub(super) struct Mean {
     of_point: Vec<Option<usize>>,
     /// Motion of each of these points with its height, one column each.
     moves: Matrix3xX<f64>,
-    /// `Σ⁻¹` times these, one row a height, and `Σ⁻¹G`.
+    /// `Σ⁻¹` times these, one row per height, and `Σ⁻¹G`.
     weighted_moves: MatrixXx3<f64>,
     weighted: DMatrix<f64>,
     /// Cofactors between the shared unknowns and the sum of the points.

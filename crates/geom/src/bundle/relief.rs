@@ -11,7 +11,7 @@ use crate::{pushbroom::ExteriorOrientation, surface::ProfileOnRelief};
 /// Planimetric information from the relief of a site.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReliefOfSite {
-    /// Standard deviations towards east and north of the position of the images against the surface from heights only,
+    /// Standard deviations in east and north of the position of the images against the surface from heights only,
     /// metres, whether they are used for it or not.
     pub sigma_m: [f64; 2],
     /// Shifts of the profiles, when heights are used for it, without profiles whose shift is a separate unknown.

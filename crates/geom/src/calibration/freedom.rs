@@ -123,7 +123,7 @@ impl CalibrationState {
         }
     }
 
-    /// The state with an increment added to its parameters, in their order.
+    /// The state with an increment added to its parameters, in order.
     #[must_use]
     pub fn moved(&self, by: &DVector<f64>) -> Self {
         let mut moved = self.clone();
@@ -176,7 +176,7 @@ impl Freedom {
         }
     }
 
-    /// The differences of φ and of the scale `m₁` between the cameras, without their common parts: all that ties
+    /// The differences of φ and of the scale `m₁` between the cameras, without their common parts: all that tie points
     /// determine without bias (a common pitch can imitate a scale, which would bias it).
     #[must_use]
     pub fn differential(layout: Layout, sigma: impl Fn(Parameter) -> f64) -> Self {

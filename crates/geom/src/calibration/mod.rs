@@ -10,7 +10,7 @@
 //! which normal equations would lose in rounding.
 //!
 //! Free parameters are a matrix of combinations in units of their a priori standard deviations (`freedom`). Adjustment
-//! by ties only can therefore free the two differences that they determine and no others (decision 0025). The orbit
+//! by tie points only can therefore free the two differences that they determine and no others (decision 0025). The orbit
 //! drift is an unknown together with the camera; offsets absorb the constant part of the orbit error.
 
 mod camera;

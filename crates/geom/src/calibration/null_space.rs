@@ -77,7 +77,7 @@ impl AngleCombination {
 /// A combination of all offset angles, and its standard deviation from ties.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TieDirection {
-    /// Standard deviation from the ties only, radians; `None` where they do not determine it.
+    /// Standard deviation from the tie points only, radians; `None` where they do not determine it.
     pub sigma_rad: Option<f64>,
     /// Components along the named combinations, which have unit length, the largest first; those above a tenth.
     pub shares: Vec<(AngleCombination, f64)>,

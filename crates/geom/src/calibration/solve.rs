@@ -47,7 +47,7 @@ pub struct Start<'a> {
 pub struct Solved {
     /// The parameters.
     pub state: CalibrationState,
-    /// Their covariance, in their order; zero for fixed ones.
+    /// Their covariance, in order; zero for fixed ones.
     pub covariance: DMatrix<f64>,
     /// Positions of the points.
     pub places_m: Vec<Vector3<f64>>,

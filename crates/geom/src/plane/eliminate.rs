@@ -14,7 +14,7 @@ const FREE: f64 = 1e-10;
 /// Rows over the same pictures, which are identified by their positions in the order of elimination, ascending.
 pub(super) struct Rows {
     pub(super) pictures: Vec<usize>,
-    /// Row by row: two numbers a picture, then the right-hand side.
+    /// Row by row: two numbers per picture, then the right-hand side.
     pub(super) values: Vec<Number>,
     /// The first column of each row that is not 0, ascending.
     pub(super) leads: Vec<usize>,

@@ -25,7 +25,7 @@ pub struct Crossover {
     pub shared: [SharedErrors; 2],
     /// Position, Mars-fixed, at the mean of both heights, metres.
     pub place_m: Vector3<f64>,
-    /// Height by the first profile minus height by the second, each interpolated between two shots, metres.
+    /// Height from the first profile minus height from the second, each interpolated between two shots, metres.
     pub difference_m: f64,
     /// Standard deviation of this difference by the noise of four shots and by the ground between them, metres: without
     /// the errors that the shots of a profile share.

@@ -24,7 +24,7 @@ pub(super) struct Kriging {
 /// triangular equations.
 const BLOCK: usize = 64;
 
-/// Weights of shots, one column a point, with the multiplier that keeps their sum at 1.
+/// Weights of shots, one column per point, with the multiplier that keeps their sum at 1.
 pub(super) struct Weights {
     /// Variogram between shots and points, m².
     between_m2: DMatrix<f64>,
@@ -139,7 +139,7 @@ impl Kriging {
         0.5 * (&covariance + covariance.transpose())
     }
 
-    /// Sums of the weights of each profile, times the factor of the radial errors that its shots share, one row a profile.
+    /// Sums of the weights of each profile, times the factor of the radial errors that its shots share, one row per profile.
     pub(super) fn radial_of_profiles(&self, weights: &Weights) -> DMatrix<f64> {
         self.weights_of_profiles(weights, |shared| shared.radial)
     }
@@ -150,7 +150,7 @@ impl Kriging {
         self.weights_of_profiles(weights, |shared| shared.farther_m() / PROFILE_PLAN_M)
     }
 
-    /// Sums of the weights of each profile, one row a profile.
+    /// Sums of the weights of each profile, one row per profile.
     pub(super) fn sums_of_profiles(&self, weights: &Weights) -> DMatrix<f64> {
         self.weights_of_profiles(weights, |_shared| 1.0)
     }

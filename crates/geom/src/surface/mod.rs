@@ -153,7 +153,7 @@ pub struct SurfaceHeights {
 pub struct Relief {
     /// Change of each height with its position, metres per metre, Mars-fixed.
     pub by_place: Vec<Vector3<f64>>,
-    /// The possible shift of each profile of the surface, one entry a profile.
+    /// The possible shift of each profile of the surface, one entry per profile.
     pub profiles: Vec<ProfileOnRelief>,
 }
 
@@ -163,7 +163,7 @@ pub struct ProfileOnRelief {
     /// Index of the profile.
     pub profile: usize,
     /// Change of measured minus predicted heights when the profile is recorded farther to the east, to the north and
-    /// higher than its true position: one row a point.
+    /// higher than its true position: one row per point.
     pub by_shift: Matrix3xX<f64>,
     /// Standard deviations of these shifts, metres.
     pub sigma_m: Vector3<f64>,

@@ -59,7 +59,7 @@ pub fn attitude_sigma_m(attitude_known: bool, off_nadir_rad: f64, profile_sigma_
     up_m.hypot(unknown_m)
 }
 
-/// Standard deviations towards east, north and up with an additional one across a track, metres.
+/// Standard deviations in east, north and height with an additional one across a track, metres.
 ///
 /// * `ends_m` – first and last place of the track, Mars-fixed; of a single place the direction is unknown, and nothing is added
 #[must_use]

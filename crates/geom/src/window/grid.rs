@@ -21,7 +21,7 @@ const ROUNDING_RAD: f64 = 1e-6;
 const CAP_DEG: f64 = 0.25;
 const CAP_ON_PARALLEL_DEG: f64 = 0.09;
 
-/// Windows in their order, prepared for searches by direction.
+/// Windows in order, prepared for searches by direction.
 ///
 /// A cell has the windows that a cap about *some* direction in it touches; each of them is then tested. So no window is
 /// lost for any cap: for those larger than cells every window is tested.

@@ -67,7 +67,7 @@ impl Span {
 
 /// The spans of a file.
 ///
-/// * `tags_s` – time tags of its shots in their order, ET seconds
+/// * `tags_s` – time tags of its shots in order, ET seconds
 #[must_use]
 pub fn spans(file: usize, tags_s: impl IntoIterator<Item = f64>) -> Vec<Span> {
     let mut spans: Vec<Span> = Vec::new();

@@ -4,7 +4,7 @@
 //! `spiceinit` writes the same tables whether ISIS or ALE computed them. A state is read as the support data that it
 //! was made of (module `state`). The following applies to tables.
 //!
-//! The result is an [`ImageSupport`], as of image support data: no later stage distinguishes them, and nothing is
+//! The result is an [`ImageSupport`], as for image support data: no later stage distinguishes them, and no correction is
 //! applied to positions and attitudes; ISIS positions and attitudes contain the pointing bias of the camera.
 //! Differences are:
 //!

@@ -33,8 +33,8 @@ struct SpotsDocument<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
     line_time_s: Option<(f64, f64)>,
-    /// Footprints from the initial orientation minus the laser from the mounting: along the track in lines,
-    /// across it in focal-plane pixels.
+    /// Image positions of footprints from the initial orientation minus those from the mounting of the laser: along
+    /// the track in lines, across it in focal-plane pixels.
     footprints_off: &'a [Summary; 2],
 }
 

@@ -47,9 +47,9 @@ struct Document<'a> {
     format: &'static str,
     /// Identifier of the calibration.
     calibration: &'a str,
-    /// The body that it sees, as in `config/bodies`.
+    /// The body that the camera observes, as in `config/bodies`.
     body: &'static str,
-    /// Unknowns that ties estimate before control is used.
+    /// Unknowns that tie points estimate before control is used.
     mode: CalibrationMode,
     /// Whether the result is usable.
     verdict: &'a Verdict,
@@ -59,7 +59,7 @@ struct Document<'a> {
     /// Drift of the orbit from line to line, body-fixed, metres: true minus the support data that were given. The
     /// constant part of the orbit's error is in the offset angles.
     drift_m_per_line: [Value; 3],
-    /// Offset angles as determined by ties only.
+    /// Offset angles as determined by tie points only.
     tie_sight: TieSightDocument,
     /// Test of heights of tie points against the ground between laser points; absent where these are too few.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -101,10 +101,10 @@ struct RoundDocument {
     round: u32,
     /// Tie points.
     ties: u64,
-    /// Residuals of ties in the worst line, root mean square, pixels, with the cameras of the terrain model.
+    /// Root mean square residual of tie points in the worst line with the cameras of the terrain model, pixels.
     #[serde(skip_serializing_if = "Option::is_none")]
     model_tie_rms_px: Option<f64>,
-    /// Residuals of ties in the worst line, root mean square, pixels, with the cameras of this round.
+    /// Root mean square residual of tie points in the worst line with the cameras of this round, pixels.
     #[serde(skip_serializing_if = "Option::is_none")]
     tie_rms_px: Option<f64>,
     /// Share of the cells of the terrain model that have a height.
@@ -170,10 +170,10 @@ struct CameraDocument<'a> {
     isd_left_px: f64,
 }
 
-/// Offset angles as determined by ties only.
+/// Offset angles as determined by tie points only.
 #[derive(Serialize, JsonSchema)]
 struct TieSightDocument {
-    /// Number of directions that ties do not determine: with a standard deviation above one degree.
+    /// Number of directions that tie points do not determine: with a standard deviation above one degree.
     unseen: u32,
     /// Names of these.
     unseen_directions: Vec<String>,
@@ -184,7 +184,7 @@ struct TieSightDocument {
 /// A combination of all offset angles.
 #[derive(Serialize, JsonSchema)]
 struct DirectionDocument {
-    /// Standard deviation by ties only, degrees; absent if unbounded.
+    /// Standard deviation by tie points only, degrees; absent if unbounded.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
     sigma_deg: Option<f64>,

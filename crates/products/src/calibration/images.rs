@@ -69,28 +69,28 @@ fn columns<'a>() -> Vec<Column<&'a ImageResult>> {
         column(
             "before_across_px",
             Unit::Pixel,
-            "position by the uncalibrated camera (of a laser point: of its given coordinates) minus the measured position, across \
+            "position computed with the uncalibrated camera (for a laser point, from its given coordinates) minus the measured position, across \
              the flight, pixels",
             |row: &Row| row.before_px.map(|before_px| before_px[0]),
         ),
         column(
             "before_along_px",
             Unit::Pixel,
-            "position by the uncalibrated camera (of a laser point: of its given coordinates) minus the measured position, \
+            "position computed with the uncalibrated camera (for a laser point, from its given coordinates) minus the measured position, \
              along the flight, pixels",
             |row: &Row| row.before_px.map(|before_px| before_px[1]),
         ),
         column(
             "after_across_px",
             Unit::Pixel,
-            "position by the calibrated camera and orbit (of a laser point: of its given coordinates) minus the measured \
+            "position computed with the calibrated camera and orbit (for a laser point, from its given coordinates) minus the measured \
              position, across the flight, pixels",
             |row: &Row| row.after_px.map(|after_px| after_px[0]),
         ),
         column(
             "after_along_px",
             Unit::Pixel,
-            "position by the calibrated camera and orbit (of a laser point: of its given coordinates) minus the measured \
+            "position computed with the calibrated camera and orbit (for a laser point, from its given coordinates) minus the measured \
              position, along the flight, pixels",
             |row: &Row| row.after_px.map(|after_px| after_px[1]),
         ),

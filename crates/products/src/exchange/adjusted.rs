@@ -92,13 +92,13 @@ pub(super) fn adjusted(point: &CorrectedPoint) -> GroundEstimate {
     estimate(point.ground, point.covariance_m2)
 }
 
-/// Standard deviations of the error that all tie points share towards east, north and up, metres.
+/// Standard deviations of the error that all tie points share in east, north and height, metres.
 pub(super) fn shared_sigma_m(adjustment: &AdjustmentProducts) -> Option<[f64; 3]> {
     let heights = adjustment.adjusted.heights.as_ref();
     heights.map(|heights| heights.mean_sigma_m)
 }
 
-/// A priori knowledge of the shift of each profile with a range, in their order.
+/// A priori knowledge of the shift of each profile with a range, in order.
 fn profile_shifts<'a>(
     site: &'a SiteProducts<'a>,
     adjustment: &AdjustmentProducts,

@@ -24,7 +24,7 @@ pub(super) struct ResidualRow<'a> {
     pub(super) point: &'a str,
     pub(super) file: &'a str,
     pub(super) serial: &'a str,
-    /// Measured place in the focal plane as ISIS has it, along the track and with the samples, millimetres.
+    /// Measured position in the focal plane as ISIS defines it, along the track and along the samples, millimetres.
     pub(super) focal_mm: [f64; 2],
     /// Measured sample and line, the middle of the first pixel at 1.
     pub(super) place: [f64; 2],
@@ -48,7 +48,7 @@ pub(super) struct PointRow<'a> {
     /// Root mean square of the residuals of its measurements, pixels.
     pub(super) rms_px: f64,
     pub(super) ground: GroundEstimate,
-    /// Standard deviations towards east, north and up without the error that all points share, metres, where that is known.
+    /// Standard deviations in east, north and height without the error that all points share, metres, where that is known.
     pub(super) relative_sigmas_m: Option<[f64; 3]>,
     pub(super) initial_m: Vector3<f64>,
 }
@@ -64,7 +64,7 @@ pub(super) struct ImageRow<'a> {
     pub(super) correction: &'a [f64; ORIENTATION_UNKNOWNS],
     pub(super) prior_sigmas: &'a [f64; ORIENTATION_UNKNOWNS],
     pub(super) sigmas: &'a [f64; ORIENTATION_UNKNOWNS],
-    /// Standard deviations of the camera's position at the exposure of the middle line towards east, north and up, metres.
+    /// Standard deviations of the camera's position at the exposure of the middle line in east, north and height, metres.
     pub(super) local_sigmas_m: [f64; 3],
     /// Numbers of used and of rejected measurements.
     pub(super) measures: [usize; 2],

@@ -2,7 +2,7 @@
 //!
 //! Version 5 of the format. Coordinates are Mars-fixed metres, covariances the upper triangles of their matrices, m².
 //! Lines and samples have the middle of the first pixel at 1. Standard deviations and residuals of measurements count
-//! lines and samples of the image. A point that the adjustment rejected is there with `Ignore = True`, and its
+//! lines and samples of the image. A point that the adjustment rejected is included with `Ignore = True`, and its
 //! measurements with `JigsawRejected = True`.
 //!
 //! Source: `ControlNetVersioner.cpp` of ISIS.

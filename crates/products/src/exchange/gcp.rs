@@ -55,7 +55,7 @@ pub struct ControlMeasure<'a> {
 
 /// Writes the points that were measured in any image to `path`, which must end in `.gcp`; returns their number.
 ///
-/// * `shared_sigma_m` – standard deviations of the error that all points share towards east, north and up, metres
+/// * `shared_sigma_m` – standard deviations of the error that all points share in east, north and height, metres
 ///
 /// # Errors
 /// [`Kind::Bug`](areograph_base::error::Kind::Bug) for values that the reader would reject or misread:

@@ -56,9 +56,9 @@ pub struct LidarPoint<'a> {
 pub struct ProfileShift<'a> {
     /// Identifier of the profile.
     pub profile: &'a str,
-    /// Standard deviations towards east, north and up before the adjustment, metres.
+    /// Standard deviations in east, north and height before the adjustment, metres.
     pub apriori_sigma_m: [f64; 3],
-    /// Standard deviations towards east, north and up after the adjustment, metres.
+    /// Standard deviations in east, north and height after the adjustment, metres.
     pub adjusted_sigma_m: [f64; 3],
 }
 
@@ -164,7 +164,7 @@ fn check<'a>(
 ) -> std::result::Result<(), ProductError> {
     let id = point.id;
     if !ids.insert(id) {
-        let reason = format!("two points have the identifier {id}; expected each once");
+        let reason = format!("two points have the identifier {id}; expected unique identifiers");
         let action = "write a point";
         return Err(ProductError::Refused { action, reason });
     }

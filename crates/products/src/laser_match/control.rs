@@ -65,13 +65,13 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "longitude_deg",
             Unit::Degree,
-            "east longitude by the laser, -180 to 180 degrees",
+            "east longitude from the laser, -180 to 180 degrees",
             |row: &Row| signed_longitude_deg(wrap_two_pi(row.point.laser[0])),
         ),
         column(
             "latitude_deg",
             Unit::Degree,
-            "areocentric latitude by the laser, degrees",
+            "areocentric latitude from the laser, degrees",
             |row: &Row| degrees(row.point.laser[1]),
         ),
         column(
@@ -83,7 +83,7 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "sigma_matching_horizontal_m",
             Unit::Metre,
-            "standard deviation of a horizontal coordinate by the matching, metres; calibrations add it to the laser's own",
+            "standard deviation of a horizontal coordinate from the matching, metres; calibrations add it to the laser's own",
             |row: &Row| row.point.sigma_horizontal_m(),
         ),
         column(

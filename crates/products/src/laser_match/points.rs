@@ -12,7 +12,7 @@ use areograph_stages::match_laser::MatchedPoint;
 
 pub(super) static TABLE: Declaration<WriteMatch> = Declaration {
     path: "control_points.parquet",
-    what: "a laser control point of every unit that is kept: its position by the laser and in the model",
+    what: "a laser control point of every unit that is kept: its position from the laser and in the model",
     readers: "scripts",
     rows: "points",
     role: Role::Data,
@@ -52,13 +52,13 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "longitude_deg",
             Unit::Degree,
-            "east longitude by the laser, IAU 2000, -180 to 180 degrees",
+            "east longitude from the laser, IAU 2000, -180 to 180 degrees",
             |row: &Row| signed_longitude_deg(wrap_two_pi(row.laser[0])),
         ),
         column(
             "latitude_deg",
             Unit::Degree,
-            "areocentric latitude by the laser, degrees",
+            "areocentric latitude from the laser, degrees",
             |row: &Row| degrees(row.laser[1]),
         ),
         column(
@@ -88,19 +88,19 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "sigma_east_m",
             Unit::Metre,
-            "standard deviation of model minus laser towards the east, by the matching only, metres",
+            "standard deviation of model minus laser in east, by the matching only, metres",
             |row: &Row| row.sigma_m[0],
         ),
         column(
             "sigma_north_m",
             Unit::Metre,
-            "standard deviation of model minus laser towards the north, by the matching only, metres",
+            "standard deviation of model minus laser in north, by the matching only, metres",
             |row: &Row| row.sigma_m[1],
         ),
         column(
             "sigma_up_m",
             Unit::Metre,
-            "standard deviation of model minus laser in height, by the matching only, metres",
+            "standard deviation of model minus laser in height, from the matching only, metres",
             |row: &Row| row.sigma_m[2],
         ),
     ]

@@ -1,6 +1,6 @@
 //! TIFF with tiles, and overviews that viewers use to show all of a long image.
 //!
-//! Lines are kept in an unnamed file until all of them are there; each overview is made from the one before it, so that
+//! Lines are kept in an unnamed file until all of them are present; each overview is made from the one before it, so that
 //! memory holds a row of tiles only.
 
 use std::{

@@ -290,7 +290,7 @@ fn boresight(from_camera: &Matrix3<f64>) -> Vector3<f64> {
 
 /// The three axes of the orbit at row `index`, as columns in Mars-fixed components; there are at least two rows.
 ///
-/// The flight is seen in inertial space: in the frame of Mars itself it would lean by up to 4 degrees.
+/// The direction of flight is taken in inertial space: in the Mars-fixed frame, it would deviate by up to 4 degrees.
 fn orbit_axes(body: Body, rows: &[SampleRow], index: usize) -> Matrix3<f64> {
     let inertial = |index: usize| {
         let row = &rows[index];

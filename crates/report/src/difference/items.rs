@@ -151,7 +151,7 @@ pub(super) fn images(manifest: &Manifest, orientation: &str) -> Vec<String> {
         .collect()
 }
 
-/// Names of `a` in their order, then those only in `b`.
+/// Names of `a` in order, then those only in `b`.
 pub(super) fn united(a: &[String], b: &[String]) -> Vec<String> {
     let unmatched = b.iter().filter(|name| !a.contains(name));
     a.iter().chain(unmatched).cloned().collect()

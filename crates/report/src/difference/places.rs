@@ -13,7 +13,7 @@ pub type Moved = [Vector3<f64>; 2];
 /// Number of places kept per kind.
 const KEPT: usize = 400;
 
-/// At most `KEPT` of `moved`, evenly chosen in their order.
+/// At most `KEPT` of `moved`, evenly chosen in order.
 pub(super) fn some_of(moved: impl ExactSizeIterator<Item = Moved>) -> Vec<Moved> {
     let step = moved.len().div_ceil(KEPT).max(1);
     moved.step_by(step).collect()

@@ -27,7 +27,7 @@ pub(crate) fn many(site: &SiteProducts) -> bool {
     site.profiles.len() > PROFILES_ALONE
 }
 
-/// Profiles with separate plots, by index, in their order.
+/// Profiles with separate plots, by index, in order.
 pub(crate) fn plotted(site: &SiteProducts) -> Vec<usize> {
     let measured = |index: &usize| site.ranges.profiles[*index].measured() > 0;
     let mut indices: Vec<usize> = (0..site.profiles.len()).filter(measured).collect();

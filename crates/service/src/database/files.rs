@@ -116,7 +116,7 @@ pub struct RootRow {
     pub files: i64,
     /// Whether they can be used.
     pub state: RootState,
-    /// Since when, milliseconds of UTC since 1970.
+    /// Start, milliseconds of UTC since 1970.
     pub since_ms: i64,
     /// The reason.
     pub detail: String,

@@ -8,7 +8,7 @@ use crate::{clock::utc_text, words::counted};
 /// A loss.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Loss {
-    /// Time at which the database was made again, milliseconds of UTC since 1970.
+    /// Time at which the database was rebuilt, milliseconds of UTC since 1970.
     pub at_ms: i64,
     /// Sites with runs that were found on the disk.
     pub sites: i64,
@@ -51,7 +51,7 @@ impl Loss {
     #[must_use]
     pub fn words(&self) -> String {
         format!(
-            "the database was made again from the products on {}: {}, {}. Tokens, sessions, jobs, nights, events, pins and audit \
+            "the database was rebuilt from the products on {}: {}, {}. Tokens, sessions, jobs, nights, events, pins and audit \
              records from before are lost; create new tokens with `areograph service token add`",
             utc_text(self.at_ms),
             counted(self.sites, "site"),

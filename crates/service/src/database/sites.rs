@@ -23,7 +23,7 @@ pub struct SiteRow {
     pub current_run: Option<String>,
     /// Time at which all its inputs were last compared, milliseconds of UTC since 1970.
     pub checked_ms: Option<i64>,
-    /// Since when the products do not correspond to the inputs.
+    /// Time from which the products have not corresponded to the inputs.
     pub stale_since_ms: Option<i64>,
     /// The reason.
     pub stale_because: Option<String>,
@@ -153,7 +153,7 @@ pub fn put_unchanged(
     Ok(())
 }
 
-/// Records since when and why a site's products do not match its inputs; the first instant is kept.
+/// Records the time from which, and the reason why, a site's products do not match its inputs; the first instant is kept.
 ///
 /// # Errors
 /// SQLite errors.

@@ -1,4 +1,4 @@
-//! Damaged products: reported once for each run; a current run is made again.
+//! Damaged products: reported once for each run; a current run is repeated.
 
 use std::{collections::BTreeMap, fs::File, io, path::Path};
 
@@ -37,7 +37,7 @@ pub fn is_known_damage(connection: &Connection, run: &str) -> Stored<bool> {
     Ok(damaged_products(connection, run)? > 0)
 }
 
-/// Reports damage, if it is new. A current run is made again, unless a job of its site is active.
+/// Reports damage, if it is new. A current run is repeated, unless a job of its site is active.
 ///
 /// # Errors
 /// SQLite errors.

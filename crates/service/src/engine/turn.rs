@@ -72,7 +72,7 @@ pub struct Engine<W> {
 }
 
 impl<W: Workers> Engine<W> {
-    /// Creates the engine of a service, after adoption of an earlier one's state. A lost database is first made again
+    /// Creates the engine of a service, after adoption of an earlier one's state. A lost database is first rebuilt
     /// from the products.
     ///
     /// # Errors

@@ -20,7 +20,7 @@ const READS: usize = 8;
 /// Concurrent streams of events.
 pub(super) const STREAMS: usize = 64;
 
-/// Time after which a request is worth repeating while a lost database is made again.
+/// Time after which a request is worth repeating while a lost database is rebuilt.
 const RECOVERY_S: u32 = 10;
 /// Concurrent workers for plans and searches.
 const WORKERS: usize = 2;
@@ -79,11 +79,11 @@ impl App {
         Arc::clone(&kept.1)
     }
 
-    /// The answer to a request for a site or run that is unknown: while a lost database is made again, it may appear.
+    /// The answer to a request for a site or run that is unknown: while a lost database is rebuilt, it may appear.
     pub(super) fn unknown(&self, detail: &'static str) -> Problem {
         if self.shared.is_recovering() {
             return Problem::busy(
-                "The database is being made again from the products. Try again.",
+                "The database is being rebuilt from the products. Try again.",
                 RECOVERY_S,
             );
         }

@@ -41,9 +41,9 @@ pub struct Adjusted {
     /// Position of the tie points by the other reading of the along-track disagreement, or the reason why it is not
     /// determined; `None` where the disagreement is small.
     pub other_reading: Option<std::result::Result<OtherReading, String>>,
-    /// One entry for each image, in their order.
+    /// One entry for each image, in order.
     pub images: Vec<CorrectedImage>,
-    /// Points with adjusted coordinates: shots, then tie points, each in their order.
+    /// Points with adjusted coordinates: shots, then tie points, each in order.
     pub points: Vec<CorrectedPoint>,
     /// Image coordinates of these points.
     pub views: Vec<ImageResidual>,
@@ -189,7 +189,7 @@ impl CorrectedImage {
 }
 
 impl CorrectedPoint {
-    /// Standard deviations towards east, north and up, metres.
+    /// Standard deviations in east, north and height, metres.
     #[must_use]
     pub fn local_sigmas_m(&self) -> [f64; 3] {
         self.local_roots_m(&self.covariance_m2)

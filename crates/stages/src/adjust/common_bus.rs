@@ -131,7 +131,7 @@ pub(super) fn add_spots<M: ExteriorOrientation>(
     Ok(Ok(()))
 }
 
-/// Standard deviations of the shift of a recorded profile towards east, north and up, metres, about the part that follows the
+/// Standard deviations of the shift of a recorded profile in east, north and height, metres, about the part that follows the
 /// rotation of its image (`shared`). Where none does, the attitude error that the profile shares is independent.
 fn shift_sigmas_m<M>(
     images: &[AdjustImage<M>],

@@ -38,7 +38,7 @@ pub enum AdjustError {
         steps: usize,
         /// The sum when the iteration stopped.
         weighted_squares: f64,
-        /// The keys that hold the orientations, with their values.
+        /// The keys that constrain the orientations, with their values.
         held_by: String,
     },
     /// An invalid standard deviation, coordinate or number.
@@ -62,7 +62,7 @@ pub enum AdjustError {
     #[error("two shots have the identifier {0}")]
     #[cause("leave out the second file, or renumber the shots")]
     DuplicateShot(String),
-    /// An orientation that sees no ground.
+    /// An image that shows no ground according to its orientation.
     #[error("image {image}: its orientation sees no ground: {unseen}")]
     #[cause("check the orientation samples of the image")]
     Blind {

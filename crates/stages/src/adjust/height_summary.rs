@@ -44,7 +44,7 @@ pub struct HeightSummary {
     pub beyond_limit: usize,
     /// Tie points that were rejected for their height; they are not among the compared ones.
     pub rejected: usize,
-    /// Standard deviations of the mean of these points towards east, north and up, metres: their common errors and,
+    /// Standard deviations of the mean of these points in east, north and height, metres: their common errors and,
     /// upwards, the shift of the mean by those beyond the limit, some of which may err.
     #[schemars(transform = none_negative)]
     pub mean_sigma_m: [f64; 3],
@@ -102,7 +102,7 @@ pub(super) fn heights<M>(
     })
 }
 
-/// Standard deviations of the error that tie points share towards east, north and up, metres: standard deviations of
+/// Standard deviations of the error that tie points share in east, north and height, metres: standard deviations of
 /// their mean and, upwards, the shift of the mean by points beyond the limit.
 pub(super) fn datum_sigma_m(adjustment: &Adjustment, variance_factor: f64) -> Option<[f64; 3]> {
     let [east_m, north_m, up_m] = mean_sigma_m(adjustment, variance_factor)?;
@@ -115,7 +115,7 @@ pub(super) fn datum_sigma_m(adjustment: &Adjustment, variance_factor: f64) -> Op
     Some([east_m, north_m, up_m.hypot(moved_m)])
 }
 
-/// Standard deviations of the mean of the points with an observed height towards east, north and up, metres.
+/// Standard deviations of the mean of the points with an observed height in east, north and height, metres.
 pub(super) fn mean_sigma_m(adjustment: &Adjustment, variance_factor: f64) -> Option<[f64; 3]> {
     let points = adjustment.heights.iter();
     let points = points.filter_map(|height| adjustment.points[height.point].as_ref().ok());

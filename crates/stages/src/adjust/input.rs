@@ -73,9 +73,9 @@ pub(super) fn hold_powers(
 /// The laser shots of an adjustment.
 #[derive(Debug, Clone, Default)]
 pub struct LaserShots {
-    /// Identifiers of the site's profiles, in their order.
+    /// Identifiers of the site's profiles, in order.
     pub profiles: Vec<String>,
-    /// Standard deviations of the offset of each profile as recorded, towards east, north and up, metres; its footprints
+    /// Standard deviations of the offset of each profile as recorded, in east, north and height, metres; its footprints
     /// share it.
     pub profile_sigmas_m: Vec<Vector3<f64>>,
     /// Shots, each row once.

@@ -111,7 +111,7 @@ impl LineDelay {
     }
 }
 
-/// Standard deviation of the delay of all lines of an image that is no unknown of the adjustment, seconds.
+/// Standard deviation of the delay of all lines of an image that is not an unknown of the adjustment, seconds.
 pub(super) fn delay_sigma_s(config: &AdjustmentConfig) -> f64 {
     let is_unknown = config.time_bias_sigma_s > 0.0;
     // By the attitude clock, line times are right; the published model knows positions to 100 m and no line times.

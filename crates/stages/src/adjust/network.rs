@@ -39,7 +39,7 @@ pub(super) struct Assembled<M> {
     /// Profiles with a range.
     pub(super) profiles: Vec<Named>,
     pub(super) rejected: Vec<RejectedPoint>,
-    /// Image coordinates of the footprints by the initial orientations.
+    /// Image coordinates of the footprints from the initial orientations.
     pub(super) mola: Vec<View>,
     /// Standard deviation of a delay of all lines of an image: as configured, and as far as it is no unknown, seconds.
     pub(super) plausible_delay_s: f64,
@@ -118,7 +118,7 @@ pub(super) fn projector<'a, M, O: ExteriorOrientation>(
     Ok(projector.through(image.oriented_camera.detector.distortion))
 }
 
-/// Image coordinates of the footprints by the initial orientations, in and around each image.
+/// Image coordinates of the footprints from the initial orientations, in and around each image.
 fn footprints_in_images<M: ExteriorOrientation>(
     images: &[AdjustImage<M>],
     shots: &LaserShots,

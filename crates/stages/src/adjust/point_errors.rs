@@ -15,7 +15,7 @@ use areograph_geom::{bundle::Adjustment, ellipsoid::local_axes, statistics::BAAR
 /// An error that a point has in common with others.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SharedError {
-    /// Standard deviations of the error towards east, north and up, metres: for tie points the error of their mean, for
+    /// Standard deviations of the error in east, north and height, metres: for tie points the error of their mean, for
     /// a footprint the shift of its profile.
     pub sigma_m: [f64; 3],
     /// Covariance of the point without it, m².

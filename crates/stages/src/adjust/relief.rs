@@ -12,7 +12,7 @@ use areograph_geom::bundle::Adjustment;
 pub struct ReliefSummary {
     /// Whether heights on slopes were used for the horizontal position.
     pub used: bool,
-    /// Standard deviations towards east and north of the images' position against the MOLA surface from relief only,
+    /// Standard deviations in east and north of the images' position against the MOLA surface from relief only,
     /// metres.
     #[schemars(transform = none_negative)]
     pub sigma_m: [f64; 2],

@@ -39,7 +39,7 @@ pub struct OtherReading {
     pub attitude_clock_s: Option<(f64, f64)>,
     /// Mean of the tie points by this reading minus their mean by the adjustment, towards east, north and up, metres.
     pub moved_m: [f64; 3],
-    /// Standard deviations of their mean by this reading, towards east, north and up, metres; `None` where no surface
+    /// Standard deviations of their mean by this reading, in east, north and height, metres; `None` where no surface
     /// controls heights.
     pub mean_sigma_m: Option<[f64; 3]>,
 }

@@ -168,7 +168,7 @@ pub struct AdjustmentSummary {
     pub shots: GroundSummary,
     /// Tie points.
     pub ties: GroundSummary,
-    /// One entry for each image, in their order.
+    /// One entry for each image, in order.
     pub images: Vec<ImageSummary>,
     /// Range bias of each profile with its standard deviation, metres, where they are unknowns.
     #[schemars(transform = at("/items/prefixItems/2", "minimum", 0))]

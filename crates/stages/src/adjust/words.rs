@@ -47,7 +47,7 @@ pub(super) fn in_words<M>(
     }
 }
 
-/// The keys that hold orientations, with their values.
+/// The keys that constrain orientations, with their values.
 fn held_by(config: &AdjustmentConfig) -> String {
     let of_model = match config.model {
         AdjustmentModel::MolaSurface => {

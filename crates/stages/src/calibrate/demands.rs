@@ -2,7 +2,7 @@
 
 use super::{error::CalibrateError, geometry::CameraImage, read::OrbitPoint, result::PointKind};
 
-/// Minimum number of ties of a camera.
+/// Minimum number of tie points of a camera.
 const TIES_MIN: usize = 10;
 /// Minimum number of control points of each kind.
 pub const CONTROLS_MIN: usize = 5;

@@ -122,7 +122,7 @@ impl ControlOffset {
     }
 }
 
-/// Ties that the calibration makes worse.
+/// Tie points that the calibration makes worse.
 fn ties(orbit: &ValidationResult, cameras: &[CameraResult]) -> Vec<String> {
     let mut worse = Vec::new();
     let [before, after] = [&orbit.before, &orbit.after].map(|of| &of.ties.cameras_px);

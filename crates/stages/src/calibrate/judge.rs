@@ -14,9 +14,9 @@ use areograph_geom::{calibration::TieSight, statistics::unit_weight_limits};
 const SCATTER_MAX: f64 = 1.5;
 /// Below this scatter, standard deviations are too large.
 const SCATTER_MIN: f64 = 0.6;
-/// Largest acceptable residual of ties, pixels; beyond it, the lines do not agree.
+/// Largest acceptable residual of tie points, pixels; beyond it, the lines do not agree.
 const TIES_MAX_PX: f64 = 1.0;
-/// Residuals of ties above this many of their standard deviations are a remark.
+/// Residuals of tie points above this many of their standard deviations are a remark.
 const TIES_SIGMAS: f64 = 2.0;
 /// Share of points that may be left out.
 const LEFT_OUT_MAX: f64 = 0.1;
@@ -42,7 +42,7 @@ pub(super) struct Evidence<'a> {
     pub(super) untested: Vec<String>,
     /// A priori knowledge.
     pub(super) known: Known,
-    /// Median standard deviation of the measurements of ties, pixels.
+    /// Median standard deviation of the measurements of tie points, pixels.
     pub(super) tie_sigma_px: f64,
     /// Remarks on the body's frame in the support data.
     pub(super) of_frames: Vec<String>,
@@ -180,22 +180,22 @@ fn scatters(of: &Evidence<'_>) -> Vec<Judged> {
     [
         judged(
             CheckKind::HeldBackPlane,
-            "residuals of withheld control in the plane",
+            "horizontal residuals of the withheld control",
             held_plane,
         ),
         judged(
             CheckKind::HeldBackHeight,
-            "residuals of withheld control in height",
+            "height residuals of the withheld control",
             held_height,
         ),
         judged(
             CheckKind::ControlPlane,
-            "residuals of used control in the plane",
+            "horizontal residuals of the control used",
             plane,
         ),
         judged(
             CheckKind::ControlHeight,
-            "residuals of used control in height",
+            "height residuals of the control used",
             height,
         ),
     ]

@@ -1,4 +1,4 @@
-//! Calibration of the lines of a camera: by ties only, then with laser control, validated by withheld control.
+//! Calibration of the lines of a camera: by tie points only, then with laser control, validated by withheld control.
 //!
 //! This stage knows support data, names and withheld points. The axes across, along and down are the spacecraft axes
 //! nearest to these directions in the first image. Calibrated support data are the given ones with a straight line of

@@ -15,9 +15,9 @@ pub struct Calibration {
     pub cameras: Vec<CameraResult>,
     /// Drift of the orbit from line to line, body-fixed, metres; the calibrated support data contain it.
     pub drift_m_per_line: [Value; 3],
-    /// Sensitivity of ties to the offset angles.
+    /// Sensitivity of tie points to the offset angles.
     pub tie_sight: TieSight,
-    /// The test of ties against the ground between laser points; `None` where these are too few.
+    /// The test of tie points against the ground between laser points; `None` where these are too few.
     pub tie_ground: Option<TieGround>,
     /// The figures before the first and after every step.
     pub steps: Vec<CalibrationStep>,

@@ -17,10 +17,10 @@ const CONTROL_SHARE: f64 = 0.02;
 impl CalibrationRound {
     /// The numbers of round `round`.
     ///
-    /// * `tied` – the calibration by ties only, with whose cameras the terrain model was made
+    /// * `tied` – the calibration by tie points only, with whose cameras the terrain model was made
     /// * `filled` – share of that model with heights
     /// * `control` – the match of the laser with it
-    /// * `done` – the calibration by ties and control
+    /// * `done` – the calibration by tie points and control
     #[must_use]
     pub fn of(
         round: u32,

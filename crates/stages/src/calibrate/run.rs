@@ -1,4 +1,4 @@
-//! The steps of a calibration: ties only; with control the angles, then the look angles, then all parameters with the
+//! The steps of a calibration: tie points only; with control the angles, then the look angles, then all parameters with the
 //! orbit.
 
 use nalgebra::DMatrix;
@@ -34,7 +34,7 @@ const LEFT_OUT: f64 = 8.0;
 /// Maximum rounds of leaving out points.
 const ROUNDS: usize = 3;
 
-/// Kinds of point in the step of ties, and in the steps with control.
+/// Kinds of point in the step of tie points, and in the steps with control.
 const TIES: &[PointKind] = &[PointKind::Tie];
 const ALL: &[PointKind] = &[PointKind::Tie, PointKind::Control];
 
@@ -47,9 +47,9 @@ struct Work<'a> {
     steps: Vec<CalibrationStep>,
     state: CalibrationState,
     covariance: DMatrix<f64>,
-    /// The test of ties against the ground; `None` where it is not possible.
+    /// The test of tie points against the ground; `None` where it is not possible.
     tie_ground: Option<TieGround>,
-    /// Heights of ties that were left out above or below the ground, metres.
+    /// Heights of tie points that were left out above or below the ground, metres.
     off_m: Vec<f64>,
 }
 
@@ -67,7 +67,7 @@ pub(super) fn calibrate(config: &CalibrationConfig) -> Result<Calibration> {
     calibrate_by(config, &support, &tables, is_controlled)
 }
 
-/// Calibrates the lines of a camera, given by their support data, by given points; without control by ties only.
+/// Calibrates the lines of a camera, given by their support data, by given points; without control by tie points only.
 ///
 /// # Errors
 /// Support data that cannot be read or do not belong together; points that do not fit them, or too few points; the same
@@ -199,7 +199,7 @@ fn left_out(points: &[OrbitPoint]) -> [[usize; 2]; 2] {
     })
 }
 
-/// Median standard deviation of the measurements of ties, pixels.
+/// Median standard deviation of the measurements of tie points, pixels.
 fn tie_sigma_px(points: &[OrbitPoint]) -> f64 {
     let ties = points.iter().filter(|point| point.kind == PointKind::Tie);
     let measured = ties.flat_map(|point| &point.measured);
@@ -310,14 +310,14 @@ impl Work<'_> {
         Ok(solved.steps)
     }
 
-    /// The step of ties.
+    /// The step of tie points.
     fn ties(&mut self) -> std::result::Result<(), CalibrateError> {
         let layout = self.state.layout();
         let known = &self.config.a_priori;
         let (freedom, free) = match self.config.solution.mode {
             CalibrationMode::Differential => (
                 Freedom::differential(layout, self.sigma(known.control_angle_rad)),
-                "differences of roll and scale between the cameras",
+                "differences in roll and scale between the cameras",
             ),
             CalibrationMode::AsPublished => (
                 Freedom::each(layout, self.sigma(known.angle_rad), is_angle),

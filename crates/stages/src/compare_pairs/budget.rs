@@ -50,7 +50,7 @@ pub(super) const fn moments_of(along: &Summary, across: &Summary) -> ResidualMom
     }
 }
 
-/// The observed along-track misregistration over the footprints of all profiles, by the line spacing of the second image.
+/// The observed along-track misregistration over the footprints of all profiles, in metres: lines times the line spacing of the second image.
 fn misregistration(footprints: &FootprintsByTies, line_spacing_m: f64) -> Option<Misregistration> {
     let profiles = &footprints.profiles;
     let mean_lines = over_footprints(profiles, |of| of.lines.mean)?;

@@ -1,4 +1,4 @@
-//! Heights of footprints by a pair of images: rays to the places of a footprint, one transferred through tie points,
+//! Heights of footprints from a pair of images: rays to the places of a footprint, one transferred through tie points,
 //! intersect at a height that the altimeter tests.
 
 use serde::{Deserialize, Serialize};
@@ -15,7 +15,7 @@ use areograph_geom::{
     pushbroom::ExteriorOrientation,
 };
 
-/// A footprint by the rays of a pair.
+/// A footprint from the rays of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FootprintHeight {
     /// Row of the footprint.
@@ -29,7 +29,7 @@ pub struct FootprintHeight {
 }
 
 impl FootprintHeight {
-    /// Height by the images above that by the altimeter, metres.
+    /// Height from the images above that from the altimeter, metres.
     #[must_use]
     pub fn above_m(&self) -> f64 {
         self.height_m - self.mola_m

@@ -67,7 +67,7 @@ impl Default for IntersectOptions {
 pub struct IntersectedTies {
     /// Points, in the order of the tie points.
     pub points: Vec<IntersectedPoint>,
-    /// Tie points without a ground point, in their order.
+    /// Tie points without a ground point, in order.
     pub rejected: Vec<RejectedTie>,
     /// Standard deviation of unit weight over all points; 1 without redundancy.
     pub sigma0: f64,

@@ -51,7 +51,7 @@ impl AdjustmentEvidence<'_> {
         let parted = self.parted();
         if !parted.is_empty() {
             invalid.push(format!(
-                "no tie point of {} took part in the adjustment: check their labels, and the tie points in ties.parquet",
+                "no tie point of {} was used in the adjustment: check their labels, and the tie points in ties.parquet",
                 parted.join("; ")
             ));
         }
@@ -194,7 +194,7 @@ impl AdjustmentEvidence<'_> {
         remarks
     }
 
-    /// Tie points that took part in the adjustment.
+    /// Tie points used in the adjustment.
     pub(super) fn taken(&self) -> usize {
         let points = self.adjusted.points.iter();
         points.filter(|point| point.kind == PointKind::Tie).count()
@@ -343,7 +343,7 @@ impl AdjustmentEvidence<'_> {
         let taken = self.taken();
         if taken < limits.ties_min as usize {
             remarks.push(format!(
-                "only {taken} tie points took part in the adjustment, expected at least {}",
+                "only {taken} tie points were used in the adjustment, expected at least {}",
                 limits.ties_min
             ));
         }

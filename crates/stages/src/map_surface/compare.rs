@@ -15,7 +15,7 @@ const SLOPE_STEP_M: f64 = 100.0;
 /// Every shot of the profiles on a model against its height there.
 ///
 /// The statistics of all shots refer to profiles at nadir, whose heights do not depend on the attitude (decision 0028). Only
-/// where these have too few shots on the model do they refer to all profiles, each with the error by its attitude.
+/// where these have too few shots on the model do they refer to all profiles, each with the error due to its attitude.
 pub(super) fn compare(
     model: &SurfaceModel,
     footprints: &Footprints<BodyFixed>,

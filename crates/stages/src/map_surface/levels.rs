@@ -94,7 +94,7 @@ pub(super) fn all_levels(
     Ok(cells)
 }
 
-/// Calls `work` for every tile of a level, on all threads; the cells in their order.
+/// Calls `work` for every tile of a level, on all threads; the cells in order.
 fn every_tile(
     level: &Level<'_>,
     watch: Watch<'_>,

@@ -83,7 +83,7 @@ stage_inputs! {
         pub laser_surface: &'a MolaSurfaceConfig,
         /// The adjustment that gave the images their orientation.
         pub adjusted: AdjustmentOfImages<'a>,
-        /// Largest common error of heights by the images, metres.
+        /// Largest common error of heights from the images, metres.
         pub off_m: &'a f64,
     }
 }
@@ -117,7 +117,7 @@ enum SurfaceError {
 struct Found {
     /// Above the sphere, metres.
     height_m: f64,
-    /// Standard deviation of the height by the match, metres.
+    /// Standard deviation of the height from the match, metres.
     sigma_m: f64,
     /// Offset of the second image across the parallax, samples of the ground.
     aside: f64,
@@ -202,7 +202,7 @@ struct Options {
     body: Body,
     /// Edge of a cell, metres.
     cell_m: f64,
-    /// Largest common error of heights by the images, metres.
+    /// Largest common error of heights from the images, metres.
     off_m: f64,
 }
 

@@ -8,7 +8,7 @@ use areograph_base::error::Cause;
 pub enum MatchError {
     /// Two files hold the same shots.
     #[error(
-        "contains shots of {other}; every shot counts once, because withheld shots must not take part in the match"
+        "contains shots of {other}; every shot counts once, because withheld shots must not be used in the match"
     )]
     #[cause("name only one of the two files")]
     SharedShots {

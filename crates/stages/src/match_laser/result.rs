@@ -85,7 +85,7 @@ pub struct MatchRequest {
     pub images: Vec<MatchImage>,
 }
 
-/// An image by its support data.
+/// An image with its support data.
 #[derive(Debug, Clone, Serialize)]
 pub struct MatchImage {
     /// Name in the control table: the name of a camera of `areograph calibrate`.
@@ -180,7 +180,7 @@ impl UnitResult {
     }
 }
 
-/// Result of the search of a unit: position of the ground in the model relative to its position by the laser.
+/// Result of the search of a unit: position of the ground in the model relative to its position from the laser.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct UnitMatch {
     /// Shift to the east and the north, cells.
@@ -243,7 +243,7 @@ pub struct MatchedPoint {
     pub laser: [f64; 3],
     /// East longitude, latitude, radians, and radius, metres, by the model.
     pub model: [f64; 3],
-    /// Standard deviations of their difference towards the east, the north and up, metres, from the matching only.
+    /// Standard deviations of their difference in east, north and height, metres, from the matching only.
     pub sigma_m: [f64; 3],
     /// Line and sample in each image, where the image shows it.
     pub in_images: Vec<Option<[f64; 2]>>,

@@ -20,7 +20,7 @@ pub(super) enum TiesError {
     #[cause("give files with measurements in ties.files")]
     Empty,
     #[error("none of the {points} tie points is measured in two images of the site")]
-    #[cause("measure tie points in at least two images, or leave out the table ties")]
+    #[cause("measure tie points in at least two images, or omit the table [ties]")]
     NoneJoins { points: usize },
     #[error("tie points are measured in {found}; expected images of the site: {expected}")]
     #[cause("set images.serial_number of each image to its name in the file")]

@@ -229,7 +229,7 @@ fn interpolated(shown_sigmas_m: &[f32], model: &SurfaceModel) -> u32 {
     u32::try_from(interpolated.count()).unwrap_or(u32::MAX)
 }
 
-/// Standard deviations of the mean place of the adjusted tie points, towards east and north, metres.
+/// Standard deviations of the mean place of the adjusted tie points, in east and north, metres.
 fn shared_sigma_m(adjusted: &Adjusted) -> Option<[f64; 2]> {
     let [east_m, north_m, _] = adjusted.heights.as_ref()?.mean_sigma_m;
     Some([east_m, north_m])

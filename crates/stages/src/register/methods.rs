@@ -30,7 +30,7 @@ pub enum Method {
 pub struct MethodRun {
     /// The iteration.
     pub method: Method,
-    /// The orientation: of first order as in Shan, Lee & Yoon 2002, or of second as in Shan et al. 2005.
+    /// Order of the orientation polynomials: first as in Shan, Lee & Yoon 2002, or second as in Shan et al. 2005.
     #[schemars(extend("enum" = ["first_order", "second_order"]))]
     pub model: CameraModel,
     /// Points that were tried.

@@ -1,4 +1,4 @@
-//! Orientation of an image by its support data: their tables, sampled as kernels are.
+//! Orientation of an image from its support data: their tables, sampled as kernels are.
 
 use nalgebra::Vector3;
 

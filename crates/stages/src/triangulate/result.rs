@@ -147,13 +147,13 @@ pub struct BrickResult {
     pub largest_m: [f64; 2],
     /// Root mean square of δX and δY, metres.
     pub rms_m: [f64; 2],
-    /// Standard deviation of a coordinate by their median, metres.
+    /// Standard deviation of a coordinate from their median, metres.
     pub robust_sigma_m: f64,
     /// Measurements beyond 3.5 of these that are still in use.
     pub flagged: u32,
     /// Measurements that were left out.
     pub removed: u32,
-    /// Shrinkage by its two rough guesses, before it was reversed.
+    /// Shrinkage that the two approximate points of a brick cause, before its reversal.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub shrinkage: Option<ShrinkageResult>,
 }

@@ -26,7 +26,7 @@ const PIECE_BYTES: usize = 1 << 17;
 /// Bytes of the length of the table of contents.
 const TAIL_BYTES: u64 = 8;
 
-/// A file that is no book, or an output that cannot be written or read.
+/// A file that is not a book, or an output that cannot be written or read.
 #[derive(Debug, thiserror::Error, Cause)]
 enum BookError {
     #[error("these are not outputs of this version of areograph: {0}")]

@@ -11,7 +11,7 @@
 //! change of the computation raises the `METHOD` of the stage. `docs/methods.csv` holds the output of every stage for
 //! fixed scenes with its number, and `tests/products/methods.rs` fails on another output under the same number. The
 //! numbers of the functions of other stages that a caller lists in `CALLS` are among its inputs. Products repeat the
-//! fingerprint of every stage, so they are made again when any of them changes.
+//! fingerprint of every stage, so they are recomputed when any of them changes.
 
 mod inputs;
 mod output;

@@ -19,11 +19,11 @@ pub struct Site {
     pub current_run: Option<String>,
     /// Verdict of that run in a word.
     pub verdict: Option<String>,
-    /// Since when that run is current.
+    /// Time from which that run has been current.
     pub current_since_utc: Option<Instant>,
     /// When its inputs were last compared completely.
     pub checked_utc: Option<Instant>,
-    /// Since when its inputs are newer than its products.
+    /// Time from which its inputs have been newer than its products.
     pub stale_since_utc: Option<Instant>,
     /// The reason, and the next step.
     pub stale_because: Option<String>,

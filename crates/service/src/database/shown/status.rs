@@ -21,10 +21,10 @@ pub struct DataStatus {
     pub products: ProductStatus,
 }
 
-/// An earlier database was lost, and made again from the products.
+/// An earlier database was lost and rebuilt from the products.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct DatabaseLoss {
-    /// When it was made again.
+    /// When it was rebuilt.
     pub at_utc: Instant,
     /// What was found, and what was lost.
     pub text: String,

@@ -52,7 +52,7 @@ struct Readiness {
     roots: bool,
     /// Whether the configuration in force is that of the file.
     configuration: bool,
-    /// Whether the runs on the disk are recorded; not while a lost database is made again from the products.
+    /// Whether the runs on the disk are recorded; not while a lost database is rebuilt from the products.
     runs: bool,
     /// When this was determined.
     at_utc: Instant,
@@ -227,7 +227,7 @@ fn of_products(data: &DataStatus) -> Vec<Gauge> {
     if let Some(loss) = &data.database_loss {
         gauges.push(plain(
             "database_lost_seconds",
-            "Time at which a lost database was made again from the products, seconds of UTC since 1970",
+            "Time at which a lost database was rebuilt from the products, seconds of UTC since 1970",
             loss.at_utc.0 as f64 / 1e3,
         ));
     }

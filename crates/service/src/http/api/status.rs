@@ -25,7 +25,7 @@ struct Status {
     name: String,
     /// Version of areograph.
     version: &'static str,
-    /// Whether a lost database is being made again from the products.
+    /// Whether a lost database is being rebuilt from the products.
     recovering: bool,
     /// Why the configuration of the file is not in force.
     configuration_problem: Option<String>,

@@ -12,7 +12,7 @@ use crate::{
 pub(super) fn attention(data: &DataStatus, recovering: bool) -> Markup {
     let products = &data.products;
     html! {
-        @if recovering { li { "The database was lost: the service is making it again from the products. The sites appear one by one." } }
+        @if recovering { li { "The database was lost: the service is rebuilding it from the products. The sites appear one by one." } }
         @if let Some(loss) = &data.database_loss { li { (capitalised(&loss.text)) "." } }
         @if products.runs_damaged > 0 {
             li {
