@@ -219,11 +219,11 @@ fn biases(config: &SiteConfig, site: &Site) -> Result<Vec<BiasEntry>> {
     let terms = config.terms();
     let scope = match config.altimeter_clock.scope {
         BiasScope::SpkLookup => "spacecraft position in the range check".to_owned(),
-        BiasScope::Rotation => format!("rotation of {} into {}", terms.body(), terms.frame()),
+        BiasScope::Rotation => format!("rotation of {} into {}", terms.body(), terms.short_frame()),
         BiasScope::Both => format!(
             "spacecraft position in the range check, and rotation of {} into {}",
             terms.body(),
-            terms.frame()
+            terms.short_frame()
         ),
         BiasScope::None => "nothing".to_owned(),
     };

@@ -62,7 +62,7 @@ impl Terms<'_> {
 
     /// The frame of the products in two or three words.
     #[must_use]
-    pub fn frame(&self) -> &'static str {
+    pub fn short_frame(&self) -> &'static str {
         &self.body.names().short_frame
     }
 
@@ -111,7 +111,7 @@ impl Terms<'_> {
             "altimeter" => self.altimeter,
             "body" => self.body(),
             "body_name" => &self.body.names().name,
-            "frame" => self.frame(),
+            "frame" => self.short_frame(),
             "latitude" => self.latitude(),
             "latitude_of_maps" if self.body == Body::Mars => "areographic",
             "latitude_of_maps" => "planetographic",
@@ -136,16 +136,15 @@ impl Terms<'_> {
         while let Some((before, after)) = rest.split_once('{') {
             filled.push_str(before);
             let named = after.split_once('}');
-            match named.and_then(|(name, after)| Some((self.value(name)?, after))) {
-                Some((value, after)) => {
-                    filled.push_str(value);
-                    rest = after;
-                }
-                None => {
-                    filled.push('{');
-                    rest = after;
-                }
-            }
+            rest = if let Some((value, after)) =
+                named.and_then(|(name, after)| Some((self.value(name)?, after)))
+            {
+                filled.push_str(value);
+                after
+            } else {
+                filled.push('{');
+                after
+            };
         }
         filled.push_str(rest);
         Cow::Owned(filled)

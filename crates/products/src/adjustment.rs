@@ -278,7 +278,7 @@ fn document<'a>(
             .iter()
             .map(|(of, is)| Definition {
                 of,
-                is: site.config.terms().fill(*is),
+                is: site.config.terms().fill(is),
             })
             .collect(),
         configured: Configured {

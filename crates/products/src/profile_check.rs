@@ -125,7 +125,7 @@ impl<'a> Document<'a> {
                 .iter()
                 .map(|(of, is)| Definition {
                     of,
-                    is: terms.fill(*is).into_owned(),
+                    is: terms.fill(is).into_owned(),
                 })
                 .collect(),
             ground_radius: site.footprints.ground_choice(),

@@ -320,7 +320,7 @@ fn document<'a>(site: &SiteProducts<'a>) -> Document<'a> {
             .iter()
             .map(|(residual, is)| Definition {
                 residual,
-                is: site.config.terms().fill(*is),
+                is: site.config.terms().fill(is),
             })
             .collect(),
         mola_clock: Clock {

@@ -27,7 +27,7 @@ fn biases(site: &SiteProducts) -> Markup {
     let body = terms.body();
     let scope = match clock.scope {
         BiasScope::SpkLookup => "the spacecraft's position in the range check".to_owned(),
-        BiasScope::Rotation => format!("the rotation of {body} into {}", terms.frame()),
+        BiasScope::Rotation => format!("the rotation of {body} into {}", terms.short_frame()),
         BiasScope::Both => {
             format!("the spacecraft's position in the range check and the rotation of {body}")
         }

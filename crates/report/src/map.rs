@@ -186,7 +186,7 @@ impl Sheet {
             shots,
             heights_m,
             areoid: terms.areoid(),
-            frame: format!("{}, {}", terms.frame(), terms.latitude()),
+            frame: format!("{}, {}", terms.short_frame(), terms.latitude()),
         }
     }
 

@@ -149,7 +149,7 @@ impl<'a> Document<'a> {
         let terms = of.site.config.terms();
         let definitions = DEFINITIONS.iter().map(|(of, is)| Definition {
             of,
-            is: terms.fill(*is),
+            is: terms.fill(is),
         });
         let unfilled = account.unfilled.iter();
         Self {

@@ -264,7 +264,7 @@ fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     clippy::cast_sign_loss,
     reason = "cells are counted"
 )]
-fn stretch(brightness: &[u8]) -> [f64; 2] {
+fn stretch(brightness: &[u8]) -> [u8; 2] {
     let mut counts = [0_u64; 256];
     for value in brightness {
         counts[usize::from(*value)] += 1;
@@ -277,7 +277,7 @@ fn stretch(brightness: &[u8]) -> [f64; 2] {
             below += counts[usize::from(*value)];
             below > wanted
         });
-        f64::from(found.unwrap_or(u8::MAX))
+        found.unwrap_or(u8::MAX)
     })
 }
 
@@ -298,8 +298,8 @@ mod tests {
     fn empty_cells_do_not_change_the_stretch() {
         let mut brightness = vec![0; 10_000];
         brightness.extend(100..=199);
-        assert_eq!(stretch(&brightness), [102.0, 198.0]);
-        assert_eq!(stretch(&[0, 0]), [255.0, 255.0]);
+        assert_eq!(stretch(&brightness), [102, 198]);
+        assert_eq!(stretch(&[0, 0]), [255, 255]);
     }
 
     #[test]

@@ -46,7 +46,7 @@ pub(super) enum Form {
     /// Polygons without a filling, labelled by a column.
     Outlines { label: &'static str },
     /// Brightness in this range.
-    Brightness { range: [f64; 2] },
+    Brightness { range: [u8; 2] },
     /// Heights in colours, multiplied with the layer below.
     Terrain { range: [f64; 2] },
     /// Heights under light from the north-west.

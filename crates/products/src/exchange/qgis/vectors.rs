@@ -41,7 +41,7 @@ impl Collection {
     }
 }
 
-fn feature(geometry: &str, coordinates: Value, properties: Map<String, Value>) -> Value {
+fn feature(geometry: &str, coordinates: &Value, properties: &Map<String, Value>) -> Value {
     json!({
         "type": "Feature",
         "geometry": { "type": geometry, "coordinates": coordinates },
@@ -70,8 +70,8 @@ pub(super) fn outlines(site: &SiteProducts) -> Collection {
         let invalid_because = image.invalid_because().join("; ");
         Some(feature(
             "Polygon",
-            json!([ring]),
-            properties([
+            &json!([ring]),
+            &properties([
                 ("image", json!(image.times.id)),
                 ("utc", json!(image.times.utc_start)),
                 ("lines", json!(image.times.lines_delivered)),
@@ -164,11 +164,11 @@ pub(super) fn residuals(site: &SiteProducts) -> Collection {
             .reduce(f64::max);
         Some(feature(
             "Point",
-            json!([
+            &json!([
                 signed_longitude_deg(place.longitude_rad),
                 degrees(place.latitude.0)
             ]),
-            properties([
+            &properties([
                 ("tie", json!(point.id)),
                 ("image", json!(image.times.id)),
                 (
