@@ -125,6 +125,9 @@ fn qgis_opens_the_project_and_draws_every_layer() {
     }
 }
 
+/// Line and sample in an image, and metres towards east and north on the ground.
+type Pair = ([f64; 2], [f64; 2]);
+
 /// Real numbers of a column, NaN where missing.
 fn column(table: &arrow_array::RecordBatch, name: &str) -> Vec<f64> {
     let values = table
@@ -143,7 +146,7 @@ fn column(table: &arrow_array::RecordBatch, name: &str) -> Vec<f64> {
 }
 
 /// The step on the ground towards east and north for a line and for a sample, fitted to pairs of image and ground points.
-fn fitted(points: &[([f64; 2], [f64; 2])]) -> Matrix2<f64> {
+fn fitted(points: &[Pair]) -> Matrix2<f64> {
     let design = DMatrix::from_fn(points.len(), 3, |row, column| match column {
         2 => 1.0,
         axis => points[row].0[axis],
@@ -174,7 +177,7 @@ fn residuals_on_the_ground_agree_with_places_of_tie_points() {
         "adjusted_latitude_deg",
     ]
     .map(|name| column(&table, name));
-    let mut points: BTreeMap<&str, Vec<([f64; 2], [f64; 2])>> = BTreeMap::new();
+    let mut points: BTreeMap<&str, Vec<Pair>> = BTreeMap::new();
     for row in 0..table.num_rows() {
         if longitudes[row].is_finite() {
             let east_m =

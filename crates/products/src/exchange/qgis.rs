@@ -122,7 +122,7 @@ fn archive(document: &str) -> zip::result::ZipResult<Vec<u8>> {
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Stored)
-        .last_modified_time(DateTime::DEFAULT);
+        .last_modified_time(DateTime::default());
     archive.start_file(DOCUMENT, options)?;
     archive.write_all(document.as_bytes())?;
     Ok(archive.finish()?.into_inner())
