@@ -233,8 +233,8 @@ fn entries_that_are_never_used_are_told() {
         warnings,
         "site.toml:2:58: kernels.pinned is never used: it belongs to kernels.root\n\
          site.toml:3:46: altimeter_clock.bias_s is never used: altimeter_clock.scope is \"none\"\n\
-         site.toml:4:11: windows are never used: there is no table pedr\n\
-         site.toml:5:10: images without a table pedr: orientation only, no footprints and no range check\n\
+         site.toml:4:11: windows are never used: there is no table [pedr]\n\
+         site.toml:5:10: images without a table [pedr]: orientation only, no footprints and no range check\n\
          site.toml:5:89: images.utc_start is never used: sclk_start comes first"
     );
 }
