@@ -329,7 +329,16 @@ fn a_site_of_images_has_an_item_and_no_tables() {
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .collect();
     names.sort();
-    assert_eq!(names, ["README.txt", "kernels.json", "stac_item.json"]);
+    assert_eq!(
+        names,
+        [
+            "README.txt",
+            "image_outlines.geojson",
+            "kernels.json",
+            "site.qgz",
+            "stac_item.json"
+        ]
+    );
     assert!(!folder.path().join("footprints.xml").exists());
     let readme = fs::read_to_string(exchange.join("README.txt")).unwrap();
     assert!(readme.contains("has no footprints") && !readme.contains("pc_align"));

@@ -171,6 +171,8 @@ fn every_product_is_there_with_its_rows() {
         ("exchange/footprints.prj", 0),
         ("exchange/footprints.cpg", 0),
         ("exchange/kernels.json", 3),
+        ("exchange/image_outlines.geojson", 1),
+        ("exchange/site.qgz", 0),
         ("exchange/README.txt", 0),
         ("exchange/stac_item.json", 0),
     ];
@@ -465,6 +467,8 @@ fn an_empty_site_has_empty_products() {
             ("report/page.postcard", 0),
             ("kernels.tm", 0),
             ("exchange/kernels.json", 3),
+            ("exchange/image_outlines.geojson", 1),
+            ("exchange/site.qgz", 0),
             ("exchange/README.txt", 0),
         ]
     );

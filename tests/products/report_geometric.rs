@@ -64,8 +64,8 @@ fn the_first_lines_tell_how_far_images_disagree_before_and_after() {
     let [before_sigma_m, sigma_m] = [&site.pairs[0], &site.adjusted_pairs[0]]
         .map(|pair| pair.footprints.as_ref().unwrap().apart_sigma_m.unwrap());
     let words = format!(
-        ", along track: a footprint falls {:.2} MOLA spacings ({before_m:.0} m, σ {before_sigma_m:.1} m) apart before the \
-         adjustment; {:.3} MOLA spacings ({after_m:.1} m, σ {sigma_m:.1} m) after it.",
+        ", along track: a footprint falls {:.2} shot spacings ({before_m:.0} m, σ {before_sigma_m:.1} m) apart before the \
+         adjustment; {:.3} shot spacings ({after_m:.1} m, σ {sigma_m:.1} m) after it.",
         before_m / spacing_m,
         after_m / spacing_m,
     );

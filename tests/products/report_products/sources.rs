@@ -51,7 +51,7 @@ const DERIVED: [(&str, &str); 14] = [
         "Rejected shots inside a window",
         "share of the shots in windows",
     ),
-    ("Shift of the camera", "along track, Mars-fixed"),
+    ("Shift of the camera", "along track, body-fixed"),
     ("Shift of the camera", "cross track"),
     ("Shift of the camera", "radial"),
 ];
