@@ -467,8 +467,6 @@ fn an_empty_site_has_empty_products() {
             ("report/page.postcard", 0),
             ("kernels.tm", 0),
             ("exchange/kernels.json", 3),
-            ("exchange/image_outlines.geojson", 1),
-            ("exchange/site.qgz", 0),
             ("exchange/README.txt", 0),
         ]
     );

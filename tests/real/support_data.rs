@@ -141,7 +141,7 @@ const MISTAKES: [Mistake; 4] = [
             }
         },
         5,
-        "support data and kernels contradict each other in its middle: boresights differ by 10.0",
+        "support data and kernels contradict each other in the middle of the image: boresights differ by 10.0",
     ),
     (
         "a kilometre away along each axis",

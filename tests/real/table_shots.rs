@@ -226,13 +226,14 @@ fn products_are_of_the_moon(out: &Path) {
 }
 
 /// Words of other sites.
-const FOREIGN: [&str; 8] = [
+const FOREIGN: [&str; 9] = [
     "MOLA",
     "PEDR",
     "Mars",
     "MARS",
     "IAU 2000",
-    "areo",
+    "areocentric",
+    "areographic",
     "{body}",
     "{altimeter}",
 ];
